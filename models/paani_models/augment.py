@@ -1,0 +1,194 @@
+"""Seeded picture augmentation. Every function takes its generator; the same seed gives the same bytes.
+
+Pictures are RGB uint8 [H,W,3]; masks are segmenter classes uint8 [H,W].
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paani_models.sources import IGNORE
+
+Picture = NDArray[np.uint8]
+Affine = NDArray[np.float32]
+Rng = np.random.Generator
+
+# Checklist S8.
+GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
+
+OBSTACLE = 1
+
+
+def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], tilt_deg: float) -> Affine:
+    """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, and a roll of up to `tilt_deg`.
+
+    Zoom 1 stretches the whole source onto the whole target, as the runtime does.
+    """
+    zoom = float(np.exp(rng.uniform(np.log(0.85), np.log(2.2)))) if rng.random() < 0.85 else 1.0
+    aspect = float(np.exp(rng.uniform(-0.15, 0.15)))
+    scale_x = target_wh[0] / source_wh[0] * zoom * aspect
+    scale_y = target_wh[1] / source_wh[1] * zoom / aspect
+    if rng.random() < 0.5:
+        scale_x = -scale_x
+    angle = np.deg2rad(rng.uniform(-tilt_deg, tilt_deg)) if rng.random() < 0.5 else 0.0
+    cos, sin = np.cos(angle), np.sin(angle)
+    linear = np.array([[cos * scale_x, -sin * scale_y], [sin * scale_x, cos * scale_y]])
+    slack_x = max(0.0, 1.0 - target_wh[0] / (source_wh[0] * abs(scale_x)))
+    slack_y = max(0.0, 1.0 - target_wh[1] / (source_wh[1] * abs(scale_y)))
+    centre = np.array(
+        [
+            source_wh[0] * (0.5 + rng.uniform(-0.5, 0.5) * slack_x),
+            source_wh[1] * (0.5 + rng.uniform(-0.5, 0.5) * slack_y),
+        ]
+    )
+    shift = np.array(target_wh) / 2.0 - linear @ centre
+    return np.hstack([linear, shift[:, None]]).astype(np.float32)
+
+
+def warp_picture(picture: Picture, affine: Affine, target_wh: tuple[int, int]) -> Picture:
+    """Bilinear; the border repeats the edge, so no edge is drawn where the picture ends."""
+    moved = cv2.warpAffine(picture, affine, target_wh, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(moved, np.uint8)
+
+
+def warp_mask(mask: Picture, affine: Affine, target_wh: tuple[int, int]) -> Picture:
+    """Nearest; outside the picture is ignored."""
+    moved = cv2.warpAffine(
+        mask, affine, target_wh, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=(IGNORE,)
+    )
+    return np.asarray(moved, np.uint8)
+
+
+def jitter_colour(rng: Rng, picture: Picture) -> Picture:
+    """Hue, saturation, gamma, contrast and brightness, each within the range that weather and cameras give."""
+    hsv = cv2.cvtColor(picture, cv2.COLOR_RGB2HSV)
+    steps = np.arange(256, dtype=np.float32)
+    hue = ((steps + rng.uniform(-8, 8)) % 180).astype(np.uint8)
+    saturation = np.clip(steps * rng.uniform(0.4, 1.5), 0, 255).astype(np.uint8)
+    curve = (steps / 255.0) ** np.exp(rng.uniform(-0.5, 0.5)) * 255.0
+    value = np.clip((curve - 128) * rng.uniform(0.7, 1.3) + 128 + rng.uniform(-30, 30), 0, 255).astype(np.uint8)
+    planes = [cv2.LUT(plane, table) for plane, table in zip(cv2.split(hsv), (hue, saturation, value), strict=True)]
+    return np.asarray(cv2.cvtColor(cv2.merge(planes), cv2.COLOR_HSV2RGB), np.uint8)
+
+
+def glare(rng: Rng, picture: Picture) -> Picture:
+    """Sun on the water: a soft bright blob, and glitter of small strokes in the lower half (checklist S8, S12)."""
+    height, width = picture.shape[:2]
+    light = np.zeros((height, width), np.float32)
+    if rng.random() < BLOB_FRAC:
+        centre = (int(rng.integers(width)), int(rng.integers(height // 4, height)))
+        axes = (
+            int(rng.integers(width // 16, width // 4)),
+            int(rng.integers(height // 16, height // 3)),
+        )
+        cv2.ellipse(
+            light,
+            centre,
+            axes,
+            float(rng.uniform(0, 180)),
+            0,
+            360,
+            (float(rng.uniform(0.4, 1.0)),),
+            -1,
+        )
+        light = cv2.GaussianBlur(light, (0, 0), max(2.0, min(axes) / 2)).astype(np.float32)
+    if rng.random() < GLITTER_FRAC:
+        middle, spread = rng.uniform(0, width), rng.uniform(width / 20, width / 5)
+        for _ in range(int(rng.integers(20, 120))):
+            x, y = int(rng.normal(middle, spread)), int(rng.integers(height // 2, height))
+            reach = int(rng.integers(1, 2 + width // 64))
+            cv2.line(light, (x - reach, y), (x + reach, y), (float(rng.uniform(0.5, 1.0)),), 1)
+    tint = np.array([1.0, rng.uniform(0.92, 1.0), rng.uniform(0.75, 1.0)], np.float32) * 255.0
+    lit = picture + light[..., None] * (tint - picture)
+    return np.clip(lit, 0, 255).astype(np.uint8)
+
+
+def degrade(rng: Rng, picture: Picture) -> Picture:
+    """Lens and sensor: blur, haze, noise, JPEG blocks; each sometimes."""
+    if rng.random() < 0.15:
+        picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.4, 1.8)).astype(np.uint8, copy=False)
+    if rng.random() < 0.12:
+        haze = np.full(3, rng.uniform(150, 235), np.float32)
+        share = rng.uniform(0.1, 0.6)
+        picture = np.clip(picture * (1 - share) + haze * share, 0, 255).astype(np.uint8)
+    if rng.random() < 0.25:
+        picture = add_noise(rng, picture, rng.uniform(2, 14))
+    if rng.random() < 0.1:
+        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 80))]
+        picture = np.asarray(cv2.imdecode(cv2.imencode(".jpg", picture, quality)[1], cv2.IMREAD_COLOR), np.uint8)
+    return picture
+
+
+def add_noise(rng: Rng, picture: Picture, sigma: float) -> Picture:
+    """Gaussian sensor noise; sigma in grey levels."""
+    noise = rng.standard_normal(picture.shape, dtype=np.float32)
+    return np.clip(picture + noise * sigma, 0, 255).astype(np.uint8)
+
+
+def cut_out(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture]:
+    """Cover one rectangle with a flat colour; what is covered is not judged."""
+    height, width = mask.shape
+    h, w = int(rng.integers(height // 16, height // 4)), int(rng.integers(width // 16, width // 4))
+    y, x = int(rng.integers(height - h)), int(rng.integers(width - w))
+    picture, mask = picture.copy(), mask.copy()
+    picture[y : y + h, x : x + w] = rng.integers(0, 256, 3)
+    mask[y : y + h, x : x + w] = IGNORE
+    return picture, mask
+
+
+def null_picture(rng: Rng, target_wh: tuple[int, int]) -> Picture:
+    """A picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, each with sensor noise."""
+    width, height = target_wh
+    kind = int(rng.integers(7))
+    flat = np.zeros((height, width, 3), np.float32)
+    if kind == 0:
+        flat += rng.uniform(0, 12)
+    elif kind == 1:
+        flat += rng.uniform(235, 255)
+    elif kind == 2:
+        flat += rng.uniform(0, 255, 3).astype(np.float32)
+    elif kind == 3:
+        flat += rng.uniform(20, 235)
+    elif kind == 4:
+        ends = rng.uniform(0, 255, (2, 3)).astype(np.float32)
+        if rng.random() < 0.5:
+            ends[:] = ends.mean(1, keepdims=True)
+        ramp = np.linspace(0, 1, width if rng.random() < 0.5 else height, dtype=np.float32)
+        ramp = (
+            ramp[None, :, None]
+            if ramp.size == width and rng.random() < 0.5
+            else np.linspace(0, 1, height, dtype=np.float32)[:, None, None]
+        )
+        flat += ends[0] + ramp * (ends[1] - ends[0])
+    elif kind == 5:
+        flat += np.array([rng.uniform(20, 110), rng.uniform(10, 70), rng.uniform(5, 50)], np.float32)
+        shade = rng.uniform(0, 1, (3, 4, 1)).astype(np.float32)
+        flat *= 0.4 + 0.8 * cv2.resize(shade, target_wh, interpolation=cv2.INTER_CUBIC)[..., None]
+    else:
+        coarse = int(2 ** rng.integers(0, 5))
+        grid = (height // coarse, width // coarse, 3 if rng.random() < 0.6 else 1)
+        noise = rng.uniform(0, 255, grid).astype(np.float32)
+        noise = cv2.resize(noise, target_wh, interpolation=cv2.INTER_LINEAR if coarse > 1 else cv2.INTER_NEAREST)
+        flat += noise.reshape(height, width, -1)
+    return add_noise(rng, np.clip(flat, 0, 255).astype(np.uint8), rng.uniform(0, 8))
+
+
+def segmenter_sample(rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int]) -> tuple[Picture, Picture]:
+    """One augmented training pair of the target size."""
+    affine = random_affine(rng, (picture.shape[1], picture.shape[0]), target_wh, tilt_deg=8.0)
+    picture, mask = warp_picture(picture, affine, target_wh), warp_mask(mask, affine, target_wh)
+    if rng.random() < 0.8:
+        picture = jitter_colour(rng, picture)
+    if rng.random() < GLARE_FRAC:
+        picture = glare(rng, picture)
+    picture = degrade(rng, picture)
+    if rng.random() < 0.2:
+        picture, mask = cut_out(rng, picture, mask)
+    return picture, mask
+
+
+def segmenter_null(rng: Rng, target_wh: tuple[int, int]) -> tuple[Picture, Picture]:
+    """A picture that shows nothing is all obstacle, so an unusable picture can never read as open water."""
+    return null_picture(rng, target_wh), np.full((target_wh[1], target_wh[0]), OBSTACLE, np.uint8)

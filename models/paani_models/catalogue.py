@@ -1,0 +1,126 @@
+"""What the board knows about a model file: its contract, its checksum, where it came from, what was measured."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from paani.errors import UserError
+
+WEIGHTS = Path(__file__).parent / "weights"
+MANIFEST = "manifest.json"
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of the manifest. Unknown fields are errors."""
+
+
+class Tensor(Record, frozen=True):
+    """One input or output of a net: static shape, float32."""
+
+    name: str
+    shape: tuple[int, ...]
+    dtype: Literal["float32"] = "float32"
+
+
+class Preprocessing(Record, frozen=True):
+    """Picture -> input: RGB / 255, then (value - mean) / std per channel.
+
+    resize: "letterbox" keeps the aspect, centred on `pad_grey`; "stretch" fills the input; both bilinear.
+    """
+
+    resize: Literal["letterbox", "stretch"]
+    mean: tuple[float, float, float]
+    std: tuple[float, float, float]
+    pad_grey: int = 0
+
+
+class Figure(Record, frozen=True):
+    """One measured value on one source's held-out sequences; n counts pictures, or boxes for detection figures."""
+
+    metric: str
+    source: str
+    value: float
+    n: int
+
+
+class Origin(Record, frozen=True):
+    """One training source as its manifest states it."""
+
+    name: str
+    repository: str
+    commit: str
+    licence: str
+
+
+class Model(Record, frozen=True):
+    """One model file and everything needed to trust and feed it."""
+
+    name: str
+    file: str
+    sha256: str
+    size_bytes: int
+    parameters: int
+    opset: int
+    input: Tensor
+    output: Tensor
+    classes: tuple[str, ...]
+    preprocessing: Preprocessing
+    architecture: str
+    licence: str
+    origins: tuple[Origin, ...] = ()
+    export_max_abs_diff: float = 0.0
+    figures: tuple[Figure, ...] = ()
+
+
+class _Manifest(Record, frozen=True):
+    models: tuple[Model, ...]
+
+
+def load_catalogue(folder: Path | None = None) -> dict[str, Model]:
+    """Models of a weights folder by name; the shipped ones by default.
+
+    Raises UserError naming the manifest where it is missing, malformed, or names a model twice.
+    """
+    path = (folder or WEIGHTS) / MANIFEST
+    try:
+        models = msgspec.json.decode(path.read_bytes(), type=_Manifest).models
+    except (OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{path}: {error}") from error
+    catalogue = {model.name: model for model in models}
+    if len(catalogue) != len(models):
+        raise UserError(f"{path}: names a model twice")
+    return catalogue
+
+
+def save_catalogue(catalogue: dict[str, Model], folder: Path) -> None:
+    """Write the manifest beside, then rename, so that a reader never sees half of it."""
+    beside = folder / f"{MANIFEST}.partial"
+    encoded = msgspec.json.encode(_Manifest(tuple(catalogue[name] for name in sorted(catalogue))))
+    beside.write_bytes(msgspec.json.format(encoded, indent=1) + b"\n")
+    beside.replace(folder / MANIFEST)
+
+
+def file_sha256(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file. Raises UserError naming a file that cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from error
+
+
+def verified_path(name: str, folder: Path | None = None) -> Path:
+    """The file of a model, its checksum just compared with the manifest's.
+
+    Raises UserError naming the model that is not in the manifest, or the file that is missing or corrupt.
+    """
+    model = load_catalogue(folder).get(name)
+    if model is None:
+        raise UserError(f"{(folder or WEIGHTS) / MANIFEST}: no model named {name!r}")
+    path = (folder or WEIGHTS) / model.file
+    if file_sha256(path) != model.sha256:
+        raise UserError(f"{path}: corrupt (SHA-256 differs from the manifest)")
+    return path

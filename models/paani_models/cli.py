@@ -1,0 +1,104 @@
+"""`paani models`: look at the training data, train, export, evaluate, check what is shipped.
+
+Only the sub-commands that need PyTorch import it, so `paani models check` runs where it is not installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from paani.errors import UserError
+from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+
+DATA_VARIABLE = "PAANI_DATA"
+NETS = ("segmenter", "detector")
+
+
+def data_folder() -> Path:
+    """The folder of annotated pictures: $PAANI_DATA, or shared/data beside the checkout."""
+    beside = Path(__file__).resolve().parents[3] / "shared" / "data"
+    return Path(os.environ.get(DATA_VARIABLE, beside))
+
+
+def main(argv: list[str]) -> int:
+    """Run one sub-command; 0 on success, 2 with one line on a user's mistake."""
+    arguments = _parser().parse_args(argv)
+    try:
+        if arguments.command == "check":
+            return _check(arguments.weights)
+        return _needs_torch(arguments)
+    except UserError as error:
+        sys.stderr.write(f"paani models: {error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("stopped; the same command goes on from the last finished epoch\n")
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani models", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    check = commands.add_parser("check", help="compare the model files with their manifest")
+    check.add_argument("--weights", type=Path, default=WEIGHTS)
+
+    prepare = commands.add_parser("prepare", help="read every picture, mask and box once and count them")
+    train = commands.add_parser("train", help="train a net; goes on where it was stopped")
+    train.add_argument("net", choices=("teacher", *NETS))
+    train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
+    train.add_argument("--start", type=Path, help="checkpoint to begin from")
+    train.add_argument("--teacher", type=Path, help="teacher checkpoint that labels unsegmented pictures")
+    train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
+    train.add_argument("--epochs", type=int, help="detector only")
+    train.add_argument("--peak-rate", type=float)
+    train.add_argument("--threads", type=int, default=2)
+    export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
+    export.add_argument("net", choices=NETS)
+    export.add_argument("--checkpoint", type=Path, required=True)
+    evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
+    evaluate.add_argument("nets", nargs="*", choices=[[], *NETS], default=[])
+    evaluate.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    for command in (export, evaluate):
+        command.add_argument("--weights", type=Path, default=WEIGHTS)
+    for command in (prepare, train, export, evaluate):
+        command.add_argument("--data", type=Path, default=data_folder())
+        command.add_argument("--sources", default="", help="comma-separated; all if not given")
+        command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
+    return parser
+
+
+def _check(weights: Path) -> int:
+    for name, model in load_catalogue(weights).items():
+        verified_path(name, weights)
+        sys.stdout.write(f"{name}: {model.file} {model.size_bytes} bytes, {model.parameters} parameters, ok\n")
+    return 0
+
+
+def _needs_torch(arguments: argparse.Namespace) -> int:
+    try:
+        from paani_models import pipeline  # noqa: PLC0415 - PyTorch is not on the board
+    except ModuleNotFoundError as error:
+        raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    names = [name for name in arguments.sources.split(",") if name]
+    pictures = pipeline.Pictures(arguments.data, names, arguments.rendered)
+    if arguments.command == "prepare":
+        pipeline.prepare(pictures)
+    elif arguments.command == "train":
+        plan = pipeline.Plan(
+            folder=arguments.folder,
+            start=arguments.start,
+            teacher=arguments.teacher,
+            stages=tuple(arguments.stage),
+            epochs=arguments.epochs,
+            peak_rate=arguments.peak_rate,
+        )
+        pipeline.train(arguments.net, pictures, plan, arguments.threads)
+    elif arguments.command == "export":
+        pipeline.export_net(arguments.net, arguments.checkpoint, arguments.weights, pictures)
+    else:
+        for net in arguments.nets or NETS:
+            pipeline.evaluate_net(net, arguments.weights, pictures, record=arguments.record)
+    return 0

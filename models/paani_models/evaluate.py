@@ -1,0 +1,102 @@
+"""Figures of the exported nets on held-out sequences, per source (checklist T3, U1 - U4)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from paani_models.augment import null_picture
+from paani_models.catalogue import Figure
+from paani_models.detection_metrics import Found, class_figures, decode
+from paani_models.detector_data import BoxedPicture, plain, read_boxed
+from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
+from paani_models.onnx_runner import Floats, open_net
+from paani_models.segmenter import CLASSES
+from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
+from paani_models.sources import DETECTOR_CLASSES, Sample, read_pair
+
+WATER, OBSTACLE = CLASSES.index("water"), CLASSES.index("obstacle")
+NULL_PICTURES = 200
+
+
+def segmenter_figures(net: Path, samples: list[Sample]) -> list[Figure]:
+    """IoU per class, their mean, and edge F1 per source, at the mask's own size; and the share of water in nothing.
+
+    A source whose people marked only water is scored on water against the rest.
+    """
+    run = open_net(net)
+    figures: list[Figure] = []
+    for name in dict.fromkeys(sample.source.name for sample in samples):
+        chosen = [sample for sample in samples if sample.source.name == name]
+        counts = np.zeros((len(CLASSES), len(CLASSES)), np.int64)
+        edges = np.zeros(4, np.int64)
+        for sample in tqdm(chosen, name, unit="picture", mininterval=5.0):
+            picture, truth = read_pair(sample)
+            label = _label(run(segmenter_input(picture)), truth.shape[:2])
+            if sample.source.water_only:
+                label, truth = (
+                    np.minimum(label, OBSTACLE),
+                    np.where(truth == 2, OBSTACLE, truth).astype(np.uint8),
+                )
+            counts += confusion(label, truth, len(CLASSES))
+            edges += edge_counts(label, truth)
+        scored = ("water",) if chosen[0].source.water_only else CLASSES
+        iou = class_iou(counts)
+        rows = {f"iou_{kind}": float(iou[CLASSES.index(kind)]) for kind in scored}
+        if len(scored) == len(CLASSES):
+            rows["miou"] = float(np.nanmean(iou))
+        rows["edge_f1"] = f1(*(int(count) for count in edges))
+        figures.extend(Figure(metric, name, round(value, 4), len(chosen)) for metric, value in rows.items())
+    return [*figures, null_figure(net)]
+
+
+def null_figure(net: Path) -> Figure:
+    """Largest share of water over seeded pictures that show nothing."""
+    run = open_net(net)
+    worst = 0.0
+    for seed in range(NULL_PICTURES):
+        label = _label(run(segmenter_input(null_picture(np.random.default_rng(seed), SIZE_WH))), SIZE_WH[::-1])
+        worst = max(worst, float((label == WATER).mean()))
+    return Figure("max_water_frac", "null_pictures", round(worst, 4), NULL_PICTURES)
+
+
+def _label(logits: Floats, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    label = logits[0].argmax(0).astype(np.uint8)
+    return np.asarray(cv2.resize(label, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
+
+
+def detector_figures(net: Path, samples: list[Sample]) -> list[Figure]:
+    """AP50, AP50:95, recall and precision at 0.40 per class and source that annotates it, and over all sources."""
+    run = open_net(net)
+    items: list[BoxedPicture] = []
+    found: list[Found] = []
+    truths: list[NDArray[np.float32]] = []
+    for sample in tqdm(samples, "detector", unit="picture", mininterval=5.0):
+        item = read_boxed(sample)
+        example = plain(item, SIZE_WH)
+        items.append(item)
+        truths.append(example.boxes)
+        found.append(decode(run(detector_input(item.picture))[0], confidence=0.01, limit=100))
+    figures: list[Figure] = []
+    annotated = {sample.source.name: sample.source.annotated for sample in samples}
+    for kind, label in enumerate(DETECTOR_CLASSES):
+        for group in [*annotated, "all"]:
+            chosen = [
+                index
+                for index, item in enumerate(items)
+                if label in annotated[item.source] and group in (item.source, "all")
+            ]
+            if not chosen:
+                continue
+            row = class_figures([found[i] for i in chosen], [truths[i] for i in chosen], kind)
+            positives = int(row.pop("n"))
+            figures.extend(
+                Figure(f"{label}_{metric}", group, round(value, 4), positives)
+                for metric, value in row.items()
+                if np.isfinite(value)
+            )
+    return figures

@@ -1,0 +1,54 @@
+"""Picture -> net input, as the board does it (checklist C3, D7, D8). Pictures are RGB uint8 [H,W,3]."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # checklist D7
+STD = np.array([0.229, 0.224, 0.225], np.float32)
+SIZE_WH = (320, 256)  # checklist C1, D5
+PAD_GREY = 114
+
+Pictures = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+
+def segmenter_batch(pictures: Pictures) -> Floats:
+    """Net-sized pictures [N,H,W,3] -> float32 [N,3,H,W], normalised."""
+    scaled = (pictures.astype(np.float32) / 255.0 - MEAN) / STD
+    return np.ascontiguousarray(scaled.transpose(0, 3, 1, 2))
+
+
+def detector_batch(pictures: Pictures) -> Floats:
+    """Net-sized pictures [N,H,W,3] -> float32 [N,3,H,W] in 0..1."""
+    return np.ascontiguousarray((pictures.astype(np.float32) / 255.0).transpose(0, 3, 1, 2))
+
+
+def segmenter_input(picture: Pictures) -> Floats:
+    """Any picture, stretched bilinearly -> [1,3,256,320]."""
+    return segmenter_batch(np.asarray(cv2.resize(picture, SIZE_WH), np.uint8)[None])
+
+
+def letterbox_affine(source_wh: tuple[int, int], target_wh: tuple[int, int]) -> Floats:
+    """Source pixels -> net pixels, float32 [2,3]: aspect kept, centred (checklist C3)."""
+    scale = min(target_wh[0] / source_wh[0], target_wh[1] / source_wh[1])
+    x, y = ((t - s * scale) / 2 for s, t in zip(source_wh, target_wh, strict=True))
+    return np.array([[scale, 0, x], [0, scale, y]], np.float32)
+
+
+def letterboxed(picture: Pictures) -> Pictures:
+    """Any picture, resized bilinearly into the middle of a grey net-sized one."""
+    height, width = picture.shape[:2]
+    scale = min(SIZE_WH[0] / width, SIZE_WH[1] / height)
+    inner = (max(1, round(width * scale)), max(1, round(height * scale)))
+    left, top = (SIZE_WH[0] - inner[0]) // 2, (SIZE_WH[1] - inner[1]) // 2
+    boxed = np.full((SIZE_WH[1], SIZE_WH[0], 3), PAD_GREY, np.uint8)
+    boxed[top : top + inner[1], left : left + inner[0]] = cv2.resize(picture, inner)
+    return boxed
+
+
+def detector_input(picture: Pictures) -> Floats:
+    """Any picture, letterboxed -> [1,3,256,320] in 0..1."""
+    return detector_batch(letterboxed(picture)[None])

@@ -1,0 +1,28 @@
+"""Run an exported net for checks and figures: the one place here that imports onnxruntime."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+
+Floats = NDArray[np.float32]
+
+
+def open_net(path: Path, threads: int = 2) -> Callable[[Floats], Floats]:
+    """A function from input [1,3,H,W] to the first output. Raises UserError naming a file that cannot be loaded."""
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    try:
+        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    name = session.get_inputs()[0].name
+    return lambda x: np.asarray(session.run(None, {name: x})[0], np.float32)

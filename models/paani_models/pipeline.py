@@ -1,0 +1,190 @@
+"""The training commands: which pictures go into which net, with which recipe."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import torch
+from tqdm import tqdm
+
+from paani.errors import UserError
+from paani_models import detector_data, evaluate, export, train_detector, train_segmenter
+from paani_models.catalogue import Model, load_catalogue, save_catalogue, verified_path
+from paani_models.detector import Detector, load_yolox
+from paani_models.network_input import detector_input, segmenter_input
+from paani_models.pseudo_labels import pseudo_labelled
+from paani_models.segmenter import Segmenter
+from paani_models.sources import (
+    DETECTOR_CLASSES,
+    RENDERED,
+    Sample,
+    Source,
+    choose,
+    read_boxes,
+    read_pair,
+    read_picture,
+    read_samples,
+)
+from paani_models.teacher import Teacher, load_imagenet
+from paani_models.train_detector import DetectorTraining
+from paani_models.train_segmenter import SegmenterTraining
+from paani_models.training import Stage, load_average
+
+IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
+COCO_FILE = "_weights/yolox_nano_coco.onnx"
+COMPARED_PICTURES = 8
+
+TEACHER_RECIPE = train_segmenter.Recipe(stages=(Stage(8, 128, 160), Stage(4, 256, 320)), peak_rate=5e-4)
+
+
+class Pictures:
+    """The chosen sources below a data folder, and optionally a folder of rendered pictures."""
+
+    def __init__(self, data: Path, names: list[str], rendered: Path | None) -> None:
+        if not data.is_dir():
+            raise UserError(f"{data}: no such folder; set PAANI_DATA or --data")
+        self.data, self.rendered = data, rendered
+        self.sources: tuple[Source, ...] = choose(names)
+        self.samples = read_samples(data, self.sources, rendered)
+
+    def folder(self, source: Source) -> Path:
+        """Where a source lies."""
+        return self.rendered if source.name == RENDERED and self.rendered else self.data / source.folder
+
+    def segmented(self, held_out: bool) -> list[Sample]:
+        """Samples with a mask."""
+        return [s for s in self.samples if s.mask and s.held_out == held_out]
+
+    def boxed(self, held_out: bool) -> list[Sample]:
+        """Samples with boxes; for training also those whose mask tells where nothing floats."""
+        return [s for s in self.samples if s.held_out == held_out and (s.label or not held_out)]
+
+    def unsegmented(self) -> list[Sample]:
+        """Training samples of the sources that have boxes and no masks, each picture once."""
+        masked = {s.picture for s in self.samples if s.mask}
+        return [s for s in self.samples if not s.source.masks and not s.held_out and s.picture not in masked]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the command line says about one training."""
+
+    folder: Path
+    start: Path | None = None
+    teacher: Path | None = None
+    stages: tuple[str, ...] = ()
+    epochs: int | None = None
+    peak_rate: float | None = None
+
+
+def prepare(pictures: Pictures) -> None:
+    """Decode every file, validate every box (checklist R8), and print the counts per source and side."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for sample in tqdm(pictures.samples, "reading", unit="picture", mininterval=2.0):
+        row = counts.setdefault((sample.source.name, "held out" if sample.held_out else "train"), Counter())
+        row["pictures"] += 1
+        if sample.mask:
+            read_pair(sample)
+            row["masks"] += 1
+        else:
+            read_picture(sample.picture)
+        if sample.label:
+            row.update(DETECTOR_CLASSES[int(kind)] for kind in read_boxes(sample.label)[:, 0])
+    for (name, side), row in counts.items():
+        sys.stdout.write(f"{name} ({side}): {', '.join(f'{count} {what}' for what, count in row.items())}\n")
+
+
+def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
+    """Train a net into `plan.folder`, from its last finished epoch if there is one."""
+    torch.set_num_threads(threads)
+    if net == "detector":
+        _train_detector(pictures, plan)
+    else:
+        _train_segmenter(net, pictures, plan)
+
+
+def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
+    """`4x128x160` -> Stage(4, 128, 160). Raises UserError where it is malformed or no multiple of 32."""
+    parsed = []
+    for text in stages:
+        fields = text.split("x")
+        if len(fields) != 3 or not all(field.isdigit() for field in fields):
+            raise UserError(f"stage: {text!r} is not EPOCHSxHEIGHTxWIDTH")
+        stage = Stage(*(int(field) for field in fields))
+        if stage.height_px % 32 or stage.width_px % 32:
+            raise UserError(f"stage: {text!r}: height and width must be multiples of 32")
+        parsed.append(stage)
+    return tuple(parsed)
+
+
+def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
+    recipe = TEACHER_RECIPE if net == "teacher" else train_segmenter.Recipe()
+    recipe = replace(
+        recipe,
+        stages=parse_stages(plan.stages) or recipe.stages,
+        peak_rate=plan.peak_rate or recipe.peak_rate,
+    )
+    torch.manual_seed(recipe.seed)
+    model: Teacher | Segmenter = Segmenter()
+    if net == "teacher":
+        model = Teacher()
+        load_imagenet(model, pictures.data / IMAGENET_FILE)
+    cached = train_segmenter.cache(pictures.segmented(held_out=False))
+    if plan.teacher is not None:
+        teacher = Teacher()
+        load_average(teacher, plan.teacher)
+        cached += pseudo_labelled(teacher, pictures.unsegmented())
+    held_out = train_segmenter.cache(pictures.segmented(held_out=True))
+    training = SegmenterTraining(model, recipe, plan.folder, cached, held_out)
+    if plan.start is not None:
+        training.progress.start_from(plan.start)
+    training.run()
+
+
+def _train_detector(pictures: Pictures, plan: Plan) -> None:
+    recipe = train_detector.Recipe()
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    torch.manual_seed(recipe.seed)
+    model = Detector()
+    if plan.start is None:
+        load_yolox(model, pictures.data / COCO_FILE)
+    else:
+        load_average(model, plan.start)
+    cached = detector_data.read_all(pictures.boxed(held_out=False))
+    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+    DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
+
+
+def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
+    """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
+    chosen = pictures.segmented(held_out=True) if net == "segmenter" else pictures.boxed(held_out=True)
+    step = max(1, len(chosen) // COMPARED_PICTURES)
+    prepared = segmenter_input if net == "segmenter" else detector_input
+    inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
+    if not inputs:
+        raise UserError("sources: no held-out picture to compare the export on")
+    used = {sample.source.name for sample in pictures.samples}
+    origins = tuple(export.origin(pictures.folder(s), s) for s in pictures.sources if s.name in used)
+    model = export.export(net, checkpoint, weights, inputs, origins)
+    sys.stdout.write(
+        f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
+    )
+
+
+def evaluate_net(net: str, weights: Path, pictures: Pictures, *, record: bool) -> None:
+    """Print one JSON line per figure; with `record` put them into the manifest."""
+    path = verified_path(net, weights)
+    if net == "segmenter":
+        figures = evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
+    else:
+        figures = evaluate.detector_figures(path, pictures.boxed(held_out=True))
+    for figure in figures:
+        sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
+    if record:
+        catalogue = load_catalogue(weights)
+        model: Model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
+        save_catalogue({**catalogue, net: model}, weights)

@@ -1,0 +1,191 @@
+"""Train the segmenter from scratch, or go on from a checkpoint; resumable after any epoch."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import cast
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from paani_models.augment import segmenter_null, segmenter_sample
+from paani_models.distillation import Distillation
+from paani_models.network_input import segmenter_batch
+from paani_models.segmenter import CLASSES, segmenter_loss
+from paani_models.segmenter_metrics import class_iou, confusion
+from paani_models.sources import RENDERED, Sample, read_pair
+from paani_models.training import (
+    Prefetch,
+    Progress,
+    Stage,
+    append_record,
+    learning_rate,
+    stage_of,
+    to_device,
+)
+
+CACHE_WH = (384, 288)
+NULL_FRAC = 0.12
+
+# Pictures drawn per epoch and source: sources with three human classes weigh more than their number.
+DRAWS = {
+    "tbiseg_usvinland": 340,
+    "tbiseg_tampere": 170,
+    "tbiseg_dasha": 110,
+    "bath_river": 240,
+    "mastr1325": 190,
+    "oasis": 170,
+    "unsegmented": 900,
+}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides a segmenter training besides the pictures."""
+
+    stages: tuple[Stage, ...] = (Stage(18, 128, 160), Stage(8, 256, 320))
+    batch: int = 16
+    peak_rate: float = 2e-3
+    weight_decay: float = 1e-4  # checklist S7
+    warmup_steps: int = 100
+    rendered_frac: float = 0.3
+    seed: int = 42  # checklist S7
+
+    @property
+    def epochs(self) -> int:
+        """Length of the training."""
+        return sum(stage.epochs for stage in self.stages)
+
+
+@dataclass(frozen=True)
+class CachedPicture:
+    """A decoded picture and its mask in segmenter classes, both CACHE_WH."""
+
+    source: str
+    picture: NDArray[np.uint8]
+    mask: NDArray[np.uint8]
+
+
+def cache(samples: list[Sample]) -> list[CachedPicture]:
+    """Decode once, keep small: 1,500 pictures take about 0.7 GB."""
+    cached = []
+    for sample in tqdm(samples, desc="decoding", unit="picture"):
+        picture, mask = read_pair(sample)
+        cached.append(
+            CachedPicture(
+                sample.source.name,
+                np.asarray(cv2.resize(picture, CACHE_WH, interpolation=cv2.INTER_AREA), np.uint8),
+                np.asarray(cv2.resize(mask, CACHE_WH, interpolation=cv2.INTER_NEAREST), np.uint8),
+            )
+        )
+    return cached
+
+
+def draw_epoch(pictures: list[CachedPicture], recipe: Recipe, epoch: int) -> list[int]:
+    """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
+    rng = np.random.default_rng((recipe.seed, epoch))
+    drawn: list[int] = []
+    for name in sorted({p.source for p in pictures} - {RENDERED}):
+        drawn.extend(_draw(rng, [i for i, p in enumerate(pictures) if p.source == name], DRAWS.get(name, 100)))
+    rendered = [i for i, p in enumerate(pictures) if p.source == RENDERED]
+    if rendered:
+        real = len(drawn) or len(rendered)
+        drawn.extend(_draw(rng, rendered, round(real * recipe.rendered_frac / (1 - recipe.rendered_frac))))
+    drawn.extend([-1] * round(len(drawn) * NULL_FRAC / (1 - NULL_FRAC)))
+    return [int(i) for i in rng.permutation(drawn)]
+
+
+def _draw(rng: np.random.Generator, indices: list[int], count: int) -> list[int]:
+    whole, rest = divmod(count, len(indices))
+    return indices * whole + [int(i) for i in rng.choice(indices, rest, replace=False)]
+
+
+class SegmenterTraining:
+    """One training run in `folder`: `run()` goes on from its last finished epoch."""
+
+    def __init__(
+        self,
+        model: nn.Module,
+        recipe: Recipe,
+        folder: Path,
+        train: list[CachedPicture],
+        held_out: list[CachedPicture],
+        distillation: Distillation | None = None,
+    ) -> None:
+        self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
+        folder.mkdir(parents=True, exist_ok=True)
+        self.model, self.distillation = model, distillation
+        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, extra=distillation)
+
+    def run(self, until: int | None = None) -> None:
+        """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
+        recipe = asdict(self.recipe)
+        self.progress.resume(self.folder, recipe)
+        while self.progress.epoch < (self.recipe.epochs if until is None else until):
+            loss = self._train_epoch()
+            figures = self.validate()
+            record = {"epoch": self.progress.epoch + 1, "loss": round(loss, 4), **figures}
+            append_record(self.folder / "epochs.jsonl", record)
+            self.progress.finish_epoch(self.folder, recipe, figures["miou"])
+
+    def _train_epoch(self) -> float:
+        recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
+        stage = stage_of(recipe.stages, epoch)
+        order = draw_epoch(self.train, recipe, epoch)
+        steps = len(order) // recipe.batch
+        total = steps * recipe.epochs
+
+        def make(index: int) -> tuple[Tensor, Tensor]:
+            return self._batch(order[index * recipe.batch : (index + 1) * recipe.batch], stage, (epoch, index))
+
+        self.model.train()
+        losses = []
+        title = f"epoch {epoch + 1}/{recipe.epochs} {stage.width_px}x{stage.height_px}"
+        for pictures, masks in tqdm(Prefetch[tuple[Tensor, Tensor]]()(make, steps), title, steps, mininterval=5.0):
+            loss = self._loss(to_device(pictures), to_device(masks))
+            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps)
+            progress.update(loss, rate, clip_norm=5.0)
+            losses.append(loss.item())
+        return float(np.mean(losses))
+
+    def _loss(self, pictures: Tensor, masks: Tensor) -> Tensor:
+        if self.distillation is None:
+            return segmenter_loss(self.model(pictures), masks)
+        logits, distance = self.distillation(pictures, self.model)
+        return segmenter_loss(logits, masks) + cast(Tensor, distance)
+
+    def _batch(self, chosen: list[int], stage: Stage, place: tuple[int, int]) -> tuple[Tensor, Tensor]:
+        size = (stage.width_px, stage.height_px)
+        pairs = []
+        for slot, index in enumerate(chosen):
+            rng = np.random.default_rng((self.recipe.seed, *place, slot))
+            if index < 0:
+                pairs.append(segmenter_null(rng, size))
+            else:
+                pairs.append(segmenter_sample(rng, self.train[index].picture, self.train[index].mask, size))
+        pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
+        return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))
+
+    @torch.no_grad()
+    def validate(self) -> dict[str, float]:
+        """IoU of the averaged weights on the held-out pictures at the current input size."""
+        stage = stage_of(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
+        size = (stage.width_px, stage.height_px)
+        counts = np.zeros((len(CLASSES), len(CLASSES)), np.int64)
+        for start in range(0, len(self.held_out), 16):
+            chunk = self.held_out[start : start + 16]
+            resized = np.stack([np.asarray(cv2.resize(p.picture, size), np.uint8) for p in chunk])
+            logits = self.progress.average.model(to_device(torch.from_numpy(segmenter_batch(resized))))
+            labels = logits.argmax(1).cpu().numpy().astype(np.uint8)
+            for item, label in zip(chunk, labels, strict=True):
+                truth = np.asarray(cv2.resize(item.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+                counts += confusion(label, truth, len(CLASSES))
+        iou = class_iou(counts)
+        return {"miou": round(float(np.nanmean(iou)), 4)} | {
+            name: round(float(value), 4) for name, value in zip(CLASSES, iou, strict=True)
+        }

@@ -1,0 +1,205 @@
+"""What both trainings share: schedule, averaged weights, batches ahead of time, checkpoints, records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import cv2
+import msgspec
+import torch
+from torch import Tensor, nn
+
+from paani.errors import UserError
+
+Batch = TypeVar("Batch")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """`epochs` passes at one input size; smaller inputs first make the early passes cheap."""
+
+    epochs: int
+    height_px: int
+    width_px: int
+
+
+def stage_of(stages: tuple[Stage, ...], epoch: int) -> Stage:
+    """The stage that a zero-based epoch falls into."""
+    for stage in stages:
+        if epoch < stage.epochs:
+            return stage
+        epoch -= stage.epochs
+    raise IndexError(epoch)
+
+
+def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int) -> float:
+    """Linear warm-up, then cosine down to one hundredth of the peak (checklist S3)."""
+    if step < warmup_steps:
+        return peak * (step + 1) / warmup_steps
+    progress = (step - warmup_steps) / max(1, total_steps - warmup_steps)
+    return peak * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, progress))))
+
+
+class AveragedWeights:
+    """Exponential moving average of a model's floating-point state; `model` is what is evaluated and exported."""
+
+    def __init__(self, model: nn.Module, decay: float = 0.997) -> None:
+        self.model = deepcopy(model).eval().requires_grad_(False)
+        self.decay = decay
+        self.updates = 0
+
+    @torch.no_grad()
+    def update(self, model: nn.Module) -> None:
+        """Blend the model in; early updates weigh more, so the average never drags the random start along."""
+        self.updates += 1
+        keep = min(self.decay, self.updates / (self.updates + 10.0))
+        current = model.state_dict()
+        for name, value in self.model.state_dict().items():
+            if value.dtype.is_floating_point:
+                value.lerp_(current[name], 1.0 - keep)
+            else:
+                value.copy_(current[name])
+
+
+class Prefetch(Generic[Batch]):
+    """Batches in order, `ahead` of them being made in `workers` threads while the net trains."""
+
+    def __init__(self, workers: int = 2, ahead: int = 4) -> None:
+        self.workers, self.ahead = workers, ahead
+
+    def __call__(self, make: Callable[[int], Batch], count: int) -> Iterator[Batch]:
+        """Yield make(0) .. make(count - 1)."""
+        cv2.setNumThreads(1)
+        with ThreadPoolExecutor(self.workers) as pool:
+            pending: list[Future[Batch]] = [pool.submit(make, i) for i in range(min(self.ahead, count))]
+            for index in range(count):
+                batch = pending.pop(0).result()
+                if index + self.ahead < count:
+                    pending.append(pool.submit(make, index + self.ahead))
+                yield batch
+
+
+def save_checkpoint(path: Path, state: dict[str, Any]) -> None:
+    """Write beside, then rename: a checkpoint is whole or absent."""
+    beside = path.with_suffix(".partial")
+    torch.save(state, beside)
+    beside.replace(path)
+
+
+def load_checkpoint(path: Path) -> dict[str, Any]:
+    """What `save_checkpoint` wrote. Raises UserError naming the file where it is missing or unreadable."""
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:
+        raise UserError(f"{path}: not a readable checkpoint ({type(error).__name__})") from error
+    if not isinstance(state, dict):
+        raise UserError(f"{path}: not a checkpoint of this training")
+    return state
+
+
+class Progress:
+    """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (checklist S11).
+
+    extra: parameters that are trained along with the model and are not part of it.
+    """
+
+    def __init__(
+        self, model: nn.Module, peak_rate: float, weight_decay: float, extra: nn.Module | None = None
+    ) -> None:
+        self.model = model.to(device())
+        for parameter in self.model.parameters():
+            if parameter.dim() == 4:
+                parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
+        self.average = AveragedWeights(self.model)
+        self.extra = extra.to(device()) if extra is not None else nn.Module()
+        trained = [p for net in (self.model, self.extra) for p in net.parameters() if p.requires_grad]
+        self.optimiser = torch.optim.AdamW(trained, peak_rate, weight_decay=weight_decay)
+        self.epoch = 0
+        self.step = 0
+        self.best = 0.0
+
+    def start_from(self, checkpoint: Path) -> None:
+        """Take the averaged weights of another run. Raises UserError where they do not fit."""
+        load_average(self.model, checkpoint)
+        self.average = AveragedWeights(self.model)
+        self.average.updates = 10_000
+
+    def update(self, loss: Tensor, rate: float, clip_norm: float) -> None:
+        """One optimiser step at a learning rate."""
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.optimiser.zero_grad(set_to_none=True)
+        torch.autograd.backward(loss)
+        nn.utils.clip_grad_norm_(self.model.parameters(), clip_norm)
+        self.optimiser.step()
+        self.average.update(self.model)
+        self.step += 1
+
+    def finish_epoch(self, folder: Path, recipe: dict[str, Any], score: float) -> None:
+        """Count the epoch and save `last.pt`, and `best.pt` if no epoch scored higher."""
+        self.epoch += 1
+        is_best = score >= self.best
+        self.best = max(self.best, score)
+        state = {
+            "model": self.model.state_dict(),
+            "average": self.average.model.state_dict(),
+            "extra": self.extra.state_dict(),
+            "updates": self.average.updates,
+            "optimiser": self.optimiser.state_dict(),
+            "rng": torch.get_rng_state(),
+            "epoch": self.epoch,
+            "step": self.step,
+            "best": self.best,
+            "recipe": recipe,
+        }
+        if is_best:
+            save_checkpoint(folder / "best.pt", state)
+        save_checkpoint(folder / "last.pt", state)
+
+    def resume(self, folder: Path, recipe: dict[str, Any]) -> None:
+        """Go on from `last.pt` if there is one. Raises UserError where it was made with another recipe."""
+        path = folder / "last.pt"
+        if not path.exists():
+            return
+        state = load_checkpoint(path)
+        if state["recipe"] != recipe:
+            raise UserError(f"{path}: was made with another recipe; choose another folder")
+        self.model.load_state_dict(state["model"])
+        self.average.model.load_state_dict(state["average"])
+        self.average.updates = state["updates"]
+        self.extra.load_state_dict(state["extra"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        torch.set_rng_state(state["rng"])
+        self.epoch, self.step, self.best = state["epoch"], state["step"], state["best"]
+
+
+def load_average(model: nn.Module, checkpoint: Path) -> None:
+    """Fill a net with a checkpoint's averaged weights. Raises UserError naming a checkpoint that does not fit."""
+    try:
+        model.load_state_dict(load_checkpoint(checkpoint)["average"])
+    except (KeyError, RuntimeError) as error:
+        raise UserError(f"{checkpoint}: not a checkpoint of this net") from error
+
+
+def append_record(path: Path, record: Mapping[str, object]) -> None:
+    """One JSON line per epoch (checklist S10)."""
+    with path.open("ab") as file:
+        file.write(msgspec.json.encode(record) + b"\n")
+
+
+def device() -> torch.device:
+    """The accelerator if there is one."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def to_device(tensor: Tensor) -> Tensor:
+    """On the training device; four-dimensional tensors channels-last, which is 1.3 times faster on a CPU."""
+    if tensor.dim() == 4:
+        return tensor.to(device(), memory_format=torch.channels_last)
+    return tensor.to(device())

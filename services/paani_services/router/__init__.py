@@ -1,0 +1,1 @@
+"""The router: the only process that listens, and the keeper of authority."""

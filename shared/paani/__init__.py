@@ -1,0 +1,1 @@
+"""PAANI's contract: messages, keys, authority, configuration, bus, clock, health."""

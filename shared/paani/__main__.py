@@ -1,0 +1,3 @@
+from paani.cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,7 @@
+"""The bus: typed publishers and bounded inboxes over one Zenoh session. Only this package imports zenoh."""
+
+from paani.bus.bus import Bus, Picture, PulledPicture, open_bus
+from paani.bus.inbox import Latest, Queue
+from paani.bus.publish import PicturePublisher, Publisher
+
+__all__ = ["Bus", "Latest", "Picture", "PicturePublisher", "Publisher", "PulledPicture", "Queue", "open_bus"]

@@ -1,0 +1,48 @@
+"""What a receiver lets in. Everything else is counted by cause and dropped."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+import msgspec
+
+from paani import messages as m
+from paani.keys import Topic
+
+T = TypeVar("T", bound=m.Message)
+
+
+class Admission(Generic[T]):
+    """Judges the messages of one topic, in the order they arrive."""
+
+    def __init__(self, topic: Topic[T], domain: int, max_future_s: float) -> None:
+        self._topic = topic
+        self._decoder = msgspec.json.Decoder(topic.type)
+        self._domain = domain
+        self._max_future_us = round(max_future_s * 1e6)
+        self._epoch = 0
+        self._seq = -1
+
+    def judge(self, data: bytes, now_us: int) -> tuple[T | None, str]:
+        """The message and an empty cause, or None and why it was refused.
+
+        A restarted producer has a higher epoch and starts its own sequence; an older epoch never comes back.
+        """
+        try:
+            message = self._decoder.decode(data)
+        except msgspec.ValidationError as error:
+            return None, "wrong_type" if " got " in str(error) or "missing" in str(error) else "out_of_range"
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            return None, "non_finite" if b"NaN" in data or b"Infinity" in data else "undecodable"
+        if message.domain != self._domain:
+            return None, "wrong_domain"
+        if message.producer != self._topic.producer:
+            return None, "wrong_producer"
+        if max(message.source_us, message.sent_us) > now_us + self._max_future_us:
+            return None, "future"
+        if message.epoch < self._epoch:
+            return None, "old_epoch"
+        if message.epoch == self._epoch and message.seq <= self._seq:
+            return None, "duplicate" if message.seq == self._seq else "replayed"
+        self._epoch, self._seq = message.epoch, message.seq
+        return message, ""

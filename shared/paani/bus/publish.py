@@ -1,0 +1,133 @@
+"""Publishers fill the header and never block, never raise on a dead link."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Generic, TypeVar
+
+import msgspec
+import zenoh
+
+from paani import messages as m
+from paani.clock import Clock
+from paani.keys import Stance, Topic
+
+T = TypeVar("T", bound=m.Message)
+
+PRIORITY = {
+    Stance.COMMAND: zenoh.Priority.REAL_TIME,
+    Stance.STATE: zenoh.Priority.DATA,
+    Stance.EVENT: zenoh.Priority.DATA_HIGH,
+    Stance.PICTURE: zenoh.Priority.DATA_LOW,
+}
+LONG_POLL_S = 2.0
+
+
+class Numbering:
+    """Epoch and sequence of one publisher."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.epoch = clock.now_us() // 1000
+        self.seq = -1
+
+    def new_epoch(self) -> None:
+        self.epoch = max(self.epoch + 1, self._clock.now_us() // 1000)
+        self.seq = -1
+
+
+class Publisher(Generic[T]):
+    """Publishes messages of one topic."""
+
+    def __init__(self, session: zenoh.Session, topic: Topic[T], key: str, domain: int, clock: Clock) -> None:
+        self._topic, self._domain, self._clock = topic, domain, clock
+        self._numbering = Numbering(clock)
+        self._encoder = msgspec.json.Encoder()
+        self._publisher = session.declare_publisher(
+            key,
+            encoding=zenoh.Encoding(topic.media_type),
+            priority=PRIORITY[topic.stance],
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=topic.stance is Stance.COMMAND,
+        )
+
+    def put(self, message: T) -> T:
+        """Publish and return the message as sent."""
+        stamped = self._stamp(message)
+        self._publisher.put(self._encoder.encode(stamped))
+        return stamped
+
+    def new_epoch(self) -> None:
+        """The source began again: receivers forget what came before."""
+        self._numbering.new_epoch()
+
+    def _stamp(self, message: T) -> T:
+        self._numbering.seq += 1
+        return msgspec.structs.replace(
+            message,
+            seq=self._numbering.seq,
+            epoch=self._numbering.epoch,
+            domain=self._domain,
+            producer=self._topic.producer,
+            sent_us=self._clock.now_us(),
+        )
+
+
+class PicturePublisher(Publisher[m.PictureHeader]):
+    """Pushes pictures on this machine and answers long-poll pulls with the newest."""
+
+    def __init__(
+        self, session: zenoh.Session, topic: Topic[m.PictureHeader], key: str, domain: int, clock: Clock, *, push: bool
+    ) -> None:
+        super().__init__(session, topic, key, domain, clock)
+        self._push = push
+        self._newest: tuple[m.PictureHeader, bytes, bytes] | None = None
+        self._arrived = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        self._answers: set[asyncio.Task[None]] = set()
+        self._key = key
+        self._queryable = session.declare_queryable(key, zenoh.handlers.Callback(self._on_query, indirect=False))
+
+    def put_picture(self, header: m.PictureHeader, data: bytes) -> m.PictureHeader:
+        """Publish encoded picture bytes; returns the header as sent."""
+        stamped = self._stamp(header)
+        attachment = self._encoder.encode(stamped)
+        self._newest = (stamped, attachment, data)
+        if self._push:
+            self._publisher.put(data, attachment=attachment, encoding=zenoh.Encoding(stamped.media_type))
+        self._arrived.set()
+        self._arrived = asyncio.Event()
+        return stamped
+
+    def _on_query(self, query: zenoh.Query) -> None:
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._start_answer, query)
+
+    def _start_answer(self, query: zenoh.Query) -> None:
+        task = asyncio.ensure_future(self._answer(query))
+        self._answers.add(task)
+        task.add_done_callback(self._answers.discard)
+
+    async def _answer(self, query: zenoh.Query) -> None:
+        with query:
+            after = after_of(str(query.parameters))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LONG_POLL_S):
+                    while not self._is_newer(after):
+                        await self._arrived.wait()
+            if self._newest is not None and self._is_newer(after):
+                header, attachment, data = self._newest
+                query.reply(self._key, data, attachment=attachment, encoding=zenoh.Encoding(header.media_type))
+
+    def _is_newer(self, after: tuple[int, int]) -> bool:
+        return self._newest is not None and (self._newest[0].epoch, self._newest[0].seq) > after
+
+
+def after_of(parameters: str) -> tuple[int, int]:
+    """Epoch and sequence in `after=<epoch>.<seq>`; anything else asks for whatever there is."""
+    name, _, value = parameters.partition("=")
+    epoch, dot, seq = value.partition(".")
+    if name == "after" and dot and epoch.isdecimal() and seq.isdecimal():
+        return int(epoch), int(seq)
+    return (-1, -1)

@@ -1,0 +1,55 @@
+"""Opening a Zenoh session off the event loop, as a client of the local router."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+
+import zenoh
+
+from paani.authority import password_of
+from paani.config import BusConfig
+
+RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
+
+
+def client_config(config: BusConfig, user: str) -> zenoh.Config:
+    """A client that speaks to one router and to nobody else."""
+    settings: dict[str, object] = {
+        "mode": "client",
+        "connect/endpoints": [config.router],
+        "connect/timeout_ms": 2000,
+        "connect/retry": RETRY,
+        "transport/auth/usrpwd/user": user,
+        "transport/auth/usrpwd/password": password_of(config, user),
+        **shared_settings(config),
+    }
+    return zenoh_config(settings)
+
+
+def shared_settings(config: BusConfig) -> dict[str, object]:
+    """Transport settings that are safety settings: a silent link is torn down within the lease."""
+    return {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,
+        "transport/link/tx/lease": config.lease_ms,
+        "transport/link/tx/keep_alive": 4,
+        "transport/shared_memory/enabled": False,
+    }
+
+
+def zenoh_config(settings: dict[str, object]) -> zenoh.Config:
+    result = zenoh.Config()
+    for path, value in settings.items():
+        result.insert_json5(path, json.dumps(value))
+    return result
+
+
+async def open_client(config: BusConfig, user: str) -> zenoh.Session:
+    """Open a session; waits for the router as long as it takes."""
+    while True:
+        try:
+            return await asyncio.to_thread(zenoh.open, client_config(config, user))
+        except zenoh.ZError:
+            await asyncio.sleep(0.1)

@@ -1,0 +1,78 @@
+"""`paani`: services by name, commands by name."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from paani.config import Config, decode_config, load_config
+from paani.errors import UserError
+from paani.process import run_service, services
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit codes: 0 done, 1 crash, 2 user's mistake (one line on standard error)."""
+    arguments = sys.argv[1:] if argv is None else argv
+    commands = {point.name: point for point in entry_points(group="paani.commands")}
+    names = services()
+    if not arguments or arguments[0] in {"-h", "--help"}:
+        sys.stdout.write(usage(sorted(commands), sorted(names)))
+        return 0
+    name, rest = arguments[0], arguments[1:]
+    try:
+        if name in commands:
+            command = commands[name].load()
+            return int(command(rest))
+        if name in names:
+            return run_service(name, _service_config(name, rest))
+        raise UserError(f"unknown command '{name}' (commands: {', '.join(sorted(commands))}; services: "
+                        f"{', '.join(sorted(names))})")
+    except UserError as error:
+        sys.stderr.write(f"paani: {error}\n")
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output went away
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def usage(commands: list[str], names: list[str]) -> str:
+    """The help text."""
+    return (
+        "usage: paani COMMAND [options]     paani SERVICE [options]\n\n"
+        f"commands: {', '.join(commands)}\n"
+        f"services: {', '.join(names)}\n\n"
+        "`paani up` starts everything; `paani COMMAND --help` says more.\n"
+    )
+
+
+def add_config_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that `config_from` reads."""
+    parser.add_argument("--profile", choices=("paani", "paper"), help="which set of constants (default: paani)")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML")
+    parser.add_argument("--set", action="append", default=[], metavar="SECTION.FIELD=VALUE", dest="sets",
+                        help="one setting; may be repeated")
+
+
+def config_from(options: argparse.Namespace, extra_sets: tuple[str, ...] = ()) -> Config:
+    """Defaults < profile < file < environment < `extra_sets` < `--set`. Raises UserError."""
+    return load_config(
+        profile=options.profile,
+        file=options.config,
+        environ=os.environ,
+        sets=(*extra_sets, *options.sets),
+    )
+
+
+def _service_config(name: str, rest: list[str]) -> Config:
+    parser = argparse.ArgumentParser(prog=f"paani {name}", description=f"Run the {name} process.")
+    add_config_arguments(parser)
+    options = parser.parse_args(rest)
+    handed = os.environ.get("PAANI_CONFIG_JSON")
+    if handed and not (options.profile or options.config or options.sets):
+        return decode_config(handed.encode())
+    return config_from(options)

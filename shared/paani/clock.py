@@ -1,0 +1,51 @@
+"""The only place that reads time."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Microsecond stamps. Live processes share one wall clock; lockstep and tests pass their own."""
+
+    def now_us(self) -> int:
+        """Now, in integer microseconds since the clock's origin."""
+        ...
+
+
+class WallClock:
+    """Unix time for stamps that other processes read."""
+
+    def now_us(self) -> int:
+        return time.time_ns() // 1000
+
+
+class MonotonicClock:
+    """Never steps; for watchdogs and ages inside one process."""
+
+    def now_us(self) -> int:
+        return time.monotonic_ns() // 1000
+
+
+class ManualClock:
+    """Time that moves when told to."""
+
+    def __init__(self, now_us: int = 1_000_000) -> None:
+        self._now_us = now_us
+
+    def now_us(self) -> int:
+        return self._now_us
+
+    def advance(self, seconds: float) -> None:
+        self._now_us += round(seconds * 1e6)
+
+
+def stopwatch_ms() -> float:
+    """Milliseconds of an arbitrary origin, for measuring durations."""
+    return time.perf_counter_ns() * 1e-6
+
+
+def process_cpu_s() -> float:
+    """CPU seconds this process has used."""
+    return time.process_time()

@@ -1,0 +1,23 @@
+"""Configuration: one frozen tree, layered from defaults, a file, the environment and the command line."""
+
+from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
+from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
+from paani.config.loading import decode_config, encode_config, load_config
+from paani.config.seeing import CameraConfig, DetectorConfig, GateConfig, PerceptionConfig
+from paani.config.simulating import (
+    AdapterConfig,
+    DynamicsConfig,
+    EyeConfig,
+    PlantConfig,
+    SensorsConfig,
+    WorldConfig,
+)
+from paani.config.tree import BusConfig, Config, DashboardConfig
+
+__all__ = [
+    "AdapterConfig", "AdvisorConfig", "BusConfig", "CameraConfig", "Config", "ControllerConfig",
+    "DashboardConfig", "DetectorConfig", "DynamicsConfig", "EyeConfig", "GateConfig",
+    "LocalizationConfig", "MotionConfig", "NavigatorConfig", "PerceptionConfig", "PlantConfig",
+    "PolicyConfig", "RiskConfig", "SensorsConfig", "TrackerConfig", "WorldConfig", "decode_config",
+    "encode_config", "load_config",
+]

@@ -1,0 +1,49 @@
+"""Localization, navigator and controller settings. Ids in comments are checklist ids."""
+
+from __future__ import annotations
+
+from paani.config.section import Fraction, NonNegative, Positive, Section
+
+
+class LocalizationConfig(Section, frozen=True):
+    rate_hz: Positive = 20.0  # L1, L3
+    gate_mahalanobis2: Positive = 25.0
+    calibration_s: NonNegative = 2.0
+    max_gps_age_s: Positive = 3.0
+    max_imu_age_s: Positive = 0.3
+    max_position_std_m: Positive = 8.0
+    stopped_speed_mps: NonNegative = 0.05  # L5
+    stopped_after_s: Positive = 2.0  # L5
+
+
+class NavigatorConfig(Section, frozen=True):
+    rate_hz: Positive = 10.0
+    acceptance_m: Positive = 1.5
+    cruise_mps: Positive = 0.6
+    turn_speed_frac: Fraction = 0.5  # M7
+    turn_deg: Positive = 25.0  # M5
+    slight_turn_deg: Positive = 10.0  # M6
+    latch_turns: bool = True
+    max_total_turn_deg: Positive = 90.0
+    advisory_max_age_s: Positive = 3.5  # M10
+    advisory_max_receipt_s: Positive = 0.6  # M10
+    odometry_max_age_s: Positive = 0.3
+    clock_max_age_s: Positive = 0.4
+
+
+class ControllerConfig(Section, frozen=True):
+    rate_hz: Positive = 10.0  # N1
+    max_speed_mps: Positive = 0.9
+    speed_kp: NonNegative = 0.15
+    speed_ki: NonNegative = 0.05
+    speed_feed_forward: NonNegative = 0.0  # N3; used when `drag_feed_forward` is off
+    drag_feed_forward: bool = True
+    drag_linear: NonNegative = 4.0  # K5
+    drag_quadratic: NonNegative = 20.0  # K5
+    force_per_unit_n: Positive = 75.0  # O1
+    heading_kp: NonNegative = 0.12
+    heading_kd: NonNegative = 0.10
+    max_forward: Fraction = 0.15
+    max_steer: Fraction = 0.10
+    slew_per_s: Positive = 0.5
+    command_max_receipt_s: Positive = 0.35

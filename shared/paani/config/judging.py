@@ -1,0 +1,68 @@
+"""Advisor settings. Ids in comments are checklist ids: the paper's constants."""
+
+from __future__ import annotations
+
+from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+
+
+class TrackerConfig(Section, frozen=True):
+    iou: Fraction = 0.25  # G2
+    hold_s: Positive = 3.0  # G3
+    confirm_hits: Size = 2  # G4
+    danger_bottom: Fraction = 0.65  # G5
+    danger_area: Fraction = 0.02  # G5
+    box_retain: Fraction = 0.35  # G6
+    confidence_retain: Fraction = 0.65  # G7
+    max_tracks: Size = 64
+    growth_full_scale_per_s: Positive = 0.16  # H1
+    centering_full_scale_per_s: Positive = 0.20  # H2
+    urgency_decay_s: Positive = 1.0
+
+
+class MotionConfig(Section, frozen=True):
+    history_s: Positive = 1.5  # I5
+    max_samples: Size = 24  # I5
+    min_samples: Size = 5  # I6
+    min_duration_s: Positive = 0.4  # I6
+    max_gap_s: Positive = 0.75  # I16
+    follow_rate: bool = True  # stretch window and gap to the measured period
+    deadband_per_s: Positive = 0.04  # I3
+    margin_floor_per_s: Positive = 0.01  # I2
+    margin_factor: Positive = 3.0  # I2
+    min_quality: Fraction = 0.25  # I8
+    max_confidence: Fraction = 0.9  # I9
+    min_detection_confidence: Fraction = 0.40
+    edge_margin: Fraction = 0.005
+    max_aspect_change: Positive = 0.5
+
+
+class RiskConfig(Section, frozen=True):
+    non_water: NonNegative = 0.55  # J4
+    obstacle: NonNegative = 0.65  # J4
+    urgency: NonNegative = 0.20  # J4
+    uncertainty: NonNegative = 0.15  # J4
+
+
+class PolicyConfig(Section, frozen=True):
+    center_block_risk: Fraction = 0.48  # J5
+    side_block_risk: Fraction = 0.58  # J5
+    occupancy_bottom: Fraction = 0.65  # J6
+    occupancy_coverage: Fraction = 0.25  # J6
+    occupancy_frames: Size = 2  # J6
+    center_vessel_area: Fraction = 0.04  # J7
+    core_left: Fraction = 0.405  # J9
+    core_right: Fraction = 0.595  # J9
+    tie: Fraction = 0.02
+    side_change_margin: Fraction = 0.0
+    clear_frames: Size = 2  # J10
+
+
+class AdvisorConfig(Section, frozen=True):
+    rate_hz: Positive = 5.0  # J17
+    evidence_max_age_s: Positive = 0.8  # J16
+    lifetime_s: Positive = 3.5  # J16
+    max_future_s: NonNegative = 0.1
+    tracker: TrackerConfig = TrackerConfig()
+    motion: MotionConfig = MotionConfig()
+    risk: RiskConfig = RiskConfig()
+    policy: PolicyConfig = PolicyConfig()

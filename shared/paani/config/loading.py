@@ -1,0 +1,129 @@
+"""Layered settings: defaults < profile < TOML file < environment < `--set`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import msgspec
+
+from paani.config.profiles import PROFILES
+from paani.config.tree import Config
+from paani.errors import UserError
+
+ENV_PREFIX = "PAANI_"
+NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
+
+
+def load_config(
+    *,
+    profile: str | None = None,
+    file: Path | None = None,
+    environ: Mapping[str, str] | None = None,
+    sets: Iterable[str] = (),
+) -> Config:
+    """Build the configuration.
+
+    sets: `section.field=value` strings; values are read as TOML, else as plain text.
+    Raises UserError with one line that names the file, variable or field at fault.
+    """
+    layers: list[tuple[str, dict[str, object]]] = []
+    if file is not None:
+        layers.append((str(file), _read_toml(file)))
+    layers.append(("environment", _from_environ(environ or {})))
+    for text in sets:
+        layers.append((f"--set {text}", _from_set(text)))
+
+    chosen = profile
+    if chosen is None:
+        for _, layer in layers:
+            chosen = str(layer.get("profile", chosen or "paani"))
+    if chosen not in PROFILES:
+        raise UserError(f"profile: unknown profile '{chosen}' (one of {', '.join(PROFILES)})")
+
+    tree: dict[str, object] = {}
+    _merge(tree, PROFILES[chosen])
+    for origin, layer in layers:
+        _merge(tree, layer)
+        _decode(tree, origin)
+    tree["profile"] = chosen
+    return _decode(tree, "configuration")
+
+
+def encode_config(config: Config) -> bytes:
+    """Exact JSON of a configuration, for handing to child processes and into logs."""
+    return msgspec.json.encode(config)
+
+
+def decode_config(data: bytes) -> Config:
+    """Inverse of `encode_config`. Raises UserError."""
+    try:
+        return msgspec.json.decode(data, type=Config)
+    except msgspec.MsgspecError as error:
+        raise UserError(f"configuration: {error}") from error
+
+
+def _decode(tree: dict[str, object], origin: str) -> Config:
+    try:
+        return msgspec.convert(tree, Config, strict=False)
+    except msgspec.ValidationError as error:
+        raise UserError(f"{origin}: {_with_path(str(error))}") from error
+
+
+def _with_path(message: str) -> str:
+    """`... - at `$.advisor.x`` becomes `advisor.x: ...`; contradictions name their fields themselves."""
+    text, _, path = message.partition(" - at ")
+    path = path.strip("`").removeprefix("$").lstrip(".")
+    return f"{path}: {text}" if path else text
+
+
+def _read_toml(file: Path) -> dict[str, object]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"{file}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{file}: {error}") from error
+
+
+def _from_environ(environ: Mapping[str, str]) -> dict[str, object]:
+    tree: dict[str, object] = {}
+    for name, text in environ.items():
+        if name.startswith(ENV_PREFIX) and name not in NOT_SETTINGS:
+            path = name.removeprefix(ENV_PREFIX).lower().split("__")
+            _merge(tree, _nest(path, _value(text)))
+    return tree
+
+
+def _from_set(text: str) -> dict[str, object]:
+    path, separator, value = text.partition("=")
+    if not separator or not path.strip():
+        raise UserError(f"--set {text}: expected section.field=value")
+    return _nest(path.strip().split("."), _value(value.strip()))
+
+
+def _value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _nest(path: list[str], value: object) -> dict[str, object]:
+    for part in reversed(path):
+        value = {part: value}
+    assert isinstance(value, dict)
+    return value
+
+
+def _merge(tree: dict[str, object], layer: Mapping[str, object]) -> None:
+    for name, value in layer.items():
+        below = tree.get(name)
+        if isinstance(below, dict) and isinstance(value, Mapping):
+            _merge(below, value)
+        elif isinstance(value, Mapping):
+            tree[name] = {}
+            _merge(tree[name], value)  # type: ignore[arg-type]  # just made, a dict
+        else:
+            tree[name] = value

@@ -1,0 +1,39 @@
+"""The `paper` profile: each difference from the default is one value here."""
+
+from __future__ import annotations
+
+PAPER: dict[str, object] = {
+    "profile": "paper",
+    "camera": {"rate_hz": 0.5},  # A8: newest frame once every 2 s
+    "perception": {
+        "rate_hz": 0.5,  # J17
+        "concurrent": False,  # B4
+        "intra_op_threads": 2,  # C14, D11
+        "fallback_non_water": 0.5,  # F3, F4
+        "fallback_uncertainty": 0.5,
+        "gate": {"enabled": False},  # J19
+    },
+    "advisor": {
+        "evidence_max_age_s": 3.5,  # J16, M10: the advisory outlives its frame at 0.5 Hz
+        "motion": {"follow_rate": False},  # I22
+    },
+    "navigator": {
+        "acceptance_m": 1.0,  # M2
+        "cruise_mps": 0.15,  # M7
+        "latch_turns": False,  # M5: continuous
+    },
+    "controller": {
+        "max_speed_mps": 0.30,  # N2
+        "speed_kp": 0.08,  # N3
+        "speed_ki": 0.0,
+        "speed_feed_forward": 0.16,  # N3
+        "drag_feed_forward": False,
+        "heading_kp": 0.08,  # N4
+        "heading_kd": 0.05,  # N4
+        "max_forward": 0.08,  # N5
+        "max_steer": 0.04,  # N5
+        "slew_per_s": 0.15,  # N6
+    },
+}
+
+PROFILES: dict[str, dict[str, object]] = {"paani": {}, "paper": PAPER}

@@ -1,0 +1,16 @@
+"""What every part of the configuration shares."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
+Fraction = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Size = Annotated[int, msgspec.Meta(ge=1, le=10_000)]
+
+
+class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A part of the tree. Unknown keys are errors, so a typo never becomes a default."""

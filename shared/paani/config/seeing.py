@@ -1,0 +1,53 @@
+"""Camera and perception settings. Ids in comments are checklist ids: the paper's constants."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+
+
+class CameraConfig(Section, frozen=True):
+    """`source`: `sim`, `webcam`, `webcam:N`, or a picture, folder or video path."""
+
+    source: str = "sim"
+    rate_hz: Positive = 5.0
+    timing: Literal["fixed", "original"] = "fixed"
+    loop: bool = True
+    width_px: Size = 320  # A8
+    height_px: Size = 240  # A8
+    jpeg_quality: Size = 85
+
+
+class GateConfig(Section, frozen=True):
+    """Usable-picture gate. `enabled=false` is the paper's behaviour (J19)."""
+
+    enabled: bool = True
+    min_width_px: Size = 160
+    min_height_px: Size = 120
+    dark_mean: NonNegative = 8.0
+    bright_frac: Fraction = 0.60
+    flat_range: NonNegative = 14.0
+    frozen_frames: Size = 5
+    frozen_mad: NonNegative = 0.05
+
+
+class DetectorConfig(Section, frozen=True):
+    confidence: Fraction = 0.40  # C6
+    nms_input: Size = 256  # C7
+    nms_iou: Fraction = 0.45  # C8
+    max_boxes: Size = 24  # C9
+
+
+class PerceptionConfig(Section, frozen=True):
+    rate_hz: Positive = 5.0
+    max_frame_age_s: Positive = 0.8  # J16, judged at inference start
+    concurrent: bool = True
+    intra_op_threads: Size = 1
+    segmenter: str = ""  # path of an ONNX file; empty: the shipped model
+    detector: str = ""
+    temperature: Positive = 1.0
+    fallback_non_water: Fraction = 1.0  # F3
+    fallback_uncertainty: Fraction = 1.0
+    gate: GateConfig = GateConfig()
+    detections: DetectorConfig = DetectorConfig()

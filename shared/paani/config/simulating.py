@@ -1,0 +1,82 @@
+"""World, plant, adapter and eye settings. Ids in comments are checklist ids."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+
+
+class WorldConfig(Section, frozen=True):
+    name: str = "river"
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**31)] = 1
+    wind_mps: NonNegative = 2.0
+
+
+class DynamicsConfig(Section, frozen=True):
+    """The paper's surface dynamics (K4-K7); F_max is three times the weight."""
+
+    mass_kg: Positive = 12.4
+    surge_linear: NonNegative = 4.0
+    surge_quadratic: NonNegative = 20.0
+    sway_linear: NonNegative = 20.0
+    sway_quadratic: NonNegative = 80.0
+    yaw_linear: NonNegative = 4.0
+    yaw_quadratic: NonNegative = 25.0
+    equilibrium_z_m: Positive = 0.177
+    heave_stiffness_n_per_m: Positive = 650.0
+    heave_damping: NonNegative = 90.0
+    max_buoyancy_weights: Positive = 3.0
+    tilt_stiffness_nm_per_rad: Positive = 90.0
+    tilt_damping: NonNegative = 24.0
+    fan_spacing_m: Positive = 0.60
+    fan_height_m: NonNegative = 0.12
+
+
+class SensorsConfig(Section, frozen=True):
+    gps_rate_hz: Positive = 5.0
+    gps_bias_std_m: NonNegative = 0.8
+    gps_bias_time_s: Positive = 60.0
+    gps_white_std_m: NonNegative = 0.05
+    gps_speed_std_mps: NonNegative = 0.05
+    imu_rate_hz: Positive = 100.0
+    gyro_noise_radps: NonNegative = 0.002
+    gyro_bias_std_radps: NonNegative = 0.002
+    accel_noise_mps2: NonNegative = 0.03
+    compass_noise_rad: NonNegative = 0.01
+    compass_bias_std_rad: NonNegative = 0.02
+
+
+class AdapterConfig(Section, frozen=True):
+    """The last gate before force."""
+
+    force_per_unit_n: Positive = 75.0  # O1
+    timeout_s: Positive = 0.5  # O2
+    max_echo_age_s: Positive = 0.5
+    arming_timeout_s: Positive = 0.5
+    pulse_timeout_s: Positive = 0.4
+    require_pulses: tuple[str, ...] = (
+        "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard",
+    )
+
+
+class PlantConfig(Section, frozen=True):
+    step_s: Positive = 0.01
+    publish_rate_hz: Positive = 20.0
+    dynamics: DynamicsConfig = DynamicsConfig()
+    sensors: SensorsConfig = SensorsConfig()
+    adapter: AdapterConfig = AdapterConfig()
+
+
+class EyeConfig(Section, frozen=True):
+    rate_hz: Positive = 5.0
+    width_px: Size = 320
+    height_px: Size = 240
+    jpeg_quality: Size = 85
+    camera_height_m: Positive = 0.9
+    camera_forward_m: float = 0.55
+    pitch_down_deg: float = 6.0
+    hfov_deg: Positive = 70.0
+    exposure_frac: Fraction = 1.0

@@ -1,0 +1,79 @@
+"""The whole configuration, and the settings that cannot work together."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
+from paani.config.judging import AdvisorConfig
+from paani.config.section import Positive, Section
+from paani.config.seeing import CameraConfig, PerceptionConfig
+from paani.config.simulating import EyeConfig, PlantConfig, WorldConfig
+
+Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
+ShortName = Annotated[str, msgspec.Meta(pattern="^[a-z0-9_]{1,32}$")]
+
+
+class BusConfig(Section, frozen=True):
+    """`runtime_dir` holds credentials and the stop latch; empty: a folder of this user's."""
+
+    domain: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 43  # A6
+    vessel: ShortName = "otter"
+    router: str = "tcp/127.0.0.1:7447"
+    runtime_dir: str = ""
+    lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000
+    max_future_s: Positive = 1.0
+
+
+class DashboardConfig(Section, frozen=True):
+    host: str = "127.0.0.1"
+    port: Port = 8043
+    serve: bool = True
+    arm_at_start: bool = False
+    picture_rate_hz: Positive = 10.0
+
+
+class Config(Section, frozen=True):
+    """Defaults < TOML file < `PAANI_<SECTION>__<FIELD>` < `--set section.field=value`."""
+
+    profile: Literal["paani", "paper"] = "paani"
+    bus: BusConfig = BusConfig()
+    camera: CameraConfig = CameraConfig()
+    perception: PerceptionConfig = PerceptionConfig()
+    advisor: AdvisorConfig = AdvisorConfig()
+    localization: LocalizationConfig = LocalizationConfig()
+    navigator: NavigatorConfig = NavigatorConfig()
+    controller: ControllerConfig = ControllerConfig()
+    world: WorldConfig = WorldConfig()
+    plant: PlantConfig = PlantConfig()
+    eye: EyeConfig = EyeConfig()
+    dashboard: DashboardConfig = DashboardConfig()
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot work together; the message names the fields."""
+        motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
+        starved = (
+            1.0 / rate_hz > motion.max_gap_s
+            or rate_hz * motion.history_s + 1 < motion.min_samples
+        )
+        if self.profile == "paani" and not motion.follow_rate and starved:
+            raise ValueError(
+                f"advisor.motion: {motion.min_samples} samples in {motion.history_s} s"
+                f" cannot arrive at {rate_hz} Hz (perception.rate_hz, camera.rate_hz)"
+            )
+        if self.navigator.cruise_mps > self.controller.max_speed_mps:
+            raise ValueError(
+                f"navigator.cruise_mps {self.navigator.cruise_mps} exceeds"
+                f" controller.max_speed_mps {self.controller.max_speed_mps}"
+            )
+        policy = self.advisor.policy
+        if policy.core_left >= policy.core_right:
+            raise ValueError("advisor.policy.core_left must be left of advisor.policy.core_right")
+        if self.advisor.evidence_max_age_s > self.advisor.lifetime_s:
+            raise ValueError("advisor.evidence_max_age_s exceeds advisor.lifetime_s")
+        if self.controller.command_max_receipt_s > self.plant.adapter.timeout_s:
+            raise ValueError(
+                "controller.command_max_receipt_s exceeds plant.adapter.timeout_s"
+            )

@@ -1,0 +1,55 @@
+"""Angles and the local tangent plane. Map frame: ENU; angles counter-clockwise from east [rad]."""
+
+from __future__ import annotations
+
+import math
+
+# WGS 84 (NIMA TR8350.2, table 3.1): semi-major axis [m], first eccentricity squared.
+SEMI_MAJOR_M = 6_378_137.0
+ECCENTRICITY2 = 6.694379990141317e-3
+
+
+def wrap_rad(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def clip(value: float, low: float, high: float) -> float:
+    """`value`, no less than `low` and no more than `high`."""
+    return low if value < low else min(value, high)
+
+
+def heading_true_deg(yaw_rad: float) -> float:
+    """Compass heading, clockwise from true north, in [0, 360), of an ENU yaw."""
+    return (90.0 - math.degrees(yaw_rad)) % 360.0
+
+
+def enu_from_geodetic(
+    latitude_deg: float, longitude_deg: float, origin_latitude_deg: float, origin_longitude_deg: float
+) -> tuple[float, float]:
+    """East and north [m] of a point near the origin, on the tangent plane's radii of curvature.
+
+    Second-order terms are left out: below 0.1 m within 1 km of the origin at mid latitudes.
+    """
+    east_m_per_deg, north_m_per_deg = _metres_per_degree(origin_latitude_deg)
+    return (
+        (longitude_deg - origin_longitude_deg) * east_m_per_deg,
+        (latitude_deg - origin_latitude_deg) * north_m_per_deg,
+    )
+
+
+def geodetic_from_enu(
+    x_m: float, y_m: float, origin_latitude_deg: float, origin_longitude_deg: float
+) -> tuple[float, float]:
+    """Inverse of `enu_from_geodetic`: latitude and longitude [deg]."""
+    east_m_per_deg, north_m_per_deg = _metres_per_degree(origin_latitude_deg)
+    return origin_latitude_deg + y_m / north_m_per_deg, origin_longitude_deg + x_m / east_m_per_deg
+
+
+def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:
+    sine = math.sin(math.radians(latitude_deg))
+    w2 = 1.0 - ECCENTRICITY2 * sine * sine
+    prime_vertical_m = SEMI_MAJOR_M / math.sqrt(w2)
+    meridian_m = prime_vertical_m * (1.0 - ECCENTRICITY2) / w2
+    cosine = math.cos(math.radians(latitude_deg))
+    return math.radians(prime_vertical_m * cosine), math.radians(meridian_m)

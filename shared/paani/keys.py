@@ -1,0 +1,153 @@
+"""One table of everything on the bus: who may write what, how often, how old it may be, how it travels.
+
+The routers' access control, the health checks, the README's table and the dashboard's inspector are
+generated from it.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+import msgspec
+
+from paani import messages as m
+
+T = TypeVar("T", bound=m.Message)
+
+
+class Stance(StrEnum):
+    """How a topic travels.
+
+    STATE is republished, newest wins; EVENT keeps a short queue; COMMAND is newest-wins and urgent;
+    PICTURE is encoded bytes with a `PictureHeader` attached, pushed on one machine and pulled across machines.
+    """
+
+    STATE = "state"
+    EVENT = "event"
+    COMMAND = "command"
+    PICTURE = "picture"
+
+
+class Topic(msgspec.Struct, Generic[T], frozen=True, kw_only=True):
+    """A row of the table. `name` is the key below `paani/<domain>/<vessel>/`."""
+
+    name: str
+    type: type[T]
+    producer: str
+    rate_hz: float
+    fresh_s: float
+    stance: Stance
+    summary: str
+
+    def key(self, domain: int, vessel: str) -> str:
+        return f"paani/{domain}/{vessel}/{self.name}"
+
+    @property
+    def media_type(self) -> str:
+        """Zenoh encoding of the payload."""
+        if self.stance is Stance.PICTURE:
+            return "image/jpeg"
+        return f"application/json;paani.{self.type.__name__}"
+
+
+PICTURE = Topic(
+    name="camera/picture", type=m.PictureHeader, producer="camera", rate_hz=5.0, fresh_s=0.8,
+    stance=Stance.PICTURE, summary="the camera's newest picture",
+)
+RENDERED = Topic(
+    name="eye/picture", type=m.PictureHeader, producer="eye", rate_hz=5.0, fresh_s=0.8,
+    stance=Stance.PICTURE, summary="picture rendered from the true pose",
+)
+MASK = Topic(
+    name="perception/mask", type=m.PictureHeader, producer="perception", rate_hz=5.0, fresh_s=0.8,
+    stance=Stance.PICTURE, summary="class mask (PNG: 0 water, 1 obstacle, 2 sky) of the frame it names",
+)
+EVIDENCE = Topic(
+    name="perception/evidence", type=m.Evidence, producer="perception", rate_hz=5.0, fresh_s=0.8,
+    stance=Stance.STATE, summary="usability, detections and corridors of one picture",
+)
+TRACKS = Topic(
+    name="advisor/tracks", type=m.Tracks, producer="advisor", rate_hz=5.0, fresh_s=0.8,
+    stance=Stance.STATE, summary="tracked boxes with identity, acceptance and motion",
+)
+ADVISORY = Topic(
+    name="advisor/advisory", type=m.Advisory, producer="advisor", rate_hz=5.0, fresh_s=3.5,
+    stance=Stance.COMMAND, summary="advised direction with the evidence that decided it",
+)
+COMMAND = Topic(
+    name="navigator/command", type=m.NavCommand, producer="navigator", rate_hz=10.0, fresh_s=0.5,
+    stance=Stance.COMMAND, summary="heading, speed and enable, together",
+)
+ROUTE = Topic(
+    name="navigator/route", type=m.Route, producer="navigator", rate_hz=0.5, fresh_s=10.0,
+    stance=Stance.STATE, summary="the route being followed",
+)
+THRUST = Topic(
+    name="controller/thrust", type=m.Thrust, producer="controller", rate_hz=10.0, fresh_s=0.5,
+    stance=Stance.COMMAND, summary="normalised thrust of the two fans",
+)
+LOCAL_ODOMETRY = Topic(
+    name="localization/local", type=m.Odometry, producer="localization", rate_hz=20.0, fresh_s=0.3,
+    stance=Stance.STATE, summary="drift-free in the short term, from the IMU alone",
+)
+ODOMETRY = Topic(
+    name="localization/odometry", type=m.Odometry, producer="localization", rate_hz=20.0, fresh_s=0.3,
+    stance=Stance.STATE, summary="pose in the map frame, from GPS and IMU",
+)
+ARMING = Topic(
+    name="operator/arming", type=m.Arming, producer="dashboard", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.COMMAND, summary="the operator's arm and latched stop",
+)
+SIM_TIME = Topic(
+    name="plant/clock", type=m.SimTime, producer="plant", rate_hz=20.0, fresh_s=0.5,
+    stance=Stance.STATE, summary="simulated time and the stamp that commands echo",
+)
+GPS = Topic(
+    name="plant/gps", type=m.GpsFix, producer="plant", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.STATE, summary="position with time-correlated error",
+)
+IMU = Topic(
+    name="plant/imu", type=m.ImuSample, producer="plant", rate_hz=100.0, fresh_s=0.2,
+    stance=Stance.EVENT, summary="body rates, specific force, compass",
+)
+THRUST_APPLIED = Topic(
+    name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
+    stance=Stance.STATE, summary="what the last gate applies, and why not",
+)
+TRUE_POSE = Topic(
+    name="@truth/pose", type=m.TruePose, producer="plant", rate_hz=20.0, fresh_s=0.5,
+    stance=Stance.STATE, summary="simulator truth: eye, dashboard and scoring only",
+)
+
+TOPICS: tuple[Topic[m.Message], ...] = (
+    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, THRUST, LOCAL_ODOMETRY,
+    ODOMETRY, ARMING, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE,
+)  # type: ignore[assignment]  # Topic is invariant in its message type; the table only reads
+
+SERVICES = (
+    "router", "plant", "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard",
+)
+BOARD_SERVICES = ("camera", "perception", "advisor", "navigator", "controller")
+VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")
+
+
+def pulse(service: str) -> Topic[m.Pulse]:
+    """The heartbeat of one process."""
+    return Topic(
+        name=f"pulse/{service}", type=m.Pulse, producer=service, rate_hz=10.0, fresh_s=0.4,
+        stance=Stance.COMMAND, summary=f"heartbeat of {service}",
+    )
+
+
+def health(service: str) -> Topic[m.Health]:
+    """The one-second report of one process."""
+    return Topic(
+        name=f"health/{service}", type=m.Health, producer=service, rate_hz=1.0, fresh_s=3.0,
+        stance=Stance.STATE, summary=f"health of {service}",
+    )
+
+
+def alive_name(service: str) -> str:
+    """Liveliness token of one process, below the vessel's prefix; the verbatim chunk keeps it out of `**`."""
+    return f"@alive/{service}"

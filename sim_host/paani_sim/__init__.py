@@ -1,0 +1,1 @@
+"""The host side: MuJoCo plant, worlds, rendered eye."""

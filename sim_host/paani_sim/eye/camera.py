@@ -1,0 +1,79 @@
+"""The camera on the bow: where it is, what it sees, and how points land in its picture. Pure.
+
+Pixel coordinates run from the top left corner; body is x forward, y left, z up.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from paani_sim.eye.mesh import rotation
+
+F64 = npt.NDArray[np.float64]
+NEAR_M = 0.15
+FAR_M = 3000.0
+
+
+@dataclass(frozen=True)
+class BoatPose:
+    """Where the boat's origin is in the map, and how it lies: roll, then pitch, then yaw."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    z_m: float = 0.177
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole on the boat. At rest (origin at 0.177 m) it looks from 0.9 m above the water."""
+
+    width_px: int = 320
+    height_px: int = 240
+    hfov_deg: float = 70.0
+    forward_m: float = 0.45
+    up_m: float = 0.723
+    down_deg: float = 4.0
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length; pixels are square."""
+        return 0.5 * self.width_px / float(np.tan(0.5 * np.radians(self.hfov_deg)))
+
+
+def look_from(pose: BoatPose, camera: Camera) -> tuple[F64, F64]:
+    """Position `(3,)` and map-from-camera rotation `(3, 3)` (columns right, up, backward)."""
+    body = rotation(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
+    mount = rotation(0.0, np.radians(camera.down_deg), 0.0)
+    axes = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    position = np.array([pose.x_m, pose.y_m, pose.z_m])
+    position = position + body @ np.array([camera.forward_m, 0.0, camera.up_m])
+    return position, body @ mount @ axes
+
+
+def view_projection(pose: BoatPose, camera: Camera) -> F64:
+    """Clip-from-map `(4, 4)`, OpenGL convention."""
+    position, turn = look_from(pose, camera)
+    view = np.eye(4)
+    view[:3, :3] = turn.T
+    view[:3, 3] = -turn.T @ position
+    focal = camera.focal_px
+    projection = np.zeros((4, 4))
+    projection[0, 0] = 2.0 * focal / camera.width_px
+    projection[1, 1] = 2.0 * focal / camera.height_px
+    projection[2, 2] = -(FAR_M + NEAR_M) / (FAR_M - NEAR_M)
+    projection[2, 3] = -2.0 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
+    projection[3, 2] = -1.0
+    return projection @ view
+
+
+def project(points_m: F64, pose: BoatPose, camera: Camera) -> F64:
+    """Pixel positions `(n, 2)` of map points `(n, 3)`; NaN for points behind the camera."""
+    clip = np.column_stack([points_m, np.ones(len(points_m))]) @ view_projection(pose, camera).T
+    depth = np.where(clip[:, 3] > NEAR_M, clip[:, 3], np.nan)
+    u = (0.5 + 0.5 * clip[:, 0] / depth) * camera.width_px
+    v = (0.5 - 0.5 * clip[:, 1] / depth) * camera.height_px
+    return np.column_stack([u, v])

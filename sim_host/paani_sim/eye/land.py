@@ -1,0 +1,205 @@
+"""Banks, hills, plants and houses around a world's water. Pure numpy."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from paani_sim.eye import sprites
+from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
+from paani_sim.eye.structures import house
+from paani_sim.worlds.curves import Points, clearance_m, normals_left, resample_closed
+from paani_sim.worlds.world import Kind, World
+
+F64 = npt.NDArray[np.float64]
+REACH_M = 460.0
+ROWS_M = (-4.0, -1.6, -0.5, 0.0, 0.35, 0.9, 1.8, 3.2, 5.5, 9.0, 14.0, 21.0)
+COARSE_M = 14.0
+
+
+@dataclass(frozen=True, eq=False)
+class Land:
+    """`ground` and `houses` meshes; `plants` `(n, 7)`: x, y, z, width, height, layer, shade."""
+
+    ground: Mesh
+    houses: tuple[Mesh, ...]
+    plants: npt.NDArray[np.float32]
+
+
+def make_land(world: World) -> Land:
+    """The land of a world, the same for the same seed."""
+    rng = np.random.default_rng([world.seed, 1])
+    field = _Noise(rng)
+    return Land(
+        ground=merge(_shore_strip(world, field), _far_ground(world, field), _hills(world, field)),
+        houses=_houses(world, field, rng),
+        plants=_plants(world, field, rng),
+    )
+
+
+class _Noise:
+    """Smooth noise of position, about -1..1, from a handful of waves."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._angle = rng.uniform(0.0, 2.0 * np.pi, (3, 6))
+        self._phase = rng.uniform(0.0, 2.0 * np.pi, (3, 6))
+
+    def at(self, xy_m: F64, wave_m: float, layer: int = 0) -> F64:
+        total = np.zeros(len(xy_m))
+        for k in range(6):
+            a, p = self._angle[layer, k], self._phase[layer, k]
+            k_radpm = 2.0 * np.pi / (wave_m * (0.6 + 0.2 * k))
+            total += np.sin(k_radpm * (xy_m[:, 0] * np.cos(a) + xy_m[:, 1] * np.sin(a)) + p)
+        return total / 3.0
+
+
+def ground_height_m(field: _Noise, xy_m: F64, clear_m: F64) -> F64:
+    """Height of the ground `clear_m` from the shore: a steep foot, a gentle bank, hills far off."""
+    clear = clear_m + 0.25 * field.at(xy_m, 5.0)
+    inland = np.maximum(-clear, 0.0)
+    rough = field.at(xy_m, 24.0, 1) * np.clip(inland / 8.0, 0.0, 1.0) * 0.5
+    rise = np.clip((inland - 50.0) / 260.0, 0.0, 1.0)
+    hills = rise**2 * (3.0 - 2.0 * rise) * (16.0 + 10.0 * field.at(xy_m, 300.0, 2))
+    dry = 0.75 * (1.0 - np.exp(-inland / 1.6)) + 0.035 * inland + rough + hills
+    return np.where(clear > 0.0, np.maximum(-0.45 * clear, -2.0), dry)
+
+
+def _ground_rgb(field: _Noise, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
+    """Mud and stones by the water, then grass in patches, then woodland."""
+    dry = 0.5 + 0.5 * np.clip(field.at(xy_m, 30.0, 2), -1.0, 1.0)
+    grass = np.array([0.28, 0.32, 0.15]) + dry[:, None] * np.array([0.14, 0.08, 0.05])
+    wood = np.array([0.20, 0.26, 0.11])
+    mud = np.array([0.34, 0.29, 0.22]) + 0.05 * field.at(xy_m, 7.0, 1)[:, None]
+    wet = np.clip((0.42 - z_m) / 0.30, 0.0, 1.0)[:, None]
+    far = np.clip((inland_m - 30.0) / 60.0, 0.0, 1.0)[:, None]
+    rgb = grass * (1.0 - far) + wood * far
+    rgb = rgb * (1.0 - wet) + mud * wet
+    lit: F64 = np.clip(rgb * np.where(z_m < 0.12, 0.62, 1.0)[:, None], 0.03, 1.0)
+    return lit
+
+
+def _surface(field: _Noise, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
+    """Ground over a grid `(rows, columns, 2)` of known clearance, `sink_m` lower than it is."""
+    rows, columns = grid_xy.shape[:2]
+    flat = grid_xy.reshape(-1, 2)
+    z = ground_height_m(field, flat, clear) - sink_m
+    rgb = _ground_rgb(field, flat, z, np.maximum(-clear, 0.0))
+    points = np.concatenate([grid_xy, z.reshape(rows, columns, 1)], axis=2)
+    return loft(points, rgb.reshape(rows, columns, 3), LAND)
+
+
+def _shore_strip(world: World, field: _Noise) -> Mesh:
+    shore = resample_closed(world.shore_m, int(len(world.shore_m) * 1.3))
+    outward = -normals_left(shore, closed=True)
+    ring = np.vstack([shore, shore[:1]])
+    outward = np.vstack([outward, outward[:1]])
+    grid = np.stack([ring + row * outward for row in ROWS_M], axis=0)
+    return _surface(field, grid, clearance_m(world.shore_m, grid.reshape(-1, 2)), 0.0)
+
+
+def _far_ground(world: World, field: _Noise) -> Mesh:
+    low, high = world.shore_m.min(axis=0) - REACH_M, world.shore_m.max(axis=0) + REACH_M
+    x, y = np.arange(low[0], high[0], COARSE_M), np.arange(low[1], high[1], COARSE_M)
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    clear = clearance_m(world.shore_m, grid.reshape(-1, 2))
+    sheet = _surface(field, grid, clear, 0.12)
+    dry = clear < -4.0
+    triangles = grid_triangles(len(x), len(y))
+    return Mesh(sheet.vertices, triangles[dry[triangles].all(axis=1)])
+
+
+def _hills(world: World, field: _Noise) -> Mesh:
+    """A ring of wooded hills that closes every view."""
+    middle = 0.5 * (world.shore_m.min(axis=0) + world.shore_m.max(axis=0))
+    half = 0.5 * np.ptp(world.shore_m, axis=0)
+    angle = np.linspace(0.0, 2.0 * np.pi, 121)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    rows = []
+    for out_m, height_m in ((300.0, 4.0), (420.0, 16.0), (560.0, 34.0), (700.0, 52.0)):
+        xy = middle + circle * (half + out_m)
+        swell = 1.0 + 0.55 * field.at(xy, 420.0, 2) + 0.12 * field.at(xy, 60.0, 1)
+        rows.append(np.column_stack([xy, height_m * np.maximum(swell, 0.25)]))
+    points = np.stack(rows)
+    rgb = np.broadcast_to(np.array([0.19, 0.26, 0.13]), points.shape)
+    return loft(points, rgb, LAND)
+
+
+def _houses(world: World, field: _Noise, rng: np.random.Generator) -> tuple[Mesh, ...]:
+    shore = resample_closed(world.shore_m, 400)
+    outward = -normals_left(shore, closed=True)
+    found: list[Mesh] = []
+    taken: list[Points] = []
+    for _ in range(160):
+        index = int(rng.integers(400))
+        spot = shore[index] + outward[index] * rng.uniform(16.0, 46.0)
+        clear = clearance_m(world.shore_m, spot[None])
+        if clear[0] > -14.0:
+            continue
+        if any(np.hypot(*(spot - other)) < 20.0 for other in taken):
+            continue
+        taken.append(spot)
+        z = float(ground_height_m(field, spot[None], clear)[0])
+        along = float(np.arctan2(outward[index, 0], -outward[index, 1]))
+        size = (float(rng.uniform(9, 15)), float(rng.uniform(7, 10)), float(rng.uniform(3.2, 6.4)))
+        found.append(
+            placed(
+                house(*size, int(rng.integers(12))),
+                (float(spot[0]), float(spot[1]), z),
+                yaw_rad=along + float(rng.normal(0.0, 0.25)),
+            )
+        )
+        if len(found) == 14:
+            break
+    return tuple(found)
+
+
+class _Sown(NamedTuple):
+    """Plants of one sort: how many, how far inland, in patches of what size and how sparse."""
+
+    layers: tuple[int, ...]
+    plants: int
+    inland_m: tuple[float, float]
+    patch_m: float
+    bar: float
+    width_m: tuple[float, float]
+    height_m: tuple[float, float]
+    free_m: float
+
+
+_SOWN = (
+    _Sown(sprites.REED, 420, (-0.5, 0.5), 24.0, 0.25, (1.5, 2.6), (1.2, 2.2), 2.0),
+    _Sown(sprites.REED, 1500, (0.3, 5.0), 30.0, -0.6, (0.7, 1.5), (0.25, 0.6), 1.0),
+    _Sown(sprites.BUSH, 700, (0.9, 6.0), 18.0, -0.1, (1.8, 4.2), (1.2, 3.0), 3.0),
+    _Sown(sprites.WILLOW, 46, (2.2, 6.0), 40.0, 0.1, (7.0, 10.0), (7.0, 10.0), 6.0),
+    _Sown(sprites.BROADLEAF, 700, (5.0, 34.0), 55.0, -0.25, (7.0, 12.0), (8.0, 14.0), 5.0),
+    _Sown(sprites.POPLAR, 60, (8.0, 30.0), 60.0, 0.0, (6.0, 9.0), (12.0, 17.0), 5.0),
+    _Sown(sprites.CONIFER, 160, (12.0, 60.0), 80.0, 0.1, (5.0, 7.5), (10.0, 17.0), 5.0),
+    _Sown(sprites.WOOD_EDGE, 260, (40.0, 130.0), 90.0, -0.5, (22.0, 32.0), (11.0, 16.0), 5.0),
+    _Sown(sprites.WOOD_EDGE, 320, (120.0, 380.0), 200.0, -0.9, (34.0, 52.0), (14.0, 20.0), 5.0),
+)
+
+
+def _plants(world: World, field: _Noise, rng: np.random.Generator) -> npt.NDArray[np.float32]:
+    """Reeds and bushes at the edge, trees behind, woodland to the hills; open meadows between."""
+    shore = resample_closed(world.shore_m, 4000)
+    outward = -normals_left(shore, closed=True)
+    open_kinds = (Kind.PERSON, Kind.PIER, Kind.OTHER)
+    keep_free = np.array([o.pose[:2] for o in world.obstacles if o.kind in open_kinds]).reshape(-1, 2)
+    rows = []
+    for sown in _SOWN:
+        near, far = sown.inland_m
+        index = rng.integers(len(shore), size=sown.plants * 2)
+        xy = shore[index] + outward[index] * rng.uniform(near, far, len(index))[:, None]
+        xy = xy[field.at(xy, sown.patch_m, sown.layers[0] % 3) > sown.bar]
+        gap = np.linalg.norm(xy[:, None] - keep_free[None], axis=2)
+        xy = xy[(gap > sown.free_m).all(axis=1)]
+        clear = clearance_m(world.shore_m, xy)
+        fits = (clear < -0.8 * near) if near > 0.0 else (np.abs(clear) < 0.8)
+        xy, clear = xy[fits][: sown.plants], clear[fits][: sown.plants]
+        width, height = rng.uniform(*sown.width_m, len(xy)), rng.uniform(*sown.height_m, len(xy))
+        z = ground_height_m(field, xy, clear) - 0.03 * height
+        layer = rng.choice(np.asarray(sown.layers), len(xy))
+        shade = rng.uniform(0.8, 1.15, len(xy))
+        rows.append(np.column_stack([xy, z, width, height, layer, shade]))
+    return np.concatenate(rows).astype(np.float32)

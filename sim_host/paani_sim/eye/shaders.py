@@ -1,0 +1,256 @@
+"""GLSL programs of the eye. Light is linear inside; pictures hold its square root.
+
+`id` is the thing's number for the label pass: 0 sky, 1 water, 2 land, 3 and up the world's things.
+"""
+
+_COMMON = """
+#version 330
+uniform vec3 eye; uniform vec3 sun; uniform vec3 sunRgb; uniform vec3 skyRgb; uniform vec3 hazeRgb;
+uniform float visibility; uniform float exposure; uniform float time;
+uniform sampler2D noiseTile; uniform sampler2D panorama;
+const float PI = 3.14159265;
+vec3 encode(vec3 light) {
+    vec3 x = light * exposure;
+    vec3 film = (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+    return sqrt(clip01(film));
+}
+vec3 skyLight(vec3 ray, float lod) {
+    vec2 uv = vec2(atan(ray.y, ray.x) / (2.0 * PI) + time * 0.00015, sqrt(max(ray.z, 0.0)));
+    vec3 c = textureLod(panorama, vec2(uv.x, clamp(uv.y, 0.004, 0.99)), lod).rgb;
+    return c * c;
+}
+float haze(float distance) { return 1.0 - exp(-distance / visibility); }
+vec3 hazeLight(vec3 ray) {
+    return mix(hazeRgb, skyLight(normalize(vec3(ray.xy, 0.03)), 5.0), 0.6) * 0.92;
+}
+""".replace("clip01(film)", "clamp(film, 0.0, 1.0)")
+
+SOLID_VERTEX = """
+#version 330
+layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 paint; layout(location = 3) in float number;
+uniform mat4 clipFromMap; uniform mat4 mapFromModel; uniform float flip; uniform float actorId;
+out vec3 world; out vec3 facing; out vec3 tint; flat out float material; flat out float id;
+out float above;
+void main() {
+    vec4 p = mapFromModel * vec4(position, 1.0);
+    world = p.xyz; facing = mat3(mapFromModel) * normal; tint = paint.rgb;
+    material = paint.a; id = number + actorId; above = p.z;
+    gl_ClipDistance[0] = flip < 0.0 ? p.z : 1.0;
+    gl_Position = clipFromMap * vec4(p.xy, p.z * flip, 1.0);
+}
+"""
+
+SOLID_FRAGMENT = (
+    _COMMON
+    + """
+in vec3 world; in vec3 facing; in vec3 tint; flat in float material; flat in float id;
+in float above;
+uniform float flip;
+layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
+void main() {
+    vec3 toEye = eye - world; float range = length(toEye);
+    vec3 n = normalize(facing), v = toEye / range;
+    if (dot(n, vec3(v.xy, v.z * flip)) < 0.0) n = -n;
+    vec3 albedo = tint * tint; int kind = int(material + 0.5);
+    float gloss = 0.0;
+    if (kind == 1) {
+        vec2 p = world.xy;
+        vec4 a = texture(noiseTile, p * 0.021), b = texture(noiseTile, p * 0.17);
+        vec4 c = texture(noiseTile, vec2(p.x + p.y, world.z * 1.7 + p.x - p.y) * 0.31);
+        albedo *= 0.45 + 0.55 * a.g + 0.5 * b.b + 0.45 * (c.a - 0.5) + 0.3 * (b.r - 0.5);
+        albedo = mix(albedo, albedo * vec3(1.35, 1.08, 0.7), clamp(a.r * 2.0 - 0.9, 0.0, 1.0));
+        n = normalize(n + vec3(b.b - 0.5, b.g - 0.5, 0.0) * 1.1);
+    } else if (kind == 2) {
+        float grain = texture(noiseTile, vec2(world.x + world.y, world.z * 4.0) * 0.9).b;
+        albedo *= 0.55 + 0.9 * grain;
+    } else if (kind == 3) {
+        vec4 a = texture(noiseTile, vec2(world.x + 0.7 * world.y, world.z) * 0.23);
+        albedo *= 0.45 + 0.6 * a.g + 0.5 * a.b;
+        albedo *= mix(0.45, 1.0, smoothstep(0.05, 0.55, above));
+    } else if (kind == 4) {
+        gloss = 0.45;
+    } else if (kind == 5) {
+        vec2 wall = vec2(dot(world.xy, abs(n.x) > abs(n.y) ? vec2(0, 1) : vec2(1, 0)), world.z);
+        vec2 cell = fract(wall * vec2(0.42, 0.38));
+        bool pane = abs(cell.x - 0.5) < 0.2 && abs(cell.y - 0.55) < 0.24 && abs(n.z) < 0.5;
+        float stain = 0.75 + 0.5 * texture(noiseTile, wall * 0.1).b;
+        albedo = pane ? vec3(0.02, 0.025, 0.03) : albedo * stain;
+        gloss = pane ? 0.35 : 0.0;
+    } else {
+        gloss = 0.05;
+        albedo *= 0.86 + 0.28 * texture(noiseTile, vec2(world.x + world.y, world.z) * 0.8).g;
+    }
+    albedo *= mix(0.55, 1.0, smoothstep(-0.02, 0.14, above));
+    float direct = max(dot(n, sun), 0.0);
+    vec3 light = sunRgb * direct + skyRgb * (0.62 + 0.38 * n.z) + 0.10 * sunRgb * (0.5 - 0.5 * n.z);
+    vec3 shade = albedo * light;
+    if (gloss > 0.0) {
+        vec3 mirrored = reflect(-v, n);
+        float edge = gloss + (1.0 - gloss) * 0.6 * pow(1.0 - max(dot(n, v), 0.0), 5.0);
+        shade += edge * skyLight(normalize(vec3(mirrored.xy, abs(mirrored.z))), 3.0) * 0.8;
+        shade += gloss * sunRgb * pow(max(dot(mirrored, sun), 0.0), 60.0) * 3.0;
+    }
+    shade = mix(shade, hazeLight(-v), haze(range));
+    colour = vec4(encode(shade), flip < 0.0 ? 0.25 + 0.75 * exp(-range / 60.0) : 1.0);
+    label = vec4(mod(id, 256.0) / 255.0, floor(id / 256.0) / 255.0, 0.0, 1.0);
+}
+"""
+)
+
+PLANT_VERTEX = """
+#version 330
+layout(location = 0) in vec3 foot; layout(location = 1) in vec4 card;
+layout(location = 2) in vec2 corner;
+uniform mat4 clipFromMap; uniform vec3 eye; uniform float flip; uniform float time;
+out vec3 world; out vec3 texel; out vec3 shade;
+void main() {
+    vec2 away = foot.xy - eye.xy;
+    vec2 across = normalize(vec2(away.y, -away.x));
+    bool mirror = fract(foot.x * 7.31 + foot.y * 3.77) > 0.5;
+    float sway = 0.012 * card.y * corner.y * sin(time * 1.3 + foot.x * 0.7 + foot.y * 0.9);
+    world = foot + vec3(across * ((corner.x - 0.5) * card.x + sway), corner.y * card.y);
+    texel = vec3(mirror ? 1.0 - corner.x : corner.x, 1.0 - corner.y, card.z);
+    float hue = fract(foot.x * 3.17 + foot.y * 5.71);
+    shade = card.w * mix(vec3(1.12, 1.0, 0.82), vec3(0.84, 0.98, 1.0), hue);
+    gl_ClipDistance[0] = flip < 0.0 ? world.z : 1.0;
+    gl_Position = clipFromMap * vec4(world.xy, world.z * flip, 1.0);
+}
+"""
+
+PLANT_FRAGMENT = (
+    _COMMON
+    + """
+in vec3 world; in vec3 texel; in vec3 shade;
+uniform sampler2DArray sprites; uniform float flip;
+layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
+void main() {
+    vec4 leaf = texture(sprites, texel);
+    if (leaf.a < 0.42) discard;
+    vec3 toEye = eye - world; float range = length(toEye);
+    vec3 v = toEye / range;
+    float facing = 0.5 + 0.5 * dot(normalize(v.xy), normalize(sun.xy + 1e-4));
+    float lift = 0.40 + 0.60 * (1.0 - texel.y);
+    vec3 light = sunRgb * (0.18 + 0.42 * facing) * lift + skyRgb * (0.35 + 0.55 * lift);
+    vec3 tint = leaf.rgb * leaf.rgb * shade;
+    vec3 lit = mix(tint * light * 1.45, hazeLight(-v), haze(range));
+    colour = vec4(encode(lit), flip < 0.0 ? 0.25 + 0.75 * exp(-range / 60.0) : 1.0);
+    label = vec4(2.0 / 255.0, 0.0, 0.0, 1.0);
+}
+"""
+)
+
+SCREEN_VERTEX = """
+#version 330
+layout(location = 0) in vec2 corner;
+uniform mat4 mapFromClip; uniform vec3 eye;
+out vec3 ray;
+void main() {
+    vec4 far = mapFromClip * vec4(corner, 0.9, 1.0);
+    ray = far.xyz / far.w - eye;
+    gl_Position = vec4(corner, 1.0, 1.0);
+}
+"""
+
+SKY_FRAGMENT = (
+    _COMMON
+    + """
+in vec3 ray;
+layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
+void main() {
+    vec3 r = normalize(ray);
+    vec3 light = skyLight(vec3(r.xy, max(r.z, 0.0)), 0.0);
+    float toward = max(dot(r, sun), 0.0);
+    light += sunRgb * (3.0 * smoothstep(0.99985, 0.99995, toward) + 0.15 * pow(toward, 400.0));
+    light = mix(light, hazeLight(r), exp(-max(r.z, 0.0) * visibility * 0.03) * 0.6);
+    colour = vec4(encode(light), 1.0);
+    label = vec4(0.0, 0.0, 0.0, 1.0);
+}
+"""
+)
+
+WATER_VERTEX = """
+#version 330
+layout(location = 0) in vec2 corner;
+uniform mat4 clipFromMap; uniform vec3 eye;
+out vec3 world;
+void main() {
+    world = vec3(eye.xy + corner * 1500.0, 0.0);
+    gl_Position = clipFromMap * vec4(world, 1.0);
+}
+"""
+
+WATER_FRAGMENT = (
+    _COMMON
+    + """
+in vec3 world;
+uniform sampler2D slopes; uniform sampler2D mirrorView;
+uniform mat4 clipFromMap; uniform vec2 screen; uniform vec2 windWay; uniform float slopeRms;
+uniform vec2 flow; uniform vec3 bodyRgb;
+layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
+vec4 swell(vec2 p, float tile, float turn, float speed) {
+    vec2 way = mat2(cos(turn), sin(turn), -sin(turn), cos(turn)) * windWay;
+    mat2 toTile = mat2(way.x, -way.y, way.y, way.x);
+    vec4 s = texture(slopes, (toTile * p - vec2(speed * time, 0.0)) / tile);
+    vec2 slope = transpose(toTile) * ((s.xy - 0.5) * 8.0);
+    vec2 rough = max(s.zw * 16.0 - pow((s.xy - 0.5) * 8.0, vec2(2.0)), 0.0);
+    return vec4(slope, rough);
+}
+void main() {
+    vec3 toEye = eye - world; float range = length(toEye);
+    vec3 v = toEye / range;
+    vec2 p = world.xy - flow * time;
+    vec2 patchNoise = texture(noiseTile, p * 0.006 + time * 0.0006 * windWay).rg;
+    float gust = clamp(0.35 + 1.5 * (patchNoise.r - 0.30) + 0.5 * (patchNoise.g - 0.5), 0.15, 1.7);
+    float rms = slopeRms * gust;
+    vec4 a = swell(p, 11.3, 0.3, 0.9), b = swell(p, 4.1, -0.5, 0.55), c = swell(p, 1.37, 0.9, 0.35);
+    vec3 part = vec3(0.55, 0.62, 0.56) * rms;
+    vec2 slope = a.xy * part.x + b.xy * part.y + c.xy * part.z;
+    vec2 rough = a.zw * part.x * part.x + b.zw * part.y * part.y + c.zw * part.z * part.z;
+    float variance = 0.5 * (rough.x + rough.y) + 1e-5;
+    float sigma = sqrt(variance);
+
+    vec2 ahead = normalize(v.xy + 1e-6);
+    slope += ahead * min(0.75 * sigma, 0.9 * sigma * sigma / (sigma + v.z) + 0.35 * sigma);
+    vec3 n = normalize(vec3(-slope, 1.0));
+    float facing = dot(n, v);
+    if (facing < 0.02) { n = normalize(n + v * (0.03 - facing)); facing = dot(n, v); }
+    vec3 r = reflect(-v, n);
+    r.z = max(abs(r.z), 0.004);
+    r = normalize(r);
+    float fresnel = 0.02 + 0.98 * pow(1.0 - clamp(facing, 0.0, 1.0), 5.0)
+        / (1.0 + 22.7 * pow(sigma, 1.5));
+
+    vec2 here = gl_FragCoord.xy / screen;
+    float near = textureLod(mirrorView, here, 2.5).a;
+    float reach = max(-60.0 * log(clamp((near - 0.25) / 0.75, 0.3, 1.0)) - range, 0.4);
+    vec3 sky = skyLight(r, clamp(2.0 + 14.0 * sigma, 1.0, 5.0));
+    vec3 mirrored = vec3(0.0);
+    for (int k = 0; k < 3; k++) {
+        float bend = (float(k) - 1.0) * 1.6 * sigma;
+        vec3 d = normalize(vec3(r.xy, max(r.z + bend, 0.004)));
+        vec4 at = clipFromMap * vec4(world + vec3(d.xy, -d.z) * reach, 1.0);
+        vec2 uv = clamp(at.xy / max(at.w, 0.01) * 0.5 + 0.5, 0.002, 0.998);
+        float lod = clamp(log2(1.0 + 90.0 * sigma), 0.0, 3.0);
+        vec4 hit = textureLod(mirrorView, uv, lod);
+        float solid = smoothstep(0.02, 0.22, hit.a);
+        mirrored += mix(sky, hit.rgb * hit.rgb, solid) / 3.0;
+    }
+    float shore = 0.85 + 0.3 * texture(noiseTile, p * 0.05).g;
+    vec3 body = bodyRgb * shore * (0.35 * sunRgb * max(sun.z, 0.0) + 0.8 * skyRgb);
+    vec3 light = mix(body, mirrored, fresnel);
+
+    vec3 h = normalize(sun + v);
+    vec2 tilt = h.xy / h.z + slope;
+    float spread = variance + 0.0006;
+    float glint = exp(-dot(tilt, tilt) / (2.0 * spread)) / (2.0 * PI * spread);
+    light += sunRgb * min(glint * 0.02 / max(4.0 * facing, 0.2), 3.0) * step(0.0, dot(v, h));
+    float crest = patchNoise.g + 0.35 * (c.x * 0.1 + texture(noiseTile, p * 0.9).b);
+    float foam = smoothstep(0.72, 0.9, crest) * smoothstep(0.15, 0.24, slopeRms);
+    light = mix(light, vec3(0.6) * (skyRgb + 0.5 * sunRgb), 0.4 * foam);
+    light = mix(light, hazeLight(-v), haze(range));
+    colour = vec4(encode(light), 1.0);
+    label = vec4(1.0 / 255.0, 0.0, 0.0, 1.0);
+}
+"""
+)

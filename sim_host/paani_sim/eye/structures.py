@@ -1,0 +1,237 @@
+"""Buoys, piers, the bridge and houses as meshes: centred on the origin, water at z = 0."""
+
+import numpy as np
+
+from paani_sim.eye.mesh import (
+    FACADE,
+    ROCK,
+    WOOD,
+    Mesh,
+    Rgb,
+    box,
+    loft,
+    merge,
+    placed,
+    rod,
+    turned,
+)
+
+BUOY_RGB: tuple[Rgb, ...] = (
+    (0.80, 0.09, 0.07),
+    (0.06, 0.45, 0.20),
+    (0.95, 0.78, 0.08),
+    (0.97, 0.42, 0.05),
+    (0.92, 0.92, 0.90),
+    (0.10, 0.10, 0.11),
+)
+BUOY_LOOKS = ("can", "cone", "sphere", "pillar", "spar")
+PIER_LOOKS = ("jetty", "pontoon", "quay")
+TIMBER: Rgb = (0.47, 0.39, 0.30)
+CONCRETE: Rgb = (0.62, 0.61, 0.58)
+STEEL: Rgb = (0.30, 0.32, 0.34)
+
+
+def buoy(look: str, width_m: float, height_m: float, variant: int) -> Mesh:
+    """A buoy; every second round of the colours it wears a white band."""
+    rgb = BUOY_RGB[variant % len(BUOY_RGB)]
+    banded = variant >= len(BUOY_RGB)
+    band = (0.93, 0.93, 0.91) if banded else rgb
+    r, h = 0.5 * width_m, height_m
+    if look == "sphere":
+        angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 11)
+        profile = [(r * float(np.cos(a)), 0.3 * h + r * float(np.sin(a))) for a in angle]
+        rows = [band if 5 <= k <= 7 else rgb for k in range(11)]
+        eye = rod((0, 0, 0.3 * h + 0.95 * r), (0, 0, 0.3 * h + r + 0.12), 0.04, STEEL)
+        return merge(turned(profile, rows, 14), eye)
+    if look == "can":
+        profile = [
+            (r, -0.3),
+            (r, 0.35 * h),
+            (r, 0.35 * h),
+            (r, 0.7 * h),
+            (r, 0.7 * h),
+            (r, h),
+            (0.0, h + 0.02),
+        ]
+        return turned(profile, [rgb, rgb, band, band, rgb, rgb, rgb], 14)
+    if look == "cone":
+        profile = [
+            (r, -0.3),
+            (r, 0.25 * h),
+            (r, 0.25 * h),
+            (0.55 * r, 0.62 * h),
+            (0.55 * r, 0.62 * h),
+            (0.04, h),
+        ]
+        return turned(profile, [rgb, rgb, band, band, rgb, rgb], 14)
+    if look == "spar":
+        profile = [
+            (0.35 * r, -0.3),
+            (0.35 * r, 0.5 * h),
+            (0.35 * r, 0.5 * h),
+            (0.30 * r, 0.72 * h),
+            (0.30 * r, 0.72 * h),
+            (0.28 * r, h),
+            (0.0, h),
+        ]
+        return turned(profile, [rgb, rgb, band, band, rgb, rgb, rgb], 8)
+    base = turned([(r, -0.3), (r, 0.16 * h), (0.85 * r, 0.24 * h), (0.2 * r, 0.26 * h)], rgb, 14)
+    legs = [
+        rod(
+            (0.55 * r * cx, 0.55 * r * cy, 0.24 * h),
+            (0.2 * r * cx, 0.2 * r * cy, 0.78 * h),
+            0.06 * r + 0.015,
+            rgb,
+        )
+        for cx, cy in ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    ]
+    panel = turned([(0.30 * r, 0.45 * h), (0.26 * r, 0.74 * h)], band, 8)
+    top = turned([(0.0, 0.78 * h), (0.34 * r, 0.80 * h), (0.05, h)], rgb, 10)
+    return merge(base, *legs, panel, top)
+
+
+def pier(look: str, length_m: float, width_m: float, height_m: float, variant: int) -> Mesh:
+    """A pier along x, its head toward +x."""
+    build = {"jetty": _jetty, "pontoon": _pontoon, "quay": _quay}[look]
+    return build(length_m, width_m, height_m, variant)
+
+
+def _jetty(length: float, width: float, height: float, variant: int) -> Mesh:
+    tone = 1.0 - 0.12 * (variant % 3)
+    rgb: Rgb = (TIMBER[0] * tone, TIMBER[1] * tone, TIMBER[2] * tone)
+    deck = box((length, width, 0.10), (rgb[0] * 1.15, rgb[1] * 1.15, rgb[2] * 1.12), WOOD)
+    parts = [placed(deck, (0.0, 0.0, height - 0.05))]
+    count = max(2, round(length / 1.9))
+    for x in np.linspace(-0.5 * length + 0.15, 0.5 * length - 0.15, count):
+        for side in (1.0, -1.0):
+            y = side * (0.5 * width - 0.06)
+            parts.append(
+                rod(
+                    (float(x), y, -0.9),
+                    (float(x), y, height + 0.25),
+                    0.10,
+                    (0.30, 0.24, 0.18),
+                    7,
+                    material=WOOD,
+                )
+            )
+        beam = box((0.12, width, 0.16), (0.28, 0.23, 0.17), WOOD)
+        parts.append(placed(beam, (float(x), 0.0, height - 0.18)))
+    if variant % 2 == 1:
+        for x in np.linspace(-0.5 * length + 0.15, 0.5 * length - 0.15, count):
+            y = 0.5 * width - 0.08
+            parts.append(rod((float(x), y, height), (float(x), y, height + 0.95), 0.05, rgb))
+        for z in (0.5, 0.92):
+            rail = box((length, 0.05, 0.09), rgb, WOOD)
+            parts.append(placed(rail, (0.0, 0.5 * width - 0.08, height + z)))
+    else:
+        for k in (0.35, 0.46):
+            parts.append(
+                rod(
+                    (k * length, -0.4 * width, height),
+                    (k * length, -0.4 * width, height + 0.42),
+                    0.09,
+                    STEEL,
+                    8,
+                )
+            )
+    return merge(*parts)
+
+
+def _pontoon(length: float, width: float, height: float, variant: int) -> Mesh:
+    grey: Rgb = (0.66, 0.65, 0.62)
+    parts = [
+        placed(box((length, width, 0.10), (0.58, 0.52, 0.44), WOOD), (0.0, 0.0, height - 0.05)),
+        placed(
+            box((0.98 * length, 0.94 * width, height), (0.34, 0.35, 0.36), ROCK),
+            (0.0, 0.0, 0.5 * height - 0.12),
+        ),
+    ]
+    for x in (-0.45, 0.0, 0.45):
+        pile = rod(
+            (x * length, 0.5 * width, -0.8),
+            (x * length, 0.5 * width, height + 1.5),
+            0.13,
+            (0.38, 0.36, 0.33),
+            8,
+        )
+        parts.append(pile)
+        cleat = box((0.3, 0.08, 0.12), grey)
+        parts.append(placed(cleat, ((x + 0.03) * length, -0.45 * width, height + 0.06)))
+    if variant % 2 == 1:
+        locker = box((1.1, 0.5, 0.5), (0.85, 0.85, 0.82))
+        parts.append(placed(locker, (-0.25 * length, 0.3 * width, height + 0.25)))
+    return merge(*parts)
+
+
+def _quay(length: float, width: float, height: float, variant: int) -> Mesh:
+    wall = box((length, width, height + 0.8), CONCRETE, ROCK)
+    cap = box((length, width + 0.12, 0.16), (0.72, 0.71, 0.68), ROCK)
+    parts = [placed(wall, (0, 0, 0.5 * height - 0.4)), placed(cap, (0, 0, height))]
+    for x in np.linspace(-0.42, 0.42, 4):
+        parts.append(
+            rod(
+                (x * length, 0.3 * width, height),
+                (x * length, 0.3 * width, height + 0.4),
+                0.12,
+                STEEL,
+                8,
+            )
+        )
+        fender = box((0.18, width + 0.3, 0.9), (0.08, 0.08, 0.08))
+        parts.append(placed(fender, (float(x) * length, 0.0, 0.5 * height)))
+    return merge(*parts)
+
+
+def bridge(length_m: float, width_m: float, base_z_m: float, height_m: float) -> Mesh:
+    """A road bridge along x with a flat arch below and abutments on both banks."""
+    deck_z = base_z_m + 0.5
+    stone: Rgb = (0.56, 0.52, 0.46)
+    x = np.linspace(-0.5 * length_m, 0.5 * length_m, 21)
+    crown = deck_z - 0.35
+    arch = crown - (crown - 0.9) * (np.abs(x) / (0.5 * length_m)) ** 2.4
+    parts = [placed(box((length_m + 8.0, width_m, 0.5), stone, ROCK), (0.0, 0.0, deck_z))]
+    for side in (1.0, -1.0):
+        y = np.full(21, side * 0.5 * width_m)
+        top, low = np.column_stack([x, y, np.full(21, deck_z)]), np.column_stack([x, y, arch])
+        parts.append(loft(np.stack([top, low] if side > 0 else [low, top]), stone, ROCK))
+        wall = box((length_m + 8.0, 0.30, 0.95), (0.62, 0.58, 0.52), ROCK)
+        parts.append(placed(wall, (0.0, side * (0.5 * width_m - 0.15), deck_z + 0.6)))
+    under = [np.column_stack([x, np.full(21, s * 0.5 * width_m), arch]) for s in (-1.0, 1.0)]
+    parts.append(loft(np.stack(under), (0.30, 0.28, 0.25), ROCK))
+    for side in (1.0, -1.0):
+        block = box((3.0, width_m + 0.6, deck_z + 1.5), stone, ROCK)
+        parts.append(placed(block, (side * (0.5 * length_m - 0.6), 0.0, 0.5 * deck_z - 0.75)))
+    parts.append(placed(box((length_m, 0.05, 0.05), STEEL), (0, 0, base_z_m + height_m)))
+    return merge(*parts)
+
+
+def house(width_m: float, depth_m: float, wall_m: float, variant: int) -> Mesh:
+    """A house with a gable roof, long side along x, ground at z = 0."""
+    walls: tuple[Rgb, ...] = (
+        (0.86, 0.82, 0.74),
+        (0.70, 0.42, 0.32),
+        (0.90, 0.90, 0.88),
+        (0.78, 0.70, 0.52),
+    )
+    roofs: tuple[Rgb, ...] = ((0.45, 0.20, 0.15), (0.28, 0.28, 0.30), (0.36, 0.24, 0.18))
+    wall, roof = walls[variant % 4], roofs[variant % 3]
+    half_w, half_d, ridge = 0.5 * width_m + 0.4, 0.5 * depth_m + 0.5, wall_m + 0.42 * depth_m
+    body = placed(box((width_m, depth_m, wall_m + 2.0), wall, FACADE), (0, 0, 0.5 * wall_m - 1.0))
+    parts = [body]
+    for side in (1.0, -1.0):
+        eaves = [(-half_w, side * half_d, wall_m - 0.2), (half_w, side * half_d, wall_m - 0.2)]
+        top = [(-half_w, 0.0, ridge), (half_w, 0.0, ridge)]
+        parts.append(loft(np.array([eaves, top] if side > 0 else [top, eaves]), roof, WOOD))
+        gable = np.array(
+            [
+                [(side * 0.5 * width_m, -0.5 * depth_m, wall_m - 0.1)] * 2,
+                [
+                    (side * 0.5 * width_m, 0.0, ridge - 0.1),
+                    (side * 0.5 * width_m, 0.5 * depth_m, wall_m - 0.1),
+                ],
+            ]
+        )
+        parts.append(loft(gable, wall))
+    parts.append(placed(box((0.7, 0.7, 1.6), (0.45, 0.25, 0.2)), (0.25 * width_m, 0.0, ridge)))
+    return merge(*parts)

@@ -1,0 +1,40 @@
+"""The worlds the boat can be put into: pure geometry, and its MuJoCo model in `spec`."""
+
+from collections.abc import Callable
+
+from paani.errors import UserError
+from paani_sim.worlds.lake import lake
+from paani_sim.worlds.river import river
+from paani_sim.worlds.world import (
+    Actor,
+    Kind,
+    Light,
+    Obstacle,
+    Pose2,
+    Wind,
+    World,
+    actor_pose,
+)
+
+WORLDS: dict[str, Callable[[], World]] = {"lake": lake, "river": river}
+
+
+def load_world(name: str) -> World:
+    """Build the named world. Raises `UserError` for a name that is not in `WORLDS`."""
+    if name not in WORLDS:
+        raise UserError(f"world: unknown world {name!r} (known: {', '.join(WORLDS)})")
+    return WORLDS[name]()
+
+
+__all__ = [
+    "WORLDS",
+    "Actor",
+    "Kind",
+    "Light",
+    "Obstacle",
+    "Pose2",
+    "Wind",
+    "World",
+    "actor_pose",
+    "load_world",
+]

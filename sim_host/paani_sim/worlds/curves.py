@@ -1,0 +1,69 @@
+"""Plane curves and polygons: resampling, offsets, containment, distances. Pure numpy, metres."""
+
+import numpy as np
+import numpy.typing as npt
+
+Points = npt.NDArray[np.float64]
+
+
+def closed_length_m(points_m: Points) -> float:
+    """Perimeter of the closed polygon `(n, 2)`."""
+    return float(np.linalg.norm(np.roll(points_m, -1, axis=0) - points_m, axis=1).sum())
+
+
+def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Points:
+    """`count` points at equal arc length along the closed polygon, the first `start_m` along."""
+    ring = np.vstack([points_m, points_m[:1]])
+    arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    at_m = (start_m + np.arange(count) * arc_m[-1] / count) % arc_m[-1]
+    return np.column_stack([np.interp(at_m, arc_m, ring[:, k]) for k in (0, 1)])
+
+
+def point_along_closed(points_m: Points, distance_m: float) -> tuple[float, float, float]:
+    """`(x_m, y_m, yaw_rad)` at `distance_m` (wrapped) along the closed polygon."""
+    ring = np.vstack([points_m, points_m[:1]])
+    steps = np.diff(ring, axis=0)
+    arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    at_m = distance_m % arc_m[-1]
+    leg = min(int(np.searchsorted(arc_m, at_m, side="right")) - 1, len(steps) - 1)
+    part = (at_m - arc_m[leg]) / (arc_m[leg + 1] - arc_m[leg])
+    x_m, y_m = ring[leg] + part * steps[leg]
+    return float(x_m), float(y_m), float(np.arctan2(steps[leg, 1], steps[leg, 0]))
+
+
+def normals_left(points_m: Points, *, closed: bool) -> Points:
+    """Unit normals `(n, 2)` to the left of the direction of travel, central differences."""
+    around = np.vstack([points_m[-1:], points_m, points_m[:1]]) if closed else points_m
+    tangent = np.gradient(around, axis=0)
+    tangent = tangent[1:-1] if closed else tangent
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.column_stack([-tangent[:, 1], tangent[:, 0]])
+
+
+def inside(polygon_m: Points, points_m: Points) -> npt.NDArray[np.bool_]:
+    """Even-odd test of `(m, 2)` points against the closed polygon `(n, 2)`."""
+    x, y = points_m[:, 0, None], points_m[:, 1, None]
+    x0, y0 = polygon_m[None, :, 0], polygon_m[None, :, 1]
+    x1, y1 = np.roll(x0, -1, axis=1), np.roll(y0, -1, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crosses = ((y0 > y) != (y1 > y)) & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
+    result: npt.NDArray[np.bool_] = np.count_nonzero(crosses, axis=1) % 2 == 1
+    return result
+
+
+def distance_to_edges_m(polygon_m: Points, points_m: Points) -> npt.NDArray[np.float64]:
+    """Unsigned distance `(m,)` from each point to the nearest edge of the closed polygon."""
+    start = polygon_m[None, :, :]
+    edge = np.roll(polygon_m, -1, axis=0)[None, :, :] - start
+    best = np.empty(len(points_m))
+    for first in range(0, len(points_m), 2048):
+        rel = points_m[first : first + 2048, None, :] - start
+        part = np.clip((rel * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-12), 0.0, 1.0)
+        best[first : first + 2048] = np.linalg.norm(rel - part[..., None] * edge, axis=-1).min(1)
+    return best
+
+
+def clearance_m(polygon_m: Points, points_m: Points) -> npt.NDArray[np.float64]:
+    """Signed distance `(m,)` to the shore: positive in the water, negative on land."""
+    sign = np.where(inside(polygon_m, points_m), 1.0, -1.0)
+    return sign * distance_to_edges_m(polygon_m, points_m)

@@ -1,0 +1,177 @@
+"""The world as a MuJoCo model: the boat as one free body, everything solid it can run into.
+
+Gravity is -9.81 and there is no fluid: buoyancy, drag and thrust are the plant's passive forces.
+"""
+
+import mujoco
+import numpy as np
+
+from paani_sim.worlds.curves import Points
+from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
+
+TIMESTEP_S = 0.01
+BOAT_MASS_KG = 12.4  # checklist K4
+BOAT_INERTIA_KGM2 = (0.86, 1.45, 2.05)
+BOAT_REST_Z_M = 0.177  # checklist K6: height of the body's origin at rest
+HULL_HALF_LENGTH_M = 0.65
+HULL_SPACING_M = 0.57
+HULL_RADIUS_M = 0.09
+HULL_Z_M = -0.12
+
+BOAT_BIT = 1  # what the boat is; solids look for it
+SOLID_BIT = 2  # what everything else is; the boat looks for it
+
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+_SITE = mujoco.mjtObj.mjOBJ_SITE
+
+_SUNK_M = 1.0  # solids reach this far under water
+_BANK_HALF_HEIGHT_M = 1.2
+_BANK_HALF_THICKNESS_M = 0.6
+
+
+def build_spec(world: World, *, visual: bool = False) -> mujoco.MjSpec:
+    """Build the model, not yet compiled (no Python callback may be installed while compiling).
+
+    Body `boat` on joint `boat_free` with geoms `hull_port`, `hull_starboard`, site `imu` and
+    sensors `accelerometer`, `gyro` (body frame, SI). Geoms `bank_<n>`, one geom per obstacle and
+    one mocap body and geom per actor, named by id. Only the boat collides, with everything else.
+    `visual` adds colours, a water plane and a light for MuJoCo's own viewer.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = world.name
+    spec.option.timestep = TIMESTEP_S
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0.0, 0.0, -9.81]
+    _add_boat(spec, world)
+    _add_banks(spec, world.shore_m)
+    for obstacle in world.obstacles:
+        _add_obstacle(spec, obstacle)
+    for actor in world.actors:
+        _add_actor(spec, actor)
+    if visual:
+        _add_looks(spec)
+    return spec
+
+
+def _add_boat(spec: mujoco.MjSpec, world: World) -> None:
+    yaw = world.start.yaw_rad
+    boat = spec.worldbody.add_body(
+        name="boat",
+        pos=[world.start.x_m, world.start.y_m, BOAT_REST_Z_M],
+        quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
+        mass=BOAT_MASS_KG,
+        ipos=[0.0, 0.0, 0.0],
+        iquat=[1.0, 0.0, 0.0, 0.0],
+        inertia=list(BOAT_INERTIA_KGM2),
+        explicitinertial=True,
+    )
+    boat.add_freejoint(name="boat_free")
+    reach_m = HULL_HALF_LENGTH_M - HULL_RADIUS_M
+    for name, side in (("hull_port", 0.5), ("hull_starboard", -0.5)):
+        y_m = side * HULL_SPACING_M
+        boat.add_geom(
+            name=name,
+            type=_CAPSULE,
+            fromto=[-reach_m, y_m, HULL_Z_M, reach_m, y_m, HULL_Z_M],
+            size=[HULL_RADIUS_M, 0.0, 0.0],
+            contype=BOAT_BIT,
+            conaffinity=SOLID_BIT,
+            friction=[0.3, 0.005, 0.0001],
+            rgba=[0.9, 0.5, 0.1, 1.0],
+        )
+    boat.add_site(name="imu", pos=[0.0, 0.0, 0.0])
+    for name, kind in (
+        ("accelerometer", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+        ("gyro", mujoco.mjtSensor.mjSENS_GYRO),
+    ):
+        spec.add_sensor(name=name, type=kind, objtype=_SITE, objname="imu")
+
+
+def _add_banks(spec: mujoco.MjSpec, shore_m: Points) -> None:
+    """One box behind each stretch of the shore, overlapping its neighbours."""
+    ends_m = np.roll(shore_m, -1, axis=0)
+    for number, (start, end) in enumerate(zip(shore_m, ends_m, strict=True)):
+        along = end - start
+        length_m = float(np.hypot(*along))
+        outward = np.array([along[1], -along[0]]) / length_m
+        centre = 0.5 * (start + end) + _BANK_HALF_THICKNESS_M * outward
+        yaw = float(np.arctan2(along[1], along[0]))
+        spec.worldbody.add_geom(
+            name=f"bank_{number}",
+            type=_BOX,
+            pos=[float(centre[0]), float(centre[1]), 0.0],
+            quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
+            size=[0.5 * length_m + 0.1, _BANK_HALF_THICKNESS_M, _BANK_HALF_HEIGHT_M],
+            contype=SOLID_BIT,
+            conaffinity=BOAT_BIT,
+            rgba=[0.35, 0.45, 0.2, 1.0],
+        )
+
+
+def _add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> None:
+    pose = obstacle.pose
+    low_m = obstacle.base_z_m if obstacle.base_z_m > 2.0 else -_SUNK_M
+    high_m = obstacle.base_z_m + obstacle.height_m
+    _add_solid(
+        spec.worldbody,
+        obstacle,
+        pos=[pose.x_m, pose.y_m, 0.5 * (low_m + high_m)],
+        yaw_rad=pose.yaw_rad,
+        half_height_m=0.5 * (high_m - low_m),
+    )
+
+
+def _add_actor(spec: mujoco.MjSpec, actor: Actor) -> None:
+    pose = actor_pose(actor, 0.0)
+    yaw = pose.yaw_rad
+    body = spec.worldbody.add_body(
+        name=actor.id,
+        mocap=True,
+        pos=[pose.x_m, pose.y_m, 0.0],
+        quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
+    )
+    _add_solid(
+        body,
+        actor,
+        pos=[0.0, 0.0, 0.5 * (actor.height_m - _SUNK_M)],
+        yaw_rad=0.0,
+        half_height_m=0.5 * (actor.height_m + _SUNK_M),
+    )
+
+
+def _add_solid(
+    parent: mujoco.MjsBody,
+    thing: Obstacle | Actor,
+    *,
+    pos: list[float],
+    yaw_rad: float,
+    half_height_m: float,
+) -> None:
+    """A box for what is long, an upright cylinder for what is round."""
+    round_plan = thing.length_m == thing.width_m
+    half_length_m, half_width_m = 0.5 * thing.length_m, 0.5 * thing.width_m
+    parent.add_geom(
+        name=thing.id,
+        type=_CYLINDER if round_plan else _BOX,
+        pos=pos,
+        quat=[np.cos(yaw_rad / 2.0), 0.0, 0.0, np.sin(yaw_rad / 2.0)],
+        size=[half_width_m, half_height_m, 0.0] if round_plan else [half_length_m, half_width_m, half_height_m],
+        contype=SOLID_BIT,
+        conaffinity=BOAT_BIT,
+        rgba=[0.7, 0.25, 0.2, 1.0],
+    )
+
+
+def _add_looks(spec: mujoco.MjSpec) -> None:
+    spec.worldbody.add_light(name="sun", pos=[0.0, 0.0, 100.0], dir=[0.3, 0.2, -1.0])
+    spec.worldbody.add_geom(
+        name="water",
+        type=_PLANE,
+        size=[800.0, 800.0, 400.0],
+        contype=0,
+        conaffinity=0,
+        rgba=[0.15, 0.25, 0.3, 1.0],
+    )

@@ -1,0 +1,123 @@
+"""Augmentation is seeded, and picture, mask and boxes move together (checklist S8, S12)."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from paani_models import augment
+from paani_models.detector_data import BoxedPicture, augmented, place, plain, random_placement
+from paani_models.network_input import letterbox_affine
+
+SIZE_WH = (320, 256)
+WATER_CLASS, OBSTACLE_CLASS = 0, 1
+
+
+def scene() -> tuple[np.ndarray, np.ndarray]:
+    """A bright square, class 1, on dark ground, class 0."""
+    picture, mask = np.full((288, 384, 3), 30, np.uint8), np.zeros((288, 384), np.uint8)
+    picture[100:180, 150:260] = 220
+    mask[100:180, 150:260] = OBSTACLE_CLASS
+    return picture, mask
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        augment.glare,
+        augment.jitter_colour,
+        augment.degrade,
+        lambda rng, _: augment.null_picture(rng, SIZE_WH),
+    ],
+    ids=["glare", "jitter", "degrade", "null"],
+)
+def test_the_same_seed_gives_the_same_bytes_s12(function: Callable[..., np.ndarray]) -> None:
+    picture = scene()[0]
+    pairs = [
+        (function(np.random.default_rng(s), picture), function(np.random.default_rng(s), picture)) for s in range(9)
+    ]
+    assert all(np.array_equal(a, b) for a, b in pairs)
+    assert len({a.tobytes() for a, _ in pairs}) > 1
+
+
+def test_glare_leaves_its_input_alone_and_brightens_the_dark_s8() -> None:
+    picture = scene()[0]
+    before = picture.copy()
+    lit = [augment.glare(np.random.default_rng(s), picture) for s in range(20)]
+    assert np.array_equal(picture, before)
+    dark = picture[..., 0] == 30
+    assert all((out[dark] >= 30).all() for out in lit)
+    assert sum(bool((out[dark] > 60).any()) for out in lit) >= 15
+
+
+def test_glare_frequencies_s8() -> None:
+    assert (augment.GLARE_FRAC, augment.BLOB_FRAC, augment.GLITTER_FRAC) == (0.35, 0.7, 0.6)
+
+
+def test_mask_follows_the_picture() -> None:
+    picture, mask = scene()
+    for seed in range(20):
+        affine = augment.random_affine(np.random.default_rng(seed), (384, 288), SIZE_WH, tilt_deg=8.0)
+        moved, labels = (
+            augment.warp_picture(picture, affine, SIZE_WH),
+            augment.warp_mask(mask, affine, SIZE_WH),
+        )
+        known = labels != 255
+        agree = (moved[..., 0] > 125) == (labels == OBSTACLE_CLASS)
+        assert agree[known].mean() > 0.98
+
+
+def test_null_pictures_are_all_obstacle_and_of_many_kinds() -> None:
+    pictures = []
+    for seed in range(60):
+        picture, mask = augment.segmenter_null(np.random.default_rng(seed), SIZE_WH)
+        assert (mask == OBSTACLE_CLASS).all()
+        pictures.append(picture)
+    means = [p.mean() for p in pictures]
+    assert min(means) < 15
+    assert max(means) > 235
+
+
+def boxed(judged: tuple[int, ...]) -> BoxedPicture:
+    picture, _ = scene()
+    box = np.array([[1, 150 / 384, 100 / 288, 260 / 384, 180 / 288]], np.float32)
+    return BoxedPicture("test", picture, box, np.array(judged, np.uint8))
+
+
+def test_letterbox_is_centred_c3() -> None:
+    """A 512 x 288 picture fills the width and leaves 38 px bars above and below."""
+    affine = letterbox_affine((512, 288), SIZE_WH)
+    np.testing.assert_allclose(affine, [[0.625, 0, 0], [0, 0.625, 38]])
+
+
+def test_boxes_follow_the_picture() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        example = place(boxed((1, 1, 1, 1)), random_placement(rng, (384, 288), SIZE_WH, (0.6, 1.2)), SIZE_WH)
+        bright = np.argwhere(example.picture[..., 0] > 170)
+        if len(example.boxes) == 0:
+            continue
+        low, high = bright.min(0)[::-1], bright.max(0)[::-1] + 1
+        np.testing.assert_allclose(example.boxes[0, 1:], [*low, *high], atol=2.5)
+
+
+def test_the_border_is_judged_and_the_unannotated_picture_is_not() -> None:
+    example = plain(boxed((0, 1, 0, 1)), SIZE_WH)
+    assert example.judged[1].all()
+    assert example.judged[0, 0].all()
+    assert not example.judged[0, 4:28].any()
+
+
+def test_a_box_cut_off_by_the_frame_is_neither_object_nor_background() -> None:
+    affine = np.array([[1.0, 0, -245.0], [0, 1.0, 0]], np.float32)
+    example = place(boxed((1, 1, 1, 1)), affine, SIZE_WH)
+    assert len(example.boxes) == 0
+    assert not example.judged[1, 13:22, 0].any()
+    assert example.judged[1, 13:22, 4:].all()
+
+
+def test_mosaic_keeps_each_pictures_own_judgement() -> None:
+    example = augmented(np.random.default_rng(3), [boxed((0, 1, 0, 0)), *[boxed((1, 1, 1, 1))] * 3], SIZE_WH)
+    assert example.judged[1].any()
+    assert not example.judged[0].all()
+    assert example.judged[0].any()
