@@ -12,14 +12,14 @@ from tqdm import tqdm
 from paani.errors import UserError
 from paani_models.augment import GLARE_FRAC, Affine, Rng, degrade, glare, jitter_colour
 from paani_models.network_input import PAD_GREY, letterbox_affine
-from paani_models.sources import DETECTOR_CLASSES, Sample, read_boxes, read_mask, read_picture
+from paani_models.sources import DETECTOR_CLASSES, Sample, Source, read_boxes, read_mask, read_picture
 
 LONG_SIDE_PX = 480
 CELL_PX = 8  # the finest stride of the detector
 MIN_SIDE_PX = 3.0
 MIN_VISIBLE_FRAC = 0.35
 PSEUDO_PERSON_MIN_SCORE = 0.5
-PERSON = 0
+WATER, OBSTACLE, SKY = 0, 1, 2  # checklist D6
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Example:
 
 
 def read_boxed(sample: Sample) -> BoxedPicture:
-    """A labelled picture; or, for a picture with only a mask, one whose water and sky hold no object.
+    """Read a labelled picture, or one with only a mask, which tells where nothing is.
 
     Raises UserError naming an unreadable file.
     """
@@ -56,14 +56,28 @@ def read_boxed(sample: Sample) -> BoxedPicture:
         return BoxedPicture(sample.source.name, rgb, boxes, np.array(annotated, np.uint8))
     if sample.mask is None:
         raise UserError(f"{sample.picture}: has neither boxes nor a mask")
-    empty = np.isin(read_mask(sample.mask), (0, 2)).astype(np.uint8)
-    empty = cv2.resize(empty, (rgb.shape[1], rgb.shape[0]), interpolation=cv2.INTER_NEAREST)
-    empty = cv2.erode(empty, np.ones((9, 9), np.uint8), borderValue=1)
     return BoxedPicture(
         sample.source.name,
         rgb,
         np.zeros((0, 5), np.float32),
-        np.repeat(np.asarray(empty, np.uint8)[None], 4, 0),
+        judged_by_mask(sample.source, read_mask(sample.mask), rgb),
+    )
+
+
+def judged_by_mask(source: Source, mask: NDArray[np.uint8], picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Where a picture without boxes is known to show nothing of a class: uint8 [4,H,W] of the picture's size.
+
+    Nothing floats in water or sky, a little inside their edge; nor on the own hull; nor anywhere, of `source.empty_of`.
+    """
+    size = (picture.shape[1], picture.shape[0])
+    labels = np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    empty = cv2.erode(np.isin(labels, (WATER, SKY)).astype(np.uint8), np.ones((9, 9), np.uint8), borderValue=1)
+    if source.own_hull:
+        _, components = cv2.connectedComponents((labels == OBSTACLE).astype(np.uint8))
+        hull = components[-1, components.shape[1] // 2]
+        empty = np.where((components == hull) & (hull > 0), 1, empty)
+    return np.stack([np.ones_like(labels) if kind in source.empty_of else empty for kind in DETECTOR_CLASSES]).astype(
+        np.uint8
     )
 
 

@@ -9,6 +9,7 @@ from torch.nn import functional as F
 from paani_models.segmenter import TAP_CHANNELS, Segmenter
 from paani_models.teacher import TAP_CHANNELS as TEACHER_CHANNELS
 from paani_models.teacher import Teacher
+from paani_models.training import device
 
 ANSWER_GAIN, FEATURE_GAIN = 1.0, 0.5
 FIRST_TAP = 1  # strides 8, 16, 32; at stride 4 both nets see edges anyway
@@ -24,7 +25,7 @@ class Distillation(nn.Module):
             for ours, theirs in zip(TAP_CHANNELS[FIRST_TAP:], TEACHER_CHANNELS[FIRST_TAP:], strict=True)
         )
         teacher.eval().requires_grad_(False)
-        self.teacher = [teacher]  # in a list: the teacher is no part of this module's state
+        self.teacher = [teacher.to(device())]  # in a list: the teacher is no part of this module's state
 
     def forward(self, pictures: Tensor, student: Segmenter) -> tuple[Tensor, Tensor]:
         """Logits of the student for the pictures [N,3,H,W], and how far it is from the teacher (a scalar)."""

@@ -15,8 +15,8 @@ from paani.errors import UserError
 from paani_models import detector_data, evaluate, export, train_detector, train_segmenter
 from paani_models.catalogue import Model, load_catalogue, save_catalogue, verified_path
 from paani_models.detector import Detector, load_yolox
+from paani_models.distillation import Distillation
 from paani_models.network_input import detector_input, segmenter_input
-from paani_models.pseudo_labels import pseudo_labelled
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
     DETECTOR_CLASSES,
@@ -133,13 +133,15 @@ def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
     if net == "teacher":
         model = Teacher()
         load_imagenet(model, pictures.data / IMAGENET_FILE)
-    cached = train_segmenter.cache(pictures.segmented(held_out=False))
+    samples, distillation = pictures.segmented(held_out=False), None
     if plan.teacher is not None:
         teacher = Teacher()
         load_average(teacher, plan.teacher)
-        cached += pseudo_labelled(teacher, pictures.unsegmented())
+        distillation = Distillation(teacher)
+        samples += pictures.unsegmented()
     held_out = train_segmenter.cache(pictures.segmented(held_out=True))
-    training = SegmenterTraining(model, recipe, plan.folder, cached, held_out)
+    cached = train_segmenter.cache(samples)
+    training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
     if plan.start is not None:
         training.progress.start_from(plan.start)
     training.run()

@@ -156,8 +156,8 @@ def segmenter_loss(logits: Tensor, target: Tensor) -> Tensor:
 
     logits: float32 [N,3,H,W]. target: int64 [N,H,W], classes 0..2, 255 ignored by both terms.
     """
-    entropy = F.cross_entropy(logits, target, ignore_index=255)
     valid = (target != 255).unsqueeze(1)
+    entropy = F.cross_entropy(logits, target, ignore_index=255, reduction="sum") / valid.sum().clamp(min=1)
     one_hot = F.one_hot(target.clamp(max=logits.shape[1] - 1), logits.shape[1])
     truth = one_hot.permute(0, 3, 1, 2).to(logits.dtype) * valid
     probability = torch.softmax(logits, 1) * valid

@@ -31,7 +31,8 @@ class Source:
 
     masks: subfolder of three-class masks, "" if none. water_only: its human masks tell water from the rest only,
     so sky and obstacle are not scored on it. annotated: detector classes whose every instance is boxed; only those
-    may be punished on background. held_out: sequences for validation; empty means one in eight by name.
+    may be punished on background. empty_of: classes that its pictures do not show, boxes or none. own_hull: the
+    boat's own bow fills the bottom middle. held_out: sequences for validation; empty means one in eight by name.
     """
 
     name: str
@@ -40,8 +41,12 @@ class Source:
     water_only: bool = False
     labels: str = ""
     annotated: frozenset[str] = frozenset()
+    empty_of: frozenset[str] = frozenset()
+    own_hull: bool = False
     held_out: tuple[str, ...] = ()
 
+
+NO_CRAFT = frozenset({"vessel", "buoy"})
 
 SOURCES = (
     Source(
@@ -49,6 +54,7 @@ SOURCES = (
         "tbiseg_usvinland",
         masks="masks3",
         water_only=True,
+        empty_of=NO_CRAFT,
         held_out=("H05_8", "N02_4", "N03_4", "W06_2", "X01_2", "X19_03"),
     ),
     Source(
@@ -56,10 +62,11 @@ SOURCES = (
         "tbiseg_tampere",
         masks="masks3",
         water_only=True,
+        own_hull=True,
         held_out=("open_image",),
     ),
-    Source("tbiseg_dasha", "tbiseg_dasha", masks="masks3", water_only=True, held_out=("DJI_0035",)),
-    Source("bath_river", "bath_river", masks="masks3", water_only=True, held_out=("run3", "run8")),
+    Source("tbiseg_dasha", "tbiseg_dasha", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("DJI_0035",)),
+    Source("bath_river", "bath_river", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("run3", "run8")),
     Source("mastr1325", "mastr1325_val_recovered", masks="masks", held_out=("run2",)),
     Source("oasis", "oasis_recovered", masks="masks", held_out=("OASIs/type2",)),
     Source("mcoe_boats", "mcoe_boats", labels="labels", annotated=frozenset({"vessel", "buoy"})),

@@ -109,9 +109,7 @@ class Progress:
     extra: parameters that are trained along with the model and are not part of it.
     """
 
-    def __init__(
-        self, model: nn.Module, peak_rate: float, weight_decay: float, extra: nn.Module | None = None
-    ) -> None:
+    def __init__(self, model: nn.Module, peak_rate: float, weight_decay: float, extra: nn.Module | None = None) -> None:
         self.model = model.to(device())
         for parameter in self.model.parameters():
             if parameter.dim() == 4:

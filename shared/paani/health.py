@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from paani import keys
 from paani import messages as m
@@ -21,7 +22,7 @@ class HealthReporter:
     def __init__(
         self,
         service: str,
-        inputs: Sequence[tuple[keys.Topic[m.Message], Inbox[object]]],
+        inputs: Sequence[tuple[keys.Topic[Any], Inbox[Any]]],
         drops: collections.Counter[str],
         note: Callable[[], str],
     ) -> None:
@@ -49,7 +50,7 @@ class HealthReporter:
         self._last_us, self._last_cpu_s = now_us, cpu_s
         return report
 
-    def _input(self, topic: keys.Topic[m.Message], inbox: Inbox[object], span_s: float) -> m.InputHealth:
+    def _input(self, topic: keys.Topic[Any], inbox: Inbox[Any], span_s: float) -> m.InputHealth:
         received = inbox.received
         rate_hz = (received - self._last_received.get(topic.name, 0)) / span_s if span_s > 0 else 0.0
         self._last_received[topic.name] = received

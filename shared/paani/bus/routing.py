@@ -31,7 +31,7 @@ async def open_router(config: BusConfig) -> zenoh.Session:
     """Start listening on `bus.router`. Raises UserError when the address is taken or wrong."""
     require_free(config.router)
     try:
-        return await asyncio.to_thread(zenoh.open, router_config(config))
+        return await asyncio.to_thread(lambda: zenoh.open(router_config(config)))
     except zenoh.ZError as error:
         raise UserError(f"bus.router {config.router}: {error}") from error
 

@@ -50,6 +50,6 @@ async def open_client(config: BusConfig, user: str) -> zenoh.Session:
     """Open a session; waits for the router as long as it takes."""
     while True:
         try:
-            return await asyncio.to_thread(zenoh.open, client_config(config, user))
+            return await asyncio.to_thread(lambda: zenoh.open(client_config(config, user)))
         except zenoh.ZError:
             await asyncio.sleep(0.1)

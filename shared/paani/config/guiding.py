@@ -2,33 +2,52 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from paani.config.section import Fraction, NonNegative, Positive, Section
+
+Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 
 
 class LocalizationConfig(Section, frozen=True):
+    """`origin_*` is where the map's (0, 0) lies; unset: the first fix."""
+
     rate_hz: Positive = 20.0  # L1, L3
+    origin_latitude_deg: Latitude | None = None
+    origin_longitude_deg: Longitude | None = None
     gate_mahalanobis2: Positive = 25.0
     calibration_s: NonNegative = 2.0
     max_gps_age_s: Positive = 3.0
     max_imu_age_s: Positive = 0.3
     max_position_std_m: Positive = 8.0
+    max_yaw_std_rad: Positive = 0.35
     stopped_speed_mps: NonNegative = 0.05  # L5
     stopped_after_s: Positive = 2.0  # L5
 
 
 class NavigatorConfig(Section, frozen=True):
+    """`route` is the path of a route file; empty: no route, no motion."""
+
+    route: str = ""
     rate_hz: Positive = 10.0
     acceptance_m: Positive = 1.5
+    pass_abeam_m: NonNegative = 6.0  # a waypoint left behind within this distance counts; 0: never
+    lookahead_m: NonNegative = 4.0  # line of sight along the leg; 0: plain waypoint bearing (M4)
     cruise_mps: Positive = 0.6
     turn_speed_frac: Fraction = 0.5  # M7
     turn_deg: Positive = 25.0  # M5
     slight_turn_deg: Positive = 10.0  # M6
     latch_turns: bool = True
+    turn_hold_s: NonNegative = 1.5  # on a latched heading before the next turn is added
     max_total_turn_deg: Positive = 90.0
     advisory_max_age_s: Positive = 3.5  # M10
     advisory_max_receipt_s: Positive = 0.6  # M10
-    odometry_max_age_s: Positive = 0.3
+    odometry_max_age_s: Positive = 0.4
     clock_max_age_s: Positive = 0.4
+    arming_max_age_s: Positive = 1.0
 
 
 class ControllerConfig(Section, frozen=True):
@@ -45,5 +64,7 @@ class ControllerConfig(Section, frozen=True):
     heading_kd: NonNegative = 0.10
     max_forward: Fraction = 0.15
     max_steer: Fraction = 0.10
+    max_integral: Fraction = 0.03
     slew_per_s: Positive = 0.5
     command_max_receipt_s: Positive = 0.35
+    odometry_max_age_s: Positive = 0.4

@@ -19,6 +19,8 @@ PAPER: dict[str, object] = {
     },
     "navigator": {
         "acceptance_m": 1.0,  # M2
+        "pass_abeam_m": 0.0,  # M2
+        "lookahead_m": 0.0,  # M4
         "cruise_mps": 0.15,  # M7
         "latch_turns": False,  # M5: continuous
     },

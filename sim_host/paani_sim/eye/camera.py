@@ -12,6 +12,7 @@ from paani_sim.eye.mesh import rotation
 
 F64 = npt.NDArray[np.float64]
 NEAR_M = 0.15
+REST_Z_M = 0.177  # checklist K6: height of the boat's origin at rest
 FAR_M = 3000.0
 
 
@@ -22,7 +23,7 @@ class BoatPose:
     x_m: float
     y_m: float
     yaw_rad: float
-    z_m: float = 0.177
+    z_m: float = REST_Z_M
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
 
@@ -34,9 +35,9 @@ class Camera:
     width_px: int = 320
     height_px: int = 240
     hfov_deg: float = 70.0
-    forward_m: float = 0.45
+    forward_m: float = 0.55
     up_m: float = 0.723
-    down_deg: float = 4.0
+    down_deg: float = 6.0
 
     @property
     def focal_px(self) -> float:

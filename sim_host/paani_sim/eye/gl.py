@@ -146,6 +146,15 @@ def draw(gl: ModuleType, batch: Batch) -> None:
     gl.glDrawElements(gl.GL_TRIANGLES, batch.index_count, gl.GL_UNSIGNED_INT, None)
 
 
+def draw_chunks(gl: ModuleType, batch: Batch, first: npt.NDArray[np.int64], count: npt.NDArray[np.int64]) -> None:
+    """Draw some stretches of a batch's indices, in the given order, with the current program."""
+    if len(first) == 0:
+        return
+    gl.glBindVertexArray(batch.vertex_array)
+    offsets = (ctypes.c_void_p * len(first))(*(4 * first).tolist())
+    gl.glMultiDrawElements(gl.GL_TRIANGLES, count.astype(np.int32), gl.GL_UNSIGNED_INT, offsets, len(first))
+
+
 def make_texture(gl: ModuleType, picture: npt.NDArray[np.uint8], unit: int, *, wrap_v: bool = True) -> int:
     """Upload `(h, w, c)` (or `(layers, h, w, c)`) with mip levels and leave it bound to `unit`."""
     layered = picture.ndim == 4

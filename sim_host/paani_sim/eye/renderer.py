@@ -15,6 +15,7 @@ import numpy.typing as npt
 from paani_sim.eye import gl as g
 from paani_sim.eye import shaders
 from paani_sim.eye.camera import BoatPose, Camera, look_from, view_projection
+from paani_sim.eye.chunks import Chunks, make_chunks, visible
 from paani_sim.eye.labels import Labelled, read_labels
 from paani_sim.eye.lens import Lens
 from paani_sim.eye.scene import (
@@ -98,8 +99,12 @@ class Eye:
         width, height = self.camera.width_px, self.camera.height_px
         self._mirror = g.make_target(gl, width, height, _MIRROR)
         self._main = g.make_target(gl, round(width * self._scale), round(height * self._scale), _MAIN)
-        self._still = g.make_batch(gl, scene.still.rows, ROW_WIDTHS, scene.still.order)
-        self._plants = g.make_batch(gl, scene.plants.rows, PLANT_WIDTHS, scene.plants.order)
+        still, plants = scene.still, scene.plants
+        place_m, reach_m = plants.rows[:, :2].astype(float), 0.5 * plants.rows[:, 3].astype(float)
+        self._still_chunks = make_chunks(still.rows[:, :2].astype(float), still.order, np.zeros(len(still.rows)))
+        self._plant_chunks = make_chunks(place_m, plants.order, reach_m)
+        self._still = g.make_batch(gl, still.rows, ROW_WIDTHS, self._still_chunks.order)
+        self._plants = g.make_batch(gl, plants.rows, PLANT_WIDTHS, self._plant_chunks.order)
         self._actors = [(actor, g.make_batch(gl, rows.rows, ROW_WIDTHS, rows.order)) for actor, rows in scene.actors]
         self._screen = g.make_batch(gl, _FLAT, (2,), _QUAD)
         self._extra: g.Batch | None = None
@@ -171,6 +176,7 @@ class Eye:
             "mapFromClip": np.linalg.inv(clip).astype(np.float32),
             "eye": position.astype(np.float32),
             "time": float(t_s),
+            "heading": pose.yaw_rad,
             "screen": np.array([self._main.width_px, self._main.height_px], np.float32),
         }
         gl.glEnable(gl.GL_DEPTH_TEST)
@@ -200,16 +206,22 @@ class Eye:
 
     def _draw_solids(self, shared: dict[str, float | F32], t_s: float, flip: float) -> None:
         gl, solid = self._gl, self._programs["solid"]
-        solid.use(**shared, flip=flip, actorId=0.0, mapFromModel=_IDENTITY)
+        solid.use(**shared, flip=flip, mapFromModel=_IDENTITY)
         for actor, batch in self._actors:
             solid.use(mapFromModel=_model(*actor_pose(actor, t_s)))
             g.draw(gl, batch)
         solid.use(mapFromModel=_IDENTITY)
         if self._extra is not None:
             g.draw(gl, self._extra)
-        g.draw(gl, self._still)
+        self._draw_ahead(self._still, self._still_chunks, shared)
         self._programs["plant"].use(**shared, flip=flip)
-        g.draw(gl, self._plants)
+        self._draw_ahead(self._plants, self._plant_chunks, shared)
+
+    def _draw_ahead(self, batch: g.Batch, chunks: Chunks, shared: dict[str, float | F32]) -> None:
+        """What of a batch can be in the picture, with room for the roll."""
+        half_rad = np.arctan(1.35 * np.tan(0.5 * np.radians(self.camera.hfov_deg)))
+        found = visible(chunks, np.asarray(shared["eye"], float), float(shared["heading"]), float(half_rad))
+        g.draw_chunks(self._gl, batch, chunks.first[found], chunks.count[found])
 
     def close(self) -> None:
         """Free the OpenGL context, where this eye made it."""

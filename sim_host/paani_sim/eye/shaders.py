@@ -6,13 +6,13 @@
 _COMMON = """
 #version 330
 uniform vec3 eye; uniform vec3 sun; uniform vec3 sunRgb; uniform vec3 skyRgb; uniform vec3 hazeRgb;
-uniform float visibility; uniform float exposure; uniform float time;
+uniform float visibility; uniform float exposure; uniform float time; uniform float flip;
 uniform sampler2D noiseTile; uniform sampler2D panorama;
 const float PI = 3.14159265;
 vec3 encode(vec3 light) {
     vec3 x = light * exposure;
     vec3 film = (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
-    return sqrt(clip01(film));
+    return sqrt(clamp(film, 0.0, 1.0));
 }
 vec3 skyLight(vec3 ray, float lod) {
     vec2 uv = vec2(atan(ray.y, ray.x) / (2.0 * PI) + time * 0.00015, sqrt(max(ray.z, 0.0)));
@@ -23,118 +23,109 @@ float haze(float distance) { return 1.0 - exp(-distance / visibility); }
 vec3 hazeLight(vec3 ray) {
     return mix(hazeRgb, skyLight(normalize(vec3(ray.xy, 0.03)), 5.0), 0.6) * 0.92;
 }
-""".replace("clip01(film)", "clamp(film, 0.0, 1.0)")
+// What the mirrored pass keeps in alpha: how far away the reflected thing is, 0 for the sky.
+float nearness(float distance) { return flip < 0.0 ? 0.25 + 0.75 * exp(-distance / 60.0) : 1.0; }
+"""
 
-SOLID_VERTEX = """
-#version 330
+SOLID_VERTEX = (
+    _COMMON
+    + """
 layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 paint; layout(location = 3) in float number;
-uniform mat4 clipFromMap; uniform mat4 mapFromModel; uniform float flip; uniform float actorId;
-out vec3 world; out vec3 facing; out vec3 tint; flat out float material; flat out float id;
-out float above;
+uniform mat4 clipFromMap; uniform mat4 mapFromModel;
+out vec3 world; out vec3 facing; out vec3 tint; out vec3 hazeTint;
+flat out int kind; flat out float id;
 void main() {
     vec4 p = mapFromModel * vec4(position, 1.0);
-    world = p.xyz; facing = mat3(mapFromModel) * normal; tint = paint.rgb;
-    material = paint.a; id = number + actorId; above = p.z;
+    world = p.xyz; facing = mat3(mapFromModel) * normal; tint = paint.rgb * paint.rgb;
+    kind = int(paint.a + 0.5); id = number;
+    hazeTint = hazeLight(p.xyz - eye);
     gl_ClipDistance[0] = flip < 0.0 ? p.z : 1.0;
     gl_Position = clipFromMap * vec4(p.xy, p.z * flip, 1.0);
 }
 """
+)
 
+# The software rasteriser runs every branch, so the surfaces share two noise samples.
 SOLID_FRAGMENT = (
     _COMMON
     + """
-in vec3 world; in vec3 facing; in vec3 tint; flat in float material; flat in float id;
-in float above;
-uniform float flip;
+in vec3 world; in vec3 facing; in vec3 tint; in vec3 hazeTint;
+flat in int kind; flat in float id;
 layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
 void main() {
     vec3 toEye = eye - world; float range = length(toEye);
     vec3 n = normalize(facing), v = toEye / range;
     if (dot(n, vec3(v.xy, v.z * flip)) < 0.0) n = -n;
-    vec3 albedo = tint * tint; int kind = int(material + 0.5);
-    float gloss = 0.0;
-    if (kind == 1) {
-        vec2 p = world.xy;
-        vec4 a = texture(noiseTile, p * 0.021), b = texture(noiseTile, p * 0.17);
-        vec4 c = texture(noiseTile, vec2(p.x + p.y, world.z * 1.7 + p.x - p.y) * 0.31);
-        albedo *= 0.45 + 0.55 * a.g + 0.5 * b.b + 0.45 * (c.a - 0.5) + 0.3 * (b.r - 0.5);
-        albedo = mix(albedo, albedo * vec3(1.35, 1.08, 0.7), clamp(a.r * 2.0 - 0.9, 0.0, 1.0));
-        n = normalize(n + vec3(b.b - 0.5, b.g - 0.5, 0.0) * 1.1);
-    } else if (kind == 2) {
-        float grain = texture(noiseTile, vec2(world.x + world.y, world.z * 4.0) * 0.9).b;
-        albedo *= 0.55 + 0.9 * grain;
-    } else if (kind == 3) {
-        vec4 a = texture(noiseTile, vec2(world.x + 0.7 * world.y, world.z) * 0.23);
-        albedo *= 0.45 + 0.6 * a.g + 0.5 * a.b;
-        albedo *= mix(0.45, 1.0, smoothstep(0.05, 0.55, above));
-    } else if (kind == 4) {
-        gloss = 0.45;
-    } else if (kind == 5) {
-        vec2 wall = vec2(dot(world.xy, abs(n.x) > abs(n.y) ? vec2(0, 1) : vec2(1, 0)), world.z);
-        vec2 cell = fract(wall * vec2(0.42, 0.38));
-        bool pane = abs(cell.x - 0.5) < 0.2 && abs(cell.y - 0.55) < 0.24 && abs(n.z) < 0.5;
-        float stain = 0.75 + 0.5 * texture(noiseTile, wall * 0.1).b;
-        albedo = pane ? vec3(0.02, 0.025, 0.03) : albedo * stain;
-        gloss = pane ? 0.35 : 0.0;
-    } else {
-        gloss = 0.05;
-        albedo *= 0.86 + 0.28 * texture(noiseTile, vec2(world.x + world.y, world.z) * 0.8).g;
-    }
-    albedo *= mix(0.55, 1.0, smoothstep(-0.02, 0.14, above));
+    bool land = kind == 1, wood = kind == 2, rock = kind == 3, glass = kind == 4, facade = kind == 5;
+    float across = world.x + 0.8 * world.y;
+    vec2 wall = vec2(abs(n.x) > abs(n.y) ? world.y : world.x, world.z);
+    vec2 wide = land ? world.xy * 0.021 : wood ? vec2(across, world.z * 4.0) * 0.9
+        : facade ? wall * 0.1 : vec2(across, world.z) * 0.5;
+    vec2 fine = land ? world.xy * 0.17 : vec2(across, world.z) * 0.23;
+    vec4 a = texture(noiseTile, wide), b = texture(noiseTile, fine);
+    float stain = land ? 0.35 + 0.55 * a.g + 0.6 * b.b + 0.35 * b.r + 0.5 * (b.a - 0.5)
+        : wood ? 0.55 + 0.9 * a.b
+        : rock ? (0.45 + 0.6 * b.g + 0.5 * b.b) * mix(0.45, 1.0, smoothstep(0.05, 0.55, world.z))
+        : 0.84 + 0.32 * a.g;
+    vec2 cell = fract(wall * vec2(0.42, 0.38));
+    bool pane = facade && abs(cell.x - 0.5) < 0.2 && abs(cell.y - 0.55) < 0.24 && abs(n.z) < 0.5;
+    vec3 dry = mix(vec3(1.0), vec3(1.35, 1.08, 0.7), land ? clamp(a.r * 2.0 - 0.9, 0.0, 1.0) : 0.0);
+    vec3 albedo = pane ? vec3(0.02, 0.025, 0.03) : tint * stain * dry;
+    n = land ? normalize(n + vec3(b.b - 0.5, b.g - 0.5, 0.0) * 1.1) : n;
+    albedo *= mix(0.55, 1.0, smoothstep(-0.02, 0.14, world.z));
     float direct = max(dot(n, sun), 0.0);
     vec3 light = sunRgb * direct + skyRgb * (0.62 + 0.38 * n.z) + 0.10 * sunRgb * (0.5 - 0.5 * n.z);
     vec3 shade = albedo * light;
-    if (gloss > 0.0) {
-        vec3 mirrored = reflect(-v, n);
-        float edge = gloss + (1.0 - gloss) * 0.6 * pow(1.0 - max(dot(n, v), 0.0), 5.0);
-        shade += edge * skyLight(normalize(vec3(mirrored.xy, abs(mirrored.z))), 3.0) * 0.8;
-        shade += gloss * sunRgb * pow(max(dot(mirrored, sun), 0.0), 60.0) * 3.0;
-    }
-    shade = mix(shade, hazeLight(-v), haze(range));
-    colour = vec4(encode(shade), flip < 0.0 ? 0.25 + 0.75 * exp(-range / 60.0) : 1.0);
+    float gloss = glass ? 0.45 : pane ? 0.35 : land || wood || rock ? 0.0 : 0.05;
+    vec3 mirrored = reflect(-v, n);
+    float edge = gloss + gloss * 4.0 * pow(1.0 - max(dot(n, v), 0.0), 5.0);
+    shade += edge * mix(hazeTint, skyRgb, clamp(abs(mirrored.z) * 1.5, 0.0, 1.0)) * 0.8;
+    shade += gloss * sunRgb * pow(max(dot(mirrored, sun), 0.0), 60.0) * 3.0;
+    shade = mix(shade, hazeTint, haze(range));
+    colour = vec4(encode(shade), nearness(range));
     label = vec4(mod(id, 256.0) / 255.0, floor(id / 256.0) / 255.0, 0.0, 1.0);
 }
 """
 )
 
-PLANT_VERTEX = """
-#version 330
+PLANT_VERTEX = (
+    _COMMON
+    + """
 layout(location = 0) in vec3 foot; layout(location = 1) in vec4 card;
 layout(location = 2) in vec2 corner;
-uniform mat4 clipFromMap; uniform vec3 eye; uniform float flip; uniform float time;
-out vec3 world; out vec3 texel; out vec3 shade;
+uniform mat4 clipFromMap;
+out vec3 texel; out vec3 light; out vec4 air;
 void main() {
     vec2 away = foot.xy - eye.xy;
     vec2 across = normalize(vec2(away.y, -away.x));
     bool mirror = fract(foot.x * 7.31 + foot.y * 3.77) > 0.5;
     float sway = 0.012 * card.y * corner.y * sin(time * 1.3 + foot.x * 0.7 + foot.y * 0.9);
-    world = foot + vec3(across * ((corner.x - 0.5) * card.x + sway), corner.y * card.y);
+    vec3 world = foot + vec3(across * ((corner.x - 0.5) * card.x + sway), corner.y * card.y);
     texel = vec3(mirror ? 1.0 - corner.x : corner.x, 1.0 - corner.y, card.z);
     float hue = fract(foot.x * 3.17 + foot.y * 5.71);
-    shade = card.w * mix(vec3(1.12, 1.0, 0.82), vec3(0.84, 0.98, 1.0), hue);
+    vec3 shade = card.w * mix(vec3(1.12, 1.0, 0.82), vec3(0.84, 0.98, 1.0), hue);
+    float facing = 0.5 - 0.5 * dot(normalize(away), normalize(sun.xy + 1e-4));
+    float lift = 0.40 + 0.60 * corner.y;
+    light = 1.45 * shade * (sunRgb * (0.18 + 0.42 * facing) * lift + skyRgb * (0.35 + 0.55 * lift));
+    air = vec4(hazeLight(world - eye), distance(world, eye));
     gl_ClipDistance[0] = flip < 0.0 ? world.z : 1.0;
     gl_Position = clipFromMap * vec4(world.xy, world.z * flip, 1.0);
 }
 """
+)
 
 PLANT_FRAGMENT = (
     _COMMON
     + """
-in vec3 world; in vec3 texel; in vec3 shade;
-uniform sampler2DArray sprites; uniform float flip;
+in vec3 texel; in vec3 light; in vec4 air;
+uniform sampler2DArray sprites;
 layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
 void main() {
     vec4 leaf = texture(sprites, texel);
     if (leaf.a < 0.42) discard;
-    vec3 toEye = eye - world; float range = length(toEye);
-    vec3 v = toEye / range;
-    float facing = 0.5 + 0.5 * dot(normalize(v.xy), normalize(sun.xy + 1e-4));
-    float lift = 0.40 + 0.60 * (1.0 - texel.y);
-    vec3 light = sunRgb * (0.18 + 0.42 * facing) * lift + skyRgb * (0.35 + 0.55 * lift);
-    vec3 tint = leaf.rgb * leaf.rgb * shade;
-    vec3 lit = mix(tint * light * 1.45, hazeLight(-v), haze(range));
-    colour = vec4(encode(lit), flip < 0.0 ? 0.25 + 0.75 * exp(-range / 60.0) : 1.0);
+    vec3 lit = mix(leaf.rgb * leaf.rgb * light, air.rgb, haze(air.a));
+    colour = vec4(encode(lit), nearness(air.a));
     label = vec4(2.0 / 255.0, 0.0, 0.0, 1.0);
 }
 """

@@ -1,0 +1,52 @@
+# `make run` and `make test` set up everything they need on a fresh Debian or Ubuntu machine.
+
+PYTHON ?= python3
+VENV   ?= .venv
+PAANI  := $(VENV)/bin/paani
+BIN    := $(VENV)/bin
+DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
+DEBIAN_TEST := $(DEBIAN) chromium
+
+.PHONY: run test check lint setup setup-test system system-test lock clean
+
+run: setup ## start the whole loop on the river world
+	$(PAANI) up $(ARGS)
+
+test: setup-test lint ## everything that CI runs
+	$(BIN)/python -m pytest -q tests
+
+check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests
+	$(BIN)/python -m pytest -q tests/unit tests/contract -m "not train and not gl and not data"
+
+lint:
+	$(BIN)/ruff check -q .
+	$(BIN)/ruff format -q --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+setup: $(VENV)/.host-stamp system
+setup-test: $(VENV)/.dev-stamp system-test
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "paani needs Python >= 3.11 (PYTHON=...)"; exit 2; }
+	@$(PYTHON) -m venv $(VENV) || { echo "cannot make $(VENV): install python3-venv"; exit 2; }
+
+$(VENV)/.host-stamp: pyproject.toml requirements.lock | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q -c requirements.lock -e ".[host]"
+	@touch $@
+
+$(VENV)/.dev-stamp: pyproject.toml requirements.lock | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q -c requirements.lock -e ".[host,dev]"
+	@touch $@ $(VENV)/.host-stamp
+
+system:
+	@sh deploy/system-packages.sh $(DEBIAN)
+
+system-test:
+	@sh deploy/system-packages.sh $(DEBIAN_TEST)
+
+lock: ## pin what the next installation takes
+	$(BIN)/uv pip compile -q --extra host --extra dev --no-header --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,1 @@
+"""Heading and speed to normalised differential thrust."""

@@ -1,0 +1,1 @@
+"""The advisor's direction and the route to one heading and speed."""

@@ -1,0 +1,1 @@
+"""The simulated boat: MuJoCo body, surface dynamics, sensors and the thrust adapter."""

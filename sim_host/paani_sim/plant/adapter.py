@@ -1,0 +1,115 @@
+"""The last gate before force: trusts nobody, zero unless everything is in order (checklist O1, O2).
+
+Time is the plant's own monotonic clock. A command is as old as the plant stamp that it echoes, so
+no other clock matters and a burst of delayed commands is refused whole.
+"""
+
+import math
+from typing import NamedTuple
+
+from paani.config import AdapterConfig
+from paani.messages import Arming, Thrust, ZeroCause
+
+PRODUCER = "controller"
+
+
+class Applied(NamedTuple):
+    """Normalised thrust and force of each fan, and why they are zero when they are."""
+
+    left: float
+    right: float
+    left_n: float
+    right_n: float
+    zero_cause: ZeroCause
+    lost_pulse: str = ""
+
+
+class ThrustAdapter:
+    """State machine of the last gate. Every method takes the plant's clock, `now_us`.
+
+    What is late comes back to life by itself when it is in order again; a latched stop does not:
+    `Arming.stopped` holds until the operator arms again.
+    """
+
+    def __init__(self, config: AdapterConfig, domain: int) -> None:
+        self._config = config
+        self._domain = domain
+        self._epoch = -1
+        self._seq = -1
+        self._accepted_us: int | None = None
+        self._refused = ZeroCause.NO_COMMAND
+        self._arming: Arming | None = None
+        self._arming_us = 0
+        self._pulses_us: dict[str, int] = {}
+        self.command: Thrust | None = None
+        self.rejected = 0
+
+    def offer(self, thrust: Thrust, now_us: int) -> ZeroCause:
+        """Check one command; NONE if it is now in force, else the cause it was refused for.
+
+        An invalid command from the controller itself also revokes the one in force.
+        """
+        cause = self._fault(thrust, now_us)
+        if cause is ZeroCause.NONE:
+            self._epoch, self._seq = thrust.epoch, thrust.seq
+            self.command, self._accepted_us = thrust, now_us
+            self._refused = ZeroCause.TIMEOUT
+            return cause
+        self.rejected += 1
+        self._refused = cause
+        if cause is ZeroCause.INVALID:
+            self._accepted_us = None
+        return cause
+
+    def hear_arming(self, arming: Arming, now_us: int) -> None:
+        """The operator's newest word, and when it came."""
+        self._arming, self._arming_us = arming, now_us
+
+    def hear_pulse(self, service: str, now_us: int) -> None:
+        """A vital process showed that its event loop runs."""
+        self._pulses_us[service] = now_us
+
+    def decide(self, now_us: int) -> Applied:
+        """What the fans do now."""
+        cause, lost_pulse = self._zero_cause(now_us)
+        if cause is not ZeroCause.NONE or self.command is None:
+            return Applied(0.0, 0.0, 0.0, 0.0, cause, lost_pulse)
+        force_n = self._config.force_per_unit_n
+        left, right = self.command.left, self.command.right
+        return Applied(left, right, force_n * left, force_n * right, cause)
+
+    def _zero_cause(self, now_us: int) -> tuple[ZeroCause, str]:
+        config = self._config
+        if self._arming is None or not self._arming.armed or self._arming.stopped:
+            return ZeroCause.NOT_ARMED, ""
+        if now_us - self._arming_us > config.arming_timeout_s * 1e6:
+            return ZeroCause.ARMING_LOST, ""
+        for service in config.require_pulses:
+            heard_us = self._pulses_us.get(service)
+            if heard_us is None or now_us - heard_us > config.pulse_timeout_s * 1e6:
+                return ZeroCause.PULSE_LOST, service
+        if self.command is None or self._accepted_us is None:
+            return self._refused, ""
+        if now_us - self._accepted_us > config.timeout_s * 1e6:
+            return self._refused, ""
+        if not self.command.enabled:
+            return ZeroCause.NOT_ENABLED, ""
+        return ZeroCause.NONE, ""
+
+    def _fault(self, thrust: Thrust, now_us: int) -> ZeroCause:
+        if thrust.producer != PRODUCER:
+            return ZeroCause.WRONG_PRODUCER
+        if thrust.domain != self._domain:
+            return ZeroCause.WRONG_DOMAIN
+        if thrust.epoch < self._epoch:
+            return ZeroCause.OLD_EPOCH
+        if thrust.epoch == self._epoch and thrust.seq <= self._seq:
+            return ZeroCause.REPLAYED
+        if thrust.echo_us > now_us:
+            return ZeroCause.FUTURE
+        if now_us - thrust.echo_us > self._config.max_echo_age_s * 1e6:
+            return ZeroCause.STALE_ECHO
+        fans = (thrust.left, thrust.right)
+        if not all(math.isfinite(fan) and 0.0 <= fan <= 1.0 for fan in fans):
+            return ZeroCause.INVALID
+        return ZeroCause.NONE

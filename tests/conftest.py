@@ -1,0 +1,129 @@
+"""Every test gets its own router, port and runtime folder; readiness is a liveliness token, never a sleep."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+
+import pytest
+from blockbuster import blockbuster_ctx
+
+from paani.bus import Bus, open_bus
+from paani.bus.routing import open_router
+from paani.clock import WallClock
+from paani.config import Config, load_config
+
+START_TIMEOUT_S = 40.0
+STOP_TIMEOUT_S = 10.0
+
+Spawn = Callable[..., AbstractAsyncContextManager[asyncio.subprocess.Process]]
+OpenAs = Callable[[str], Awaitable[Bus]]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="write the golden files anew")
+
+
+@pytest.fixture
+def update_golden(request: pytest.FixtureRequest) -> bool:
+    return bool(request.config.getoption("--update-golden"))
+
+
+@pytest.fixture(autouse=True)
+def no_blocking_calls() -> Iterator[None]:
+    """Our code may not block the event loop; the detector watches only our packages."""
+    with blockbuster_ctx(["paani", "paani_services", "paani_sim"]):
+        yield
+
+
+@pytest.fixture
+def free_port() -> int:
+    return find_free_port()
+
+
+def find_free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def private_sets(tmp_path: Path) -> tuple[str, ...]:
+    """Settings that keep one test's bus apart from every other."""
+    return (
+        f"bus.router=tcp/127.0.0.1:{find_free_port()}",
+        f"bus.runtime_dir={tmp_path / 'runtime'}",
+        f"dashboard.port={find_free_port()}",
+    )
+
+
+@pytest.fixture
+def config(private_sets: tuple[str, ...]) -> Config:
+    return load_config(sets=private_sets)
+
+
+@pytest.fixture
+async def open_as(config: Config) -> AsyncIterator[OpenAs]:
+    """`await open_as("advisor")` opens the bus as that user, on a real router that runs in this process."""
+    router = await open_router(config.bus)
+    opened: list[Bus] = []
+
+    async def open_as(user: str) -> Bus:
+        bus = await open_bus(config.bus, user, WallClock())
+        opened.append(bus)
+        return bus
+
+    yield open_as
+    for bus in opened:
+        await bus.close()
+    await asyncio.to_thread(router.close)
+
+
+@pytest.fixture
+def spawn(open_as: OpenAs, private_sets: tuple[str, ...]) -> Spawn:
+    """`async with spawn("advisor", "advisor.rate_hz=50"):` runs the real process; a dirty exit fails the test."""
+
+    @contextlib.asynccontextmanager
+    async def spawn(service: str, *sets: str) -> AsyncIterator[asyncio.subprocess.Process]:
+        arguments = [word for setting in (*private_sets, *sets) for word in ("--set", setting)]
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "paani", service, *arguments,
+            stderr=asyncio.subprocess.PIPE, env={**os.environ, "OMP_NUM_THREADS": "1"},
+        )
+        try:
+            await wait_alive(await open_as("observer"), service, process)
+            yield process
+        finally:
+            if process.returncode is None:
+                process.send_signal(signal.SIGCONT)
+                process.terminate()
+            async with asyncio.timeout(STOP_TIMEOUT_S):
+                _, errors = await process.communicate()
+        assert process.returncode == 0, f"{service} exited {process.returncode}: {errors.decode()[-2000:]}"
+
+    return spawn
+
+
+async def wait_alive(bus: Bus, service: str, process: asyncio.subprocess.Process) -> None:
+    """Return when the service's liveliness token is there; fail at once when it exits first."""
+
+    async def token() -> None:
+        async for name, alive in bus.alive_events():
+            if name == service and alive:
+                return
+
+    waiting = [asyncio.create_task(token()), asyncio.create_task(process.wait())]
+    async with asyncio.timeout(START_TIMEOUT_S):
+        await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+    for task in waiting:
+        task.cancel()
+    if process.returncode is not None:
+        assert process.stderr is not None
+        pytest.fail(f"{service} exited {process.returncode}: {(await process.stderr.read()).decode()[-2000:]}")

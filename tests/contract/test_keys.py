@@ -1,0 +1,116 @@
+"""The table of keys: every row complete, every type closed, every byte the same as last time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from paani import authority, keys
+from paani import messages as m
+
+ROOT = Path(__file__).parents[2]
+GOLDEN = Path(__file__).parent / "golden"
+ROWS: tuple[keys.Topic[Any], ...] = (*keys.TOPICS, keys.pulse("advisor"), keys.health("advisor"))
+
+
+def minimal(kind: Any) -> Any:
+    """A value of the type with every required field filled."""
+    info = msgspec.inspect.type_info(kind)
+    return msgspec.convert(_fill(info), kind)
+
+
+def _fill(info: Any) -> Any:
+    match info:
+        case msgspec.inspect.StructType():
+            return {f.name: _fill(f.type) for f in info.fields if f.required}
+        case msgspec.inspect.IntType():
+            return info.ge or 0
+        case msgspec.inspect.FloatType():
+            return 0.25
+        case msgspec.inspect.BoolType():
+            return True
+        case msgspec.inspect.StrType():
+            return "text"
+        case msgspec.inspect.EnumType():
+            return next(iter(info.cls)).value
+        case msgspec.inspect.TupleType():
+            return [_fill(item) for item in info.item_types]
+        case msgspec.inspect.VarTupleType():
+            return [_fill(info.item_type)]
+    raise AssertionError(f"open or unknown type {info}")
+
+
+@pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
+def test_a_row_is_complete(topic: keys.Topic[Any]) -> None:
+    """B1-B13: each interface has one producer, a rate, a freshness limit and a stance."""
+    assert topic.producer in keys.SERVICES
+    assert 0 < topic.rate_hz <= 100
+    assert topic.fresh_s * topic.rate_hz > 1.0
+    assert topic.key(43, "otter").startswith("paani/43/otter/")
+    assert topic.summary
+
+
+def test_names_are_unique() -> None:
+    names = [topic.name for topic in keys.TOPICS]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
+def test_the_wire_format_has_not_changed(topic: keys.Topic[Any], update_golden: bool) -> None:
+    """Golden bytes: a field may only be added with a default, which appends to the object."""
+    data = msgspec.json.encode(minimal(topic.type))
+    golden = GOLDEN / f"{topic.type.__name__}.json"
+    if update_golden:
+        golden.write_bytes(data)
+    old = msgspec.json.decode(golden.read_bytes())
+    new = msgspec.json.decode(data)
+    assert {name: new.get(name) for name in old} == old
+    assert msgspec.json.decode(golden.read_bytes(), type=topic.type) is not None
+
+
+@pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
+def test_a_type_is_closed_flat_json(topic: keys.Topic[Any]) -> None:
+    """No dicts, no unions, no arrays of arrays: viewers' JSON-schema parsers take it."""
+    _require_flat(msgspec.inspect.type_info(topic.type), depth=0)
+
+
+def _require_flat(info: Any, depth: int) -> None:
+    match info:
+        case msgspec.inspect.StructType():
+            for field in info.fields:
+                _require_flat(field.type, 0)
+        case msgspec.inspect.TupleType():
+            assert depth == 0
+            assert len({type(item) for item in info.item_types}) == 1
+            _require_flat(info.item_types[0], depth + 1)
+        case msgspec.inspect.VarTupleType():
+            assert depth == 0
+            _require_flat(info.item_type, depth + 1)
+        case _:
+            assert not isinstance(info, msgspec.inspect.DictType | msgspec.inspect.UnionType | msgspec.inspect.AnyType)
+
+
+def test_stamps_are_safe_in_javascript() -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.json.decode(b'{"source_us": 9007199254740993}', type=m.Pulse)
+
+
+def test_only_the_controller_may_write_thrust() -> None:
+    """A7 B13: neither perception nor advisor can write anything that moves the boat."""
+    moving = {keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name}
+    for service in keys.SERVICES:
+        may = moving & set(authority.written_by(service))
+        expected = {"controller": {keys.THRUST.name}, "navigator": {keys.COMMAND.name}, "dashboard": {keys.ARMING.name}}
+        assert may == expected.get(service, set())
+
+
+def test_the_readme_shows_the_table_of_keys() -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "paani", "topics", "--markdown"], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() in (ROOT / "shared" / "README.md").read_text(encoding="utf-8")

@@ -1,0 +1,63 @@
+"""The house rules that a machine can check."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+NAMELESS = {"utils", "helpers", "common", "misc", "base", "manager", "types"}
+MAX_LINES, MAX_SERVICE_LINES = 400, 150
+
+
+def tracked(*suffixes: str) -> list[Path]:
+    listing = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [ROOT / name for name in listing.stdout.splitlines() if name.endswith(suffixes) and (ROOT / name).exists()]
+
+
+SOURCES = tracked(".py", ".js")
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_one_file_one_job(path: Path) -> None:
+    assert path.stem not in NAMELESS
+    lines = len(path.read_text(encoding="utf-8").splitlines())
+    assert lines <= (MAX_SERVICE_LINES if path.name == "service.py" else MAX_LINES)
+
+
+@pytest.mark.parametrize(
+    ("word", "allowed"),
+    [
+        ("import zenoh", "shared/paani/bus/"),
+        ("import onnxruntime", "services/paani_services/perception/engine.py models/paani_models/onnx_runner.py"),
+        ("import mujoco", "sim_host/paani_sim/"),
+        ("filterpy", "services/paani_services/localization/"),
+        ("from aiohttp", "services/paani_services/dashboard/"),
+        ("import serial", "services/paani_services/bridge/"),
+    ],
+)
+def test_each_library_has_one_importer(word: str, allowed: str) -> None:
+    for path in SOURCES:
+        name = str(path.relative_to(ROOT))
+        if path.suffix == ".py" and not name.startswith("tests/") and word in path.read_text(encoding="utf-8"):
+            assert any(name.startswith(place) for place in allowed.split()), name
+
+
+def test_no_picture_of_the_data_ships() -> None:
+    pictures = [p for p in tracked(".jpg", ".jpeg", ".png", ".gif", ".mp4") if "docs" not in p.parts]
+    assert pictures == []
+
+
+def test_every_top_level_folder_explains_itself() -> None:
+    for folder in ("shared", "services", "sim_host", "models", "deploy", "tests"):
+        assert (ROOT / folder / "README.md").is_file(), folder
+
+
+def test_served_files_name_no_other_host() -> None:
+    for path in (ROOT / "services/paani_services/dashboard/static").rglob("*"):
+        if path.suffix in {".js", ".html", ".css"}:
+            text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
+            assert "http://" not in text, path
+            assert "https://" not in text, path

@@ -1,0 +1,151 @@
+"""The bus over a real router: authority, newest wins, pulled pictures, liveliness, recovery."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.authority import ensure_credentials
+from paani.bus import open_bus
+from paani.bus.routing import open_router
+from paani.clock import WallClock
+from paani.config import Config, load_config
+from tests.conftest import OpenAs, Spawn
+
+pytestmark = pytest.mark.integration
+CLOCK = WallClock()
+
+
+def thrust(left: float = 0.1) -> m.Thrust:
+    return m.Thrust(source_us=CLOCK.now_us(), left=left, right=0.1, enabled=True)
+
+
+async def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    async with asyncio.timeout(timeout_s):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:
+    """B13, architecture 4: a service that is not the producer is not heard, wildcards included."""
+    plant, controller, advisor = await open_as("plant"), await open_as("controller"), await open_as("advisor")
+    heard = plant.latest(keys.THRUST)
+    own, forged = controller.publisher(keys.THRUST), advisor.publisher(keys.THRUST)
+    while heard.value is None:
+        own.put(thrust())
+        await asyncio.sleep(0.02)
+    before = heard.received
+    for _ in range(5):
+        forged.put(thrust(left=1.0))
+        advisor.put_raw("controller/thrust", b"{}")
+        advisor.put_raw("controller/*", b"{}")
+        advisor.put_raw("**", b"{}")
+        controller.put_raw("controller/*", b"{}")
+    own.put(thrust(left=0.3))
+    await until(lambda: heard.value is not None and heard.value.left == 0.3)
+    assert heard.received == before + 1
+    assert not plant.drops
+
+
+async def test_what_is_refused_is_counted_by_cause(open_as: OpenAs) -> None:
+    plant, controller = await open_as("plant"), await open_as("controller")
+    heard = plant.latest(keys.THRUST)
+    own = controller.publisher(keys.THRUST)
+    while heard.value is None:
+        sent = own.put(thrust())
+        await asyncio.sleep(0.02)
+    for data in (b"", b'{"left": NaN}', b"{}"):
+        controller.put_raw("controller/thrust", data)
+    await until(lambda: sum(plant.drops.values()) == 3)
+    assert dict(plant.drops) == {"undecodable": 1, "non_finite": 1, "wrong_type": 1}
+    assert heard.value is not None
+    assert heard.value.seq == sent.seq
+
+
+async def test_truth_is_for_its_readers_alone(open_as: OpenAs) -> None:
+    """L4: no estimator or advisor can read the simulator's truth."""
+    plant, dashboard, localization = await open_as("plant"), await open_as("dashboard"), await open_as("localization")
+    seen, hidden = dashboard.latest(keys.TRUE_POSE), localization.latest(keys.TRUE_POSE)
+    publisher = plant.publisher(keys.TRUE_POSE)
+    pose = m.TruePose(
+        source_us=1, sim_us=0, x_m=0, y_m=0, z_m=0, roll_rad=0, pitch_rad=0, yaw_rad=0, surge_mps=0, sway_mps=0,
+        yaw_rate_radps=0,
+    )
+    while seen.received < 3:
+        publisher.put(pose)
+        await asyncio.sleep(0.02)
+    assert hidden.received == 0
+
+
+async def test_a_wrong_password_does_not_get_in(open_as: OpenAs, config: Config, private_sets: tuple[str, ...]) -> None:
+    await open_as("observer")
+    other = load_config(sets=(*private_sets, f"bus.runtime_dir={config.bus.runtime_dir}-other"))
+    await asyncio.to_thread(ensure_credentials, other.bus)
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(2.5):
+            await open_bus(other.bus, "controller", CLOCK)
+
+
+async def test_newest_wins_and_the_rest_is_counted(open_as: OpenAs) -> None:
+    plant, controller = await open_as("plant"), await open_as("controller")
+    heard = plant.latest(keys.THRUST)
+    own = controller.publisher(keys.THRUST)
+    while heard.value is None:
+        own.put(thrust())
+        await asyncio.sleep(0.02)
+    await heard.next()
+    start = heard.received
+    for index in range(20):
+        own.put(thrust(left=index / 20))
+    await until(lambda: heard.received == start + 20)
+    assert (await heard.next()).left == 19 / 20
+    assert heard.superseded >= 19
+
+
+async def test_pictures_are_pulled_one_at_a_time(open_as: OpenAs) -> None:
+    camera, dashboard = await open_as("camera"), await open_as("dashboard")
+    pictures = camera.picture_publisher(keys.PICTURE, push=False)
+    pulled = dashboard.pull_picture(keys.PICTURE)
+    header = m.PictureHeader(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
+    seen = []
+    for index in range(5):
+        pictures.put_picture(header, b"jpeg %d" % index)
+        picture = await asyncio.wait_for(pulled.next(), 5)
+        seen.append(picture.data)
+    assert seen == [b"jpeg %d" % index for index in range(5)]
+    pictures.new_epoch()
+    pictures.put_picture(header, b"again")
+    assert (await asyncio.wait_for(pulled.next(), 5)).data == b"again"
+
+
+async def test_services_find_each_other_again_after_the_router_dies(config: Config) -> None:
+    router = await open_router(config.bus)
+    plant = await open_bus(config.bus, "plant", CLOCK)
+    controller = await open_bus(config.bus, "controller", CLOCK)
+    heard, own = plant.latest(keys.THRUST), controller.publisher(keys.THRUST)
+    for _ in range(2):
+        start = heard.received
+        async with asyncio.timeout(5):
+            while heard.received == start:
+                own.put(thrust())
+                await asyncio.sleep(0.02)
+        await asyncio.to_thread(router.close)
+        own.put(thrust())  # on a dead link: neither blocks nor raises
+        router = await open_router(config.bus)
+    for bus in (plant, controller):
+        await bus.close()
+    await asyncio.to_thread(router.close)
+
+
+async def test_alive_means_ready(open_as: OpenAs, spawn: Spawn) -> None:
+    observer = await open_as("observer")
+    async with spawn("advisor"):
+        health = observer.latest(keys.health("advisor"))
+        report = await asyncio.wait_for(health.next(), 5)
+        assert report.ready
+        assert {entry.topic for entry in report.inputs} >= {keys.EVIDENCE.name}
+        assert report.rss_mib > 10

@@ -1,0 +1,81 @@
+"""What a receiver refuses, and the name it gives each refusal."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani import keys
+from paani import messages as m
+from paani.bus.admission import Admission
+
+NOW_US = 1_000_000_000
+
+
+def thrust(**changes: object) -> m.Thrust:
+    message = m.Thrust(
+        source_us=NOW_US, seq=5, epoch=7, producer="controller", sent_us=NOW_US, left=0.1, right=0.2, enabled=True
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def admission() -> Admission[m.Thrust]:
+    return Admission(keys.THRUST, domain=43, max_future_s=1.0)
+
+
+def raw(message: m.Message, **changes: object) -> bytes:
+    return msgspec.json.encode({**msgspec.to_builtins(message), **changes})
+
+
+@pytest.mark.parametrize(
+    ("data", "cause"),
+    [
+        (raw(thrust()), ""),
+        (b"", "undecodable"),
+        (b"\xff\xfe\x00", "undecodable"),
+        (b'{"left": ', "undecodable"),
+        (raw(thrust()).replace(b"0.1", b"NaN"), "non_finite"),
+        (raw(thrust()).replace(b"0.1", b"-Infinity"), "non_finite"),
+        (raw(thrust(), left="fast"), "wrong_type"),
+        (raw(thrust(), enabled=None), "wrong_type"),
+        (b"{}", "wrong_type"),
+        (b"[]", "wrong_type"),
+        (raw(thrust(), left=1.5), "out_of_range"),
+        (raw(thrust(), left=-0.1), "out_of_range"),
+        (raw(thrust(), domain=42), "wrong_domain"),
+        (raw(thrust(), producer="advisor"), "wrong_producer"),
+        (raw(thrust(), source_us=NOW_US + 2_000_000), "future"),
+        (raw(thrust(), sent_us=NOW_US + 2_000_000), "future"),
+    ],
+)
+def test_each_fault_has_its_cause(data: bytes, cause: str) -> None:
+    message, given_cause = admission().judge(data, NOW_US)
+    assert given_cause == cause
+    assert (message is None) == bool(cause)
+
+
+def test_duplicates_replays_and_older_epochs_never_come_back() -> None:
+    judge = admission().judge
+    assert judge(raw(thrust(seq=5)), NOW_US)[1] == ""
+    assert judge(raw(thrust(seq=5)), NOW_US)[1] == "duplicate"
+    assert judge(raw(thrust(seq=4)), NOW_US)[1] == "replayed"
+    assert judge(raw(thrust(seq=6)), NOW_US)[1] == ""
+    assert judge(raw(thrust(seq=0, epoch=8)), NOW_US)[1] == ""
+    assert judge(raw(thrust(seq=99, epoch=7)), NOW_US)[1] == "old_epoch"
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_raise(data: bytes) -> None:
+    message, cause = admission().judge(data, NOW_US)
+    assert message is None
+    assert cause
+
+
+@given(st.integers(0, 400), st.integers(0, 255))
+def test_a_flipped_byte_never_yields_a_value_out_of_range(index: int, value: int) -> None:
+    data = bytearray(raw(thrust()))
+    data[index % len(data)] = value
+    message, _ = admission().judge(bytes(data), NOW_US)
+    assert message is None or (0.0 <= message.left <= 1.0 and 0.0 <= message.right <= 1.0)

@@ -1,0 +1,96 @@
+"""Settings: layered, closed, and refused with one line that names the field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from paani.config import Config, decode_config, encode_config, load_config
+from paani.errors import UserError
+
+
+def test_later_layers_win(tmp_path: Path) -> None:
+    file = tmp_path / "boat.toml"
+    file.write_text("[camera]\nrate_hz = 3.0\nsource = 'webcam'\n[navigator]\ncruise_mps = 0.4\n")
+    config = load_config(
+        file=file, environ={"PAANI_CAMERA__RATE_HZ": "4.0", "HOME": "/"}, sets=["navigator.cruise_mps=0.5"]
+    )
+    assert (config.camera.source, config.camera.rate_hz, config.navigator.cruise_mps) == ("webcam", 4.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("setting", "line"),
+    [
+        ("advisor.policy.centre=1", "advisor.policy: Object contains unknown field `centre`"),
+        ("camera.rate_hz=0", "camera.rate_hz: Expected `float` > 0.0"),
+        ("camera.rate_hz=nan", "camera.rate_hz: Expected `float` > 0.0"),
+        ("camera.rate_hz=fast", "camera.rate_hz: Expected `float`, got `str`"),
+        ("bus.vessel=Otter/x", "bus.vessel: Expected `str` matching regex"),
+        ("navigator.cruise_mps=2.0", "navigator.cruise_mps 2.0 exceeds controller.max_speed_mps 0.9"),
+        ("profile=fancy", "profile: unknown profile 'fancy'"),
+        ("nonsense", "expected section.field=value"),
+        ("advisor.lifetime_s=0.1", "advisor.evidence_max_age_s exceeds advisor.lifetime_s"),
+    ],
+)
+def test_a_bad_setting_is_one_line_that_names_it(setting: str, line: str) -> None:
+    with pytest.raises(UserError) as error:
+        load_config(sets=[setting])
+    assert line in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", ["[camera", "\x00", "camera = 3"])
+def test_a_bad_file_is_named(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "boat.toml"
+    file.write_text(content)
+    with pytest.raises(UserError, match="boat.toml"):
+        load_config(file=file)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="absent.toml"):
+        load_config(file=tmp_path / "absent.toml")
+
+
+@pytest.mark.parametrize(("rate_hz", "accepted"), [(0.5, False), (2.0, False), (3.0, True)])
+def test_a_rate_that_starves_the_motion_estimator_is_refused_i22(rate_hz: float, accepted: bool) -> None:
+    sets = [f"perception.rate_hz={rate_hz}", "advisor.motion.follow_rate=false"]
+    if accepted:
+        load_config(sets=sets)
+    else:
+        with pytest.raises(UserError, match="perception.rate_hz"):
+            load_config(sets=sets)
+
+
+def test_the_paper_profile_carries_the_papers_constants() -> None:
+    """A6 A8 C6 C7 C8 C9 C14 D11 J5 J16 J17 M2 M5 M6 M7 N1 N2 N3 N4 N5 N6 O1 O2 L1 L3."""
+    c = load_config(profile="paper")
+    assert c.profile == "paper"
+    assert c.bus.domain == 43
+    assert (c.camera.width_px, c.camera.height_px, c.camera.rate_hz) == (320, 240, 0.5)
+    detections = c.perception.detections
+    assert (detections.confidence, detections.nms_input, detections.nms_iou, detections.max_boxes) == (0.4, 256, 0.45, 24)
+    assert (c.perception.rate_hz, c.perception.concurrent, c.perception.intra_op_threads) == (0.5, False, 2)
+    assert not c.perception.gate.enabled
+    assert (c.advisor.policy.center_block_risk, c.advisor.policy.side_block_risk) == (0.48, 0.58)
+    assert (c.advisor.rate_hz, c.advisor.lifetime_s, c.perception.max_frame_age_s) == (5.0, 3.5, 0.8)
+    navigator = c.navigator
+    assert (navigator.acceptance_m, navigator.cruise_mps, navigator.turn_speed_frac) == (1.0, 0.15, 0.5)
+    assert (navigator.turn_deg, navigator.slight_turn_deg, navigator.latch_turns) == (25.0, 10.0, False)
+    k = c.controller
+    assert (k.rate_hz, k.max_speed_mps, k.max_forward, k.max_steer, k.slew_per_s) == (10.0, 0.30, 0.08, 0.04, 0.15)
+    assert (k.speed_kp, k.speed_feed_forward, k.heading_kp, k.heading_kd) == (0.08, 0.16, 0.08, 0.05)
+    assert (c.plant.adapter.force_per_unit_n, c.plant.adapter.timeout_s) == (75.0, 0.5)
+    assert c.localization.rate_hz == 20.0
+
+
+def test_a_configuration_survives_being_handed_to_a_child() -> None:
+    config = load_config(profile="paper", sets=["camera.source=/tmp/pictures"])
+    assert decode_config(encode_config(config)) == config
+    with pytest.raises(UserError):
+        decode_config(b'{"camera": {"rate": 1}}')
+
+
+def test_defaults_are_valid() -> None:
+    assert load_config() == Config()

@@ -1,0 +1,88 @@
+"""The eye as a process: a pose on the bus gives a picture on the bus."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+
+import cv2
+import numpy as np
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Picture
+from paani.clock import WallClock
+from paani.config import Config, load_config
+from paani.errors import UserError
+from paani_sim.eye.gl import Context
+from paani_sim.eye.service import open_eye, pose_of, run
+
+pytestmark = [pytest.mark.gl, pytest.mark.timeout(60)]
+
+
+def truth(source_us: int, *, sim_us: int = 2_000_000, x_m: float = 20.0) -> m.TruePose:
+    return m.TruePose(
+        source_us=source_us, sim_us=sim_us, x_m=x_m, y_m=0.0, z_m=0.177, roll_rad=0.02, pitch_rad=-0.01,
+        yaw_rad=0.4, surge_mps=0.0, sway_mps=0.0, yaw_rate_radps=0.0,
+    )  # fmt: skip
+
+
+def require_gl() -> None:
+    try:
+        Context().close()
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+def test_pose_keeps_every_axis() -> None:
+    pose = pose_of(truth(1))
+    assert (pose.x_m, pose.y_m, pose.z_m) == (20.0, 0.0, 0.177)
+    assert (pose.roll_rad, pose.pitch_rad, pose.yaw_rad) == (0.02, -0.01, 0.4)
+
+
+def test_settings_reach_the_eye() -> None:
+    require_gl()
+    config = load_config(sets=("world.name=lake", "world.wind_mps=5", "eye.camera_height_m=1.2", "eye.width_px=160"))
+    with open_eye(config) as eye:
+        assert eye.world.name == "lake"
+        assert eye.world.wind.speed_mps == 5.0
+        assert eye.camera.up_m + 0.177 == pytest.approx(1.2)
+        assert eye.camera.width_px == 160
+
+
+def test_unknown_world_is_one_line() -> None:
+    with pytest.raises(UserError, match="unknown world"):
+        open_eye(load_config(sets=("world.name=sea",)))
+
+
+async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], config: Config) -> None:
+    """The picture carries the pose's stamp, names its frame, and comes no faster than the set rate."""
+    require_gl()
+    plant, viewer = await open_as("plant"), await open_as("camera")
+    poses, pictures = plant.publisher(keys.TRUE_POSE), viewer.latest_picture(keys.RENDERED)
+    clock = WallClock()
+    eye = asyncio.create_task(run(await open_as("eye"), clock, config))
+    try:
+        seen: list[Picture] = []
+        sent: dict[int, float] = {}
+        async with asyncio.timeout(40.0):
+            while len(seen) < 4:
+                x_m = 20.0 + 2.0 * len(seen)
+                sent[poses.put(truth(clock.now_us(), x_m=x_m)).source_us] = x_m
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(0.05):
+                        seen.append(await pictures.next())
+                assert not eye.done()
+    finally:
+        eye.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await eye
+    headers = [p.header for p in seen]
+    assert [h.frame_seq for h in headers] == [0, 1, 2, 3]
+    assert all(h.source_us in sent for h in headers)
+    assert len({h.frame_epoch for h in headers}) == 1
+    assert headers[-1].sent_us - headers[0].sent_us > 2.5e6 / config.eye.rate_hz
+    picture = cv2.imdecode(np.frombuffer(seen[-1].data, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    assert picture.shape == (240, 320, 3)
+    assert picture.mean() > 50.0
