@@ -94,8 +94,13 @@ def spawn(open_as: OpenAs, private_sets: tuple[str, ...]) -> Spawn:
     async def spawn(service: str, *sets: str) -> AsyncIterator[asyncio.subprocess.Process]:
         arguments = [word for setting in (*private_sets, *sets) for word in ("--set", setting)]
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "paani", service, *arguments,
-            stderr=asyncio.subprocess.PIPE, env={**os.environ, "OMP_NUM_THREADS": "1"},
+            sys.executable,
+            "-m",
+            "paani",
+            service,
+            *arguments,
+            stderr=asyncio.subprocess.PIPE,
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
         )
         try:
             await wait_alive(await open_as("observer"), service, process)

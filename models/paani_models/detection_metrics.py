@@ -15,6 +15,7 @@ CONFIDENCE = 0.40  # checklist C6
 NMS_IOU = 0.45  # checklist C8
 NMS_INPUT = 256  # checklist C7
 MAX_BOXES = 24  # checklist C9
+NEAR_SIDE_PX = 16.0  # an object whose shorter side is at least this counts as near
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def average_precision(scores: Floats, hits: NDArray[np.bool_], positives: int) -
 def class_figures(found: list[Found], truths: list[Floats], kind: int) -> dict[str, float]:
     """AP50, AP50:95, recall and precision at CONFIDENCE of one class over pictures that annotate it.
 
-    truths: per picture float32 [n,5], class and corners. `n` counts the true boxes.
+    truths: per picture float32 [n,5], class and corners. `n` counts the true boxes. A figure without a case is NaN.
     """
     of_kind = [(f.boxes[f.classes == kind], f.scores[f.classes == kind]) for f in found]
     real = [truth[truth[:, 0] == kind, 1:] for truth in truths]
@@ -98,10 +99,16 @@ def class_figures(found: list[Found], truths: list[Floats], kind: int) -> dict[s
     curves = [average_precision(scores, hits, positives) for hits in steps]
     confident = scores > CONFIDENCE
     right = int((steps[0] & confident).sum())
+    near = [r[(r[:, 2:] - r[:, :2]).min(1, initial=np.inf) >= NEAR_SIDE_PX] for r in real]
+    near_found = sum(
+        int(match(b[s > CONFIDENCE], s[s > CONFIDENCE], r, 0.5).sum()) for (b, s), r in zip(of_kind, near, strict=True)
+    )
+    near_count = sum(len(r) for r in near)
     return {
         "n": positives,
         "ap50": curves[0],
         "ap50_95": float(np.mean(curves)),
         "recall_at_0.40": right / positives if positives else float("nan"),
+        "recall_16px_at_0.40": near_found / near_count if near_count else float("nan"),
         "precision_at_0.40": right / int(confident.sum()) if confident.any() else float("nan"),
     }

@@ -11,13 +11,13 @@ from tqdm import tqdm
 
 from paani_models.augment import null_picture
 from paani_models.catalogue import Figure
-from paani_models.detection_metrics import Found, class_figures, decode
+from paani_models.detection_metrics import CONFIDENCE, Found, class_figures, decode
 from paani_models.detector_data import BoxedPicture, plain, read_boxed
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
 from paani_models.onnx_runner import Floats, open_net
 from paani_models.segmenter import CLASSES
 from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
-from paani_models.sources import DETECTOR_CLASSES, Sample, read_pair
+from paani_models.sources import DETECTOR_CLASSES, Sample, read_pair, read_picture
 
 WATER, OBSTACLE = CLASSES.index("water"), CLASSES.index("obstacle")
 NULL_PICTURES = 200
@@ -99,4 +99,19 @@ def detector_figures(net: Path, samples: list[Sample]) -> list[Figure]:
                 for metric, value in row.items()
                 if np.isfinite(value)
             )
+    return figures
+
+
+def false_alarm_figures(net: Path, samples: list[Sample]) -> list[Figure]:
+    """Boxes above 0.40 per picture, of classes that a source's pictures do not show; n counts pictures."""
+    run = open_net(net)
+    figures = []
+    for source in dict.fromkeys(sample.source for sample in samples if sample.source.empty_of):
+        chosen = [sample for sample in samples if sample.source == source]
+        absent = [DETECTOR_CLASSES.index(kind) for kind in source.empty_of]
+        alarms = 0
+        for sample in tqdm(chosen, f"{source.name} alarms", unit="picture", mininterval=5.0):
+            found = decode(run(detector_input(read_picture(sample.picture)))[0], CONFIDENCE)
+            alarms += int(np.isin(found.classes, absent).sum())
+        figures.append(Figure("false_alarms_per_picture", source.name, round(alarms / len(chosen), 4), len(chosen)))
     return figures

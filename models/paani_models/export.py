@@ -27,7 +27,7 @@ from paani_models.catalogue import (
 from paani_models.detector import Detector
 from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
-from paani_models.sources import DETECTOR_CLASSES, Source
+from paani_models.sources import DETECTOR_CLASSES, RENDERED, Source
 from paani_models.training import load_average
 
 OPSET = 17  # checklist T1
@@ -150,7 +150,9 @@ class _Stated(msgspec.Struct):
 
 
 def origin(folder: Path, source: Source) -> Origin:
-    """A source's provenance as its manifest states it."""
+    """Read a source's provenance from its manifest; rendered pictures are the project's own."""
+    if source.name == RENDERED:
+        return Origin(source.name, "paani_sim", "", "Apache-2.0")
     path = folder / "manifest.json"
     try:
         stated = msgspec.json.decode(path.read_bytes(), type=_Stated)

@@ -184,6 +184,7 @@ def evaluate_net(net: str, weights: Path, pictures: Pictures, *, record: bool) -
         figures = evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
     else:
         figures = evaluate.detector_figures(path, pictures.boxed(held_out=True))
+        figures += evaluate.false_alarm_figures(path, pictures.segmented(held_out=True))
     for figure in figures:
         sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
     if record:

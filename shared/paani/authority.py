@@ -54,9 +54,15 @@ def access_control(config: BusConfig) -> dict[str, object]:
     policies: list[dict[str, object]] = []
 
     def rule(name: str, messages: list[str], flow: str, key_exprs: list[str]) -> str:
-        rules.append({
-            "id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": key_exprs,
-        })
+        rules.append(
+            {
+                "id": name,
+                "messages": messages,
+                "flows": [flow],
+                "permission": "allow",
+                "key_exprs": key_exprs,
+            }
+        )
         return name
 
     alive = f"{prefix}/@alive/*"

@@ -28,8 +28,9 @@ def main(argv: list[str] | None = None) -> int:
             return int(command(rest))
         if name in names:
             return run_service(name, _service_config(name, rest))
-        raise UserError(f"unknown command '{name}' (commands: {', '.join(sorted(commands))}; services: "
-                        f"{', '.join(sorted(names))})")
+        raise UserError(
+            f"unknown command '{name}' (commands: {', '.join(sorted(commands))}; services: {', '.join(sorted(names))})"
+        )
     except UserError as error:
         sys.stderr.write(f"paani: {error}\n")
         return 2
@@ -54,8 +55,14 @@ def add_config_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that `config_from` reads."""
     parser.add_argument("--profile", choices=("paani", "paper"), help="which set of constants (default: paani)")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML")
-    parser.add_argument("--set", action="append", default=[], metavar="SECTION.FIELD=VALUE", dest="sets",
-                        help="one setting; may be repeated")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.FIELD=VALUE",
+        dest="sets",
+        help="one setting; may be repeated",
+    )
 
 
 def config_from(options: argparse.Namespace, extra_sets: tuple[str, ...] = ()) -> Config:

@@ -51,6 +51,8 @@ class Topic(msgspec.Struct, Generic[T], frozen=True, kw_only=True):
         return f"application/json;paani.{self.type.__name__}"
 
 
+# One row, one glance.
+# fmt: off
 PICTURE = Topic(
     name="camera/picture", type=m.PictureHeader, producer="camera", rate_hz=5.0, fresh_s=0.8,
     stance=Stance.PICTURE, summary="the camera's newest picture",
@@ -123,10 +125,20 @@ TRUE_POSE = Topic(
 TOPICS: tuple[Topic[m.Message], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, THRUST, LOCAL_ODOMETRY,
     ODOMETRY, ARMING, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE,
-)  # type: ignore[assignment]  # Topic is invariant in its message type; the table only reads
+)  # type: ignore[assignment]  # Topic is invariant; the table only reads
+# fmt: on
 
 SERVICES = (
-    "router", "plant", "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard",
+    "router",
+    "plant",
+    "eye",
+    "camera",
+    "perception",
+    "advisor",
+    "navigator",
+    "controller",
+    "localization",
+    "dashboard",
 )
 BOARD_SERVICES = ("camera", "perception", "advisor", "navigator", "controller")
 VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")
@@ -135,16 +147,26 @@ VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "contro
 def pulse(service: str) -> Topic[m.Pulse]:
     """The heartbeat of one process."""
     return Topic(
-        name=f"pulse/{service}", type=m.Pulse, producer=service, rate_hz=10.0, fresh_s=0.4,
-        stance=Stance.COMMAND, summary=f"heartbeat of {service}",
+        name=f"pulse/{service}",
+        type=m.Pulse,
+        producer=service,
+        rate_hz=10.0,
+        fresh_s=0.4,
+        stance=Stance.COMMAND,
+        summary=f"heartbeat of {service}",
     )
 
 
 def health(service: str) -> Topic[m.Health]:
     """The one-second report of one process."""
     return Topic(
-        name=f"health/{service}", type=m.Health, producer=service, rate_hz=1.0, fresh_s=3.0,
-        stance=Stance.STATE, summary=f"health of {service}",
+        name=f"health/{service}",
+        type=m.Health,
+        producer=service,
+        rate_hz=1.0,
+        fresh_s=3.0,
+        stance=Stance.STATE,
+        summary=f"health of {service}",
     )
 
 

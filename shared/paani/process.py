@@ -27,9 +27,7 @@ def services() -> dict[str, Callable[[], Service]]:
 
 def run_service(name: str, config: Config) -> int:
     """Run one service until it ends or is told to stop. Exit codes: 0 stopped, 2 user's mistake, 1 crash."""
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {name} %(levelname)s %(message)s"
-    )
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {name} %(levelname)s %(message)s")
     try:
         asyncio.run(_serve(name, services()[name](), config))
     except UserError as error:

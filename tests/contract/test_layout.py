@@ -13,7 +13,9 @@ MAX_LINES, MAX_SERVICE_LINES = 400, 150
 
 
 def tracked(*suffixes: str) -> list[Path]:
-    listing = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True)
+    listing = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     return [ROOT / name for name in listing.stdout.splitlines() if name.endswith(suffixes) and (ROOT / name).exists()]
 
 

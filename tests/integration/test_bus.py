@@ -72,7 +72,16 @@ async def test_truth_is_for_its_readers_alone(open_as: OpenAs) -> None:
     seen, hidden = dashboard.latest(keys.TRUE_POSE), localization.latest(keys.TRUE_POSE)
     publisher = plant.publisher(keys.TRUE_POSE)
     pose = m.TruePose(
-        source_us=1, sim_us=0, x_m=0, y_m=0, z_m=0, roll_rad=0, pitch_rad=0, yaw_rad=0, surge_mps=0, sway_mps=0,
+        source_us=1,
+        sim_us=0,
+        x_m=0,
+        y_m=0,
+        z_m=0,
+        roll_rad=0,
+        pitch_rad=0,
+        yaw_rad=0,
+        surge_mps=0,
+        sway_mps=0,
         yaw_rate_radps=0,
     )
     while seen.received < 3:

@@ -44,12 +44,12 @@ def test_a_bad_setting_is_one_line_that_names_it(setting: str, line: str) -> Non
 def test_a_bad_file_is_named(tmp_path: Path, content: str) -> None:
     file = tmp_path / "boat.toml"
     file.write_text(content)
-    with pytest.raises(UserError, match="boat.toml"):
+    with pytest.raises(UserError, match=r"boat\.toml"):
         load_config(file=file)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="absent.toml"):
+    with pytest.raises(UserError, match=r"absent\.toml"):
         load_config(file=tmp_path / "absent.toml")
 
 
@@ -59,7 +59,7 @@ def test_a_rate_that_starves_the_motion_estimator_is_refused_i22(rate_hz: float,
     if accepted:
         load_config(sets=sets)
     else:
-        with pytest.raises(UserError, match="perception.rate_hz"):
+        with pytest.raises(UserError, match=r"perception\.rate_hz"):
             load_config(sets=sets)
 
 
@@ -69,8 +69,8 @@ def test_the_paper_profile_carries_the_papers_constants() -> None:
     assert c.profile == "paper"
     assert c.bus.domain == 43
     assert (c.camera.width_px, c.camera.height_px, c.camera.rate_hz) == (320, 240, 0.5)
-    detections = c.perception.detections
-    assert (detections.confidence, detections.nms_input, detections.nms_iou, detections.max_boxes) == (0.4, 256, 0.45, 24)
+    boxes = c.perception.detections
+    assert (boxes.confidence, boxes.nms_input, boxes.nms_iou, boxes.max_boxes) == (0.4, 256, 0.45, 24)
     assert (c.perception.rate_hz, c.perception.concurrent, c.perception.intra_op_threads) == (0.5, False, 2)
     assert not c.perception.gate.enabled
     assert (c.advisor.policy.center_block_risk, c.advisor.policy.side_block_risk) == (0.48, 0.58)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from paani_models import augment
-from paani_models.detector_data import BoxedPicture, augmented, place, plain, random_placement
+from paani_models.detector_data import BoxedPicture, augmented, judged_by_mask, place, plain, random_placement
 from paani_models.network_input import letterbox_affine
+from paani_models.sources import NO_CRAFT, Source
 
 SIZE_WH = (320, 256)
 WATER_CLASS, OBSTACLE_CLASS = 0, 1
@@ -121,3 +122,32 @@ def test_mosaic_keeps_each_pictures_own_judgement() -> None:
     assert example.judged[1].any()
     assert not example.judged[0].all()
     assert example.judged[0].any()
+
+
+def river_with_bow() -> np.ndarray:
+    """Sky, then bank, then water, and a bow in the bottom middle."""
+    mask = np.zeros((240, 320), np.uint8)
+    mask[:60], mask[60:120] = 2, 1
+    mask[200:, 140:180] = 1
+    return mask
+
+
+def test_a_mask_tells_where_nothing_floats() -> None:
+    mask = river_with_bow()
+    judged = judged_by_mask(Source("river", "river"), mask, np.zeros((*mask.shape, 3), np.uint8))
+    assert judged[:, 150, 20].all()
+    assert judged[:, 20, 20].all()
+    assert not judged[:, 90, 20].any()
+    assert not judged[:, 122, 20].any()  # too near the bank
+    assert not judged[:, 230, 160].any()
+
+
+def test_a_source_without_craft_and_an_own_hull_are_judged() -> None:
+    mask = river_with_bow()
+    picture = np.zeros((*mask.shape, 3), np.uint8)
+    judged = judged_by_mask(Source("river", "river", empty_of=NO_CRAFT), mask, picture)
+    assert judged[[1, 3]].all()
+    assert not judged[[0, 2], 90, 20].any()
+    judged = judged_by_mask(Source("river", "river", own_hull=True), mask, picture)
+    assert judged[:, 230, 160].all()
+    assert not judged[:, 90, 20].any()

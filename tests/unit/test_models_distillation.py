@@ -47,6 +47,7 @@ def test_standardised_features() -> None:
     assert torch.allclose(features.std((0, 2, 3)), torch.ones(5), atol=1e-3)
 
 
+@pytest.mark.train
 def test_the_teacher_stays_and_the_segmenter_moves_towards_it() -> None:
     torch.manual_seed(0)
     teacher, student = Teacher(), Segmenter()

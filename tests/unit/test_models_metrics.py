@@ -97,3 +97,18 @@ def test_decode_suppresses_across_classes_c8_and_keeps_24_c9() -> None:
     assert decode(pile, 0.40).classes.tolist() == [1]
     row = candidates(*((10 * i, 50, 5, 5, 0.9, 0, 0, 0) for i in range(40)))
     assert len(decode(row, 0.40).boxes) == 24
+
+
+def test_near_objects_are_counted_apart() -> None:
+    """One object of 10 px is missed, one of 20 px is found: recall 1/2, near recall 1."""
+    found = Found(np.array([[100, 100, 120, 120]], np.float32), np.array([0.9], np.float32), np.array([0]))
+    truth = np.array([[0, 0, 0, 10, 10], [0, 100, 100, 120, 120]], np.float32)
+    figures = class_figures([found], [truth], kind=0)
+    assert (figures["recall_at_0.40"], figures["recall_16px_at_0.40"]) == (0.5, 1.0)
+
+
+def test_a_class_without_a_case_has_no_figure() -> None:
+    nothing = Found(np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64))
+    figures = class_figures([nothing], [np.zeros((0, 5), np.float32)], kind=0)
+    assert figures.pop("n") == 0
+    assert all(np.isnan(value) for value in figures.values())

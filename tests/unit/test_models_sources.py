@@ -74,6 +74,7 @@ def test_unknown_source_and_missing_manifest_are_one_line(tmp_path: Path) -> Non
         read_samples(tmp_path, choose(["tbiseg_dasha"]))
 
 
+@pytest.mark.data
 @pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
 def test_no_picture_is_on_both_sides_r8() -> None:
     samples = read_samples(data_folder(), SOURCES)

@@ -50,6 +50,7 @@ def segmenter_run(folder: Path, pictures: list[CachedPicture]) -> SegmenterTrain
     return SegmenterTraining(Segmenter(), SMALL, folder, pictures, pictures[:2])
 
 
+@pytest.mark.train
 def test_a_resumed_run_equals_an_unbroken_one_s11(tmp_path: Path, river: list[CachedPicture]) -> None:
     segmenter_run(tmp_path / "whole", river).run()
     segmenter_run(tmp_path / "broken", river).run(until=1)
@@ -62,12 +63,14 @@ def test_a_resumed_run_equals_an_unbroken_one_s11(tmp_path: Path, river: list[Ca
     assert all(torch.equal(one[key], other[key]) for key in one)
 
 
+@pytest.mark.train
 def test_records_hold_loss_and_iou_per_class_s10(tmp_path: Path, river: list[CachedPicture]) -> None:
     segmenter_run(tmp_path, river).run(until=1)
     record = msgspec.json.decode((tmp_path / "epochs.jsonl").read_bytes())
     assert {"epoch", "loss", "miou", "water", "obstacle", "sky"} <= set(record)
 
 
+@pytest.mark.train
 def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPicture]) -> None:
     segmenter_run(tmp_path, river).run(until=1)
     other = SegmenterTraining(Segmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
@@ -75,6 +78,7 @@ def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPictur
         other.run()
 
 
+@pytest.mark.train
 def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train_detector, "NULL_DRAWS", 1)
     picture = np.full((256, 320, 3), 90, np.uint8)

@@ -16,6 +16,7 @@
     longitude_deg = 9.4795
 """
 
+import itertools
 import tomllib
 from pathlib import Path
 from typing import Annotated
@@ -64,9 +65,10 @@ def load_route(path: Path) -> Route:
         _waypoint(point, file.origin, f"navigator.route {path}: waypoints[{number}]")
         for number, point in enumerate(file.waypoints)
     )
-    for number, (one, other) in enumerate(zip(waypoints, waypoints[1:], strict=False)):
+    ring = (*waypoints, waypoints[0]) if file.repeat else waypoints
+    for number, (one, other) in enumerate(itertools.pairwise(ring)):
         if one == other:
-            raise UserError(f"navigator.route {path}: waypoints[{number + 1}] repeats the one before")
+            raise UserError(f"navigator.route {path}: waypoints[{number}] and the next are the same")
     return Route(source_us=0, name=file.name, waypoints=waypoints, repeat=file.repeat)
 
 

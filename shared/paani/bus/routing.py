@@ -16,15 +16,17 @@ from paani.errors import UserError
 def router_config(config: BusConfig) -> zenoh.Config:
     """A router that denies by default."""
     credentials = ensure_credentials(config)
-    return zenoh_config({
-        "mode": "router",
-        "listen/endpoints": [config.router],
-        "transport/auth/usrpwd/user": "router",
-        "transport/auth/usrpwd/password": password_of(config, "router"),
-        "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
-        "access_control": access_control(config),
-        **shared_settings(config),
-    })
+    return zenoh_config(
+        {
+            "mode": "router",
+            "listen/endpoints": [config.router],
+            "transport/auth/usrpwd/user": "router",
+            "transport/auth/usrpwd/password": password_of(config, "router"),
+            "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
+            "access_control": access_control(config),
+            **shared_settings(config),
+        }
+    )
 
 
 async def open_router(config: BusConfig) -> zenoh.Session:

@@ -48,6 +48,7 @@ class NavigatorConfig(Section, frozen=True):
     odometry_max_age_s: Positive = 0.4
     clock_max_age_s: Positive = 0.4
     arming_max_age_s: Positive = 1.0
+    max_future_s: NonNegative = 0.1
 
 
 class ControllerConfig(Section, frozen=True):

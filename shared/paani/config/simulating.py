@@ -58,7 +58,14 @@ class AdapterConfig(Section, frozen=True):
     arming_timeout_s: Positive = 0.5
     pulse_timeout_s: Positive = 0.4
     require_pulses: tuple[str, ...] = (
-        "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard",
+        "eye",
+        "camera",
+        "perception",
+        "advisor",
+        "navigator",
+        "controller",
+        "localization",
+        "dashboard",
     )
 
 

@@ -54,10 +54,7 @@ class Config(Section, frozen=True):
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
-        starved = (
-            1.0 / rate_hz > motion.max_gap_s
-            or rate_hz * motion.history_s + 1 < motion.min_samples
-        )
+        starved = 1.0 / rate_hz > motion.max_gap_s or rate_hz * motion.history_s + 1 < motion.min_samples
         if self.profile == "paani" and not motion.follow_rate and starved:
             raise ValueError(
                 f"advisor.motion: {motion.min_samples} samples in {motion.history_s} s"
@@ -74,6 +71,4 @@ class Config(Section, frozen=True):
         if self.advisor.evidence_max_age_s > self.advisor.lifetime_s:
             raise ValueError("advisor.evidence_max_age_s exceeds advisor.lifetime_s")
         if self.controller.command_max_receipt_s > self.plant.adapter.timeout_s:
-            raise ValueError(
-                "controller.command_max_receipt_s exceeds plant.adapter.timeout_s"
-            )
+            raise ValueError("controller.command_max_receipt_s exceeds plant.adapter.timeout_s")

@@ -169,8 +169,9 @@ def _obstacles(channel: Channel) -> tuple[Obstacle, ...]:
 
 
 def _actors(channel: Channel) -> tuple[Actor, ...]:
-    boat_m = resample_closed(channel.loop_m(40.0, 178.0, 0.075), 140)
-    kayak_m = resample_closed(channel.loop_m(218.0, 276.0, 0.07), 60)
+    """Both go round against the route's sense, near the middle: the boat meets them, in view."""
+    boat_m = resample_closed(channel.loop_m(40.0, 178.0, 0.045)[::-1], 140)
+    kayak_m = resample_closed(channel.loop_m(218.0, 276.0, 0.05)[::-1], 60)
     return (
         Actor("boat_under_way", Kind.VESSEL, "cruiser", boat_m, 1.2, 5.6, 2.1, 1.9, 150.0, 2),
         Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 30.0, 2),

@@ -1,0 +1,1 @@
+"""Pose and velocity estimated from GPS and IMU."""

@@ -1,0 +1,31 @@
+"""Localization process: IMU and GPS in, local and global odometry out."""
+
+import asyncio
+
+from paani import keys
+from paani.bus import Bus
+from paani.clock import Clock
+from paani.config import Config
+from paani_services.localization.estimator import Estimator
+
+IMU_DEPTH = 64
+
+
+async def run(bus: Bus, clock: Clock, config: Config) -> None:
+    """Estimate at `rate_hz`."""
+    imu, gps = bus.queue(keys.IMU, IMU_DEPTH), bus.latest(keys.GPS)
+    local, odometry = bus.publisher(keys.LOCAL_ODOMETRY), bus.publisher(keys.ODOMETRY)
+    estimator = Estimator(config.localization)
+    period_us = round(1e6 / config.localization.rate_hz)
+    seen = None
+    with bus.alive():
+        due_us = clock.now_us()
+        while True:
+            fix = gps.value if gps.value is not seen else None
+            seen = gps.value
+            now_us = clock.now_us()
+            local_now, global_now = estimator.step(imu.drain(), fix, now_us)
+            local.put(local_now)
+            odometry.put(global_now)
+            due_us = max(due_us + period_us, now_us)
+            await asyncio.sleep(max(0, due_us - clock.now_us()) * 1e-6)

@@ -1,0 +1,211 @@
+"""From advice, route and estimate to one order. Pure: no clock, no bus, no logging.
+
+Every gate that is shut is named in the order's `inhibits`; an order that moves has none.
+"""
+
+import math
+
+import msgspec
+
+from paani.config import NavigatorConfig
+from paani.geometry import wrap_rad
+from paani.messages import (
+    Advisory,
+    Arming,
+    Direction,
+    Inhibit,
+    NavCommand,
+    Odometry,
+    Route,
+    SimTime,
+)
+from paani_services.navigator.progress import course_rad, cross_track_m, first_target, is_reached
+from paani_services.navigator.turning import TURNS, Turn, continuous_heading, latched
+
+
+class NavState(msgspec.Struct, frozen=True):
+    """What one call leaves for the next. `target` is the waypoint steered for, None before the first."""
+
+    target: int | None = None
+    reached: int = 0
+    finished: bool = False
+    turn: Turn | None = None
+    sim_us: int = -1
+    advanced_us: int | None = None
+
+
+class Heard(msgspec.Struct, frozen=True):
+    """The newest message of each kind, and when it came [us]."""
+
+    advisory: Advisory | None = None
+    advisory_us: int = 0
+    odometry: Odometry | None = None
+    odometry_us: int = 0
+    clock: SimTime | None = None
+    clock_us: int = 0
+    arming: Arming | None = None
+    arming_us: int = 0
+
+
+def navigate(
+    state: NavState,
+    heard: Heard,
+    route: Route | None,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
+) -> tuple[NavState, NavCommand]:
+    """One step. The order carries the advisory's `source_us` and the plant's newest stamp."""
+    state = _watch_clock(state, heard, now_us)
+    inhibits = _gates(state, heard, now_us, domain, config)
+    if route is None:
+        inhibits.append(Inhibit.NO_ROUTE)
+    state = _forget_turn(state, heard)
+    odometry, advisory = heard.odometry, heard.advisory
+    if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or route is None:
+        return state, _order(state, heard, now_us, inhibits)
+
+    position_m = (odometry.x_m, odometry.y_m)
+    if state.target is None:
+        state = msgspec.structs.replace(state, target=first_target(route, position_m))
+    direction = advisory.direction if advisory is not None else Direction.NO_DATA
+    heading_rad = odometry.yaw_rad
+    speed_mps = config.cruise_mps
+    if not inhibits and direction is Direction.STRAIGHT:
+        state = _advance(state, route, position_m, config)
+        if state.finished:
+            inhibits.append(Inhibit.ROUTE_FINISHED)
+    target = state.target or 0
+    if inhibits:
+        return state, _order(
+            state, heard, now_us, inhibits, cross_m=cross_track_m(route, target, position_m)
+        )
+    if direction in TURNS:
+        speed_mps *= config.turn_speed_frac
+        if config.latch_turns:
+            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config)
+            state = msgspec.structs.replace(state, turn=turn)
+            heading_rad = turn.heading_rad
+            if capped:
+                inhibits.append(Inhibit.TURN_CAPPED)
+        else:
+            heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
+    else:
+        heading_rad = wrap_rad(course_rad(route, target, position_m, config.lookahead_m))
+    return state, _order(
+        state, heard, now_us, inhibits, heading_rad, speed_mps, cross_track_m(route, target, position_m)
+    )
+
+
+def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
+    """Note when simulated time last moved forward; a reset counts only once it moves on again."""
+    if heard.clock is None or heard.clock.sim_us == state.sim_us:
+        return state
+    advanced_us = state.advanced_us
+    if state.sim_us >= 0:
+        advanced_us = now_us if heard.clock.sim_us > state.sim_us else None
+    return msgspec.structs.replace(state, sim_us=heard.clock.sim_us, advanced_us=advanced_us)
+
+
+def _gates(
+    state: NavState, heard: Heard, now_us: int, domain: int, config: NavigatorConfig
+) -> list[Inhibit]:
+    """Every gate that is shut (M8-M11)."""
+
+    def is_old(stamp_us: int, limit_s: float) -> bool:
+        return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
+
+    found: list[Inhibit] = []
+    advisory, odometry, clock, arming = heard.advisory, heard.odometry, heard.clock, heard.arming
+    messages = (advisory, odometry, clock, arming)
+    if any(message is not None and message.domain != domain for message in messages):
+        found.append(Inhibit.WRONG_DOMAIN)
+    if (
+        arming is None
+        or not arming.armed
+        or arming.stopped
+        or is_old(heard.arming_us, config.arming_max_age_s)
+    ):
+        found.append(Inhibit.NOT_ARMED)
+    if clock is None or is_old(heard.clock_us, config.clock_max_age_s):
+        found.append(Inhibit.NO_CLOCK)
+    elif (
+        not clock.running
+        or state.advanced_us is None
+        or is_old(state.advanced_us, config.clock_max_age_s)
+    ):
+        found.append(Inhibit.CLOCK_STOPPED)
+    if odometry is None:
+        found.append(Inhibit.NO_ODOMETRY)
+    else:
+        if is_old(heard.odometry_us, config.odometry_max_age_s) or is_old(
+            odometry.source_us, config.odometry_max_age_s
+        ):
+            found.append(Inhibit.STALE_ODOMETRY)
+        numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
+        if not odometry.healthy or not all(map(math.isfinite, numbers)):
+            found.append(Inhibit.UNHEALTHY_ODOMETRY)
+    if advisory is None:
+        found.append(Inhibit.NO_ADVISORY)
+    else:
+        if is_old(heard.advisory_us, config.advisory_max_receipt_s) or is_old(
+            advisory.source_us, config.advisory_max_age_s
+        ):
+            found.append(Inhibit.STALE_ADVISORY)
+        if advisory.direction is Direction.STOP:
+            found.append(Inhibit.ADVISED_STOP)
+        elif advisory.direction is Direction.NO_DATA:
+            found.append(Inhibit.ADVISED_NO_DATA)
+    return found
+
+
+def _forget_turn(state: NavState, heard: Heard) -> NavState:
+    """Going straight ends a run of turns, and so does disarming; a STOP between two turns does not."""
+    straight = heard.advisory is not None and heard.advisory.direction is Direction.STRAIGHT
+    armed = heard.arming is not None and heard.arming.armed and not heard.arming.stopped
+    if state.turn is not None and (straight or not armed):
+        return msgspec.structs.replace(state, turn=None)
+    return state
+
+
+def _advance(
+    state: NavState, route: Route, position_m: tuple[float, float], config: NavigatorConfig
+) -> NavState:
+    """Count the waypoints reached; only called while going straight, so turns keep theirs (M1, M3)."""
+    target, reached, finished = state.target or 0, state.reached, state.finished
+    last = len(route.waypoints) - 1
+    for _ in route.waypoints:
+        if finished or not is_reached(route, target, position_m, config):
+            break
+        reached += 1
+        if target == last and not route.repeat:
+            finished = True
+        else:
+            target = (target + 1) % (last + 1)
+    return msgspec.structs.replace(state, target=target, reached=reached, finished=finished)
+
+
+def _order(
+    state: NavState,
+    heard: Heard,
+    now_us: int,
+    inhibits: list[Inhibit],
+    heading_rad: float = 0.0,
+    speed_mps: float = 0.0,
+    cross_m: float = 0.0,
+) -> NavCommand:
+    advisory = heard.advisory
+    enable = not inhibits
+    return NavCommand(
+        source_us=advisory.source_us if advisory is not None else now_us,
+        enable=enable,
+        heading_rad=heading_rad if enable else 0.0,
+        speed_mps=speed_mps if enable else 0.0,
+        echo_us=heard.clock.stamp_us if heard.clock is not None else 0,
+        inhibits=tuple(inhibits),
+        direction=advisory.direction if advisory is not None else Direction.NO_DATA,
+        waypoint_index=state.target or 0,
+        waypoints_reached=state.reached,
+        cross_track_m=cross_m,
+        advisory_sent_us=advisory.sent_us if advisory is not None else 0,
+    )
