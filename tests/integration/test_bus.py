@@ -56,8 +56,9 @@ async def test_what_is_refused_is_counted_by_cause(open_as: OpenAs) -> None:
     heard = plant.latest(keys.THRUST)
     own = controller.publisher(keys.THRUST)
     while heard.value is None:
-        sent = own.put(thrust())
+        own.put(thrust())
         await asyncio.sleep(0.02)
+    sent = own.put(thrust())
     for data in (b"", b'{"left": NaN}', b"{}"):
         controller.put_raw("controller/thrust", data)
     await until(lambda: sum(plant.drops.values()) == 3)

@@ -24,7 +24,8 @@ GPS_SPEED_STD_MPS = 0.07
 SWAY_STD_MPS = 0.15
 LOCAL_SPEED_STD_MPS = 2.0  # the local filter's surge fades towards zero instead of running away
 CONVERGED_FIXES = 5
-REFUSED_FIXES = 10  # in a row: the filter is wrong, not the receiver
+DOUBTFUL_FIXES = 3  # refused in a row: one of the two is wrong
+REFUSED_FIXES = 10  # refused in a row: the filter is wrong, not the receiver
 
 
 class Estimator:
@@ -162,6 +163,7 @@ class Estimator:
             imu_fresh
             and self._is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
             and self._accepted >= CONVERGED_FIXES
+            and self._refused < DOUBTFUL_FIXES
             and odometry.position_std_m <= self._config.max_position_std_m
             and odometry.yaw_std_rad <= self._config.max_yaw_std_rad
         )

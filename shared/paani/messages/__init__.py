@@ -1,0 +1,78 @@
+"""Every message that crosses the bus.
+
+Closed, frozen structs that encode to plain JSON. Angles are radians, counter-clockwise from east (ENU);
+boxes are `(x1, y1, x2, y2)`, normalised to the picture, origin top left; stamps are integer microseconds.
+A bounded field cannot carry NaN or infinity: JSON has neither, and the bounds reject the rest.
+"""
+
+from paani.messages.advisor import (
+    Advisory,
+    Direction,
+    Hazard,
+    LaneRisk,
+    MotionCause,
+    MotionState,
+    Reason,
+    Track,
+    Tracks,
+)
+from paani.messages.camera import PictureHeader, TimeBase
+from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
+from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.health import DropCount, Health, InputHealth, Pulse
+from paani.messages.perception import (
+    Detection,
+    Evidence,
+    InferenceTiming,
+    Label,
+    LaneEvidence,
+    SegmentationSource,
+    UnusableCause,
+)
+from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
+
+__all__ = [
+    "Advisory",
+    "Arming",
+    "BoxXyxy",
+    "Count",
+    "Detection",
+    "Direction",
+    "DropCount",
+    "Evidence",
+    "Finite",
+    "GpsFix",
+    "Hazard",
+    "Health",
+    "ImuSample",
+    "InferenceTiming",
+    "Inhibit",
+    "InputHealth",
+    "Label",
+    "LaneEvidence",
+    "LaneRisk",
+    "Message",
+    "MotionCause",
+    "MotionState",
+    "NavCommand",
+    "NonNegative",
+    "Odometry",
+    "PictureHeader",
+    "Pulse",
+    "Reason",
+    "Route",
+    "SegmentationSource",
+    "SimTime",
+    "Stamp",
+    "Text",
+    "Thrust",
+    "ThrustApplied",
+    "TimeBase",
+    "Track",
+    "Tracks",
+    "TruePose",
+    "Unit",
+    "UnusableCause",
+    "Waypoint",
+    "ZeroCause",
+]

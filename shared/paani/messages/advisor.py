@@ -1,0 +1,139 @@
+"""Tracks and advice."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.perception import Label, UnusableCause
+
+
+class Hazard(StrEnum):
+    """Compact hazard vocabulary, one to one with `Label` (checklist G8)."""
+
+    SWIMMER = "swimmer"
+    CRAFT = "craft"
+    STRUCTURE = "structure"
+    MARKER = "marker"
+
+
+class MotionState(StrEnum):
+    """Apparent motion: diagnostic only, it lowers no risk and authorises nothing (checklist I20)."""
+
+    APPROACHING = "approaching"
+    RECEDING = "receding"
+    STEADY = "steady"
+    UNKNOWN = "unknown"
+
+
+class MotionCause(StrEnum):
+    """Why the apparent motion is unknown, or NONE when it is known."""
+
+    NONE = "none"
+    TOO_FEW_SAMPLES = "too_few_samples"
+    TOO_SHORT = "too_short"
+    LOW_QUALITY = "low_quality"
+    AMBIGUOUS_INTERVAL = "ambiguous_interval"
+    CLIPPED_BY_FRAME = "clipped_by_frame"
+    WEAK_DETECTION = "weak_detection"
+    AMBIGUOUS_ASSOCIATION = "ambiguous_association"
+    SHAPE_CHANGE = "shape_change"
+    TIME_REVERSED = "time_reversed"
+    EPOCH_CHANGE = "epoch_change"
+    GAP = "gap"
+
+
+class Track(msgspec.Struct, frozen=True, kw_only=True):
+    """One tracked box. Acceptance and prediction are explicit, never hidden in the score (checklist G11)."""
+
+    id: Count
+    label: Label
+    hazard: Hazard
+    confidence: Unit
+    box_xyxy: BoxXyxy
+    hits: Count
+    confirmed: bool
+    immediate_danger: bool
+    accepted: bool
+    held: bool
+    age_s: NonNegative
+    urgency: Unit
+    motion: MotionState = MotionState.UNKNOWN
+    motion_cause: MotionCause = MotionCause.TOO_FEW_SAMPLES
+    motion_rate_per_s: Finite = 0.0
+    motion_margin_per_s: NonNegative = 0.0
+    motion_confidence: Unit = 0.0
+
+
+class Tracks(Message, frozen=True, kw_only=True):
+    frame_seq: Count
+    frame_epoch: Count
+    tracks: tuple[Track, ...] = ()
+
+
+class Direction(StrEnum):
+    """The advised direction (checklist J18)."""
+
+    STRAIGHT = "STRAIGHT"
+    SLIGHT_LEFT = "SLIGHT_LEFT"
+    SLIGHT_RIGHT = "SLIGHT_RIGHT"
+    LEFT = "LEFT"
+    RIGHT = "RIGHT"
+    STOP = "STOP"
+    NO_DATA = "NO_DATA"
+
+
+class Reason(StrEnum):
+    """Why this direction. Scores, temporal rules, occupancy, age and input faults never share a code (B17)."""
+
+    CENTER_CLEAR = "CENTER_CLEAR"
+    CENTER_RISK = "CENTER_RISK"
+    CENTER_OCCUPIED = "CENTER_OCCUPIED"
+    CENTER_VESSEL = "CENTER_VESSEL"
+    CENTER_EDGE_INCURSION = "CENTER_EDGE_INCURSION"
+    TURN_RETAINED = "TURN_RETAINED"
+    TIE_KEPT_SIDE = "TIE_KEPT_SIDE"
+    TIE_STARBOARD = "TIE_STARBOARD"
+    NO_SAFE_SIDE = "NO_SAFE_SIDE"
+    NO_SIDE_UNOCCUPIED = "NO_SIDE_UNOCCUPIED"
+    STALE_EVIDENCE = "STALE_EVIDENCE"
+    FUTURE_EVIDENCE = "FUTURE_EVIDENCE"
+    UNUSABLE_IMAGE = "UNUSABLE_IMAGE"
+    MALFORMED_EVIDENCE = "MALFORMED_EVIDENCE"
+    NO_EVIDENCE = "NO_EVIDENCE"
+
+
+class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
+    """R_j and the four numbers it was made from (checklist J4), with the overrides that apply."""
+
+    risk: Unit = 1.0
+    non_water: Unit = 1.0
+    obstacle: Unit = 0.0
+    urgency: Unit = 0.0
+    uncertainty: Unit = 1.0
+    clear_width: Unit = 0.0
+    occupied: bool = False
+    blocked: bool = True
+    track_ids: tuple[Count, ...] = ()
+
+
+class Advisory(Message, frozen=True, kw_only=True):
+    """What the advisor advises and the evidence it used (checklist J11)."""
+
+    direction: Direction
+    reason: Reason
+    cause: UnusableCause = UnusableCause.NONE
+    left: LaneRisk = LaneRisk()
+    center: LaneRisk = LaneRisk()
+    right: LaneRisk = LaneRisk()
+    center_block_risk: Unit = 0.48
+    side_block_risk: Unit = 0.58
+    contributing_track_ids: tuple[Count, ...] = ()
+    evidence_age_s: Finite = 0.0
+    lifetime_s: NonNegative = 3.5
+    frame_seq: Count = 0
+    frame_epoch: Count = 0
+    evidence_sent_us: Stamp = 0
+    explanation: Text = ""

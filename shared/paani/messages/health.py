@@ -1,0 +1,40 @@
+"""Heartbeats and the one-second report."""
+
+from __future__ import annotations
+
+import msgspec
+
+from paani.messages.header import Count, Message, NonNegative, Text
+
+
+class Pulse(Message, frozen=True, kw_only=True):
+    """Ten times a second from the event loop of each vital process: silence means dead or hung."""
+
+
+class InputHealth(msgspec.Struct, frozen=True, kw_only=True):
+    topic: Text
+    alive: bool
+    fresh: bool
+    rate_ok: bool
+    rate_hz: NonNegative
+    age_s: NonNegative
+    received: Count
+    superseded: Count
+
+
+class DropCount(msgspec.Struct, frozen=True, kw_only=True):
+    cause: Text
+    count: Count
+
+
+class Health(Message, frozen=True, kw_only=True):
+    """Once a second from every process."""
+
+    service: Text
+    ready: bool
+    uptime_s: NonNegative
+    cpu_cores: NonNegative
+    rss_mib: NonNegative
+    inputs: tuple[InputHealth, ...] = ()
+    drops: tuple[DropCount, ...] = ()
+    note: Text = ""

@@ -1,0 +1,90 @@
+"""What perception sees in one picture."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+from paani.messages.camera import TimeBase
+from paani.messages.header import BoxXyxy, Count, Message, NonNegative, Text, Unit
+
+
+class Label(StrEnum):
+    """Detector classes in output order (checklist C2)."""
+
+    PERSON = "person"
+    VESSEL = "vessel"
+    PIER = "pier"
+    BUOY = "buoy"
+
+
+class UnusableCause(StrEnum):
+    """Why a picture cannot be evidence; NONE when it can."""
+
+    NONE = "none"
+    UNDECODABLE = "undecodable"
+    WRONG_SIZE = "wrong_size"
+    BLACK = "black"
+    WHITE = "white"
+    FLAT = "flat"
+    NOISE = "noise"
+    BLURRED = "blurred"
+    COVERED = "covered"
+    FROZEN = "frozen"
+    STALE = "stale"
+
+
+class SegmentationSource(StrEnum):
+    """Who drew the mask. Only LEARNED may count as free-space evidence (checklist F2)."""
+
+    LEARNED = "learned"
+    FALLBACK = "fallback"
+    NONE = "none"
+
+
+class Detection(msgspec.Struct, frozen=True, kw_only=True):
+    label: Label
+    confidence: Unit
+    box_xyxy: BoxXyxy
+
+
+class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
+    """One corridor of the mask: N_j, U_j and clear width (checklist E4-E6), fractions of the corridor."""
+
+    non_water: Unit = 1.0
+    uncertainty: Unit = 1.0
+    clear_width: Unit = 0.0
+
+
+class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
+    """Wall time of each step for one picture; `frame_age_ms` is the picture's age at inference start."""
+
+    frame_age_ms: NonNegative = 0.0
+    decode_ms: NonNegative = 0.0
+    gate_ms: NonNegative = 0.0
+    detector_ms: NonNegative = 0.0
+    segmenter_ms: NonNegative = 0.0
+    inference_ms: NonNegative = 0.0
+    total_ms: NonNegative = 0.0
+
+
+class Evidence(Message, frozen=True, kw_only=True):
+    """What perception saw in one picture (checklist B5)."""
+
+    frame_seq: Count
+    frame_epoch: Count
+    width_px: Count
+    height_px: Count
+    usable: bool
+    cause: UnusableCause = UnusableCause.NONE
+    time_base: TimeBase = TimeBase.CAPTURE
+    detections: tuple[Detection, ...] = ()
+    left: LaneEvidence = LaneEvidence()
+    center: LaneEvidence = LaneEvidence()
+    right: LaneEvidence = LaneEvidence()
+    segmentation: SegmentationSource = SegmentationSource.NONE
+    navigation_eligible: bool = False
+    confidence_threshold: Unit = 0.4
+    timing: InferenceTiming = InferenceTiming()
+    models: Text = ""
