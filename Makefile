@@ -1,7 +1,11 @@
 # `make run` and `make test` set up everything they need on a fresh Debian or Ubuntu machine.
 
+# `make test EXTRAS=host,dev,train` also runs the tests that train; they need PyTorch.
+
 PYTHON ?= python3
 VENV   ?= .venv
+EXTRAS ?= host,dev
+comma  := ,
 PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
@@ -24,20 +28,16 @@ lint:
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-setup: $(VENV)/.host-stamp system
-setup-test: $(VENV)/.dev-stamp system-test
+setup: $(VENV)/.stamp-host system
+setup-test: $(VENV)/.stamp-$(subst $(comma),-,$(EXTRAS)) system-test
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "paani needs Python >= 3.11 (PYTHON=...)"; exit 2; }
 	@$(PYTHON) -m venv $(VENV) || { echo "cannot make $(VENV): install python3-venv"; exit 2; }
 
-$(VENV)/.host-stamp: pyproject.toml requirements.lock | $(VENV)/bin/python
-	$(BIN)/python -m pip install -q -c requirements.lock -e ".[host]"
+$(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q -c requirements.lock -e ".[$(subst -,$(comma),$*)]"
 	@touch $@
-
-$(VENV)/.dev-stamp: pyproject.toml requirements.lock | $(VENV)/bin/python
-	$(BIN)/python -m pip install -q -c requirements.lock -e ".[host,dev]"
-	@touch $@ $(VENV)/.host-stamp
 
 system:
 	@sh deploy/system-packages.sh $(DEBIAN)
@@ -46,7 +46,7 @@ system-test:
 	@sh deploy/system-packages.sh $(DEBIAN_TEST)
 
 lock: ## pin what the next installation takes
-	$(BIN)/uv pip compile -q --extra host --extra dev --no-header --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
+	$(BIN)/uv pip compile -q --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

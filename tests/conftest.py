@@ -116,6 +116,11 @@ def spawn(open_as: OpenAs, private_sets: tuple[str, ...]) -> Spawn:
     return spawn
 
 
+def put_raw(bus: Bus, name: str, data: bytes) -> None:
+    """Write any bytes below the vessel's prefix, as a faulty or hostile peer would."""
+    bus._session.put(f"{bus.prefix}/{name}", data)
+
+
 async def wait_alive(bus: Bus, service: str, process: asyncio.subprocess.Process) -> None:
     """Return when the service's liveliness token is there; fail at once when it exits first."""
 

@@ -15,11 +15,10 @@ from paani_models.detection_metrics import CONFIDENCE, Found, class_figures, dec
 from paani_models.detector_data import BoxedPicture, plain, read_boxed
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
 from paani_models.onnx_runner import Floats, open_net
-from paani_models.segmenter import CLASSES
 from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
 from paani_models.sources import DETECTOR_CLASSES, Sample, read_pair, read_picture
 
-WATER, OBSTACLE = CLASSES.index("water"), CLASSES.index("obstacle")
+WATER, OBSTACLE = SEGMENTER_CLASSES.index("water"), SEGMENTER_CLASSES.index("obstacle")
 NULL_PICTURES = 200
 
 
@@ -32,7 +31,7 @@ def segmenter_figures(net: Path, samples: list[Sample]) -> list[Figure]:
     figures: list[Figure] = []
     for name in dict.fromkeys(sample.source.name for sample in samples):
         chosen = [sample for sample in samples if sample.source.name == name]
-        counts = np.zeros((len(CLASSES), len(CLASSES)), np.int64)
+        counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
         edges = np.zeros(4, np.int64)
         for sample in tqdm(chosen, name, unit="picture", mininterval=5.0):
             picture, truth = read_pair(sample)
@@ -42,12 +41,12 @@ def segmenter_figures(net: Path, samples: list[Sample]) -> list[Figure]:
                     np.minimum(label, OBSTACLE),
                     np.where(truth == 2, OBSTACLE, truth).astype(np.uint8),
                 )
-            counts += confusion(label, truth, len(CLASSES))
+            counts += confusion(label, truth, len(SEGMENTER_CLASSES))
             edges += edge_counts(label, truth)
-        scored = ("water",) if chosen[0].source.water_only else CLASSES
+        scored = ("water",) if chosen[0].source.water_only else SEGMENTER_CLASSES
         iou = class_iou(counts)
-        rows = {f"iou_{kind}": float(iou[CLASSES.index(kind)]) for kind in scored}
-        if len(scored) == len(CLASSES):
+        rows = {f"iou_{kind}": float(iou[SEGMENTER_CLASSES.index(kind)]) for kind in scored}
+        if len(scored) == len(SEGMENTER_CLASSES):
             rows["miou"] = float(np.nanmean(iou))
         rows["edge_f1"] = f1(*(int(count) for count in edges))
         figures.extend(Figure(metric, name, round(value, 4), len(chosen)) for metric, value in rows.items())

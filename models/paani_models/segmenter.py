@@ -12,7 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-CLASSES = ("water", "obstacle", "sky")  # checklist D6
+from paani_models.sources import SEGMENTER_CLASSES
+
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # checklist D5
 PARAMETERS = 1_082_467  # checklist D9
 
@@ -123,7 +124,7 @@ class Segmenter(nn.Module):
             nn.Sequential(nn.Conv2d(width, width, 3, padding=1, bias=False), nn.BatchNorm2d(width), nn.ReLU())
             for _ in TAP_CHANNELS[:-1]
         )
-        self.head = nn.Conv2d(width, len(CLASSES), 3, padding=1)
+        self.head = nn.Conv2d(width, len(SEGMENTER_CLASSES), 3, padding=1)
 
     def taps(self, x: Tensor) -> list[Tensor]:
         """Encoder outputs at strides 4, 8, 16, 32."""

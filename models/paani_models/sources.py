@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from paani.errors import UserError
 
 IGNORE = 255
+SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # checklist D6
 DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # checklist C2
 RENDERED = "rendered"  # the one source that is drawn, not photographed
 

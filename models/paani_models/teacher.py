@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from paani.errors import UserError
-from paani_models.segmenter import CLASSES, DECODER_CHANNELS
+from paani_models.segmenter import DECODER_CHANNELS
 
 # (expansion, channels, repeats, stride): Sandler et al. 2018, table 2.
 _STAGES = (
@@ -93,7 +93,7 @@ class Teacher(nn.Module):
             nn.Sequential(nn.Conv2d(width, width, 3, padding=1, bias=False), nn.BatchNorm2d(width), nn.ReLU())
             for _ in TAP_CHANNELS[:-1]
         )
-        self.head = nn.Conv2d(width, len(CLASSES), 3, padding=1)
+        self.head = nn.Conv2d(width, len(SEGMENTER_CLASSES), 3, padding=1)
         self.register_buffer("scale", 2.0 * torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
         self.register_buffer("shift", 2.0 * torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1) - 1.0)
 

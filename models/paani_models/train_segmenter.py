@@ -16,7 +16,7 @@ from tqdm import tqdm
 from paani_models.augment import segmenter_null, segmenter_sample
 from paani_models.distillation import Distillation
 from paani_models.network_input import segmenter_batch
-from paani_models.segmenter import CLASSES, segmenter_loss
+from paani_models.segmenter import segmenter_loss
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import IGNORE, RENDERED, Sample, read_mask, read_picture
 from paani_models.training import (
@@ -175,7 +175,7 @@ class SegmenterTraining:
         """IoU of the averaged weights on the held-out pictures at the current input size."""
         stage = stage_of(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
         size = (stage.width_px, stage.height_px)
-        counts = np.zeros((len(CLASSES), len(CLASSES)), np.int64)
+        counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
         for start in range(0, len(self.held_out), 16):
             chunk = self.held_out[start : start + 16]
             resized = np.stack([np.asarray(cv2.resize(p.picture, size), np.uint8) for p in chunk])
@@ -183,8 +183,8 @@ class SegmenterTraining:
             labels = logits.argmax(1).cpu().numpy().astype(np.uint8)
             for item, label in zip(chunk, labels, strict=True):
                 truth = np.asarray(cv2.resize(item.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-                counts += confusion(label, truth, len(CLASSES))
+                counts += confusion(label, truth, len(SEGMENTER_CLASSES))
         iou = class_iou(counts)
         return {"miou": round(float(np.nanmean(iou)), 4)} | {
-            name: round(float(value), 4) for name, value in zip(CLASSES, iou, strict=True)
+            name: round(float(value), 4) for name, value in zip(SEGMENTER_CLASSES, iou, strict=True)
         }

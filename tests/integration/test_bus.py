@@ -14,7 +14,7 @@ from paani.bus import open_bus
 from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
-from tests.conftest import OpenAs, Spawn
+from tests.conftest import OpenAs, Spawn, put_raw
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
@@ -41,10 +41,10 @@ async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:
     before = heard.received
     for _ in range(5):
         forged.put(thrust(left=1.0))
-        advisor.put_raw("controller/thrust", b"{}")
-        advisor.put_raw("controller/*", b"{}")
-        advisor.put_raw("**", b"{}")
-        controller.put_raw("controller/*", b"{}")
+        put_raw(advisor, "controller/thrust", b"{}")
+        put_raw(advisor, "controller/*", b"{}")
+        put_raw(advisor, "**", b"{}")
+        put_raw(controller, "controller/*", b"{}")
     own.put(thrust(left=0.3))
     await until(lambda: heard.value is not None and heard.value.left == 0.3)
     assert heard.received == before + 1
@@ -60,7 +60,7 @@ async def test_what_is_refused_is_counted_by_cause(open_as: OpenAs) -> None:
         await asyncio.sleep(0.02)
     sent = own.put(thrust())
     for data in (b"", b'{"left": NaN}', b"{}"):
-        controller.put_raw("controller/thrust", data)
+        put_raw(controller, "controller/thrust", data)
     await until(lambda: sum(plant.drops.values()) == 3)
     assert dict(plant.drops) == {"undecodable": 1, "non_finite": 1, "wrong_type": 1}
     assert heard.value is not None

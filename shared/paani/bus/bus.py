@@ -139,10 +139,6 @@ class Bus:
     async def close(self) -> None:
         await asyncio.to_thread(self._session.close)
 
-    def put_raw(self, name: str, data: bytes) -> None:
-        """Write any bytes below the vessel's prefix, as a faulty or hostile peer would."""
-        self._session.put(f"{self.prefix}/{name}", data)
-
     async def fetch(self, topic: keys.Topic[m.PictureHeader], after: tuple[int, int]) -> zenoh.Sample | None:
         """One long poll for a picture newer than `after` (epoch, seq)."""
         samples: list[zenoh.Sample] = []

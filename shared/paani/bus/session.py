@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
+import logging
 
 import zenoh
 
 from paani.authority import password_of
 from paani.config import BusConfig
 
+LOG = logging.getLogger(__name__)
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
@@ -47,9 +50,12 @@ def zenoh_config(settings: dict[str, object]) -> zenoh.Config:
 
 
 async def open_client(config: BusConfig, user: str) -> zenoh.Session:
-    """Open a session; waits for the router as long as it takes."""
-    while True:
+    """Open a session; waits for the router as long as it takes, and says so once."""
+    for attempt in itertools.count():
         try:
             return await asyncio.to_thread(lambda: zenoh.open(client_config(config, user)))
         except zenoh.ZError:
+            if attempt == 0:
+                LOG.warning("waiting for the router at %s (user %s)", config.router, user)
             await asyncio.sleep(0.1)
+    raise AssertionError("unreachable")
