@@ -16,7 +16,7 @@ from paani_models.detector_data import BoxedPicture, plain, read_boxed
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
 from paani_models.onnx_runner import Floats, open_net
 from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
-from paani_models.sources import DETECTOR_CLASSES, Sample, read_pair, read_picture
+from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_pair, read_picture
 
 WATER, OBSTACLE = SEGMENTER_CLASSES.index("water"), SEGMENTER_CLASSES.index("obstacle")
 NULL_PICTURES = 200

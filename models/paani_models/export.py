@@ -27,7 +27,7 @@ from paani_models.catalogue import (
 from paani_models.detector import Detector
 from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
-from paani_models.sources import DETECTOR_CLASSES, RENDERED, Source
+from paani_models.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
 from paani_models.training import load_average
 
 OPSET = 17  # checklist T1

@@ -16,6 +16,7 @@ from torch.nn import functional as F
 
 from paani.errors import UserError
 from paani_models.segmenter import DECODER_CHANNELS
+from paani_models.sources import SEGMENTER_CLASSES
 
 # (expansion, channels, repeats, stride): Sandler et al. 2018, table 2.
 _STAGES = (

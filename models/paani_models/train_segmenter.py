@@ -18,7 +18,7 @@ from paani_models.distillation import Distillation
 from paani_models.network_input import segmenter_batch
 from paani_models.segmenter import segmenter_loss
 from paani_models.segmenter_metrics import class_iou, confusion
-from paani_models.sources import IGNORE, RENDERED, Sample, read_mask, read_picture
+from paani_models.sources import IGNORE, RENDERED, SEGMENTER_CLASSES, Sample, read_mask, read_picture
 from paani_models.training import (
     Prefetch,
     Progress,

@@ -6,7 +6,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 from paani_models import detector, segmenter  # noqa: E402
-from paani_models.sources import DETECTOR_CLASSES  # noqa: E402
+from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
 
 
 def test_segmenter_parameters_d9() -> None:
@@ -40,7 +40,7 @@ def test_segmenter_output_is_piecewise_constant_over_four_pixels_d4_d5() -> None
 
 
 def test_segmenter_class_order_d6() -> None:
-    assert segmenter.CLASSES == ("water", "obstacle", "sky")
+    assert SEGMENTER_CLASSES == ("water", "obstacle", "sky")
 
 
 def test_segmenter_loss_ignores_255() -> None:

@@ -14,7 +14,7 @@ from paani.geometry import wrap_rad
 Array = npt.NDArray[np.float64]
 
 PX, PY, PSI, U, V, B = range(6)
-ACCEL_STD_MPS2 = 0.25  # what the averaged, levelled accelerometer misses, per square root second
+ACCEL_STD_MPS2 = 0.08  # what the averaged, levelled accelerometer misses, per square root second
 GYRO_STD_RADPS = 0.01
 BIAS_STD_RADPS = 2e-4
 POSITION_STD_M = 0.02

@@ -3,7 +3,7 @@
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
 from paani.config.loading import decode_config, encode_config, load_config
-from paani.config.seeing import CameraConfig, DetectorConfig, GateConfig, PerceptionConfig
+from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, GateConfig, PerceptionConfig
 from paani.config.simulating import (
     AdapterConfig,
     DynamicsConfig,
@@ -21,6 +21,7 @@ __all__ = [
     "CameraConfig",
     "Config",
     "ControllerConfig",
+    "CorridorConfig",
     "DashboardConfig",
     "DetectorConfig",
     "DynamicsConfig",

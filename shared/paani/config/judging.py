@@ -16,7 +16,8 @@ class TrackerConfig(Section, frozen=True):
     max_tracks: Size = 64
     growth_full_scale_per_s: Positive = 0.16  # H1
     centering_full_scale_per_s: Positive = 0.20  # H2
-    urgency_decay_s: Positive = 1.0
+    urgency_decay_s: Positive = 1.0  # H4
+    held_decay_s: Positive = 1.0  # how fast the obstacle weight of a box fades while it is not seen
 
 
 class MotionConfig(Section, frozen=True):
@@ -26,14 +27,20 @@ class MotionConfig(Section, frozen=True):
     min_duration_s: Positive = 0.4  # I6
     max_gap_s: Positive = 0.75  # I16
     follow_rate: bool = True  # stretch window and gap to the measured period
+    slow_period_s: Positive = 0.3  # a longer period between frames stretches them
+    history_periods: Positive = 6.0
+    gap_periods: Positive = 2.5
     deadband_per_s: Positive = 0.04  # I3
     margin_floor_per_s: Positive = 0.01  # I2
     margin_factor: Positive = 3.0  # I2
     min_quality: Fraction = 0.25  # I8
     max_confidence: Fraction = 0.9  # I9
+    full_duration_s: Positive = 1.0  # I7
+    full_samples: Size = 8  # I7
+    full_detection_confidence: Fraction = 0.6  # I7
     min_detection_confidence: Fraction = 0.40
     edge_margin: Fraction = 0.005
-    max_aspect_change: Positive = 0.5
+    max_aspect_change: Positive = 0.5  # of log(width / height)
 
 
 class RiskConfig(Section, frozen=True):

@@ -39,6 +39,24 @@ class DetectorConfig(Section, frozen=True):
     max_boxes: Size = 24  # C9
 
 
+class CorridorConfig(Section, frozen=True):
+    """Where the boat may go in the picture: normalised x ranges (they overlap) below normalised height `top`."""
+
+    top: Fraction = 0.30  # E2
+    left: tuple[Fraction, Fraction] = (0.03, 0.39)  # E3
+    center: tuple[Fraction, Fraction] = (0.31, 0.69)  # E3
+    right: tuple[Fraction, Fraction] = (0.61, 0.97)  # E3
+    clear_column: Fraction = 0.60  # E6
+
+    def __post_init__(self) -> None:
+        """A corridor has a width, and something lies below its top."""
+        for name, (start, end) in (("left", self.left), ("center", self.center), ("right", self.right)):
+            if start >= end:
+                raise ValueError(f"{name}: {start} is not left of {end}")
+        if self.top > 0.95:
+            raise ValueError(f"top: {self.top} leaves no picture below it")
+
+
 class PerceptionConfig(Section, frozen=True):
     rate_hz: Positive = 5.0
     max_frame_age_s: Positive = 0.8  # J16, judged at inference start
@@ -49,5 +67,6 @@ class PerceptionConfig(Section, frozen=True):
     temperature: Positive = 1.0
     fallback_non_water: Fraction = 1.0  # F3
     fallback_uncertainty: Fraction = 1.0
+    corridors: CorridorConfig = CorridorConfig()
     gate: GateConfig = GateConfig()
     detections: DetectorConfig = DetectorConfig()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from paani.messages.header import Count, Message, Text
+from paani.messages.header import Count, Message, Stamp, Text
 
 
 class TimeBase(StrEnum):
-    """What `source_us` of a picture counts (checklist I17)."""
+    """Which time tells the motion between pictures (checklist I17): `source_us` live, `media_us` in a replay.
+
+    MEDIA is the recording's own time, FRAME_INDEX the index over the replay rate. Freshness is always `source_us`.
+    """
 
     CAPTURE = "capture"
     MEDIA = "media"
@@ -25,3 +28,4 @@ class PictureHeader(Message, frozen=True, kw_only=True):
     media_type: Text = "image/jpeg"
     time_base: TimeBase = TimeBase.CAPTURE
     calibrated: bool = False
+    media_us: Stamp = 0

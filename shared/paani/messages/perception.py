@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.camera import TimeBase
-from paani.messages.header import BoxXyxy, Count, Message, NonNegative, Text, Unit
+from paani.messages.header import BoxXyxy, Count, Message, NonNegative, Stamp, Text, Unit
 
 
 class Label(StrEnum):
@@ -88,3 +88,4 @@ class Evidence(Message, frozen=True, kw_only=True):
     confidence_threshold: Unit = 0.4
     timing: InferenceTiming = InferenceTiming()
     models: Text = ""
+    media_us: Stamp = 0

@@ -61,6 +61,7 @@ class Plant:
         self.collisions = 0
         self.in_contact = False
         self._last_contact_s = -math.inf
+        mujoco.set_mju_user_warning(_keep_no_log_file)
         mujoco.mj_forward(self._model, self._data)
 
     def close(self) -> None:
@@ -166,3 +167,7 @@ class Plant:
             if now_s - self._last_contact_s > COLLISION_GAP_S:
                 self.collisions += 1
             self._last_contact_s = now_s
+
+
+def _keep_no_log_file(_: str) -> None:
+    """Without it MuJoCo writes its warnings to a file in the working folder; `step` raises anyway."""

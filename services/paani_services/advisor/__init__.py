@@ -1,0 +1,1 @@
+"""Evidence of one picture to an advised direction, with its reasons."""

@@ -1,0 +1,81 @@
+"""One plain sentence for people, made last, from the numbers in the advisory itself (checklist J12). Pure."""
+
+from paani.messages import Advisory, Direction, LaneRisk, Reason, Track, UnusableCause
+
+MANOEUVRE = {
+    Direction.STRAIGHT: "Straight on",
+    Direction.SLIGHT_LEFT: "Slightly left",
+    Direction.SLIGHT_RIGHT: "Slightly right",
+    Direction.LEFT: "Turn left",
+    Direction.RIGHT: "Turn right",
+    Direction.STOP: "Stop",
+    Direction.NO_DATA: "No advice",
+}
+UNUSABLE = {
+    UnusableCause.NONE: "gave no reason",
+    UnusableCause.UNDECODABLE: "cannot be decoded",
+    UnusableCause.WRONG_SIZE: "has the wrong size",
+    UnusableCause.BLACK: "is black",
+    UnusableCause.WHITE: "is white",
+    UnusableCause.FLAT: "shows nothing",
+    UnusableCause.NOISE: "is noise",
+    UnusableCause.BLURRED: "is blurred",
+    UnusableCause.COVERED: "is covered",
+    UnusableCause.FROZEN: "is frozen",
+    UnusableCause.STALE: "was too old to look at",
+}
+NAMED_TRACKS = 3
+
+
+def explain(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+    """Say what is advised and why."""
+    return f"{MANOEUVRE[advisory.direction]}: {_because(advisory, tracks)}."
+
+
+def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+    left, center, right = advisory.left, advisory.center, advisory.right
+    ahead = _obstacles(center, tracks)
+    centre = f"centre risk {center.risk:.2f} (limit {advisory.center_block_risk:.2f}){ahead}"
+    sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {advisory.side_block_risk:.2f})"
+    match advisory.reason:
+        case Reason.NO_EVIDENCE:
+            return "nothing has been seen yet"
+        case Reason.STALE_EVIDENCE:
+            return f"the last picture is {advisory.evidence_age_s:.1f} s old"
+        case Reason.FUTURE_EVIDENCE:
+            return f"the picture is dated {-advisory.evidence_age_s:.1f} s in the future"
+        case Reason.UNUSABLE_IMAGE:
+            return f"the picture {UNUSABLE[advisory.cause]}"
+        case Reason.MALFORMED_EVIDENCE:
+            return "the evidence is malformed"
+        case Reason.CENTER_CLEAR:
+            return f"the way ahead is clear, {centre}"
+        case Reason.TURN_RETAINED:
+            return f"keeping the turn until the way ahead stays clear, {centre}"
+        case Reason.CENTER_OCCUPIED:
+            return f"the way ahead is occupied{ahead}; {sides}"
+        case Reason.CENTER_VESSEL:
+            return f"a vessel is close ahead{ahead}; {sides}"
+        case Reason.CENTER_EDGE_INCURSION:
+            return f"an obstacle reaches into the way ahead from one side, {centre}"
+        case Reason.TIE_KEPT_SIDE:
+            return f"{centre}; the sides are alike, keeping this one, {sides}"
+        case Reason.TIE_STARBOARD:
+            return f"{centre}; the sides are alike, starboard by rule, {sides}"
+        case Reason.NO_SAFE_SIDE:
+            return f"{centre} and no side is safe, {sides}"
+        case Reason.NO_SIDE_UNOCCUPIED:
+            return f"{centre} and the safer side is occupied, {sides}"
+        case _:
+            return f"{centre}; {sides}"
+
+
+def _obstacles(lane: LaneRisk, tracks: tuple[Track, ...]) -> str:
+    """`: vessel #3 and pier #7`, or nothing."""
+    names = [f"{track.label} #{track.id}" for track in tracks if track.id in lane.track_ids]
+    if not names:
+        return ""
+    shown = names[:NAMED_TRACKS]
+    if len(names) > NAMED_TRACKS:
+        shown.append(f"{len(names) - NAMED_TRACKS} more")
+    return ", " + (" and ".join(shown) if len(shown) < NAMED_TRACKS else f"{', '.join(shown[:-1])} and {shown[-1]}")

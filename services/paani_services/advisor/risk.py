@@ -1,0 +1,128 @@
+"""How bad each corridor is: the water's part, the obstacles' part, their sum R_j (checklist J1-J4). Pure."""
+
+from collections.abc import Iterable
+
+import msgspec
+
+from paani.config import Config, CorridorConfig, RiskConfig
+from paani.geometry import clip
+from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
+from paani_services.advisor.tracker import TrackerState, is_immediate_danger, presence, urgency_now
+
+LANES = ("left", "center", "right")
+NEAR_FROM, NEAR_SPAN, TALL_SPAN = 0.30, 0.70, 0.50  # resolution 6
+NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # resolution 6
+
+
+class Obstacle(msgspec.Struct, frozen=True):
+    """An accepted track as the policy weighs it; `presence` falls from 1 while it is not seen."""
+
+    id: int
+    craft: bool
+    box: BoxXyxy
+    severity: float
+    urgency: float
+    presence: float
+    danger: bool
+
+
+class Components(msgspec.Struct, frozen=True):
+    """R_j of one corridor and what it is made of; `track_ids` overlap it (J13)."""
+
+    risk: float
+    non_water: float
+    obstacle: float
+    urgency: float
+    uncertainty: float
+    clear_width: float
+    track_ids: tuple[int, ...]
+
+
+def severity(confidence: float, box: BoxXyxy) -> float:
+    """Bounded severity of a box, from confidence, nearness (its bottom) and height (J1, resolution 6)."""
+    near = clip((box[3] - NEAR_FROM) / NEAR_SPAN, 0.0, 1.0)
+    tall = clip((box[3] - box[1]) / TALL_SPAN, 0.0, 1.0)
+    return clip(confidence * (NEAR_SHARE * near + TALL_SHARE * tall), 0.0, 1.0)
+
+
+def shared_width(box: BoxXyxy, span: tuple[float, float]) -> float:
+    """Width that a box and an x range have in common, normalised to the picture."""
+    return max(0.0, min(box[2], span[1]) - max(box[0], span[0]))
+
+
+def overlap(box: BoxXyxy, span: tuple[float, float]) -> float:
+    """Fraction of the box's width inside the corridor (J2, resolution 7): two lanes may both count it."""
+    return clip(shared_width(box, span) / (box[2] - box[0]), 0.0, 1.0)
+
+
+def either(values: Iterable[float]) -> float:
+    """E(a, b) = 1 - (1-a)(1-b), over any number of values in [0, 1] (J3)."""
+    none = 1.0
+    for value in values:
+        none *= 1.0 - value
+    return clip(1.0 - none, 0.0, 1.0)
+
+
+def total(non_water: float, obstacle: float, urgency: float, uncertainty: float, weights: RiskConfig) -> float:
+    """R = min(1, 0.55 N + 0.65 O + 0.20 M + 0.15 U) (J4)."""
+    return min(
+        1.0,
+        weights.non_water * non_water
+        + weights.obstacle * obstacle
+        + weights.urgency * urgency
+        + weights.uncertainty * uncertainty,
+    )
+
+
+def obstacles_of(state: TrackerState, config: Config) -> tuple[Obstacle, ...]:
+    """Accepted tracks only: confirmed, or an immediate danger."""
+    settings = config.advisor.tracker
+    return tuple(
+        Obstacle(
+            id=track.id,
+            craft=track.label == "vessel",
+            box=track.box,
+            severity=severity(track.display_confidence, track.box),
+            urgency=urgency_now(track, state.at_us, settings),
+            presence=presence(track, state.at_us, settings),
+            danger=is_immediate_danger(track.box, settings),
+        )
+        for track in state.tracks
+        if track.hits >= settings.confirm_hits or is_immediate_danger(track.box, settings)
+    )
+
+
+def water_of(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
+    """The mask's view of a corridor, or the default components where the mask may not count (F2, F3)."""
+    if evidence.navigation_eligible and evidence.segmentation is SegmentationSource.LEARNED:
+        found: LaneEvidence = getattr(evidence, lane)
+        return found
+    return LaneEvidence(
+        non_water=config.perception.fallback_non_water, uncertainty=config.perception.fallback_uncertainty
+    )
+
+
+def components(
+    evidence: Evidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config
+) -> Components:
+    """Everything R_j of one corridor is made of."""
+    span = lane_span(lane, config.perception.corridors)
+    water = water_of(evidence, lane, config)
+    inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
+    obstacle = either(o.severity * share * o.presence for o, share in inside)
+    urgency = either(o.urgency * share for o, share in inside)
+    return Components(
+        risk=total(water.non_water, obstacle, urgency, water.uncertainty, config.advisor.risk),
+        non_water=water.non_water,
+        obstacle=obstacle,
+        urgency=urgency,
+        uncertainty=water.uncertainty,
+        clear_width=water.clear_width,
+        track_ids=tuple(o.id for o, _ in inside),
+    )
+
+
+def lane_span(lane: str, corridors: CorridorConfig) -> tuple[float, float]:
+    """Normalised x range of a corridor."""
+    span: tuple[float, float] = getattr(corridors, lane)
+    return span

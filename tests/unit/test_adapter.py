@@ -1,0 +1,191 @@
+"""The last gate before force (O1, O2): what it lets through, and what it refuses and why."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from paani.config import AdapterConfig
+from paani.messages import Arming, Thrust, ZeroCause
+from paani_sim.plant.adapter import ThrustAdapter
+
+NOW_US = 50_000_000
+CONFIG = AdapterConfig()
+ARMED = Arming(source_us=1, armed=True)
+
+
+def thrust(**changes: object) -> Thrust:
+    message = Thrust(
+        source_us=1, left=0.02, right=0.04, enabled=True, echo_us=NOW_US - 100_000,
+        seq=7, epoch=100, domain=43, producer="controller",
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def ready(config: AdapterConfig = CONFIG) -> ThrustAdapter:
+    adapter = ThrustAdapter(config, domain=43)
+    keep_alive(adapter, NOW_US)
+    return adapter
+
+
+def keep_alive(adapter: ThrustAdapter, now_us: int) -> None:
+    adapter.hear_arming(ARMED, now_us)
+    for service in CONFIG.require_pulses:
+        adapter.hear_pulse(service, now_us)
+
+
+def test_o1_force_is_75_n_per_unit() -> None:
+    """O1: 75 N per normalised unit and fan."""
+    adapter = ready()
+    assert adapter.offer(thrust(), NOW_US) is ZeroCause.NONE
+    applied = adapter.decide(NOW_US)
+    assert (applied.left_n, applied.right_n) == pytest.approx((1.5, 3.0))
+    assert (applied.left, applied.right, applied.zero_cause) == (0.02, 0.04, ZeroCause.NONE)
+
+
+def test_o2_zero_half_a_second_after_the_last_command() -> None:
+    """O2: watchdog 0.5 s; it ends by itself with the next command."""
+    adapter = ready()
+    adapter.offer(thrust(), NOW_US)
+    for after_s, cause in ((0.5, ZeroCause.NONE), (0.501, ZeroCause.TIMEOUT)):
+        now_us = NOW_US + round(after_s * 1e6)
+        keep_alive(adapter, now_us)
+        assert adapter.decide(now_us).zero_cause is cause
+    later_us = NOW_US + 600_000
+    adapter.offer(thrust(seq=8, echo_us=later_us - 50_000), later_us)
+    assert adapter.decide(later_us).zero_cause is ZeroCause.NONE
+
+
+@pytest.mark.parametrize(
+    ("changes", "cause"),
+    [
+        ({"producer": "advisor"}, ZeroCause.WRONG_PRODUCER),
+        ({"producer": ""}, ZeroCause.WRONG_PRODUCER),
+        ({"domain": 44}, ZeroCause.WRONG_DOMAIN),
+        ({"epoch": 99, "seq": 900}, ZeroCause.OLD_EPOCH),
+        ({"seq": 7}, ZeroCause.REPLAYED),
+        ({"seq": 3}, ZeroCause.REPLAYED),
+        ({"seq": 8, "echo_us": NOW_US + 1}, ZeroCause.FUTURE),
+        ({"seq": 8, "echo_us": NOW_US - 500_001}, ZeroCause.STALE_ECHO),
+        ({"seq": 8, "echo_us": 0}, ZeroCause.STALE_ECHO),
+    ],
+)
+def test_refused_commands_leave_the_one_in_force(changes: dict[str, object], cause: ZeroCause) -> None:
+    adapter = ready()
+    adapter.offer(thrust(), NOW_US)
+    assert adapter.offer(thrust(**changes), NOW_US) is cause
+    assert adapter.rejected == 1
+    assert adapter.decide(NOW_US).right == 0.04
+    keep_alive(adapter, NOW_US + 600_000)
+    assert adapter.decide(NOW_US + 600_000).zero_cause is cause
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.01, 1.01])
+def test_invalid_thrust_stops_at_once(value: float) -> None:
+    adapter = ready()
+    adapter.offer(thrust(), NOW_US)
+    assert adapter.offer(thrust(seq=8, left=value), NOW_US) is ZeroCause.INVALID
+    applied = adapter.decide(NOW_US)
+    assert (applied.left_n, applied.right_n, applied.zero_cause) == (0.0, 0.0, ZeroCause.INVALID)
+    adapter.offer(thrust(seq=9), NOW_US)
+    assert adapter.decide(NOW_US).zero_cause is ZeroCause.NONE
+
+
+def test_a_burst_of_delayed_commands_is_refused_whole() -> None:
+    """Commands held up by a link for a second echo stamps a second old."""
+    adapter = ready()
+    now_us = NOW_US + 1_000_000
+    keep_alive(adapter, now_us)
+    burst = [adapter.offer(thrust(seq=10 + n), now_us) for n in range(20)]
+    assert set(burst) == {ZeroCause.STALE_ECHO}
+    assert adapter.decide(now_us).right_n == 0.0
+
+
+def test_a_restarted_controller_begins_again() -> None:
+    adapter = ready()
+    adapter.offer(thrust(), NOW_US)
+    assert adapter.offer(thrust(epoch=101, seq=0), NOW_US) is ZeroCause.NONE
+
+
+def test_disabled_command_is_accepted_and_gives_zero() -> None:
+    adapter = ready()
+    assert adapter.offer(thrust(enabled=False), NOW_US) is ZeroCause.NONE
+    assert adapter.decide(NOW_US).zero_cause is ZeroCause.NOT_ENABLED
+
+
+@pytest.mark.parametrize(
+    "arming",
+    [None, Arming(source_us=1, armed=False), Arming(source_us=1, armed=True, stopped=True)],
+)
+def test_no_force_without_the_operators_word(arming: Arming | None) -> None:
+    adapter = ThrustAdapter(CONFIG, domain=43)
+    for service in CONFIG.require_pulses:
+        adapter.hear_pulse(service, NOW_US)
+    if arming is not None:
+        adapter.hear_arming(arming, NOW_US)
+    adapter.offer(thrust(), NOW_US)
+    assert adapter.decide(NOW_US).zero_cause is ZeroCause.NOT_ARMED
+
+
+def test_arming_must_be_repeated() -> None:
+    adapter = ready()
+    now_us = NOW_US + 500_001
+    for service in CONFIG.require_pulses:
+        adapter.hear_pulse(service, now_us)
+    adapter.offer(thrust(echo_us=now_us), now_us)
+    assert adapter.decide(now_us).zero_cause is ZeroCause.ARMING_LOST
+    adapter.hear_arming(ARMED, now_us)
+    assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
+
+
+def test_a_latched_stop_holds_while_everything_else_comes_back() -> None:
+    adapter = ready()
+    adapter.hear_arming(Arming(source_us=1, armed=False, stopped=True), NOW_US)
+    for n in range(20):
+        now_us = NOW_US + n * 100_000
+        for service in CONFIG.require_pulses:
+            adapter.hear_pulse(service, now_us)
+        adapter.offer(thrust(seq=8 + n, echo_us=now_us), now_us)
+        assert adapter.decide(now_us).zero_cause is ZeroCause.NOT_ARMED
+
+
+@pytest.mark.parametrize("silent", CONFIG.require_pulses)
+def test_each_vital_process_must_beat(silent: str) -> None:
+    """A process that hangs for longer than 0.4 s stops the boat; its next beat frees it."""
+    adapter = ready()
+    now_us = NOW_US + 400_001
+    adapter.hear_arming(ARMED, now_us)
+    for service in CONFIG.require_pulses:
+        if service != silent:
+            adapter.hear_pulse(service, now_us)
+    adapter.offer(thrust(echo_us=now_us), now_us)
+    applied = adapter.decide(now_us)
+    assert (applied.zero_cause, applied.lost_pulse) == (ZeroCause.PULSE_LOST, silent)
+    assert applied.left_n == applied.right_n == 0.0
+    adapter.hear_pulse(silent, now_us)
+    assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
+
+
+def test_nothing_heard_nothing_applied() -> None:
+    assert ready().decide(NOW_US).zero_cause is ZeroCause.NO_COMMAND
+
+
+@given(
+    left=st.floats(), right=st.floats(), enabled=st.booleans(),
+    echo_us=st.integers(0, 2 * NOW_US), domain=st.integers(42, 44),
+)
+def test_force_is_always_within_limits(
+    left: float, right: float, enabled: bool, echo_us: int, domain: int
+) -> None:
+    adapter = ready()
+    adapter.offer(
+        thrust(left=left, right=right, enabled=enabled, echo_us=echo_us, domain=domain), NOW_US
+    )
+    applied = adapter.decide(NOW_US)
+    assert 0.0 <= applied.left_n <= 75.0
+    assert 0.0 <= applied.right_n <= 75.0
+    if applied.left_n or applied.right_n:
+        assert enabled
+        assert domain == 43
+        assert 0 <= NOW_US - echo_us <= 500_000

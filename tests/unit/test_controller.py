@@ -1,0 +1,181 @@
+"""Heading and speed to thrust (N1-N8): order of operations, signs, limits, and what stops it."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from paani.config import ControllerConfig, load_config
+from paani.messages import Direction, Inhibit, NavCommand, Odometry, Thrust
+from paani_services.controller.control import ControlState, Heard, control
+
+NOW_US = 9_000_000
+PAPER = load_config(profile="paper").controller
+PAANI = load_config().controller
+
+
+def command(**changes: object) -> NavCommand:
+    message = NavCommand(
+        source_us=NOW_US - 300_000, enable=True, heading_rad=0.0, speed_mps=0.15,
+        echo_us=123, sent_us=NOW_US - 20_000, direction=Direction.STRAIGHT,
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def odometry(**changes: object) -> Odometry:
+    message = Odometry(
+        source_us=NOW_US, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.15, healthy=True
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def run(
+    config: ControllerConfig,
+    given_command: NavCommand | None,
+    given_odometry: Odometry | None,
+    state: ControlState = ControlState(),
+    now_us: int = NOW_US,
+    odometry_us: int = NOW_US,
+) -> tuple[ControlState, Thrust]:
+    return control(state, Heard(given_command, NOW_US, given_odometry, odometry_us), now_us, 43, config)
+
+
+def settle(config: ControllerConfig, order: NavCommand, pose: Odometry, steps: int = 60) -> Thrust:
+    """The same inputs again and again, so that slew no longer matters."""
+    state, message = run(config, order, pose)
+    for n in range(1, steps):
+        now_us = NOW_US + n * 100_000
+        state, message = control(state, Heard(order, now_us, pose, now_us), now_us, 43, config)
+    return message
+
+
+def test_n8_recorded_snapshot() -> None:
+    """N8: SLIGHT_LEFT at half of 0.15 m/s, v = 0.0732 m/s gives fans 0.00000 / 0.02611."""
+    order = command(heading_rad=math.radians(10.0), speed_mps=0.075)
+    thrust = settle(PAPER, order, odometry(surge_mps=0.0732))
+    assert f"{thrust.left:.5f} {thrust.right:.5f}" == "0.00000 0.02611"
+    assert thrust.enabled
+
+
+def test_n3_n5_n7_forward_is_p_plus_feed_forward() -> None:
+    """N3: 0.16 v_ref + 0.08 (v_ref - v); N2: the order is capped at 0.30 m/s; N5: at 0.08."""
+    assert settle(PAPER, command(), odometry(surge_mps=0.1)).left == pytest.approx(0.024 + 0.004)
+    capped = settle(PAPER, command(speed_mps=0.9), odometry(surge_mps=0.30))
+    assert capped.left == pytest.approx(0.16 * 0.30)
+    assert settle(PAPER, command(speed_mps=0.30), odometry(surge_mps=-2.0)).left == pytest.approx(0.08)
+
+
+def test_n4_n5_heading_pd_and_its_limit() -> None:
+    """N4: 0.08 e - 0.05 r in radians; N5: no more than 0.04; a left turn needs the right fan."""
+    thrust = settle(PAPER, command(heading_rad=0.2), odometry(yaw_rate_radps=0.1))
+    assert (thrust.right - thrust.left) / 2.0 == pytest.approx(0.08 * 0.2 - 0.05 * 0.1)
+    hard = settle(PAPER, command(heading_rad=2.0, speed_mps=0.30), odometry(surge_mps=0.1))
+    assert (hard.right - hard.left) / 2.0 == pytest.approx(0.04)
+
+
+def test_heading_error_goes_the_short_way_round() -> None:
+    thrust = settle(PAPER, command(heading_rad=math.pi - 0.1), odometry(yaw_rad=-math.pi + 0.1))
+    assert thrust.heading_error_rad == pytest.approx(-0.2)
+    assert thrust.left > thrust.right
+
+
+def test_n6_slew_limits_each_fan_both_ways() -> None:
+    """N6: 0.15 per second; at 10 Hz 0.015 per step."""
+    start = ControlState(left=0.05, right=0.0, last_us=NOW_US - 100_000)
+    _, thrust = run(PAPER, command(heading_rad=0.5), odometry(), start)
+    assert (thrust.left, thrust.right) == pytest.approx((0.035, 0.015))
+
+
+def test_a_stop_is_never_slewed() -> None:
+    start = ControlState(left=0.08, right=0.08, integral=0.01, last_us=NOW_US - 100_000)
+    state, thrust = run(PAPER, command(enable=False, inhibits=(Inhibit.ADVISED_STOP,)), odometry(), start)
+    assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)
+    assert thrust.inhibits == (Inhibit.ADVISED_STOP,)
+    assert state == ControlState()
+
+
+@pytest.mark.parametrize(
+    ("given_command", "given_odometry", "inhibit"),
+    [
+        (None, odometry(), Inhibit.NO_COMMAND),
+        (command(), None, Inhibit.NO_ODOMETRY),
+        (command(), odometry(healthy=False), Inhibit.UNHEALTHY_ODOMETRY),
+        (command(), odometry(surge_mps=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
+        (command(heading_rad=math.nan), odometry(), Inhibit.COMMAND_INVALID),
+        (command(speed_mps=math.inf), odometry(), Inhibit.COMMAND_INVALID),
+        (command(speed_mps=-0.1), odometry(), Inhibit.COMMAND_INVALID),
+        (command(frame="odom"), odometry(), Inhibit.COMMAND_INVALID),
+        (command(enable=False), odometry(), Inhibit.COMMAND_INVALID),
+        (command(inhibits=(Inhibit.NO_ROUTE,)), odometry(), Inhibit.COMMAND_INVALID),
+        (command(domain=44), odometry(), Inhibit.WRONG_DOMAIN),
+    ],
+)
+def test_b11_what_stops_it(
+    given_command: NavCommand | None, given_odometry: Odometry | None, inhibit: Inhibit
+) -> None:
+    """B11: heading, speed, enable, frame and validity are checked together."""
+    _, thrust = run(PAANI, given_command, given_odometry)
+    assert inhibit in thrust.inhibits
+    assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)
+
+
+def test_receipt_ages_are_bounded() -> None:
+    late_us = NOW_US + round(PAANI.command_max_receipt_s * 1e6) + 1
+    _, thrust = run(PAANI, command(), odometry(), now_us=late_us, odometry_us=late_us)
+    assert thrust.inhibits == (Inhibit.STALE_COMMAND,)
+    _, thrust = run(PAANI, command(), odometry(), odometry_us=NOW_US - 400_001)
+    assert thrust.inhibits == (Inhibit.STALE_ODOMETRY,)
+
+
+def test_stamps_pass_through() -> None:
+    """The plant judges age by the stamp it issued; latency is measured from the evidence."""
+    _, thrust = run(PAANI, command(), odometry())
+    assert (thrust.echo_us, thrust.source_us) == (123, NOW_US - 300_000)
+    assert thrust.command_sent_us == NOW_US - 20_000
+
+
+def test_l5_speed_noise_at_rest_turns_no_fan() -> None:
+    """L5: the stopped-speed guard; without it the noise would be pushed against."""
+    still = command(speed_mps=0.0)
+    guarded = settle(PAPER, still, odometry(surge_mps=-0.04, stopped=True))
+    unguarded = settle(PAPER, still, odometry(surge_mps=-0.04, stopped=False))
+    assert guarded.left == guarded.right == 0.0
+    assert unguarded.left > 0.0
+
+
+@pytest.mark.parametrize("speed_mps", [0.15, 0.3, 0.6, 0.9])
+def test_drag_inverse_feed_forward(speed_mps: float) -> None:
+    """1b #18: at the ordered speed the fans give exactly the drag, (4 v + 20 v^2) / 150."""
+    thrust = settle(PAANI, command(speed_mps=speed_mps), odometry(surge_mps=speed_mps))
+    assert thrust.left == pytest.approx((4.0 * speed_mps + 20.0 * speed_mps**2) / 150.0)
+
+
+def test_integral_does_not_wind_up() -> None:
+    """A boat held fast for a minute gets full forward thrust, and no debt to work off afterwards."""
+    state, order = ControlState(), command(speed_mps=0.6)
+    for n in range(600):
+        now_us = NOW_US + n * 100_000
+        held = Heard(order, now_us, odometry(surge_mps=0.0), now_us)
+        state, thrust = control(state, held, now_us, 43, PAANI)
+    assert abs(state.integral) <= PAANI.max_integral
+    assert thrust.left <= PAANI.max_forward
+
+
+@given(
+    heading=st.floats(-10, 10), speed=st.floats(0, 5), yaw=st.floats(-4, 4),
+    surge=st.floats(-3, 3), rate=st.floats(-3, 3), left=st.floats(0, 1), right=st.floats(0, 1),
+    profile=st.sampled_from([PAPER, PAANI]),
+)
+def test_thrust_is_bounded_and_never_astern(
+    heading: float, speed: float, yaw: float, surge: float, rate: float,
+    left: float, right: float, profile: ControllerConfig,
+) -> None:
+    """N7: whatever the inputs, both fans stay in [0, 1] and move no faster than the slew allows."""
+    start = ControlState(left=left, right=right, last_us=NOW_US - 100_000)
+    pose = odometry(yaw_rad=yaw, surge_mps=surge, yaw_rate_radps=rate)
+    _, thrust = run(profile, command(heading_rad=heading, speed_mps=speed), pose, start)
+    assert 0.0 <= thrust.left <= 1.0
+    assert 0.0 <= thrust.right <= 1.0
+    assert abs(thrust.left - left) <= profile.slew_per_s * 0.1 + 1e-9
+    assert abs(thrust.right - right) <= profile.slew_per_s * 0.1 + 1e-9

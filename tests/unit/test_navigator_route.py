@@ -1,0 +1,78 @@
+"""Route files: what is accepted, and the line that names what is not."""
+
+from pathlib import Path
+
+import pytest
+from paani.errors import UserError
+from paani_services.navigator.route import load_route
+
+METRES = """
+name = "pond"
+[[waypoints]]
+x_m = 0
+y_m = 0.0
+[[waypoints]]
+x_m = 10.0
+y_m = -2
+"""
+GEODETIC = """
+name = "pond"
+repeat = false
+[origin]
+latitude_deg = 47.65
+longitude_deg = 9.48
+[[waypoints]]
+latitude_deg = 47.65
+longitude_deg = 9.48
+[[waypoints]]
+latitude_deg = 47.6509
+longitude_deg = 9.48
+"""
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "route.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_metres(tmp_path: Path) -> None:
+    route = load_route(written(tmp_path, METRES))
+    assert [(w.x_m, w.y_m) for w in route.waypoints] == [(0.0, 0.0), (10.0, -2.0)]
+    assert (route.name, route.repeat) == ("pond", True)
+
+
+def test_geodetic(tmp_path: Path) -> None:
+    route = load_route(written(tmp_path, GEODETIC))
+    assert route.waypoints[0].x_m == 0.0
+    assert route.waypoints[1].y_m == pytest.approx(100.07, abs=0.1)
+    assert not route.repeat
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("name = ", "Invalid value"),
+        ('name = "a"\n', "waypoints"),
+        ('name = "a"\n[[waypoints]]\nx_m = 1.0\ny_m = 1.0\n', "waypoints"),
+        (METRES + "z_m = 3.0\n", "z_m"),
+        (METRES.replace("y_m = -2", ""), "waypoints[1]"),
+        (METRES.replace("x_m = 10.0", "x_m = nan"), "waypoints[1]"),
+        (METRES.replace("x_m = 10.0", 'x_m = "ten"'), "waypoints[1].x_m"),
+        (METRES.replace("10.0", "0").replace("-2", "0"), "waypoints[0] and the next are the same"),
+        (GEODETIC.replace("[origin]", "[elsewhere]"), "elsewhere"),
+        (GEODETIC.replace("latitude_deg = 47.6509", "latitude_deg = 91.0"), "latitude_deg"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, text: str, named: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        load_route(path)
+    assert str(path) in str(caught.value)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="No such file"):
+        load_route(tmp_path / "nowhere.toml")

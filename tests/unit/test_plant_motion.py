@@ -1,0 +1,140 @@
+"""The plant as a boat: heave, speeds, turning, collisions, determinism."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from paani.config import DynamicsConfig, PlantConfig
+from paani_sim.plant.plant import Plant, PlantDiverged
+from paani_sim.worlds import World, load_world
+
+STEP_S = 0.01
+FORCE_N = 75.0
+OpenPlant = Callable[..., Plant]
+
+
+@pytest.fixture
+def open_plant() -> Iterator[OpenPlant]:
+    opened: list[Plant] = []
+
+    def make(world: World | None = None, config: PlantConfig | None = None, seed: int = 1) -> Plant:
+        opened.append(Plant(world or open_water(), config or PlantConfig(), seed))
+        return opened[-1]
+
+    yield make
+    for plant in opened:
+        plant.close()
+
+
+def open_water() -> World:
+    return dataclasses.replace(load_world("lake"), obstacles=(), actors=())
+
+
+def test_k6_heave_settles_at_0_177_with_a_damped_period_of_1_s(open_plant: OpenPlant) -> None:
+    """K6, 1a: omega_n 7.24 rad/s, zeta 0.50; damped period 1.0 s, overshoot 16 %, z_e 0.177 m."""
+    plant = open_plant()
+    plant.place(0.0, 0.0, 0.0, z_m=0.227)
+    heights = []
+    for _ in range(400):
+        plant.step(0.0, 0.0)
+        heights.append(plant.z_m - 0.177)
+    crossings = [i for i, (a, b) in enumerate(itertools.pairwise(heights)) if a * b < 0.0]
+    assert 2.0 * (crossings[1] - crossings[0]) * STEP_S == pytest.approx(0.99, abs=0.04)
+    assert -min(heights) / 0.05 == pytest.approx(0.16, abs=0.02)
+    assert plant.z_m == pytest.approx(0.177, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("thrust_frac", "speed_mps"), [(0.01, 0.19), (0.02, 0.30), (0.04, 0.46), (0.08, 0.68), (1.0, 2.69)]
+)
+def test_k4_k5_thrust_gives_the_drag_limited_speed(
+    open_plant: OpenPlant, thrust_frac: float, speed_mps: float
+) -> None:
+    """75 N per unit and fan against 4 v + 20 v^2; 0.68 m/s at the paper's forward limit (1a)."""
+    plant = open_plant()
+    plant.place(-60.0, 0.0, 0.0)
+    for _ in range(2500):
+        plant.step(FORCE_N * thrust_frac, FORCE_N * thrust_frac)
+    forward_mps, _, _ = plant.velocity
+    over_ground_mps = forward_mps / math.cos(plant.attitude.pitch_rad)
+    assert over_ground_mps == pytest.approx(speed_mps, rel=0.02)
+
+
+def test_full_limit_turn(open_plant: OpenPlant) -> None:
+    """Forward 0.08 and steering 0.04: 1.8 N m against 4 r + 25 r^2 is 0.200 rad/s, to port."""
+    plant = open_plant()
+    plant.place(0.0, 0.0, 0.0)
+    for _ in range(1500):
+        plant.step(FORCE_N * 0.04, FORCE_N * 0.12)
+    assert plant.velocity[2] == pytest.approx(0.200, abs=0.002)
+
+
+def test_k10_displacement_needs_thrust(open_plant: OpenPlant) -> None:
+    """K10: 27 s of thrust displace the boat; 27 s without do not."""
+    plant = open_plant()
+    for _ in range(2700):
+        plant.step(0.0, 0.0)
+    assert plant.distance_m < 1e-6
+    for _ in range(2700):
+        plant.step(FORCE_N * 0.02, FORCE_N * 0.02)
+    assert plant.distance_m == pytest.approx(27.0 * 0.30, rel=0.2)
+
+
+def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
+    """K3: banks are solid; staying in touch is one collision, coming back later another."""
+    plant = open_plant()
+    east_m = load_world("lake").shore_m[:, 0].max()
+    plant.place(east_m - 4.0, 0.0, 0.0)
+    for _ in range(1500):
+        plant.step(FORCE_N * 0.06, FORCE_N * 0.06)
+    assert plant.collisions == 1
+    assert plant.in_contact
+    plant.place(east_m - 4.0, 0.0, 0.0)
+    for _ in range(1500):
+        plant.step(FORCE_N * 0.06, FORCE_N * 0.06)
+    assert plant.collisions == 2
+
+
+def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
+    plant = open_plant(load_world("river"))
+    path_m = load_world("river").actors[0].path_m
+    ahead_m = path_m[(len(path_m) * 2) // 3]
+    plant.place(float(ahead_m[0]), float(ahead_m[1]), 0.0)
+    hit = False
+    for _ in range(26000):
+        plant.step(0.0, 0.0)
+        hit = hit or plant.collisions > 0
+        if hit:
+            break
+    assert hit
+
+
+def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
+    """1000 steps in one process, with a second plant alive: the force hook keeps them apart."""
+
+    def trace(seed: int) -> tuple[str, tuple[float, ...]]:
+        plant = open_plant(load_world("river"), seed=seed)
+        for step in range(1000):
+            plant.step(3.0, 4.0 + 0.001 * step)
+        return plant.state_hash(), (*plant.read_gps(), plant.read_imu().yaw_rad)
+
+    assert trace(5) == trace(5)
+    assert trace(5)[0] == trace(6)[0]
+    assert trace(5)[1] != trace(6)[1]
+
+
+def test_divergence_names_itself(
+    open_plant: OpenPlant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo would reset the boat and write a log file; neither happens."""
+    monkeypatch.chdir(tmp_path)
+    config = PlantConfig(dynamics=DynamicsConfig(tilt_damping=1e9, heave_damping=1e9))
+    plant = open_plant(config=config)
+    plant.place(0.0, 0.0, 0.0, z_m=0.2)
+    with pytest.raises(PlantDiverged, match="not finite"):
+        for _ in range(20000):
+            plant.step(1e8, 0.0)
+    assert not list(tmp_path.iterdir())
