@@ -16,7 +16,8 @@ BUOY_AHEAD = m.Detection(label=m.Label.BUOY, confidence=0.8, box_xyxy=(0.45, 0.4
 def lane(risk: float) -> m.LaneEvidence:
     """Water evidence that alone gives `risk` (at most 0.70) by J4: non-water first, then uncertainty."""
     non_water = min(1.0, risk / 0.55)
-    return m.LaneEvidence(non_water=non_water, uncertainty=(risk - 0.55 * non_water) / 0.15, clear_width=1.0 - non_water)
+    uncertainty = max(0.0, risk - 0.55 * non_water) / 0.15
+    return m.LaneEvidence(non_water=non_water, uncertainty=uncertainty, clear_width=1.0 - non_water)
 
 
 CLEAR = m.Evidence(

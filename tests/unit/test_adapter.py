@@ -6,6 +6,7 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from paani.config import AdapterConfig
 from paani.messages import Arming, Thrust, ZeroCause
 from paani_sim.plant.adapter import ThrustAdapter

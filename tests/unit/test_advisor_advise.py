@@ -207,8 +207,13 @@ def test_any_evidence_gives_an_advisory_that_survives_the_wire(frames: list[tupl
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.lists(st.builds(box, st.sampled_from(m.Label), st.just((0.42, 0.3, 0.58, 0.6)), st.floats(0.41, 1.0)), max_size=3),
-       st.floats(0.0, 0.6), st.floats(0.0, 0.1))
+@given(
+    st.lists(
+        st.builds(box, st.sampled_from(m.Label), st.just((0.42, 0.3, 0.58, 0.6)), st.floats(0.41, 1.0)), max_size=3
+    ),
+    st.floats(0.0, 0.6),
+    st.floats(0.0, 0.1),
+)
 def test_more_evidence_of_danger_never_lowers_a_risk(
     detections: list[m.Detection], risk: float, more: float
 ) -> None:

@@ -1,19 +1,25 @@
 """Plant, sensors, estimator, navigator, controller and adapter in one process, in lockstep."""
 
+import dataclasses
 import math
 import statistics
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import msgspec
+import numpy as np
 import pytest
+
 from paani.config import Config, load_config
+from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
     Arming,
     Direction,
+    GpsFix,
+    ImuSample,
+    Inhibit,
     NavCommand,
     Odometry,
-    Pulse,
     Reason,
     Route,
     SimTime,
@@ -33,6 +39,7 @@ from paani_sim.worlds import World, load_world
 
 START_US = 1_000_000
 DOMAIN = 43
+Launch = Callable[..., "Lockstep"]
 
 
 class Lockstep:
@@ -67,7 +74,8 @@ class Lockstep:
 
     def run(self, seconds: float) -> Iterator[None]:
         """Advance, yielding at 10 Hz."""
-        samples, fix = [], None
+        samples: list[ImuSample] = []
+        fix: GpsFix | None = None
         for _ in range(round(seconds * 100)):
             self.applied = self.adapter.decide(self.now_us)
             self.plant.step(self.applied.left_n, self.applied.right_n)
@@ -115,3 +123,139 @@ class Lockstep:
         for service in self.config.plant.adapter.require_pulses:
             self.adapter.hear_pulse(service, now_us)
         self.adapter.offer(self.thrust, now_us)
+
+
+@pytest.fixture
+def launch() -> Iterator[Launch]:
+    opened: list[Lockstep] = []
+
+    def make(world: World, profile: str = "paani", *sets: str, seed: int = 1) -> Lockstep:
+        opened.append(Lockstep(world, load_config(profile=profile, sets=sets), seed))
+        return opened[-1]
+
+    yield make
+    for each in opened:
+        each.plant.close()
+
+
+def open_water(name: str) -> World:
+    """The world with nothing in the way: constant STRAIGHT advice would run into it."""
+    return dataclasses.replace(load_world(name), obstacles=(), actors=())
+
+
+def off_route_m(world: World, position_m: tuple[float, float]) -> float:
+    """True distance to the nearest leg."""
+    here = np.array(position_m)
+    legs = np.roll(world.route_m, -1, axis=0) - world.route_m
+    part = ((here - world.route_m) * legs).sum(1) / (legs * legs).sum(1)
+    nearest = world.route_m + np.clip(part, 0.0, 1.0)[:, None] * legs
+    return float(np.linalg.norm(here - nearest, axis=1).min())
+
+
+def test_l4_m3_follows_three_waypoints_of_the_lake(launch: Launch) -> None:
+    """Guided by estimates alone: GPS bias of 0.8 m per axis is the error that remains (L4)."""
+    boat = launch(load_world("lake"))
+    speeds, off_m = [], []
+    for _ in boat.run(50.0):
+        if boat.plant.sim_us > 10e6:
+            speeds.append(boat.plant.velocity[0])
+            off_m.append(off_route_m(boat.world, boat.plant.position_m))
+    assert boat.nav.reached >= 3
+    assert boat.plant.collisions == 0
+    assert boat.applied.zero_cause is ZeroCause.NONE
+    assert statistics.fmean(speeds) == pytest.approx(0.6, abs=0.02)
+    assert statistics.pstdev(speeds) < 0.03
+    assert max(off_m) < 2.5
+
+
+@pytest.mark.parametrize("name", ["lake", "river"])
+def test_cruise_at_0_6_is_smooth_and_on_the_line(launch: Launch, name: str) -> None:
+    """With a perfect GPS and compass the guidance itself stays within 0.15 m of the route."""
+    perfect = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0")
+    boat = launch(open_water(name), "paani", *perfect)
+    off_m, steering = [], []
+    for _ in boat.run(150.0):
+        assert boat.thrust is not None
+        if boat.plant.sim_us > 15e6:
+            off_m.append(off_route_m(boat.world, boat.plant.position_m))
+            steering.append(boat.thrust.right - boat.thrust.left)
+    assert boat.nav.reached >= 10
+    assert max(off_m) < 0.15
+    assert statistics.pstdev(steering) < 0.02
+
+
+def mean_speed_mps(boat: Lockstep, settle_s: float, measure_s: float) -> float:
+    boat.settle(settle_s)
+    return statistics.fmean(boat.plant.velocity[0] for _ in boat.run(measure_s))
+
+
+def test_n3_paper_speed_loop_is_70_percent_off(launch: Launch) -> None:
+    """1a: with the paper's gains an order of 0.15 m/s gives 0.256 m/s."""
+    boat = launch(open_water("lake"), "paper")
+    assert mean_speed_mps(boat, 30.0, 40.0) == pytest.approx(0.256, abs=0.006)
+
+
+@pytest.mark.parametrize("order_mps", [0.15, 0.3, 0.6, 0.9])
+def test_paani_holds_the_ordered_speed(launch: Launch, order_mps: float) -> None:
+    """1b #18: within 0.02 m/s of the order, estimator in the loop."""
+    boat = launch(open_water("lake"), "paani", f"navigator.cruise_mps={order_mps}")
+    assert mean_speed_mps(boat, 15.0, 40.0) == pytest.approx(order_mps, abs=0.02)
+
+
+def test_stuck_turn_ends_within_90_degrees_and_stops(launch: Launch) -> None:
+    """1b #15: constant LEFT from a moving boat; it comes to rest, and STRAIGHT sets it free."""
+    boat = launch(open_water("lake"))
+    boat.settle(15.0)
+    start_rad = boat.plant.attitude.yaw_rad
+    boat.direction = Direction.LEFT
+    turned = [wrap_rad(boat.plant.attitude.yaw_rad - start_rad) for _ in boat.run(60.0)]
+    assert math.degrees(max(turned)) < 97.0
+    assert abs(boat.plant.velocity[0]) < 0.02
+    assert boat.command is not None
+    assert boat.command.inhibits == (Inhibit.TURN_CAPPED,)
+    boat.direction = Direction.STRAIGHT
+    boat.settle(15.0)
+    assert boat.plant.velocity[0] > 0.5
+
+
+def test_m5_paper_turn_goes_round_and_round(launch: Launch) -> None:
+    """M5 as written: a constant LEFT turns the boat through more than a full circle."""
+    boat = launch(open_water("lake"), "paper")
+    boat.settle(15.0)
+    boat.direction = Direction.LEFT
+    turned_rad = sum(boat.plant.velocity[2] * 0.1 for _ in boat.run(150.0))
+    assert turned_rad > 2.0 * math.pi
+
+
+@pytest.mark.parametrize("advice", [Direction.STOP, Direction.NO_DATA])
+def test_m8_advice_that_is_no_direction_stops_within_a_step(launch: Launch, advice: Direction) -> None:
+    """M8: zero thrust one guidance step later, and a boat at rest soon after."""
+    boat = launch(open_water("lake"))
+    boat.settle(15.0)
+    assert boat.applied.left_n > 0.0
+    boat.direction = advice
+    boat.settle(0.2)
+    assert (boat.applied.left_n, boat.applied.right_n) == (0.0, 0.0)
+    assert boat.applied.zero_cause is ZeroCause.NOT_ENABLED
+    boat.settle(15.0)
+    assert abs(boat.plant.velocity[0]) < 0.02
+
+
+def test_disarmed_boat_stays(launch: Launch) -> None:
+    boat = launch(load_world("lake"))
+    boat.armed = False
+    boat.settle(20.0)
+    assert boat.plant.distance_m < 1e-6
+    assert boat.applied.zero_cause is ZeroCause.NOT_ARMED
+
+
+def test_lockstep_repeats_bit_by_bit(launch: Launch) -> None:
+    """The same seed gives the same run through the whole chain."""
+
+    def trace(seed: int) -> str:
+        boat = launch(load_world("river"), seed=seed)
+        boat.settle(12.0)
+        return boat.plant.state_hash()
+
+    assert trace(3) == trace(3)
+    assert trace(3) != trace(4)

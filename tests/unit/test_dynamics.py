@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from paani.config import DynamicsConfig
 from paani_sim.plant.dynamics import GRAVITY_MPS2, Fans, HullState, attitude, body_velocity, wrench
 

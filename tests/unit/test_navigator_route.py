@@ -1,10 +1,15 @@
 """Route files: what is accepted, and the line that names what is not."""
 
+import itertools
+import math
 from pathlib import Path
 
 import pytest
+
 from paani.errors import UserError
 from paani_services.navigator.route import load_route
+from paani_sim.plant.chart import route_toml
+from paani_sim.worlds import WORLDS, load_world
 
 METRES = """
 name = "pond"
@@ -71,6 +76,20 @@ def test_mistakes_are_named(tmp_path: Path, text: str, named: str) -> None:
     assert str(path) in str(caught.value)
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", sorted(WORLDS))
+def test_k2_route_of_each_world_is_a_route_file(tmp_path: Path, name: str) -> None:
+    """K2: the lake's repeating route has 59 waypoints and is 465.443 m long, as the navigator reads it."""
+    world = load_world(name)
+    route = load_route(written(tmp_path, route_toml(world)))
+    points = [(waypoint.x_m, waypoint.y_m) for waypoint in route.waypoints]
+    length_m = sum(math.dist(one, other) for one, other in itertools.pairwise([*points, points[0]]))
+    assert (route.name, route.repeat) == (name, True)
+    assert length_m == pytest.approx(world.route_length_m, abs=0.01)
+    if name == "lake":
+        assert len(points) == 59
+        assert length_m == pytest.approx(465.443, abs=0.01)
 
 
 def test_missing_file(tmp_path: Path) -> None:

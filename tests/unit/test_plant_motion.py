@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
 from paani.config import DynamicsConfig, PlantConfig
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.worlds import World, load_world
@@ -27,6 +28,11 @@ def open_plant() -> Iterator[OpenPlant]:
     yield make
     for plant in opened:
         plant.close()
+
+
+def drive(plant: Plant, steps: int, force_n: float) -> None:
+    for _ in range(steps):
+        plant.step(force_n, force_n)
 
 
 def open_water() -> World:
@@ -56,8 +62,7 @@ def test_k4_k5_thrust_gives_the_drag_limited_speed(
     """75 N per unit and fan against 4 v + 20 v^2; 0.68 m/s at the paper's forward limit (1a)."""
     plant = open_plant()
     plant.place(-60.0, 0.0, 0.0)
-    for _ in range(2500):
-        plant.step(FORCE_N * thrust_frac, FORCE_N * thrust_frac)
+    drive(plant, 2500, FORCE_N * thrust_frac)
     forward_mps, _, _ = plant.velocity
     over_ground_mps = forward_mps / math.cos(plant.attitude.pitch_rad)
     assert over_ground_mps == pytest.approx(speed_mps, rel=0.02)
@@ -75,11 +80,9 @@ def test_full_limit_turn(open_plant: OpenPlant) -> None:
 def test_k10_displacement_needs_thrust(open_plant: OpenPlant) -> None:
     """K10: 27 s of thrust displace the boat; 27 s without do not."""
     plant = open_plant()
-    for _ in range(2700):
-        plant.step(0.0, 0.0)
+    drive(plant, 2700, 0.0)
     assert plant.distance_m < 1e-6
-    for _ in range(2700):
-        plant.step(FORCE_N * 0.02, FORCE_N * 0.02)
+    drive(plant, 2700, FORCE_N * 0.02)
     assert plant.distance_m == pytest.approx(27.0 * 0.30, rel=0.2)
 
 
@@ -88,13 +91,11 @@ def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
     plant = open_plant()
     east_m = load_world("lake").shore_m[:, 0].max()
     plant.place(east_m - 4.0, 0.0, 0.0)
-    for _ in range(1500):
-        plant.step(FORCE_N * 0.06, FORCE_N * 0.06)
+    drive(plant, 1500, FORCE_N * 0.06)
     assert plant.collisions == 1
     assert plant.in_contact
     plant.place(east_m - 4.0, 0.0, 0.0)
-    for _ in range(1500):
-        plant.step(FORCE_N * 0.06, FORCE_N * 0.06)
+    drive(plant, 1500, FORCE_N * 0.06)
     assert plant.collisions == 2
 
 
@@ -135,6 +136,5 @@ def test_divergence_names_itself(
     plant = open_plant(config=config)
     plant.place(0.0, 0.0, 0.0, z_m=0.2)
     with pytest.raises(PlantDiverged, match="not finite"):
-        for _ in range(20000):
-            plant.step(1e8, 0.0)
+        drive(plant, 2000, 1e8)
     assert not list(tmp_path.iterdir())

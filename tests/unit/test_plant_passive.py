@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import mujoco
 import pytest
+
 from paani_sim.plant import passive
 
 XML = """

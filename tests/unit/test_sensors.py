@@ -5,6 +5,7 @@ import statistics
 
 import numpy as np
 import pytest
+
 from paani.config import SensorsConfig
 from paani.geometry import enu_from_geodetic
 from paani_sim.plant.sensors import Truth, initial_errors, measure_gps, measure_imu

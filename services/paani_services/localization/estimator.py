@@ -39,6 +39,10 @@ class Estimator:
             if latitude_deg is not None and longitude_deg is not None
             else None
         )
+        self._reset()
+
+    def _reset(self) -> None:
+        """Know nothing; also when the IMU began again, for the boat may have been moved."""
         self._calibration: list[ImuSample] = []
         self._local: PlanarFilter | None = None
         self._global: PlanarFilter | None = None
@@ -56,8 +60,11 @@ class Estimator:
 
         Both are unhealthy until the gyro is calibrated and, for the global one, the position has
         converged; and again whenever GPS or IMU is older than its limit or the spread is too large.
+        A new epoch of the IMU starts everything anew.
         """
         if samples:
+            if self._last_imu is not None and samples[-1].epoch != self._last_imu.epoch:
+                self._reset()
             self._move(samples)
         if fix is not None and fix.fix:
             self._take_fix(fix)

@@ -98,13 +98,18 @@ def navigate(
 
 
 def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
-    """Note when simulated time last moved forward; a reset counts only once it moves on again."""
+    """Note when simulated time last moved forward.
+
+    After a reset the boat may be anywhere: it joins the route anew, once time moves on again.
+    """
     if heard.clock is None or heard.clock.sim_us == state.sim_us:
         return state
-    advanced_us = state.advanced_us
-    if state.sim_us >= 0:
-        advanced_us = now_us if heard.clock.sim_us > state.sim_us else None
-    return msgspec.structs.replace(state, sim_us=heard.clock.sim_us, advanced_us=advanced_us)
+    sim_us = heard.clock.sim_us
+    if state.sim_us < 0:
+        return msgspec.structs.replace(state, sim_us=sim_us)
+    if sim_us < state.sim_us:
+        return NavState(reached=state.reached, sim_us=sim_us)
+    return msgspec.structs.replace(state, sim_us=sim_us, advanced_us=now_us)
 
 
 def _gates(

@@ -27,6 +27,12 @@ class LocalizationConfig(Section, frozen=True):
     stopped_speed_mps: NonNegative = 0.05  # L5
     stopped_after_s: Positive = 2.0  # L5
 
+    def __post_init__(self) -> None:
+        if (self.origin_latitude_deg is None) != (self.origin_longitude_deg is None):
+            raise ValueError(
+                "localization.origin_latitude_deg and localization.origin_longitude_deg go together"
+            )
+
 
 class NavigatorConfig(Section, frozen=True):
     """`route` is the path of a route file; empty: no route, no motion."""

@@ -20,16 +20,28 @@ class CameraConfig(Section, frozen=True):
 
 
 class GateConfig(Section, frozen=True):
-    """Usable-picture gate. `enabled=false` is the paper's behaviour (J19)."""
+    """Usable-picture gate: a picture beyond any of these limits is not evidence. `enabled=false` is the paper (J19).
+
+    The limits lie between broken pictures and everything that real cameras deliver, fog, glare and night included.
+    """
 
     enabled: bool = True
     min_width_px: Size = 160
     min_height_px: Size = 120
-    dark_mean: NonNegative = 8.0
-    bright_frac: Fraction = 0.60
-    flat_range: NonNegative = 14.0
-    frozen_frames: Size = 5
-    frozen_mad: NonNegative = 0.05
+    dark_mean: NonNegative = 8.0  # of 255
+    dark_frac: Fraction = 0.85  # of pixels at most 6
+    bright_frac: Fraction = 0.60  # of pixels at least 250
+    flat_range: NonNegative = 14.0  # 1st to 99th percentile
+    flat_frac: Fraction = 0.95  # of tiles without texture
+    noise_correlation: Fraction = 0.25  # of neighbours in the small picture
+    noise_sigma: NonNegative = 18.0
+    noise_fineness: NonNegative = 2.2  # fine over coarse edges
+    blur_fineness: NonNegative = 0.29
+    cover_frac: Fraction = 0.50  # of tiles dark and without texture, beside a bright rest
+    cover_rest_mean: NonNegative = 58.0
+    cover_total_frac: Fraction = 0.95  # whatever the rest
+    frozen_frames: Size = 5  # distinct frames that show the same
+    frozen_mad: NonNegative = 0.05  # mean absolute difference of the small pictures
 
 
 class DetectorConfig(Section, frozen=True):
@@ -62,8 +74,8 @@ class PerceptionConfig(Section, frozen=True):
     max_frame_age_s: Positive = 0.8  # J16, judged at inference start
     concurrent: bool = True
     intra_op_threads: Size = 1
-    segmenter: str = ""  # path of an ONNX file; empty: the shipped model
-    detector: str = ""
+    segmenter: str = ""  # path of an ONNX file; empty: the shipped model; "none": the fallback alone (F1)
+    detector: str = ""  # path of an ONNX file; empty: the shipped model
     temperature: Positive = 1.0
     fallback_non_water: Fraction = 1.0  # F3
     fallback_uncertainty: Fraction = 1.0

@@ -1,0 +1,1 @@
+"""One picture to evidence: usable or not, boxes, corridors of water."""

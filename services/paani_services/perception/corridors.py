@@ -1,0 +1,73 @@
+"""Class scores of the mask to three corridors of water (checklist E1-E7). Pure.
+
+The net's last step repeats each score four times in both directions, so every fourth score says everything.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import CorridorConfig
+from paani.messages import LaneEvidence
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+STRIDE = 4
+WATER, OBSTACLE, SKY = 0, 1, 2  # D6
+
+
+class Lanes(NamedTuple):
+    left: LaneEvidence
+    center: LaneEvidence
+    right: LaneEvidence
+
+
+def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
+    """Class mask and confidence of each cell (E1).
+
+    logits: float32 [1, 3, H, W]. Returns uint8 and float32 [H/4, W/4]: argmax and largest softmax probability.
+    """
+    scores = logits[0, :, ::STRIDE, ::STRIDE] / np.float32(temperature)
+    largest = scores.max(axis=0)
+    confidence = 1.0 / np.exp(scores - largest).sum(axis=0)
+    return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)
+
+
+def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig) -> Lanes:
+    """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside."""
+    rows = shares(mask.shape[0], corridors.top, 1.0)
+    water = (mask == WATER).astype(np.float64)
+    return Lanes(*(
+        _lane(water, confidence, rows, shares(mask.shape[1], *span), corridors.clear_column)
+        for span in (corridors.left, corridors.center, corridors.right)
+    ))
+
+
+def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:
+    """How much of each of `cells` equal cells of [0, 1] lies in [start, end]: [cells] in [0, 1]."""
+    edges = np.arange(cells + 1) / cells
+    inside = np.minimum(edges[1:], end) - np.maximum(edges[:-1], start)
+    return np.asarray(np.clip(inside, 0.0, None) * cells, np.float64)
+
+
+def _lane(
+    water: NDArray[np.float64],
+    confidence: Floats,
+    rows: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    clear_column: float,
+) -> LaneEvidence:
+    total = rows.sum() * columns.sum()
+    water_of_column = rows @ water / rows.sum()
+    non_water = 1.0 - float(water_of_column @ columns / columns.sum())  # E4
+    uncertainty = 1.0 - float(rows @ confidence @ columns / total)  # E5
+    best = run = 0.0
+    for share, width in zip(water_of_column, columns, strict=True):
+        run = run + width if width > 0.0 and share >= clear_column - 1e-12 else 0.0
+        best = max(best, run)
+    return LaneEvidence(
+        non_water=min(1.0, max(0.0, non_water)),
+        uncertainty=min(1.0, max(0.0, uncertainty)),
+        clear_width=min(1.0, best / float(columns.sum())),  # E6
+    )

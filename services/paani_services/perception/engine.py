@@ -1,0 +1,54 @@
+"""Runs an ONNX model on the CPU: the one place in the services that imports onnxruntime."""
+
+from pathlib import Path
+
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+from paani_models.catalogue import Model, file_sha256, load_catalogue, verified_path
+
+Floats = NDArray[np.float32]
+
+
+class Engine:
+    """One loaded model: `load`, `run`, `info`."""
+
+    def __init__(self, session: ort.InferenceSession, contract: Model, name: str) -> None:
+        self._session, self._name = session, name
+        self._input = session.get_inputs()[0].name
+        self.contract = contract
+
+    @classmethod
+    def load(cls, role: str, path: str, threads: int) -> "Engine":
+        """The shipped model of a role ("detector", "segmenter"), checksum compared, or a file of the user's.
+
+        Raises UserError naming a file that is missing, corrupt, no ONNX model, or of other shapes than the
+        catalogue states for the role.
+        """
+        contract = load_catalogue()[role]
+        file = Path(path) if path else verified_path(role)
+        checksum = file_sha256(file)
+        options = ort.SessionOptions()
+        options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        options.log_severity_level = 3
+        try:
+            session = ort.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime raises classes of its own that it does not export
+            raise UserError(f"{file}: not an ONNX model that can run here") from error
+        ends = ((session.get_inputs(), contract.input), (session.get_outputs(), contract.output))
+        for found, wanted in ends:
+            shapes = [(tuple(end.shape), end.type) for end in found]
+            if shapes != [(wanted.shape, "tensor(float)")]:
+                raise UserError(f"{file}: {role} must have float32 {list(wanted.shape)}, found {shapes}")
+        return cls(session, contract, f"{role} {checksum[:12]}")
+
+    def run(self, tensor: Floats) -> Floats:
+        """One inference: float32 of the contract's input shape to its output shape."""
+        return np.asarray(self._session.run(None, {self._input: tensor})[0], np.float32)
+
+    def info(self) -> str:
+        """Role and the beginning of the file's checksum."""
+        return self._name

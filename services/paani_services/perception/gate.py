@@ -1,0 +1,127 @@
+"""Is this picture fit to be evidence? A net calls black water, so this is asked first (checklist J19). Pure."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import GateConfig
+from paani.messages import UnusableCause
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+MIDDLE_WH, SMALL_WH, TILE_PX = (320, 240), (80, 60), 20
+DARK_LEVEL, BRIGHT_LEVEL = 6, 250  # of 255
+PLAIN_STD, DARK_TILE_STD, DARK_TILE_MEAN = 2.0, 3.0, 40.0
+# J. Immerkaer, Fast Noise Variance Estimation, 1996: a mask that image structure does not answer to.
+NOISE_MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
+NOISE_SCALE = float(np.sqrt(np.pi / 2.0)) / 6.0
+
+
+class GateState(NamedTuple):
+    """The last distinct frame in small, and how many in a row have shown the same."""
+
+    small: Floats | None = None
+    same: int = 1
+    epoch: int = -1
+
+
+class Statistics(NamedTuple):
+    """What the gate looks at. Levels are of 255, shares of 1; `correlation` is of neighbouring small pixels."""
+
+    mean: float
+    dark_frac: float
+    bright_frac: float
+    range: float
+    plain_frac: float
+    correlation: float
+    sigma: float
+    fineness: float
+    covered_frac: float
+    rest_mean: float
+
+
+def judge(state: GateState, bgr: Bytes, epoch: int, config: GateConfig) -> tuple[GateState, UnusableCause]:
+    """Judge one distinct frame; NONE when it is fit.
+
+    bgr: uint8 [H, W, 3]. epoch: the frame's; a new one begins the search for a frozen camera again. The caller
+    passes each frame once, so that the same picture again is a camera that repeats itself.
+    """
+    if not config.enabled:
+        return state, UnusableCause.NONE
+    height, width = bgr.shape[:2]
+    if width < config.min_width_px or height < config.min_height_px:
+        return GateState(), UnusableCause.WRONG_SIZE
+    middle, small = reduced(bgr)
+    known = state.small if state.epoch == epoch else None
+    still = known is not None and float(np.abs(small - known).mean()) < config.frozen_mad
+    state = GateState(small, state.same + 1 if still else 1, epoch)
+    cause = cause_of(measure(middle, small), config)
+    if cause is UnusableCause.NONE and state.same >= config.frozen_frames:
+        cause = UnusableCause.FROZEN
+    return state, cause
+
+
+def reduced(bgr: Bytes) -> tuple[Bytes, Floats]:
+    """Luma at 320x240 (uint8) and at 80x60 (float32)."""
+    shrinks = bgr.shape[1] >= MIDDLE_WH[0]
+    resized = cv2.resize(bgr, MIDDLE_WH, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    middle = np.asarray(cv2.cvtColor(resized, cv2.COLOR_BGR2GRAY), np.uint8)
+    return middle, np.asarray(cv2.resize(middle, SMALL_WH, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def measure(middle: Bytes, small: Floats) -> Statistics:
+    """Statistics of one picture, from its two reductions."""
+    fine = middle.astype(np.float32)
+    low, high = np.percentile(small, (1, 99))
+    tiles = fine.reshape(MIDDLE_WH[1] // TILE_PX, TILE_PX, MIDDLE_WH[0] // TILE_PX, TILE_PX)
+    tile_mean, tile_std = tiles.mean((1, 3)), tiles.std((1, 3))
+    covered = (tile_std < DARK_TILE_STD) & (tile_mean < DARK_TILE_MEAN)
+    centred = small - small.mean()
+    variance = float((centred * centred).mean()) + 1e-6
+    return Statistics(
+        mean=float(small.mean()),
+        dark_frac=float((middle <= DARK_LEVEL).mean()),
+        bright_frac=float((middle >= BRIGHT_LEVEL).mean()),
+        range=float(high - low),
+        plain_frac=float((tile_std < PLAIN_STD).mean()),
+        correlation=min(
+            float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean())
+        ) / variance,
+        sigma=float(np.abs(cv2.filter2D(fine, -1, NOISE_MASK)).mean()) * NOISE_SCALE,
+        fineness=_edges(fine) / (_edges(small) + 1e-3),
+        covered_frac=float(covered.mean()),
+        rest_mean=float(tile_mean[~covered].mean()) if not covered.all() else 0.0,
+    )
+
+
+def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
+    """The first limit that a picture breaks."""
+    if seen.mean < config.dark_mean or seen.dark_frac > config.dark_frac:
+        return UnusableCause.BLACK
+    if seen.bright_frac > config.bright_frac:
+        return UnusableCause.WHITE
+    if seen.range < config.flat_range or seen.plain_frac > config.flat_frac:
+        return UnusableCause.FLAT
+    if (
+        seen.correlation < config.noise_correlation
+        or seen.sigma > config.noise_sigma
+        or seen.fineness > config.noise_fineness
+    ):
+        return UnusableCause.NOISE
+    if seen.covered_frac > config.cover_total_frac or (
+        seen.covered_frac > config.cover_frac and seen.rest_mean > config.cover_rest_mean
+    ):
+        return UnusableCause.COVERED
+    if seen.fineness < config.blur_fineness:
+        return UnusableCause.BLURRED
+    return UnusableCause.NONE
+
+
+def _edges(luma: Floats) -> float:
+    """Mean absolute central difference, both ways."""
+    across = np.abs(luma[:, 2:] - luma[:, :-2]).mean()
+    down = np.abs(luma[2:] - luma[:-2]).mean()
+    return float(across + down) / 4.0

@@ -1,0 +1,174 @@
+"""One picture through the gate and both models to evidence."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import cv2
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import PerceptionConfig
+from paani.messages import (
+    Detection,
+    Evidence,
+    InferenceTiming,
+    LaneEvidence,
+    PictureHeader,
+    SegmentationSource,
+    UnusableCause,
+)
+from paani_services.perception.corridors import Lanes, classify, summarise
+from paani_services.perception.decode import decode
+from paani_services.perception.engine import Engine
+from paani_services.perception.fallback import CONFIDENCE, colour_mask
+from paani_services.perception.gate import GateState, judge
+from paani_services.perception.preprocess import letterbox, stretch, tables
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+NO_SEGMENTER = "none"
+
+
+class Segmentation(NamedTuple):
+    """Mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), its corridors, who drew it, and how long it took."""
+
+    mask: Bytes
+    lanes: Lanes
+    source: SegmentationSource
+    took_ms: float
+
+
+class Perceiver:
+    """Both models, and the gate's memory of the pictures before. Not for two threads at once."""
+
+    def __init__(self, config: PerceptionConfig, stopwatch_ms: Callable[[], float]) -> None:
+        """Raises UserError for a model that cannot be used."""
+        self._config, self._stopwatch_ms = config, stopwatch_ms
+        self._detector = Engine.load("detector", config.detector, config.intra_op_threads)
+        self._segmenter = (
+            None
+            if config.segmenter == NO_SEGMENTER
+            else Engine.load("segmenter", config.segmenter, config.intra_op_threads)
+        )
+        engines = [engine for engine in (self._detector, self._segmenter) if engine]
+        self._models = ", ".join(engine.info() for engine in engines)
+        self._tables = [tables(e.contract.preprocessing.mean, e.contract.preprocessing.std) for e in engines]
+        self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
+        self._gate = GateState()
+
+    def perceive(
+        self, data: bytes | Bytes, header: PictureHeader, age_s: float
+    ) -> tuple[Evidence, Bytes | None]:
+        """Evidence of one distinct frame, and its class mask uint8 [64, 80], None where the picture is unusable.
+
+        data: an encoded picture, or BGR uint8 [H, W, 3]. age_s: the picture's age now, at the start (resolution 1).
+        Never raises for a bad picture: it is evidence with `usable` false and its cause.
+        """
+        start_ms = self._stopwatch_ms()
+        bgr = decoded(data)
+        decoded_ms = self._stopwatch_ms()
+        cause = self._judge(bgr, header, age_s)
+        gated_ms = self._stopwatch_ms()
+        timing = InferenceTiming(
+            frame_age_ms=max(0.0, age_s) * 1e3, decode_ms=decoded_ms - start_ms, gate_ms=gated_ms - decoded_ms
+        )
+        if bgr is None or cause is not UnusableCause.NONE:
+            return self._evidence(header, bgr, cause, (), None, timing, start_ms), None
+        if self._beside is not None:
+            detecting = self._beside.submit(self._detect, bgr)
+            segmentation = self._segment(bgr)
+            detections, detector_ms = detecting.result()
+        else:
+            detections, detector_ms = self._detect(bgr)  # B4: detector, then segmenter
+            segmentation = self._segment(bgr)
+        timing = msgspec.structs.replace(
+            timing,
+            detector_ms=detector_ms,
+            segmenter_ms=segmentation.took_ms,
+            inference_ms=self._stopwatch_ms() - gated_ms,
+        )
+        return self._evidence(header, bgr, cause, detections, segmentation, timing, start_ms), segmentation.mask
+
+    def close(self) -> None:
+        """Ends the second thread."""
+        if self._beside is not None:
+            self._beside.shutdown()
+
+    def _judge(self, bgr: Bytes | None, header: PictureHeader, age_s: float) -> UnusableCause:
+        if bgr is None:
+            return UnusableCause.UNDECODABLE
+        self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate)
+        return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
+
+    def _detect(self, bgr: Bytes) -> tuple[tuple[Detection, ...], float]:
+        start_ms = self._stopwatch_ms()
+        contract = self._detector.contract
+        height, width = contract.input.shape[2:]
+        tensor, place = letterbox(bgr, height, width, contract.preprocessing.pad_grey, self._tables[0])
+        detections = decode(self._detector.run(tensor), place, self._config.detections)
+        return detections, self._stopwatch_ms() - start_ms
+
+    def _segment(self, bgr: Bytes) -> Segmentation:
+        """The learned mask; the colour mask where there is no segmenter or its scores are not finite."""
+        start_ms = self._stopwatch_ms()
+        source, (mask, confidence) = SegmentationSource.LEARNED, self._learned_mask(bgr)
+        if not np.isfinite(confidence).all():
+            source, mask = SegmentationSource.FALLBACK, colour_mask(bgr)
+            confidence = np.full(mask.shape, CONFIDENCE, np.float32)
+        lanes = summarise(mask, confidence, self._config.corridors)
+        return Segmentation(mask, lanes, source, self._stopwatch_ms() - start_ms)
+
+    def _learned_mask(self, bgr: Bytes) -> tuple[Bytes, Floats]:
+        """Mask and confidence; a confidence that is not finite where there is no segmenter."""
+        if self._segmenter is None:
+            return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
+        height, width = self._segmenter.contract.input.shape[2:]
+        logits = self._segmenter.run(stretch(bgr, height, width, self._tables[1]))
+        return classify(logits, self._config.temperature)
+
+    def _evidence(
+        self,
+        header: PictureHeader,
+        bgr: Bytes | None,
+        cause: UnusableCause,
+        detections: tuple[Detection, ...],
+        segmentation: Segmentation | None,
+        timing: InferenceTiming,
+        start_ms: float,
+    ) -> Evidence:
+        height, width = bgr.shape[:2] if bgr is not None else (header.height_px, header.width_px)
+        lanes = segmentation.lanes if segmentation else Lanes(LaneEvidence(), LaneEvidence(), LaneEvidence())
+        source = segmentation.source if segmentation else SegmentationSource.NONE
+        return Evidence(
+            source_us=header.source_us,
+            frame_seq=header.frame_seq,
+            frame_epoch=header.frame_epoch,
+            width_px=width,
+            height_px=height,
+            usable=cause is UnusableCause.NONE,
+            cause=cause,
+            time_base=header.time_base,
+            media_us=header.media_us,
+            detections=detections,
+            left=lanes.left,
+            center=lanes.center,
+            right=lanes.right,
+            segmentation=source,
+            navigation_eligible=source is SegmentationSource.LEARNED,
+            confidence_threshold=self._config.detections.confidence,
+            timing=msgspec.structs.replace(timing, total_ms=self._stopwatch_ms() - start_ms),
+            models=self._models,
+        )
+
+
+def decoded(data: bytes | Bytes) -> Bytes | None:
+    """BGR uint8 [H, W, 3] of an encoded picture; None where it is none."""
+    if not isinstance(data, bytes):
+        return data if data.ndim == 3 and data.shape[2] == 3 and data.size else None
+    try:
+        bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    return None if bgr is None else np.asarray(bgr, np.uint8)

@@ -1,0 +1,55 @@
+"""Perception process: the camera's newest picture in; evidence and mask out."""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Picture
+from paani.clock import Clock, stopwatch_ms
+from paani.config import Config
+from paani_services.perception.pipeline import Perceiver
+
+EARLY_FRAC = 0.1  # a frame this part of the period too early is in time
+
+
+async def run(bus: Bus, clock: Clock, config: Config) -> None:
+    """Look at the newest picture at most `perception.rate_hz` times a second, off the loop."""
+    pictures = bus.latest_picture(keys.PICTURE)
+    evidence, masks = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
+    loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
+    perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
+    period_us = round(1e6 / config.perception.rate_hz)
+    last, due_us = (-1, -1), 0
+
+    def look(picture: Picture) -> tuple[m.Evidence, bytes]:
+        age_s = (clock.now_us() - picture.header.source_us) * 1e-6
+        found, mask = perceiver.perceive(picture.data, picture.header, age_s)
+        return found, b"" if mask is None else cv2.imencode(".png", mask)[1].tobytes()
+
+    try:
+        with bus.alive():
+            while True:
+                await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
+                picture = await pictures.next()
+                frame = (picture.header.frame_epoch, picture.header.frame_seq)
+                if frame <= last:  # B3
+                    bus.count_drop("duplicate_frame" if frame == last else "old_frame")
+                    continue
+                last, due_us = frame, clock.now_us() + round((1.0 - EARLY_FRAC) * period_us)
+                found, png = await loop.run_in_executor(worker, look, picture)
+                sent = evidence.put(found)
+                if png:
+                    masks.put_picture(mask_header(picture.header), png)
+                bus.note(f"unusable: {sent.cause}" if not sent.usable else sent.models)
+    finally:
+        worker.shutdown(wait=False)
+        perceiver.close()
+
+
+def mask_header(header: m.PictureHeader) -> m.PictureHeader:
+    """The mask belongs to the frame it was drawn from."""
+    return msgspec.structs.replace(header, width_px=80, height_px=64, media_type="image/png")

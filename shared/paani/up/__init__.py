@@ -1,0 +1,1 @@
+"""`paani up`: starts, watches, restarts and sums up all processes."""

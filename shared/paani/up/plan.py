@@ -1,0 +1,80 @@
+"""What one start runs, with which settings."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from paani import keys
+from paani.bus.routing import require_free
+from paani.config import Config
+from paani.errors import UserError
+from paani.runtime import runtime_dir
+
+EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
+EYE = "eye"
+
+
+class Plan(NamedTuple):
+    """Services in the order they start, and the settings all of them are handed."""
+
+    services: tuple[str, ...]
+    config: Config
+
+
+async def make_plan(config: Config) -> Plan:
+    """Complete the settings. Raises UserError for what can be known before anything starts.
+
+    The world's route and origin are handed to navigator and localization unless they have their own.
+    With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse.
+    """
+    require_free(config.bus.router)
+    if config.dashboard.serve:
+        await _require_free_page(config)
+    route, (latitude_deg, longitude_deg) = await _world_route(config)
+    navigator, localization = config.navigator, config.localization
+    if not navigator.route:
+        navigator = replace(navigator, route=str(route))
+    if localization.origin_latitude_deg is None and localization.origin_longitude_deg is None:
+        localization = replace(localization, origin_latitude_deg=latitude_deg, origin_longitude_deg=longitude_deg)
+    config = replace(config, navigator=navigator, localization=localization)
+    if config.camera.source == "sim":
+        return Plan(keys.SERVICES, config)
+    adapter = config.plant.adapter
+    adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
+    config = replace(config, plant=replace(config.plant, adapter=adapter))
+    return Plan(tuple(name for name in keys.SERVICES if name != EYE), config)
+
+
+async def _require_free_page(config: Config) -> None:
+    host, port = config.dashboard.host, config.dashboard.port
+    try:
+        server = await asyncio.get_running_loop().create_server(asyncio.Protocol, host, port)
+    except OSError as error:
+        raise UserError(f"dashboard.port {port}: {error.strerror}") from error
+    server.close()
+    await server.wait_closed()
+
+
+async def _world_route(config: Config) -> tuple[Path, tuple[float, float]]:
+    """The world's route as a file in the runtime folder, and its origin (latitude, longitude) [deg]."""
+    path = await asyncio.to_thread(lambda: runtime_dir(config.bus) / f"route-{config.world.name}.toml")
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", EXPORT_ROUTE, config.world.name, str(path), stderr=asyncio.subprocess.PIPE
+    )
+    try:
+        _, errors = await process.communicate()
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+    if process.returncode:
+        lines = errors.decode(errors="replace").strip().splitlines() or [f"world.name {config.world.name}: no route"]
+        raise UserError(lines[-1])
+    origin = tomllib.loads(await asyncio.to_thread(path.read_text, encoding="utf-8"))["origin"]
+    return path, (origin["latitude_deg"], origin["longitude_deg"])
