@@ -138,6 +138,45 @@ def cut_out(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture
     return picture, mask
 
 
+def obstacle_patch(rng: Rng, picture: Picture, mask: Picture) -> Picture | None:
+    """Find a rectangle that is all obstacle, give or take a twentieth; None where six tries find none."""
+    height, width = mask.shape
+    for _ in range(6):
+        h, w = int(rng.integers(height // 8, height // 2)), int(rng.integers(width // 8, width // 2))
+        y, x = int(rng.integers(height - h)), int(rng.integers(width - w))
+        if (mask[y : y + h, x : x + w] == OBSTACLE).mean() >= 0.95:
+            return picture[y : y + h, x : x + w]
+    return None
+
+
+def paste_obstacle(rng: Rng, picture: Picture, mask: Picture, patch: Picture) -> tuple[Picture, Picture]:
+    """Stand a patch in the picture: as a wall along one side, receding, or as a block; what it covers is obstacle.
+
+    It breaks the habit of rivers that whatever is at the bottom is water.
+    """
+    height, width = mask.shape
+    if rng.random() < 0.7:
+        near, far = rng.uniform(0.0, 0.5), rng.uniform(0.25, 0.55)
+        reach, foot = rng.uniform(0.15, 0.6), rng.uniform(0.6, 0.95)
+        quad = np.array([[0, min(near, far)], [reach, far], [reach, foot], [0, rng.uniform(foot, 1.6)]], np.float32)
+        if rng.random() < 0.5:
+            quad[:, 0] = 1.0 - quad[:, 0]
+    else:
+        x, w = rng.uniform(0.0, 0.9), rng.uniform(0.05, 0.35)
+        top, bottom = rng.uniform(0.1, 0.6), rng.uniform(0.62, 1.1)
+        quad = np.array([[x, top], [x + w, top], [x + w, bottom], [x, bottom]], np.float32)
+    h, w = patch.shape[:2]
+    corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.float32)
+    warp = cv2.getPerspectiveTransform(corners, quad * np.array([width, height], np.float32))
+    shaded = np.clip(patch * rng.uniform(0.6, 1.3), 0, 255).astype(np.uint8)
+    pasted = cv2.warpPerspective(shaded, warp, (width, height), flags=cv2.INTER_LINEAR)
+    covered = cv2.warpPerspective(np.ones((h, w), np.uint8), warp, (width, height), flags=cv2.INTER_NEAREST) > 0
+    return (
+        np.where(covered[..., None], pasted, picture).astype(np.uint8),
+        np.where(covered, OBSTACLE, mask).astype(np.uint8),
+    )
+
+
 def null_picture(rng: Rng, target_wh: tuple[int, int]) -> Picture:
     """A picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, each with sensor noise."""
     width, height = target_wh
@@ -175,10 +214,14 @@ def null_picture(rng: Rng, target_wh: tuple[int, int]) -> Picture:
     return add_noise(rng, np.clip(flat, 0, 255).astype(np.uint8), rng.uniform(0, 8))
 
 
-def segmenter_sample(rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int]) -> tuple[Picture, Picture]:
-    """One augmented training pair of the target size."""
+def segmenter_sample(
+    rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int], patch: Picture | None = None
+) -> tuple[Picture, Picture]:
+    """Make one training pair of the target size; a patch of obstacle, if given, is pasted in."""
     affine = random_affine(rng, (picture.shape[1], picture.shape[0]), target_wh, tilt_deg=8.0)
     picture, mask = warp_picture(picture, affine, target_wh), warp_mask(mask, affine, target_wh)
+    if patch is not None:
+        picture, mask = paste_obstacle(rng, picture, mask, patch)
     if rng.random() < 0.8:
         picture = jitter_colour(rng, picture)
     if rng.random() < GLARE_FRAC:

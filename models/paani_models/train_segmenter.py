@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from paani_models.augment import segmenter_null, segmenter_sample
+from paani_models.augment import obstacle_patch, segmenter_null, segmenter_sample
 from paani_models.distillation import Distillation
 from paani_models.network_input import segmenter_batch
 from paani_models.segmenter import segmenter_loss
@@ -31,6 +31,7 @@ from paani_models.training import (
 
 CACHE_WH = (384, 288)
 NULL_FRAC = 0.12
+PASTE_FRAC = 0.9  # tries; about one donor in four has a patch to give
 UNSEGMENTED = "unsegmented"  # pictures of all sources without masks: only a teacher says what they show
 
 # Pictures drawn per epoch and source: sources with three human classes weigh more than their number.
@@ -166,7 +167,10 @@ class SegmenterTraining:
             if index < 0:
                 pairs.append(segmenter_null(rng, size))
             else:
-                pairs.append(segmenter_sample(rng, self.train[index].picture, self.train[index].mask, size))
+                item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
+                wanted = rng.random() < PASTE_FRAC
+                patch = obstacle_patch(rng, donor.picture, donor.mask) if wanted else None
+                pairs.append(segmenter_sample(rng, item.picture, item.mask, size, patch))
         pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
         return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))
 

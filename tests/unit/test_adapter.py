@@ -18,8 +18,15 @@ ARMED = Arming(source_us=1, armed=True)
 
 def thrust(**changes: object) -> Thrust:
     message = Thrust(
-        source_us=1, left=0.02, right=0.04, enabled=True, echo_us=NOW_US - 100_000,
-        seq=7, epoch=100, domain=43, producer="controller",
+        source_us=1,
+        left=0.02,
+        right=0.04,
+        enabled=True,
+        echo_us=NOW_US - 100_000,
+        seq=7,
+        epoch=100,
+        domain=43,
+        producer="controller",
     )
     return msgspec.structs.replace(message, **changes)
 
@@ -168,21 +175,28 @@ def test_each_vital_process_must_beat(silent: str) -> None:
     assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
 
 
+def test_a_vital_process_that_never_beat_keeps_the_boat_still() -> None:
+    adapter = ThrustAdapter(CONFIG, domain=43)
+    adapter.hear_arming(ARMED, NOW_US)
+    adapter.offer(thrust(), NOW_US)
+    applied = adapter.decide(NOW_US)
+    assert (applied.zero_cause, applied.lost_pulse) == (ZeroCause.PULSE_LOST, CONFIG.require_pulses[0])
+
+
 def test_nothing_heard_nothing_applied() -> None:
     assert ready().decide(NOW_US).zero_cause is ZeroCause.NO_COMMAND
 
 
 @given(
-    left=st.floats(), right=st.floats(), enabled=st.booleans(),
-    echo_us=st.integers(0, 2 * NOW_US), domain=st.integers(42, 44),
+    left=st.floats(),
+    right=st.floats(),
+    enabled=st.booleans(),
+    echo_us=st.integers(0, 2 * NOW_US),
+    domain=st.integers(42, 44),
 )
-def test_force_is_always_within_limits(
-    left: float, right: float, enabled: bool, echo_us: int, domain: int
-) -> None:
+def test_force_is_always_within_limits(left: float, right: float, enabled: bool, echo_us: int, domain: int) -> None:
     adapter = ready()
-    adapter.offer(
-        thrust(left=left, right=right, enabled=enabled, echo_us=echo_us, domain=domain), NOW_US
-    )
+    adapter.offer(thrust(left=left, right=right, enabled=enabled, echo_us=echo_us, domain=domain), NOW_US)
     applied = adapter.decide(NOW_US)
     assert 0.0 <= applied.left_n <= 75.0
     assert 0.0 <= applied.right_n <= 75.0

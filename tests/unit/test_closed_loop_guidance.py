@@ -48,11 +48,8 @@ class Lockstep:
     def __init__(self, world: World, config: Config, seed: int = 1) -> None:
         self.world, self.config = world, config
         self.plant = Plant(world, config.plant, seed)
-        origin = {
-            "origin_latitude_deg": world.origin_lat_deg,
-            "origin_longitude_deg": world.origin_lon_deg,
-        }
-        self.estimator = Estimator(msgspec.structs.replace(config.localization, **origin))
+        origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
+        self.estimator = Estimator(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self.route = Route(
             source_us=0,
             name=world.name,
@@ -107,9 +104,7 @@ class Lockstep:
             arming=arming,
             arming_us=now_us,
         )
-        self.nav, self.command = navigate(
-            self.nav, heard, self.route, now_us, DOMAIN, self.config.navigator
-        )
+        self.nav, self.command = navigate(self.nav, heard, self.route, now_us, DOMAIN, self.config.navigator)
         self.ctl, thrust = control(
             self.ctl,
             ControllerHeard(self.command, now_us, self.odometry, now_us),

@@ -19,16 +19,19 @@ PAANI = load_config().controller
 
 def command(**changes: object) -> NavCommand:
     message = NavCommand(
-        source_us=NOW_US - 300_000, enable=True, heading_rad=0.0, speed_mps=0.15,
-        echo_us=123, sent_us=NOW_US - 20_000, direction=Direction.STRAIGHT,
+        source_us=NOW_US - 300_000,
+        enable=True,
+        heading_rad=0.0,
+        speed_mps=0.15,
+        echo_us=123,
+        sent_us=NOW_US - 20_000,
+        direction=Direction.STRAIGHT,
     )
     return msgspec.structs.replace(message, **changes)
 
 
 def odometry(**changes: object) -> Odometry:
-    message = Odometry(
-        source_us=NOW_US, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.15, healthy=True
-    )
+    message = Odometry(source_us=NOW_US, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.15, healthy=True)
     return msgspec.structs.replace(message, **changes)
 
 
@@ -113,9 +116,7 @@ def test_a_stop_is_never_slewed() -> None:
         (command(domain=44), odometry(), Inhibit.WRONG_DOMAIN),
     ],
 )
-def test_b11_what_stops_it(
-    given_command: NavCommand | None, given_odometry: Odometry | None, inhibit: Inhibit
-) -> None:
+def test_b11_what_stops_it(given_command: NavCommand | None, given_odometry: Odometry | None, inhibit: Inhibit) -> None:
     """B11: heading, speed, enable, frame and validity are checked together."""
     _, thrust = run(PAANI, given_command, given_odometry)
     assert inhibit in thrust.inhibits
@@ -165,13 +166,24 @@ def test_integral_does_not_wind_up() -> None:
 
 
 @given(
-    heading=st.floats(-10, 10), speed=st.floats(0, 5), yaw=st.floats(-4, 4),
-    surge=st.floats(-3, 3), rate=st.floats(-3, 3), left=st.floats(0, 1), right=st.floats(0, 1),
+    heading=st.floats(-10, 10),
+    speed=st.floats(0, 5),
+    yaw=st.floats(-4, 4),
+    surge=st.floats(-3, 3),
+    rate=st.floats(-3, 3),
+    left=st.floats(0, 1),
+    right=st.floats(0, 1),
     profile=st.sampled_from([PAPER, PAANI]),
 )
 def test_thrust_is_bounded_and_never_astern(
-    heading: float, speed: float, yaw: float, surge: float, rate: float,
-    left: float, right: float, profile: ControllerConfig,
+    heading: float,
+    speed: float,
+    yaw: float,
+    surge: float,
+    rate: float,
+    left: float,
+    right: float,
+    profile: ControllerConfig,
 ) -> None:
     """N7: whatever the inputs, both fans stay in [0, 1] and move no faster than the slew allows."""
     start = ControlState(left=left, right=right, last_us=NOW_US - 100_000)

@@ -79,7 +79,10 @@ def test_drag_takes_energy_whatever_the_motion(vx: float, vy: float, rate: float
 @given(st.floats(-0.6, 0.6), st.floats(-3.0, 3.0))
 def test_attitude_inverts_the_quaternion(pitch: float, yaw: float) -> None:
     cy, sy, cp, sp = (
-        math.cos(yaw / 2), math.sin(yaw / 2), math.cos(pitch / 2), math.sin(pitch / 2),
+        math.cos(yaw / 2),
+        math.sin(yaw / 2),
+        math.cos(pitch / 2),
+        math.sin(pitch / 2),
     )
     angles = attitude(cy * cp, -sy * sp, cy * sp, sy * cp)
     assert angles == pytest.approx((0.0, pitch, yaw), abs=1e-9)

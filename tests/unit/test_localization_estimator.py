@@ -14,7 +14,7 @@ from paani_services.localization.calibration import UNCALIBRATED_STD_RADPS, gyro
 from paani_services.localization.estimator import Estimator
 
 ORIGIN_DEG = (50.0, 8.0)
-CONFIG = LocalizationConfig(origin_latitude_deg=50.0, origin_longitude_deg=8.0)
+CONFIG = LocalizationConfig(origin_lat_lon_deg=ORIGIN_DEG)
 START_US = 5_000_000
 BIAS_RADPS = 0.004
 
@@ -48,11 +48,15 @@ class Ride:
         self.y_m += surge_mps * math.sin(self.yaw_rad) * 0.01
         noise = self.rng.standard_normal(4)
         return ImuSample(
-            source_us=self.now_us, epoch=self.epoch, gyro_x_radps=0.0, gyro_y_radps=0.0,
+            source_us=self.now_us,
+            epoch=self.epoch,
+            gyro_x_radps=0.0,
+            gyro_y_radps=0.0,
             gyro_z_radps=yaw_rate_radps + BIAS_RADPS + 0.002 * noise[0],
             accel_x_mps2=0.03 * noise[1],
             accel_y_mps2=surge_mps * yaw_rate_radps + 0.03 * noise[2],
-            accel_z_mps2=9.81, orientation_available=True,
+            accel_z_mps2=9.81,
+            orientation_available=True,
             yaw_rad=self.yaw_rad + 0.01 * noise[3],
         )
 
@@ -64,8 +68,12 @@ class Ride:
         vx = surge_mps * math.cos(self.yaw_rad) + 0.05 * noise[2]
         vy = surge_mps * math.sin(self.yaw_rad) + 0.05 * noise[3]
         return GpsFix(
-            source_us=self.now_us, latitude_deg=latitude_deg, longitude_deg=longitude_deg,
-            sog_mps=math.hypot(vx, vy), cog_rad=math.atan2(vy, vx), position_std_m=0.8,
+            source_us=self.now_us,
+            latitude_deg=latitude_deg,
+            longitude_deg=longitude_deg,
+            sog_mps=math.hypot(vx, vy),
+            cog_rad=math.atan2(vy, vx),
+            position_std_m=0.8,
         )
 
 
@@ -165,6 +173,21 @@ def test_l5_stopped_flag(ride: Ride) -> None:
 def test_gyro_bias_is_learnt_at_rest(ride: Ride) -> None:
     rates = [one.yaw_rate_radps for one in ride.go(2.0)]
     assert statistics.fmean(rates) == pytest.approx(0.0, abs=6e-4)
+
+
+@pytest.mark.parametrize(("roll_rad", "pitch_rad"), [(0.05, 0.0), (0.0, 0.05), (-0.04, 0.06)])
+def test_tilt_is_not_taken_for_acceleration(ride: Ride, roll_rad: float, pitch_rad: float) -> None:
+    """A boat at rest that heels or trims feels gravity along its axes, and stays at rest."""
+    for _ in range(40):
+        tilted = msgspec.structs.replace(
+            ride._sample(0.0, 0.0),
+            roll_rad=roll_rad,
+            pitch_rad=pitch_rad,
+            accel_x_mps2=-9.81 * math.sin(pitch_rad),
+            accel_y_mps2=9.81 * math.sin(roll_rad) * math.cos(pitch_rad),
+        )
+        local, _ = ride.estimator.step([tilted], None, ride.now_us)
+        assert math.hypot(local.surge_mps, local.sway_mps) < 0.05
 
 
 def test_calibration_refuses_a_boat_that_turns() -> None:

@@ -35,10 +35,14 @@ RUNNING = NavState(target=1, sim_us=1000, advanced_us=NOW_US - 50_000)
 
 def heard(now_us: int = NOW_US, /, **changes: object) -> Heard:
     message = Heard(
-        advisory=advice(Direction.STRAIGHT, now_us), advisory_us=now_us,
-        odometry=pose(3.0, 0.0, source_us=now_us), odometry_us=now_us,
-        clock=SimTime(source_us=now_us, sim_us=now_us, stamp_us=777), clock_us=now_us,
-        arming=Arming(source_us=now_us, armed=True), arming_us=now_us,
+        advisory=advice(Direction.STRAIGHT, now_us),
+        advisory_us=now_us,
+        odometry=pose(3.0, 0.0, source_us=now_us),
+        odometry_us=now_us,
+        clock=SimTime(source_us=now_us, sim_us=now_us, stamp_us=777),
+        clock_us=now_us,
+        arming=Arming(source_us=now_us, armed=True),
+        arming_us=now_us,
     )
     return msgspec.structs.replace(message, **changes)
 
@@ -48,9 +52,7 @@ def advice(direction: Direction, source_us: int = NOW_US) -> Advisory:
 
 
 def pose(x_m: float, y_m: float, yaw_rad: float = 0.0, source_us: int = NOW_US) -> Odometry:
-    return Odometry(
-        source_us=source_us, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, surge_mps=0.3, healthy=True
-    )
+    return Odometry(source_us=source_us, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, surge_mps=0.3, healthy=True)
 
 
 def run(
@@ -184,6 +186,7 @@ def test_m1_waypoint_is_kept_during_visual_turns() -> None:
 
 def test_waypoint_left_abeam_counts_in_paani_only() -> None:
     """A waypoint that an obstacle covers is passed, not orbited."""
+    assert Drill(PAANI).order(Direction.STRAIGHT, pose(8.0, 1.0)).waypoint_index == 1
     past = pose(10.5, 3.0)
     assert Drill(PAANI).order(Direction.STRAIGHT, past).waypoint_index == 2
     assert Drill(PAPER).order(Direction.STRAIGHT, past).waypoint_index == 1
@@ -282,8 +285,11 @@ def test_evidence_and_plant_stamps_pass_through() -> None:
 
 
 @given(
-    x=st.floats(-50, 50), y=st.floats(-50, 50), yaw=st.floats(-3.14, 3.14),
-    direction=st.sampled_from(Direction), profile=st.sampled_from([PAPER, PAANI]),
+    x=st.floats(-50, 50),
+    y=st.floats(-50, 50),
+    yaw=st.floats(-3.14, 3.14),
+    direction=st.sampled_from(Direction),
+    profile=st.sampled_from([PAPER, PAANI]),
 )
 def test_an_order_that_moves_has_no_inhibits_and_is_finite(
     x: float, y: float, yaw: float, direction: Direction, profile: NavigatorConfig

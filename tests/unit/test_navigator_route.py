@@ -8,8 +8,8 @@ import pytest
 
 from paani.errors import UserError
 from paani_services.navigator.route import load_route
-from paani_sim.plant.chart import route_toml
 from paani_sim.worlds import WORLDS, load_world
+from paani_sim.worlds.export_route import route_toml
 
 METRES = """
 name = "pond"

@@ -56,9 +56,7 @@ def test_k6_heave_settles_at_0_177_with_a_damped_period_of_1_s(open_plant: OpenP
 @pytest.mark.parametrize(
     ("thrust_frac", "speed_mps"), [(0.01, 0.19), (0.02, 0.30), (0.04, 0.46), (0.08, 0.68), (1.0, 2.69)]
 )
-def test_k4_k5_thrust_gives_the_drag_limited_speed(
-    open_plant: OpenPlant, thrust_frac: float, speed_mps: float
-) -> None:
+def test_k4_k5_thrust_gives_the_drag_limited_speed(open_plant: OpenPlant, thrust_frac: float, speed_mps: float) -> None:
     """75 N per unit and fan against 4 v + 20 v^2; 0.68 m/s at the paper's forward limit (1a)."""
     plant = open_plant()
     plant.place(-60.0, 0.0, 0.0)
@@ -127,9 +125,7 @@ def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
     assert trace(5)[1] != trace(6)[1]
 
 
-def test_divergence_names_itself(
-    open_plant: OpenPlant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_divergence_names_itself(open_plant: OpenPlant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """MuJoCo would reset the boat and write a log file; neither happens."""
     monkeypatch.chdir(tmp_path)
     config = PlantConfig(dynamics=DynamicsConfig(tilt_damping=1e9, heave_damping=1e9))

@@ -79,9 +79,7 @@ def control(
     )
 
 
-def inhibits_of(
-    heard: Heard, now_us: int, domain: int, config: ControllerConfig
-) -> tuple[Inhibit, ...]:
+def inhibits_of(heard: Heard, now_us: int, domain: int, config: ControllerConfig) -> tuple[Inhibit, ...]:
     """Every reason to give no thrust now; those of the command itself come first."""
     command, odometry = heard.command, heard.odometry
     found: list[Inhibit] = []
@@ -118,9 +116,7 @@ def _speed(
         return 0.0, 0.0, 0.0  # L5: speed noise at rest must not turn the fans
     error_mps = ordered_mps - (0.0 if odometry.stopped else odometry.surge_mps)
     base = config.speed_kp * error_mps + _feed_forward(ordered_mps, config)
-    grown = clip(
-        integral + config.speed_ki * error_mps * step_s, -config.max_integral, config.max_integral
-    )
+    grown = clip(integral + config.speed_ki * error_mps * step_s, -config.max_integral, config.max_integral)
     if not 0.0 <= base + grown <= config.max_forward and abs(grown) > abs(integral):
         grown = integral  # saturated: winding up further would only overshoot later
     return error_mps, clip(base + grown, 0.0, config.max_forward), grown
@@ -148,6 +144,4 @@ def _is_valid(command: NavCommand) -> bool:
 
 
 def _is_finite(odometry: Odometry) -> bool:
-    return all(
-        map(math.isfinite, (odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps))
-    )
+    return all(map(math.isfinite, (odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)))

@@ -23,8 +23,6 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(command.next(), silence_s)
             heard = Heard(command.value, command.received_us, odometry.value, odometry.received_us)
-            state, message = control(
-                state, heard, clock.now_us(), config.bus.domain, config.controller
-            )
+            state, message = control(state, heard, clock.now_us(), config.bus.domain, config.controller)
             bus.note(", ".join(message.inhibits))
             thrust.put(message)

@@ -33,12 +33,7 @@ class Estimator:
 
     def __init__(self, config: LocalizationConfig) -> None:
         self._config = config
-        latitude_deg, longitude_deg = config.origin_latitude_deg, config.origin_longitude_deg
-        self._origin_deg = (
-            (latitude_deg, longitude_deg)
-            if latitude_deg is not None and longitude_deg is not None
-            else None
-        )
+        self._origin_deg = config.origin_lat_lon_deg
         self._reset()
 
     def _reset(self) -> None:
@@ -53,9 +48,7 @@ class Estimator:
         self._refused = 0
         self._slow_since_us: int | None = None
 
-    def step(
-        self, samples: Sequence[ImuSample], fix: GpsFix | None, now_us: int
-    ) -> tuple[Odometry, Odometry]:
+    def step(self, samples: Sequence[ImuSample], fix: GpsFix | None, now_us: int) -> tuple[Odometry, Odometry]:
         """Local and global odometry after these IMU samples, oldest first, and perhaps a new fix.
 
         Both are unhealthy until the gyro is calibrated and, for the global one, the position has
@@ -84,9 +77,7 @@ class Estimator:
             step_s = NOMINAL_GAP_S * len(samples)
         self._last_imu = newest
         yaw_rate = statistics.fmean(sample.gyro_z_radps for sample in samples)
-        ahead = statistics.fmean(
-            sample.accel_x_mps2 + GRAVITY_MPS2 * math.sin(sample.pitch_rad) for sample in samples
-        )
+        ahead = statistics.fmean(sample.accel_x_mps2 + GRAVITY_MPS2 * math.sin(sample.pitch_rad) for sample in samples)
         left = statistics.fmean(
             sample.accel_y_mps2 - GRAVITY_MPS2 * math.sin(sample.roll_rad) * math.cos(sample.pitch_rad)
             for sample in samples
@@ -137,10 +128,16 @@ class Estimator:
         surge_mps = fix.sog_mps * math.cos(fix.cog_rad - yaw_rad)
         self._global = PlanarFilter(
             np.array([x_m, y_m, yaw_rad, surge_mps, 0.0, self._bias.radps]),
-            np.array([
-                fix.position_std_m, fix.position_std_m, self._initial_yaw_std_rad(self._last_imu),
-                0.2, 0.1, self._bias.std_radps,
-            ]),
+            np.array(
+                [
+                    fix.position_std_m,
+                    fix.position_std_m,
+                    self._initial_yaw_std_rad(self._last_imu),
+                    0.2,
+                    0.1,
+                    self._bias.std_radps,
+                ]
+            ),
         )
         self._accepted = self._refused = 0
 
@@ -176,9 +173,7 @@ class Estimator:
         )
         return self._odometry(self._global, now_us, healthy=healthy, floor_m=floor_m)
 
-    def _odometry(
-        self, source: PlanarFilter, now_us: int, *, healthy: bool, floor_m: float = 0.0
-    ) -> Odometry:
+    def _odometry(self, source: PlanarFilter, now_us: int, *, healthy: bool, floor_m: float = 0.0) -> Odometry:
         x, std = source.x.tolist(), source.std.tolist()
         latitude_deg, longitude_deg = 0.0, 0.0
         if source is self._global and self._origin_deg is not None:

@@ -37,35 +37,49 @@ class PlanarFilter:
     @property
     def std(self) -> Array:
         """Standard deviation of each state (6,)."""
-        return np.sqrt(np.maximum(np.diag(self._ekf.P), 0.0))
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
-    def predict(
-        self, yaw_rate_radps: float, ahead_mps2: float, left_mps2: float, step_s: float
-    ) -> None:
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the state (6, 6)."""
+        return np.asarray(self._ekf.P)
+
+    def predict(self, yaw_rate_radps: float, ahead_mps2: float, left_mps2: float, step_s: float) -> None:
         """Advance by `step_s` with the measured yaw rate and level acceleration along body axes."""
         px, py, psi, u, v, b = self._ekf.x.tolist()
         rate = yaw_rate_radps - b
         sin, cos = math.sin(psi), math.cos(psi)
-        self._ekf.x = np.array([
-            px + (u * cos - v * sin) * step_s,
-            py + (u * sin + v * cos) * step_s,
-            wrap_rad(psi + rate * step_s),
-            u + (ahead_mps2 + rate * v) * step_s,
-            v + (left_mps2 - rate * u) * step_s,
-            b,
-        ])
+        self._ekf.x = np.array(
+            [
+                px + (u * cos - v * sin) * step_s,
+                py + (u * sin + v * cos) * step_s,
+                wrap_rad(psi + rate * step_s),
+                u + (ahead_mps2 + rate * v) * step_s,
+                v + (left_mps2 - rate * u) * step_s,
+                b,
+            ]
+        )
         jacobian = np.eye(6)
         jacobian[PX, PSI], jacobian[PX, U], jacobian[PX, V] = (
-            -(u * sin + v * cos) * step_s, cos * step_s, -sin * step_s,
+            -(u * sin + v * cos) * step_s,
+            cos * step_s,
+            -sin * step_s,
         )
         jacobian[PY, PSI], jacobian[PY, U], jacobian[PY, V] = (
-            (u * cos - v * sin) * step_s, sin * step_s, cos * step_s,
+            (u * cos - v * sin) * step_s,
+            sin * step_s,
+            cos * step_s,
         )
         jacobian[PSI, B] = -step_s
         jacobian[U, V], jacobian[U, B] = rate * step_s, -v * step_s
         jacobian[V, U], jacobian[V, B] = -rate * step_s, u * step_s
         noise_std = [
-            POSITION_STD_M, POSITION_STD_M, GYRO_STD_RADPS, ACCEL_STD_MPS2, ACCEL_STD_MPS2, BIAS_STD_RADPS,
+            POSITION_STD_M,
+            POSITION_STD_M,
+            GYRO_STD_RADPS,
+            ACCEL_STD_MPS2,
+            ACCEL_STD_MPS2,
+            BIAS_STD_RADPS,
         ]
         noise = np.diag(np.square(noise_std) * step_s)
         self._ekf.P = jacobian @ self._ekf.P @ jacobian.T + noise
@@ -103,7 +117,11 @@ class PlanarFilter:
         jacobian = np.zeros((1, 6))
         jacobian[0, index] = 1.0
         return self._correct(
-            np.array([value]), self._ekf.x[index : index + 1], jacobian, std, gate2,
+            np.array([value]),
+            self._ekf.x[index : index + 1],
+            jacobian,
+            std,
+            gate2,
             circular=index == PSI,
         )
 

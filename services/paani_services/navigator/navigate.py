@@ -77,9 +77,7 @@ def navigate(
             inhibits.append(Inhibit.ROUTE_FINISHED)
     target = state.target or 0
     if inhibits:
-        return state, _order(
-            state, heard, now_us, inhibits, cross_m=cross_track_m(route, target, position_m)
-        )
+        return state, _order(state, heard, now_us, inhibits, cross_m=cross_track_m(route, target, position_m))
     if direction in TURNS:
         speed_mps *= config.turn_speed_frac
         if config.latch_turns:
@@ -112,9 +110,7 @@ def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
     return msgspec.structs.replace(state, sim_us=sim_us, advanced_us=now_us)
 
 
-def _gates(
-    state: NavState, heard: Heard, now_us: int, domain: int, config: NavigatorConfig
-) -> list[Inhibit]:
+def _gates(state: NavState, heard: Heard, now_us: int, domain: int, config: NavigatorConfig) -> list[Inhibit]:
     """Every gate that is shut (M8-M11)."""
 
     def is_old(stamp_us: int, limit_s: float) -> bool:
@@ -125,20 +121,11 @@ def _gates(
     messages = (advisory, odometry, clock, arming)
     if any(message is not None and message.domain != domain for message in messages):
         found.append(Inhibit.WRONG_DOMAIN)
-    if (
-        arming is None
-        or not arming.armed
-        or arming.stopped
-        or is_old(heard.arming_us, config.arming_max_age_s)
-    ):
+    if arming is None or not arming.armed or arming.stopped or is_old(heard.arming_us, config.arming_max_age_s):
         found.append(Inhibit.NOT_ARMED)
     if clock is None or is_old(heard.clock_us, config.clock_max_age_s):
         found.append(Inhibit.NO_CLOCK)
-    elif (
-        not clock.running
-        or state.advanced_us is None
-        or is_old(state.advanced_us, config.clock_max_age_s)
-    ):
+    elif not clock.running or state.advanced_us is None or is_old(state.advanced_us, config.clock_max_age_s):
         found.append(Inhibit.CLOCK_STOPPED)
     if odometry is None:
         found.append(Inhibit.NO_ODOMETRY)
@@ -173,9 +160,7 @@ def _forget_turn(state: NavState, heard: Heard) -> NavState:
     return state
 
 
-def _advance(
-    state: NavState, route: Route, position_m: tuple[float, float], config: NavigatorConfig
-) -> NavState:
+def _advance(state: NavState, route: Route, position_m: tuple[float, float], config: NavigatorConfig) -> NavState:
     """Count the waypoints reached; only called while going straight, so turns keep theirs (M1, M3)."""
     target, reached, finished = state.target or 0, state.reached, state.finished
     last = len(route.waypoints) - 1

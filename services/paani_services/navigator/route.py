@@ -1,19 +1,19 @@
 """Route files.
 
-    name = "lake"
-    repeat = true               # optional; false ends the route at its last waypoint
+name = "lake"
+repeat = true               # optional; false ends the route at its last waypoint
 
-    [origin]                    # only needed by geodetic waypoints
-    latitude_deg = 47.6512
-    longitude_deg = 9.4794
+[origin]                    # only needed by geodetic waypoints
+latitude_deg = 47.6512
+longitude_deg = 9.4794
 
-    [[waypoints]]               # two or more, each in map metres or geodetic
-    x_m = 12.5
-    y_m = -3.0
+[[waypoints]]               # two or more, each in map metres or geodetic
+x_m = 12.5
+y_m = -3.0
 
-    [[waypoints]]
-    latitude_deg = 47.6513
-    longitude_deg = 9.4795
+[[waypoints]]
+latitude_deg = 47.6513
+longitude_deg = 9.4795
 """
 
 import itertools
@@ -79,8 +79,6 @@ def _waypoint(point: _Point, origin: _Origin | None, where: str) -> Waypoint:
         case _Point(x_m=None, y_m=None, latitude_deg=float(lat), longitude_deg=float(lon)):
             if origin is None:
                 raise UserError(f"{where}: latitude_deg needs the file's [origin]")
-            east_m, north_m = enu_from_geodetic(
-                lat, lon, origin.latitude_deg, origin.longitude_deg
-            )
+            east_m, north_m = enu_from_geodetic(lat, lon, origin.latitude_deg, origin.longitude_deg)
             return Waypoint(x_m=east_m, y_m=north_m)
     raise UserError(f"{where}: needs x_m and y_m, or latitude_deg and longitude_deg")

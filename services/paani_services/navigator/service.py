@@ -20,7 +20,8 @@ EARLY_US = 5_000  # a wake-up this much before the period is over is on time
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Order at `rate_hz`, and at once when the advice or a gate changes."""
-    route = load_route(Path(config.navigator.route)) if config.navigator.route else None
+    file = config.navigator.route
+    route = await asyncio.to_thread(load_route, Path(file)) if file else None
     advisory, odometry = bus.latest(keys.ADVISORY), bus.latest(keys.ODOMETRY)
     sim_time, arming = bus.latest(keys.SIM_TIME), bus.latest(keys.ARMING)
     command, route_out = bus.publisher(keys.COMMAND), bus.publisher(keys.ROUTE)
@@ -36,15 +37,17 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     await asyncio.wait_for(wake.wait(), period_s)
                 wake.clear()
                 heard = Heard(
-                    advisory=advisory.value, advisory_us=advisory.received_us,
-                    odometry=odometry.value, odometry_us=odometry.received_us,
-                    clock=sim_time.value, clock_us=sim_time.received_us,
-                    arming=arming.value, arming_us=arming.received_us,
+                    advisory=advisory.value,
+                    advisory_us=advisory.received_us,
+                    odometry=odometry.value,
+                    odometry_us=odometry.received_us,
+                    clock=sim_time.value,
+                    clock_us=sim_time.received_us,
+                    arming=arming.value,
+                    arming_us=arming.received_us,
                 )
                 now_us = clock.now_us()
-                state, order = navigate(
-                    state, heard, route, now_us, config.bus.domain, config.navigator
-                )
+                state, order = navigate(state, heard, route, now_us, config.bus.domain, config.navigator)
                 if now_us - sent_us >= period_s * 1e6 - EARLY_US or _differs(order, sent):
                     sent, sent_us = command.put(order), now_us
                     bus.note(", ".join(order.inhibits))

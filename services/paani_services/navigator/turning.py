@@ -64,9 +64,7 @@ def latched(
     return _extended(turn, direction, yaw_rad, config)
 
 
-def _extended(
-    turn: Turn, direction: Direction, yaw_rad: float, config: NavigatorConfig
-) -> tuple[Turn, bool]:
+def _extended(turn: Turn, direction: Direction, yaw_rad: float, config: NavigatorConfig) -> tuple[Turn, bool]:
     limit_rad = math.radians(config.max_total_turn_deg)
     side = _SIDE[direction]
     sofar_rad = wrap_rad(yaw_rad - turn.start_rad)

@@ -63,7 +63,7 @@ def _lane(
     non_water = 1.0 - float(water_of_column @ columns / columns.sum())  # E4
     uncertainty = 1.0 - float(rows @ confidence @ columns / total)  # E5
     best = run = 0.0
-    for share, width in zip(water_of_column, columns, strict=True):
+    for share, width in zip(water_of_column.tolist(), columns.tolist(), strict=True):
         run = run + width if width > 0.0 and share >= clear_column - 1e-12 else 0.0
         best = max(best, run)
     return LaneEvidence(

@@ -29,13 +29,17 @@ class GateState(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """What the gate looks at. Levels are of 255, shares of 1; `correlation` is of neighbouring small pixels."""
+    """What the gate looks at. Levels are of 255, shares of 1; `correlation` is of neighbouring small pixels.
+
+    `upright_residual` is the part of the variation that vertical stripes do not explain: test cards have none.
+    """
 
     mean: float
     dark_frac: float
     bright_frac: float
     range: float
     plain_frac: float
+    upright_residual: float
     correlation: float
     sigma: float
     fineness: float
@@ -87,6 +91,7 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
         bright_frac=float((middle >= BRIGHT_LEVEL).mean()),
         range=float(high - low),
         plain_frac=float((tile_std < PLAIN_STD).mean()),
+        upright_residual=float((small - small.mean(axis=0)).std() / (small.std() + 1e-3)),
         correlation=min(
             float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean())
         ) / variance,
@@ -103,7 +108,11 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
         return UnusableCause.BLACK
     if seen.bright_frac > config.bright_frac:
         return UnusableCause.WHITE
-    if seen.range < config.flat_range or seen.plain_frac > config.flat_frac:
+    if (
+        seen.range < config.flat_range
+        or seen.plain_frac > config.flat_frac
+        or seen.upright_residual < config.flat_residual
+    ):
         return UnusableCause.FLAT
     if (
         seen.correlation < config.noise_correlation

@@ -13,11 +13,10 @@ Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 
 
 class LocalizationConfig(Section, frozen=True):
-    """`origin_*` is where the map's (0, 0) lies; unset: the first fix."""
+    """`origin_lat_lon_deg` is where the map's (0, 0) lies; unset: the first fix."""
 
     rate_hz: Positive = 20.0  # L1, L3
-    origin_latitude_deg: Latitude | None = None
-    origin_longitude_deg: Longitude | None = None
+    origin_lat_lon_deg: tuple[Latitude, Longitude] | None = None
     gate_mahalanobis2: Positive = 25.0
     calibration_s: NonNegative = 2.0
     max_gps_age_s: Positive = 3.0
@@ -26,12 +25,6 @@ class LocalizationConfig(Section, frozen=True):
     max_yaw_std_rad: Positive = 0.35
     stopped_speed_mps: NonNegative = 0.05  # L5
     stopped_after_s: Positive = 2.0  # L5
-
-    def __post_init__(self) -> None:
-        if (self.origin_latitude_deg is None) != (self.origin_longitude_deg is None):
-            raise ValueError(
-                "localization.origin_latitude_deg and localization.origin_longitude_deg go together"
-            )
 
 
 class NavigatorConfig(Section, frozen=True):

@@ -8,7 +8,10 @@ from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
 
 class CameraConfig(Section, frozen=True):
-    """`source`: `sim`, `webcam`, `webcam:N`, or a picture, folder or video path."""
+    """`source`: `sim`, `webcam`, `webcam:N`, or a picture, folder or video path.
+
+    A single picture is a camera that always shows the same: the gate calls it frozen.
+    """
 
     source: str = "sim"
     rate_hz: Positive = 5.0
@@ -33,6 +36,7 @@ class GateConfig(Section, frozen=True):
     bright_frac: Fraction = 0.60  # of pixels at least 250
     flat_range: NonNegative = 14.0  # 1st to 99th percentile
     flat_frac: Fraction = 0.95  # of tiles without texture
+    flat_residual: Fraction = 0.15  # of the variation is not vertical stripes
     noise_correlation: Fraction = 0.25  # of neighbours in the small picture
     noise_sigma: NonNegative = 18.0
     noise_fineness: NonNegative = 2.2  # fine over coarse edges

@@ -37,12 +37,12 @@ async def make_plan(config: Config) -> Plan:
     require_free(config.bus.router)
     if config.dashboard.serve:
         await _require_free_page(config)
-    route, (latitude_deg, longitude_deg) = await _world_route(config)
+    route, origin_deg = await _world_route(config)
     navigator, localization = config.navigator, config.localization
     if not navigator.route:
         navigator = replace(navigator, route=str(route))
-    if localization.origin_latitude_deg is None and localization.origin_longitude_deg is None:
-        localization = replace(localization, origin_latitude_deg=latitude_deg, origin_longitude_deg=longitude_deg)
+    if localization.origin_lat_lon_deg is None:
+        localization = replace(localization, origin_lat_lon_deg=origin_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
         return Plan(keys.SERVICES, config)

@@ -25,9 +25,10 @@ class Silence:
         self._starting.add(service)
 
     def heard(self, service: str, now_us: int) -> None:
-        """It is alive and has spoken."""
-        self._heard_us[service] = now_us
-        self._starting.discard(service)
+        """It is alive and has spoken. What comes after its process ended does not count."""
+        if service in self._heard_us:
+            self._heard_us[service] = now_us
+            self._starting.discard(service)
 
     def ended(self, service: str) -> None:
         """Its process is gone."""

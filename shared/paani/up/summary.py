@@ -135,6 +135,10 @@ class Summary:
         for samples in self._latency.values():
             samples.clear()
 
+    @property
+    def begun(self) -> bool:
+        return self._begin_us is not None
+
     def count_output(self, service: str, n: int) -> None:
         """`n` more messages of a service whose main output (a picture) is not fed."""
         self._outputs[service] += n

@@ -77,9 +77,7 @@ def wrench(state: HullState, fans: Fans, config: DynamicsConfig) -> Wrench:
         forward_y * ahead_n + left_y * sideways_n,
         forward_z * ahead_n + left_z * sideways_n + up_n,
         -stiffness * angles.roll_rad - damping * state.roll_rate_radps,
-        -stiffness * angles.pitch_rad
-        - damping * state.pitch_rate_radps
-        + config.fan_height_m * thrust_n,
+        -stiffness * angles.pitch_rad - damping * state.pitch_rate_radps + config.fan_height_m * thrust_n,
         0.5 * config.fan_spacing_m * (fans.right_n - fans.left_n)
         - _drag(yaw_rate, config.yaw_linear, config.yaw_quadratic),
     )

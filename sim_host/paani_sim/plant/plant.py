@@ -144,9 +144,7 @@ class Plant:
         angles = attitude(*pose[3:7])
         force = self._data.sensor("accelerometer").data.tolist()
         rates = self._data.sensor("gyro").data.tolist()
-        return Truth(
-            pose[0], pose[1], velocity[0], velocity[1], *angles, tuple(rates), tuple(force)
-        )
+        return Truth(pose[0], pose[1], velocity[0], velocity[1], *angles, tuple(rates), tuple(force))
 
     def _move_actors(self) -> None:
         time_s = self.sim_us * 1e-6
@@ -159,8 +157,7 @@ class Plant:
     def _count_contacts(self) -> None:
         contacts = (self._data.contact[index] for index in range(self._data.ncon))
         self.in_contact = any(
-            contact.dist <= 0.0 and not self._boat_geoms.isdisjoint(contact.geom.tolist())
-            for contact in contacts
+            contact.dist <= 0.0 and not self._boat_geoms.isdisjoint(contact.geom.tolist()) for contact in contacts
         )
         if self.in_contact:
             now_s = self.sim_us * 1e-6

@@ -100,9 +100,7 @@ def measure_gps(
     return errors._replace(gps_x_m=bias_x_m, gps_y_m=bias_y_m), reading
 
 
-def measure_imu(
-    errors: SensorErrors, truth: Truth, config: SensorsConfig, rng: np.random.Generator
-) -> ImuReading:
+def measure_imu(errors: SensorErrors, truth: Truth, config: SensorsConfig, rng: np.random.Generator) -> ImuReading:
     """One sample: rates with bias and noise, specific force with noise, attitude with compass bias."""
     draw = rng.standard_normal(7).tolist()
     gyro, accel = config.gyro_noise_radps, config.accel_noise_mps2

@@ -1,0 +1,1 @@
+"""Pictures of the world, real or rendered, onto the bus."""

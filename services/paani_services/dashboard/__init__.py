@@ -1,0 +1,1 @@
+"""The operator's page: what the boat sees, thinks and does; one STOP."""

@@ -1,0 +1,85 @@
+"""What may be asked of the page's server, and by which page. Pure."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import Annotated, TypeVar
+from urllib.parse import urlsplit
+
+import msgspec
+
+HOLD_MIN_MS, HOLD_MAX_MS = 1000, 5000
+
+T = TypeVar("T")
+
+
+class BadRequestError(Exception):
+    """One line and the field at fault."""
+
+    def __init__(self, text: str, field: str) -> None:
+        super().__init__(text)
+        self.field = field
+
+
+class ArmRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Arming takes a control held for a second and let go before it expires."""
+
+    held_ms: Annotated[int, msgspec.Meta(ge=HOLD_MIN_MS, le=HOLD_MAX_MS)]
+
+
+class SnapshotQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """`max_age_s`: an older picture is refused."""
+
+    max_age_s: Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)] = 5.0
+
+
+class NoQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Requests that take nothing."""
+
+
+def read_body(body: bytes, kind: type[T]) -> T:
+    """Raises BadRequestError naming the field."""
+    try:
+        return msgspec.json.decode(body, type=kind)
+    except msgspec.MsgspecError as error:
+        raise _bad(error, "body") from error
+    except UnicodeDecodeError as error:
+        raise BadRequestError("body: not UTF-8", "body") from error
+
+
+def read_query(query: dict[str, str], kind: type[T]) -> T:
+    """Raises BadRequestError naming the parameter."""
+    try:
+        return msgspec.convert(query, kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise _bad(error, "query") from error
+
+
+def is_our_host(host_header: str, bound_host: str) -> bool:
+    """Whether a Host header names this server by address, as localhost, or as configured.
+
+    Any other name is a page elsewhere that had its own name resolve to us.
+    """
+    name = urlsplit(f"//{host_header}").hostname or ""
+    if name in {"localhost", bound_host.lower()}:
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def is_same_origin(origin: str | None, host_header: str) -> bool:
+    """Whether a page served by this very server sent the request."""
+    return origin in {f"http://{host_header}", f"https://{host_header}"}
+
+
+def _bad(error: Exception, whole: str) -> BadRequestError:
+    text, _, path = str(error).partition(" - at ")
+    field = path.strip("`").removeprefix("$").lstrip(".") or whole
+    for marker in ("missing required field `", "unknown field `"):
+        _, found, name = text.partition(marker)
+        if found:
+            field = name.rstrip("`")
+    return BadRequestError(f"{field}: {text}", field)

@@ -1,0 +1,79 @@
+"""`paani up`."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import msgspec
+
+from paani.cli import add_config_arguments, config_from
+from paani.errors import UserError
+from paani.up.display import Display
+from paani.up.drive import Outcome, drive
+from paani.up.plan import make_plan
+from paani.up.summary import Report
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 it ran to its end, 1 a service could not be kept alive, 2 user's mistake."""
+    options = _parser().parse_args(argv)
+    if options.summary is not None and not options.summary.absolute().parent.is_dir():
+        raise UserError(f"--summary {options.summary}: no such folder")
+    outcome = asyncio.run(_up(options))
+    if options.summary is not None:
+        write_report(options.summary, outcome.report)
+    if outcome.failure:
+        sys.stderr.write(f"paani: {outcome.failure}\n")
+        return 1
+    return 0
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Beside the file first, then renamed. Raises UserError."""
+    beside = path.with_name(f".{path.name}.beside")
+    try:
+        beside.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+        beside.replace(path)
+    except OSError as error:
+        raise UserError(f"--summary {path}: {error.strerror}") from error
+
+
+def up_sets(*, world: str | None, camera: str | None, headless: bool) -> tuple[str, ...]:
+    """Settings that the options of `paani up` stand for. The boat is a simulated one: the operator arms at start."""
+    sets = ["dashboard.arm_at_start=true"]
+    if world is not None:
+        sets.append(f"world.name={json.dumps(world)}")
+    if camera is not None:
+        sets.append(f"camera.source={json.dumps(camera)}")
+    if headless:
+        sets.append("dashboard.serve=false")
+    return tuple(sets)
+
+
+def seconds(text: str) -> float:
+    """A positive number of seconds."""
+    value = float(text)
+    if not 0.0 < value < 1e7:
+        raise ValueError(text)
+    return value
+
+
+async def _up(options: argparse.Namespace) -> Outcome:
+    sets = up_sets(world=options.world, camera=options.camera, headless=options.headless)
+    plan = await make_plan(config_from(options, sets))
+    return await drive(plan, options.seconds, Display(sys.stdout))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani up", description="Run the whole loop until Ctrl-C.")
+    parser.add_argument("--world", help="river or lake (default: river)")
+    parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
+    parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
+    parser.add_argument("--summary", type=Path, metavar="FILE", help="write the run's figures as JSON")
+    parser.add_argument("--headless", action="store_true", help="serve no page")
+    add_config_arguments(parser)
+    return parser

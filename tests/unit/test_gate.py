@@ -1,0 +1,106 @@
+"""The usable-picture gate: what no camera sees is refused, what cameras see is not."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from paani.config import GateConfig, load_config
+from paani.messages import UnusableCause
+from paani_services.perception.gate import GateState, judge
+from tests.unit.pictures import PICTURES, noisy, river
+
+C = UnusableCause
+ON = GateConfig()
+
+
+@pytest.mark.parametrize(("name", "causes"), [
+    ("black", {C.BLACK}),
+    ("black_with_noise", {C.BLACK}),
+    ("nearly_black", {C.BLACK}),
+    ("white", {C.WHITE}),
+    ("overexposed", {C.WHITE}),
+    ("grey", {C.FLAT}),
+    ("green", {C.FLAT}),
+    ("grey_with_noise", {C.FLAT, C.NOISE}),
+    ("test_card", {C.FLAT}),
+    ("test_card_with_noise", {C.FLAT}),
+    ("white_noise", {C.NOISE}),
+    ("salt_and_pepper", {C.NOISE}),
+    ("river_in_strong_noise", {C.NOISE}),
+    ("blurred", {C.BLURRED}),
+    ("gradient", {C.BLURRED, C.FLAT}),
+    ("covered_60", {C.COVERED}),
+    ("covered_80", {C.COVERED}),
+])  # fmt: skip
+@pytest.mark.parametrize("size_wh", [(320, 240), (640, 480)])
+def test_what_no_camera_should_see(name: str, causes: set[UnusableCause], size_wh: tuple[int, int]) -> None:
+    """J19, W1, U8: each with its cause, in its first frame, through JPEG."""
+    picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_NEAREST)
+    if name == "white_noise":
+        picture = np.random.default_rng(2).integers(0, 256, (size_wh[1], size_wh[0], 3), np.uint8)
+    assert judge(GateState(), picture, 1, ON)[1] in causes
+    coded = cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1], cv2.IMREAD_COLOR)
+    assert judge(GateState(), np.asarray(coded, np.uint8), 1, ON)[1] in causes
+
+
+@pytest.mark.parametrize("name", ["river", "river_in_fog", "river_at_dusk", "river_in_light_noise"])
+def test_what_cameras_see(name: str) -> None:
+    assert judge(GateState(), PICTURES[name], 1, ON)[1] is C.NONE
+
+
+def test_wrong_size() -> None:
+    assert judge(GateState(), river()[:100], 1, ON)[1] is C.WRONG_SIZE
+    assert judge(GateState(), river()[:, :150], 1, ON)[1] is C.WRONG_SIZE
+
+
+def test_a_camera_that_repeats_itself_is_frozen() -> None:
+    """Five distinct frames that show the same; one new picture ends it; a new epoch begins again."""
+    state = GateState()
+    still = river()
+    causes = []
+    for _ in range(7):
+        state, cause = judge(state, still, 1, ON)
+        causes.append(cause)
+    assert causes == [C.NONE] * 4 + [C.FROZEN] * 3
+    state, cause = judge(state, noisy(still, 3.0, seed=5), 1, ON)
+    assert cause is C.NONE
+    for epoch in range(2, 12):
+        state, cause = judge(state, still, epoch, ON)
+        assert cause is C.NONE
+
+
+def test_a_moored_camera_is_not_frozen() -> None:
+    """Sensor noise of one level is enough."""
+    state = GateState()
+    for seed in range(20):
+        state, cause = judge(state, noisy(river(), 1.0, seed), 1, ON)
+        assert cause is C.NONE
+
+
+def test_the_paper_has_no_gate() -> None:
+    """J19: black is accepted in the `paper` profile."""
+    paper = load_config(profile="paper").perception.gate
+    assert judge(GateState(), PICTURES["black"], 1, paper)[1] is C.NONE
+
+
+@pytest.mark.data
+def test_real_pictures_pass() -> None:
+    """At most 0.2 % of the annotated real pictures, night included, are refused (every third is looked at)."""
+    folder = Path(os.environ.get("PAANI_DATA", Path(__file__).parents[3] / "shared" / "data"))
+    sources = sorted(p for p in folder.glob("*/images") if p.parent.name != "unlabelled")
+    if not sources:
+        pytest.skip(f"no pictures in {folder}")
+    files = [file for source in sources for file in sorted(source.iterdir())][::3]
+    refused = []
+    for file in files:
+        picture = cv2.imread(str(file))
+        cause = judge(GateState(), np.asarray(picture, np.uint8), 1, ON)[1]
+        if cause not in {C.NONE, C.WRONG_SIZE}:
+            refused.append((file.name, cause))
+    assert len(files) > 1000
+    assert len(refused) <= 0.002 * len(files), refused
