@@ -160,9 +160,9 @@ def test_a_latched_stop_holds_while_everything_else_comes_back() -> None:
 
 @pytest.mark.parametrize("silent", CONFIG.require_pulses)
 def test_each_vital_process_must_beat(silent: str) -> None:
-    """A process that hangs for longer than 0.4 s stops the boat; its next beat frees it."""
+    """A process that hangs for longer than 0.35 s stops the boat; its next beat frees it."""
     adapter = ready()
-    now_us = NOW_US + 400_001
+    now_us = NOW_US + 350_001
     adapter.hear_arming(ARMED, now_us)
     for service in CONFIG.require_pulses:
         if service != silent:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, RiskConfig
 from paani_services.advisor.risk import either, overlap, severity, total
-from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, play, seeing
+from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, box, play, seeing
 
 UNIT = st.floats(0.0, 1.0)
 BOX = st.tuples(UNIT, UNIT, UNIT, UNIT).map(
@@ -77,6 +77,14 @@ def test_a_detection_reaches_only_the_lanes_it_overlaps() -> None:
     assert advice[1].center.risk == pytest.approx(0.05 + 0.65 * expected)
     assert (advice[1].left.obstacle, advice[1].right.obstacle) == (0.0, 0.0)
     assert advice[1].contributing_track_ids == (tracks[1].tracks[0].id,) == advice[1].center.track_ids
+
+
+def test_a_box_above_the_corridors_is_in_none() -> None:
+    """J2, E2: a bridge over the corridor's top is tracked and weighs nothing."""
+    _, advice, tracks = play([seeing(box(m.Label.VESSEL, (0.30, 0.02, 0.70, 0.30)))] * 4)
+    assert tracks[3].tracks[0].accepted
+    assert advice[3].contributing_track_ids == ()
+    assert advice[3].center.risk == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def test_mistakes_name_the_path(tmp_path: Path) -> None:
 
 
 def test_a_missing_webcam_is_named() -> None:
-    with pytest.raises(UserError, match="webcam:77.*/dev/video77"):
+    with pytest.raises(UserError, match=r"webcam:77.*/dev/video77"):
         Webcam(77, 320, 240)
 
 

@@ -34,7 +34,7 @@ from paani_services.navigator.navigate import Heard as NavigatorHeard
 from paani_services.navigator.navigate import NavState, navigate
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant
-from paani_sim.plant.service import gps_message, imu_message
+from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import World, load_world
 
 START_US = 1_000_000

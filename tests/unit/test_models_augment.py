@@ -151,3 +151,30 @@ def test_a_source_without_craft_and_an_own_hull_are_judged() -> None:
     judged = judged_by_mask(Source("river", "river", own_hull=True), mask, picture)
     assert judged[:, 230, 160].all()
     assert not judged[:, 90, 20].any()
+
+
+def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
+    picture, mask = np.full((256, 320, 3), 30, np.uint8), np.zeros((256, 320), np.uint8)
+    patch = np.full((60, 80, 3), 220, np.uint8)
+    shares = []
+    for seed in range(40):
+        shown, labels = augment.paste_obstacle(np.random.default_rng(seed), picture, mask, patch)
+        covered = labels == OBSTACLE_CLASS
+        assert (shown[~covered] == 30).all()
+        assert np.isin(labels, (0, OBSTACLE_CLASS)).all()
+        assert (shown[covered] > 100).mean() > 0.9
+        shares.append(covered.mean())
+    assert 0.02 < np.mean(shares) < 0.5
+    assert not mask.any()
+
+
+def test_patches_are_cut_from_obstacle_only() -> None:
+    picture = np.zeros((288, 384, 3), np.uint8)
+    mask = np.zeros((288, 384), np.uint8)
+    mask[:200] = OBSTACLE_CLASS
+    picture[:200] = 9
+    patches = [augment.obstacle_patch(np.random.default_rng(seed), picture, mask) for seed in range(20)]
+    found = [patch for patch in patches if patch is not None]
+    assert len(found) >= 10
+    assert all((patch == 9).mean() >= 0.95 for patch in found)
+    assert augment.obstacle_patch(np.random.default_rng(0), picture, np.zeros_like(mask)) is None

@@ -75,7 +75,8 @@ def test_c5_non_finite_candidates_are_dropped() -> None:
 @pytest.mark.parametrize(("score", "n"), [(0.40, 0), (0.4001, 1), (0.39, 0)])
 def test_c6_threshold_is_exclusive(score: float, n: int) -> None:
     """C6: more than 0.40."""
-    assert len(decode(output((160, 128, 40, 40, score, 0, 0, 0)), SAME, DetectorConfig(confidence=np.float32(0.4)))) == n
+    exact = DetectorConfig(confidence=float(np.float32(0.4)))
+    assert len(decode(output((160, 128, 40, 40, score, 0, 0, 0)), SAME, exact)) == n
 
 
 def test_c2_class_order() -> None:

@@ -34,8 +34,10 @@ def explain(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
 
 def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     left, center, right = advisory.left, advisory.center, advisory.right
-    ahead = _obstacles(center, tracks)
-    centre = f"centre risk {center.risk:.2f} (limit {advisory.center_block_risk:.2f}){ahead}"
+    names = _obstacles(center, tracks)
+    by = f" by {names}" if names else ""
+    centre = f"centre risk {center.risk:.2f} (limit {advisory.center_block_risk:.2f})"
+    centre += f" with {names} in it" if names else ""
     sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {advisory.side_block_risk:.2f})"
     match advisory.reason:
         case Reason.NO_EVIDENCE:
@@ -53,9 +55,9 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
         case Reason.TURN_RETAINED:
             return f"keeping the turn until the way ahead stays clear, {centre}"
         case Reason.CENTER_OCCUPIED:
-            return f"the way ahead is occupied{ahead}; {sides}"
+            return f"the way ahead is occupied{by}; {sides}"
         case Reason.CENTER_VESSEL:
-            return f"a vessel is close ahead{ahead}; {sides}"
+            return f"the way ahead is taken{by}; {sides}"
         case Reason.CENTER_EDGE_INCURSION:
             return f"an obstacle reaches into the way ahead from one side, {centre}"
         case Reason.TIE_KEPT_SIDE:
@@ -71,11 +73,11 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
 
 
 def _obstacles(lane: LaneRisk, tracks: tuple[Track, ...]) -> str:
-    """`: vessel #3 and pier #7`, or nothing."""
+    """`vessel #3 and pier #7`, or nothing."""
     names = [f"{track.label} #{track.id}" for track in tracks if track.id in lane.track_ids]
     if not names:
         return ""
     shown = names[:NAMED_TRACKS]
     if len(names) > NAMED_TRACKS:
         shown.append(f"{len(names) - NAMED_TRACKS} more")
-    return ", " + (" and ".join(shown) if len(shown) < NAMED_TRACKS else f"{', '.join(shown[:-1])} and {shown[-1]}")
+    return " and ".join(shown) if len(shown) < NAMED_TRACKS else f"{', '.join(shown[:-1])} and {shown[-1]}"

@@ -75,7 +75,7 @@ def total(non_water: float, obstacle: float, urgency: float, uncertainty: float,
 
 
 def obstacles_of(state: TrackerState, config: Config) -> tuple[Obstacle, ...]:
-    """Accepted tracks only: confirmed, or an immediate danger."""
+    """Accepted tracks, confirmed or an immediate danger, that reach below the corridors' top."""
     settings = config.advisor.tracker
     return tuple(
         Obstacle(
@@ -88,7 +88,8 @@ def obstacles_of(state: TrackerState, config: Config) -> tuple[Obstacle, ...]:
             danger=is_immediate_danger(track.box, settings),
         )
         for track in state.tracks
-        if track.hits >= settings.confirm_hits or is_immediate_danger(track.box, settings)
+        if track.box[3] > config.perception.corridors.top
+        and (track.hits >= settings.confirm_hits or is_immediate_danger(track.box, settings))
     )
 
 

@@ -43,7 +43,9 @@ def play(path: Path, config: CameraConfig) -> Iterator[Frame]:
     """Frames of a picture, a folder of pictures (by name) or a video; for ever if `loop`.
 
     `timing` "fixed" gives every frame at `rate_hz`; "original" keeps a video's own times, leaving out frames that come
-    faster than `rate_hz`. A single picture never begins again: it is a camera that shows the same. Raises UserError naming a path that is missing, empty or unreadable, before the first frame.
+    faster than `rate_hz`. A single picture never begins again: it is a camera that always shows the same.
+    Raises UserError naming a path that is missing, empty or unreadable, before the first frame; a spoilt picture
+    among others is a frame without a picture.
     """
     still = path.is_file() and path.suffix.lower() not in VIDEO_SUFFIXES
     for number in itertools.count() if config.loop else range(1):
@@ -140,7 +142,7 @@ def webcam_index(source: str) -> int | None:
 def _pictures(files: list[Path], config: CameraConfig) -> Iterator[Frame]:
     for index, file in enumerate(files):
         bgr = read_picture(file)
-        if bgr is None and index == 0:
+        if bgr is None and len(files) == 1:
             raise UserError(f"{file}: not a picture")
         yield Frame(
             None if bgr is None else fitted(bgr, config.width_px),

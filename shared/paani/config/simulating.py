@@ -56,7 +56,7 @@ class AdapterConfig(Section, frozen=True):
     timeout_s: Positive = 0.5  # O2
     max_echo_age_s: Positive = 0.5
     arming_timeout_s: Positive = 0.5
-    pulse_timeout_s: Positive = 0.4
+    pulse_timeout_s: Positive = 0.35  # leaves 0.15 s of the 0.5 s for the last beat's journey and one step
     require_pulses: tuple[str, ...] = (
         "eye",
         "camera",

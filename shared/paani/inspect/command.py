@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import itertools
 import math
 import sys
 
@@ -91,7 +92,7 @@ async def _hz(config: BusConfig, name: str, seconds: float) -> None:
 
 def rate_line(arrivals_ms: list[float], nominal_hz: float) -> str:
     """Mean rate and spread of the gaps between arrivals so far."""
-    gaps_ms = [after - before for before, after in zip(arrivals_ms, arrivals_ms[1:], strict=False)]
+    gaps_ms = [after - before for before, after in itertools.pairwise(arrivals_ms)]
     if not gaps_ms:
         return f"{len(arrivals_ms)} messages (nominal {nominal_hz:g} Hz)"
     mean_ms = sum(gaps_ms) / len(gaps_ms)

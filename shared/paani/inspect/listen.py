@@ -10,7 +10,7 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.authority import OBSERVER, password_of
-from paani.bus import Bus, open_bus
+from paani.bus import Bus, Latest, open_bus
 from paani.clock import WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
@@ -59,9 +59,10 @@ async def messages(bus: Bus, topic: keys.Topic[Any]) -> AsyncIterator[m.Message]
 
 async def rates(bus: Bus, seconds: float) -> dict[str, float]:
     """Messages a second of every topic of the table, counted over `seconds`; of pictures only what is pushed."""
-    inboxes = {
-        topic.name: bus.latest_picture(topic) if topic.stance is keys.Stance.PICTURE else bus.latest(topic)
-        for topic in keys.TOPICS
-    }
+    inboxes = {topic.name: _count(bus, topic) for topic in keys.TOPICS}
     await asyncio.sleep(seconds)
     return {name: inbox.received / seconds for name, inbox in inboxes.items()}
+
+
+def _count(bus: Bus, topic: keys.Topic[Any]) -> Latest[Any]:
+    return bus.latest_picture(topic) if topic.stance is keys.Stance.PICTURE else bus.latest(topic)

@@ -29,7 +29,8 @@ def markdown() -> str:
 
 def plain(live_hz: Mapping[str, float] | None) -> str:
     """The table in columns, with the rates measured now when there is a bus."""
-    head, body = HEAD, rows()
+    head: tuple[str, ...] = HEAD
+    body = rows()
     if live_hz is not None:
         head = (*HEAD[:4], "now [Hz]", *HEAD[4:])
         body = [(*row[:4], f"{live_hz[row[0]]:.1f}", *row[4:]) for row in body]

@@ -62,7 +62,10 @@ class ZeroCause(StrEnum):
 
 
 class ThrustApplied(Message, frozen=True, kw_only=True):
-    """What the last gate did: the force it applies now and why it is zero when it is."""
+    """What the last gate did: the force it applies now and why it is zero when it is.
+
+    `since_us` is when what is applied now came into force: this command, or zero.
+    """
 
     left: Unit
     right: Unit
@@ -74,6 +77,7 @@ class ThrustApplied(Message, frozen=True, kw_only=True):
     command_source_us: Stamp = 0
     rejected: Count = 0
     lost_pulse: Text = ""
+    since_us: Stamp = 0
 
 
 class TruePose(Message, frozen=True, kw_only=True):

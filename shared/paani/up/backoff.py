@@ -15,12 +15,15 @@ class Backoff:
 
     def __init__(self, rng: random.Random) -> None:
         self._rng = rng
+        self._delay_s = FIRST_S
         self.failures = 0
 
     def after(self, lived_s: float) -> float:
         """Delay [s] after a life of `lived_s`, jittered by 20 % so that processes do not start in step."""
         if lived_s >= STABLE_S:
             self.failures = 0
-        delay_s: float = min(FIRST_S * 2.0**self.failures, LONGEST_S)
+        if self.failures == 0:
+            self._delay_s = FIRST_S
+        delay_s, self._delay_s = self._delay_s, min(2.0 * self._delay_s, LONGEST_S)
         self.failures += 1
         return min(delay_s * self._rng.uniform(1.0 - JITTER_FRAC, 1.0 + JITTER_FRAC), LONGEST_S)

@@ -7,9 +7,8 @@ Latencies are differences of the stamps that messages carry, all on this machine
     advisor            evidence sent -> first advisory from it sent (republished advice does not count)
     navigator          that advisory sent -> first order from it sent
     controller         that order sent -> first thrust from it sent
-    adapter            that thrust sent -> first report of the last gate that has it in force; the gate reports
-                       every 50 ms, so up to 50 ms of this is waiting for the report
-    capture_to_thrust  picture captured -> first report of the last gate with a thrust decided from that picture
+    adapter            that thrust sent -> step at which the last gate put it in force (refused or zeroed: no sample)
+    capture_to_thrust  picture captured -> step at which the last gate put in force a thrust decided from it
     transport          capture_to_thrust less the inference on the same picture
 """
 
@@ -168,11 +167,13 @@ class Summary:
                 self._outputs["controller"] += 1
                 if self._step("controller", self._commands, message.command_sent_us, message.sent_us):
                     self._thrusts.remember(message.sent_us)
+            case m.ThrustApplied(zero_cause=cause) if cause is not m.ZeroCause.NONE:
+                self._outputs["plant"] += 1
             case m.ThrustApplied():
                 self._outputs["plant"] += 1
-                self._step("adapter", self._thrusts, message.command_sent_us, message.source_us)
+                self._step("adapter", self._thrusts, message.command_sent_us, message.since_us)
                 inference_ms = self._pictures.get(message.command_source_us, 0.0)
-                if self._step("capture_to_thrust", self._pictures, message.command_source_us, message.source_us):
+                if self._step("capture_to_thrust", self._pictures, message.command_source_us, message.since_us):
                     self._latency["transport"].append(self._latency["capture_to_thrust"][-1] - inference_ms)
             case m.TruePose():
                 self._distance_m[message.epoch] = message.distance_m
@@ -238,7 +239,7 @@ class Summary:
         source = (type(message).__name__, message.producer)
         epoch, seq = self._place.get(source, (message.epoch, message.seq - 1))
         if message.epoch == epoch and message.seq > seq + 1:
-            self._lost["lost_on_bus"] += message.seq - seq - 1
+            self._lost[f"lost_{type(message).__name__}"] += message.seq - seq - 1
         self._place[source] = (message.epoch, message.seq)
 
 

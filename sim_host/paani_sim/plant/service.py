@@ -10,6 +10,7 @@ from paani.clock import Clock, MonotonicClock
 from paani.config import Config
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant
+from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
 from paani_sim.worlds import load_world
 
 MAX_BEHIND_S = 0.25  # further behind than this, simulated time slips instead of being caught up
@@ -76,6 +77,9 @@ class _Instruments:
         self._gps_every = max(1, round(rate_hz / config.plant.sensors.gps_rate_hz))
         self._imu_every = max(1, round(rate_hz / config.plant.sensors.imu_rate_hz))
         self._every = max(1, round(rate_hz / config.plant.publish_rate_hz))
+        self._last_cause = m.ZeroCause.NO_COMMAND
+        self._in_force: m.Thrust | None = None
+        self._since_us = 0
 
     def publish(self, plant: Plant, adapter: ThrustAdapter, applied: Applied, source_us: int) -> None:
         """`source_us` dates the step that was just made."""
@@ -87,62 +91,9 @@ class _Instruments:
             stamp_us = self._monotonic.now_us()
             self._time.put(m.SimTime(source_us=source_us, sim_us=plant.sim_us, stamp_us=stamp_us))
             self._pose.put(pose_message(plant, source_us))
-            self._applied.put(applied_message(adapter, applied, source_us))
-
-
-def gps_message(plant: Plant, source_us: int) -> m.GpsFix:
-    """Read the GPS."""
-    return m.GpsFix(source_us=source_us, **plant.read_gps()._asdict())
-
-
-def imu_message(plant: Plant, source_us: int) -> m.ImuSample:
-    """Read the IMU."""
-    reading = plant.read_imu()
-    gyro, accel = reading.rates_radps, reading.specific_force_mps2
-    return m.ImuSample(
-        source_us=source_us,
-        gyro_x_radps=gyro[0],
-        gyro_y_radps=gyro[1],
-        gyro_z_radps=gyro[2],
-        accel_x_mps2=accel[0],
-        accel_y_mps2=accel[1],
-        accel_z_mps2=accel[2],
-        orientation_available=True,
-        roll_rad=reading.roll_rad,
-        pitch_rad=reading.pitch_rad,
-        yaw_rad=reading.yaw_rad,
-    )
-
-
-def pose_message(plant: Plant, source_us: int) -> m.TruePose:
-    """Simulator truth."""
-    (x_m, y_m), angles, (surge_mps, sway_mps, yaw_rate) = plant.position_m, plant.attitude, plant.velocity
-    return m.TruePose(
-        source_us=source_us,
-        sim_us=plant.sim_us,
-        x_m=x_m,
-        y_m=y_m,
-        z_m=plant.z_m,
-        roll_rad=angles.roll_rad,
-        pitch_rad=angles.pitch_rad,
-        yaw_rad=angles.yaw_rad,
-        surge_mps=surge_mps,
-        sway_mps=sway_mps,
-        yaw_rate_radps=yaw_rate,
-        distance_m=plant.distance_m,
-        collisions=plant.collisions,
-        in_contact=plant.in_contact,
-    )
-
-
-def applied_message(adapter: ThrustAdapter, applied: Applied, source_us: int) -> m.ThrustApplied:
-    """What the last gate does now, and the command behind it."""
-    command = adapter.command
-    return m.ThrustApplied(
-        source_us=source_us,
-        **applied._asdict(),
-        rejected=adapter.rejected,
-        command_seq=command.seq if command else 0,
-        command_sent_us=command.sent_us if command else 0,
-        command_source_us=command.source_us if command else 0,
-    )
+        in_force = adapter.command if applied.zero_cause is m.ZeroCause.NONE else None
+        if in_force is not self._in_force or self._since_us == 0:
+            self._in_force, self._since_us = in_force, source_us
+        if plant.steps % self._every == 0 or applied.zero_cause is not self._last_cause:
+            self._applied.put(applied_message(adapter, applied, source_us, self._since_us))
+            self._last_cause = applied.zero_cause

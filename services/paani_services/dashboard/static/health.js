@@ -1,0 +1,64 @@
+// @ts-check
+// One row per process: is it there, how fast, how old its report, what it costs, what it dropped.
+
+import { ageText, byId, fixed, make, setText } from "./text.js";
+
+/** The topic whose rate speaks for a process. @type {Record<string, string>} */
+const SPEAKS = {
+  plant: "plant/thrust_applied", eye: "eye/picture", camera: "camera/picture", perception: "perception/evidence",
+  advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
+  localization: "localization/odometry", dashboard: "operator/arming",
+};
+const COLUMNS = 8;
+/** @type {Map<string, HTMLElement[]>} */
+const cells = new Map();
+
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
+export function renderHealth(store, open, now) {
+  const settings = store.get("dashboard/settings");
+  if (!settings) return;
+  const lives = new Map((store.get("dashboard/services")?.services ?? []).map((/** @type {any} */ life) => [life.service, life]));
+  const rates = new Map();
+  for (const name of settings.services) {
+    for (const input of store.get(`health/${name}`)?.inputs ?? []) rates.set(input.topic, input);
+  }
+  let ready = 0, cpu = 0;
+  for (const name of settings.services) {
+    const report = store.get(`health/${name}`), life = lives.get(name), fresh = open && store.isFresh(`health/${name}`, now);
+    const alive = Boolean(open && life?.alive && fresh), input = rates.get(SPEAKS[name]);
+    const drops = (report?.drops ?? []).reduce((/** @type {number} */ sum, /** @type {any} */ drop) => sum + drop.count, 0);
+    ready += alive ? 1 : 0;
+    cpu += alive ? report.cpu_cores : 0;
+    const [service, state, rate, age, cores, memory, dropped, starts] = row(name);
+    const [word, kind] = alive ? ["ready", "good"] : life?.alive && open ? ["silent", "bad"] : life?.starts ? ["gone", "bad"] : ["absent", "warn"];
+    setText(service, name);
+    setText(state, word);
+    state.className = kind;
+    setText(rate, input && alive ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–");
+    rate.className = alive && input && !input.rate_ok ? "warn" : "";
+    setText(age, report ? ageText(store.ageS(`health/${name}`, now)) : "–");
+    setText(cores, report ? `${fixed(report.cpu_cores * 100, 0)} %` : "–");
+    setText(memory, report ? fixed(report.rss_mib, 0) : "–");
+    setText(dropped, report ? String(drops) : "–");
+    dropped.className = drops ? "warn" : "";
+    setText(starts, life ? String(life.starts) : "–");
+    starts.className = life?.starts > 1 ? "warn" : "";
+    service.title = report?.note ?? "";
+    dropped.title = (report?.drops ?? []).map((/** @type {any} */ drop) => `${drop.cause}: ${drop.count}`).join(", ");
+    for (const cell of [rate, age, cores, memory, dropped]) cell.classList.toggle("stale", !fresh);
+  }
+  setText(byId("health-sum"), `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`);
+}
+
+/** @param {string} name */
+function row(name) {
+  let found = cells.get(name);
+  if (!found) {
+    found = Array.from({ length: COLUMNS }, () => make("td"));
+    const line = make("tr");
+    line.append(...found);
+    byId("health").append(line);
+    cells.set(name, found);
+  }
+  return found;
+}

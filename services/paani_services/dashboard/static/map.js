@@ -1,0 +1,196 @@
+// @ts-check
+// The map panel: local metres, north up, on a canvas.
+
+import { byId, fixed, headingDeg, setText } from "./text.js";
+
+const TRAIL = 4000, STEP_M = 0.15;
+const NICE_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
+
+export class ChartMap {
+  constructor() {
+    this.canvas = /** @type {HTMLCanvasElement} */ (byId("map"));
+    this.ctx = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
+    this.centre = { x: 0, y: 0 };
+    this.pxPerM = 6;
+    this.follow = true;
+    /** @type {Record<string, {x: number, y: number}[]>} */
+    this.trails = { "localization/odometry": [], "@truth/pose": [] };
+    this.bind();
+  }
+
+  bind() {
+    byId("map-follow").addEventListener("click", () => this.setFollow(!this.follow));
+    byId("map-in").addEventListener("click", () => this.zoom(1.4));
+    byId("map-out").addEventListener("click", () => this.zoom(1 / 1.4));
+    byId("map-fit").addEventListener("click", () => { this.fitRoute = true; this.setFollow(false); });
+    this.canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15); }, { passive: false });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!event.buttons) return;
+      this.setFollow(false);
+      this.centre = { x: this.centre.x - event.movementX / this.pxPerM, y: this.centre.y + event.movementY / this.pxPerM };
+    });
+    this.fitRoute = false;
+  }
+
+  /** @param {boolean} follow */
+  setFollow(follow) {
+    this.follow = follow;
+    byId("map-follow").setAttribute("aria-pressed", String(follow));
+  }
+
+  /** @param {number} factor */
+  zoom(factor) {
+    this.pxPerM = Math.min(80, Math.max(0.5, this.pxPerM * factor));
+  }
+
+  /** @param {string} key @param {any} pose */
+  take(key, pose) {
+    const trail = this.trails[key], last = trail.at(-1);
+    if (last && Math.hypot(last.x - pose.x_m, last.y - pose.y_m) < STEP_M) return;
+    trail.push({ x: pose.x_m, y: pose.y_m });
+    if (trail.length > TRAIL) trail.splice(0, TRAIL / 4);
+  }
+
+  /** @param {import("./store.js").Store} store @param {number} now */
+  render(store, now) {
+    const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
+    const odometry = store.get("localization/odometry"), truth = store.get("@truth/pose"), route = store.get("navigator/route");
+    const ratio = Math.min(devicePixelRatio || 1, 2), wide = this.canvas.clientWidth, high = this.canvas.clientHeight;
+    if (!wide || !high) return;
+    if (this.canvas.width !== Math.round(wide * ratio) || this.canvas.height !== Math.round(high * ratio)) {
+      this.canvas.width = Math.round(wide * ratio);
+      this.canvas.height = Math.round(high * ratio);
+    }
+    if (this.fitRoute && route) this.fit(route.waypoints, wide, high);
+    const pose = odometry ?? truth;
+    if (this.follow && pose) this.centre = { x: pose.x_m, y: pose.y_m };
+    const { ctx } = this;
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    ctx.clearRect(0, 0, wide, high);
+    const at = (/** @type {number} */ x, /** @type {number} */ y) =>
+      /** @type {[number, number]} */ ([wide / 2 + (x - this.centre.x) * this.pxPerM, high / 2 - (y - this.centre.y) * this.pxPerM]);
+    this.grid(wide, high, at, colour("--line"));
+    if (route) this.route(route, store, at, colour("--route"), colour("--quiet"));
+    this.trail(this.trails["@truth/pose"], at, colour("--text"), 1.5, [2, 4]);
+    this.trail(this.trails["localization/odometry"], at, colour("--cyan"), 2, []);
+    if (truth) this.boat(truth, at, colour("--text"), false, store.isFresh("@truth/pose", now));
+    if (odometry) this.boat(odometry, at, colour("--cyan"), true, store.isFresh("localization/odometry", now));
+    this.furniture(wide, high, colour("--text"), colour("--quiet"));
+    setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");
+    const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;
+    setText(byId("map-error"), Number.isFinite(error) ? `estimate off by ${fixed(error, 1)} m` : "");
+  }
+
+  /** @param {{x_m: number, y_m: number}[]} points @param {number} wide @param {number} high */
+  fit(points, wide, high) {
+    const xs = points.map((p) => p.x_m), ys = points.map((p) => p.y_m);
+    const [x1, x2, y1, y2] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    this.centre = { x: (x1 + x2) / 2, y: (y1 + y2) / 2 };
+    this.pxPerM = Math.min(wide / (x2 - x1 + 12), high / (y2 - y1 + 12));
+    this.fitRoute = false;
+  }
+
+  /** @typedef {(x: number, y: number) => [number, number]} At */
+
+  /** @param {number} wide @param {number} high @param {At} at @param {string} colour */
+  grid(wide, high, at, colour) {
+    const step = NICE_M.find((m) => m * this.pxPerM >= 56) ?? 500;
+    const { ctx } = this, [x0, y0] = at(0, 0), px = step * this.pxPerM;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = 1;
+    ctx.globalAlpha = 0.55;
+    ctx.beginPath();
+    for (let x = ((x0 % px) + px) % px; x < wide; x += px) { ctx.moveTo(Math.round(x) + 0.5, 0); ctx.lineTo(Math.round(x) + 0.5, high); }
+    for (let y = ((y0 % px) + px) % px; y < high; y += px) { ctx.moveTo(0, Math.round(y) + 0.5); ctx.lineTo(wide, Math.round(y) + 0.5); }
+    ctx.stroke();
+    ctx.globalAlpha = 1;
+  }
+
+  /** @param {any} route @param {import("./store.js").Store} store @param {At} at @param {string} colour @param {string} quiet */
+  route(route, store, at, colour, quiet) {
+    const { ctx } = this, next = store.get("navigator/command")?.waypoint_index ?? -1;
+    const acceptancePx = (store.get("dashboard/settings")?.acceptance_m ?? 1) * this.pxPerM;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = 1.5;
+    ctx.beginPath();
+    for (const point of route.waypoints) ctx.lineTo(...at(point.x_m, point.y_m));
+    if (route.repeat) ctx.closePath();
+    ctx.stroke();
+    route.waypoints.forEach((/** @type {any} */ point, /** @type {number} */ index) => {
+      const [x, y] = at(point.x_m, point.y_m), isNext = index === next;
+      ctx.fillStyle = ctx.strokeStyle = colour;
+      ctx.beginPath();
+      ctx.arc(x, y, isNext ? 4 : 2.5, 0, 7);
+      ctx.fill();
+      ctx.globalAlpha = isNext ? 1 : 0.35;
+      ctx.beginPath();
+      ctx.arc(x, y, Math.max(acceptancePx, 4), 0, 7);
+      ctx.stroke();
+      ctx.globalAlpha = 1;
+      if (isNext) {
+        ctx.fillStyle = quiet;
+        ctx.font = "12px system-ui, sans-serif";
+        ctx.fillText(`next ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
+      }
+    });
+  }
+
+  /** @param {{x: number, y: number}[]} points @param {At} at @param {string} colour @param {number} thick @param {number[]} dash */
+  trail(points, at, colour, thick, dash) {
+    const { ctx } = this;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = thick;
+    ctx.setLineDash(dash);
+    ctx.globalAlpha = 0.85;
+    ctx.beginPath();
+    for (const point of points) ctx.lineTo(...at(point.x, point.y));
+    ctx.stroke();
+    ctx.setLineDash([]);
+    ctx.globalAlpha = 1;
+  }
+
+  /** @param {any} pose @param {At} at @param {string} colour @param {boolean} filled @param {boolean} fresh */
+  boat(pose, at, colour, filled, fresh) {
+    const { ctx } = this, [x, y] = at(pose.x_m, pose.y_m), size = Math.max(9, 0.9 * this.pxPerM);
+    ctx.save();
+    ctx.globalAlpha = fresh ? 1 : 0.35;
+    ctx.translate(x, y);
+    if (filled && pose.position_std_m) {
+      ctx.strokeStyle = colour;
+      ctx.globalAlpha *= 0.5;
+      ctx.beginPath();
+      ctx.arc(0, 0, pose.position_std_m * this.pxPerM, 0, 7);
+      ctx.stroke();
+      ctx.globalAlpha = fresh ? 1 : 0.35;
+    }
+    ctx.rotate(-pose.yaw_rad);
+    ctx.beginPath();
+    ctx.moveTo(size, 0);
+    ctx.lineTo(-size * 0.7, size * 0.55);
+    ctx.lineTo(-size * 0.4, 0);
+    ctx.lineTo(-size * 0.7, -size * 0.55);
+    ctx.closePath();
+    ctx.fillStyle = ctx.strokeStyle = colour;
+    ctx.lineWidth = 1.5;
+    if (filled) ctx.fill();
+    else ctx.stroke();
+    ctx.restore();
+  }
+
+  /** Scale bar and north. @param {number} wide @param {number} high @param {string} colour @param {string} quiet */
+  furniture(wide, high, colour, quiet) {
+    const { ctx } = this, metres = NICE_M.find((m) => m * this.pxPerM >= 60) ?? 500, px = metres * this.pxPerM;
+    ctx.strokeStyle = ctx.fillStyle = quiet;
+    ctx.lineWidth = 2;
+    ctx.beginPath();
+    ctx.moveTo(12, high - 18); ctx.lineTo(12, high - 12); ctx.lineTo(12 + px, high - 12); ctx.lineTo(12 + px, high - 18);
+    ctx.stroke();
+    ctx.font = "12px system-ui, sans-serif";
+    ctx.fillText(`${metres} m`, 12, high - 24);
+    ctx.fillStyle = colour;
+    ctx.beginPath();
+    ctx.moveTo(wide - 20, 12); ctx.lineTo(wide - 14, 30); ctx.lineTo(wide - 20, 26); ctx.lineTo(wide - 26, 30);
+    ctx.fill();
+    ctx.fillText("N", wide - 24, 44);
+  }
+}

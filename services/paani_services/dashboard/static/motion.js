@@ -1,0 +1,49 @@
+// @ts-check
+// What the fans do, and every reason why the boat does not move.
+
+import { WHY_STILL, byId, fixed, make, setText, words } from "./text.js";
+
+const FULL_SCALE = 0.25; // the controller orders no more than this of the fans
+
+/** @param {import("./store.js").Store} store @param {number} now */
+export function renderMotion(store, now) {
+  const applied = store.get("plant/thrust_applied"), fresh = store.isFresh("plant/thrust_applied", now);
+  for (const side of ["left", "right"]) {
+    const value = applied ? applied[side] : 0;
+    byId(`fan-${side}`).style.width = `${Math.min(1, value / FULL_SCALE) * 100}%`;
+    setText(byId(`fan-${side}-n`), applied ? `${fixed(applied[`${side}_n`], 1)} N` : "–");
+  }
+  document.querySelector(".fans")?.classList.toggle("stale", !fresh);
+  const reasons = whyStill(store, now);
+  const moving = fresh && applied?.zero_cause === "none";
+  setText(byId("motion-word"), moving ? "under way" : fresh ? "held at zero thrust" : "plant not heard");
+  const items = reasons.map(([who, text]) => {
+    const item = make("li");
+    item.append(make("span", "", who), make("span", "", text));
+    return item;
+  });
+  if (!items.length) items.push(make("li", "clear", ""));
+  if (!reasons.length) items[0].append(make("span", "", "plant"), make("span", "", "nothing holds it back"));
+  const list = byId("inhibits"), key = JSON.stringify(reasons);
+  if (list.dataset.key !== key) {
+    list.dataset.key = key;
+    list.replaceChildren(...items);
+  }
+}
+
+/** Who holds the boat, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */
+function whyStill(store, now) {
+  /** @type {[string, string][]} */
+  const found = [];
+  const applied = store.get("plant/thrust_applied");
+  if (!store.isFresh("plant/thrust_applied", now)) found.push(["plant", "not heard"]);
+  else if (applied.zero_cause !== "none") {
+    const detail = applied.lost_pulse ? `: ${applied.lost_pulse}` : "";
+    found.push(["plant", (WHY_STILL[applied.zero_cause] ?? words(applied.zero_cause)) + detail]);
+  }
+  for (const [who, key] of [["navigator", "navigator/command"], ["controller", "controller/thrust"]]) {
+    if (!store.isFresh(key, now)) found.push([who, "not heard"]);
+    else for (const inhibit of store.get(key).inhibits) found.push([who, WHY_STILL[inhibit] ?? words(inhibit)]);
+  }
+  return found;
+}

@@ -1,0 +1,118 @@
+// @ts-check
+// Draws what perception and the advisor say about one picture, in the picture's own normalised coordinates.
+
+import { fixed, words } from "./text.js";
+
+export const MASK_RGBA = [[23, 184, 214, 82], [242, 140, 30, 128], [36, 56, 143, 92]];
+const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
+const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb";
+
+/**
+ * A class mask as a tinted, transparent canvas.
+ * @param {ImageBitmap} bitmap grey levels are classes: 0 water, 1 obstacle, 2 sky
+ */
+export function tintMask(bitmap) {
+  const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
+  context.drawImage(bitmap, 0, 0);
+  const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  for (let i = 0; i < pixels.data.length; i += 4) {
+    pixels.data.set(MASK_RGBA[pixels.data[i]] ?? [0, 0, 0, 0], i);
+  }
+  context.putImageData(pixels, 0, 0);
+  return canvas;
+}
+
+/** @typedef {{ctx: CanvasRenderingContext2D, width: number, height: number, unit: number}} Pane */
+
+/** @param {Pane} pane @param {OffscreenCanvas} mask */
+export function drawMask({ ctx, width, height }, mask) {
+  ctx.imageSmoothingEnabled = true;
+  ctx.drawImage(mask, 0, 0, width, height);
+}
+
+/** @param {Pane} pane @param {string} text @param {number} x @param {number} y @param {string} colour @param {CanvasTextAlign} align */
+function label({ ctx, unit, width }, text, x, y, colour, align = "left") {
+  ctx.font = `600 ${12 * unit}px system-ui, sans-serif`;
+  ctx.textBaseline = "middle";
+  const wide = ctx.measureText(text).width + 8 * unit, high = 18 * unit;
+  let left = align === "center" ? x - wide / 2 : x;
+  left = Math.min(Math.max(0, left), width - wide);
+  const top = Math.max(0, y);
+  ctx.fillStyle = "rgb(8 11 14 / .78)";
+  ctx.fillRect(left, top, wide, high);
+  ctx.fillStyle = colour;
+  ctx.textAlign = "left";
+  ctx.fillText(text, left + 4 * unit, top + high / 2 + unit);
+}
+
+/** @param {Pane} pane @param {number[]} box @param {string} colour @param {number} thick @param {number[]} dash */
+function outline({ ctx, width, height, unit }, box, colour, thick, dash) {
+  const [x1, y1, x2, y2] = box;
+  ctx.setLineDash(dash.map((part) => part * unit));
+  ctx.lineWidth = thick * unit;
+  ctx.strokeStyle = colour;
+  ctx.strokeRect(x1 * width, y1 * height, (x2 - x1) * width, (y2 - y1) * height);
+  ctx.setLineDash([]);
+}
+
+/** @param {Pane} pane @param {any} evidence @param {any} tracks of the same frame, or undefined */
+export function drawBoxes(pane, evidence, tracks) {
+  const named = [];
+  if (tracks) {
+    for (const track of tracks.tracks) {
+      const colour = track.immediate_danger ? IMMEDIATE : track.accepted ? ACCEPTED : TENTATIVE;
+      outline(pane, track.box_xyxy, colour, track.immediate_danger ? 3 : 2, track.held ? [6, 4] : []);
+      const state = track.held ? " held" : track.immediate_danger ? " immediate" : track.accepted ? "" : " tentative";
+      named.push([`#${track.id} ${track.label} ${fixed(track.confidence)}${state}`, track.box_xyxy, colour]);
+    }
+  } else {
+    for (const found of evidence.detections) {
+      outline(pane, found.box_xyxy, TENTATIVE, 1.5, []);
+      named.push([`${found.label} ${fixed(found.confidence)}`, found.box_xyxy, TENTATIVE]);
+    }
+  }
+  for (const [text, box, colour] of named) {
+    const y = box[1] * pane.height - 19 * pane.unit;
+    label(pane, text, box[0] * pane.width - pane.unit, y < 0 ? box[1] * pane.height + 2 * pane.unit : y, colour);
+  }
+}
+
+/** Corridor brackets along the bottom. @param {Pane} pane @param {any} corridors @param {any} advisory of the same frame, or undefined */
+export function drawLanes(pane, corridors, advisory) {
+  const { ctx, width, height, unit } = pane;
+  for (const [index, name] of ["left", "center", "right"].entries()) {
+    const [from, to] = corridors[name];
+    const lane = advisory?.[name];
+    const colour = lane ? (lane.blocked ? BLOCKED : CLEAR) : UNKNOWN;
+    const x1 = from * width, x2 = to * width, top = corridors.top * height;
+    const foot = height - (index === 1 ? 4 : 9) * unit;
+    const fade = ctx.createLinearGradient(0, top, 0, height);
+    fade.addColorStop(0, `${colour}00`);
+    fade.addColorStop(1, `${colour}38`);
+    ctx.fillStyle = fade;
+    ctx.fillRect(x1, top, x2 - x1, height - top);
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = 3 * unit;
+    ctx.beginPath();
+    ctx.moveTo(x1, foot - 12 * unit);
+    ctx.lineTo(x1, foot);
+    ctx.lineTo(x2, foot);
+    ctx.lineTo(x2, foot - 12 * unit);
+    ctx.stroke();
+    const says = lane ? `${fixed(lane.risk)} ${lane.blocked ? "blocked" : "clear"}` : words(name);
+    label(pane, says, ((x1 + x2) / 2), height - 33 * unit, colour, "center");
+  }
+}
+
+/** The height below which a corridor is judged. @param {Pane} pane @param {number} top */
+export function drawLimit({ ctx, width, height, unit }, top) {
+  ctx.strokeStyle = "rgb(235 243 248 / .75)";
+  ctx.lineWidth = unit;
+  ctx.setLineDash([3 * unit, 5 * unit]);
+  ctx.beginPath();
+  ctx.moveTo(0, top * height);
+  ctx.lineTo(width, top * height);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}

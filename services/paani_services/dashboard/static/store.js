@@ -1,0 +1,46 @@
+// @ts-check
+// The newest value of each key and how old it is: the server's age of it plus the time since it came here.
+
+/** @typedef {{value: any, at: number, ageMs: number}} Entry */
+
+export class Store {
+  constructor() {
+    /** @type {Map<string, Entry>} */
+    this.entries = new Map();
+    /** @type {Map<string, number>} */
+    this.freshS = new Map();
+    this.heardAt = 0;
+  }
+
+  /** @param {string} key @param {any} value @param {number} ageMs @param {number} now */
+  put(key, value, ageMs, now) {
+    this.entries.set(key, { value, at: now, ageMs });
+    if (key === "dashboard/settings") {
+      for (const topic of value.topics) this.freshS.set(topic.name, topic.fresh_s);
+    }
+    const ours = key.startsWith("dashboard/") || key === "operator/arming" || key === "health/dashboard";
+    if (!ours) this.heardAt = Math.max(this.heardAt, now - ageMs);
+  }
+
+  /** @param {string} key */
+  get(key) {
+    return this.entries.get(key)?.value;
+  }
+
+  /** Seconds; infinite before the first. @param {string} key @param {number} now */
+  ageS(key, now) {
+    const entry = this.entries.get(key);
+    return entry ? (now - entry.at + entry.ageMs) / 1000 : Infinity;
+  }
+
+  /** @param {string} key @param {number} now */
+  isFresh(key, now) {
+    const limit = this.freshS.get(key) ?? (key.startsWith("health/") ? 3 : 1);
+    return this.ageS(key, now) <= limit;
+  }
+
+  /** Seconds since anything came from the boat. @param {number} now */
+  silenceS(now) {
+    return this.heardAt ? (now - this.heardAt) / 1000 : Infinity;
+  }
+}

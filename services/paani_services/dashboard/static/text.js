@@ -1,0 +1,67 @@
+// @ts-check
+// Words and numbers for people. Pure.
+
+/** @param {string} name */
+export const words = (name) => name.toLowerCase().replaceAll("_", " ");
+
+/** @param {number} value @param {number} [digits] */
+export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
+
+/** @param {number} seconds */
+export function ageText(seconds) {
+  if (!Number.isFinite(seconds)) return "never";
+  return seconds < 10 ? `${seconds.toFixed(1)} s` : seconds < 120 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
+}
+
+/** True heading in degrees from a counter-clockwise angle from east. @param {number} yawRad */
+export const headingDeg = (yawRad) => (((90 - (yawRad * 180) / Math.PI) % 360) + 360) % 360;
+
+/** @type {Record<string, string>} */
+export const WHY_STILL = {
+  NOT_ARMED: "not armed",
+  NO_CLOCK: "the boat's clock has not been heard",
+  CLOCK_STOPPED: "the boat's clock stands still",
+  NO_ODOMETRY: "position unknown",
+  STALE_ODOMETRY: "position too old",
+  UNHEALTHY_ODOMETRY: "position not trusted",
+  NO_ADVISORY: "no advice yet",
+  STALE_ADVISORY: "advice too old",
+  ADVISED_STOP: "the advisor says stop",
+  ADVISED_NO_DATA: "the advisor has nothing to judge",
+  TURN_CAPPED: "turned as far as allowed without a clear way",
+  NO_ROUTE: "no route",
+  ROUTE_FINISHED: "route finished",
+  WRONG_DOMAIN: "message from another domain",
+  NO_COMMAND: "no order yet",
+  STALE_COMMAND: "order too old",
+  COMMAND_INVALID: "order not valid",
+  no_command: "no thrust command yet",
+  timeout: "thrust commands stopped coming",
+  not_enabled: "the command does not enable thrust",
+  not_armed: "not armed",
+  arming_lost: "the operator is not heard",
+  pulse_lost: "a vital process is silent",
+  stale_echo: "thrust command too old",
+  wrong_producer: "thrust command from somebody else",
+  wrong_domain: "thrust command from another domain",
+  old_epoch: "thrust command from an earlier run",
+  replayed: "thrust command repeated",
+  future: "thrust command from the future",
+  invalid: "thrust command out of range",
+};
+
+/** Set text only when it changes. @param {Element | null} element @param {string} text */
+export function setText(element, text) {
+  if (element && element.textContent !== text) element.textContent = text;
+}
+
+/** @param {string} id @returns {any} */
+export const byId = (id) => document.getElementById(id);
+
+/** @param {string} tag @param {string} [className] @param {string} [text] */
+export function make(tag, className = "", text = "") {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  if (text) element.textContent = text;
+  return element;
+}

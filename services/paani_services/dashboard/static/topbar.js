@@ -1,0 +1,67 @@
+// @ts-check
+// Link, advice, speed and heading.
+
+import { ageText, byId, fixed, headingDeg, setText, words } from "./text.js";
+
+const LOST_S = 1.5;
+/** @type {Record<string, [string, string, string]>} word, kind, path of the arrow */
+const ADVICE = {
+  STRAIGHT: ["STRAIGHT", "go", "M24 42V7M11 20L24 7l13 13"],
+  SLIGHT_LEFT: ["SLIGHT LEFT", "turn", "M29 42V26L14 10M13 25V9h16"],
+  SLIGHT_RIGHT: ["SLIGHT RIGHT", "turn", "M19 42V26L34 10M35 25V9H19"],
+  LEFT: ["LEFT", "turn", "M36 42V20H9M21 8L9 20l12 12"],
+  RIGHT: ["RIGHT", "turn", "M12 42V20h27M27 8l12 12-12 12"],
+  STOP: ["STOP", "stop", "M16 6h16l10 10v16L32 42H16L6 32V16zM15 24h18"],
+  NO_DATA: ["NO DATA", "none", "M10 24h6M22 24h4M32 24h6"],
+};
+
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
+export function renderTopbar(store, open, now) {
+  const settings = store.get("dashboard/settings");
+  if (settings) {
+    setText(byId("vessel"), `${settings.vessel} · ${settings.domain}`);
+    setText(byId("mode"), settings.mode);
+    byId("mode").dataset.mode = settings.mode;
+  }
+  renderLink(store, open, now);
+  renderAdvice(store, now);
+  renderPose(store, now);
+}
+
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
+function renderLink(store, open, now) {
+  const silenceS = store.silenceS(now), never = silenceS === Infinity;
+  const lost = !never && (!open || silenceS > LOST_S);
+  document.body.dataset.link = lost ? "lost" : never ? "waiting" : "live";
+  setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : `live ${fixed(silenceS, 1)} s`);
+  setText(byId("link-age"), !open ? "no dashboard" : lost ? "boat silent" : never ? "for the boat" : "link");
+  document.title = lost ? "LOST · PAANI" : "PAANI";
+}
+
+/** @param {import("./store.js").Store} store @param {number} now */
+function renderAdvice(store, now) {
+  const advisory = store.get("advisor/advisory");
+  const fresh = store.isFresh("advisor/advisory", now);
+  const [word, kind, arrow] = ADVICE[fresh ? advisory.direction : "NO_DATA"];
+  const box = byId("advice");
+  if (box.dataset.arrow !== arrow) {
+    box.dataset.arrow = arrow;
+    box.dataset.kind = kind;
+    byId("advice-arrow").innerHTML = `<path d="${arrow}"/>`;
+  }
+  setText(byId("advice-word"), word);
+  const old = advisory ? `last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "nothing heard yet";
+  const cause = fresh && advisory.cause !== "none" ? `: ${advisory.cause}` : "";
+  setText(byId("advice-reason"), fresh ? words(advisory.reason).replace(/^center/, "centre") + cause : old);
+}
+
+/** @param {import("./store.js").Store} store @param {number} now */
+function renderPose(store, now) {
+  const odometry = store.get("localization/odometry"), command = store.get("navigator/command");
+  const fresh = store.isFresh("localization/odometry", now);
+  setText(byId("speed"), odometry ? fixed(odometry.surge_mps) : "–");
+  setText(byId("heading"), odometry ? String(Math.round(headingDeg(odometry.yaw_rad)) % 360).padStart(3, "0") : "–");
+  setText(byId("waypoints"), command ? String(command.waypoints_reached) : "–");
+  for (const id of ["speed", "heading"]) byId(id).parentElement.classList.toggle("stale", !fresh);
+  byId("waypoints").parentElement.classList.toggle("stale", !store.isFresh("navigator/command", now));
+}

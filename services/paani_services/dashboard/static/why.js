@@ -1,0 +1,114 @@
+// @ts-check
+// Why this advice: the decision's steps, the three lanes' components, the input, the tracks.
+
+import { ageText, byId, fixed, make, setText, words } from "./text.js";
+
+const LANES = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
+const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
+const STEPS = ["Picture", "Age", "Centre", "Sides", "Advice"];
+/** Which step decided. @type {Record<string, number>} */
+const DECIDED_AT = {
+  UNUSABLE_IMAGE: 0, MALFORMED_EVIDENCE: 0, NO_EVIDENCE: 0, STALE_EVIDENCE: 1, FUTURE_EVIDENCE: 1,
+  CENTER_CLEAR: 2, CENTER_EDGE_INCURSION: 3, CENTER_RISK: 3, CENTER_OCCUPIED: 3, CENTER_VESSEL: 3,
+  NO_SAFE_SIDE: 3, NO_SIDE_UNOCCUPIED: 3, TIE_KEPT_SIDE: 3, TIE_STARBOARD: 3, TURN_RETAINED: 4,
+};
+
+/** @type {Record<string, Record<string, any>>} */
+const rows = {};
+
+export function buildWhy() {
+  for (const step of STEPS) byId("path").append(make("li", "", step));
+  for (const [name, title] of LANES) {
+    const row = make("div", "lane"), bars = make("div", "bars"), risk = make("strong"), parts = make("div", "parts"), verdict = make("span", "verdict");
+    /** @type {Record<string, any>} */
+    const widgets = { row, risk, verdict, limit: document.createElement("u") };
+    for (const [part, className, letter] of PARTS) {
+      widgets[part] = make("b", className);
+      widgets[`${part}_text`] = make("span", "", letter);
+      bars.append(widgets[part]);
+      parts.append(widgets[`${part}_text`]);
+    }
+    bars.append(widgets.limit);
+    row.append(make("span", "", title), bars, risk, make("span"), parts, verdict);
+    parts.style.gridColumn = "2";
+    row.children[3].remove();
+    byId("lanes").append(row);
+    rows[name] = widgets;
+  }
+}
+
+/** @param {import("./store.js").Store} store @param {number} now */
+export function renderWhy(store, now) {
+  const advisory = store.get("advisor/advisory"), settings = store.get("dashboard/settings");
+  const fresh = store.isFresh("advisor/advisory", now), panel = /** @type {HTMLElement} */ (document.querySelector(".why"));
+  for (const part of panel.children) if (part.tagName !== "HEADER") part.classList.toggle("stale", !fresh);
+  setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice heard");
+  if (!advisory || !settings) return;
+  setText(byId("explanation"), advisory.explanation || words(advisory.reason));
+  renderPath(advisory);
+  for (const [name] of LANES) renderLane(rows[name], advisory[name], name === "center" ? advisory.center_block_risk : advisory.side_block_risk, settings.weights);
+  renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
+  renderTracks(store.get("advisor/tracks"), new Set(advisory.contributing_track_ids));
+}
+
+/** @param {any} advisory */
+function renderPath(advisory) {
+  const decided = DECIDED_AT[advisory.reason] ?? 4;
+  const stops = advisory.direction === "STOP" || advisory.direction === "NO_DATA";
+  [...byId("path").children].forEach((item, index) => {
+    const state = index < decided ? "passed" : index > decided ? "" : stops ? "failed" : advisory.reason === "CENTER_CLEAR" ? "passed" : "decided";
+    item.dataset.step = index === decided && advisory.reason === "CENTER_CLEAR" ? "decided" : state;
+    setText(item, index === decided ? words(advisory.reason).replace(/^center/, "centre") : STEPS[index]);
+    item.title = STEPS[index];
+  });
+}
+
+/** @param {Record<string, any>} row @param {any} lane @param {number} limit @param {any} weights */
+function renderLane(row, lane, limit, weights) {
+  row.row.dataset.blocked = String(lane.blocked);
+  row.limit.style.left = `${limit * 100}%`;
+  setText(row.risk, fixed(lane.risk));
+  setText(row.verdict, lane.occupied ? "occupied" : lane.blocked ? "blocked" : "clear");
+  for (const [part, , letter] of PARTS) {
+    row[part].style.width = `${weights[part] * lane[part] * 100}%`;
+    setText(row[`${part}_text`], `${letter} ${fixed(lane[part])}`);
+    row[`${part}_text`].title = `${weights[part]} × ${fixed(lane[part], 3)} = ${fixed(weights[part] * lane[part], 3)}`;
+  }
+}
+
+/** @param {any} evidence @param {any} advisory @param {number} ageS */
+function renderInput(evidence, advisory, ageS) {
+  const timing = evidence?.timing;
+  const facts = [
+    ["picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", evidence && !evidence.usable],
+    ["age", ageText(ageS), false],
+    ["mask", evidence ? words(evidence.segmentation) : "–", evidence && evidence.segmentation !== "learned"],
+    ["inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
+  ];
+  const list = byId("input");
+  if (list.children.length !== facts.length * 2) list.replaceChildren(...facts.flatMap(() => [make("dt"), make("dd")]));
+  facts.forEach(([name, value, bad], index) => {
+    setText(list.children[index * 2], String(name));
+    setText(list.children[index * 2 + 1], String(value));
+    list.children[index * 2 + 1].classList.toggle("bad", Boolean(bad));
+  });
+}
+
+/** @param {any} message @param {Set<number>} counting */
+function renderTracks(message, counting) {
+  const tracks = message?.tracks ?? [], list = byId("tracks");
+  if (!tracks.length) {
+    list.replaceChildren(make("p", "quiet", "nothing in sight"));
+    return;
+  }
+  list.replaceChildren(
+    ...tracks.map((/** @type {any} */ track) => {
+      const row = make("div"), state = track.immediate_danger ? "immediate" : track.accepted ? "accepted" : "tentative";
+      const known = track.motion === "unknown" ? "motion unknown" : track.motion;
+      row.dataset.counts = String(counting.has(track.id));
+      row.append(make("span", "", `#${track.id}`), make("span", "", track.label), make("span", "", fixed(track.confidence)));
+      row.append(make("span", "", [state, track.held ? "held" : "", known].filter(Boolean).join(", ")));
+      return row;
+    }),
+  );
+}

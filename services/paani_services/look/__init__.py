@@ -1,0 +1,1 @@
+"""Judging pictures at the desk: the boat's own eyes and judgement, without bus or simulator."""

@@ -1,0 +1,64 @@
+"""What the plant measures and does, as messages. `source_us` dates the step they speak of."""
+
+from paani import messages as m
+from paani_sim.plant.adapter import Applied, ThrustAdapter
+from paani_sim.plant.plant import Plant
+
+
+def gps_message(plant: Plant, source_us: int) -> m.GpsFix:
+    """Read the GPS."""
+    return m.GpsFix(source_us=source_us, **plant.read_gps()._asdict())
+
+
+def imu_message(plant: Plant, source_us: int) -> m.ImuSample:
+    """Read the IMU."""
+    reading = plant.read_imu()
+    gyro, accel = reading.rates_radps, reading.specific_force_mps2
+    return m.ImuSample(
+        source_us=source_us,
+        gyro_x_radps=gyro[0],
+        gyro_y_radps=gyro[1],
+        gyro_z_radps=gyro[2],
+        accel_x_mps2=accel[0],
+        accel_y_mps2=accel[1],
+        accel_z_mps2=accel[2],
+        orientation_available=True,
+        roll_rad=reading.roll_rad,
+        pitch_rad=reading.pitch_rad,
+        yaw_rad=reading.yaw_rad,
+    )
+
+
+def pose_message(plant: Plant, source_us: int) -> m.TruePose:
+    """Simulator truth."""
+    (x_m, y_m), angles, (surge_mps, sway_mps, yaw_rate) = plant.position_m, plant.attitude, plant.velocity
+    return m.TruePose(
+        source_us=source_us,
+        sim_us=plant.sim_us,
+        x_m=x_m,
+        y_m=y_m,
+        z_m=plant.z_m,
+        roll_rad=angles.roll_rad,
+        pitch_rad=angles.pitch_rad,
+        yaw_rad=angles.yaw_rad,
+        surge_mps=surge_mps,
+        sway_mps=sway_mps,
+        yaw_rate_radps=yaw_rate,
+        distance_m=plant.distance_m,
+        collisions=plant.collisions,
+        in_contact=plant.in_contact,
+    )
+
+
+def applied_message(adapter: ThrustAdapter, applied: Applied, source_us: int, since_us: int) -> m.ThrustApplied:
+    """What the last gate does now, and the command behind it."""
+    command = adapter.command
+    return m.ThrustApplied(
+        source_us=source_us,
+        since_us=since_us,
+        **applied._asdict(),
+        rejected=adapter.rejected,
+        command_seq=command.seq if command else 0,
+        command_sent_us=command.sent_us if command else 0,
+        command_source_us=command.source_us if command else 0,
+    )

@@ -1,0 +1,102 @@
+"""Camera, perception and advisor as processes over a real router."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import cv2
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Latest
+from paani.clock import WallClock
+from tests.conftest import OpenAs, Spawn
+from tests.unit.pictures import PICTURES, noisy, river
+
+pytestmark = pytest.mark.integration
+CLEAR = m.LaneEvidence(non_water=0.05, uncertainty=0.05, clear_width=1.0)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Fifteen rivers, then ten black pictures."""
+    for i in range(25):
+        picture = noisy(river(), 3.0, seed=i) if i < 15 else PICTURES["black"]
+        cv2.imwrite(str(tmp_path / f"{i:02}.png"), picture)
+    return tmp_path
+
+
+async def until(inbox: Latest[m.Advisory], direction: m.Direction, reason: m.Reason) -> m.Advisory:
+    async with asyncio.timeout(20):
+        while True:
+            advice = await inbox.next()
+            if (advice.direction, advice.reason) == (direction, reason):
+                return advice
+
+
+async def test_pictures_become_advice_and_black_stops_it(spawn: Spawn, open_as: OpenAs, folder: Path) -> None:
+    """B1, B2, J19: a folder through three processes; evidence, mask and advice name the same frames."""
+    bus = await open_as("observer")
+    advisory, evidence = bus.latest(keys.ADVISORY), bus.queue(keys.EVIDENCE, 64)
+    mask = bus.latest_picture(keys.MASK)
+    async with spawn("advisor"), spawn("perception"), spawn("camera", f"camera.source={folder}"):
+        await until(advisory, m.Direction.STRAIGHT, m.Reason.CENTER_CLEAR)
+        stop = await until(advisory, m.Direction.STOP, m.Reason.UNUSABLE_IMAGE)
+        assert stop.cause is m.UnusableCause.BLACK
+        seen = evidence.drain()
+    frames = [(e.frame_epoch, e.frame_seq) for e in seen]
+    assert frames == sorted(set(frames))
+    first_black = next(e for e in seen if e.cause is m.UnusableCause.BLACK)
+    assert first_black.frame_seq == 15
+    assert (stop.frame_epoch, stop.frame_seq) in frames
+    assert mask.value is not None
+    assert (mask.value.header.frame_epoch, mask.value.header.frame_seq) in frames
+    assert mask.value.header.media_type == "image/png"
+
+
+async def test_the_advice_stops_when_the_evidence_ends(spawn: Spawn, open_as: OpenAs) -> None:
+    """J14, J16, J17: NO_DATA before any evidence; republished with its date; STOP once it is older than 0.8 s."""
+    perception, observer = await open_as("perception"), await open_as("observer")
+    publisher, advisory = perception.publisher(keys.EVIDENCE), observer.latest(keys.ADVISORY)
+    clock = WallClock()
+    async with spawn("advisor"):
+        await until(advisory, m.Direction.NO_DATA, m.Reason.NO_EVIDENCE)
+        sent = publisher.put(evidence_at(clock.now_us()))
+        given = [await until(advisory, m.Direction.STRAIGHT, m.Reason.CENTER_CLEAR)]
+        async with asyncio.timeout(5):
+            while given[-1].direction is m.Direction.STRAIGHT:
+                given.append(await advisory.next())
+        late_s = (clock.now_us() - sent.source_us) * 1e-6
+    assert len(given) >= 3
+    assert {(a.source_us, a.frame_seq) for a in given} == {(sent.source_us, 0)}
+    assert given[-1].reason is m.Reason.STALE_EVIDENCE
+    assert 0.8 <= late_s < 1.1
+
+
+async def test_the_simulators_pictures_keep_their_date(spawn: Spawn, open_as: OpenAs) -> None:
+    """A9: the camera passes the rendered picture on with the stamp of the pose that it shows."""
+    eye, observer = await open_as("eye"), await open_as("observer")
+    rendered, pictures = eye.picture_publisher(keys.RENDERED), observer.latest_picture(keys.PICTURE)
+    data = cv2.imencode(".jpg", river())[1].tobytes()
+    clock = WallClock()
+    async with spawn("camera", "camera.source=sim"):
+        for seq in range(4):
+            stamp_us = clock.now_us() - 100_000
+            header = m.PictureHeader(
+                source_us=stamp_us, frame_seq=seq % 2, frame_epoch=seq // 2, width_px=320, height_px=240
+            )
+            rendered.put_picture(header, data)
+            async with asyncio.timeout(10):
+                picture = await pictures.next()
+            assert picture.header.source_us == stamp_us
+            assert picture.data == data
+            assert picture.header.frame_seq == seq % 2
+
+
+def evidence_at(now_us: int) -> m.Evidence:
+    return m.Evidence(
+        source_us=now_us, frame_seq=0, frame_epoch=1, width_px=320, height_px=240, usable=True,
+        left=CLEAR, center=CLEAR, right=CLEAR, segmentation=m.SegmentationSource.LEARNED, navigation_eligible=True,
+    )  # fmt: skip
