@@ -31,7 +31,7 @@ def noisy(picture: Bytes, sigma: float, seed: int = 1) -> Bytes:
 
 
 def solid(*bgr: int) -> Bytes:
-    return np.full((HEIGHT, WIDTH, 3), bgr, np.uint8)
+    return np.asarray(np.full((HEIGHT, WIDTH, 3), bgr), np.uint8)
 
 
 def _test_card() -> Bytes:
@@ -44,7 +44,7 @@ def _test_card() -> Bytes:
 
 def _salted(picture: Bytes) -> Bytes:
     where = np.random.default_rng(3).random(picture.shape[:2])
-    salted = picture.copy()
+    salted = np.array(picture, np.uint8)
     salted[where < 0.15] = 0
     salted[where > 0.85] = 255
     return salted

@@ -137,9 +137,10 @@ def test_occupancy_does_not_count_republishes() -> None:
     """J6, J10: the same frame again is no second frame."""
     low = box(BUOY, (0.45, 0.62, 0.58, 0.68), 0.42)
     state, _, _ = play([seeing(low)] * 2)
-    assert state.evidence is not None
+    evidence = state.evidence
+    assert evidence is not None
     for repeat in range(5):
-        state, given, _ = advise(state, state.evidence, state.evidence.source_us + 1000 * repeat, PAANI)
+        state, given, _ = advise(state, evidence, evidence.source_us + 1000 * repeat, PAANI)
         assert not given.center.occupied
 
 
@@ -160,9 +161,10 @@ def test_j10_a_turn_is_kept_until_two_distinct_clear_frames() -> None:
     blocked, clear = water(0.05, 0.50, 0.30), CLEAR
     state, advice, _ = play([blocked, clear])
     assert [(a.direction, a.reason) for a in advice] == [(D.LEFT, R.CENTER_RISK), (D.LEFT, R.TURN_RETAINED)]
-    assert state.evidence is not None
+    evidence = state.evidence
+    assert evidence is not None
     for repeat in range(5):
-        state, given, _ = advise(state, state.evidence, state.evidence.source_us + 10_000 * repeat, PAANI)
+        state, given, _ = advise(state, evidence, evidence.source_us + 10_000 * repeat, PAANI)
         assert given.reason is R.TURN_RETAINED
     _, advice, _ = play([clear], state=state, first_seq=2)
     assert (advice[0].direction, advice[0].reason) == (D.STRAIGHT, R.CENTER_CLEAR)

@@ -31,7 +31,7 @@ def folder(tmp_path: Path) -> Path:
 def video(tmp_path: Path) -> Path:
     """Thirty frames at 15 Hz; frame i is of grey level 5 i."""
     path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 15.0, (320, 240))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (320, 240))
     for i in range(30):
         writer.write(np.full((240, 320, 3), 5 * i, np.uint8))
     writer.release()

@@ -59,7 +59,9 @@ def test_pictures_and_full_lines(folder: Path, tmp_path: Path, capsys: pytest.Ca
     found = lines(capsys)
     assert list(found["river"]) == ["path", "evidence", "advice", "explanation"]
     assert sorted(p.name for p in out.iterdir()) == ["black.jpg", "river.jpg", "white.jpg", "white_noise.jpg"]
-    assert cv2.imread(str(out / "river.jpg")).shape == (718, 800, 3)
+    drawn = cv2.imread(str(out / "river.jpg"))
+    assert drawn is not None
+    assert drawn.shape == (718, 800, 3)
 
 
 def test_the_paper_goes_on_in_the_dark(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,7 +90,7 @@ def test_stills_do_not_know_of_each_other(tmp_path: Path, capsys: pytest.Capture
 def test_a_video_is_one_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A film of one and the same picture is a frozen camera from its fifth frame on."""
     path = tmp_path / "still.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 5.0, (320, 240))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 5.0, (320, 240))
     for _ in range(8):
         writer.write(np.asarray(river(), np.uint8))
     writer.release()

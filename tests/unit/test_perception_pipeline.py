@@ -43,7 +43,8 @@ def test_b5_evidence_of_a_picture() -> None:
     assert evidence.confidence_threshold == 0.40
     assert "detector" in evidence.models
     assert mask is not None
-    assert (mask.shape, mask.dtype) == ((64, 80), np.uint8)
+    assert mask.shape == (64, 80)
+    assert mask.dtype == np.uint8
     assert set(np.unique(mask)) <= {0, 1, 2}
     assert msgspec.json.decode(msgspec.json.encode(evidence), type=m.Evidence) == evidence
 

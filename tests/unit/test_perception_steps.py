@@ -33,7 +33,8 @@ def test_c3_letterbox() -> None:
     """C3: aspect kept, centred on grey, RGB, 1/255."""
     picture = solid(10, 20, 200)
     tensor, place = letterbox(picture, 256, 320, 114, UNITY)
-    assert (tensor.shape, tensor.dtype) == ((1, 3, 256, 320), np.float32)
+    assert tensor.shape == (1, 3, 256, 320)
+    assert tensor.dtype == np.float32
     assert place == Letterbox(1.0, 1.0, 0, 8, 320, 240)
     assert tensor[0, :, 128, 160] == pytest.approx([200 / 255, 20 / 255, 10 / 255])
     assert tensor[0, :, 0, 0] == pytest.approx([114 / 255] * 3)
@@ -115,7 +116,9 @@ def test_e1_softmax() -> None:
     logits = np.zeros((1, 3, 256, 320), np.float32)
     logits[0, 0], logits[0, 1] = 2.0, 1.0
     mask, confidence = classify(logits, 1.0)
-    assert (mask.shape, mask.dtype, int(mask.max())) == ((64, 80), np.uint8, 0)
+    assert mask.shape == (64, 80)
+    assert mask.dtype == np.uint8
+    assert mask.max() == 0
     assert confidence == pytest.approx(math.e**2 / (math.e**2 + math.e + 1.0), abs=1e-6)
     assert classify(logits, 2.0)[1] == pytest.approx(math.e / (math.e + math.e**0.5 + 1.0), abs=1e-6)
 

@@ -229,7 +229,7 @@ def test_i16_gap() -> None:
 
 def test_i17_a_replay_measures_motion_on_its_media_time() -> None:
     """I17: frames played twice as slowly as recorded keep the recorded rate; freshness stays with source_us."""
-    state = AdvisorState()
+    state, tracks = AdvisorState(), m.Tracks(source_us=0, frame_seq=0, frame_epoch=0)
     for i, frame in enumerate(growing(0.3, 10)):
         replayed = msgspec.structs.replace(
             frame, frame_seq=i, source_us=T0_US + i * 400_000, media_us=i * 200_000, time_base=m.TimeBase.MEDIA

@@ -19,7 +19,7 @@ EARLY_US = 5_000  # a wake-up this much before the period is over is on time
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Order at `rate_hz`, and at once when the advice or a gate changes."""
+    """Order at `rate_hz`, and at once when the evidence, the advice or a gate changes."""
     file = config.navigator.route
     route = await asyncio.to_thread(load_route, Path(file)) if file else None
     advisory, odometry = bus.latest(keys.ADVISORY), bus.latest(keys.ODOMETRY)
@@ -63,4 +63,7 @@ async def _wake_on(inbox: Latest[Any], wake: asyncio.Event) -> None:
 
 
 def _differs(order: m.NavCommand, sent: m.NavCommand | None) -> bool:
-    return sent is None or (order.inhibits, order.direction) != (sent.inhibits, sent.direction)
+    """New evidence, other advice or another gate goes out at once; the rest waits for the period."""
+    if sent is None:
+        return True
+    return (order.source_us, order.direction, order.inhibits) != (sent.source_us, sent.direction, sent.inhibits)

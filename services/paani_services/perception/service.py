@@ -11,7 +11,7 @@ from paani import messages as m
 from paani.bus import Bus, Picture
 from paani.clock import Clock, stopwatch_ms
 from paani.config import Config
-from paani_services.perception.pipeline import Perceiver
+from paani_services.perception.pipeline import Bytes, Perceiver
 
 EARLY_FRAC = 0.1  # a frame this part of the period too early is in time
 
@@ -25,10 +25,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     period_us = round(1e6 / config.perception.rate_hz)
     last, due_us = (-1, -1), 0
 
-    def look(picture: Picture) -> tuple[m.Evidence, bytes]:
+    def look(picture: Picture) -> tuple[m.Evidence, Picture | None]:
         age_s = (clock.now_us() - picture.header.source_us) * 1e-6
         found, mask = perceiver.perceive(picture.data, picture.header, age_s)
-        return found, b"" if mask is None else cv2.imencode(".png", mask)[1].tobytes()
+        return found, None if mask is None else mask_picture(mask, picture.header)
 
     try:
         with bus.alive():
@@ -40,16 +40,18 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue
                 last, due_us = frame, clock.now_us() + round((1.0 - EARLY_FRAC) * period_us)
-                found, png = await loop.run_in_executor(worker, look, picture)
+                found, mask = await loop.run_in_executor(worker, look, picture)
                 sent = evidence.put(found)
-                if png:
-                    masks.put_picture(mask_header(picture.header), png)
+                if mask is not None:
+                    masks.put_picture(mask.header, mask.data)
                 bus.note(f"unusable: {sent.cause}" if not sent.usable else sent.models)
     finally:
         worker.shutdown(wait=False)
         perceiver.close()
 
 
-def mask_header(header: m.PictureHeader) -> m.PictureHeader:
-    """The mask belongs to the frame it was drawn from."""
-    return msgspec.structs.replace(header, width_px=80, height_px=64, media_type="image/png")
+def mask_picture(mask: Bytes, header: m.PictureHeader) -> Picture:
+    """The mask as a PNG of class numbers, under the name of the frame it was drawn from."""
+    height, width = mask.shape
+    named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
+    return Picture(named, cv2.imencode(".png", mask)[1].tobytes())

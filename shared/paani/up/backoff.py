@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import random
 
-FIRST_S = 0.2
+FIRST_S = 0.5  # with the start itself, longer than the thrust adapter's patience: every death stops the boat
 LONGEST_S = 10.0
 STABLE_S = 10.0
 JITTER_FRAC = 0.2
 
 
 class Backoff:
-    """Doubles from 0.2 s to 10 s; a life of 10 s or more begins again at 0.2 s."""
+    """Doubles from 0.5 s to 10 s; a life of 10 s or more begins again at 0.5 s."""
 
     def __init__(self, rng: random.Random) -> None:
         self._rng = rng

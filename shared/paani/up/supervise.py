@@ -50,6 +50,7 @@ class Unit:
         self.alive = False
         self.ever_alive = False
         self.restarts = 0
+        self.fallen = False
 
     def send(self, number: signal.Signals) -> None:
         """Signal the process group, if there still is one."""
@@ -111,6 +112,7 @@ class Supervisor:
                 raise NotKeptAlive(f"{name} ended {unit.backoff.failures} times before it was alive: {last}")
             self._say(f"{name} ended ({_ending(code)}); starting it again in {delay_s:.1f} s (log: {unit.log})")
             await asyncio.sleep(delay_s)
+            unit.fallen = True
             unit.restarts += 1
 
     async def follow_alive(self, bus: Bus) -> None:
@@ -167,8 +169,9 @@ class Supervisor:
         self._silence.started(unit.name, self._clock.now_us())
 
     def _set_alive(self, unit: Unit, *, alive: bool) -> None:
-        if alive and not unit.alive and unit.restarts:
+        if alive and unit.fallen:
             self._say(f"{unit.name} is back")
+            unit.fallen = False
         unit.alive = alive
         unit.ever_alive |= alive
         self._changed.set()
