@@ -57,7 +57,7 @@ def _covered(share: float) -> Bytes:
 
 
 def _scaled(gain: float, offset: float = 0.0) -> Bytes:
-    return np.clip(river() * gain + offset, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(river() * gain + offset, 0, 255), np.uint8)
 
 
 PICTURES: dict[str, Bytes] = {

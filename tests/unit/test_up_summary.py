@@ -53,7 +53,8 @@ def chain(summary: Summary, captured_us: int, seq: int) -> None:
     for repeat in range(2):
         summary.feed(
             m.ThrustApplied(
-                source_us=applied_us + 20_000 + repeat * 50_000, since_us=applied_us, seq=2 * seq + repeat, left=0.1, right=0.1, left_n=7.5,
+                source_us=applied_us + 20_000 + repeat * 50_000, since_us=applied_us,
+                seq=2 * seq + repeat, left=0.1, right=0.1, left_n=7.5,
                 right_n=7.5, zero_cause=m.ZeroCause.NONE, command_sent_us=thrust_us, command_source_us=captured_us,
             )
         )  # fmt: skip

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Latest, Publisher
+from paani.bus import Publisher
 from paani.clock import Clock
 from paani.runtime import write_private
 from paani_services.dashboard import operator as op
@@ -66,13 +66,11 @@ class Console:
         finally:
             self._publisher.put(m.Arming(source_us=self._clock.now_us(), armed=False, stopped=self.state.stopped))
 
-    async def confirm_always(self, applied: Latest[m.ThrustApplied]) -> None:
-        """While a STOP waits, listen for the plant's zero."""
-        while True:
-            message = await applied.next()
-            before, self.state = self.state, op.hear_applied(self.state, message, self._clock.now_us())
-            if self.state != before:
-                self._changed.set()
+    def hear_applied(self, applied: m.ThrustApplied) -> None:
+        """The plant's word, for a STOP that waits to be confirmed."""
+        before, self.state = self.state, op.hear_applied(self.state, applied, self._clock.now_us())
+        if self.state != before:
+            self._changed.set()
 
     async def changed(self, timeout_s: float) -> None:
         """Return when the state changed, or after `timeout_s`."""

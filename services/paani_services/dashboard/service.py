@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from paani import keys
+from paani import messages as m
 from paani.bus import Bus, Latest
 from paani.clock import Clock
 from paani.config import Config
@@ -28,10 +29,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     console = Console(bus.publisher(keys.ARMING), folder, clock)
     await console.restore(arm_at_start=config.dashboard.arm_at_start)
-    applied = bus.latest(keys.THRUST_APPLIED)
     page = show_page(bus, console, clock, config) if config.dashboard.serve else contextlib.nullcontext()
-    async with page, asyncio.TaskGroup() as tasks:
-        tasks.create_task(console.confirm_always(applied))
+    async with page:
         with bus.alive():
             await console.speak_always()
 
@@ -46,6 +45,7 @@ async def show_page(bus: Bus, console: Console, clock: Clock, config: Config) ->
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
         feeds.append(forward_while_watched(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
+        feeds.append(forward_applied(hub, console, bus.latest(keys.THRUST_APPLIED), clock))
         feeds += [show_operator(hub, console, clock), show_lives(hub, bus, clock)]
         running = [tasks.create_task(feed) for feed in feeds]
         try:
@@ -68,8 +68,10 @@ async def serving(hub: Hub, console: Console, clock: Clock, config: Config) -> A
 
 
 def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:
-    """Every topic that is plain JSON, and every health report."""
-    topics: list[keys.Topic[Any]] = [topic for topic in keys.TOPICS if topic.stance is not keys.Stance.PICTURE]
+    """Every topic that is plain JSON but the plant's answer to a STOP, and every health report."""
+    topics: list[keys.Topic[Any]] = [
+        topic for topic in keys.TOPICS if topic.stance is not keys.Stance.PICTURE and topic is not keys.THRUST_APPLIED
+    ]
     topics += [keys.health(service) for service in keys.SERVICES]
     return [(topic, bus.latest(topic)) for topic in topics]
 
@@ -91,6 +93,15 @@ async def forward_while_watched(
         value = await inbox.next()
         hub.put(topic.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(period_s)
+
+
+async def forward_applied(hub: Hub, console: Console, inbox: Latest[m.ThrustApplied], clock: Clock) -> None:
+    """What the plant applies: to the page, and to the STOP that waits for it."""
+    while True:
+        value = await inbox.next()
+        console.hear_applied(value)
+        hub.put(keys.THRUST_APPLIED.name, value, inbox.received_us, clock.now_us())
+        await asyncio.sleep(0.5 / keys.THRUST_APPLIED.rate_hz)
 
 
 async def show_operator(hub: Hub, console: Console, clock: Clock) -> None:

@@ -1,7 +1,7 @@
 // @ts-check
 // The newest lines first: what the server tells, and each change of advice.
 
-import { byId, make, words } from "./text.js";
+import { byId, make, reasonText } from "./text.js";
 
 const KEPT = 60;
 let advice = "";
@@ -22,6 +22,5 @@ export function noteAdvice(advisory) {
   if (now === advice) return;
   advice = now;
   const level = advisory.direction === "STOP" || advisory.direction === "NO_DATA" ? "stop" : "info";
-  const reason = words(advisory.reason).replace(/^center/, "centre");
-  addLine({ at_us: advisory.sent_us, level, text: `${advisory.direction.replaceAll("_", " ")}, ${reason}` });
+  addLine({ at_us: advisory.sent_us, level, text: `${advisory.direction.replaceAll("_", " ")}: ${reasonText(advisory.reason)}` });
 }

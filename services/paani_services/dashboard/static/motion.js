@@ -1,7 +1,7 @@
 // @ts-check
 // What the fans do, and every reason why the boat does not move.
 
-import { WHY_STILL, byId, fixed, make, setText, words } from "./text.js";
+import { WHY_STILL, byId, fixed, make, sentence, setText, words } from "./text.js";
 
 const FULL_SCALE = 0.25; // the controller orders no more than this of the fans
 
@@ -17,13 +17,12 @@ export function renderMotion(store, now) {
   const reasons = whyStill(store, now);
   const moving = fresh && applied?.zero_cause === "none";
   setText(byId("motion-word"), moving ? "under way" : fresh ? "held at zero thrust" : "plant not heard");
-  const items = reasons.map(([who, text]) => {
+  const lines = reasons.length ? reasons : [["plant", "nothing holds it back"]];
+  const items = lines.map(([who, text]) => {
     const item = make("li");
-    item.append(make("span", "", who), make("span", "", text));
+    item.append(make("span", "", sentence(who)), make("span", reasons.length ? "" : "clear", text));
     return item;
   });
-  if (!items.length) items.push(make("li", "clear", ""));
-  if (!reasons.length) items[0].append(make("span", "", "plant"), make("span", "", "nothing holds it back"));
   const list = byId("inhibits"), key = JSON.stringify(reasons);
   if (list.dataset.key !== key) {
     list.dataset.key = key;

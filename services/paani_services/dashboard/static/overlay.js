@@ -3,7 +3,7 @@
 
 import { fixed, words } from "./text.js";
 
-export const MASK_RGBA = [[23, 184, 214, 82], [242, 140, 30, 128], [36, 56, 143, 92]];
+export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
 const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb";
 
@@ -89,7 +89,7 @@ export function drawLanes(pane, corridors, advisory) {
     const foot = height - (index === 1 ? 4 : 9) * unit;
     const fade = ctx.createLinearGradient(0, top, 0, height);
     fade.addColorStop(0, `${colour}00`);
-    fade.addColorStop(1, `${colour}38`);
+    fade.addColorStop(1, `${colour}2a`);
     ctx.fillStyle = fade;
     ctx.fillRect(x1, top, x2 - x1, height - top);
     ctx.strokeStyle = colour;

@@ -4,6 +4,12 @@
 /** @param {string} name */
 export const words = (name) => name.toLowerCase().replaceAll("_", " ");
 
+/** @param {string} text */
+export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** A reason code as people say it. @param {string} reason */
+export const reasonText = (reason) => sentence(words(reason).replace(/^center/, "centre"));
+
 /** @param {number} value @param {number} [digits] */
 export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
 

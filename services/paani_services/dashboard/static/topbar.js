@@ -1,7 +1,7 @@
 // @ts-check
 // Link, advice, speed and heading.
 
-import { ageText, byId, fixed, headingDeg, setText, words } from "./text.js";
+import { ageText, byId, fixed, headingDeg, reasonText, setText } from "./text.js";
 
 const LOST_S = 1.5;
 /** @type {Record<string, [string, string, string]>} word, kind, path of the arrow */
@@ -50,9 +50,9 @@ function renderAdvice(store, now) {
     byId("advice-arrow").innerHTML = `<path d="${arrow}"/>`;
   }
   setText(byId("advice-word"), word);
-  const old = advisory ? `last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "nothing heard yet";
+  const old = advisory ? `Last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "Nothing heard yet";
   const cause = fresh && advisory.cause !== "none" ? `: ${advisory.cause}` : "";
-  setText(byId("advice-reason"), fresh ? words(advisory.reason).replace(/^center/, "centre") + cause : old);
+  setText(byId("advice-reason"), fresh ? reasonText(advisory.reason) + cause : old);
 }
 
 /** @param {import("./store.js").Store} store @param {number} now */

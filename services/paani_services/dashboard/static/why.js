@@ -1,7 +1,7 @@
 // @ts-check
 // Why this advice: the decision's steps, the three lanes' components, the input, the tracks.
 
-import { ageText, byId, fixed, make, setText, words } from "./text.js";
+import { ageText, byId, fixed, make, reasonText, setText, words } from "./text.js";
 
 const LANES = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
 const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
@@ -29,9 +29,7 @@ export function buildWhy() {
       parts.append(widgets[`${part}_text`]);
     }
     bars.append(widgets.limit);
-    row.append(make("span", "", title), bars, risk, make("span"), parts, verdict);
-    parts.style.gridColumn = "2";
-    row.children[3].remove();
+    row.append(make("span", "", title), bars, risk, parts, verdict);
     byId("lanes").append(row);
     rows[name] = widgets;
   }
@@ -44,11 +42,14 @@ export function renderWhy(store, now) {
   for (const part of panel.children) if (part.tagName !== "HEADER") part.classList.toggle("stale", !fresh);
   setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice heard");
   if (!advisory || !settings) return;
-  setText(byId("explanation"), advisory.explanation || words(advisory.reason));
+  setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
   renderPath(advisory);
   for (const [name] of LANES) renderLane(rows[name], advisory[name], name === "center" ? advisory.center_block_risk : advisory.side_block_risk, settings.weights);
   renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
-  renderTracks(store.get("advisor/tracks"), new Set(advisory.contributing_track_ids));
+  const seen = store.get("advisor/tracks");
+  byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));
+  setText(byId("tracks-sum"), seen?.tracks.length ? `${seen.tracks.length} seen, ${advisory.contributing_track_ids.length} counted` : "");
+  renderTracks(seen, new Set(advisory.contributing_track_ids));
 }
 
 /** @param {any} advisory */
@@ -56,9 +57,8 @@ function renderPath(advisory) {
   const decided = DECIDED_AT[advisory.reason] ?? 4;
   const stops = advisory.direction === "STOP" || advisory.direction === "NO_DATA";
   [...byId("path").children].forEach((item, index) => {
-    const state = index < decided ? "passed" : index > decided ? "" : stops ? "failed" : advisory.reason === "CENTER_CLEAR" ? "passed" : "decided";
-    item.dataset.step = index === decided && advisory.reason === "CENTER_CLEAR" ? "decided" : state;
-    setText(item, index === decided ? words(advisory.reason).replace(/^center/, "centre") : STEPS[index]);
+    item.dataset.step = index < decided ? "passed" : index > decided ? "" : stops ? "failed" : "decided";
+    setText(item, index === decided ? reasonText(advisory.reason) : STEPS[index]);
     item.title = STEPS[index];
   });
 }
@@ -80,10 +80,10 @@ function renderLane(row, lane, limit, weights) {
 function renderInput(evidence, advisory, ageS) {
   const timing = evidence?.timing;
   const facts = [
-    ["picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", evidence && !evidence.usable],
-    ["age", ageText(ageS), false],
-    ["mask", evidence ? words(evidence.segmentation) : "–", evidence && evidence.segmentation !== "learned"],
-    ["inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
+    ["Picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", evidence && !evidence.usable],
+    ["Age", ageText(ageS), false],
+    ["Mask", evidence ? words(evidence.segmentation) : "–", evidence && evidence.segmentation !== "learned"],
+    ["Inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
   ];
   const list = byId("input");
   if (list.children.length !== facts.length * 2) list.replaceChildren(...facts.flatMap(() => [make("dt"), make("dd")]));
@@ -98,7 +98,7 @@ function renderInput(evidence, advisory, ageS) {
 function renderTracks(message, counting) {
   const tracks = message?.tracks ?? [], list = byId("tracks");
   if (!tracks.length) {
-    list.replaceChildren(make("p", "quiet", "nothing in sight"));
+    list.replaceChildren(make("p", "quiet", "Nothing in sight"));
     return;
   }
   list.replaceChildren(

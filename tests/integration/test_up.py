@@ -1,0 +1,155 @@
+"""`paani up`: the whole loop with one command, and nothing left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.clock import stopwatch_ms
+from paani.up.summary import STAGES
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
+
+READY_S = 90.0
+
+
+class Up:
+    """One `paani up` as a user starts it."""
+
+    def __init__(self, folder: Path, *words: str) -> None:
+        self._out, self._err = folder / "out.txt", folder / "err.txt"
+        with self._out.open("w") as out, self._err.open("w") as err:
+            self.process = subprocess.Popen([sys.executable, "-m", "paani", "up", *words], stdout=out, stderr=err)
+
+    @property
+    def out(self) -> str:
+        return self._out.read_text()
+
+    @property
+    def errors(self) -> list[str]:
+        return self._err.read_text().splitlines()
+
+    def children(self) -> dict[str, int]:
+        """Its services that run now, whoever their parent is."""
+        found = {}
+        for folder in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                words = (folder / "cmdline").read_text().rstrip("\0").split("\0")
+                if words[1:4] == ["-m", "paani.up.child", str(self.process.pid)]:
+                    found[words[-1]] = int(folder.name)
+        return found
+
+    def until(self, condition: Callable[[], bool], limit_s: float) -> None:
+        deadline_ms = stopwatch_ms() + limit_s * 1e3
+        while not condition():
+            assert self.process.poll() is None, (self.out, self.errors)
+            assert stopwatch_ms() < deadline_ms, (self.out, self.errors)
+            threading.Event().wait(0.05)
+
+
+def words_of(sets: tuple[str, ...], *more: str) -> list[str]:
+    return [*more, *(word for setting in sets for word in ("--set", setting))]
+
+
+def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    """The summary has what it promises, perception keeps up, and the boat moves."""
+    file = tmp_path / "s.json"
+    up = Up(tmp_path, *words_of(private_sets, "--headless", "--for", "20", "--summary", str(file)))
+    assert up.process.wait(READY_S + 30) == 0, (up.out, up.errors)
+    assert up.children() == {}
+    summary = json.loads(file.read_text())
+    assert summary["duration_s"] == pytest.approx(20.0, abs=1.0)
+    assert (summary["profile"], summary["world"]) == ("paani", "river")
+    assert set(summary["services"]) == set(keys.SERVICES)
+    for service in summary["services"].values():
+        assert service["rate_hz"] > 0.5
+        assert service["rss_mib"] > 10
+        assert service["cpu_cores"] > 0
+        assert service["restarts"] == 0
+    board = sum(summary["services"][name]["rss_mib"] for name in keys.BOARD_SERVICES)
+    assert summary["board_rss_mib"] == pytest.approx(board, abs=0.1)
+    assert set(summary["latency_ms"]) == set(STAGES)
+    for stage in summary["latency_ms"].values():
+        assert 0 < stage["p50"] <= stage["p95"] <= stage["p99"]
+    assert set(summary["decisions"]) == {d.value for d in m.Direction}
+    assert sum(summary["decisions"].values()) == sum(summary["reasons"].values()) > 60
+    assert summary["services"]["perception"]["rate_hz"] >= 4.0
+    assert summary["distance_m"] > 4.0
+    assert summary["collisions"] == 0
+    assert isinstance(summary["drops"], dict)
+    assert isinstance(summary["waypoints_reached"], int)
+
+
+def test_a_hung_process_is_started_again_and_ctrl_c_ends_all(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    file = tmp_path / "s.json"
+    up = Up(tmp_path, *words_of(private_sets, "--summary", str(file)))
+    up.until(lambda: "http://127.0.0.1:" in up.out, READY_S)
+    frozen = up.children()["advisor"]
+    os.kill(frozen, signal.SIGSTOP)
+    up.until(lambda: "advisor is back" in up.out, 15.0)
+    assert "advisor hangs" in up.out
+    assert up.children()["advisor"] != frozen
+    up.process.send_signal(signal.SIGINT)
+    assert up.process.wait(3.0) == 0
+    assert up.children() == {}
+    assert json.loads(file.read_text())["services"]["advisor"]["restarts"] == 1
+
+
+def test_no_orphan_survives_a_killed_supervisor(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    up = Up(tmp_path, *words_of(private_sets, "--headless"))
+    up.until(lambda: len(up.children()) == len(keys.SERVICES), READY_S)
+    up.process.kill()
+    up.process.wait()
+    threading.Event().wait(1.0)
+    assert up.children() == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--set", "advisor.policy.tie=2"), "advisor.policy.tie"),
+        (("--world", "ocean"), "ocean"),
+        (("--camera", "no/such/folder"), "no/such/folder"),
+        (("--set", "perception.segmenter=CORRUPT"), "corrupt.onnx"),
+        (("--summary", "no/such/folder/s.json"), "no/such/folder"),
+        (("--profile", "paani", "--config", "no_such.toml"), "no_such.toml"),
+    ],
+    ids=["setting", "world", "camera", "model", "summary", "file"],
+)
+def test_a_mistake_is_one_line(
+    tmp_path: Path, private_sets: tuple[str, ...], words: tuple[str, ...], named: str
+) -> None:
+    corrupt = tmp_path / "corrupt.onnx"
+    corrupt.write_bytes(b"not a model")
+    words = tuple(word.replace("CORRUPT", str(corrupt)) for word in words)
+    up = Up(tmp_path, *words_of(private_sets, "--headless", *words))
+    assert up.process.wait(60) == 2, (up.out, up.errors)
+    assert len(up.errors) == 1
+    assert named in up.errors[0]
+    assert up.children() == {}
+
+
+@pytest.mark.parametrize("field", ["bus.router", "dashboard.port"])
+def test_a_busy_port_is_named_before_anything_starts(tmp_path: Path, private_sets: tuple[str, ...], field: str) -> None:
+    setting = next(setting for setting in private_sets if setting.startswith(field))
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        taken.bind(("127.0.0.1", int(setting.rpartition(":" if "router" in field else "=")[2])))
+        taken.listen()
+        up = Up(tmp_path, *words_of(private_sets))
+        assert up.process.wait(20) == 2
+    assert len(up.errors) == 1
+    assert field in up.errors[0]
+    assert up.out == ""
