@@ -48,6 +48,12 @@ def test_a_folder_plays_by_name(folder: Path) -> None:
     assert not any(f.restarted for f in frames)
 
 
+def test_folders_below_are_played_too(folder: Path) -> None:
+    (folder / "below").mkdir()
+    (folder / "a.jpg").rename(folder / "below" / "a.jpg")
+    assert [Path(f.name).name for f in play(folder, FIXED)] == ["b.jpg", "a.jpg", "c.jpg"]
+
+
 def test_a_loop_says_where_it_begins_again(folder: Path) -> None:
     """B2: the first frame of each later pass."""
     frames = list(itertools.islice(play(folder, CameraConfig(loop=True)), 7))

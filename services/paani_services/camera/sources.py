@@ -74,9 +74,9 @@ def recording(path: Path, config: CameraConfig) -> Iterator[Frame]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Picture files of a folder, by name. Raises UserError naming a folder that cannot be read."""
+    """Picture files of a folder and of those below it, by path. Raises UserError naming a folder that cannot be read."""
     try:
-        return sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES and file.is_file())
+        return sorted(file for file in folder.rglob("*") if file.suffix.lower() in PICTURE_SUFFIXES and file.is_file())
     except OSError as error:
         raise UserError(f"{folder}: {error.strerror}") from error
 

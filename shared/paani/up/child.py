@@ -7,8 +7,6 @@ import os
 import signal
 import sys
 
-from paani.cli import main
-
 PR_SET_PDEATHSIG = 1
 
 
@@ -18,6 +16,8 @@ def run(parent_pid: int, nice: int, service: str) -> int:
     if os.getppid() != parent_pid:  # it died before we asked
         return 1
     os.nice(nice)
+    from paani.cli import main  # noqa: PLC0415  # takes a second on a busy machine: not before the request above
+
     return main([service])
 
 

@@ -1,7 +1,7 @@
 // @ts-check
 // What the fans do, and every reason why the boat does not move.
 
-import { WHY_STILL, byId, fixed, make, sentence, setText, words } from "./text.js";
+import { WHY_STILL, byId, fixed, headingDeg, make, sentence, setFacts, setText, words } from "./text.js";
 
 const FULL_SCALE = 0.25; // the controller orders no more than this of the fans
 
@@ -14,6 +14,7 @@ export function renderMotion(store, now) {
     setText(byId(`fan-${side}-n`), applied ? `${fixed(applied[`${side}_n`], 1)} N` : "–");
   }
   document.querySelector(".fans")?.classList.toggle("stale", !fresh);
+  renderOrder(store, now, applied);
   const reasons = whyStill(store, now);
   const moving = fresh && applied?.zero_cause === "none";
   setText(byId("motion-word"), moving ? "under way" : fresh ? "held at zero thrust" : "plant not heard");
@@ -28,6 +29,19 @@ export function renderMotion(store, now) {
     list.dataset.key = key;
     list.replaceChildren(...items);
   }
+}
+
+/** @param {import("./store.js").Store} store @param {number} now @param {any} applied */
+function renderOrder(store, now, applied) {
+  const command = store.get("navigator/command");
+  const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
+  setFacts(byId("order"), [
+    ["Ordered", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
+    ["Heading", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
+    ["Off track", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
+    ["Order age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
+  ]);
+  byId("order").classList.toggle("stale", !store.isFresh("navigator/command", now));
 }
 
 /** Who holds the boat, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */

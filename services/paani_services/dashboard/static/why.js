@@ -1,7 +1,7 @@
 // @ts-check
 // Why this advice: the decision's steps, the three lanes' components, the input, the tracks.
 
-import { ageText, byId, fixed, make, reasonText, setText, words } from "./text.js";
+import { ageText, byId, fixed, make, reasonText, setFacts, setText, words } from "./text.js";
 
 const LANES = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
 const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
@@ -79,19 +79,12 @@ function renderLane(row, lane, limit, weights) {
 /** @param {any} evidence @param {any} advisory @param {number} ageS */
 function renderInput(evidence, advisory, ageS) {
   const timing = evidence?.timing;
-  const facts = [
-    ["Picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", evidence && !evidence.usable],
+  setFacts(byId("input"), [
+    ["Picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", Boolean(evidence && !evidence.usable)],
     ["Age", ageText(ageS), false],
-    ["Mask", evidence ? words(evidence.segmentation) : "–", evidence && evidence.segmentation !== "learned"],
+    ["Mask", evidence ? words(evidence.segmentation) : "–", Boolean(evidence && evidence.segmentation !== "learned")],
     ["Inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
-  ];
-  const list = byId("input");
-  if (list.children.length !== facts.length * 2) list.replaceChildren(...facts.flatMap(() => [make("dt"), make("dd")]));
-  facts.forEach(([name, value, bad], index) => {
-    setText(list.children[index * 2], String(name));
-    setText(list.children[index * 2 + 1], String(value));
-    list.children[index * 2 + 1].classList.toggle("bad", Boolean(bad));
-  });
+  ]);
 }
 
 /** @param {any} message @param {Set<number>} counting */
@@ -104,7 +97,7 @@ function renderTracks(message, counting) {
   list.replaceChildren(
     ...tracks.map((/** @type {any} */ track) => {
       const row = make("div"), state = track.immediate_danger ? "immediate" : track.accepted ? "accepted" : "tentative";
-      const known = track.motion === "unknown" ? "motion unknown" : track.motion;
+      const known = track.motion === "unknown" ? "" : track.motion;
       row.dataset.counts = String(counting.has(track.id));
       row.append(make("span", "", `#${track.id}`), make("span", "", track.label), make("span", "", fixed(track.confidence)));
       row.append(make("span", "", [state, track.held ? "held" : "", known].filter(Boolean).join(", ")));

@@ -1,0 +1,84 @@
+"""Late joiners get everything there is with its true age; a client that never reads costs nobody anything."""
+
+from __future__ import annotations
+
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Picture
+from paani.config import load_config
+from paani_services.dashboard.frames import decode_frame
+from paani_services.dashboard.hub import EVENT_KEY, Client, Event, Hub
+from paani_services.dashboard.settings import Lives, page_settings
+
+
+def taken(client: Client) -> dict[str, tuple[int, bytes]]:
+    found = {}
+    while (frame := client.slots.pop()) is not None:
+        key, header, body = decode_frame(frame)
+        found[key] = (header.age_ms, body)
+    return found
+
+
+def arming(seq: int) -> m.Arming:
+    return m.Arming(source_us=1, armed=False, seq=seq)
+
+
+async def test_a_late_joiner_gets_the_newest_with_its_age() -> None:
+    hub = Hub()
+    hub.put("operator/arming", arming(1), 1_000_000, 1_000_000)
+    hub.put("operator/arming", arming(2), 2_000_000, 2_000_000)
+    hub.tell(Event(2_500_000, "warn", "eye is gone"))
+    got = taken(hub.join(5_000_000))
+    age_ms, body = got["operator/arming"]
+    assert age_ms == 3000
+    assert msgspec.json.decode(body, type=m.Arming).seq == 2
+    assert got[EVENT_KEY][0] == 2500
+
+
+async def test_a_stalled_client_keeps_one_frame_per_key_and_the_other_gets_all() -> None:
+    hub = Hub()
+    stalled, healthy = hub.join(0), hub.join(0)
+    for seq in range(100):
+        hub.put("operator/arming", arming(seq), 0, 0)
+        got = taken(healthy)
+        assert msgspec.json.decode(got["operator/arming"][1], type=m.Arming).seq == seq
+    assert len(stalled.slots) == 1
+    assert stalled.slots.superseded == 99
+
+
+async def test_nothing_is_encoded_while_nobody_watches() -> None:
+    hub = Hub()
+    client = hub.join(0)
+    assert hub.watched.is_set()
+    hub.leave(client)
+    hub.put("operator/arming", arming(1), 0, 0)
+    assert not hub.watched.is_set()
+    assert len(client.slots) == 0
+
+
+async def test_a_picture_travels_as_its_bytes_with_its_header_beside() -> None:
+    hub = Hub()
+    client = hub.join(0)
+    header = m.PictureHeader(source_us=1, frame_seq=7, frame_epoch=3, width_px=4, height_px=2)
+    hub.put(keys.PICTURE.name, Picture(header, b"\xff\xd8jpeg"), 0, 40_000)
+    frame = client.slots.pop()
+    assert frame is not None
+    key, head, body = decode_frame(frame)
+    assert (key, head.age_ms, body) == ("camera/picture", 40, b"\xff\xd8jpeg")
+    assert msgspec.json.decode(head.picture, type=m.PictureHeader) == header
+
+
+def test_restarts_are_counted() -> None:
+    lives = Lives()
+    for alive in (True, True, False, True):
+        known = lives.hear("eye", alive=alive)
+    assert {life.service: life.starts for life in known.services}["eye"] == 2
+
+
+def test_the_page_names_the_mode_by_the_camera() -> None:
+    modes = {
+        s: page_settings(load_config(sets=(f"camera.source={s}",))).mode for s in ("sim", "webcam:1", "/tmp/v.mp4")
+    }
+    assert modes == {"sim": "sim", "webcam:1": "board", "/tmp/v.mp4": "replay"}

@@ -1,0 +1,150 @@
+"""The operator's word: a STOP latches over everything but a new arming, and an unclear latch is a STOP."""
+
+from __future__ import annotations
+
+import asyncio
+import stat
+from pathlib import Path
+
+import pytest
+
+from paani import messages as m
+from paani.clock import ManualClock
+from paani_services.dashboard import operator as op
+from paani_services.dashboard.console import LATCH_FILE, Console, read_latch, write_latch
+
+
+def applied(cause: m.ZeroCause, thrust: float = 0.0) -> m.ThrustApplied:
+    return m.ThrustApplied(
+        source_us=1, left=thrust, right=thrust, left_n=75 * thrust, right_n=75 * thrust, zero_cause=cause
+    )
+
+
+class Heard:
+    """Keeps what the console says, where the bus would carry it."""
+
+    def __init__(self) -> None:
+        self.words: list[m.Arming] = []
+
+    def put(self, message: m.Arming) -> m.Arming:
+        self.words.append(message)
+        return message
+
+
+def console(folder: Path) -> tuple[Console, Heard]:
+    heard = Heard()
+    return Console(heard, folder, ManualClock()), heard  # type: ignore[arg-type]  # the bus's place at the edge
+
+
+@pytest.mark.parametrize(
+    ("latch", "arm_at_start", "armed", "stopped"),
+    [
+        (None, False, False, False),
+        (None, True, True, False),
+        (op.CLEAR, True, True, False),
+        (op.STOPPED, True, False, True),
+        (op.STOPPED, False, False, True),
+        ("", True, False, True),
+        ("clear", True, False, True),
+        ("nonsense\n", True, False, True),
+    ],
+)
+def test_start(latch: str | None, arm_at_start: bool, armed: bool, stopped: bool) -> None:
+    state = op.at_start(latch, arm_at_start=arm_at_start)
+    assert (state.armed, state.stopped) == (armed, stopped)
+    word = op.arming(state, 5)
+    assert (word.armed, word.stopped) == (armed, stopped)
+
+
+def test_stop_holds_until_armed_again() -> None:
+    state = op.stop(op.arm(op.Operator()), 10)
+    assert (op.arming(state, 11).armed, op.arming(state, 11).stopped) == (False, True)
+    state = op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 12)
+    assert op.arming(state, 13).stopped
+    assert op.arming(op.arm(state), 14).armed
+
+
+def test_a_stop_is_confirmed_only_by_zero_for_want_of_arming() -> None:
+    state = op.stop(op.Operator(armed=True), 1_000)
+    for cause, thrust in ((m.ZeroCause.NONE, 0.1), (m.ZeroCause.TIMEOUT, 0.0), (m.ZeroCause.PULSE_LOST, 0.0)):
+        state = op.hear_applied(state, applied(cause, thrust), 20_000)
+        assert state.confirmed_us == 0
+    state = op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 51_000)
+    assert state.confirmed_us - state.asked_us == 50_000
+    assert op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 90_000) == state
+
+
+def test_pressing_again_does_not_shorten_the_measured_time() -> None:
+    state = op.stop(op.stop(op.Operator(armed=True), 1_000), 40_000)
+    assert (state.asked_us, state.stops) == (1_000, 2)
+
+
+async def test_stop_is_spoken_before_it_is_written_and_outlives_the_process(tmp_path: Path) -> None:
+    first, heard = console(tmp_path)
+    await first.restore(arm_at_start=True)
+    assert first.state.armed
+    asking = asyncio.create_task(first.stop())
+    await asyncio.sleep(0)
+    assert heard.words[-1].stopped
+    assert await asking
+    again, _ = console(tmp_path)
+    await again.restore(arm_at_start=True)
+    assert again.state.stopped
+    assert not again.state.armed
+
+
+async def test_arming_releases_the_latch_on_disk(tmp_path: Path) -> None:
+    first, heard = console(tmp_path)
+    await first.stop()
+    assert await first.arm()
+    assert (heard.words[-1].armed, heard.words[-1].stopped) == (True, False)
+    assert await asyncio.to_thread(read_latch, tmp_path / LATCH_FILE) == op.CLEAR
+
+
+async def test_a_stop_during_arming_wins(tmp_path: Path) -> None:
+    first, heard = console(tmp_path)
+    await first.stop()
+    arming = asyncio.create_task(first.arm())
+    await asyncio.sleep(0)
+    stopping = asyncio.create_task(first.stop())
+    assert not await arming
+    assert await stopping
+    assert first.state.stopped
+    assert not any(word.armed for word in heard.words)
+    assert await asyncio.to_thread(read_latch, tmp_path / LATCH_FILE) == op.STOPPED
+
+
+async def test_a_disk_that_refuses_stops_and_does_not_arm(tmp_path: Path) -> None:
+    first, heard = console(tmp_path / "missing")
+    assert not await first.stop()
+    assert heard.words[-1].stopped
+    assert not await first.arm()
+    assert first.state.stopped
+
+
+async def test_the_last_word_is_that_nobody_arms(tmp_path: Path) -> None:
+    first, heard = console(tmp_path)
+    await first.restore(arm_at_start=True)
+    speaking = asyncio.create_task(first.speak_always())
+    await asyncio.sleep(0.01)
+    assert heard.words[-1].armed
+    speaking.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await speaking
+    assert not heard.words[-1].armed
+
+
+def test_the_latch_file_is_private_and_whole(tmp_path: Path) -> None:
+    path = tmp_path / LATCH_FILE
+    assert write_latch(path, op.STOPPED)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert [file.name for file in tmp_path.iterdir()] == [LATCH_FILE]
+
+
+def test_an_unreadable_latch_is_a_stop(tmp_path: Path) -> None:
+    path = tmp_path / LATCH_FILE
+    path.write_bytes(b"\xff\xfe")
+    assert op.at_start(read_latch(path), arm_at_start=True).stopped
+    path.unlink()
+    path.mkdir()
+    assert op.at_start(read_latch(path), arm_at_start=True).stopped

@@ -1,0 +1,78 @@
+"""Bad requests name the field at fault; strangers are told from our own page."""
+
+from __future__ import annotations
+
+import pytest
+
+from paani_services.dashboard.requests import (
+    ArmRequest,
+    BadRequestError,
+    NoQuery,
+    SnapshotQuery,
+    is_our_host,
+    is_same_origin,
+    read_body,
+    read_query,
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        (b"", "body"),
+        (b"{", "body"),
+        (b"[]", "body"),
+        (b"\xff", "body"),
+        (b"{}", "held_ms"),
+        (b'{"held_ms":999}', "held_ms"),
+        (b'{"held_ms":5001}', "held_ms"),
+        (b'{"held_ms":"1500"}', "held_ms"),
+        (b'{"held_ms":NaN}', "body"),
+        (b'{"held_ms":1500,"force":true}', "force"),
+    ],
+)
+def test_a_bad_arm_request_names_its_field(body: bytes, field: str) -> None:
+    with pytest.raises(BadRequestError) as caught:
+        read_body(body, ArmRequest)
+    assert caught.value.field == field
+
+
+def test_a_held_control_is_enough() -> None:
+    assert read_body(b'{"held_ms":1000}', ArmRequest).held_ms == 1000
+
+
+@pytest.mark.parametrize(
+    ("query", "field"), [({"max_age_s": "soon"}, "max_age_s"), ({"max_age_s": "0"}, "max_age_s"), ({"w": "9"}, "w")]
+)
+def test_a_bad_query_names_its_parameter(query: dict[str, str], field: str) -> None:
+    with pytest.raises(BadRequestError) as caught:
+        read_query(query, SnapshotQuery)
+    assert caught.value.field == field
+
+
+def test_good_queries() -> None:
+    assert read_query({"max_age_s": "2.5"}, SnapshotQuery).max_age_s == 2.5
+    assert read_query({}, NoQuery) == NoQuery()
+
+
+@pytest.mark.parametrize(
+    ("host", "ours"),
+    [
+        ("127.0.0.1:8043", True),
+        ("localhost:8043", True),
+        ("[::1]:8043", True),
+        ("192.168.4.1:8043", True),
+        ("otter.lan:8043", True),
+        ("elsewhere.example:8043", False),
+        ("", False),
+    ],
+)
+def test_a_name_that_is_not_ours_is_refused(host: str, ours: bool) -> None:
+    assert is_our_host(host, "otter.lan") is ours
+
+
+def test_same_origin_is_exact() -> None:
+    assert is_same_origin("http://127.0.0.1:8043", "127.0.0.1:8043")
+    assert not is_same_origin("http://127.0.0.1:8044", "127.0.0.1:8043")
+    assert not is_same_origin("null", "127.0.0.1:8043")
+    assert not is_same_origin(None, "127.0.0.1:8043")
