@@ -72,8 +72,7 @@ async def test_a_picture_travels_as_its_bytes_with_its_header_beside() -> None:
 
 def test_restarts_are_counted() -> None:
     lives = Lives()
-    for alive in (True, True, False, True):
-        known = lives.hear("eye", alive=alive)
+    known = [lives.hear("eye", alive=alive) for alive in (True, True, False, True)][-1]
     assert {life.service: life.starts for life in known.services}["eye"] == 2
 
 

@@ -1,0 +1,112 @@
+"""Headless Chromium, and a boat that speaks on the bus with frames of known colours."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+from collections.abc import AsyncIterator
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus
+from paani.clock import WallClock
+from tests.conftest import OpenAs
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+PICTURE_BGR = (90, 70, 50)
+BOX = (0.125, 0.25, 0.375, 0.5)
+MASK_EDGE = 0.5  # water to the left, obstacle to the right
+PERIOD_S = 0.2
+
+
+class Boat:
+    """Publishes picture, mask, evidence, tracks and advice; the ids agree unless `astray` shifts them."""
+
+    def __init__(self, buses: dict[str, Bus]) -> None:
+        self._clock = WallClock()
+        self._pictures = buses["camera"].picture_publisher(keys.PICTURE)
+        self._masks = buses["perception"].picture_publisher(keys.MASK)
+        self._evidence = buses["perception"].publisher(keys.EVIDENCE)
+        self._tracks = buses["advisor"].publisher(keys.TRACKS)
+        self._advisory = buses["advisor"].publisher(keys.ADVISORY)
+        self._applied = buses["plant"].publisher(keys.THRUST_APPLIED)
+        self.arming = buses["plant"].latest(keys.ARMING)
+        picture = np.full((240, 320, 3), PICTURE_BGR, np.uint8)
+        mask = np.zeros((64, 80), np.uint8)
+        mask[:, round(80 * MASK_EDGE) :] = 1
+        self._jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+        self._png = cv2.imencode(".png", mask)[1].tobytes()
+        self.seq = 0
+        self.astray = 0
+
+    async def speak(self) -> None:
+        """Speak until cancelled."""
+        while True:
+            self.say()
+            await asyncio.sleep(PERIOD_S)
+
+    def say(self) -> None:
+        now_us, self.seq = self._clock.now_us(), self.seq + 1
+        picture = m.PictureHeader(source_us=now_us, frame_seq=self.seq, frame_epoch=1, width_px=320, height_px=240)
+        self._pictures.put_picture(picture, self._jpeg)
+        judged = self.seq + self.astray
+        header = msgspec.structs.replace(picture, frame_seq=judged, width_px=80, height_px=64, media_type="image/png")
+        self._masks.put_picture(header, self._png)
+        found = m.Detection(label=m.Label.BUOY, confidence=0.8, box_xyxy=BOX)
+        self._evidence.put(
+            m.Evidence(
+                source_us=now_us, frame_seq=judged, frame_epoch=1, width_px=320, height_px=240, usable=True,
+                detections=(found,), segmentation=m.SegmentationSource.LEARNED, navigation_eligible=True,
+            )
+        )  # fmt: skip
+        track = m.Track(
+            id=4, label=m.Label.BUOY, hazard=m.Hazard.MARKER, confidence=0.8, box_xyxy=BOX, hits=3, confirmed=True,
+            immediate_danger=False, accepted=True, held=False, age_s=1.0, urgency=0.0,
+        )  # fmt: skip
+        self._tracks.put(m.Tracks(source_us=now_us, frame_seq=judged, frame_epoch=1, tracks=(track,)))
+        clear = m.LaneRisk(risk=0.25, non_water=0.4, uncertainty=0.2, clear_width=0.9, blocked=False)
+        blocked = m.LaneRisk(risk=0.8, non_water=0.9, obstacle=0.5, uncertainty=0.2, blocked=True, track_ids=(4,))
+        self._advisory.put(
+            m.Advisory(
+                source_us=now_us, direction=m.Direction.RIGHT, reason=m.Reason.CENTER_RISK, left=blocked,
+                center=blocked, right=clear, contributing_track_ids=(4,), frame_seq=judged, frame_epoch=1,
+                explanation="Turn right: centre risk 0.80 (limit 0.48); left 0.80, right 0.25 (limit 0.58).",
+            )
+        )  # fmt: skip
+        armed = self.arming.value is not None and self.arming.value.armed
+        cause, thrust = (m.ZeroCause.NONE, 0.1) if armed else (m.ZeroCause.NOT_ARMED, 0.0)
+        self._applied.put(
+            m.ThrustApplied(
+                source_us=now_us, left=thrust, right=thrust, left_n=75 * thrust, right_n=75 * thrust, zero_cause=cause
+            )
+        )
+
+
+@pytest.fixture
+async def boat(open_as: OpenAs) -> AsyncIterator[Boat]:
+    buses = {user: await open_as(user) for user in ("camera", "perception", "advisor", "plant")}
+    boat = Boat(buses)
+    speaking = asyncio.create_task(boat.speak())
+    yield boat
+    speaking.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await speaking
+
+
+@pytest.fixture
+async def browser() -> AsyncIterator[Any]:
+    playwright = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no Chromium on this machine")
+    async with playwright.async_playwright() as driver:
+        browser = await driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        await browser.close()

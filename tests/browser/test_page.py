@@ -1,0 +1,209 @@
+"""The page in a real browser, on a real bus: overlays sit on their own frame, STOP latches, silence is red (P1)."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from paani.config import Config
+from tests.browser.conftest import BOX, MASK_EDGE, PICTURE_BGR, Boat
+from tests.conftest import Spawn
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+WAIT_S = 20.0
+TOLERANCE = 14
+WATER_RGBA, OBSTACLE_RGBA = (23, 184, 214, 66), (242, 140, 30, 100)
+ACCEPTED_RGB = (255, 180, 84)
+PIXEL = """([x, y]) => {
+  const c = document.querySelector("#camera");
+  return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
+}"""
+
+
+class Watched:
+    """A page, and everything it complained of or asked of other hosts."""
+
+    def __init__(self, page: Any, origin: str) -> None:
+        self.page, self.complaints = page, []
+        self.strangers: list[str] = []
+        page.on("console", lambda line: self.complaints.append(line.text) if line.type == "error" else None)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self._judge(request.url, origin))
+
+    complaints: list[str]
+
+    def _judge(self, url: str, origin: str) -> None:
+        if not url.startswith((origin, "blob:", "data:")):
+            self.strangers.append(url)
+
+
+async def watch(browser: Any, config: Config, width: int = 1440, height: int = 900) -> Watched:
+    origin = f"http://127.0.0.1:{config.dashboard.port}"
+    page = await browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
+    watched = Watched(page, origin)
+    await page.goto(origin)
+    return watched
+
+
+async def overlay(page: Any) -> dict[str, int | None]:
+    return dict(await page.evaluate("({...paani.overlay})"))
+
+
+def blend(rgba: tuple[int, int, int, int]) -> tuple[float, ...]:
+    """The picture's colour under a tint."""
+    share = rgba[3] / 255
+    return tuple(p * (1 - share) + t * share for p, t in zip(PICTURE_BGR[::-1], rgba[:3], strict=True))
+
+
+def is_colour(pixel: list[int], colour: tuple[float, ...]) -> bool:
+    return all(abs(a - b) <= TOLERANCE for a, b in zip(pixel, colour, strict=True))
+
+
+async def test_the_overlay_lies_on_its_own_frame(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    async with spawn("dashboard"):
+        watched = await watch(browser, config)
+        page = watched.page
+        await until(page, "paani.overlay.mask_seq !== null")
+        for _ in range(10):
+            shown = await overlay(page)
+            assert len({shown["frame_seq"], shown["picture_seq"], shown["mask_seq"], shown["evidence_seq"]}) == 1
+            await asyncio.sleep(0.1)
+        await page.screenshot(path=tmp_path / "page.png")
+        for layer in ("3", "4"):
+            await page.keyboard.press(layer)
+        await page.wait_for_timeout(300)
+
+        for x, tint in ((MASK_EDGE - 0.02, WATER_RGBA), (MASK_EDGE + 0.02, OBSTACLE_RGBA)):
+            for y in (0.1, 0.9):
+                pixel = await page.evaluate(PIXEL, [x, y])
+                assert is_colour(pixel, blend(tint)), (x, y, pixel)
+        x1, y1, x2, y2 = BOX
+        for x, y in ((x1, 0.4), (x2, 0.4), (0.3, y2)):
+            assert is_colour(await page.evaluate(PIXEL, [x, y]), ACCEPTED_RGB), (x, y)
+        for x, y in ((x1 + 0.02, y1 + 0.06), (x2 + 0.02, 0.4), (0.3, y2 + 0.03)):
+            assert is_colour(await page.evaluate(PIXEL, [x, y]), blend(WATER_RGBA)), (x, y)
+
+        assert await page.inner_text("#advice-word") == "RIGHT"
+        assert "centre risk 0.80" in await page.inner_text("#explanation")
+        assert await page.evaluate("[...document.querySelectorAll('.lane .verdict')].map(e => e.textContent)") == [
+            "blocked", "blocked", "clear",
+        ]  # fmt: skip
+        assert (tmp_path / "page.png").stat().st_size > 20_000
+        assert watched.complaints == []
+        assert watched.strangers == []
+
+
+async def test_evidence_of_another_frame_is_left_out(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+    boat.astray = 500
+    async with spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await until(page, "paani.overlay.picture_seq > 5")
+        shown = await overlay(page)
+        assert shown["evidence_seq"] is None
+        assert shown["mask_seq"] is None
+        for x, y in ((0.3, 0.9), (0.7, 0.9), (BOX[0], 0.4), (0.5, 0.97)):
+            assert is_colour(await page.evaluate(PIXEL, [x, y]), PICTURE_BGR[::-1]), (x, y)
+        assert "overlay left out" in await page.inner_text("#camera-note")
+
+
+async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+    async with spawn("dashboard"):
+        watched = await watch(browser, config)
+        page = watched.page
+        await until(page, "paani.link === 'live'")
+        await hold_to_arm(page)
+        await said(boat, armed=True, stopped=False)
+        await page.keyboard.press("Space")
+        await said(boat, armed=False, stopped=True)
+        await until(page, "document.querySelector('#order-detail').textContent.startsWith('plant at zero in')")
+        assert watched.complaints == []
+    await until(page, "paani.link === 'lost'")
+    assert (await page.inner_text("#link-word")).startswith("LOST")
+    frame = "getComputedStyle(document.body, '::after').borderTopWidth"
+    assert await page.evaluate(frame) == "6px"
+
+    boat.arming.value = None
+    async with spawn("dashboard", "dashboard.arm_at_start=true"):
+        await said(boat, armed=False, stopped=True)
+        await until(page, "paani.link === 'live'")
+        await hold_to_arm(page)
+        await said(boat, armed=True, stopped=False)
+
+
+@pytest.mark.parametrize("held_s", [0.3, 5.4])
+async def test_arming_wants_a_hold_that_has_not_expired(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config, held_s: float
+) -> None:
+    async with spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await until(page, "!document.querySelector('#arm').disabled")
+        await hold_to_arm(page, held_s)
+        await asyncio.sleep(0.5)
+        assert boat.arming.value is not None
+        assert not boat.arming.value.armed
+
+
+async def test_a_phone_shows_everything_without_scrolling_sideways(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("dashboard"):
+        page = (await watch(browser, config, 360, 740)).page
+        await until(page, "paani.overlay.mask_seq !== null")
+        assert await page.evaluate("document.documentElement.scrollWidth") == 360
+        stop = await page.locator("#stop").bounding_box()
+        assert stop["y"] + stop["height"] <= 740
+        await page.locator("#stop").click()
+        await said(boat, armed=False, stopped=True)
+
+
+async def test_the_choice_of_frame(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+    """The pure chooser, in the engine that runs it."""
+    async with spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        choose = """async ([pictures, evidence, masks]) => {
+          const { choose } = await import("/static/match.js");
+          const c = choose(pictures, (id) => evidence.includes(id), (id) => masks.includes(id));
+          return [c.id, c.evidence, c.mask];
+        }"""
+        cases: list[tuple[list[str], list[str], list[str], list[object]]] = [
+            ([], [], [], [None, False, False]),
+            (["3", "2", "1"], [], ["3"], ["3", False, False]),
+            (["3", "2", "1"], ["2", "1"], ["2", "1"], ["2", True, True]),
+            (["3", "2", "1"], ["3", "2"], ["2"], ["2", True, True]),
+            (["4", "3", "2"], ["4", "3", "2"], ["2"], ["4", True, False]),
+            (["3"], ["9"], ["9"], ["3", False, False]),
+        ]
+        for pictures, evidence, masks, expected in cases:
+            assert await page.evaluate(choose, [pictures, evidence, masks]) == expected
+
+
+async def hold_to_arm(page: Any, held_s: float = 1.3) -> None:
+    await until(page, "!document.querySelector('#arm').disabled")
+    box = await page.locator("#arm").bounding_box()
+    await page.mouse.move(box["x"] + 20, box["y"] + 20)
+    await page.mouse.down()
+    await page.wait_for_timeout(held_s * 1000)
+    await page.mouse.up()
+
+
+async def said(boat: Boat, *, armed: bool, stopped: bool) -> None:
+    """Wait until the operator's word on the bus is this."""
+    async with asyncio.timeout(10):
+        while True:
+            word = boat.arming.value
+            if word is not None and (word.armed, word.stopped) == (armed, stopped):
+                return
+            await asyncio.sleep(0.02)
+
+
+async def until(page: Any, expression: str) -> None:
+    """Wait until an expression is true; the page's policy forbids Playwright's own waiting, which evaluates text."""
+    async with asyncio.timeout(WAIT_S):
+        while not await page.evaluate(expression):
+            await asyncio.sleep(0.05)

@@ -1,0 +1,152 @@
+"""The web server as a stranger meets it: what it serves, what it refuses, what it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+import socket
+import sys
+from collections.abc import AsyncIterator
+
+import aiohttp
+import pytest
+
+from paani import keys
+from paani.config import Config
+from tests.browser.conftest import Boat
+from tests.conftest import OpenAs, Spawn
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
+
+HELD = {"held_ms": 1500}
+
+
+@pytest.fixture
+async def client(config: Config) -> AsyncIterator[aiohttp.ClientSession]:
+    async with aiohttp.ClientSession(f"http://127.0.0.1:{config.dashboard.port}") as client:
+        yield client
+
+
+async def token_of(client: aiohttp.ClientSession) -> str:
+    async with client.get("/") as page:
+        found = re.search(r'paani-arm-token" content="([^"]+)"', await page.text())
+    assert found is not None
+    return found[1]
+
+
+async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> None:
+    async with spawn("dashboard"):
+        for path, media_type in (("/", "text/html"), ("/static/main.js", "text/javascript")):
+            async with client.get(path) as answer:
+                assert answer.status == 200
+                assert answer.content_type == media_type
+                assert answer.headers["Cache-Control"] == "no-cache"
+                policy = answer.headers["Content-Security-Policy"]
+                assert policy.startswith("default-src 'self'; img-src 'self' blob: data:")
+                assert "unsafe" not in policy
+        for path in ("/static/../service.py", "/static/%2e%2e%2fservice.py", "/static/absent.js", "/etc/passwd"):
+            async with client.get(path) as answer:
+                assert answer.status == 404
+        async with client.get("/api/topics") as answer:
+            assert [row["name"] for row in await answer.json()] == [topic.name for topic in keys.TOPICS]
+
+
+async def test_arming_wants_our_page_its_token_and_a_whole_request(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    async with spawn("dashboard"):
+        ours = {"Origin": f"http://127.0.0.1:{config.dashboard.port}", "X-Paani-Token": await token_of(client)}
+        cases: list[tuple[dict[str, str], object, int, str]] = [
+            ({}, HELD, 403, "Origin"),
+            ({**ours, "Origin": "http://elsewhere.example"}, HELD, 403, "Origin"),
+            ({**ours, "X-Paani-Token": "guess"}, HELD, 403, "X-Paani-Token"),
+            (ours, {"held_ms": 10}, 400, "held_ms"),
+            (ours, {"held_ms": 1500, "speed": 9}, 400, "speed"),
+            ({**ours, "Host": "elsewhere.example"}, HELD, 403, "Host"),
+        ]
+        for headers, body, status, field in cases:
+            async with client.post("/api/arm", json=body, headers=headers) as answer:
+                assert (answer.status, (await answer.json())["field"]) == (status, field)
+        await asyncio.sleep(0.3)
+        assert boat.arming.value is not None
+        assert not boat.arming.value.armed
+        async with client.post("/api/arm", json=HELD, headers=ours) as answer:
+            assert answer.status == 200
+
+
+async def test_anybody_may_stop_with_any_body(client: aiohttp.ClientSession, spawn: Spawn, boat: Boat) -> None:
+    async with spawn("dashboard", "dashboard.arm_at_start=true"):
+        async with client.post("/api/stop", data=b"\xff not json", headers={"Host": "elsewhere.example"}) as answer:
+            assert (await answer.json()) == {"stopped": True, "kept": True}
+        async with asyncio.timeout(5):
+            while boat.arming.value is None or not boat.arming.value.stopped:
+                await boat.arming.next()
+        assert not boat.arming.value.armed
+
+
+async def test_snapshot(client: aiohttp.ClientSession, spawn: Spawn, boat: Boat) -> None:
+    async with spawn("dashboard"):
+        async with asyncio.timeout(10):
+            while True:
+                async with client.get("/snapshot.jpg?max_age_s=2") as answer:
+                    if answer.status == 200:
+                        assert (await answer.read()).startswith(b"\xff\xd8")
+                        break
+                await asyncio.sleep(0.1)
+        async with client.get("/snapshot.jpg?max_age_s=soon") as answer:
+            assert (answer.status, (await answer.json())["field"]) == (400, "max_age_s")
+
+
+async def test_a_client_that_never_reads_delays_nobody(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    origin = f"http://127.0.0.1:{config.dashboard.port}"
+    async with spawn("dashboard"):
+        with socket.create_connection(("127.0.0.1", config.dashboard.port)) as stalled:
+            stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            stalled.sendall(
+                f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{config.dashboard.port}\r\nOrigin: {origin}\r\n"
+                "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+            )
+            async with client.ws_connect("/ws", origin=origin) as watching:
+                frames = 0
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(3):
+                        while True:
+                            frames += b"camera/picture" in (await watching.receive_bytes())[:32]
+                assert frames >= 10
+
+
+async def test_another_page_may_not_watch(client: aiohttp.ClientSession, spawn: Spawn) -> None:
+    async with spawn("dashboard"):
+        with pytest.raises(aiohttp.WSServerHandshakeError) as caught:
+            await client.ws_connect("/ws", origin="http://elsewhere.example")
+        assert caught.value.status == 403
+
+
+async def test_headless_speaks_and_serves_nothing(spawn: Spawn, boat: Boat, config: Config) -> None:
+    async with spawn("dashboard", "dashboard.serve=false", "dashboard.arm_at_start=true"):
+        async with asyncio.timeout(5):
+            assert (await boat.arming.next()).armed
+        with pytest.raises(ConnectionRefusedError):
+            await asyncio.open_connection("127.0.0.1", config.dashboard.port)
+    async with asyncio.timeout(5):
+        while boat.arming.value is None or boat.arming.value.armed:
+            await boat.arming.next()
+
+
+async def test_busy_port_is_one_line_and_exit_2(open_as: OpenAs, private_sets: tuple[str, ...], config: Config) -> None:
+    await open_as("observer")
+    with socket.create_server(("127.0.0.1", config.dashboard.port)):
+        arguments = [word for setting in private_sets for word in ("--set", setting)]
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "paani", "dashboard", *arguments, stderr=asyncio.subprocess.PIPE
+        )
+        async with asyncio.timeout(30):
+            _, errors = await process.communicate()
+    assert process.returncode == 2
+    lines = errors.decode().splitlines()
+    assert len(lines) == 1
+    assert "dashboard.port" in lines[0]
