@@ -110,7 +110,7 @@ def export(
 
 def write_onnx(net: nn.Module, contract: Model, path: Path) -> None:
     """Export in evaluation mode with static shapes, and check the file's structure."""
-    net.eval().to("cpu", memory_format=torch.contiguous_format)  # type: ignore[call-overload]
+    net.eval().to("cpu", memory_format=torch.contiguous_format)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the TorchScript exporter announces its age and every traced constant
         torch.onnx.export(

@@ -119,6 +119,20 @@ def test_no_orphan_survives_a_killed_supervisor(tmp_path: Path, private_sets: tu
     assert up.children() == {}
 
 
+def test_what_cannot_be_kept_alive_ends_all(
+    tmp_path: Path, private_sets: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A broken installation: the process crashes at each start, and the reason is told once."""
+    (tmp_path / "onnxruntime.py").write_text("raise ImportError('this installation is broken')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    up = Up(tmp_path, *words_of(private_sets, "--headless"))
+    assert up.process.wait(60) == 1, (up.out, up.errors)
+    assert len(up.errors) == 1
+    assert "perception ended 5 times" in up.errors[0]
+    assert "this installation is broken" in up.errors[0]
+    assert up.children() == {}
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [

@@ -33,7 +33,10 @@ def water(left: float, center: float, right: float) -> m.Evidence:
 
 
 def play(
-    frames: list[m.Evidence], config: Config = PAANI, period_s: float = 0.2, state: AdvisorState | None = None,
+    frames: list[m.Evidence],
+    config: Config = PAANI,
+    period_s: float = 0.2,
+    state: AdvisorState | None = None,
     first_seq: int = 0,
 ) -> tuple[AdvisorState, list[m.Advisory], list[m.Tracks]]:
     """Advise on frames that come `period_s` apart, each 0.1 s after its capture."""

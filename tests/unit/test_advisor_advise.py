@@ -144,9 +144,7 @@ def test_j11_everything_that_decided_is_in_the_advisory() -> None:
 def test_j12_the_explanation_is_made_last_from_the_same_numbers() -> None:
     """J12: after hysteresis and after the age override, and it quotes the lanes that decided."""
     state, advice, _ = play([water(0.10, 0.50, 0.40), CLEAR])
-    assert advice[0].explanation == (
-        "Turn left: centre risk 0.50 (limit 0.48); left 0.10, right 0.40 (limit 0.58)."
-    )
+    assert advice[0].explanation == ("Turn left: centre risk 0.50 (limit 0.48); left 0.10, right 0.40 (limit 0.58).")
     assert advice[1].explanation == (
         "Turn left: keeping the turn until the way ahead stays clear, centre risk 0.05 (limit 0.48)."
     )
@@ -214,10 +212,9 @@ def test_any_evidence_gives_an_advisory_that_survives_the_wire(frames: list[tupl
     st.floats(0.0, 0.6),
     st.floats(0.0, 0.1),
 )
-def test_more_evidence_of_danger_never_lowers_a_risk(
-    detections: list[m.Detection], risk: float, more: float
-) -> None:
+def test_more_evidence_of_danger_never_lowers_a_risk(detections: list[m.Detection], risk: float, more: float) -> None:
     """J4: risk is monotone in the water's part and in the number of boxes."""
+
     def center_risk(water_risk: float, boxes: list[m.Detection]) -> float:
         frame = msgspec.structs.replace(water(0.1, water_risk, 0.1), detections=tuple(boxes))
         return play([frame] * 2)[1][1].center.risk

@@ -39,9 +39,7 @@ def test_v14_a_side_below_its_limit_may_still_be_occupied() -> None:
     risks = (0.6615, 0.6025, 0.4489)
     moored = box(BUOY, (0.70, 0.56, 0.95, 0.66), 0.45)
     obstacle = 0.45 * (0.6 * (0.66 - 0.30) / 0.70 + 0.4 * 0.10 / 0.50)
-    evidence = msgspec.structs.replace(
-        water(risks[0], risks[1], risks[2] - 0.65 * obstacle), detections=(moored,)
-    )
+    evidence = msgspec.structs.replace(water(risks[0], risks[1], risks[2] - 0.65 * obstacle), detections=(moored,))
     _, advice, _ = play([evidence])
     assert (advice[0].left.risk, advice[0].center.risk, advice[0].right.risk) == pytest.approx(risks, abs=1e-9)
     assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SIDE_UNOCCUPIED)
@@ -108,9 +106,7 @@ def test_an_edge_incursion_never_turns_towards_it() -> None:
 
 
 def test_blocking_water_is_no_edge_incursion() -> None:
-    evidence = msgspec.structs.replace(
-        CLEAR, center=lane(0.50), detections=(box(PIER, (0.30, 0.30, 0.40, 0.62), 0.9),)
-    )
+    evidence = msgspec.structs.replace(CLEAR, center=lane(0.50), detections=(box(PIER, (0.30, 0.30, 0.40, 0.62), 0.9),))
     _, advice, _ = play([evidence] * 2)
     assert advice[1].direction is D.RIGHT
 

@@ -78,9 +78,12 @@ def test_g3_hold() -> None:
 
 def test_g6_g7_smoothing() -> None:
     """G6: 0.35 of the box before; G7: 0.65 of the score before."""
-    _, _, tracks = play([
-        seeing(box(BUOY, (0.40, 0.40, 0.60, 0.60), 0.6)), seeing(box(BUOY, (0.42, 0.40, 0.62, 0.60), 0.9)),
-    ])
+    _, _, tracks = play(
+        [
+            seeing(box(BUOY, (0.40, 0.40, 0.60, 0.60), 0.6)),
+            seeing(box(BUOY, (0.42, 0.40, 0.62, 0.60), 0.9)),
+        ]
+    )
     track = tracks[1].tracks[0]
     assert track.box_xyxy == pytest.approx((0.413, 0.40, 0.613, 0.60))
     assert track.confidence == pytest.approx(0.65 * 0.6 + 0.35 * 0.9)
@@ -103,27 +106,37 @@ def test_a_label_may_change_without_losing_the_track() -> None:
 
 def test_h1_growth() -> None:
     """H1: sqrt(area) from 0.20 to 0.216 in 0.2 s is 0.08/s: half of full scale."""
-    _, _, tracks = play([
-        seeing(box(BUOY, (0.4, 0.4, 0.6, 0.6))), seeing(box(BUOY, (0.392, 0.392, 0.608, 0.608))),
-    ])
+    _, _, tracks = play(
+        [
+            seeing(box(BUOY, (0.4, 0.4, 0.6, 0.6))),
+            seeing(box(BUOY, (0.392, 0.392, 0.608, 0.608))),
+        ]
+    )
     assert tracks[1].tracks[0].urgency == pytest.approx(0.5)
 
 
 def test_h2_centering_and_h3_maximum() -> None:
     """H2: 0.02 nearer to the centre in 0.2 s is 0.10/s: half of full scale; H3: the larger of both counts."""
-    _, _, tracks = play([
-        seeing(box(BUOY, (0.2, 0.4, 0.4, 0.6))), seeing(box(BUOY, (0.22, 0.4, 0.42, 0.6))),
-        seeing(box(BUOY, (0.19, 0.4, 0.39, 0.6))),
-    ])
+    _, _, tracks = play(
+        [
+            seeing(box(BUOY, (0.2, 0.4, 0.4, 0.6))),
+            seeing(box(BUOY, (0.22, 0.4, 0.42, 0.6))),
+            seeing(box(BUOY, (0.19, 0.4, 0.39, 0.6))),
+        ]
+    )
     assert tracks[1].tracks[0].urgency == pytest.approx(0.5)
     assert tracks[2].tracks[0].urgency == pytest.approx(0.0, abs=1e-9)  # moving away is no urgency
 
 
 def test_h4_h5_held_urgency_decays() -> None:
     """H4: exp(-dt / 1 s) while held; H5: a miss adds no motion sample."""
-    _, _, tracks = play([
-        seeing(box(BUOY, (0.2, 0.4, 0.4, 0.6))), seeing(box(BUOY, (0.22, 0.4, 0.42, 0.6))), *[CLEAR] * 5,
-    ])
+    _, _, tracks = play(
+        [
+            seeing(box(BUOY, (0.2, 0.4, 0.4, 0.6))),
+            seeing(box(BUOY, (0.22, 0.4, 0.42, 0.6))),
+            *[CLEAR] * 5,
+        ]
+    )
     assert tracks[6].tracks[0].urgency == pytest.approx(0.5 * math.exp(-1.0))
     assert tracks[6].tracks[0].hits == 2
 

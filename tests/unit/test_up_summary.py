@@ -120,6 +120,8 @@ def test_each_stage_is_the_difference_of_its_stamps(stage: str, expected_ms: flo
 def test_rates_decisions_and_reasons_are_counted_since_all_were_alive() -> None:
     summary = Summary()
     chain(summary, captured_us=0, seq=0)
+    for seq in (0, 5):
+        summary.feed(m.Arming(source_us=0, armed=True, seq=seq, producer="dashboard"))
     summary.begin(5 * S)
     chain(summary, captured_us=6 * S, seq=1)
     summary.count_output("eye", 20)
@@ -131,6 +133,7 @@ def test_rates_decisions_and_reasons_are_counted_since_all_were_alive() -> None:
     assert got.decisions == {d.value: 2 * (d is m.Direction.STRAIGHT) for d in m.Direction}
     assert got.reasons == {r.value: 2 * (r is m.Reason.CENTER_CLEAR) for r in m.Reason}
     assert got.latency_ms["advisor"].samples == 1
+    assert got.drops == {}
 
 
 def test_what_was_promised_is_there_even_when_nothing_happened() -> None:

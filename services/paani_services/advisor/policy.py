@@ -97,9 +97,7 @@ def _around(
     return TURNS[side], _why_blocked(lanes["center"], vessel, policy)
 
 
-def _better_side(
-    state: PolicyState, lanes: dict[str, LaneRisk], policy: PolicyConfig
-) -> tuple[str, Reason | None]:
+def _better_side(state: PolicyState, lanes: dict[str, LaneRisk], policy: PolicyConfig) -> tuple[str, Reason | None]:
     """The lower risk; a tie keeps the side already taken, else goes to starboard (resolution 13)."""
     better = "left" if lanes["left"].risk < lanes["right"].risk else "right"
     gain = abs(lanes["left"].risk - lanes["right"].risk)

@@ -103,9 +103,7 @@ def water_of(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
     )
 
 
-def components(
-    evidence: Evidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config
-) -> Components:
+def components(evidence: Evidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> Components:
     """Everything R_j of one corridor is made of."""
     span = lane_span(lane, config.perception.corridors)
     water = water_of(evidence, lane, config)

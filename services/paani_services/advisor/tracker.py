@@ -119,9 +119,7 @@ def associate(
         if t not in pairs and d not in used:
             pairs[t] = d
             used.add(d)
-    ambiguous = frozenset(
-        d for t, d in pairs.items() if sum(ct == t or cd == d for _, ct, cd in candidates) > 1
-    )
+    ambiguous = frozenset(d for t, d in pairs.items() if sum(ct == t or cd == d for _, ct, cd in candidates) > 1)
     return pairs, ambiguous
 
 

@@ -94,9 +94,7 @@ async def _watch(
         worker.submit(camera.close)
 
 
-async def _replay(
-    bus: Bus, clock: Clock, settings: CameraConfig, output: Output, worker: ThreadPoolExecutor
-) -> None:
+async def _replay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output, worker: ThreadPoolExecutor) -> None:
     """A recording in its own order; a file that is no picture goes out as it is, to be refused by perception."""
     frames = play(Path(settings.source), settings)
     frame = await _off_loop(worker, next, frames, None)
@@ -128,8 +126,13 @@ def _encoded(frame: Frame, quality: int) -> bytes:
 def _header(bgr: Bytes | None, source_us: int, frame: Frame | None = None) -> m.PictureHeader:
     height, width = bgr.shape[:2] if bgr is not None else (0, 0)
     return m.PictureHeader(
-        source_us=source_us, frame_seq=0, frame_epoch=0, width_px=width, height_px=height,
-        time_base=frame.time_base if frame else m.TimeBase.CAPTURE, media_us=frame.media_us if frame else 0,
+        source_us=source_us,
+        frame_seq=0,
+        frame_epoch=0,
+        width_px=width,
+        height_px=height,
+        time_base=frame.time_base if frame else m.TimeBase.CAPTURE,
+        media_us=frame.media_us if frame else 0,
     )
 
 

@@ -33,9 +33,11 @@ def annotated(
     if mask is not None:
         classes = cv2.resize(mask, (WIDTH_PX, height_px), interpolation=cv2.INTER_NEAREST)
         canvas = np.asarray(canvas * (1.0 - TINT_SHARE) + TINTS[classes] * TINT_SHARE, np.uint8)
-    lanes = [] if mask is None else [
-        (corridors.left, advisory.left), (corridors.right, advisory.right), (corridors.center, advisory.center)
-    ]
+    lanes = (
+        []
+        if mask is None
+        else [(corridors.left, advisory.left), (corridors.right, advisory.right), (corridors.center, advisory.center)]
+    )
     for span, lane in lanes:
         _corridor(canvas, span, corridors.top, lane, span == corridors.center)
     for detection in evidence.detections:

@@ -69,7 +69,10 @@ def main(argv: list[str]) -> int:
                 sys.stdout.write(_line(judgement, options.json))
                 if out is not None and judgement.bgr is not None:
                     picture = annotated(
-                        judgement.bgr, judgement.mask, judgement.evidence, judgement.advisory,
+                        judgement.bgr,
+                        judgement.mask,
+                        judgement.evidence,
+                        judgement.advisory,
                         config.perception.corridors,
                     )
                     _save(out / file_name(judgement.name, taken), picture)

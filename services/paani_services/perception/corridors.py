@@ -38,10 +38,12 @@ def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig) -> Lan
     """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside."""
     rows = shares(mask.shape[0], corridors.top, 1.0)
     water = (mask == WATER).astype(np.float64)
-    return Lanes(*(
-        _lane(water, confidence, rows, shares(mask.shape[1], *span), corridors.clear_column)
-        for span in (corridors.left, corridors.center, corridors.right)
-    ))
+    return Lanes(
+        *(
+            _lane(water, confidence, rows, shares(mask.shape[1], *span), corridors.clear_column)
+            for span in (corridors.left, corridors.center, corridors.right)
+        )
+    )
 
 
 def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:

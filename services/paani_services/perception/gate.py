@@ -92,9 +92,8 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
         range=float(high - low),
         plain_frac=float((tile_std < PLAIN_STD).mean()),
         upright_residual=float((small - small.mean(axis=0)).std() / (small.std() + 1e-3)),
-        correlation=min(
-            float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean())
-        ) / variance,
+        correlation=min(float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean()))
+        / variance,
         sigma=float(np.abs(cv2.filter2D(fine, -1, NOISE_MASK)).mean()) * NOISE_SCALE,
         fineness=_edges(fine) / (_edges(small) + 1e-3),
         covered_frac=float(covered.mean()),

@@ -58,9 +58,7 @@ class Perceiver:
         self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
         self._gate = GateState()
 
-    def perceive(
-        self, data: bytes | Bytes, header: PictureHeader, age_s: float
-    ) -> tuple[Evidence, Bytes | None]:
+    def perceive(self, data: bytes | Bytes, header: PictureHeader, age_s: float) -> tuple[Evidence, Bytes | None]:
         """Evidence of one distinct frame, and its class mask uint8 [64, 80], None where the picture is unusable.
 
         data: an encoded picture, or BGR uint8 [H, W, 3]. age_s: the picture's age now, at the start (resolution 1).

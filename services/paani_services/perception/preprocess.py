@@ -40,9 +40,7 @@ def letterbox(bgr: Bytes, height_px: int, width_px: int, pad_grey: int, table: F
     boxed = np.full((height_px, width_px, 3), pad_grey, np.uint8)
     inner = bgr if (inner_w, inner_h) == (source_w, source_h) else cv2.resize(bgr, (inner_w, inner_h))
     boxed[top : top + inner_h, left : left + inner_w] = inner
-    return _normalised(boxed, table), Letterbox(
-        inner_w / source_w, inner_h / source_h, left, top, source_w, source_h
-    )
+    return _normalised(boxed, table), Letterbox(inner_w / source_w, inner_h / source_h, left, top, source_w, source_h)
 
 
 def stretch(bgr: Bytes, height_px: int, width_px: int, table: Floats) -> Floats:

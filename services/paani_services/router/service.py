@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 
 from paani.bus import Bus
-from paani.bus.routing import open_router
 from paani.clock import Clock
 from paani.config import Config
 

@@ -24,6 +24,7 @@ def main(argv: list[str]) -> int:
     if options.summary is not None and not options.summary.absolute().parent.is_dir():
         raise UserError(f"--summary {options.summary}: no such folder")
     outcome = asyncio.run(_up(options))
+    sys.stdout.write(_result(outcome.report))
     if options.summary is not None:
         write_report(options.summary, outcome.report)
     if outcome.failure:
@@ -60,6 +61,14 @@ def seconds(text: str) -> float:
     if not 0.0 < value < 1e7:
         raise ValueError(text)
     return value
+
+
+def _result(report: Report) -> str:
+    rate_hz = report.services["perception"].rate_hz
+    return (
+        f"{report.duration_s:.0f} s: {report.distance_m:.1f} m, {report.waypoints_reached} waypoints, "
+        f"{report.collisions} collisions, perception {rate_hz:.1f} Hz\n"
+    )
 
 
 async def _up(options: argparse.Namespace) -> Outcome:

@@ -27,7 +27,6 @@ from paani.up.supervise import NotKeptAlive, Supervisor
 
 READY_S = 120.0
 PROGRESS_S = 0.2
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Outcome(NamedTuple):
@@ -47,7 +46,10 @@ async def drive(plan: Plan, seconds: float | None, display: Display) -> Outcome:
     supervisor = Supervisor(plan, logs, display.say)
     told_to_stop = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in SIGNALS:
+    signals = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup ignores it
+        signals.append(signal.SIGHUP)
+    for number in signals:
         loop.add_signal_handler(number, told_to_stop.set)
     failure = ""
     try:
@@ -59,7 +61,7 @@ async def drive(plan: Plan, seconds: float | None, display: Display) -> Outcome:
         if not failure and summary.begun and supervisor.missing:
             failure = f"not alive at the end: {', '.join(supervisor.missing)}"
         await supervisor.stop()
-        for number in SIGNALS:
+        for number in signals:
             loop.remove_signal_handler(number)
     return Outcome(report, failure)
 

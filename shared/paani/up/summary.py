@@ -58,8 +58,9 @@ class ServiceFigures(msgspec.Struct, frozen=True, kw_only=True):
 class Report(msgspec.Struct, frozen=True, kw_only=True):
     """What `--summary` writes.
 
-    Rates, CPU, latencies, decisions and reasons are those of the last `duration_s`, since every service was alive;
-    distance, waypoints, collisions, drops and `superseded` are totals since the start.
+    Rates, CPU, latencies, decisions, reasons and `lost_*` (numbers missing on the bus) are those of the last
+    `duration_s`, since every service was alive; distance, waypoints, collisions, the other drops and `superseded`
+    are totals since the start.
     `drops` are messages refused or lost, by cause; `superseded` are those that a newer one of the same topic
     replaced before anyone looked, which is how newest-wins topics work.
     """
@@ -127,8 +128,8 @@ class Summary:
     def begin(self, now_us: int) -> None:
         """Every service is alive: what is measured over time is measured from here."""
         self._begin_us = now_us
-        self._outputs.clear()
-        self._cpu.clear()
+        for counters in (self._outputs, self._cpu, self._lost):
+            counters.clear()
         for counts in (self._decisions, self._reasons):
             counts.update({name: -n for name, n in counts.items()})
         for samples in self._latency.values():
