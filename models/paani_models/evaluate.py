@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.errors import UserError
 from paani_models.augment import null_picture
 from paani_models.catalogue import Figure
 from paani_models.detection_metrics import CONFIDENCE, Found, class_figures, decode
@@ -16,7 +17,7 @@ from paani_models.detector_data import BoxedPicture, plain, read_boxed
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
 from paani_models.onnx_runner import Floats, open_net
 from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
-from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_pair, read_picture
+from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, WATER_MASKS, Sample, read_mask, read_picture
 
 WATER, OBSTACLE = SEGMENTER_CLASSES.index("water"), SEGMENTER_CLASSES.index("obstacle")
 NULL_PICTURES = 200
@@ -34,13 +35,10 @@ def segmenter_figures(net: Path, samples: list[Sample]) -> list[Figure]:
         counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
         edges = np.zeros(4, np.int64)
         for sample in tqdm(chosen, name, unit="picture", mininterval=5.0):
-            picture, truth = read_pair(sample)
-            label = _label(run(segmenter_input(picture)), truth.shape[:2])
+            truth = read_truth(sample)
+            label = _label(run(segmenter_input(read_picture(sample.picture))), truth.shape[:2])
             if sample.source.water_only:
-                label, truth = (
-                    np.minimum(label, OBSTACLE),
-                    np.where(truth == 2, OBSTACLE, truth).astype(np.uint8),
-                )
+                label = np.minimum(label, OBSTACLE)
             counts += confusion(label, truth, len(SEGMENTER_CLASSES))
             edges += edge_counts(label, truth)
         scored = ("water",) if chosen[0].source.water_only else SEGMENTER_CLASSES
@@ -48,9 +46,18 @@ def segmenter_figures(net: Path, samples: list[Sample]) -> list[Figure]:
         rows = {f"iou_{kind}": float(iou[SEGMENTER_CLASSES.index(kind)]) for kind in scored}
         if len(scored) == len(SEGMENTER_CLASSES):
             rows["miou"] = float(np.nanmean(iou))
-        rows["edge_f1"] = f1(*(int(count) for count in edges))
+        if not chosen[0].source.soft_edges:
+            rows["edge_f1"] = f1(*(int(count) for count in edges))
         figures.extend(Figure(metric, name, round(value, 4), len(chosen)) for metric, value in rows.items())
     return [*figures, null_figure(net)]
+
+
+def read_truth(sample: Sample) -> NDArray[np.uint8]:
+    """Read what people drew, in segmenter classes; where they drew only water, the rest is obstacle."""
+    if sample.mask is None:
+        raise UserError(f"{sample.picture}: has no mask")
+    drawn = sample.mask.parent.parent / WATER_MASKS / sample.mask.name if sample.source.water_only else sample.mask
+    return read_mask(drawn)
 
 
 def null_figure(net: Path) -> Figure:

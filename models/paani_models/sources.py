@@ -17,6 +17,7 @@ from paani.errors import UserError
 IGNORE = 255
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # checklist D6
 DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # checklist C2
+WATER_MASKS = "masks"
 RENDERED = "rendered"  # the one source that is drawn, not photographed
 
 # Coded mask value -> segmenter class (checklist R10): 0 obstacle -> 1, 1 water -> 0, 2 sky -> 2, else ignored.
@@ -30,16 +31,18 @@ _RUN_LENGTH = 24  # pictures per run where a source names no sequences
 class Source:
     """One annotated folder.
 
-    masks: subfolder of three-class masks, "" if none. water_only: its human masks tell water from the rest only,
-    so sky and obstacle are not scored on it. annotated: detector classes whose every instance is boxed; only those
-    may be punished on background. empty_of: classes that its pictures do not show, boxes or none. own_hull: the
-    boat's own bow fills the bottom middle. held_out: sequences for validation; empty means one in eight by name.
+    masks: subfolder of three-class masks, "" if none. water_only: people marked only water, in WATER_MASKS, and that
+    is what is scored. soft_edges: its masks leave a band between classes undecided, so edges are not scored.
+    annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
+    classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
+    held_out: sequences for validation; empty means one in eight by name.
     """
 
     name: str
     folder: str
     masks: str = ""
     water_only: bool = False
+    soft_edges: bool = False
     labels: str = ""
     annotated: frozenset[str] = frozenset()
     empty_of: frozenset[str] = frozenset()
@@ -68,8 +71,8 @@ SOURCES = (
     ),
     Source("tbiseg_dasha", "tbiseg_dasha", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("DJI_0035",)),
     Source("bath_river", "bath_river", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("run3", "run8")),
-    Source("mastr1325", "mastr1325_val_recovered", masks="masks", held_out=("run2",)),
-    Source("oasis", "oasis_recovered", masks="masks", held_out=("OASIs/type2",)),
+    Source("mastr1325", "mastr1325_val_recovered", masks="masks", soft_edges=True, held_out=("run2",)),
+    Source("oasis", "oasis_recovered", masks="masks", soft_edges=True, held_out=("OASIs/type2",)),
     Source("mcoe_boats", "mcoe_boats", labels="labels", annotated=frozenset({"vessel", "buoy"})),
     Source(
         "hsu_shore_tiles",

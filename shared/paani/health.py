@@ -29,7 +29,7 @@ class HealthReporter:
         self._service, self._inputs, self._drops, self._note = service, inputs, drops, note
         self._started_us = self._last_us = 0
         self._last_cpu_s = process_cpu_s()
-        self._last_received: dict[str, int] = {}
+        self._last_received: dict[int, int] = {}
 
     def report(self, now_us: int) -> m.Health:
         """The report for the time since the last one."""
@@ -52,8 +52,8 @@ class HealthReporter:
 
     def _input(self, topic: keys.Topic[Any], inbox: Inbox[Any], span_s: float) -> m.InputHealth:
         received = inbox.received
-        rate_hz = (received - self._last_received.get(topic.name, 0)) / span_s if span_s > 0 else 0.0
-        self._last_received[topic.name] = received
+        rate_hz = (received - self._last_received.get(id(inbox), 0)) / span_s if span_s > 0 else 0.0
+        self._last_received[id(inbox)] = received
         age_s = min(inbox.receipt_age_s(), 1e6)
         return m.InputHealth(
             topic=topic.name,

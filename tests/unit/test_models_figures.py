@@ -25,7 +25,7 @@ def held_out(*names: str) -> list[Sample]:
 def test_segmenter_figures_are_reproduced_t3_u3_u4() -> None:
     measured = {f.metric: f for f in segmenter_figures(verified_path("segmenter"), held_out("mastr1325")) if f.n == 24}
     expected = recorded("segmenter", "mastr1325")
-    assert set(measured) == {"iou_water", "iou_obstacle", "iou_sky", "miou", "edge_f1"} == set(expected)
+    assert set(measured) == {"iou_water", "iou_obstacle", "iou_sky", "miou"} == set(expected)
     for metric, figure in measured.items():
         assert figure.value == pytest.approx(expected[metric].value, abs=0.005)
 
@@ -44,10 +44,10 @@ def test_detector_figures_are_reproduced_u1_u2() -> None:
 @pytest.mark.data
 @needs_data
 def test_water_is_water_on_rivers_never_seen_in_training() -> None:
-    """USVInland: six held-out sequences, every fourth of their pictures."""
-    samples = held_out("tbiseg_usvinland")[::4]
-    measured = {f.metric: f.value for f in segmenter_figures(verified_path("segmenter"), samples)}
-    assert measured["iou_water"] >= 0.93
+    """USVInland, six held-out sequences; Tampere, one."""
+    for name in ("tbiseg_usvinland", "tbiseg_tampere"):
+        measured = {f.metric: f.value for f in segmenter_figures(verified_path("segmenter"), held_out(name))}
+        assert measured["iou_water"] >= 0.93
 
 
 @pytest.mark.data

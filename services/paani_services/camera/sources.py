@@ -74,7 +74,7 @@ def recording(path: Path, config: CameraConfig) -> Iterator[Frame]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Picture files of a folder and of those below it, by path. Raises UserError naming a folder that cannot be read."""
+    """Picture files of a folder and those below, by path. Raises UserError naming a folder that cannot be read."""
     try:
         return sorted(file for file in folder.rglob("*") if file.suffix.lower() in PICTURE_SUFFIXES and file.is_file())
     except OSError as error:

@@ -1,0 +1,55 @@
+"""What a process says of itself: rates from counters, inputs alive and fresh by the table of keys."""
+
+from __future__ import annotations
+
+import collections
+
+import pytest
+
+from paani import keys
+from paani.bus.inbox import Latest
+from paani.clock import ManualClock
+from paani.health import HealthReporter
+
+
+async def test_rates_ages_and_drops() -> None:
+    clock = ManualClock()
+    busy: Latest[int] = Latest(clock)
+    silent: Latest[int] = Latest(clock)
+    drops: collections.Counter[str] = collections.Counter()
+    reporter = HealthReporter(
+        "advisor", [(keys.EVIDENCE, busy), (keys.EVIDENCE, silent)], drops, lambda: "CENTER_CLEAR"
+    )
+    reporter.report(clock.now_us())
+    for value in range(5):
+        clock.advance(0.2)
+        busy.offer(value)
+    drops["replayed"] += 3
+    report = reporter.report(clock.now_us())
+    first, second = report.inputs
+    assert (first.rate_hz, first.rate_ok, first.fresh, first.received) == (pytest.approx(5.0), True, True, 5)
+    assert (second.alive, second.fresh, second.rate_ok) == (False, False, False)
+    assert [(drop.cause, drop.count) for drop in report.drops] == [("replayed", 3)]
+    assert report.uptime_s == pytest.approx(1.0)
+    assert report.note == "CENTER_CLEAR"
+    assert report.rss_mib > 1.0
+
+
+@pytest.mark.parametrize(("silence_s", "alive", "fresh"), [(0.1, True, True), (1.0, True, False), (20.0, False, False)])
+async def test_silence_is_first_stale_then_dead(silence_s: float, alive: bool, fresh: bool) -> None:
+    clock = ManualClock()
+    inbox: Latest[int] = Latest(clock)
+    inbox.offer(1)
+    clock.advance(silence_s)
+    report = HealthReporter("advisor", [(keys.EVIDENCE, inbox)], collections.Counter(), lambda: "").report(
+        clock.now_us()
+    )
+    assert (report.inputs[0].alive, report.inputs[0].fresh) == (alive, fresh)
+
+
+async def test_newest_wins_in_an_inbox() -> None:
+    inbox: Latest[int] = Latest(ManualClock())
+    for value in range(4):
+        inbox.offer(value)
+    assert await inbox.next() == 3
+    assert (inbox.received, inbox.superseded) == (4, 3)
