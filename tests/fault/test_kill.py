@@ -129,11 +129,10 @@ def stopped_after_s(service: str, applied: list[m.ThrustApplied], hit_us: int, b
         told = next(r for r in applied if r.source_us > hit_us + ZERO_S * 1e6)
         assert not moves(told)
         return (told.since_us - hit_us) * 1e-6
-    last_us = max((r.source_us for r in applied if moves(r) and r.source_us <= back_us), default=hit_us)
     if service == "plant":  # a dead plant applies nothing
-        return (last_us - hit_us) * 1e-6
-    told = next(r for r in applied if r.source_us > last_us)
-    assert not moves(told)
+        return (max(r.source_us for r in applied if moves(r) and r.source_us <= back_us) - hit_us) * 1e-6
+    told = next(r for r in applied if r.source_us > hit_us and not moves(r))
+    assert not any(moves(r) for r in applied if told.source_us < r.source_us <= hit_us + ZERO_S * 1e6)
     return (told.source_us - hit_us) * 1e-6
 
 
