@@ -13,6 +13,7 @@ from paani.messages import (
     Arming,
     Direction,
     Inhibit,
+    LaneRisk,
     NavCommand,
     Odometry,
     Reason,
@@ -163,6 +164,29 @@ def test_turn_back_is_allowed_at_the_cap() -> None:
     order = drill.order(Direction.RIGHT, pose(3.0, 0.0, yaw_rad=math.radians(88.0)))
     assert order.enable
     assert order.heading_rad == pytest.approx(math.radians(63.0))
+
+
+@pytest.mark.parametrize("direction", [Direction.LEFT, Direction.SLIGHT_LEFT])
+def test_the_route_is_not_resumed_into_what_was_just_passed(direction: Direction) -> None:
+    """Turned left, away from something: the way back to the right waits until `clear_m` further on."""
+    drill, yaw_rad = Drill(PAANI), math.radians(30.0)
+    drill.order(direction, pose(3.0, 1.0, yaw_rad))
+    beside = drill.order(Direction.STRAIGHT, pose(4.0, 1.5, yaw_rad))
+    assert beside.heading_rad == pytest.approx(yaw_rad)
+    past = drill.order(Direction.STRAIGHT, pose(3.0 + PAANI.clear_m, 3.0, yaw_rad))
+    assert past.heading_rad < 0.0
+
+
+def test_an_occupied_side_is_kept_off_while_going_straight() -> None:
+    drill = Drill(PAANI)
+    occupied = msgspec.structs.replace(advice(Direction.STRAIGHT), right=LaneRisk(occupied=True))
+    at = pose(3.0, 2.0)
+    given_heard = heard(drill.now_us, advisory=occupied, odometry=at)
+    _, command = navigate(RUNNING, given_heard, SQUARE, drill.now_us, 43, PAANI)
+    assert command.heading_rad == 0.0
+    open_water = heard(drill.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
+    assert navigate(RUNNING, open_water, SQUARE, drill.now_us, 43, PAANI)[1].heading_rad < 0.0
+    assert navigate(RUNNING, given_heard, SQUARE, drill.now_us, 43, PAPER)[1].heading_rad < 0.0
 
 
 def test_m2_acceptance_radius_and_m3_repeat() -> None:

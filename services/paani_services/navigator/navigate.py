@@ -8,7 +8,6 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
-from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
     Arming,
@@ -19,6 +18,7 @@ from paani.messages import (
     Route,
     SimTime,
 )
+from paani_services.navigator.passing import Guards, guarded_course, watch
 from paani_services.navigator.progress import course_rad, cross_track_m, first_target, is_reached
 from paani_services.navigator.turning import TURNS, Turn, continuous_heading, latched
 
@@ -30,6 +30,7 @@ class NavState(msgspec.Struct, frozen=True):
     reached: int = 0
     finished: bool = False
     turn: Turn | None = None
+    guards: Guards = Guards()
     sim_us: int = -1
     advanced_us: int | None = None
 
@@ -69,6 +70,8 @@ def navigate(
     if state.target is None:
         state = msgspec.structs.replace(state, target=first_target(route, position_m))
     direction = advisory.direction if advisory is not None else Direction.NO_DATA
+    if advisory is not None and config.clear_m > 0.0:
+        state = msgspec.structs.replace(state, guards=watch(state.guards, advisory, odometry, config.clear_m))
     heading_rad = odometry.yaw_rad
     speed_mps = config.cruise_mps
     if not inhibits and direction is Direction.STRAIGHT:
@@ -89,7 +92,7 @@ def navigate(
         else:
             heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
     else:
-        heading_rad = wrap_rad(course_rad(route, target, position_m, config.lookahead_m))
+        heading_rad = guarded_course(course_rad(route, target, position_m, config.lookahead_m), state.guards)
     return state, _order(
         state, heard, now_us, inhibits, heading_rad, speed_mps, cross_track_m(route, target, position_m)
     )

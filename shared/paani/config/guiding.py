@@ -42,6 +42,7 @@ class NavigatorConfig(Section, frozen=True):
     latch_turns: bool = True
     turn_hold_s: NonNegative = 1.5  # on a latched heading before the next turn is added
     max_total_turn_deg: Positive = 90.0
+    clear_m: NonNegative = 6.0  # past the last sight of something beside the bow; 0: turn back at once
     advisory_max_age_s: Positive = 3.5  # M10
     advisory_max_receipt_s: Positive = 0.6  # M10
     odometry_max_age_s: Positive = 0.4

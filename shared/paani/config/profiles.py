@@ -23,6 +23,7 @@ PAPER: dict[str, object] = {
         "pass_abeam_m": 0.0,  # M2
         "lookahead_m": 0.0,  # M4
         "cruise_mps": 0.15,  # M7
+        "clear_m": 0.0,
         "latch_turns": False,  # M5: continuous
     },
     "controller": {

@@ -80,6 +80,7 @@ def _add_boat(spec: mujoco.MjSpec, world: World) -> None:
             contype=BOAT_BIT,
             conaffinity=SOLID_BIT,
             friction=[0.3, 0.005, 0.0001],
+            priority=1,  # a wet hull slides along whatever it touches
             rgba=[0.9, 0.5, 0.1, 1.0],
         )
     boat.add_site(name="imu", pos=[0.0, 0.0, 0.0])
