@@ -138,7 +138,7 @@ def test_what_cannot_be_kept_alive_ends_all(
     [
         (("--set", "advisor.policy.tie=2"), "advisor.policy.tie"),
         (("--world", "ocean"), "ocean"),
-        (("--camera", "no/such/folder"), "no/such/folder"),
+        (("--camera", "no/such/folder"), "camera.source no/such/folder"),
         (("--set", "perception.segmenter=CORRUPT"), "corrupt.onnx"),
         (("--summary", "no/such/folder/s.json"), "no/such/folder"),
         (("--profile", "paani", "--config", "no_such.toml"), "no_such.toml"),

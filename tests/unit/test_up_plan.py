@@ -38,11 +38,13 @@ async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> N
     assert plan.config.localization.origin_lat_lon_deg == (10.0, 20.0)
 
 
-async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...]) -> None:
+async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_path: Path) -> None:
     """The plant and everything else still run; the last gate waits for no pulse of the eye."""
-    plan = await make_plan(load_config(sets=(*private_sets, "camera.source=pictures")))
+    plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
     assert set(keys.SERVICES) - set(plan.services) == {"eye"}
     assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
+    with pytest.raises(UserError, match=r"camera\.source absent: no such file or folder"):
+        await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))
 
 
 async def test_a_busy_page_port_is_no_mistake_without_the_page(config: Config, private_sets: tuple[str, ...]) -> None:

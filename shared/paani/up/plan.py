@@ -35,6 +35,7 @@ async def make_plan(config: Config) -> Plan:
     With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse.
     """
     require_free(config.bus.router)
+    await _require_source(config.camera.source)
     if config.dashboard.serve:
         await _require_free_page(config)
     route, origin_deg = await _world_route(config)
@@ -50,6 +51,11 @@ async def make_plan(config: Config) -> Plan:
     adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
     config = replace(config, plant=replace(config.plant, adapter=adapter))
     return Plan(tuple(name for name in keys.SERVICES if name != EYE), config)
+
+
+async def _require_source(source: str) -> None:
+    if source != "sim" and not source.startswith("webcam") and not await asyncio.to_thread(Path(source).exists):
+        raise UserError(f"camera.source {source}: no such file or folder")
 
 
 async def _require_free_page(config: Config) -> None:
