@@ -12,7 +12,7 @@ import pytest
 from paani.config import CameraConfig
 from paani.errors import UserError
 from paani.messages import TimeBase
-from paani_services.camera.service import jpeg
+from paani_services.camera.service import jpeg, patience_us
 from paani_services.camera.sources import Webcam, fitted, play, webcam_index
 from tests.unit.pictures import river
 
@@ -116,3 +116,9 @@ def test_webcam_names() -> None:
     assert [webcam_index(s) for s in ("webcam", "webcam:2", "sim", "webcams/film.mp4")] == [0, 2, None, None]
     with pytest.raises(UserError, match="webcam:x"):
         webcam_index("webcam:x")
+
+
+@pytest.mark.parametrize(("rate_hz", "patience_s"), [(0.5, 1.98), (5.0, 0.18), (50.0, 0.01)])
+def test_a_slow_camera_is_not_early_a8(rate_hz: float, patience_s: float) -> None:
+    """A8, J17: one picture every two seconds is every two seconds; the tolerance is for jitter alone."""
+    assert patience_us(rate_hz) == pytest.approx(patience_s * 1e6)

@@ -16,7 +16,7 @@ from paani.clock import Clock
 from paani.config import CameraConfig, Config
 from paani_services.camera.sources import Bytes, Frame, Webcam, fitted, play, webcam_index
 
-EARLY_FRAC = 0.1  # a picture this part of the period too early is in time
+EARLY_S = 0.02  # a picture this much too early is in time: sources jitter
 T = TypeVar("T")
 
 
@@ -58,7 +58,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
 async def _relay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output) -> None:
     """The simulator's pictures as they are, dated by the pose they show."""
     rendered = bus.pull_picture(keys.RENDERED)
-    period_us = round((1.0 - EARLY_FRAC) * 1e6 / settings.rate_hz)
+    period_us = patience_us(settings.rate_hz)
     origin, due_us = None, 0
     with bus.alive():
         while True:
@@ -77,7 +77,7 @@ async def _watch(
 ) -> None:
     """The webcam's newest picture: every one is taken from the camera, those that are due are published."""
     camera = await _off_loop(worker, Webcam, index, settings.width_px, settings.height_px)
-    period_us, due_us = round((1.0 - EARLY_FRAC) * 1e6 / settings.rate_hz), 0
+    period_us, due_us = patience_us(settings.rate_hz), 0
     try:
         with bus.alive():
             while True:
@@ -111,6 +111,12 @@ async def _replay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output
             frame = await _off_loop(worker, next, frames, None)
         bus.note(f"{settings.source}: played to its end")
         await asyncio.Event().wait()
+
+
+def patience_us(rate_hz: float) -> int:
+    """Time to let pass after a picture before the next is wanted."""
+    period_s = 1.0 / rate_hz
+    return round(max(period_s - EARLY_S, 0.5 * period_s) * 1e6)
 
 
 def jpeg(bgr: Bytes, quality: int) -> bytes:

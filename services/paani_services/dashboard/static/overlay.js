@@ -62,8 +62,10 @@ export function drawBoxes(pane, evidence, tracks) {
   if (tracks) {
     for (const track of tracks.tracks) {
       const colour = track.immediate_danger ? IMMEDIATE : track.accepted ? ACCEPTED : TENTATIVE;
+      if (track.held && !track.accepted) continue; // neither seen now nor counted
       outline(pane, track.box_xyxy, colour, track.immediate_danger ? 3 : 2, track.held ? [6, 4] : []);
-      const state = track.held ? " held" : track.immediate_danger ? " immediate" : track.accepted ? "" : " tentative";
+      if (track.held) continue; // its dashes say so; a name for each would bury the picture
+      const state = track.immediate_danger ? " immediate" : track.accepted ? "" : " tentative";
       named.push([`#${track.id} ${track.label} ${fixed(track.confidence)}${state}`, track.box_xyxy, colour]);
     }
   } else {
