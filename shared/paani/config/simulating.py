@@ -7,6 +7,7 @@ from typing import Annotated
 import msgspec
 
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+from paani.keys import VITAL_SERVICES
 
 
 class WorldConfig(Section, frozen=True):
@@ -57,16 +58,7 @@ class AdapterConfig(Section, frozen=True):
     max_echo_age_s: Positive = 0.5
     arming_timeout_s: Positive = 0.5
     pulse_timeout_s: Positive = 0.35  # leaves 0.15 s of the 0.5 s for the last beat's journey and one step
-    require_pulses: tuple[str, ...] = (
-        "eye",
-        "camera",
-        "perception",
-        "advisor",
-        "navigator",
-        "controller",
-        "localization",
-        "dashboard",
-    )
+    require_pulses: tuple[str, ...] = VITAL_SERVICES
 
 
 class PlantConfig(Section, frozen=True):
