@@ -41,6 +41,15 @@ class ManualClock:
         self._now_us += round(seconds * 1e6)
 
 
+EARLY_S = 0.02  # a picture this much too early is in time: sources jitter
+
+
+def patience_us(rate_hz: float) -> int:
+    """Time to let pass after a picture before the next is wanted."""
+    period_s = 1.0 / rate_hz
+    return round(max(period_s - EARLY_S, 0.5 * period_s) * 1e6)
+
+
 def stopwatch_ms() -> float:
     """Milliseconds of an arbitrary origin, for measuring durations."""
     return time.perf_counter_ns() * 1e-6

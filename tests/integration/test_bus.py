@@ -10,7 +10,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.authority import ensure_credentials
-from paani.bus import open_bus
+from paani.bus import Latest, Publisher, open_bus
 from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
@@ -30,14 +30,19 @@ async def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
             await asyncio.sleep(0.01)
 
 
+async def until_heard(own: Publisher[m.Thrust], heard: Latest[m.Thrust]) -> None:
+    """A subscriber is known to its publisher only a moment after it was declared."""
+    while heard.value is None:
+        own.put(thrust())
+        await asyncio.sleep(0.02)
+
+
 async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:
     """B13, architecture 4: a service that is not the producer is not heard, wildcards included."""
     plant, controller, advisor = await open_as("plant"), await open_as("controller"), await open_as("advisor")
     heard = plant.latest(keys.THRUST)
     own, forged = controller.publisher(keys.THRUST), advisor.publisher(keys.THRUST)
-    while heard.value is None:
-        own.put(thrust())
-        await asyncio.sleep(0.02)
+    await until_heard(own, heard)
     before = heard.received
     for _ in range(5):
         forged.put(thrust(left=1.0))
@@ -55,9 +60,7 @@ async def test_what_is_refused_is_counted_by_cause(open_as: OpenAs) -> None:
     plant, controller = await open_as("plant"), await open_as("controller")
     heard = plant.latest(keys.THRUST)
     own = controller.publisher(keys.THRUST)
-    while heard.value is None:
-        own.put(thrust())
-        await asyncio.sleep(0.02)
+    await until_heard(own, heard)
     sent = own.put(thrust())
     for data in (b"", b'{"left": NaN}', b"{}"):
         put_raw(controller, "controller/thrust", data)
@@ -104,9 +107,7 @@ async def test_newest_wins_and_the_rest_is_counted(open_as: OpenAs) -> None:
     plant, controller = await open_as("plant"), await open_as("controller")
     heard = plant.latest(keys.THRUST)
     own = controller.publisher(keys.THRUST)
-    while heard.value is None:
-        own.put(thrust())
-        await asyncio.sleep(0.02)
+    await until_heard(own, heard)
     await heard.next()
     start = heard.received
     for index in range(20):

@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
+from paani.clock import patience_us
 from paani.config import CameraConfig
 from paani.errors import UserError
 from paani.messages import TimeBase
-from paani_services.camera.service import jpeg, patience_us
+from paani_services.camera.service import jpeg
 from paani_services.camera.sources import Webcam, fitted, play, webcam_index
 from tests.unit.pictures import river
 

@@ -12,11 +12,10 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock
+from paani.clock import Clock, patience_us
 from paani.config import CameraConfig, Config
 from paani_services.camera.sources import Bytes, Frame, Webcam, fitted, play, webcam_index
 
-EARLY_S = 0.02  # a picture this much too early is in time: sources jitter
 T = TypeVar("T")
 
 
@@ -111,12 +110,6 @@ async def _replay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output
             frame = await _off_loop(worker, next, frames, None)
         bus.note(f"{settings.source}: played to its end")
         await asyncio.Event().wait()
-
-
-def patience_us(rate_hz: float) -> int:
-    """Time to let pass after a picture before the next is wanted."""
-    period_s = 1.0 / rate_hz
-    return round(max(period_s - EARLY_S, 0.5 * period_s) * 1e6)
 
 
 def jpeg(bgr: Bytes, quality: int) -> bytes:

@@ -6,14 +6,8 @@ While a side is guarded, the way back to the route may not turn towards it: the 
 import msgspec
 
 from paani.geometry import wrap_rad
-from paani.messages import Advisory, Direction, Odometry
-
-AWAY_FROM = {
-    Direction.LEFT: "right",
-    Direction.SLIGHT_LEFT: "right",
-    Direction.RIGHT: "left",
-    Direction.SLIGHT_RIGHT: "left",
-}
+from paani.messages import Advisory, Odometry
+from paani_services.navigator.turning import SIDE
 
 
 class Guard(msgspec.Struct, frozen=True):
@@ -34,18 +28,18 @@ class Guards(msgspec.Struct, frozen=True):
 def watch(guards: Guards, advisory: Advisory, odometry: Odometry, clear_m: float) -> Guards:
     """Guard a side that is occupied, or that a turn leads away from, until `clear_m` beyond the last such advice."""
     here = Guard(odometry.x_m, odometry.y_m, odometry.yaw_rad)
-    turned_from = AWAY_FROM.get(advisory.direction)
+    turning = SIDE.get(advisory.direction, 0.0)  # positive to the left, away from the right
 
-    def side(name: str, occupied: bool, before: Guard | None) -> Guard | None:
-        if occupied or turned_from == name:
+    def side(occupied: bool, turned_from: bool, before: Guard | None) -> Guard | None:
+        if occupied or turned_from:
             return here
         if before is None or (before.x_m - here.x_m) ** 2 + (before.y_m - here.y_m) ** 2 > clear_m**2:
             return None
         return before
 
     return Guards(
-        left=side("left", advisory.left.occupied, guards.left),
-        right=side("right", advisory.right.occupied, guards.right),
+        left=side(advisory.left.occupied, turning < 0.0, guards.left),
+        right=side(advisory.right.occupied, turning > 0.0, guards.right),
     )
 
 

@@ -10,14 +10,14 @@ from paani.messages import Direction
 
 ON_HEADING_RAD = math.radians(5.0)
 
-_SIDE = {
+SIDE = {
     Direction.LEFT: 1.0,
     Direction.SLIGHT_LEFT: 1.0,
     Direction.RIGHT: -1.0,
     Direction.SLIGHT_RIGHT: -1.0,
 }
 _SLIGHT = frozenset({Direction.SLIGHT_LEFT, Direction.SLIGHT_RIGHT})
-TURNS = frozenset(_SIDE)
+TURNS = frozenset(SIDE)
 
 
 class Turn(msgspec.Struct, frozen=True):
@@ -66,7 +66,7 @@ def latched(
 
 def _extended(turn: Turn, direction: Direction, yaw_rad: float, config: NavigatorConfig) -> tuple[Turn, bool]:
     limit_rad = math.radians(config.max_total_turn_deg)
-    side = _SIDE[direction]
+    side = SIDE[direction]
     sofar_rad = wrap_rad(yaw_rad - turn.start_rad)
     if side * sofar_rad >= limit_rad - ON_HEADING_RAD:
         return turn, True
@@ -77,4 +77,4 @@ def _extended(turn: Turn, direction: Direction, yaw_rad: float, config: Navigato
 
 def _step_rad(direction: Direction, config: NavigatorConfig) -> float:
     step_deg = config.slight_turn_deg if direction in _SLIGHT else config.turn_deg
-    return _SIDE[direction] * math.radians(step_deg)
+    return SIDE[direction] * math.radians(step_deg)

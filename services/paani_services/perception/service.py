@@ -9,11 +9,9 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Picture
-from paani.clock import Clock, stopwatch_ms
+from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
 from paani_services.perception.pipeline import Bytes, Perceiver
-
-EARLY_FRAC = 0.1  # a frame this part of the period too early is in time
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -22,7 +20,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     evidence, masks = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
-    period_us = round(1e6 / config.perception.rate_hz)
+    period_us = patience_us(config.perception.rate_hz)
     last, due_us = (-1, -1), 0
 
     def look(picture: Picture) -> tuple[m.Evidence, Picture | None]:
@@ -39,7 +37,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 if frame <= last:  # B3
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue
-                last, due_us = frame, clock.now_us() + round((1.0 - EARLY_FRAC) * period_us)
+                last, due_us = frame, clock.now_us() + period_us
                 found, mask = await loop.run_in_executor(worker, look, picture)
                 sent = evidence.put(found)
                 if mask is not None:
