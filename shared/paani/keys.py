@@ -7,7 +7,7 @@ generated from it.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -122,10 +122,19 @@ TRUE_POSE = Topic(
     stance=Stance.STATE, summary="simulator truth: eye, dashboard and scoring only",
 )
 
-TOPICS: tuple[Topic[m.Message], ...] = (
+DECIDING_SERVICES = ("advisor", "navigator", "controller")
+STEPS = {
+    service: Topic(
+        name=f"{service}/step", type=m.Step, producer=service, rate_hz=10.0, fresh_s=1.0, stance=Stance.EVENT,
+        summary=f"what each step of the {service} had heard, and what it sent",
+    )
+    for service in DECIDING_SERVICES
+}
+
+TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, THRUST, LOCAL_ODOMETRY,
-    ODOMETRY, ARMING, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE,
-)  # type: ignore[assignment]  # Topic is invariant; the table only reads
+    ODOMETRY, ARMING, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, *STEPS.values(),
+)
 # fmt: on
 
 SERVICES = (

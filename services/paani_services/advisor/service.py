@@ -4,30 +4,30 @@ import asyncio
 import contextlib
 
 from paani import keys
-from paani.bus import Bus
+from paani.bus import Bus, Stepper
 from paani.clock import Clock
 from paani.config import Config
-from paani_services.advisor.advise import AdvisorState, advise, stale_at_us
+from paani.messages import Advisory
+from paani_services.advisor.advise import stale_at_us
+from paani_services.advisor.decide import DECIDER
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Advise on each new evidence at once, republish between, and stop the moment the evidence is too old."""
-    evidence = bus.latest(keys.EVIDENCE)
-    advisory, tracks = bus.publisher(keys.ADVISORY), bus.publisher(keys.TRACKS)
+    stepper = Stepper(bus, clock, config, DECIDER)
+    evidence = stepper.inboxes[keys.EVIDENCE.name]
     period_us = round(1e6 / config.advisor.rate_hz)
-    state = AdvisorState()
     with bus.alive():
         while True:
-            now_us = clock.now_us()
-            malformed = state.tracker.malformed
-            state, advice, seen = advise(state, evidence.value, now_us, config)
-            advisory.put(advice)
-            tracks.put(seen)
-            if state.tracker.malformed > malformed:
-                bus.count_drop("malformed_box", state.tracker.malformed - malformed)
-            bus.note(f"{advice.direction} {advice.reason}")
+            malformed = stepper.state.tracker.malformed
+            now_us, outputs = stepper.decide()
+            advisory = stepper.conclude(outputs)[keys.ADVISORY.name]
+            assert isinstance(advisory, Advisory)
+            bus.note(f"{advisory.direction} {advisory.reason}")
+            if stepper.state.tracker.malformed > malformed:
+                bus.count_drop("malformed_box", stepper.state.tracker.malformed - malformed)
             due_us = now_us + period_us
-            stale_us = stale_at_us(state, config)
+            stale_us = stale_at_us(stepper.state, config)
             if stale_us is not None and now_us < stale_us:
                 due_us = min(due_us, stale_us)
             with contextlib.suppress(TimeoutError):

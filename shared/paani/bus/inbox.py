@@ -9,6 +9,7 @@ import math
 from typing import Generic, TypeVar
 
 from paani.clock import Clock
+from paani.decider import Input
 
 V = TypeVar("V")
 
@@ -46,6 +47,7 @@ class Latest(Inbox[V]):
     def __init__(self, clock: Clock) -> None:
         super().__init__(clock)
         self.value: V | None = None
+        self.newest = Input()
         self._taken = True
 
     def offer(self, value: V) -> None:
@@ -54,6 +56,7 @@ class Latest(Inbox[V]):
         self.superseded += not self._taken
         self.value, self._taken = value, False
         self.received_us = self._clock.now_us()
+        self.newest = Input(value, self.received_us)
         self._wake()
 
     async def next(self) -> V:

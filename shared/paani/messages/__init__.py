@@ -17,6 +17,7 @@ from paani.messages.advisor import (
     Tracks,
 )
 from paani.messages.camera import PictureHeader, TimeBase
+from paani.messages.decision import HeardMessage, SentMessage, Step
 from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
@@ -44,6 +45,7 @@ __all__ = [
     "GpsFix",
     "Hazard",
     "Health",
+    "HeardMessage",
     "ImuSample",
     "InferenceTiming",
     "Inhibit",
@@ -62,8 +64,10 @@ __all__ = [
     "Reason",
     "Route",
     "SegmentationSource",
+    "SentMessage",
     "SimTime",
     "Stamp",
+    "Step",
     "Text",
     "Thrust",
     "ThrustApplied",
