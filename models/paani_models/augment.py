@@ -17,12 +17,13 @@ Rng = np.random.Generator
 
 # Checklist S8.
 GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
+MIRROR_FRAC = 0.2
 
-OBSTACLE = 1
+WATER, OBSTACLE = 0, 1
 
 
 def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], tilt_deg: float) -> Affine:
-    """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, and a roll of up to `tilt_deg`.
+    """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, and a roll of up to `tilt_deg`, rarely more.
 
     Zoom 1 stretches the whole source onto the whole target, as the runtime does.
     """
@@ -32,7 +33,8 @@ def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, in
     scale_y = target_wh[1] / source_wh[1] * zoom / aspect
     if rng.random() < 0.5:
         scale_x = -scale_x
-    angle = np.deg2rad(rng.uniform(-tilt_deg, tilt_deg)) if rng.random() < 0.5 else 0.0
+    reach_deg = tilt_deg * (2.5 if rng.random() < 0.15 else 1.0)
+    angle = np.deg2rad(rng.uniform(-reach_deg, reach_deg)) if rng.random() < 0.5 else 0.0
     cos, sin = np.cos(angle), np.sin(angle)
     linear = np.array([[cos * scale_x, -sin * scale_y], [sin * scale_x, cos * scale_y]])
     slack_x = max(0.0, 1.0 - target_wh[0] / (source_wh[0] * abs(scale_x)))
@@ -62,7 +64,9 @@ def warp_mask(mask: Picture, affine: Affine, target_wh: tuple[int, int]) -> Pict
 
 
 def jitter_colour(rng: Rng, picture: Picture) -> Picture:
-    """Hue, saturation, gamma, contrast and brightness, each within the range that weather and cameras give."""
+    """Hue, saturation, gamma, contrast, brightness, white balance, within the range that weather and cameras give."""
+    if rng.random() < 0.4:
+        picture = np.clip(picture * rng.uniform(0.85, 1.15, 3), 0, 255).astype(np.uint8)
     hsv = cv2.cvtColor(picture, cv2.COLOR_RGB2HSV)
     steps = np.arange(256, dtype=np.float32)
     hue = ((steps + rng.uniform(-8, 8)) % 180).astype(np.uint8)
@@ -103,6 +107,21 @@ def glare(rng: Rng, picture: Picture) -> Picture:
     tint = np.array([1.0, rng.uniform(0.92, 1.0), rng.uniform(0.75, 1.0)], np.float32) * 255.0
     lit = picture + light[..., None] * (tint - picture)
     return np.clip(lit, 0, 255).astype(np.uint8)
+
+
+def mirror_water(rng: Rng, picture: Picture, mask: Picture) -> Picture:
+    """Calm water: what stands above its far edge is mirrored in it, rippled, stretched and dimmed."""
+    height, width = mask.shape
+    water = mask == WATER
+    edge = np.where(water.any(0), water.argmax(0), 0).astype(np.float32)
+    columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    depth = rows - edge
+    ripple = rng.standard_normal((height // 3, width // 12), dtype=np.float32)
+    ripple = np.asarray(cv2.resize(ripple, (width, height)), np.float32) * rng.uniform(0.0, 0.08) * depth
+    source = np.clip(edge - depth * rng.uniform(0.6, 1.2) + ripple, 0, height - 1).astype(np.float32)
+    mirrored = cv2.remap(picture, columns + ripple * 0.5, source, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    share = rng.uniform(0.25, 0.85) * cv2.blur(water.astype(np.float32), (3, 3))[..., None] * water[..., None]
+    return np.clip(picture * (1 - share) + mirrored * rng.uniform(0.65, 1.0) * share, 0, 255).astype(np.uint8)
 
 
 def degrade(rng: Rng, picture: Picture) -> Picture:
@@ -218,6 +237,8 @@ def segmenter_sample(
     rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int], patch: Picture | None = None
 ) -> tuple[Picture, Picture]:
     """Make one training pair of the target size; a patch of obstacle, if given, is pasted in."""
+    if rng.random() < MIRROR_FRAC:
+        picture = mirror_water(rng, picture, mask)
     affine = random_affine(rng, (picture.shape[1], picture.shape[0]), target_wh, tilt_deg=8.0)
     picture, mask = warp_picture(picture, affine, target_wh), warp_mask(mask, affine, target_wh)
     if patch is not None:

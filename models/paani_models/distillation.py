@@ -31,12 +31,13 @@ class Distillation(nn.Module):
         """Logits of the student for the pictures [N,3,H,W], and how far it is from the teacher (a scalar)."""
         with torch.no_grad():
             taught = self.teacher[0].taps(pictures)
-            answer = self.teacher[0].decode(taught)
+            answer = self.teacher[0].decode(taught, pictures)
         taps = student.taps(pictures)
         logits = student.decode(taps)
         loss = ANSWER_GAIN * answer_distance(logits, answer)
         for adapter, ours, theirs in zip(self.adapters, taps[FIRST_TAP:], taught[FIRST_TAP:], strict=True):
-            loss = loss + FEATURE_GAIN / len(self.adapters) * F.mse_loss(adapter(ours), standardised(theirs))
+            goal = F.interpolate(standardised(theirs), size=ours.shape[2:], mode="bilinear", align_corners=False)
+            loss = loss + FEATURE_GAIN / len(self.adapters) * F.mse_loss(adapter(ours), goal)
         return logits, loss
 
 

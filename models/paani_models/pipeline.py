@@ -38,7 +38,7 @@ IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
 COMPARED_PICTURES = 8
 
-TEACHER_RECIPE = train_segmenter.Recipe(stages=(Stage(8, 128, 160), Stage(4, 256, 320)), peak_rate=5e-4)
+TEACHER_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
 
 class Pictures:

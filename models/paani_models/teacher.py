@@ -1,4 +1,4 @@
-"""A larger segmenter for training only: ImageNet MobileNetV2 encoder, the same decoder. It labels unlabelled pictures.
+"""A segmenter that starts from ImageNet: MobileNetV2 encoder at 11/16 of the input's size, separable decoder.
 
 The encoder's weights come with batch norm folded in (`convNN.weight`, `convNN.bias` in running order), for RGB in -1..1
 and padding on the bottom and right only before a stride.
@@ -15,10 +15,9 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from paani.errors import UserError
-from paani_models.segmenter import DECODER_CHANNELS
 from paani_models.sources import SEGMENTER_CLASSES
 
-# (expansion, channels, repeats, stride): Sandler et al. 2018, table 2.
+# (expansion, channels, repeats, stride): Sandler et al. 2018, table 2, without its last stage.
 _STAGES = (
     (1, 16, 1, 1),
     (6, 24, 2, 2),
@@ -26,11 +25,13 @@ _STAGES = (
     (6, 64, 4, 2),
     (6, 96, 3, 1),
     (6, 160, 3, 2),
-    (6, 320, 1, 1),
 )
-_TAPS = (1, 2, 4, 6)  # stages at strides 4, 8, 16, 32
-TAP_CHANNELS = (24, 32, 96, 320)
+_TAPS = (1, 2, 4, 5)  # stages at strides 4, 8, 16, 32
+TAP_CHANNELS = (24, 32, 96, 160)
 _FROZEN_STAGES = 2  # the first stages are general and the dearest to train
+ENCODER_SCALE = 11 / 16  # of the input's sides: as fast as the net of `paani_models.segmenter`
+DECODER_CHANNELS = 48
+DETAIL_CHANNELS = 16
 
 
 class FoldedConv(nn.Module):
@@ -73,6 +74,16 @@ class Block(nn.Module):
         return x + y if self.residual else y
 
 
+def _conv_norm(cin: int, cout: int, kernel: int, stride: int = 1, groups: int = 1) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(cin, cout, kernel, stride, kernel // 2, groups=groups, bias=False), nn.BatchNorm2d(cout), nn.ReLU()
+    )
+
+
+def _refine(channels: int) -> nn.Sequential:
+    return nn.Sequential(_conv_norm(channels, channels, 3, groups=channels), _conv_norm(channels, channels, 1))
+
+
 class Teacher(nn.Module):
     """Same input and output as `paani_models.segmenter.Segmenter`."""
 
@@ -89,17 +100,24 @@ class Teacher(nn.Module):
         self.stages = nn.ModuleList(stages)
         width = DECODER_CHANNELS
         self.project = nn.Conv2d(TAP_CHANNELS[-1], width, 1)
+        self.scene = nn.Conv2d(TAP_CHANNELS[-1], width, 1)
         self.laterals = nn.ModuleList(nn.Conv2d(c, width, 1) for c in TAP_CHANNELS[-2::-1])
-        self.refines = nn.ModuleList(
-            nn.Sequential(nn.Conv2d(width, width, 3, padding=1, bias=False), nn.BatchNorm2d(width), nn.ReLU())
-            for _ in TAP_CHANNELS[:-1]
+        self.refines = nn.ModuleList(_refine(width) for _ in TAP_CHANNELS[:-1])
+        self.detail = nn.Sequential(
+            _conv_norm(3, DETAIL_CHANNELS // 2, 3, 2),
+            _conv_norm(DETAIL_CHANNELS // 2, DETAIL_CHANNELS, 3, 2),
+            nn.Conv2d(DETAIL_CHANNELS, width, 1),
         )
+        self.finish = _refine(width)
         self.head = nn.Conv2d(width, len(SEGMENTER_CLASSES), 3, padding=1)
         self.register_buffer("scale", 2.0 * torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
         self.register_buffer("shift", 2.0 * torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1) - 1.0)
 
     def taps(self, x: Tensor) -> list[Tensor]:
-        """Encoder outputs at strides 4, 8, 16, 32 (TAP_CHANNELS)."""
+        """Encoder outputs at strides 4, 8, 16, 32 of the encoder's own size (TAP_CHANNELS)."""
+        height, width = x.shape[2:]
+        size = (int(height * ENCODER_SCALE), int(width * ENCODER_SCALE))
+        x = F.interpolate(x, size=size, mode="bilinear", align_corners=False)
         x = self.stem(x * cast(Tensor, self.scale) + cast(Tensor, self.shift))
         taps = []
         for index, stage in enumerate(self.stages):
@@ -108,16 +126,22 @@ class Teacher(nn.Module):
                 taps.append(x)
         return taps
 
-    def decode(self, taps: list[Tensor]) -> Tensor:
-        """What `taps` gave -> logits at the input's size."""
+    def decode(self, taps: list[Tensor], x: Tensor) -> Tensor:
+        """What `taps` gave for an input -> logits at the input's size."""
         *shallow, deepest = taps
-        y = self.project(deepest)
+        y = self.project(deepest) + F.relu(self.scene(deepest.mean((2, 3), keepdim=True)))
         for lateral, refine, tap in zip(self.laterals, self.refines, reversed(shallow), strict=True):
             y = refine(F.interpolate(y, size=tap.shape[2:], mode="nearest") + lateral(tap))
+        detail = self.detail(x)
+        y = self.finish(F.interpolate(y, size=detail.shape[2:], mode="bilinear", align_corners=False) + detail)
         return F.interpolate(self.head(y), scale_factor=4.0, mode="nearest")
 
     def forward(self, x: Tensor) -> Tensor:
-        return self.decode(self.taps(x))
+        return self.decode(self.taps(x), x)
+
+    def encoder(self) -> nn.ModuleList:
+        """The part that `load_imagenet` fills."""
+        return nn.ModuleList([self.stem, self.stages])
 
 
 def load_imagenet(model: Teacher, path: Path) -> None:
@@ -126,8 +150,7 @@ def load_imagenet(model: Teacher, path: Path) -> None:
         weights = np.load(path)
     except (OSError, ValueError) as error:
         raise UserError(f"{path}: {error}") from error
-    encoder = nn.ModuleList([model.stem, model.stages])
-    convs = [module for module in encoder.modules() if isinstance(module, nn.Conv2d)]
+    convs = [module for module in model.encoder().modules() if isinstance(module, nn.Conv2d)]
     for index, conv in enumerate(convs):
         weight, bias = (
             torch.tensor(weights[f"conv{index:02d}.{part}"].astype(np.float32)) for part in ("weight", "bias")

@@ -19,6 +19,7 @@ from paani_models.network_input import segmenter_batch
 from paani_models.segmenter import segmenter_loss
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import IGNORE, RENDERED, SEGMENTER_CLASSES, Sample, read_mask, read_picture
+from paani_models.teacher import Teacher
 from paani_models.training import (
     Prefetch,
     Progress,
@@ -38,8 +39,8 @@ UNSEGMENTED = "unsegmented"  # pictures of all sources without masks: only a tea
 DRAWS = {
     "tbiseg_usvinland": 340,
     "tbiseg_tampere": 170,
-    "tbiseg_dasha": 110,
-    "bath_river": 240,
+    "tbiseg_dasha": 130,
+    "bath_river": 300,
     "mastr1325": 190,
     "oasis": 170,
     UNSEGMENTED: 900,
@@ -120,7 +121,8 @@ class SegmenterTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model, self.distillation = model, distillation
-        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, extra=distillation)
+        gentle = model.encoder() if isinstance(model, Teacher) else None
+        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""

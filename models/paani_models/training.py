@@ -19,6 +19,8 @@ from paani.errors import UserError
 
 Batch = TypeVar("Batch")
 
+GENTLE_GAIN = 0.3
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -107,9 +109,17 @@ class Progress:
     """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (checklist S11).
 
     extra: parameters that are trained along with the model and are not part of it.
+    gentle: a part of the model that is well trained already and learns at GENTLE_GAIN times the rate.
     """
 
-    def __init__(self, model: nn.Module, peak_rate: float, weight_decay: float, extra: nn.Module | None = None) -> None:
+    def __init__(
+        self,
+        model: nn.Module,
+        peak_rate: float,
+        weight_decay: float,
+        extra: nn.Module | None = None,
+        gentle: nn.Module | None = None,
+    ) -> None:
         self.model = model.to(device())
         for parameter in self.model.parameters():
             if parameter.dim() == 4:
@@ -117,7 +127,12 @@ class Progress:
         self.average = AveragedWeights(self.model)
         self.extra = extra.to(device()) if extra is not None else nn.Module()
         trained = [p for net in (self.model, self.extra) for p in net.parameters() if p.requires_grad]
-        self.optimiser = torch.optim.AdamW(trained, peak_rate, weight_decay=weight_decay)
+        slow = {id(p) for p in gentle.parameters()} if gentle is not None else set()
+        groups = [
+            {"params": [p for p in trained if (id(p) in slow) == gently], "gain": GENTLE_GAIN if gently else 1.0}
+            for gently in (False, True)
+        ]
+        self.optimiser = torch.optim.AdamW([g for g in groups if g["params"]], peak_rate, weight_decay=weight_decay)
         self.epoch = 0
         self.step = 0
         self.best = 0.0
@@ -131,7 +146,7 @@ class Progress:
     def update(self, loss: Tensor, rate: float, clip_norm: float) -> None:
         """One optimiser step at a learning rate."""
         for group in self.optimiser.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate * group["gain"]
         self.optimiser.zero_grad(set_to_none=True)
         torch.autograd.backward(loss)
         nn.utils.clip_grad_norm_(self.model.parameters(), clip_norm)

@@ -193,6 +193,8 @@ class Estimator:
             stopped=self._is_stopped(now_us),
             latitude_deg=latitude_deg,
             longitude_deg=longitude_deg,
+            roll_rad=last.roll_rad if last and last.orientation_available else 0.0,
+            pitch_rad=last.pitch_rad if last and last.orientation_available else 0.0,
         )
 
     @staticmethod

@@ -14,6 +14,7 @@ from paani.messages import LaneEvidence
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 STRIDE = 4
+MIN_COUNTED = 0.5  # a corridor of which less can be seen is unknown, which is blocked
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
 
 
@@ -34,13 +35,19 @@ def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
     return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)
 
 
-def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig) -> Lanes:
-    """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside."""
+def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig, counts: Floats | None = None) -> Lanes:
+    """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside.
+
+    counts: how much of each cell counts (own hull and what lies outside the picture do not); None: everything.
+    A corridor of which less than half counts is blocked.
+    """
     rows = shares(mask.shape[0], corridors.top, 1.0)
-    water = (mask == WATER).astype(np.float64)
+    counts = np.ones(mask.shape, np.float32) if counts is None else counts
+    seen = counts.astype(np.float64)
+    water = (mask == WATER) * seen
     return Lanes(
         *(
-            _lane(water, confidence, rows, shares(mask.shape[1], *span), corridors.clear_column)
+            _lane(water, confidence * seen, seen, rows, shares(mask.shape[1], *span), corridors.clear_column)
             for span in (corridors.left, corridors.center, corridors.right)
         )
     )
@@ -55,18 +62,23 @@ def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:
 
 def _lane(
     water: NDArray[np.float64],
-    confidence: Floats,
+    confidence: NDArray[np.float64],
+    seen: NDArray[np.float64],
     rows: NDArray[np.float64],
     columns: NDArray[np.float64],
     clear_column: float,
 ) -> LaneEvidence:
-    total = rows.sum() * columns.sum()
-    water_of_column = rows @ water / rows.sum()
-    non_water = 1.0 - float(water_of_column @ columns / columns.sum())  # E4
-    uncertainty = 1.0 - float(rows @ confidence @ columns / total)  # E5
+    seen_of_column = rows @ seen
+    total = float(seen_of_column @ columns)
+    if total < MIN_COUNTED * rows.sum() * columns.sum():
+        return LaneEvidence()
+    water_of_column = rows @ water
+    non_water = 1.0 - float(water_of_column @ columns) / total  # E4
+    uncertainty = 1.0 - float(rows @ confidence @ columns) / total  # E5
     best = run = 0.0
-    for share, width in zip(water_of_column.tolist(), columns.tolist(), strict=True):
-        run = run + width if width > 0.0 and share >= clear_column - 1e-12 else 0.0
+    clear = (seen_of_column > 0.0) & (water_of_column >= (clear_column - 1e-12) * seen_of_column)
+    for is_clear, width in zip(clear.tolist(), columns.tolist(), strict=True):
+        run = run + width if width > 0.0 and is_clear else 0.0
         best = max(best, run)
     return LaneEvidence(
         non_water=min(1.0, max(0.0, non_water)),

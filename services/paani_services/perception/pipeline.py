@@ -25,6 +25,7 @@ from paani_services.perception.engine import Engine
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.gate import GateState, judge
 from paani_services.perception.preprocess import letterbox, stretch, tables
+from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -57,11 +58,15 @@ class Perceiver:
         self._tables = [tables(e.contract.preprocessing.mean, e.contract.preprocessing.std) for e in engines]
         self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
         self._gate = GateState()
+        self._counts: dict[tuple[int, ...], Floats] = {}
 
-    def perceive(self, data: bytes | Bytes, header: PictureHeader, age_s: float) -> tuple[Evidence, Bytes | None]:
+    def perceive(
+        self, data: bytes | Bytes, header: PictureHeader, age_s: float, roll_rad: float = 0.0
+    ) -> tuple[Evidence, Bytes | None]:
         """Evidence of one distinct frame, and its class mask uint8 [64, 80], None where the picture is unusable.
 
         data: an encoded picture, or BGR uint8 [H, W, 3]. age_s: the picture's age now, at the start (resolution 1).
+        roll_rad: of the boat when it was taken, starboard down positive; 0 where unknown.
         Never raises for a bad picture: it is evidence with `usable` false and its cause.
         """
         start_ms = self._stopwatch_ms()
@@ -74,20 +79,22 @@ class Perceiver:
         )
         if bgr is None or cause is not UnusableCause.NONE:
             return self._evidence(header, bgr, cause, (), None, timing, start_ms), None
+        roll_rad = followed_roll_rad(roll_rad, self._config.max_roll_rad) if self._config.follow_roll else 0.0
         if self._beside is not None:
             detecting = self._beside.submit(self._detect, bgr)
-            segmentation = self._segment(bgr)
+            segmentation = self._segment(bgr, roll_rad)
             detections, detector_ms = detecting.result()
         else:
             detections, detector_ms = self._detect(bgr)  # B4: detector, then segmenter
-            segmentation = self._segment(bgr)
+            segmentation = self._segment(bgr, roll_rad)
         timing = msgspec.structs.replace(
             timing,
             detector_ms=detector_ms,
             segmenter_ms=segmentation.took_ms,
             inference_ms=self._stopwatch_ms() - gated_ms,
         )
-        return self._evidence(header, bgr, cause, detections, segmentation, timing, start_ms), segmentation.mask
+        evidence = self._evidence(header, bgr, cause, detections, segmentation, timing, start_ms)
+        return msgspec.structs.replace(evidence, roll_rad=roll_rad), segmentation.mask
 
     def close(self) -> None:
         """Ends the second thread."""
@@ -106,16 +113,27 @@ class Perceiver:
         height, width = contract.input.shape[2:]
         tensor, place = letterbox(bgr, height, width, contract.preprocessing.pad_grey, self._tables[0])
         detections = decode(self._detector.run(tensor), place, self._config.detections)
+        if self._config.ego_polygon:
+            counts = self._counted((64, 80))
+            detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, counts))
         return detections, self._stopwatch_ms() - start_ms
 
-    def _segment(self, bgr: Bytes) -> Segmentation:
+    def _counted(self, shape: tuple[int, ...]) -> Floats:
+        """How much of each cell of a grid lies outside the own hull."""
+        if shape not in self._counts:
+            self._counts[shape] = counted(self._config.ego_polygon, *shape)
+        return self._counts[shape]
+
+    def _segment(self, bgr: Bytes, roll_rad: float) -> Segmentation:
         """The learned mask; the colour mask where there is no segmenter or its scores are not finite."""
         start_ms = self._stopwatch_ms()
         source, (mask, confidence) = SegmentationSource.LEARNED, self._learned_mask(bgr)
         if not np.isfinite(confidence).all():
             source, mask = SegmentationSource.FALLBACK, colour_mask(bgr)
             confidence = np.full(mask.shape, CONFIDENCE, np.float32)
-        lanes = summarise(mask, confidence, self._config.corridors)
+        aspect = bgr.shape[1] / bgr.shape[0]
+        flat = level(mask, confidence, self._counted(mask.shape), roll_rad, aspect)
+        lanes = summarise(flat.mask, flat.confidence, self._config.corridors, flat.counts)
         return Segmentation(mask, lanes, source, self._stopwatch_ms() - start_ms)
 
     def _learned_mask(self, bgr: Bytes) -> tuple[Bytes, Floats]:

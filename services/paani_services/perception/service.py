@@ -17,6 +17,7 @@ from paani_services.perception.pipeline import Bytes, Perceiver
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Look at the newest picture at most `perception.rate_hz` times a second, off the loop."""
     pictures = bus.latest_picture(keys.PICTURE)
+    odometry = bus.latest(keys.ODOMETRY)
     evidence, masks = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
@@ -25,7 +26,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
 
     def look(picture: Picture) -> tuple[m.Evidence, Picture | None]:
         age_s = (clock.now_us() - picture.header.source_us) * 1e-6
-        found, mask = perceiver.perceive(picture.data, picture.header, age_s)
+        roll_rad = roll_at(picture.header.source_us, odometry.value, config.perception.max_roll_age_s)
+        found, mask = perceiver.perceive(picture.data, picture.header, age_s, roll_rad)
         return found, None if mask is None else mask_picture(mask, picture.header)
 
     try:
@@ -46,6 +48,13 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     finally:
         worker.shutdown(wait=False)
         perceiver.close()
+
+
+def roll_at(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:
+    """The boat's roll when a picture was taken; 0 where nothing that near is known."""
+    if odometry is None or abs(source_us - odometry.source_us) * 1e-6 > max_age_s:
+        return 0.0
+    return odometry.roll_rad
 
 
 def mask_picture(mask: Bytes, header: m.PictureHeader) -> Picture:

@@ -11,6 +11,7 @@ PAPER: dict[str, object] = {
         "intra_op_threads": 2,  # C14, D11
         "fallback_non_water": 0.5,  # F3, F4
         "fallback_uncertainty": 0.5,
+        "follow_roll": False,  # E3: corridors are fixed in the picture
         "gate": {"enabled": False},  # J19
     },
     "advisor": {

@@ -74,6 +74,8 @@ class CorridorConfig(Section, frozen=True):
 
 
 class PerceptionConfig(Section, frozen=True):
+    """`ego_polygon`: corners of the own hull in the picture, normalised; what lies in it is no evidence."""
+
     rate_hz: Positive = 5.0
     max_frame_age_s: Positive = 0.8  # J16, judged at inference start
     concurrent: bool = True
@@ -83,6 +85,15 @@ class PerceptionConfig(Section, frozen=True):
     temperature: Positive = 1.0
     fallback_non_water: Fraction = 1.0  # F3
     fallback_uncertainty: Fraction = 1.0
+    ego_polygon: tuple[tuple[Fraction, Fraction], ...] = ()
+    follow_roll: bool = True  # corridors stay level while the boat rolls
+    max_roll_rad: NonNegative = 0.35
+    max_roll_age_s: Positive = 0.3
     corridors: CorridorConfig = CorridorConfig()
     gate: GateConfig = GateConfig()
     detections: DetectorConfig = DetectorConfig()
+
+    def __post_init__(self) -> None:
+        """A hull has an area."""
+        if 0 < len(self.ego_polygon) < 3:
+            raise ValueError(f"ego_polygon: {len(self.ego_polygon)} corners enclose nothing")

@@ -99,3 +99,5 @@ class Odometry(Message, frozen=True, kw_only=True):
     stopped: bool = False
     latitude_deg: Finite = 0.0
     longitude_deg: Finite = 0.0
+    roll_rad: Finite = 0.0
+    pitch_rad: Finite = 0.0

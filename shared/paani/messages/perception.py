@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.camera import TimeBase
-from paani.messages.header import BoxXyxy, Count, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
 
 
 class Label(StrEnum):
@@ -70,7 +70,10 @@ class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Evidence(Message, frozen=True, kw_only=True):
-    """What perception saw in one picture (checklist B5)."""
+    """What perception saw in one picture (checklist B5).
+
+    `roll_rad`: the roll the corridors were levelled by. Boxes lie in the picture as it is.
+    """
 
     frame_seq: Count
     frame_epoch: Count
@@ -89,3 +92,4 @@ class Evidence(Message, frozen=True, kw_only=True):
     timing: InferenceTiming = InferenceTiming()
     models: Text = ""
     media_us: Stamp = 0
+    roll_rad: Finite = 0.0

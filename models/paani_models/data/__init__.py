@@ -1,0 +1,1 @@
+"""Annotated pictures before training: public sets prepared, manifests, leaks between splits, bundles."""
