@@ -160,3 +160,17 @@ async def test_alive_means_ready(open_as: OpenAs, spawn: Spawn) -> None:
         assert report.ready
         assert {entry.topic for entry in report.inputs} >= {keys.EVIDENCE.name}
         assert report.rss_mib > 10
+
+
+async def test_a_picture_is_watched_by_subscribers_and_by_those_who_pull(open_as: OpenAs) -> None:
+    perception, observer, dashboard = await open_as("perception"), await open_as("observer"), await open_as("dashboard")
+    masks = perception.picture_publisher(keys.MASK)
+    pulled_only = perception.picture_publisher(keys.MASK, push=False)
+    await asyncio.sleep(0.3)
+    assert not masks.is_watched()
+    observer.latest_picture(keys.MASK)
+    await until(masks.is_watched)
+    assert not pulled_only.is_watched()
+    pulling = asyncio.create_task(dashboard.pull_picture(keys.MASK).next())
+    await until(pulled_only.is_watched)
+    pulling.cancel()

@@ -28,7 +28,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         age_s = (clock.now_us() - picture.header.source_us) * 1e-6
         roll_rad = roll_at(picture.header.source_us, odometry.value, config.perception.max_roll_age_s)
         found, mask = perceiver.perceive(picture.data, picture.header, age_s, roll_rad)
-        return found, None if mask is None else mask_picture(mask, picture.header)
+        return found, mask_picture(mask, picture.header) if mask is not None and masks.is_watched() else None
 
     try:
         with bus.alive():

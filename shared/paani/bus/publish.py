@@ -22,6 +22,7 @@ PRIORITY = {
     Stance.PICTURE: zenoh.Priority.DATA_LOW,
 }
 LONG_POLL_S = 2.0
+WATCHED_US = 5_000_000  # whoever pulls asks again within this time
 
 
 class Numbering:
@@ -82,6 +83,7 @@ class PicturePublisher(Publisher[m.PictureHeader]):
     ) -> None:
         super().__init__(session, topic, key, domain, clock)
         self._push = push
+        self._asked_us: int | None = None
         self._newest: tuple[m.PictureHeader, bytes, bytes] | None = None
         self._arrived = asyncio.Event()
         self._loop = asyncio.get_running_loop()
@@ -100,7 +102,13 @@ class PicturePublisher(Publisher[m.PictureHeader]):
         self._arrived = asyncio.Event()
         return stamped
 
+    def is_watched(self) -> bool:
+        """Does anyone subscribe, or has anyone pulled lately? What nobody watches need not be drawn."""
+        asked = self._asked_us is not None and self._clock.now_us() - self._asked_us < WATCHED_US
+        return asked or (self._push and bool(self._publisher.matching_status.matching))
+
     def _on_query(self, query: zenoh.Query) -> None:
+        self._asked_us = self._clock.now_us()
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._start_answer, query)
 
