@@ -4,7 +4,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-import cv2
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from paani.messages import (
 )
 from paani_services.perception.corridors import Lanes, classify, summarise
 from paani_services.perception.decode import decode
+from paani_services.perception.decoding import decoded
 from paani_services.perception.engine import Engine
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.gate import GateState, judge
@@ -177,14 +177,3 @@ class Perceiver:
             timing=msgspec.structs.replace(timing, total_ms=self._stopwatch_ms() - start_ms),
             models=self._models,
         )
-
-
-def decoded(data: bytes | Bytes) -> Bytes | None:
-    """BGR uint8 [H, W, 3] of an encoded picture; None where it is none."""
-    if not isinstance(data, bytes):
-        return data if data.ndim == 3 and data.shape[2] == 3 and data.size else None
-    try:
-        bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        return None
-    return None if bgr is None else np.asarray(bgr, np.uint8)
