@@ -6,9 +6,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from paani_models.imagenet_segmenter import TAP_CHANNELS as TEACHER_CHANNELS
+from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.segmenter import TAP_CHANNELS, Segmenter
-from paani_models.teacher import TAP_CHANNELS as TEACHER_CHANNELS
-from paani_models.teacher import Teacher
 from paani_models.training import device
 
 ANSWER_GAIN, FEATURE_GAIN = 1.0, 0.5
@@ -18,7 +18,7 @@ FIRST_TAP = 1  # strides 8, 16, 32; at stride 4 both nets see edges anyway
 class Distillation(nn.Module):
     """Loss between a frozen teacher and a segmenter; its adapters are trained along and then thrown away."""
 
-    def __init__(self, teacher: Teacher) -> None:
+    def __init__(self, teacher: ImageNetSegmenter) -> None:
         super().__init__()
         self.adapters = nn.ModuleList(
             nn.Sequential(nn.Conv2d(ours, theirs, 1, bias=False), nn.BatchNorm2d(theirs, affine=False))

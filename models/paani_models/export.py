@@ -25,6 +25,7 @@ from paani_models.catalogue import (
     save_catalogue,
 )
 from paani_models.detector import Detector
+from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
 from paani_models.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
@@ -69,7 +70,7 @@ CONTRACTS = {
 
 def network(name: str) -> nn.Module:
     """An untrained net of a contract."""
-    return Segmenter() if name == "segmenter" else Detector()
+    return {"segmenter": ImageNetSegmenter, "paper-segmenter": Segmenter, "detector": Detector}[name]()
 
 
 def export(

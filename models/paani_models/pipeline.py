@@ -16,6 +16,7 @@ from paani_models import detector_data, evaluate, export, train_detector, train_
 from paani_models.catalogue import Model, load_catalogue, save_catalogue, verified_path
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
+from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
 from paani_models.network_input import detector_input, segmenter_input
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
@@ -29,7 +30,6 @@ from paani_models.sources import (
     read_picture,
     read_samples,
 )
-from paani_models.teacher import Teacher, load_imagenet
 from paani_models.train_detector import DetectorTraining
 from paani_models.train_segmenter import SegmenterTraining
 from paani_models.training import Stage, load_average
@@ -38,7 +38,7 @@ IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
 COMPARED_PICTURES = 8
 
-TEACHER_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
+IMAGENET_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
 
 class Pictures:
@@ -60,8 +60,14 @@ class Pictures:
         return [s for s in self.samples if s.mask and s.held_out == held_out]
 
     def boxed(self, held_out: bool) -> list[Sample]:
-        """Samples with boxes; for training also those whose mask tells where nothing floats."""
-        return [s for s in self.samples if s.held_out == held_out and (s.label or not held_out)]
+        """Samples with boxes; for training also those whose mask tells where nothing floats.
+
+        A picture that is held out for its boxes is not trained on for its mask.
+        """
+        if held_out:
+            return [s for s in self.samples if s.held_out and s.label]
+        kept = {s.picture for s in self.samples if s.held_out and s.label}
+        return [s for s in self.samples if not s.held_out and s.picture not in kept]
 
     def unsegmented(self) -> list[Sample]:
         """Training samples of the sources that have boxes and no masks, each picture once."""
@@ -122,20 +128,20 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
 
 
 def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
-    recipe = TEACHER_RECIPE if net == "teacher" else train_segmenter.Recipe()
+    recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.Recipe()
     recipe = replace(
         recipe,
         stages=parse_stages(plan.stages) or recipe.stages,
         peak_rate=plan.peak_rate or recipe.peak_rate,
     )
     torch.manual_seed(recipe.seed)
-    model: Teacher | Segmenter = Segmenter()
-    if net == "teacher":
-        model = Teacher()
+    model: ImageNetSegmenter | Segmenter = Segmenter()
+    if net == "segmenter":
+        model = ImageNetSegmenter()
         load_imagenet(model, pictures.data / IMAGENET_FILE)
     samples, distillation = pictures.segmented(held_out=False), None
     if plan.teacher is not None:
-        teacher = Teacher()
+        teacher = ImageNetSegmenter()
         load_average(teacher, plan.teacher)
         distillation = Distillation(teacher)
         samples += pictures.unsegmented()

@@ -18,6 +18,7 @@ IGNORE = 255
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # checklist D6
 DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # checklist C2
 WATER_MASKS = "masks"
+ANNOTATIONS = Path(__file__).parent / "annotations"  # <source folder>/<picture>.txt, boxes that we drew
 RENDERED = "rendered"  # the one source that is drawn, not photographed
 
 # Coded mask value -> segmenter class (checklist R10): 0 obstacle -> 1, 1 water -> 0, 2 sky -> 2, else ignored.
@@ -35,6 +36,7 @@ class Source:
     is what is scored. soft_edges: its masks leave a band between classes undecided, so edges are not scored.
     annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
+    drawn: boxes are in ANNOTATIONS, and its sequences go past several places, so ten frame numbers count as one.
     held_out: sequences for validation; empty means one in eight by name.
     """
 
@@ -47,6 +49,7 @@ class Source:
     annotated: frozenset[str] = frozenset()
     empty_of: frozenset[str] = frozenset()
     own_hull: bool = False
+    drawn: bool = False
     held_out: tuple[str, ...] = ()
 
 
@@ -104,19 +107,13 @@ SOURCES = (
     ),
     Source("inland_vessel", "inland_vessel", labels="labels", annotated=frozenset({"vessel"})),
     Source("redyellow_buoy", "redyellow_buoy", labels="labels", annotated=frozenset({"buoy"})),
-    Source(
-        "dasha_pier",
-        "tbiseg_dasha",
-        labels="labels_pier_hand",
-        annotated=frozenset({"pier"}),
-        held_out=("none",),
-    ),
+    Source("dasha_pier", "tbiseg_dasha", annotated=frozenset({"pier"}), drawn=True, held_out=("none",)),
     Source(
         "tampere_pier",
         "tbiseg_tampere",
-        labels="labels_pier_hand",
         annotated=frozenset({"pier"}),
-        held_out=("none",),
+        drawn=True,
+        held_out=("dock_image_07", "dock_image_08", "dock_image_09"),  # one place, seen nowhere else
     ),
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )
@@ -189,10 +186,12 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
         if item.file in seen:
             continue
         seen.add(item.file)
-        sequence = item.seq if named else f"run{index // _RUN_LENGTH}"
         stem = Path(item.file).stem
+        sequence = item.seq if named else f"run{index // _RUN_LENGTH}"
         mask = folder / source.masks / f"{stem}.png" if source.masks else None
         label = folder / source.labels / f"{stem}.txt" if source.labels else None
+        if source.drawn:
+            sequence, label = stem[:-1], ANNOTATIONS / source.folder / f"{stem}.txt"
         if label is not None and not label.is_file():
             if mask is None:
                 continue

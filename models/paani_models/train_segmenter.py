@@ -15,11 +15,11 @@ from tqdm import tqdm
 
 from paani_models.augment import obstacle_patch, segmenter_null, segmenter_sample
 from paani_models.distillation import Distillation
+from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.network_input import segmenter_batch
 from paani_models.segmenter import segmenter_loss
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import IGNORE, RENDERED, SEGMENTER_CLASSES, Sample, read_mask, read_picture
-from paani_models.teacher import Teacher
 from paani_models.training import (
     Prefetch,
     Progress,
@@ -121,7 +121,7 @@ class SegmenterTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model, self.distillation = model, distillation
-        gentle = model.encoder() if isinstance(model, Teacher) else None
+        gentle = model.encoder() if isinstance(model, ImageNetSegmenter) else None
         self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
 
     def run(self, until: int | None = None) -> None:

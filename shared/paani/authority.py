@@ -17,7 +17,7 @@ from paani.errors import UserError
 from paani.runtime import runtime_dir, write_private
 
 OBSERVER = "observer"
-TRUTH_READERS = ("eye", "dashboard", OBSERVER)
+TRUTH_READERS = ("eye", "dashboard", "recorder", OBSERVER)
 USERS = (*keys.SERVICES, OBSERVER)
 USERS_FILE = ".users"
 

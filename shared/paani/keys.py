@@ -101,6 +101,14 @@ ARMING = Topic(
     name="operator/arming", type=m.Arming, producer="dashboard", rate_hz=5.0, fresh_s=1.0,
     stance=Stance.COMMAND, summary="the operator's arm and latched stop",
 )
+TUNING = Topic(
+    name="operator/tuning", type=m.Tuning, producer="dashboard", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.COMMAND, summary="the operator's request to try, promote or take back parameters of the policy",
+)
+SHADOW = Topic(
+    name="advisor/shadow", type=m.Shadow, producer="advisor", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.STATE, summary="parameters tried beside those in force, and where the advice would differ",
+)
 SIM_TIME = Topic(
     name="plant/clock", type=m.SimTime, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="simulated time and the stamp that commands echo",
@@ -121,6 +129,10 @@ TRUE_POSE = Topic(
     name="@truth/pose", type=m.TruePose, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="simulator truth: eye, dashboard and scoring only",
 )
+RECORDER_STATE = Topic(
+    name="recorder/state", type=m.RecorderState, producer="recorder", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.STATE, summary="what the recorder writes, dropped and never heard",
+)
 
 DECIDING_SERVICES = ("advisor", "navigator", "controller")
 STEPS = {
@@ -133,7 +145,7 @@ STEPS = {
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, THRUST, LOCAL_ODOMETRY,
-    ODOMETRY, ARMING, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, *STEPS.values(),
+    ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, RECORDER_STATE, *STEPS.values(),
 )
 # fmt: on
 
@@ -148,6 +160,7 @@ SERVICES = (
     "controller",
     "localization",
     "dashboard",
+    "recorder",
 )
 BOARD_SERVICES = ("camera", "perception", "advisor", "navigator", "controller")
 VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")

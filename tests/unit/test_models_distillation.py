@@ -11,20 +11,26 @@ torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 from paani.errors import UserError  # noqa: E402
 from paani_models.cli import data_folder  # noqa: E402
 from paani_models.distillation import Distillation, answer_distance, standardised  # noqa: E402
+from paani_models.imagenet_segmenter import (  # noqa: E402
+    ENCODER_SCALE,
+    TAP_CHANNELS,
+    ImageNetSegmenter,
+    load_imagenet,
+)
 from paani_models.pipeline import IMAGENET_FILE  # noqa: E402
 from paani_models.segmenter import Segmenter  # noqa: E402
-from paani_models.teacher import TAP_CHANNELS, Teacher, load_imagenet  # noqa: E402
 
 IMAGENET = data_folder() / IMAGENET_FILE
 
 
-def test_teacher_has_the_segmenters_contract() -> None:
-    teacher = Teacher().eval()
-    x = torch.zeros(1, 3, 64, 96)
-    assert [(t.shape[1], 64 // t.shape[2]) for t in teacher.taps(x)] == list(
-        zip(TAP_CHANNELS, (4, 8, 16, 32), strict=True)
-    )
-    assert tuple(teacher(x).shape) == (1, 3, 64, 96)
+def test_the_imagenet_segmenter_has_the_segmenters_contract() -> None:
+    teacher = ImageNetSegmenter().eval()
+    x = torch.zeros(1, 3, 256, 320)
+    height = 256 * ENCODER_SCALE
+    assert [(t.shape[1], int(height // t.shape[2])) for t in teacher.taps(x)] == [
+        (channels, stride if stride < 32 else 35) for channels, stride in zip(TAP_CHANNELS, (4, 8, 16, 32), strict=True)
+    ]
+    assert tuple(teacher(x).shape) == (1, 3, 256, 320)
 
 
 def test_the_same_answer_is_at_distance_zero() -> None:
@@ -50,7 +56,7 @@ def test_standardised_features() -> None:
 @pytest.mark.train
 def test_the_teacher_stays_and_the_segmenter_moves_towards_it() -> None:
     torch.manual_seed(0)
-    teacher, student = Teacher(), Segmenter()
+    teacher, student = ImageNetSegmenter(), Segmenter()
     before = {name: value.clone() for name, value in teacher.state_dict().items()}
     distillation = Distillation(teacher)
     optimiser = torch.optim.Adam([*student.parameters(), *distillation.parameters()], 1e-3)
@@ -71,13 +77,13 @@ def test_a_file_that_is_no_encoder_is_named(tmp_path: Path) -> None:
     arrays: dict[str, Any] = {"conv00.weight": np.zeros((1, 1, 1, 1)), "conv00.bias": np.zeros(1)}
     np.savez(tmp_path / "other.npz", **arrays)
     with pytest.raises(UserError, match=r"other\.npz: conv00 has shape"):
-        load_imagenet(Teacher(), tmp_path / "other.npz")
+        load_imagenet(ImageNetSegmenter(), tmp_path / "other.npz")
 
 
 @pytest.mark.data
 @pytest.mark.skipif(not IMAGENET.is_file(), reason=f"no {IMAGENET}; set PAANI_DATA")
 def test_imagenet_start_fills_the_encoder_and_freezes_its_first_stages() -> None:
-    teacher = Teacher()
+    teacher = ImageNetSegmenter()
     load_imagenet(teacher, IMAGENET)
     assert not any(p.requires_grad for p in teacher.stem.parameters())
     assert all(p.requires_grad for p in teacher.stages[-1].parameters())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -111,15 +110,6 @@ def _row(line: str, place: str, kinds: int) -> Box:
     if low < -EDGE_SLACK or high > 1.0 + EDGE_SLACK:
         raise UserError(f"{place}: a box outside the picture")
     return Box(int(kind), cx, cy, width, height)
-
-
-def collect(paths: Iterable[Path], read: Callable[[Path], object]) -> Iterator[str]:
-    """What `read` says of each path that it refuses."""
-    for path in paths:
-        try:
-            read(path)
-        except UserError as error:
-            yield str(error)
 
 
 def refuse(mistakes: list[str]) -> None:

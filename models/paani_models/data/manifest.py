@@ -95,7 +95,5 @@ def count_boxes(manifest: SourceManifest) -> tuple[BoxCounts, ...]:
 def counts_table(rows: tuple[BoxCounts, ...]) -> str:
     """Aligned text: split, images, person, vessel, pier, buoy."""
     lines = [f"{'split':6} {'images':>7} " + " ".join(f"{name:>7}" for name in DETECTOR_CLASSES)]
-    lines += [
-        f"{r.split:6} {r.images:7,} {r.person:7,} {r.vessel:7,} {r.pier:7,} {r.buoy:7,}" for r in rows
-    ]
+    lines += [f"{r.split:6} {r.images:7,} {r.person:7,} {r.vessel:7,} {r.pier:7,} {r.buoy:7,}" for r in rows]
     return "\n".join(lines) + "\n"

@@ -1,8 +1,9 @@
 """Configuration: one frozen tree, layered from defaults, a file, the environment and the command line."""
 
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
-from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
+from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
 from paani.config.loading import decode_config, encode_config, load_config
+from paani.config.recording import RecorderConfig
 from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, GateConfig, PerceptionConfig
 from paani.config.simulating import (
     AdapterConfig,
@@ -33,9 +34,11 @@ __all__ = [
     "PerceptionConfig",
     "PlantConfig",
     "PolicyConfig",
+    "RecorderConfig",
     "RiskConfig",
     "SensorsConfig",
     "TrackerConfig",
+    "TuningConfig",
     "WorldConfig",
     "decode_config",
     "encode_config",

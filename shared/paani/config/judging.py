@@ -64,6 +64,14 @@ class PolicyConfig(Section, frozen=True):
     clear_frames: Size = 2  # J10
 
 
+class TuningConfig(Section, frozen=True):
+    """When tried parameters may take effect: after 10 s of frames at the nominal rate, within the hour, at once."""
+
+    min_frames: Size = 50
+    max_proposal_age_s: Positive = 3600.0
+    max_request_age_s: Positive = 5.0  # a request that lay longer is refused, not obeyed late
+
+
 class AdvisorConfig(Section, frozen=True):
     rate_hz: Positive = 5.0  # J17
     evidence_max_age_s: Positive = 0.8  # J16
@@ -73,3 +81,4 @@ class AdvisorConfig(Section, frozen=True):
     motion: MotionConfig = MotionConfig()
     risk: RiskConfig = RiskConfig()
     policy: PolicyConfig = PolicyConfig()
+    tuning: TuningConfig = TuningConfig()

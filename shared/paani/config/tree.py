@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.judging import AdvisorConfig
+from paani.config.recording import RecorderConfig
 from paani.config.section import Positive, Section
 from paani.config.seeing import CameraConfig, PerceptionConfig
 from paani.config.simulating import EyeConfig, PlantConfig, WorldConfig
@@ -50,6 +51,7 @@ class Config(Section, frozen=True):
     plant: PlantConfig = PlantConfig()
     eye: EyeConfig = EyeConfig()
     dashboard: DashboardConfig = DashboardConfig()
+    recorder: RecorderConfig = RecorderConfig()
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""

@@ -31,14 +31,18 @@ from paani.messages.perception import (
     UnusableCause,
 )
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
+from paani.messages.recorder import RecordedTopic, RecorderState
+from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
 
 __all__ = [
     "Advisory",
     "Arming",
     "BoxXyxy",
+    "Change",
     "Count",
     "Detection",
     "Direction",
+    "Disagreement",
     "DropCount",
     "Evidence",
     "Finite",
@@ -62,9 +66,12 @@ __all__ = [
     "PictureHeader",
     "Pulse",
     "Reason",
+    "RecordedTopic",
+    "RecorderState",
     "Route",
     "SegmentationSource",
     "SentMessage",
+    "Shadow",
     "SimTime",
     "Stamp",
     "Step",
@@ -75,6 +82,9 @@ __all__ = [
     "Track",
     "Tracks",
     "TruePose",
+    "Tuning",
+    "TuningAct",
+    "TuningRefusal",
     "Unit",
     "UnusableCause",
     "Waypoint",

@@ -85,7 +85,7 @@ def percentiles(samples: Iterable[float]) -> Percentiles:
     ordered = sorted(samples)
     if not ordered:
         return Percentiles()
-    p50, p95, p99 = (round(ordered[math.ceil(p * len(ordered) / 100) - 1], 3) for p in (50, 95, 99))
+    p50, p95, p99 = (round(nearest_rank(ordered, p), 3) for p in (50, 95, 99))
     return Percentiles(p50=p50, p95=p95, p99=p99, samples=len(ordered))
 
 

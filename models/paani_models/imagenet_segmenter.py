@@ -1,4 +1,4 @@
-"""A segmenter that starts from ImageNet: MobileNetV2 encoder at 11/16 of the input's size, separable decoder.
+"""The shipped segmenter: MobileNetV2 encoder that starts from ImageNet, separable decoder.
 
 The encoder's weights come with batch norm folded in (`convNN.weight`, `convNN.bias` in running order), for RGB in -1..1
 and padding on the bottom and right only before a stride.
@@ -84,8 +84,11 @@ def _refine(channels: int) -> nn.Sequential:
     return nn.Sequential(_conv_norm(channels, channels, 3, groups=channels), _conv_norm(channels, channels, 1))
 
 
-class Teacher(nn.Module):
-    """Same input and output as `paani_models.segmenter.Segmenter`."""
+class ImageNetSegmenter(nn.Module):
+    """RGB normalised as in `paani_models.catalogue`, float32 [N,3,H,W] (H, W multiples of 32) -> logits [N,3,H,W].
+
+    The encoder sees a smaller picture; a thin branch at full size keeps the edges. Logits are constant over 4x4 pixels.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -144,7 +147,7 @@ class Teacher(nn.Module):
         return nn.ModuleList([self.stem, self.stages])
 
 
-def load_imagenet(model: Teacher, path: Path) -> None:
+def load_imagenet(model: ImageNetSegmenter, path: Path) -> None:
     """Fill the encoder and freeze its first stages. Raises UserError where the file does not fit."""
     try:
         weights = np.load(path)

@@ -1,0 +1,116 @@
+"""An exported net back into PyTorch, so that training can go on from weights of which no checkpoint is left.
+
+Export folds batch norm into the convolutions. Here each normalisation is given the statistics that its convolution
+shows on pictures, and the scale and offset that undo them: evaluation equals the exported file, and training, which
+normalises by the batch, starts close to it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import onnx
+import torch
+from onnx import numpy_helper
+from torch import Tensor, nn
+from torch.utils.hooks import RemovableHandle
+
+from paani.errors import UserError
+
+
+def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
+    """Fill `model` with the weights of its own export.
+
+    pictures: float32 [N,3,H,W] as the net gets them, whose statistics the normalisations take.
+    Raises UserError where the file is no export of this net.
+    """
+    stored = _convolutions(path)
+    convs = _in_running_order(model, pictures[:1])
+    if len(stored) != len(convs):
+        raise UserError(f"{path}: {len(stored)} convolutions, expected {len(convs)}")
+    norms = _norm_behind(model)
+    biases: dict[nn.Conv2d, Tensor] = {}
+    for index, (conv, (weight, bias)) in enumerate(zip(convs, stored, strict=True)):
+        if weight.shape != conv.weight.shape:
+            raise UserError(
+                f"{path}: convolution {index} has shape {tuple(weight.shape)}, expected {tuple(conv.weight.shape)}"
+            )
+        conv.weight.data = weight
+        if conv in norms:
+            _pass_through(norms[conv], bias)
+            biases[conv] = bias
+        elif conv.bias is not None:
+            conv.bias.data = bias
+    _take_statistics(model, {conv: norms[conv] for conv in biases}, biases, pictures)
+
+
+def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
+    try:
+        graph = onnx.load(str(path)).graph
+    except Exception as error:
+        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    pairs = []
+    for node in graph.node:
+        if node.op_type == "Conv":
+            if len(node.input) < 3 or any(name not in constants for name in node.input[1:3]):
+                raise UserError(f"{path}: {node.name}: a convolution without stored weight and bias")
+            weight, bias = (torch.tensor(constants[name]) for name in node.input[1:3])
+            pairs.append((weight, bias))
+    return pairs
+
+
+@torch.no_grad()
+def _in_running_order(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
+    order: list[nn.Conv2d] = []
+    handles: list[RemovableHandle] = [
+        module.register_forward_hook(lambda conv, _inputs, _output: order.append(conv))
+        for module in model.modules()
+        if isinstance(module, nn.Conv2d)
+    ]
+    model.eval()(picture)
+    for handle in handles:
+        handle.remove()
+    return order
+
+
+def _norm_behind(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
+    """Which normalisation follows which convolution; both stand side by side in a `Sequential`."""
+    found = {}
+    for block in model.modules():
+        layers = list(block.children()) if isinstance(block, nn.Sequential) else []
+        for first, second in zip(layers, layers[1:], strict=False):
+            if isinstance(first, nn.Conv2d) and isinstance(second, nn.BatchNorm2d):
+                found[first] = second
+    return found
+
+
+def _pass_through(norm: nn.BatchNorm2d, bias: Tensor) -> None:
+    _set(norm, torch.zeros_like(bias), torch.ones_like(bias), bias)
+
+
+def _set(norm: nn.BatchNorm2d, mean: Tensor, variance: Tensor, bias: Tensor) -> None:
+    assert norm.running_mean is not None
+    assert norm.running_var is not None
+    norm.running_mean.copy_(mean)
+    norm.running_var.copy_(variance)
+    norm.weight.data = (variance + norm.eps).sqrt()
+    norm.bias.data = bias + mean
+
+
+@torch.no_grad()
+def _take_statistics(
+    model: nn.Module, norms: dict[nn.Conv2d, nn.BatchNorm2d], biases: dict[nn.Conv2d, Tensor], pictures: Tensor
+) -> None:
+    seen: dict[nn.Conv2d, tuple[Tensor, Tensor]] = {}
+
+    def look(conv: nn.Module, _inputs: tuple[Tensor, ...], output: Tensor) -> None:
+        assert isinstance(conv, nn.Conv2d)
+        seen[conv] = (output.mean((0, 2, 3)), output.var((0, 2, 3), unbiased=False))
+
+    handles = [conv.register_forward_hook(look) for conv in norms]
+    model.eval()(pictures)
+    for handle in handles:
+        handle.remove()
+    for conv, norm in norms.items():
+        _set(norm, *seen[conv], biases[conv])

@@ -1,0 +1,94 @@
+"""Annotated pictures to spoil: clean pictures with their class masks, and views without water cut from above it."""
+
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import cv2
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+
+Bytes = NDArray[np.uint8]
+T = TypeVar("T")
+SIZE_WH = (320, 240)
+# Mask folders by preference, coded 0 obstacle, 1 water, 2 sky, 255 unknown.
+MASK_FOLDERS = ("masks3", "masks")
+CLASS_OF = np.full(256, 255, np.uint8)
+CLASS_OF[:3] = (1, 0, 2)  # to water 0, obstacle 1, sky 2 (D6)
+DRY_ROWS = 60  # a view without water is cut from at least this many rows
+
+
+class Scene(NamedTuple):
+    """A picture BGR uint8 [240, 320, 3] and its mask uint8 [240, 320] (0 water, 1 obstacle, 2 sky, 255 unknown)."""
+
+    source: str
+    sequence: str
+    picture: Bytes
+    mask: Bytes
+
+
+class _Item(msgspec.Struct):
+    file: str
+    seq: str = ""
+
+
+class _Manifest(msgspec.Struct):
+    items: list[_Item]
+
+
+def sources(folder: Path) -> list[Path]:
+    """Sub-folders that hold annotated pictures. Raises UserError when there is none."""
+    found = [path.parent for path in sorted(folder.glob("*/manifest.json"))]
+    if not found:
+        raise UserError(f"{folder}: no sub-folder with a manifest.json")
+    return found
+
+
+def clean_pictures(source: Path, at_most: int) -> list[Bytes]:
+    """Pictures of a source as they are, evenly spread over it."""
+    paths = sorted(p for p in (source / "images").glob("*") if p.suffix.lower() in {".jpg", ".jpeg", ".png"})
+    read = (cv2.imread(str(path), cv2.IMREAD_COLOR) for path in spread(paths, at_most))
+    return [np.asarray(picture, np.uint8) for picture in read if picture is not None]
+
+
+def scenes(source: Path, at_most: int) -> list[Scene]:
+    """Pictures with masks of all three classes, evenly spread; none where the source has no such masks."""
+    manifest = source / "manifest.json"
+    try:
+        items = msgspec.json.decode(manifest.read_bytes(), type=_Manifest).items
+    except (OSError, msgspec.DecodeError) as error:
+        raise UserError(f"{manifest}: {error}") from error
+    folders = [source / name for name in MASK_FOLDERS if (source / name).is_dir()]
+    if not folders:
+        return []
+    found = []
+    for item in spread(sorted(items, key=lambda i: i.file), at_most):
+        picture = cv2.imread(str(source / "images" / Path(item.file).name), cv2.IMREAD_COLOR)
+        mask = cv2.imread(str(folders[0] / f"{Path(item.file).stem}.png"), cv2.IMREAD_GRAYSCALE)
+        if picture is None or mask is None:
+            continue
+        small = np.asarray(cv2.resize(picture, SIZE_WH, interpolation=cv2.INTER_AREA), np.uint8)
+        classes = CLASS_OF[cv2.resize(mask, SIZE_WH, interpolation=cv2.INTER_NEAREST)]
+        found.append(Scene(source.name, item.seq, small, np.asarray(classes, np.uint8)))
+    return found
+
+
+def dry_view(scene: Scene) -> Bytes | None:
+    """The part of a picture above its water, as large as a picture; None where there is too little of it."""
+    rows = np.flatnonzero((scene.mask == 0).mean(axis=1) > 0.02)
+    top = int(rows[0]) if rows.size else SIZE_WH[1]
+    if top < DRY_ROWS:
+        return None
+    width = min(SIZE_WH[0], round(top * SIZE_WH[0] / SIZE_WH[1]))
+    left = (SIZE_WH[0] - width) // 2
+    part = scene.picture[:top, left : left + width]
+    return np.asarray(cv2.resize(part, SIZE_WH, interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def spread(items: list[T], at_most: int) -> list[T]:
+    """At most so many, at even distances."""
+    if len(items) <= at_most:
+        return items
+    return [items[round(i * (len(items) - 1) / max(1, at_most - 1))] for i in range(at_most)]

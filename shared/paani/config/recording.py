@@ -1,0 +1,31 @@
+"""Recorder settings."""
+
+from __future__ import annotations
+
+from paani.config.section import NonNegative, Positive, Section, Size
+from paani.keys import TOPICS
+
+
+class RecorderConfig(Section, frozen=True):
+    """`folder` is where recordings go; empty: nothing is recorded and there is no recorder.
+
+    `leave_out`: topics not recorded. The eye's pictures are what the camera relays, byte for byte.
+    A part ends after `part_s` or `part_mib`. `budget_mib` bounds all parts in the folder: the oldest go, but for those
+    with a file `NAME.keep` beside them. With less than `min_free_mib` left on the disk nothing is written.
+    """
+
+    folder: str = ""
+    leave_out: tuple[str, ...] = ("eye/picture",)
+    queue_messages: Size = 2000
+    queue_mib: Positive = 16.0
+    flush_s: Positive = 0.5  # a crash costs at most this and one write
+    part_s: Positive = 600.0
+    part_mib: Positive = 512.0
+    budget_mib: Positive = 20_000.0  # about a day with pictures
+    min_free_mib: NonNegative = 1000.0
+
+    def __post_init__(self) -> None:
+        """What is left out exists."""
+        for name in self.leave_out:
+            if name not in {topic.name for topic in TOPICS}:
+                raise ValueError(f"leave_out: no topic '{name}'")

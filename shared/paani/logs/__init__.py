@@ -1,0 +1,1 @@
+"""Logs of drives: MCAP files. Only this package imports mcap."""

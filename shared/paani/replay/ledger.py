@@ -1,0 +1,148 @@
+"""Steps of one service as a log has them, each with the messages it was given and those it sent. Pure.
+
+Memory is bounded: messages are kept for a minute, and what a step had heard for as long as the next may hear it.
+"""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.decider import Decider, Input
+from paani.logs.reader import Record
+
+KEEP_US = 60_000_000
+LATE_US = 3_000_000  # messages of one moment reach the recorder in any order within this
+
+Name = tuple[str, int, int]  # topic, epoch, seq
+
+
+class Given(NamedTuple):
+    """One step. `inputs` is None where `lacks` says why; `early`: what it lacks was sent before the log began.
+
+    sent: what the step sent, with the recorded payload; None where the log has none.
+    """
+
+    log_us: int
+    step: m.Step
+    inputs: dict[str, Input] | None
+    lacks: str
+    early: bool
+    sent: tuple[tuple[m.SentMessage, bytes | None], ...]
+
+
+class _Head(msgspec.Struct):
+    epoch: int
+    seq: int
+
+
+class _Held:
+    __slots__ = ("claimed", "data", "log_us")
+
+    def __init__(self, data: bytes, log_us: int) -> None:
+        self.data, self.log_us, self.claimed = data, log_us, False
+
+
+class Ledger:
+    """`steps` goes once through the records of `topics`; the other attributes are complete after it.
+
+    orphans: outputs that no step names, between the first and the last that one does.
+    malformed: messages without a readable header, by topic.
+    """
+
+    def __init__(self, decider: Decider[Any]) -> None:
+        self._step_topic = keys.STEPS[decider.service].name
+        heard = (*decider.inputs, *decider.own)
+        self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in heard}
+        self._empty = {topic.name: Input() for topic in decider.inputs}
+        self._outputs = {topic.name for topic in decider.outputs}
+        self.topics = frozenset((self._step_topic, *self._decoders, *self._outputs))
+        self.orphans: list[Name] = []
+        self.malformed: collections.Counter[str] = collections.Counter()
+        self._messages: dict[Name, _Held] = {}
+        self._newest_heard: dict[str, tuple[int, int, Any]] = {}
+        self._first: dict[str, tuple[int, int]] = {}
+        self._claimed: dict[tuple[str, int], tuple[int, int]] = {}  # (topic, epoch): lowest and highest seq
+        self._unclaimed: list[Name] = []
+
+    def steps(self, records: Iterable[Record]) -> Iterator[Given]:
+        """Every step in the order recorded, each a few seconds of log later than it came."""
+        waiting: collections.deque[tuple[int, m.Step]] = collections.deque()
+        head, step_decoder = msgspec.json.Decoder(_Head), msgspec.json.Decoder(m.Step)
+        for record in records:
+            topic, log_us, _, data = record
+            try:
+                if topic == self._step_topic:
+                    waiting.append((log_us, step_decoder.decode(data)))
+                else:
+                    name = head.decode(data)
+                    self._messages.setdefault((topic, name.epoch, name.seq), _Held(data, log_us))
+                    self._first.setdefault(topic, (name.epoch, name.seq))
+            except (msgspec.MsgspecError, UnicodeDecodeError):
+                self.malformed[topic] += 1
+            while waiting and waiting[0][0] + LATE_US <= log_us:
+                yield self._given(*waiting.popleft())
+            self._forget(log_us - KEEP_US)
+        while waiting:
+            yield self._given(*waiting.popleft())
+        self._forget(None)
+        self.orphans = [name for name in self._unclaimed if self._is_between(name)]
+
+    def _given(self, log_us: int, step: m.Step) -> Given:
+        sent = []
+        for message in step.sent:
+            held = self._messages.get((message.topic, message.epoch, message.seq))
+            if held is not None:
+                held.claimed = True
+            low, high = self._claimed.get((message.topic, message.epoch), (message.seq, message.seq))
+            self._claimed[message.topic, message.epoch] = min(low, message.seq), max(high, message.seq)
+            sent.append((message, None if held is None else held.data))
+        inputs = dict(self._empty)
+        lacks, early = "", True
+        for heard in step.heard:
+            if heard.topic not in self._decoders:
+                continue  # of a version whose decider heard more
+            message, lack = self._message(heard)
+            if lack:
+                lacks = lacks or lack
+                early = early and (heard.epoch, heard.seq) < self._first.get(heard.topic, (0, 0))
+            else:
+                inputs[heard.topic] = Input(message, heard.received_us)
+        return Given(log_us, step, None if lacks else inputs, lacks, bool(lacks) and early, tuple(sent))
+
+    def _message(self, heard: m.HeardMessage) -> tuple[Any, str]:
+        """The message that was heard, or why there is none."""
+        last = self._newest_heard.get(heard.topic)
+        if last is not None and last[:2] == (heard.epoch, heard.seq):
+            return last[2], ""
+        held = self._messages.get((heard.topic, heard.epoch, heard.seq))
+        if held is None:
+            return None, f"{heard.topic} it had heard is not in the log"
+        try:
+            message = self._decoders[heard.topic].decode(held.data)
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            return None, f"{heard.topic} it had heard does not decode: {error}"
+        self._newest_heard[heard.topic] = heard.epoch, heard.seq, message
+        return message, ""
+
+    def _forget(self, before_us: int | None) -> None:
+        """Drop messages older than this (None: all), noting outputs that no step has named."""
+        messages = self._messages
+        while messages:
+            name = next(iter(messages))
+            held = messages[name]
+            if before_us is not None and held.log_us >= before_us:
+                return
+            del messages[name]
+            if name[0] in self._outputs and not held.claimed:
+                self._unclaimed.append(name)
+
+    def _is_between(self, name: Name) -> bool:
+        topic, epoch, seq = name
+        low, high = self._claimed.get((topic, epoch), (0, -1))
+        return low < seq < high

@@ -1,0 +1,118 @@
+"""Computes the decisions of one service again from what its steps had been given. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import msgspec
+
+from paani import messages as m
+from paani.config import Config
+from paani.decider import Decider
+from paani.logs.reader import Record
+from paani.replay.ledger import Given, Ledger
+
+
+class Skip(StrEnum):
+    """Why a step cannot be computed again."""
+
+    BEFORE_STATE = "before the first state in the log"
+    AFTER_BREAK = "no state since a break"
+    STATE_UNREADABLE = "its state does not decode"
+    LACKS_INPUT = "a message it had heard is not in the log"
+    FAILED = "the decider failed"
+
+
+class Again(NamedTuple):
+    """One step, computed again: what each sent message was, and what it is now; or why it is not.
+
+    state_same: whether the state before it is the recorded one; None where none is recorded.
+    excused: not computed only because the log begins where it does. break_: steps missing just before it.
+    """
+
+    given: Given
+    outputs: tuple[tuple[m.SentMessage, bytes | None, bytes], ...] = ()
+    skip: Skip | None = None
+    detail: str = ""
+    excused: bool = False
+    state_same: bool | None = None
+    missing_before: int = 0
+
+
+class Recompute:
+    """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts."""
+
+    def __init__(self, decider: Decider[Any], config: Config, *, evolve: bool) -> None:
+        self.ledger = Ledger(decider)
+        self._decider, self._config, self._evolve = decider, config, evolve
+        self._producers = {topic.name: topic.producer for topic in decider.outputs}
+        self._encoder = msgspec.json.Encoder()
+        self._states = msgspec.json.Decoder(type(decider.state()))
+        self._state: Any = None
+        self._excused, self._reason = True, Skip.BEFORE_STATE
+        self._last: m.Step | None = None
+
+    def steps(self, records: Iterable[Record]) -> Iterator[Again]:
+        """Every step that the log has, in order."""
+        for given in self.ledger.steps(records):
+            last, step = self._last, given.step
+            if last is not None and (step.epoch, step.seq) <= (last.epoch, last.seq):
+                continue  # the same twice
+            missing = 0
+            if last is not None and step.epoch == last.epoch:
+                missing = step.seq - last.seq - 1
+            elif last is not None:  # the process began again
+                missing = step.seq
+                self._state, self._reason, self._excused = None, Skip.AFTER_BREAK, False
+            if missing:
+                self._lose(Skip.AFTER_BREAK, excused=False)
+            self._last = step
+            yield self._again(given)._replace(missing_before=missing)
+
+    def _again(self, given: Given) -> Again:
+        step, same = given.step, None
+        if step.state:
+            try:
+                recorded = self._states.decode(step.state)
+            except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+                self._lose(Skip.STATE_UNREADABLE, excused=False)
+                return Again(given, skip=Skip.STATE_UNREADABLE, detail=str(error))
+            if self._state is not None and not self._evolve:
+                same = self._encoder.encode(self._state).decode() == step.state
+            if self._state is None or not self._evolve:
+                self._state = recorded
+        if self._state is None:
+            return Again(given, skip=self._reason, excused=self._excused)
+        if given.inputs is None:
+            self._lose(Skip.AFTER_BREAK, excused=given.early)
+            return Again(given, skip=Skip.LACKS_INPUT, detail=given.lacks, excused=given.early)
+        try:
+            self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
+            compared = tuple(
+                (sent, recorded, self._encoded(sent, outputs[sent.topic])) for sent, recorded in given.sent
+            )
+        except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
+            self._lose(Skip.AFTER_BREAK, excused=False)
+            return Again(given, skip=Skip.FAILED, detail=f"{type(error).__name__}: {error}")
+        return Again(given, compared, state_same=same)
+
+    def _encoded(self, sent: m.SentMessage, message: m.Message) -> bytes:
+        """As the bus would have sent it, with the header that the step has kept."""
+        return self._encoder.encode(
+            msgspec.structs.replace(
+                message,
+                seq=sent.seq,
+                epoch=sent.epoch,
+                domain=self._config.bus.domain,
+                producer=self._producers[sent.topic],
+                sent_us=sent.sent_us,
+            )
+        )
+
+    def _lose(self, reason: Skip, *, excused: bool) -> None:
+        """The state is not known any more. With changed settings it goes on: the recorded one is not ours."""
+        if self._evolve and self._state is not None:
+            return
+        self._state, self._reason, self._excused = None, reason, excused
