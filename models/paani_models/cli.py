@@ -15,6 +15,7 @@ from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 
 DATA_VARIABLE = "PAANI_DATA"
 NETS = ("segmenter", "detector")
+TRAINED = ("segmenter", "paper-segmenter", "detector")
 
 
 def data_folder() -> Path:
@@ -47,16 +48,16 @@ def _parser() -> argparse.ArgumentParser:
 
     prepare = commands.add_parser("prepare", help="read every picture, mask and box once and count them")
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
-    train.add_argument("net", choices=("teacher", *NETS))
+    train.add_argument("net", choices=TRAINED)
     train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
-    train.add_argument("--start", type=Path, help="checkpoint to begin from")
-    train.add_argument("--teacher", type=Path, help="teacher checkpoint that labels unsegmented pictures")
+    train.add_argument("--start", type=Path, help="checkpoint, or exported ONNX file, to begin from")
+    train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
     train.add_argument("--epochs", type=int, help="detector only")
     train.add_argument("--peak-rate", type=float)
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
-    export.add_argument("net", choices=NETS)
+    export.add_argument("net", choices=TRAINED)
     export.add_argument("--checkpoint", type=Path, required=True)
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate.add_argument("nets", nargs="*", choices=[[], *NETS], default=[])

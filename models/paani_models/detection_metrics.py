@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
-IOU_STEPS = np.arange(0.5, 0.96, 0.05)
+IOU_STEPS = np.linspace(0.5, 0.95, 10)  # checklist U2
+RECALL_STEPS = np.linspace(0.0, 1.0, 101)  # checklist U1
 CONFIDENCE = 0.40  # checklist C6
 NMS_IOU = 0.45  # checklist C8
 NMS_INPUT = 256  # checklist C7
@@ -25,6 +29,20 @@ class Found:
     boxes: Floats
     scores: Floats
     classes: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One class in one picture: what was found, best first, and which of it hits.
+
+    hits: [10, n], by IOU_STEPS. near_found and near: true boxes of NEAR_SIDE_PX and more, found at CONFIDENCE and all.
+    """
+
+    scores: Floats
+    hits: Flags
+    positives: int
+    near_found: int
+    near: int
 
 
 def decode(output: Floats, confidence: float, limit: int = MAX_BOXES) -> Found:
@@ -46,69 +64,110 @@ def decode(output: Floats, confidence: float, limit: int = MAX_BOXES) -> Found:
     )
 
 
-def overlaps(a: Floats, b: Floats) -> NDArray[np.float64]:
-    """IoU matrix [len(a), len(b)] of corner boxes."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+def overlaps(a: Floats, b: Floats) -> Doubles:
+    """IoU matrix [len(a), len(b)] of corner boxes; 0 where both are empty."""
+    first, second = a.astype(np.float64), b.astype(np.float64)
+    low = np.maximum(first[:, None, :2], second[None, :, :2])
+    high = np.minimum(first[:, None, 2:], second[None, :, 2:])
     shared = np.clip(high - low, 0, None).prod(2)
-    area_a, area_b = ((x[:, 2:] - x[:, :2]).prod(1) for x in (a, b))
-    return np.asarray(shared / (area_a[:, None] + area_b[None] - shared + 1e-9), np.float64)
+    area_a, area_b = ((x[:, 2:] - x[:, :2]).prod(1) for x in (first, second))
+    union = area_a[:, None] + area_b[None] - shared
+    return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
 
 
-def match(boxes: Floats, scores: Floats, truth: Floats, threshold: float) -> NDArray[np.bool_]:
+def match(boxes: Floats, scores: Floats, truth: Floats, threshold: float) -> Flags:
     """Whether each box, best score first, hits a truth box not hit before; in the order of `boxes`."""
-    hits = np.zeros(len(boxes), np.bool_)
-    if len(boxes) == 0 or len(truth) == 0:
+    return _match(overlaps(boxes, truth), scores, threshold)
+
+
+def _match(table: Doubles, scores: Floats, threshold: float) -> Flags:
+    hits = np.zeros(len(table), np.bool_)
+    if table.size == 0:
         return hits
-    table = overlaps(boxes, truth)
+    free = table.copy()
     for index in np.argsort(-scores, kind="stable"):
-        target = int(table[index].argmax())
-        if table[index, target] >= threshold:
+        target = int(free[index].argmax())
+        if free[index, target] >= threshold:
             hits[index] = True
-            table[:, target] = -1.0
+            free[:, target] = -1.0
     return hits
 
 
-def average_precision(scores: Floats, hits: NDArray[np.bool_], positives: int) -> float:
+def precision_recall(scores: Floats, hits: Flags, positives: int) -> tuple[Doubles, Doubles]:
+    """Precision and recall after each box, best score first."""
+    true = np.cumsum(hits[np.argsort(-scores, kind="stable")])
+    return true / np.arange(1, len(true) + 1), true / positives
+
+
+def average_precision(scores: Floats, hits: Flags, positives: int) -> float:
     """Mean of the precision envelope at recalls 0, 0.01 .. 1; NaN without a positive."""
     if positives == 0:
         return float("nan")
-    order = np.argsort(-scores, kind="stable")
-    true = np.cumsum(hits[order])
-    recall = true / positives
-    precision = true / np.arange(1, len(order) + 1)
+    precision, recall = precision_recall(scores, hits, positives)
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    places = np.searchsorted(recall, np.linspace(0, 1, 101), side="left")
+    places = np.searchsorted(recall, RECALL_STEPS, side="left")
     return float(np.where(places < len(envelope), np.append(envelope, 0.0)[places], 0.0).mean())
 
 
-def class_figures(found: list[Found], truths: list[Floats], kind: int) -> dict[str, float]:
+def judge(found: Found, truth: Floats, kind: int) -> Judged:
+    """One class of one picture. truth: [n,5], class and corners."""
+    mine = found.classes == kind
+    boxes, scores = found.boxes[mine], found.scores[mine]
+    order = np.argsort(-scores, kind="stable")
+    boxes, scores = boxes[order], scores[order]
+    real = truth[truth[:, 0] == kind, 1:]
+    near = real[(real[:, 2:] - real[:, :2]).min(1, initial=np.inf) >= NEAR_SIDE_PX]
+    table, sure = overlaps(boxes, real), scores > CONFIDENCE
+    return Judged(
+        scores,
+        np.stack([_match(table, scores, step) for step in IOU_STEPS]),
+        len(real),
+        int(match(boxes[sure], scores[sure], near, 0.5).sum()),
+        len(near),
+    )
+
+
+def ap50(judged: Sequence[Judged]) -> float:
+    """AP at IoU 0.5 of one class over pictures."""
+    scores, hits, positives = _joined(judged)
+    return average_precision(scores, hits[0], positives)
+
+
+def summary(judged: Sequence[Judged]) -> dict[str, float]:
     """AP50, AP50:95, recall and precision at CONFIDENCE of one class over pictures that annotate it.
 
-    truths: per picture float32 [n,5], class and corners. `n` counts the true boxes. A figure without a case is NaN.
+    `n` counts the true boxes. A figure without a case is NaN.
     """
-    of_kind = [(f.boxes[f.classes == kind], f.scores[f.classes == kind]) for f in found]
-    real = [truth[truth[:, 0] == kind, 1:] for truth in truths]
-    positives = sum(len(r) for r in real)
-    scores = np.concatenate([s for _, s in of_kind]) if of_kind else np.zeros(0, np.float32)
-    none = np.zeros(0, np.bool_)
-    steps = [
-        np.concatenate([none, *(match(b, s, r, step) for (b, s), r in zip(of_kind, real, strict=True))])
-        for step in IOU_STEPS
-    ]
-    curves = [average_precision(scores, hits, positives) for hits in steps]
-    confident = scores > CONFIDENCE
-    right = int((steps[0] & confident).sum())
-    near = [r[(r[:, 2:] - r[:, :2]).min(1, initial=np.inf) >= NEAR_SIDE_PX] for r in real]
-    near_found = sum(
-        int(match(b[s > CONFIDENCE], s[s > CONFIDENCE], r, 0.5).sum()) for (b, s), r in zip(of_kind, near, strict=True)
-    )
-    near_count = sum(len(r) for r in near)
+    scores, hits, positives = _joined(judged)
+    curves = [average_precision(scores, step, positives) for step in hits]
+    sure = scores > CONFIDENCE
+    right = int((hits[0] & sure).sum())
+    near_found, near = sum(j.near_found for j in judged), sum(j.near for j in judged)
     return {
         "n": positives,
         "ap50": curves[0],
         "ap50_95": float(np.mean(curves)),
         "recall_at_0.40": right / positives if positives else float("nan"),
-        "recall_16px_at_0.40": near_found / near_count if near_count else float("nan"),
-        "precision_at_0.40": right / int(confident.sum()) if confident.any() else float("nan"),
+        "recall_16px_at_0.40": near_found / near if near else float("nan"),
+        "precision_at_0.40": right / int(sure.sum()) if sure.any() else float("nan"),
     }
+
+
+def class_figures(found: list[Found], truths: list[Floats], kind: int) -> dict[str, float]:
+    """`summary` of one class. truths: per picture float32 [n,5], class and corners."""
+    return summary([judge(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
+
+
+def curve50(judged: Sequence[Judged]) -> tuple[Doubles, Doubles]:
+    """Precision and recall at IoU 0.5 after each box over all pictures, best score first; empty without a positive."""
+    scores, hits, positives = _joined(judged)
+    if positives == 0:
+        return np.zeros(0), np.zeros(0)
+    return precision_recall(scores, hits[0], positives)
+
+
+def _joined(judged: Sequence[Judged]) -> tuple[Floats, Flags, int]:
+    if not judged:
+        return np.zeros(0, np.float32), np.zeros((len(IOU_STEPS), 0), np.bool_), 0
+    scores = np.concatenate([j.scores for j in judged])
+    return scores, np.concatenate([j.hits for j in judged], axis=1), sum(j.positives for j in judged)

@@ -19,6 +19,7 @@ CELL_PX = 8  # the finest stride of the detector
 MIN_SIDE_PX = 3.0
 MIN_VISIBLE_FRAC = 0.35
 PSEUDO_PERSON_MIN_SCORE = 0.5
+SMALL_PX, SMALL_FRAC, CLOSE_UP_PX, CLOSE_UP_ZOOM = 12.0, 0.4, (5.0, 24.0), 4.0
 WATER, OBSTACLE, SKY = 0, 1, 2  # checklist D6
 
 
@@ -154,13 +155,36 @@ def random_placement(
     return np.array([[x_scale, 0, x_low], [0, scale / stretch, low[1]]], np.float32)
 
 
+def close_up(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> Affine | None:
+    """Zoom in on one small object, so that its shorter side gets CLOSE_UP_PX pixels; None where none is small."""
+    source = np.array(item.picture.shape[1::-1], np.float64)
+    fit = float((target_wh / source).min())
+    corners = item.boxes[:, 1:].reshape(-1, 2, 2) * source
+    sides = (corners[:, 1] - corners[:, 0]).min(1) * fit
+    small = np.flatnonzero(sides < SMALL_PX)
+    if len(small) == 0:
+        return None
+    chosen = int(rng.choice(small))
+    wanted = np.exp(rng.uniform(*np.log(CLOSE_UP_PX)))
+    scale = fit * float(np.clip(wanted / sides[chosen], 1.0, CLOSE_UP_ZOOM))
+    size = source * scale
+    low = rng.uniform(0.15, 0.85, 2) * target_wh - corners[chosen].mean(0) * scale
+    low = np.where(size > target_wh, np.clip(low, target_wh - size, 0.0), (target_wh - size) / 2)
+    if rng.random() < 0.5:
+        return np.array([[-scale, 0, target_wh[0] - low[0]], [0, scale, low[1]]], np.float32)
+    return np.array([[scale, 0, low[0]], [0, scale, low[1]]], np.float32)
+
+
 def augmented(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> Example:
     """One training example: of one picture, or a two by two mosaic of four."""
     if len(items) == 4:
         example = _mosaic(rng, items, target_wh)
     else:
         height, width = items[0].picture.shape[:2]
-        example = place(items[0], random_placement(rng, (width, height), target_wh, (0.6, 1.8)), target_wh)
+        affine = close_up(rng, items[0], target_wh) if rng.random() < SMALL_FRAC else None
+        if affine is None:
+            affine = random_placement(rng, (width, height), target_wh, (0.6, 1.8))
+        example = place(items[0], affine, target_wh)
     picture = example.picture
     if rng.random() < 0.8:
         picture = jitter_colour(rng, picture)

@@ -48,7 +48,7 @@ CONTRACTS = {
         output=Tensor("logits", (1, 3, segmenter.INPUT_HEIGHT_PX, segmenter.INPUT_WIDTH_PX)),
         classes=SEGMENTER_CLASSES,
         preprocessing=Preprocessing("stretch", (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)),
-        architecture="MobileNetV3-Small encoder, 64-channel top-down decoder",
+        architecture="MobileNetV2 encoder at 11/16 size, 48-channel separable top-down decoder",
         licence="weights: for research; see the terms of each training source",
     ),
     "detector": Model(
@@ -66,6 +66,14 @@ CONTRACTS = {
         licence="weights: for research; see the terms of each training source",
     ),
 }
+
+
+CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
+    CONTRACTS["segmenter"],
+    name="paper-segmenter",
+    file="paper-segmenter.onnx",
+    architecture="MobileNetV3-Small encoder, 64-channel top-down decoder",
+)
 
 
 def network(name: str) -> nn.Module:

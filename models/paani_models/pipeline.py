@@ -7,7 +7,9 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import msgspec
+import numpy as np
 import torch
 from tqdm import tqdm
 
@@ -17,7 +19,7 @@ from paani_models.catalogue import Model, load_catalogue, save_catalogue, verifi
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
-from paani_models.network_input import detector_input, segmenter_input
+from paani_models.network_input import SIZE_WH, detector_input, segmenter_batch, segmenter_input
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
     DETECTOR_CLASSES,
@@ -33,6 +35,7 @@ from paani_models.sources import (
 from paani_models.train_detector import DetectorTraining
 from paani_models.train_segmenter import SegmenterTraining
 from paani_models.training import Stage, load_average
+from paani_models.warm_start import load_exported
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
@@ -148,7 +151,11 @@ def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
     held_out = train_segmenter.cache(pictures.segmented(held_out=True))
     cached = train_segmenter.cache(samples)
     training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
-    if plan.start is not None:
+    if plan.start is not None and plan.start.suffix == ".onnx":
+        shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
+        load_exported(model, plan.start, torch.from_numpy(segmenter_batch(shown)))
+        training.progress.average_from_model()
+    elif plan.start is not None:
         training.progress.start_from(plan.start)
     training.run()
 
@@ -160,6 +167,8 @@ def _train_detector(pictures: Pictures, plan: Plan) -> None:
     model = Detector()
     if plan.start is None:
         load_yolox(model, pictures.data / COCO_FILE)
+    elif plan.start.suffix == ".onnx":
+        load_exported(model, plan.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
     else:
         load_average(model, plan.start)
     cached = detector_data.read_all(pictures.boxed(held_out=False))
@@ -169,9 +178,9 @@ def _train_detector(pictures: Pictures, plan: Plan) -> None:
 
 def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
-    chosen = pictures.segmented(held_out=True) if net == "segmenter" else pictures.boxed(held_out=True)
+    chosen = pictures.boxed(held_out=True) if net == "detector" else pictures.segmented(held_out=True)
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepared = segmenter_input if net == "segmenter" else detector_input
+    prepared = detector_input if net == "detector" else segmenter_input
     inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")

@@ -30,16 +30,16 @@ from paani_models.training import (
 
 # Pictures drawn per epoch and source; a source not named here is drawn once each.
 DRAWS = {
-    "hsu_shore_tiles": 260,
+    "hsu_shore_tiles": 420,
     "uon_robotx": 150,
     "tunai_sooke": 60,
     "inland_vessel": 48,
     "redyellow_buoy": 45,
-    "dasha_pier": 60,
-    "tampere_pier": 40,
-    "tbiseg_usvinland": 200,
-    "tbiseg_tampere": 100,
-    "tbiseg_dasha": 60,
+    "dasha_pier": 100,
+    "tampere_pier": 80,
+    "tbiseg_usvinland": 160,
+    "tbiseg_tampere": 60,
+    "tbiseg_dasha": 40,
     "bath_river": 140,
     "mastr1325": 40,
     "oasis": 40,

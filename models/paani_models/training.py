@@ -140,6 +140,10 @@ class Progress:
     def start_from(self, checkpoint: Path) -> None:
         """Take the averaged weights of another run. Raises UserError where they do not fit."""
         load_average(self.model, checkpoint)
+        self.average_from_model()
+
+    def average_from_model(self) -> None:
+        """Begin the average with the model's weights, as with those of a finished training."""
         self.average = AveragedWeights(self.model)
         self.average.updates = 10_000
 

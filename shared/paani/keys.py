@@ -151,6 +151,7 @@ TOPICS: tuple[Topic[Any], ...] = (
 
 SERVICES = (
     "router",
+    "recorder",
     "plant",
     "eye",
     "camera",
@@ -160,7 +161,6 @@ SERVICES = (
     "controller",
     "localization",
     "dashboard",
-    "recorder",
 )
 BOARD_SERVICES = ("camera", "perception", "advisor", "navigator", "controller")
 VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")

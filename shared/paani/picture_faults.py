@@ -16,6 +16,8 @@ Fault = Callable[[Bytes, int, np.random.Generator], Bytes]
 Move = Callable[[Bytes, Bytes, int, np.random.Generator], tuple[Bytes, Bytes]]
 SEVERITIES = (1, 2, 3, 4, 5)
 IGNORE = 255
+WATER = 0  # in class masks
+MIN_DRY_FRAC = 0.25  # a view without water needs this share of the picture's rows
 
 
 def black(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
@@ -232,6 +234,18 @@ def spoilt(name: str, picture: Bytes, mask: Bytes, severity: int, rng: np.random
     if name in MOVES:
         return MOVES[name](picture, mask, severity, rng)
     return FAULTS[name](picture, severity, rng), mask
+
+
+def above_water(picture: Bytes, mask: Bytes) -> Bytes | None:
+    """The part of a picture above its water, as large as the picture: no water scene. None where that is too little."""
+    height, width = picture.shape[:2]
+    rows = np.flatnonzero((mask == WATER).mean(axis=1) > 0.02)
+    top = int(rows[0]) * height // mask.shape[0] if rows.size else height
+    if top < MIN_DRY_FRAC * height:
+        return None
+    part = min(width, round(top * width / height))
+    left = (width - part) // 2
+    return np.asarray(cv2.resize(picture[:top, left : left + part], (width, height)), np.uint8)
 
 
 def _clipped(values: NDArray[np.floating]) -> Bytes:

@@ -9,8 +9,8 @@ import sys
 import msgspec
 import pytest
 
-from paani import keys
 from paani.bench.table import Bench, text_of
+from paani.config import Config
 from paani.up.summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -27,8 +27,8 @@ def test_bench_chain(private_sets: tuple[str, ...]) -> None:
     figures = json.loads(result.stdout)
     assert figures["machine"].keys() == {"cores", "load_before", "load_after"}
     assert set(figures["run"]["latency_ms"]) == set(STAGES)
-    assert set(figures["run"]["services"]) == set(keys.SERVICES)
+    assert set(figures["run"]["services"]) == set(Config().services)
     assert figures["transport_over_inference"] > 0
     text = text_of(msgspec.json.decode(result.stdout, type=Bench))
     assert all(stage in text for stage in STAGES)
-    assert all(service in text for service in keys.SERVICES)
+    assert all(service in text for service in Config().services)

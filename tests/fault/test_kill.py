@@ -20,7 +20,7 @@ from paani import messages as m
 from paani.authority import OBSERVER
 from paani.bus import Bus, open_bus
 from paani.clock import WallClock, stopwatch_ms
-from paani.config import BusConfig, load_config
+from paani.config import BusConfig, Config, load_config
 from tests.conftest import find_free_port
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(90)]
@@ -118,7 +118,7 @@ def pid_of(loop: Loop, service: str) -> int:
 def settled(watch: Watch) -> bool:
     now_us = CLOCK.now_us()
     return (
-        all(watch.alive.get(service) for service in keys.SERVICES)
+        all(watch.alive.get(service) for service in Config().services)
         and sum(moves(r) for r in watch.applied if r.source_us > now_us - 500_000) >= 8
     )
 

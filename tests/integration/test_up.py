@@ -18,6 +18,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import stopwatch_ms
+from paani.config import Config
 from paani.up.summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -72,7 +73,7 @@ def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ..
     summary = json.loads(file.read_text())
     assert summary["duration_s"] == pytest.approx(20.0, abs=1.0)
     assert (summary["profile"], summary["world"]) == ("paani", "river")
-    assert set(summary["services"]) == set(keys.SERVICES)
+    assert set(summary["services"]) == set(Config().services)
     for service in summary["services"].values():
         assert service["rate_hz"] > 0.5
         assert service["rss_mib"] > 10
@@ -109,7 +110,7 @@ def test_a_hung_process_is_started_again_and_ctrl_c_ends_all(tmp_path: Path, pri
 
 def test_no_orphan_survives_a_killed_supervisor(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     up = Up(tmp_path, *words_of(private_sets, "--headless"))
-    up.until(lambda: len(up.children()) == len(keys.SERVICES), READY_S)
+    up.until(lambda: len(up.children()) == len(Config().services), READY_S)
     up.process.kill()
     up.process.wait()
     for _ in range(20):

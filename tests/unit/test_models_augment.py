@@ -1,12 +1,21 @@
 """Augmentation is seeded, and picture, mask and boxes move together (checklist S8, S12)."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from paani_models import augment
-from paani_models.detector_data import BoxedPicture, augmented, judged_by_mask, place, plain, random_placement
+from paani_models.detector_data import (
+    BoxedPicture,
+    augmented,
+    close_up,
+    judged_by_mask,
+    place,
+    plain,
+    random_placement,
+)
 from paani_models.network_input import letterbox_affine
 from paani_models.sources import NO_CRAFT, Source
 
@@ -178,3 +187,32 @@ def test_patches_are_cut_from_obstacle_only() -> None:
     assert len(found) >= 10
     assert all((patch == 9).mean() >= 0.95 for patch in found)
     assert augment.obstacle_patch(np.random.default_rng(0), picture, np.zeros_like(mask)) is None
+
+
+def test_mirrored_water_changes_water_only() -> None:
+    """Above the far edge the picture stays; in the water it takes on what stands there."""
+    picture = np.full((96, 128, 3), 40, np.uint8)
+    picture[:48] = (220, 30, 30)
+    mask = np.full((96, 128), 1, np.uint8)
+    mask[48:] = 0
+    mirrored = augment.mirror_water(np.random.default_rng(0), picture, mask)
+    assert np.array_equal(mirrored[:48], picture[:48])
+    assert mirrored[50:, :, 0].mean() > 60
+    dry = np.full((96, 128), 1, np.uint8)
+    assert np.array_equal(augment.mirror_water(np.random.default_rng(0), picture, dry), picture)
+
+
+def test_a_close_up_gives_a_small_object_its_pixels_and_keeps_it_in_view() -> None:
+    item = BoxedPicture(
+        "s",
+        np.zeros((240, 480, 3), np.uint8),
+        np.array([[0, 0.9, 0.1, 0.91, 0.13], [1, 0.1, 0.1, 0.6, 0.9]], np.float32),
+        np.ones(4, np.uint8),
+    )
+    for seed in range(30):
+        affine = close_up(np.random.default_rng(seed), item, (320, 256))
+        assert affine is not None
+        kept = {int(row[0]): row for row in place(item, affine, (320, 256)).boxes}
+        assert 0 in kept
+        assert 4.9 <= min(kept[0][3] - kept[0][1], kept[0][4] - kept[0][2]) <= 24.1
+    assert close_up(np.random.default_rng(0), replace(item, boxes=item.boxes[1:]), (320, 256)) is None

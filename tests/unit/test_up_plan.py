@@ -27,7 +27,7 @@ async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_s
     route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
     assert plan.config.localization.origin_lat_lon_deg == (world.origin_lat_deg, world.origin_lon_deg)
     np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], world.route_m, atol=1e-4)
-    assert plan.services == keys.SERVICES
+    assert plan.services == tuple(name for name in keys.SERVICES if name != "recorder")
     assert decode_config(encode_config(plan.config)) == plan.config
 
 
@@ -41,7 +41,7 @@ async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> N
 async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_path: Path) -> None:
     """The plant and everything else still run; the last gate waits for no pulse of the eye."""
     plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
-    assert set(keys.SERVICES) - set(plan.services) == {"eye"}
+    assert set(keys.SERVICES) - set(plan.services) == {"eye", "recorder"}
     assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
     with pytest.raises(UserError, match=r"camera\.source absent: no such file or folder"):
         await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))

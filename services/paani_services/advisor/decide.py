@@ -1,21 +1,39 @@
-"""The advisor as a decider: evidence in; advisory and tracks out."""
+"""The advisor as a decider: evidence and the operator's tuning in; advisory, tracks and the shadow's report out."""
+
+import msgspec
 
 from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani_services.advisor.advise import AdvisorState, advise
+from paani_services.advisor.shadow import TuningState, heed, report, try_beside, tuned
 
 
-def decide(state: AdvisorState, inputs: Inputs, now_us: int, config: Config) -> tuple[AdvisorState, Outputs]:
-    """One step; see `advise`."""
-    state, advisory, tracks = advise(state, inputs[keys.EVIDENCE.name].message, now_us, config)
-    return state, {keys.ADVISORY.name: advisory, keys.TRACKS.name: tracks}
+class DeciderState(msgspec.Struct, frozen=True):
+    """The memory of the policy in force, and what is tried beside it."""
+
+    active: AdvisorState = AdvisorState()
+    tuning: TuningState = TuningState()
+
+
+def decide(state: DeciderState, inputs: Inputs, now_us: int, config: Config) -> tuple[DeciderState, Outputs]:
+    """One step; see `advise`. What is tried never reaches the advisory."""
+    evidence = inputs[keys.EVIDENCE.name].message
+    request, arming = inputs[keys.TUNING.name].message, inputs[keys.ARMING.name]
+    tuning, before = heed(state.tuning, state.active, request, arming, now_us, config)
+    after, advisory, tracks = advise(before, evidence, now_us, tuned(config, tuning.active))
+    tuning = try_beside(tuning, before, after, advisory, evidence, now_us, config)
+    return DeciderState(after, tuning), {
+        keys.ADVISORY.name: advisory,
+        keys.TRACKS.name: tracks,
+        keys.SHADOW.name: report(tuning, now_us, config),
+    }
 
 
 DECIDER = Decider(
     service="advisor",
-    state=AdvisorState,
-    inputs=(keys.EVIDENCE,),
-    outputs=(keys.ADVISORY, keys.TRACKS),
+    state=DeciderState,
+    inputs=(keys.EVIDENCE, keys.TUNING, keys.ARMING),
+    outputs=(keys.ADVISORY, keys.TRACKS, keys.SHADOW),
     decide=decide,
 )

@@ -1,11 +1,11 @@
 """Apparent motion of one tracked box: does it grow or shrink? Diagnostic only (checklist I20). Pure.
 
-The slope's margin is not statistically calibrated and the confidence is not a probability (I21). Nothing removes
-the boat's own motion (I19).
+The slope's margin is not statistically calibrated and the confidence is not a probability (I21).
 """
 
 import math
 import statistics
+from typing import NamedTuple
 
 import msgspec
 
@@ -17,7 +17,7 @@ MIN_VARIANCE_S2 = 1e-9
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """One sighting: time [us], y = log sqrt(normalised area) (I1), width / height, confidence."""
+    """One sighting: time [us], y = log size (I1), width / height, confidence."""
 
     at_us: int
     log_size: float
@@ -26,13 +26,23 @@ class Sample(msgspec.Struct, frozen=True):
 
 
 class MotionHistory(msgspec.Struct, frozen=True):
-    """Samples since the last reset, oldest first, and what caused that reset."""
+    """Samples since the last reset, oldest first, and what caused that reset while too few have come since."""
 
     samples: tuple[Sample, ...] = ()
     reset: MotionCause = MotionCause.NONE
 
 
-class Window(msgspec.Struct, frozen=True):
+class Sighting(NamedTuple):
+    """A box as it was detected. `ambiguous`: it could have been another object's."""
+
+    at_us: int
+    box: BoxXyxy
+    log_size: float
+    confidence: float
+    ambiguous: bool
+
+
+class Window(NamedTuple):
     """How far back samples reach, and how far apart they may lie [s]."""
 
     history_s: float
@@ -50,8 +60,8 @@ class Estimate(msgspec.Struct, frozen=True):
 
 
 def window_for(period_s: float, config: MotionConfig) -> Window:
-    """The configured window; `follow_rate` stretches it when frames come slowly (resolution 2)."""
-    if not config.follow_rate or period_s <= config.slow_period_s:
+    """The configured window; `follow_rate` stretches it to the time between frames (resolution 2)."""
+    if not config.follow_rate:
         return Window(config.history_s, config.max_gap_s)
     return Window(
         max(config.history_s, config.history_periods * period_s),
@@ -59,27 +69,19 @@ def window_for(period_s: float, config: MotionConfig) -> Window:
     )
 
 
-def observe(
-    history: MotionHistory,
-    at_us: int,
-    box: BoxXyxy,
-    confidence: float,
-    ambiguous: bool,
-    window: Window,
-    config: MotionConfig,
-) -> MotionHistory:
+def observe(history: MotionHistory, sighting: Sighting, window: Window, config: MotionConfig) -> MotionHistory:
     """Add one sighting of a box, or begin again where it cannot be compared with those before (I10-I16).
 
     A sighting that is itself unfit (clipped, weak, ambiguous) is not kept; any other reset keeps it as the first.
     """
+    at_us, box = sighting.at_us, sighting.box
     if is_clipped(box, config.edge_margin):
         return MotionHistory(reset=MotionCause.CLIPPED_BY_FRAME)
-    if confidence < config.min_detection_confidence:
+    if sighting.confidence < config.min_detection_confidence:
         return MotionHistory(reset=MotionCause.WEAK_DETECTION)
-    if ambiguous:
+    if sighting.ambiguous:
         return MotionHistory(reset=MotionCause.AMBIGUOUS_ASSOCIATION)
-    width, height = box[2] - box[0], box[3] - box[1]
-    sample = Sample(at_us, 0.5 * math.log(width * height), width / height, confidence)
+    sample = Sample(at_us, sighting.log_size, (box[2] - box[0]) / (box[3] - box[1]), sighting.confidence)
     if history.samples:
         last = history.samples[-1]
         gap_s = (at_us - last.at_us) * 1e-6
@@ -90,15 +92,20 @@ def observe(
         if abs(math.log(sample.aspect / last.aspect)) > config.max_aspect_change:
             return MotionHistory((sample,), MotionCause.SHAPE_CHANGE)
     oldest_us = at_us - round(window.history_s * 1e6)
-    kept = tuple(s for s in (*history.samples, sample) if s.at_us >= oldest_us)
-    return MotionHistory(kept[-config.max_samples :], history.reset)
+    kept = tuple(s for s in (*history.samples, sample) if s.at_us >= oldest_us)[-config.max_samples :]
+    return MotionHistory(kept, history.reset if len(kept) < config.min_samples else MotionCause.NONE)
 
 
-def estimate(history: MotionHistory, config: MotionConfig) -> Estimate:
-    """Least-squares growth with its margin, judged against the dead band (I1-I9)."""
+def estimate(history: MotionHistory, at_us: int, window: Window, config: MotionConfig) -> Estimate:
+    """Least-squares growth with its margin, judged against the dead band (I1-I9).
+
+    at_us: time of the newest frame; what was not seen for longer than the gap is unknown, whatever it did before.
+    """
     samples = history.samples
     if len(samples) < config.min_samples:
         return _unknown(history.reset if history.reset != MotionCause.NONE else MotionCause.TOO_FEW_SAMPLES)
+    if (at_us - samples[-1].at_us) * 1e-6 > window.max_gap_s:
+        return _unknown(MotionCause.GAP)
     duration_s = (samples[-1].at_us - samples[0].at_us) * 1e-6
     if duration_s < config.min_duration_s:
         return _unknown(MotionCause.TOO_SHORT)

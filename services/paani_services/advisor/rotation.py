@@ -5,7 +5,7 @@ Body is x forward, y left, z up; positive pitch lowers the bow, positive roll lo
 """
 
 import math
-from typing import Annotated
+from typing import NamedTuple
 
 import msgspec
 
@@ -39,7 +39,12 @@ class Attitude(msgspec.Struct, frozen=True):
     pitch_rad: float
 
 
-Attitudes = Annotated[tuple[Attitude, ...], msgspec.Meta(max_length=ATTITUDES_KEPT)]
+class View(NamedTuple):
+    """How one picture was taken, as far as known. `attitude` is known only where `lens` is."""
+
+    use: RotationUse
+    lens: Lens | None = None
+    attitude: Attitude | None = None
 
 
 def lens_of(evidence: Evidence, config: Config) -> Lens | None:
@@ -57,8 +62,8 @@ def lens_of(evidence: Evidence, config: Config) -> Lens | None:
     return Lens(focal_x, focal_x * evidence.width_px / evidence.height_px, math.radians(down_deg))
 
 
-def heard(attitudes: Attitudes, odometry: Odometry | None) -> Attitudes:
-    """The attitudes with that of new, healthy odometry; another epoch begins again."""
+def heard(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[Attitude, ...]:
+    """The attitudes, oldest first, with that of new, healthy odometry; another epoch begins again."""
     if odometry is None or not odometry.healthy:
         return attitudes
     numbers = (odometry.yaw_rad, odometry.yaw_rate_radps, odometry.roll_rad, odometry.pitch_rad)
@@ -72,7 +77,7 @@ def heard(attitudes: Attitudes, odometry: Odometry | None) -> Attitudes:
     return (new,)
 
 
-def attitude_at(attitudes: Attitudes, at_us: int, max_gap_s: float) -> Attitude | None:
+def attitude_at(attitudes: tuple[Attitude, ...], at_us: int, max_gap_s: float) -> Attitude | None:
     """The attitude heard nearest to `at_us`, its yaw carried there at its rate; None if none is within `max_gap_s`."""
     if not attitudes:
         return None
@@ -83,25 +88,27 @@ def attitude_at(attitudes: Attitudes, at_us: int, max_gap_s: float) -> Attitude 
     return msgspec.structs.replace(nearest, at_us=at_us, yaw_rad=nearest.yaw_rad + nearest.yaw_rate_radps * ahead_s)
 
 
-def seen_attitude(state: Attitudes, evidence: Evidence, lens: Lens | None, config: Config) -> tuple[Attitude | None, RotationUse]:
-    """The attitude the picture was taken in, or why the boat's turning is not accounted for."""
+def view_of(attitudes: tuple[Attitude, ...], evidence: Evidence, config: Config) -> View:
+    """Lens and attitude of a picture, as far as they are known and wanted."""
     motion = config.advisor.motion
     if not motion.compensate_rotation:
-        return None, RotationUse.OFF
+        return View(RotationUse.OFF)
+    lens = lens_of(evidence, config)
     if lens is None:
-        return None, RotationUse.UNKNOWN_LENS
+        return View(RotationUse.UNKNOWN_LENS)
     if evidence.time_base is not TimeBase.CAPTURE:
-        return None, RotationUse.RECORDING
-    attitude = attitude_at(state, evidence.source_us, motion.max_odometry_gap_s)
-    return attitude, RotationUse.NO_ODOMETRY if attitude is None else RotationUse.KNOWN
+        return View(RotationUse.RECORDING, lens)
+    attitude = attitude_at(attitudes, evidence.source_us, motion.max_odometry_gap_s)
+    return View(RotationUse.NO_ODOMETRY if attitude is None else RotationUse.KNOWN, lens, attitude)
 
 
-def turned(box: BoxXyxy, before: Attitude | None, now: Attitude, lens: Lens) -> BoxXyxy | None:
-    """Where a box far away went, by rotation alone, cut to the picture; None where it left it.
+def turned(box: BoxXyxy, before: Attitude | None, view: View) -> BoxXyxy | None:
+    """Where the boat's rotation since `before` took a box, cut to the picture; None where it left it.
 
-    The box as it is where the two attitudes do not compare.
+    The box as it is where the rotation is not known.
     """
-    if before is None or before.epoch != now.epoch:
+    lens, now = view.lens, view.attitude
+    if before is None or now is None or lens is None or before.epoch != now.epoch:
         return box
     yaw_rad = before.yaw_rad - now.yaw_rad
     corners = [(box[0], box[1]), (box[2], box[1]), (box[0], box[3]), (box[2], box[3])]

@@ -1,4 +1,4 @@
-"""Advisor process: evidence in; advisory and tracks out, at once and again at `advisor.rate_hz`."""
+"""Advisor process: evidence in; advisory, tracks and shadow out, at once and again at `advisor.rate_hz`."""
 
 import asyncio
 import contextlib
@@ -19,15 +19,19 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     period_us = round(1e6 / config.advisor.rate_hz)
     with bus.alive():
         while True:
-            malformed = stepper.state.tracker.malformed
+            malformed, refused = stepper.state.active.tracker.malformed, stepper.state.tuning.refused
             now_us, outputs = stepper.decide()
             advisory = stepper.conclude(outputs)[keys.ADVISORY.name]
             assert isinstance(advisory, Advisory)
-            bus.note(f"{advisory.direction} {advisory.reason}")
-            if stepper.state.tracker.malformed > malformed:
-                bus.count_drop("malformed_box", stepper.state.tracker.malformed - malformed)
+            state = stepper.state
+            tuning = f"; promoted {state.tuning.active.proposal}" if state.tuning.active.proposal else ""
+            bus.note(f"{advisory.direction} {advisory.reason}{tuning}")
+            if state.active.tracker.malformed > malformed:
+                bus.count_drop("malformed_box", state.active.tracker.malformed - malformed)
+            if state.tuning.refused > refused:
+                bus.count_drop("refused_tuning")
             due_us = now_us + period_us
-            stale_us = stale_at_us(stepper.state, config)
+            stale_us = stale_at_us(state.active, config)
             if stale_us is not None and now_us < stale_us:
                 due_us = min(due_us, stale_us)
             with contextlib.suppress(TimeoutError):

@@ -64,7 +64,7 @@ def page_settings(config: Config) -> PageSettings:
         weights=config.advisor.risk,
         acceptance_m=config.navigator.acceptance_m,
         topics=tuple(Freshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.TOPICS),
-        services=keys.SERVICES,
+        services=config.services,
     )
 
 

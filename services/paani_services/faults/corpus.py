@@ -17,7 +17,6 @@ SIZE_WH = (320, 240)
 MASK_FOLDERS = ("masks3", "masks")
 CLASS_OF = np.full(256, 255, np.uint8)
 CLASS_OF[:3] = (1, 0, 2)  # to water 0, obstacle 1, sky 2 (D6)
-DRY_ROWS = 60  # a view without water is cut from at least this many rows
 
 
 class Scene(NamedTuple):
@@ -73,18 +72,6 @@ def scenes(source: Path, at_most: int) -> list[Scene]:
         classes = CLASS_OF[cv2.resize(mask, SIZE_WH, interpolation=cv2.INTER_NEAREST)]
         found.append(Scene(source.name, item.seq, small, np.asarray(classes, np.uint8)))
     return found
-
-
-def dry_view(scene: Scene) -> Bytes | None:
-    """The part of a picture above its water, as large as a picture; None where there is too little of it."""
-    rows = np.flatnonzero((scene.mask == 0).mean(axis=1) > 0.02)
-    top = int(rows[0]) if rows.size else SIZE_WH[1]
-    if top < DRY_ROWS:
-        return None
-    width = min(SIZE_WH[0], round(top * SIZE_WH[0] / SIZE_WH[1]))
-    left = (SIZE_WH[0] - width) // 2
-    part = scene.picture[:top, left : left + width]
-    return np.asarray(cv2.resize(part, SIZE_WH, interpolation=cv2.INTER_CUBIC), np.uint8)
 
 
 def spread(items: list[T], at_most: int) -> list[T]:

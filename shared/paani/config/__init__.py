@@ -2,7 +2,7 @@
 
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
-from paani.config.loading import decode_config, encode_config, load_config
+from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.recording import RecorderConfig
 from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, GateConfig, PerceptionConfig
 from paani.config.simulating import (
@@ -43,4 +43,5 @@ __all__ = [
     "decode_config",
     "encode_config",
     "load_config",
+    "with_settings",
 ]

@@ -64,6 +64,15 @@ def decode_config(data: bytes) -> Config:
         raise UserError(f"configuration: {error}") from error
 
 
+def with_settings(config: Config, sets: Iterable[str]) -> Config:
+    """The same configuration with other `section.field=value` settings. Raises UserError naming the field at fault."""
+    tree: dict[str, object] = msgspec.to_builtins(config)
+    texts = tuple(sets)
+    for text in texts:
+        _merge(tree, _from_set(text))
+    return _decode(tree, " ".join(texts))
+
+
 def _decode(tree: dict[str, object], origin: str) -> Config:
     try:
         return msgspec.convert(tree, Config, strict=False)

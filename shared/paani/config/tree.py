@@ -12,6 +12,7 @@ from paani.config.recording import RecorderConfig
 from paani.config.section import Positive, Section
 from paani.config.seeing import CameraConfig, PerceptionConfig
 from paani.config.simulating import EyeConfig, PlantConfig, WorldConfig
+from paani.keys import SERVICES
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
 ShortName = Annotated[str, msgspec.Meta(pattern="^[a-z0-9_]{1,32}$")]
@@ -52,6 +53,14 @@ class Config(Section, frozen=True):
     eye: EyeConfig = EyeConfig()
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
+
+    @property
+    def services(self) -> tuple[str, ...]:
+        """Processes that run with these settings, in the order they start."""
+        idle = {"eye"} if self.camera.source != "sim" else set()
+        if not self.recorder.folder:
+            idle.add("recorder")
+        return tuple(name for name in SERVICES if name not in idle)
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""

@@ -29,10 +29,15 @@ class Record(NamedTuple):
 
 
 class Log:
-    """One recording. Made by `open_log`; `problems` grows when reading meets damage."""
+    """One recording. Made by `open_log`; `problems` grows when reading meets damage.
+
+    start_us, end_us: when the first and the last message came [us, wall]; 0 where there is none.
+    """
 
     def __init__(self, path: Path, parts: tuple[Layout, ...], problems: list[str]) -> None:
         self.path, self._parts, self.problems = path, parts, problems
+        self.start_us = min((span.start_us for part in parts for span in part.spans), default=0)
+        self.end_us = max((span.end_us for part in parts for span in part.spans), default=0)
 
     @property
     def topics(self) -> dict[str, int]:
@@ -42,16 +47,6 @@ class Log:
             for topic, count in part.counts.items():
                 counts[topic] = counts.get(topic, 0) + count
         return dict(sorted(counts.items()))
-
-    @property
-    def start_us(self) -> int:
-        """When the first message came; 0 where there is none."""
-        return min((span.start_us for part in self._parts for span in part.spans), default=0)
-
-    @property
-    def end_us(self) -> int:
-        """When the last message came; 0 where there is none."""
-        return max((span.end_us for part in self._parts for span in part.spans), default=0)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -141,9 +136,7 @@ def _require_one_drive(path: Path, parts: list[Layout]) -> None:
         raise UserError(f"{path}: recordings with different settings ({names}); name one file")
 
 
-def _in_order(
-    spans: list[tuple[Span, Layout]], read: functools.partial[list[Record]]
-) -> Iterator[Record]:
+def _in_order(spans: list[tuple[Span, Layout]], read: functools.partial[list[Record]]) -> Iterator[Record]:
     """Merge spans whose times may overlap, holding no more of them than do."""
     spans.sort(key=lambda pair: pair[0].start_us)
     held: list[Record] = []

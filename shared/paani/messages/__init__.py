@@ -13,6 +13,7 @@ from paani.messages.advisor import (
     MotionCause,
     MotionState,
     Reason,
+    RotationUse,
     Track,
     Tracks,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "PictureHeader",
     "Pulse",
     "Reason",
+    "RotationUse",
     "RecordedTopic",
     "RecorderState",
     "Route",

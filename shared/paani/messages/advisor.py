@@ -67,10 +67,26 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     motion_confidence: Unit = 0.0
 
 
+class RotationUse(StrEnum):
+    """Whether the boat's own turning was told apart from motion in this picture, or why not."""
+
+    KNOWN = "known"
+    OFF = "off"
+    UNKNOWN_LENS = "unknown_lens"
+    NO_ODOMETRY = "no_odometry"
+    RECORDING = "recording"
+
+
 class Tracks(Message, frozen=True, kw_only=True):
+    """Tracked boxes of one frame; `period_s` between frames set how far back and how far apart motion samples lie."""
+
     frame_seq: Count
     frame_epoch: Count
     tracks: tuple[Track, ...] = ()
+    rotation: RotationUse = RotationUse.OFF
+    period_s: NonNegative = 0.0
+    motion_history_s: NonNegative = 0.0
+    motion_max_gap_s: NonNegative = 0.0
 
 
 class Direction(StrEnum):

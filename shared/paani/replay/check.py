@@ -33,7 +33,8 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
 
     messages: sent messages compared, `differing_messages` of them not byte for byte the same. states: recorded states
     compared with the ones computed up to there. before_start: steps that the log's beginning leaves without state or
-    input, and at_end: outputs that its end cut off; both are explained.
+    input, and outputs sent before the recorder was connected with their publisher; at_end: outputs that the log's end
+    cut off. Both are explained.
     """
 
     service: str
@@ -87,7 +88,9 @@ def check_service(
         for sent, recorded, computed in again.outputs:
             digest.update(computed)
             if recorded is None:
-                if again.given.log_us + LATE_US >= end_us:
+                if recompute.ledger.precedes(sent.topic, sent.epoch, sent.seq):
+                    result.before_start += 1
+                elif again.given.log_us + LATE_US >= end_us:
                     result.at_end += 1
                 else:
                     causes[f"{sent.topic} it had sent is not in the log"] += 1

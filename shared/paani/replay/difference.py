@@ -26,7 +26,9 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
 
 def first_difference(at_us: int, sent: m.SentMessage, recorded: bytes, computed: bytes) -> Difference:
     """Name the first differing field of two payloads that are not the same bytes."""
-    field, before, now = next(differing_fields(recorded, computed), ("(bytes)", f"{len(recorded)} bytes", f"{len(computed)} bytes"))
+    field, before, now = next(
+        differing_fields(recorded, computed), ("(bytes)", f"{len(recorded)} bytes", f"{len(computed)} bytes")
+    )
     return Difference(
         at_us=at_us,
         topic=sent.topic,

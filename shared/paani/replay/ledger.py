@@ -66,7 +66,7 @@ class Ledger:
         self.malformed: collections.Counter[str] = collections.Counter()
         self._messages: dict[Name, _Held] = {}
         self._newest_heard: dict[str, tuple[int, int, Any]] = {}
-        self._first: dict[str, tuple[int, int]] = {}
+        self._first: dict[str, dict[int, int]] = {}  # topic: epoch: first seq recorded
         self._claimed: dict[tuple[str, int], tuple[int, int]] = {}  # (topic, epoch): lowest and highest seq
         self._unclaimed: list[Name] = []
 
@@ -82,7 +82,7 @@ class Ledger:
                 else:
                     name = head.decode(data)
                     self._messages.setdefault((topic, name.epoch, name.seq), _Held(data, log_us))
-                    self._first.setdefault(topic, (name.epoch, name.seq))
+                    self._first.setdefault(topic, {}).setdefault(name.epoch, name.seq)
             except (msgspec.MsgspecError, UnicodeDecodeError):
                 self.malformed[topic] += 1
             while waiting and waiting[0][0] + LATE_US <= log_us:
@@ -92,6 +92,11 @@ class Ledger:
             yield self._given(*waiting.popleft())
         self._forget(None)
         self.orphans = [name for name in self._unclaimed if self._is_between(name)]
+
+    def precedes(self, topic: str, epoch: int, seq: int) -> bool:
+        """Whether a message was sent before the first one that the recorder got from its publisher."""
+        first = self._first.get(topic, {})
+        return seq < first[epoch] if epoch in first else bool(first) and epoch < min(first)
 
     def _given(self, log_us: int, step: m.Step) -> Given:
         sent = []
@@ -110,7 +115,7 @@ class Ledger:
             message, lack = self._message(heard)
             if lack:
                 lacks = lacks or lack
-                early = early and (heard.epoch, heard.seq) < self._first.get(heard.topic, (0, 0))
+                early = early and self.precedes(heard.topic, heard.epoch, heard.seq)
             else:
                 inputs[heard.topic] = Input(message, heard.received_us)
         return Given(log_us, step, None if lacks else inputs, lacks, bool(lacks) and early, tuple(sent))

@@ -43,7 +43,7 @@ def write_report(path: Path, report: Report) -> None:
         raise UserError(f"--summary {path}: {error.strerror}") from error
 
 
-def up_sets(*, world: str | None, camera: str | None, headless: bool) -> tuple[str, ...]:
+def up_sets(*, world: str | None, camera: str | None, headless: bool, record: Path | None = None) -> tuple[str, ...]:
     """Settings that the options of `paani up` stand for. The boat is a simulated one: the operator arms at start."""
     sets = ["dashboard.arm_at_start=true"]
     if world is not None:
@@ -52,6 +52,8 @@ def up_sets(*, world: str | None, camera: str | None, headless: bool) -> tuple[s
         sets.append(f"camera.source={json.dumps(camera)}")
     if headless:
         sets.append("dashboard.serve=false")
+    if record is not None:
+        sets.append(f"recorder.folder={json.dumps(str(record.absolute()))}")
     return tuple(sets)
 
 
@@ -72,7 +74,7 @@ def _result(report: Report) -> str:
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
-    sets = up_sets(world=options.world, camera=options.camera, headless=options.headless)
+    sets = up_sets(world=options.world, camera=options.camera, headless=options.headless, record=options.record)
     plan = await make_plan(config_from(options, sets))
     return await drive(plan, options.seconds, Display(sys.stdout))
 
@@ -83,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
     parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
     parser.add_argument("--summary", type=Path, metavar="FILE", help="write the run's figures as JSON")
+    parser.add_argument("--record", type=Path, metavar="DIR", help="record everything into this folder")
     parser.add_argument("--headless", action="store_true", help="serve no page")
     add_config_arguments(parser)
     return parser

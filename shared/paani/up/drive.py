@@ -23,7 +23,7 @@ from paani.up.display import Display
 from paani.up.plan import Plan
 from paani.up.silence import ROUTER
 from paani.up.summary import Report, Summary
-from paani.up.supervise import NotKeptAlive, Supervisor
+from paani.up.supervise import RECORDER, NotKeptAlive, Supervisor
 
 READY_S = 120.0
 PROGRESS_S = 0.2
@@ -77,9 +77,14 @@ async def _run(
             collector = Collector(bus, summary)
             for service in plan.services:
                 bus.on(keys.health(service), functools.partial(_heard, supervisor))
-            rest = [supervisor.keep_running(name) for name in plan.services if name != ROUTER]
-            for work in (supervisor.follow_alive(bus), supervisor.watch(), collector.run(), *rest):
+            for work in (supervisor.follow_alive(bus), supervisor.watch(), collector.run()):
                 tasks.append(group.create_task(work))
+            if RECORDER in plan.services:
+                tasks.append(group.create_task(supervisor.keep_running(RECORDER), name=RECORDER))
+                await _recording(supervisor)
+            for name in plan.services:
+                if name not in {ROUTER, RECORDER}:
+                    tasks.append(group.create_task(supervisor.keep_running(name), name=name))
             await _all_alive(supervisor, display)
             summary.begin(clock.now_us())
             if plan.config.dashboard.serve:
@@ -94,6 +99,14 @@ async def _run(
             collector.drain()
         if bus is not None:
             await bus.close()
+
+
+async def _recording(supervisor: Supervisor) -> None:
+    """The recorder hears everybody's first word only if it is there before them."""
+    try:
+        await asyncio.wait_for(supervisor.is_alive(RECORDER), READY_S)
+    except TimeoutError:
+        raise NotKeptAlive(f"not alive after {READY_S:.0f} s: {RECORDER}") from None
 
 
 async def _all_alive(supervisor: Supervisor, display: Display) -> None:

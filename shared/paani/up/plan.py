@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from paani import keys
 from paani.bus.routing import require_free
 from paani.config import Config
 from paani.errors import UserError
@@ -46,11 +45,11 @@ async def make_plan(config: Config) -> Plan:
         localization = replace(localization, origin_lat_lon_deg=origin_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
-        return Plan(keys.SERVICES, config)
+        return Plan(config.services, config)
     adapter = config.plant.adapter
     adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
     config = replace(config, plant=replace(config.plant, adapter=adapter))
-    return Plan(tuple(name for name in keys.SERVICES if name != EYE), config)
+    return Plan(config.services, config)
 
 
 async def _require_source(source: str) -> None:

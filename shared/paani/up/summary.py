@@ -15,13 +15,13 @@ Latencies are differences of the stamps that messages carry, all on this machine
 from __future__ import annotations
 
 import collections
-import math
 from collections.abc import Iterable, Mapping
 
 import msgspec
 
 from paani import keys
 from paani import messages as m
+from paani.order_statistics import nearest_rank
 
 STAGES = (
     "perception",

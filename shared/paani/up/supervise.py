@@ -20,9 +20,12 @@ from paani.up.plan import EYE, Plan
 from paani.up.silence import ROUTER, Silence
 
 WATCH_S = 0.5
-STOP_S, STOP_ROUTER_S, KILL_S = 1.8, 0.6, 0.4  # together under 3 s
+RECORDER = "recorder"
+# One group after the other, so that the recorder hears the others' last words. Together under 3 s.
+STOP_RECORDER_S, STOP_ROUTER_S, KILL_S = 0.9, 0.4, 0.3
+STOP_S = 1.3
 GIVE_UP_FAILURES = 5  # ends in a row of a process that was never alive
-NICE = {EYE: 5}  # drawing yields to the control chain
+NICE = {EYE: 5, RECORDER: 5}  # drawing and writing yield to the control chain
 USER_MISTAKE = 2
 # One thread for each native library: the processes are the parallelism.
 CHILD_ENVIRONMENT = {
@@ -85,6 +88,12 @@ class Supervisor:
         """Services that are not alive now."""
         return [name for name, unit in self.units.items() if not unit.alive]
 
+    async def is_alive(self, name: str) -> None:
+        """Returns when this service is alive."""
+        while not self.units[name].alive:
+            self._changed.clear()
+            await self._changed.wait()
+
     async def all_alive(self) -> None:
         """Returns when every service is alive."""
         while self.missing:
@@ -104,7 +113,7 @@ class Supervisor:
             code = await unit.process.wait()
             self._silence.ended(name)
             self._set_alive(unit, alive=False)
-            if code == USER_MISTAKE:
+            if code == USER_MISTAKE and not (name == RECORDER and unit.ever_alive):  # the boat goes on without it
                 raise UserError(await asyncio.to_thread(_mistake, unit))
             delay_s = unit.backoff.after((self._clock.now_us() - started_us) * 1e-6)
             if not unit.ever_alive and unit.backoff.failures >= GIVE_UP_FAILURES:
@@ -137,11 +146,12 @@ class Supervisor:
                 self.units[name].send(signal.SIGKILL)
 
     async def stop(self) -> None:
-        """SIGTERM to all but the router, then to the router; SIGKILL for what is still there. Under 3 s."""
+        """SIGTERM to all but recorder and router, then to these; SIGKILL for what is still there. Under 3 s."""
         self._stopping = True
-        others = [unit for name, unit in self.units.items() if name != ROUTER]
-        routers = [unit for name, unit in self.units.items() if name == ROUTER]
-        for units, limit_s in ((others, STOP_S), (routers, STOP_ROUTER_S)):
+        others = [unit for name, unit in self.units.items() if name not in {ROUTER, RECORDER}]
+        last = ((RECORDER, STOP_RECORDER_S), (ROUTER, STOP_ROUTER_S))
+        groups = [(others, STOP_S), *(([self.units[name]], s) for name, s in last if name in self.units)]
+        for units, limit_s in groups:
             for unit in units:
                 unit.send(signal.SIGTERM)
                 unit.send(signal.SIGCONT)
