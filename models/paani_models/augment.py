@@ -23,7 +23,9 @@ WATER, OBSTACLE = 0, 1
 
 
 def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], tilt_deg: float) -> Affine:
-    """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, and a roll of up to `tilt_deg`, rarely more.
+    """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, roll.
+
+    The roll is up to `tilt_deg`, rarely two and a half times that.
 
     Zoom 1 stretches the whole source onto the whole target, as the runtime does.
     """

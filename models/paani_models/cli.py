@@ -15,7 +15,7 @@ from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 
 DATA_VARIABLE = "PAANI_DATA"
 NETS = ("segmenter", "detector")
-TRAINED = ("segmenter", "paper-segmenter", "detector")
+TRAINED = ("segmenter", "paper-segmenter", "detector", "gate")
 
 
 def data_folder() -> Path:
@@ -50,10 +50,11 @@ def _parser() -> argparse.ArgumentParser:
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
     train.add_argument("net", choices=TRAINED)
     train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
-    train.add_argument("--start", type=Path, help="checkpoint, or exported ONNX file, to begin from")
+    train.add_argument("--start", type=Path, help="checkpoint, or exported ONNX file, to begin from; for the gate: the segmenter that it guards")
     train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
+    train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
-    train.add_argument("--epochs", type=int, help="detector only")
+    train.add_argument("--epochs", type=int, help="detector and gate only")
     train.add_argument("--peak-rate", type=float)
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
@@ -92,6 +93,7 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
             folder=arguments.folder,
             start=arguments.start,
             teacher=arguments.teacher,
+            labels_from=arguments.labels_from,
             stages=tuple(arguments.stage),
             epochs=arguments.epochs,
             peak_rate=arguments.peak_rate,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from paani.errors import UserError
-from paani_models import detector, segmenter
+from paani_models import detector, gate, segmenter
 from paani_models.catalogue import (
     Model,
     Origin,
@@ -25,6 +25,7 @@ from paani_models.catalogue import (
     save_catalogue,
 )
 from paani_models.detector import Detector
+from paani_models.gate import Gate
 from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
@@ -68,6 +69,20 @@ CONTRACTS = {
 }
 
 
+CONTRACTS["gate"] = Model(
+    name="gate",
+    file="gate.onnx",
+    sha256="",
+    size_bytes=0,
+    parameters=0,
+    opset=OPSET,
+    input=Tensor("input", (1, 3, gate.INPUT_HEIGHT_PX, gate.INPUT_WIDTH_PX)),
+    output=Tensor("fitness", (1, 1)),
+    classes=("fit",),
+    preprocessing=Preprocessing("stretch", _UNCHANGED, (1.0, 1.0, 1.0)),
+    architecture="four strided convolutions, two dense layers",
+    licence="weights: for research; see the terms of each training source",
+)
 CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
     CONTRACTS["segmenter"],
     name="paper-segmenter",
@@ -78,7 +93,8 @@ CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
 
 def network(name: str) -> nn.Module:
     """An untrained net of a contract."""
-    return {"segmenter": ImageNetSegmenter, "paper-segmenter": Segmenter, "detector": Detector}[name]()
+    nets = {"segmenter": ImageNetSegmenter, "paper-segmenter": Segmenter, "detector": Detector, "gate": Gate}
+    return nets[name]()
 
 
 def export(

@@ -10,6 +10,7 @@ MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # checklist D7
 STD = np.array([0.229, 0.224, 0.225], np.float32)
 SIZE_WH = (320, 256)  # checklist C1, D5
 PAD_GREY = 114
+GATE_MIDDLE_WH, GATE_WH = (320, 240), (160, 120)
 
 Pictures = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -29,6 +30,13 @@ def detector_batch(pictures: Pictures) -> Floats:
 def segmenter_input(picture: Pictures) -> Floats:
     """Any picture, stretched bilinearly -> [1,3,256,320]."""
     return segmenter_batch(np.asarray(cv2.resize(picture, SIZE_WH), np.uint8)[None])
+
+
+def gate_input(picture: Pictures) -> Floats:
+    """Any picture, averaged down in two steps as the board's gate does it -> [1,3,120,160]."""
+    middle = cv2.resize(picture, GATE_MIDDLE_WH, interpolation=cv2.INTER_AREA)
+    small = np.asarray(cv2.resize(middle, GATE_WH, interpolation=cv2.INTER_AREA), np.uint8)
+    return detector_batch(small[None])
 
 
 def letterbox_affine(source_wh: tuple[int, int], target_wh: tuple[int, int]) -> Floats:

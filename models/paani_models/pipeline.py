@@ -14,12 +14,13 @@ import torch
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models import detector_data, evaluate, export, train_detector, train_segmenter
+from paani_models import detector_data, evaluate, export, train_detector, train_gate, train_segmenter
 from paani_models.catalogue import Model, load_catalogue, save_catalogue, verified_path
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
-from paani_models.network_input import SIZE_WH, detector_input, segmenter_batch, segmenter_input
+from paani_models.network_input import SIZE_WH, detector_input, gate_input, segmenter_batch, segmenter_input
+from paani_models.pseudo_labels import pseudo_labelled
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
     DETECTOR_CLASSES,
@@ -33,6 +34,7 @@ from paani_models.sources import (
     read_samples,
 )
 from paani_models.train_detector import DetectorTraining
+from paani_models.train_gate import GateTraining
 from paani_models.train_segmenter import SegmenterTraining
 from paani_models.training import Stage, load_average
 from paani_models.warm_start import load_exported
@@ -72,6 +74,11 @@ class Pictures:
         kept = {s.picture for s in self.samples if s.held_out and s.label}
         return [s for s in self.samples if not s.held_out and s.picture not in kept]
 
+    def never_held_out(self) -> list[Sample]:
+        """Every picture that no source holds out, once."""
+        kept = {s.picture for s in self.samples if s.held_out}
+        return list({s.picture: s for s in self.samples if s.picture not in kept}.values())
+
     def unsegmented(self) -> list[Sample]:
         """Training samples of the sources that have boxes and no masks, each picture once."""
         masked = {s.picture for s in self.samples if s.mask}
@@ -85,6 +92,7 @@ class Plan:
     folder: Path
     start: Path | None = None
     teacher: Path | None = None
+    labels_from: Path | None = None
     stages: tuple[str, ...] = ()
     epochs: int | None = None
     peak_rate: float | None = None
@@ -112,6 +120,8 @@ def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
     torch.set_num_threads(threads)
     if net == "detector":
         _train_detector(pictures, plan)
+    elif net == "gate":
+        _train_gate(pictures, plan)
     else:
         _train_segmenter(net, pictures, plan)
 
@@ -147,9 +157,14 @@ def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
         teacher = ImageNetSegmenter()
         load_average(teacher, plan.teacher)
         distillation = Distillation(teacher)
+    if plan.teacher is not None or plan.labels_from is not None:
         samples += pictures.unsegmented()
     held_out = train_segmenter.cache(pictures.segmented(held_out=True))
     cached = train_segmenter.cache(samples)
+    if plan.labels_from is not None:
+        labeller = ImageNetSegmenter()
+        load_average(labeller, plan.labels_from)
+        cached = pseudo_labelled(labeller, cached, samples)
     training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
     if plan.start is not None and plan.start.suffix == ".onnx":
         shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
@@ -176,11 +191,20 @@ def _train_detector(pictures: Pictures, plan: Plan) -> None:
     DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
 
 
+def _train_gate(pictures: Pictures, plan: Plan) -> None:
+    """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
+    recipe = train_gate.Recipe()
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    drawn = [sample for sample in pictures.segmented(held_out=False) if sample.source.name != RENDERED]
+    segmenter = plan.start or verified_path("segmenter")
+    GateTraining(plan.folder, drawn, pictures.never_held_out(), segmenter, recipe).run()
+
+
 def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
     chosen = pictures.boxed(held_out=True) if net == "detector" else pictures.segmented(held_out=True)
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepared = detector_input if net == "detector" else segmenter_input
+    prepared = {"detector": detector_input, "gate": gate_input}.get(net, segmenter_input)
     inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")

@@ -7,6 +7,7 @@ normalises by the batch, starts close to it.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import onnx
@@ -79,7 +80,7 @@ def _norm_behind(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
     found = {}
     for block in model.modules():
         layers = list(block.children()) if isinstance(block, nn.Sequential) else []
-        for first, second in zip(layers, layers[1:], strict=False):
+        for first, second in pairwise(layers):
             if isinstance(first, nn.Conv2d) and isinstance(second, nn.BatchNorm2d):
                 found[first] = second
     return found

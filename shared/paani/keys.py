@@ -192,6 +192,12 @@ def health(service: str) -> Topic[m.Health]:
     )
 
 
+def every_topic() -> tuple[Topic[Any], ...]:
+    """The table, every pulse and every health report."""
+    pulses, reports = (pulse(name) for name in VITAL_SERVICES), (health(name) for name in SERVICES)
+    return (*TOPICS, *pulses, *reports)
+
+
 def alive_name(service: str) -> str:
     """Liveliness token of one process, below the vessel's prefix; the verbatim chunk keeps it out of `**`."""
     return f"@alive/{service}"

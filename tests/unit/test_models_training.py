@@ -14,7 +14,7 @@ from paani_models import train_detector, train_segmenter  # noqa: E402
 from paani_models.cli import main  # noqa: E402
 from paani_models.detector import Detector  # noqa: E402
 from paani_models.detector_data import BoxedPicture  # noqa: E402
-from paani_models.export import CONTRACTS, largest_difference, write_onnx  # noqa: E402
+from paani_models.export import CONTRACTS, largest_difference, network, write_onnx  # noqa: E402
 from paani_models.pipeline import parse_stages  # noqa: E402
 from paani_models.segmenter import Segmenter  # noqa: E402
 from paani_models.train_segmenter import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
@@ -157,14 +157,19 @@ def test_an_unreadable_checkpoint_is_named(tmp_path: Path) -> None:
         load_checkpoint(tmp_path / "last.pt")
 
 
-@pytest.mark.parametrize("name", ["segmenter", "detector"])
+@pytest.mark.parametrize("name", CONTRACTS)
 def test_export_equals_the_net_on_pictures_t2(tmp_path: Path, name: str) -> None:
     torch.manual_seed(1)
-    net = Segmenter() if name == "segmenter" else Detector()
+    net = network(name)
     write_onnx(net, CONTRACTS[name], tmp_path / "net.onnx")
     rng = np.random.default_rng(0)
     inputs = [rng.random((1, 3, 256, 320), dtype=np.float32) for _ in range(2)]
     assert largest_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+
+
+def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> None:
+    write_onnx(Segmenter(), CONTRACTS["paper-segmenter"], tmp_path / "net.onnx")
+    assert (tmp_path / "net.onnx").stat().st_size == pytest.approx(4_344_661, rel=0.015)
 
 
 def test_export_notices_other_weights(tmp_path: Path) -> None:

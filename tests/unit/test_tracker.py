@@ -10,8 +10,9 @@ import pytest
 from paani import messages as m
 from paani.config import MotionConfig
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.motion import MotionHistory, Window, estimate, observe, window_for
-from paani_services.advisor.tracker import HAZARDS, associate, iou
+from paani_services.advisor.association import associate, iou
+from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe, window_for
+from paani_services.advisor.tracker import HAZARDS
 from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing
 
 BUOY = m.Label.BUOY
@@ -38,9 +39,8 @@ def test_g8_hazards_are_one_to_one() -> None:
 def test_g2_greedy_overlap() -> None:
     """G2: the best pair first; below 0.25 no pair."""
     assert iou((0.0, 0.0, 0.2, 0.2), (0.1, 0.0, 0.3, 0.2)) == pytest.approx(1 / 3)
-    pairs, ambiguous = associate([(0.0, 0.0, 0.2, 0.2)], [(0.1, 0.0, 0.3, 0.2), (0.01, 0.0, 0.2, 0.2)], 0.25)
-    assert pairs == {0: 1}
-    assert ambiguous == {1}
+    found = associate([(0.0, 0.0, 0.2, 0.2)], [(0.1, 0.0, 0.3, 0.2), (0.01, 0.0, 0.2, 0.2)], 0.25)
+    assert found == ({1: 0}, {1})
     assert associate([(0.0, 0.0, 0.2, 0.2)], [(0.13, 0.0, 0.33, 0.2)], 0.25) == ({}, frozenset())
 
 
@@ -168,10 +168,9 @@ def test_i2_margin_by_hand() -> None:
     history = MotionHistory()
     for i, y in enumerate((0.0, 0.1, 0.0, 0.1, 0.0)):
         half = 0.1 * math.exp(y)
-        history = observe(
-            history, i * 200_000, (0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half), 0.8, False, WINDOW, MotionConfig()
-        )
-    found = estimate(history, MotionConfig())
+        xyxy = (0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half)
+        history = observe(history, Sighting(i * 200_000, xyxy, y, 0.8, False), WINDOW, MotionConfig())
+    found = estimate(history, 800_000, WINDOW, MotionConfig())
     assert found.rate_per_s == pytest.approx(0.0, abs=1e-12)
     assert found.margin_per_s == pytest.approx(0.3)
     assert (found.state, found.cause) == (S.UNKNOWN, C.LOW_QUALITY)  # I7, I8: 0.8 * 5/8 * 1 * .04/.3 = 0.067
@@ -184,9 +183,9 @@ def test_i5_i6_samples() -> None:
     _, _, tracks = play(growing(0.3, 5, 0.05), period_s=0.05)
     assert tracks[-1].tracks[0].motion_cause is C.TOO_SHORT
     state, _, _ = play(growing(0.1, 40, 0.02), period_s=0.02)
-    assert len(state.tracker.tracks[0].motion.samples) == 24
+    assert len(state.tracker.tracks[0].identity.motion.samples) == 24
     state, _, _ = play(growing(0.1, 20))
-    assert len(state.tracker.tracks[0].motion.samples) == 8
+    assert len(state.tracker.tracks[0].identity.motion.samples) == 8
 
 
 def test_i9_confidence_is_capped() -> None:

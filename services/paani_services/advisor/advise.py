@@ -4,11 +4,11 @@ import msgspec
 
 from paani.config import Config
 from paani.geometry import clip
-from paani.messages import Advisory, Direction, Evidence, LaneRisk, Reason, Tracks, UnusableCause
+from paani.messages import Advisory, Direction, Evidence, LaneRisk, Odometry, Reason, Tracks, UnusableCause
 from paani_services.advisor.explanation import explain
 from paani_services.advisor.policy import Decision, PolicyState, decide
 from paani_services.advisor.risk import LANES, components, obstacles_of
-from paani_services.advisor.tracker import TrackerState, is_sound, published, update
+from paani_services.advisor.tracker import TrackerState, hear, is_sound, published, update
 
 MAX_AGE_S = 1e6
 
@@ -23,15 +23,17 @@ class AdvisorState(msgspec.Struct, frozen=True):
 
 
 def advise(
-    state: AdvisorState, evidence: Evidence | None, now_us: int, config: Config
+    state: AdvisorState, evidence: Evidence | None, now_us: int, config: Config, odometry: Odometry | None = None
 ) -> tuple[AdvisorState, Advisory, Tracks]:
     """Advise a direction; called for each new evidence and again to republish.
 
     now_us: time on the clock that stamped `evidence.source_us`. A frame already digested, or one older than it in
     the same epoch, counts as no frame: the last decision is given again, dated by its own evidence, and turns into
     STOP once that is too old. Unusable, malformed or future evidence advises STOP, whatever else is known; NO_DATA
-    is for having had no evidence at all. Never raises.
+    is for having had no evidence at all. Odometry tells how the boat turned between frames; it moves no risk down.
+    Never raises.
     """
+    state = msgspec.structs.replace(state, tracker=hear(state.tracker, odometry))
     future = False
     if evidence is not None and _is_new(state, evidence):
         future = (now_us - evidence.source_us) * 1e-6 < -config.advisor.max_future_s
@@ -43,7 +45,7 @@ def advise(
         tracks = Tracks(source_us=now_us, frame_seq=0, frame_epoch=0)
     else:
         decision = _stop(Reason.FUTURE_EVIDENCE) if future else _fresh_decision(state, now_us, config)
-        tracks = _tracks(state, known, config)
+        tracks = published(state.tracker, known, config.advisor)
         advisory = _advisory(decision, known, now_us, config)
     return state, msgspec.structs.replace(advisory, explanation=explain(advisory, tracks.tracks)), tracks
 
@@ -63,7 +65,7 @@ def _is_new(state: AdvisorState, evidence: Evidence) -> bool:
 def _digest(state: AdvisorState, evidence: Evidence, config: Config) -> AdvisorState:
     """Take in one distinct frame."""
     fits = is_well_formed(evidence)
-    tracker = update(state.tracker, evidence, config.advisor)
+    tracker = update(state.tracker, evidence, config)
     policy = state.policy
     if evidence.usable and fits:
         obstacles = obstacles_of(tracker, config)
@@ -116,13 +118,4 @@ def _advisory(decision: Decision, evidence: Evidence, now_us: int, config: Confi
         frame_seq=evidence.frame_seq,
         frame_epoch=evidence.frame_epoch,
         evidence_sent_us=evidence.sent_us,
-    )
-
-
-def _tracks(state: AdvisorState, evidence: Evidence, config: Config) -> Tracks:
-    return Tracks(
-        source_us=evidence.source_us,
-        frame_seq=evidence.frame_seq,
-        frame_epoch=evidence.frame_epoch,
-        tracks=tuple(published(track, state.tracker.at_us, config.advisor) for track in state.tracker.tracks),
     )

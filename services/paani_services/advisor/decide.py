@@ -21,8 +21,9 @@ def decide(state: DeciderState, inputs: Inputs, now_us: int, config: Config) -> 
     evidence = inputs[keys.EVIDENCE.name].message
     request, arming = inputs[keys.TUNING.name].message, inputs[keys.ARMING.name]
     tuning, before = heed(state.tuning, state.active, request, arming, now_us, config)
-    after, advisory, tracks = advise(before, evidence, now_us, tuned(config, tuning.active))
-    tuning = try_beside(tuning, before, after, advisory, evidence, now_us, config)
+    odometry = inputs[keys.ODOMETRY.name].message
+    after, advisory, tracks = advise(before, evidence, now_us, tuned(config, tuning.active), odometry)
+    tuning = try_beside(tuning, before, after, advisory, evidence, now_us, config, odometry)
     return DeciderState(after, tuning), {
         keys.ADVISORY.name: advisory,
         keys.TRACKS.name: tracks,
@@ -33,7 +34,7 @@ def decide(state: DeciderState, inputs: Inputs, now_us: int, config: Config) -> 
 DECIDER = Decider(
     service="advisor",
     state=DeciderState,
-    inputs=(keys.EVIDENCE, keys.TUNING, keys.ARMING),
+    inputs=(keys.EVIDENCE, keys.ODOMETRY, keys.TUNING, keys.ARMING),
     outputs=(keys.ADVISORY, keys.TRACKS, keys.SHADOW),
     decide=decide,
 )

@@ -22,6 +22,7 @@ UNUSABLE = {
     UnusableCause.BLURRED: "is blurred",
     UnusableCause.COVERED: "is covered",
     UnusableCause.FROZEN: "is frozen",
+    UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",
 }
 NAMED_TRACKS = 3

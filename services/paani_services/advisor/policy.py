@@ -5,7 +5,7 @@ import msgspec
 from paani.config import Config, PolicyConfig
 from paani.messages import Direction, LaneRisk, Reason
 from paani_services.advisor.risk import LANES, Components, Obstacle, lane_span, shared_width
-from paani_services.advisor.tracker import area
+from paani_services.advisor.association import area
 
 SEEN_ENOUGH = 0.5  # an obstacle fainter than this has been out of sight too long to occupy a lane
 TURNS = {"left": Direction.LEFT, "right": Direction.RIGHT}

@@ -7,7 +7,7 @@ import msgspec
 from paani.config import Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
-from paani_services.advisor.tracker import TrackerState, is_immediate_danger, presence, urgency_now
+from paani_services.advisor.tracker import TrackerState, is_accepted, is_immediate_danger, presence, urgency_now
 
 LANES = ("left", "center", "right")
 NEAR_FROM, NEAR_SPAN, TALL_SPAN = 0.30, 0.70, 0.50  # resolution 6
@@ -88,8 +88,7 @@ def obstacles_of(state: TrackerState, config: Config) -> tuple[Obstacle, ...]:
             danger=is_immediate_danger(track.box, settings),
         )
         for track in state.tracks
-        if track.box[3] > config.perception.corridors.top
-        and (track.hits >= settings.confirm_hits or is_immediate_danger(track.box, settings))
+        if track.box[3] > config.perception.corridors.top and is_accepted(track, settings)
     )
 
 

@@ -14,7 +14,18 @@ from paani.config import AdvisorConfig, Config, with_settings
 from paani.config.tuning import TUNABLE
 from paani.decider import Input
 from paani.errors import UserError
-from paani.messages import Advisory, Change, Direction, Disagreement, Evidence, Shadow, Tuning, TuningAct, TuningRefusal
+from paani.messages import (
+    Advisory,
+    Change,
+    Direction,
+    Disagreement,
+    Evidence,
+    Odometry,
+    Shadow,
+    Tuning,
+    TuningAct,
+    TuningRefusal,
+)
 from paani_services.advisor.advise import AdvisorState, advise
 
 RECENT = 8
@@ -103,6 +114,7 @@ def try_beside(
     evidence: Evidence | None,
     now_us: int,
     config: Config,
+    odometry: Odometry | None = None,
 ) -> TuningState:
     """Let the trial judge the same evidence, and compare where the active policy took in a distinct frame.
 
@@ -111,7 +123,7 @@ def try_beside(
     trial = state.trial
     if trial is None:
         return state
-    memory, shadow, _ = advise(trial.state, evidence, now_us, tuned(config, trial.parameters))
+    memory, shadow, _ = advise(trial.state, evidence, now_us, tuned(config, trial.parameters), odometry)
     trial = msgspec.structs.replace(trial, state=memory)
     if after.evidence is not None and _frame(after.evidence) != _frame(before.evidence):
         trial = _compared(trial, advisory, shadow)

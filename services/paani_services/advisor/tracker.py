@@ -1,18 +1,34 @@
 """Boxes of one picture joined to the boxes before: identity, confirmation, hold, urgency. Pure.
 
 No motion filter and no re-identification (checklist G10): a box that is not seen stays where it was until its
-hold ends.
+hold ends. What the boat's own turning did to a box decides only whose identity it has.
 """
 
+import itertools
 import math
 import statistics
+from collections.abc import Iterator
 
 import msgspec
 
-from paani.config import AdvisorConfig, TrackerConfig
+from paani.config import AdvisorConfig, Config, TrackerConfig
 from paani.geometry import clip
-from paani.messages import BoxXyxy, Detection, Evidence, Hazard, Label, MotionCause, TimeBase, Track
-from paani_services.advisor.motion import MotionHistory, Window, estimate, observe, window_for
+from paani.messages import (
+    BoxXyxy,
+    Detection,
+    Evidence,
+    Hazard,
+    Label,
+    MotionCause,
+    Odometry,
+    RotationUse,
+    TimeBase,
+    Track,
+    Tracks,
+)
+from paani_services.advisor.association import Pairs, area, associate, kinship
+from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe, window_for
+from paani_services.advisor.rotation import Attitude, View, heard, log_size, turned, view_of
 
 HAZARDS = {  # resolution 22
     Label.PERSON: Hazard.SWIMMER,
@@ -23,22 +39,39 @@ HAZARDS = {  # resolution 22
 MIN_SIDE = 1e-6
 PERIODS_KEPT = 8
 MAX_PERIOD_S = 5.0  # a longer pause is no frame period
+MAX_AGE_S = 1e9
+
+
+class Identity(msgspec.Struct, frozen=True):
+    """Who a track is: its number, since when, how often seen, and how its size went."""
+
+    id: int
+    born_us: int
+    hits: int = 0
+    motion: MotionHistory = MotionHistory()
 
 
 class TrackMemory(msgspec.Struct, frozen=True):
-    """What is remembered of one object. `box` is the last one seen; `display_*` are smoothed (G6, G7)."""
+    """What is remembered of one place in the picture where something is or was.
 
-    id: int
+    `box` is the last one seen there, `display_*` are smoothed (G6, G7), `hits` counts sightings there. `identity` may
+    have come from another place when the boat turned, and then has sightings of its own. `seen_from`: how the boat lay.
+    """
+
+    identity: Identity
     label: Label
     box: BoxXyxy
     display_box: BoxXyxy
     display_confidence: float
     hits: int
-    born_us: int
     seen_us: int
     urgency: float
-    motion: MotionHistory
     held: bool = False
+    seen_from: Attitude | None = None
+
+    @property
+    def id(self) -> int:
+        return self.identity.id
 
 
 class TrackerState(msgspec.Struct, frozen=True):
@@ -51,6 +84,8 @@ class TrackerState(msgspec.Struct, frozen=True):
     began_again: bool = False
     periods_s: tuple[float, ...] = ()
     malformed: int = 0
+    attitudes: tuple[Attitude, ...] = ()
+    rotation: RotationUse = RotationUse.OFF
 
     @property
     def period_s(self) -> float:
@@ -58,83 +93,94 @@ class TrackerState(msgspec.Struct, frozen=True):
         return statistics.median(self.periods_s) if self.periods_s else 0.0
 
 
-def update(state: TrackerState, evidence: Evidence, config: AdvisorConfig) -> TrackerState:
+class _Frame(msgspec.Struct, frozen=True):
+    """What every box of one frame has in common."""
+
+    at_us: int
+    view: View
+    window: Window
+    began_again: bool
+    config: AdvisorConfig
+
+
+def hear(state: TrackerState, odometry: Odometry | None) -> TrackerState:
+    """Remember how the boat lay; odometry heard before changes nothing."""
+    attitudes = heard(state.attitudes, odometry)
+    return state if attitudes is state.attitudes else msgspec.structs.replace(state, attitudes=attitudes)
+
+
+def update(state: TrackerState, evidence: Evidence, config: Config) -> TrackerState:
     """Join one new frame's boxes to the tracks; an unusable frame only lets holds run out.
 
-    The caller passes each distinct frame once. Malformed boxes are left out and counted.
+    The caller passes each distinct frame once. Malformed boxes are left out and counted. The boxes, their hold and
+    their weight go by overlap with the last place alone, whatever the boat's turning; identities go with the turning.
     """
+    settings = config.advisor.tracker
+    state = _on_the_clock(state, evidence)
+    given = evidence.detections if evidence.usable else ()
+    sound = sorted((d for d in given if is_sound(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
+    frame = _Frame(
+        state.at_us,
+        view_of(state.attitudes, evidence, config),
+        window_for(state.period_s, config.advisor.motion),
+        state.began_again,
+        config.advisor,
+    )
+    seen, kin = _joined(state.tracks, sound, frame)
+    continued, new_ids = set(kin.track_of.values()), itertools.count(state.next_id)
+    detection_of = {t: d for d, t in seen.track_of.items()}
+    tracks = []
+    for t, track in enumerate(state.tracks):
+        if t in detection_of:
+            d = detection_of[t]
+            tracks.append(
+                _seen_again(track, sound[d], _identity(d, sound[d], state.tracks, kin, new_ids, frame), frame)
+            )
+        else:
+            identity = Identity(next(new_ids), frame.at_us) if t in continued else track.identity
+            tracks.append(
+                msgspec.structs.replace(track, identity=identity, held=True, seen_us=min(track.seen_us, frame.at_us))
+            )
+    tracks += [
+        _first_seen(detection, _identity(d, detection, state.tracks, kin, new_ids, frame), frame)
+        for d, detection in enumerate(sound)
+        if d not in seen.track_of
+    ]
+    alive = [t for t in tracks if (frame.at_us - t.seen_us) * 1e-6 < settings.hold_s]
+    newest = sorted(range(len(alive)), key=lambda i: (-alive[i].seen_us, -alive[i].display_confidence, i))
+    return msgspec.structs.replace(
+        state,
+        tracks=tuple(alive[i] for i in sorted(newest[: settings.max_tracks])),
+        next_id=next(new_ids),
+        began_again=False,
+        malformed=state.malformed + sum(not is_sound(d) for d in given),
+        rotation=frame.view.use,
+    )
+
+
+def _on_the_clock(state: TrackerState, evidence: Evidence) -> TrackerState:
+    """The state at the frame's time; a new epoch of frames forgets the tracks."""
     at_us = evidence.source_us if evidence.time_base is TimeBase.CAPTURE else evidence.media_us
     if state.epoch is not None and state.epoch != evidence.frame_epoch:
-        state = TrackerState(next_id=state.next_id, malformed=state.malformed, began_again=True)
+        state = msgspec.structs.replace(state, tracks=(), periods_s=(), began_again=True)
     elif state.epoch is not None:
         gap_s = (at_us - state.at_us) * 1e-6
         if 0.0 < gap_s <= MAX_PERIOD_S:
             state = msgspec.structs.replace(state, periods_s=(*state.periods_s, gap_s)[-PERIODS_KEPT:])
-        state = msgspec.structs.replace(state, began_again=False)
-    given = evidence.detections if evidence.usable else ()
-    sound = [d for d in given if is_sound(d)]
-    sound = sorted(sound, key=lambda d: -d.confidence)[: config.tracker.max_tracks]
-    window = window_for(state.period_s, config.motion)
-    pairs, ambiguous = associate([t.box for t in state.tracks], [d.box_xyxy for d in sound], config.tracker.iou)
-    taken = {d: t for t, d in pairs.items()}
-    tracks = [
-        _seen(track, sound[pairs[i]], at_us, pairs[i] in ambiguous, window, config)
-        if i in pairs
-        else msgspec.structs.replace(track, held=True, seen_us=min(track.seen_us, at_us))
-        for i, track in enumerate(state.tracks)
-    ]
-    born = [detection for i, detection in enumerate(sound) if i not in taken]
-    tracks += [
-        _born(state.next_id + i, detection, at_us, state.began_again, window, config)
-        for i, detection in enumerate(born)
-    ]
-    alive = [t for t in tracks if (at_us - t.seen_us) * 1e-6 < config.tracker.hold_s]
-    alive.sort(key=lambda t: (-t.seen_us, -t.display_confidence, t.id))
-    return TrackerState(
-        tracks=tuple(sorted(alive[: config.tracker.max_tracks], key=lambda t: t.id)),
-        next_id=state.next_id + len(born),
-        at_us=at_us,
-        epoch=evidence.frame_epoch,
-        periods_s=state.periods_s,
-        malformed=state.malformed + sum(not is_sound(d) for d in given),
-    )
+    return msgspec.structs.replace(state, at_us=at_us, epoch=evidence.frame_epoch)
 
 
-def associate(
-    tracks: list[BoxXyxy], detections: list[BoxXyxy], min_iou: float
-) -> tuple[dict[int, int], frozenset[int]]:
-    """Greedy best-overlap-first pairs {track: detection} (G2), and detections that could have gone elsewhere too.
-
-    Labels are not compared: one object may change its label from frame to frame.
-    """
-    candidates = sorted(
-        (-overlap, t, d)
-        for t, track in enumerate(tracks)
-        for d, detection in enumerate(detections)
-        if (overlap := iou(track, detection)) >= min_iou
-    )
-    pairs: dict[int, int] = {}
-    used: set[int] = set()
-    for _, t, d in candidates:
-        if t not in pairs and d not in used:
-            pairs[t] = d
-            used.add(d)
-    ambiguous = frozenset(d for t, d in pairs.items() if sum(ct == t or cd == d for _, ct, cd in candidates) > 1)
-    return pairs, ambiguous
-
-
-def iou(a: BoxXyxy, b: BoxXyxy) -> float:
-    """Intersection over union of two sound boxes."""
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    if width <= 0.0 or height <= 0.0:
-        return 0.0
-    both = width * height
-    return both / (area(a) + area(b) - both)
-
-
-def area(box: BoxXyxy) -> float:
-    return (box[2] - box[0]) * (box[3] - box[1])
+def _joined(tracks: tuple[TrackMemory, ...], sound: list[Detection], frame: _Frame) -> tuple[Pairs, Pairs]:
+    """Which place each detection is at, and whose identity it has."""
+    boxes, min_iou = [d.box_xyxy for d in sound], frame.config.tracker.iou
+    places = [track.box for track in tracks]
+    seen = associate(places, boxes, min_iou)
+    if frame.view.attitude is None:
+        return seen, seen
+    expected = [turned(track.box, track.seen_from, frame.view) for track in tracks]
+    if expected == places:
+        return seen, seen
+    return seen, kinship(seen, associate(expected, boxes, min_iou))
 
 
 def is_sound(detection: Detection) -> bool:
@@ -163,23 +209,46 @@ def presence(track: TrackMemory, at_us: int, config: TrackerConfig) -> float:
     return math.exp(-max(0, at_us - track.seen_us) * 1e-6 / config.held_decay_s)
 
 
-def published(track: TrackMemory, at_us: int, config: AdvisorConfig) -> Track:
-    """The track as a message: acceptance, danger and hold are their own fields (G11)."""
-    confirmed = track.hits >= config.tracker.confirm_hits
-    danger = is_immediate_danger(track.box, config.tracker)
-    motion = estimate(track.motion, config.motion)
+def is_accepted(track: TrackMemory, config: TrackerConfig) -> bool:
+    """Does it count as an obstacle: confirmed at this place or by its identity, or an immediate danger (G4, G5)?"""
+    return is_confirmed(track, config) or is_immediate_danger(track.box, config)
+
+
+def is_confirmed(track: TrackMemory, config: TrackerConfig) -> bool:
+    """Seen often enough (G4)."""
+    return max(track.hits, track.identity.hits) >= config.confirm_hits
+
+
+def published(state: TrackerState, evidence: Evidence, config: AdvisorConfig) -> Tracks:
+    """The tracks as a message, with the times that their motion was measured by."""
+    window = window_for(state.period_s, config.motion)
+    return Tracks(
+        source_us=evidence.source_us,
+        frame_seq=evidence.frame_seq,
+        frame_epoch=evidence.frame_epoch,
+        tracks=tuple(_published(track, state.at_us, window, config) for track in state.tracks),
+        rotation=state.rotation,
+        period_s=state.period_s,
+        motion_history_s=window.history_s,
+        motion_max_gap_s=window.max_gap_s,
+    )
+
+
+def _published(track: TrackMemory, at_us: int, window: Window, config: AdvisorConfig) -> Track:
+    """Acceptance, danger and hold are their own fields (G11)."""
+    motion = estimate(track.identity.motion, at_us, window, config.motion)
     return Track(
         id=track.id,
         label=track.label,
         hazard=HAZARDS[track.label],
         confidence=track.display_confidence,
         box_xyxy=track.display_box,
-        hits=track.hits,
-        confirmed=confirmed,
-        immediate_danger=danger,
-        accepted=confirmed or danger,
+        hits=max(track.hits, track.identity.hits),
+        confirmed=is_confirmed(track, config.tracker),
+        immediate_danger=is_immediate_danger(track.box, config.tracker),
+        accepted=is_accepted(track, config.tracker),
         held=track.held,
-        age_s=max(0, at_us - track.born_us) * 1e-6,
+        age_s=clip((at_us - track.identity.born_us) * 1e-6, 0.0, MAX_AGE_S),
         urgency=urgency_now(track, at_us, config.tracker),
         motion=motion.state,
         motion_cause=motion.cause,
@@ -189,40 +258,56 @@ def published(track: TrackMemory, at_us: int, config: AdvisorConfig) -> Track:
     )
 
 
-def _born(
-    track_id: int, detection: Detection, at_us: int, began_again: bool, window: Window, config: AdvisorConfig
-) -> TrackMemory:
-    before = MotionHistory(reset=MotionCause.EPOCH_CHANGE if began_again else MotionCause.NONE)
+def _identity(
+    d: int,
+    detection: Detection,
+    tracks: tuple[TrackMemory, ...],
+    kin: Pairs,
+    new_ids: Iterator[int],
+    frame: _Frame,
+) -> Identity:
+    """Whoever detection `d` is, with this sighting; somebody new where it is nobody's kin."""
+    if d in kin.track_of:
+        before = tracks[kin.track_of[d]].identity
+    else:
+        began = MotionHistory(reset=MotionCause.EPOCH_CHANGE if frame.began_again else MotionCause.NONE)
+        before = Identity(next(new_ids), frame.at_us, motion=began)
+    size = log_size(detection.box_xyxy, frame.view.lens)
+    sighting = Sighting(frame.at_us, detection.box_xyxy, size, detection.confidence, d in kin.doubtful)
+    return Identity(
+        id=before.id,
+        born_us=min(before.born_us, frame.at_us),
+        hits=before.hits + 1,
+        motion=observe(before.motion, sighting, frame.window, frame.config.motion),
+    )
+
+
+def _first_seen(detection: Detection, identity: Identity, frame: _Frame) -> TrackMemory:
     return TrackMemory(
-        id=track_id,
+        identity=identity,
         label=detection.label,
         box=detection.box_xyxy,
         display_box=detection.box_xyxy,
         display_confidence=detection.confidence,
         hits=1,
-        born_us=at_us,
-        seen_us=at_us,
+        seen_us=frame.at_us,
         urgency=0.0,
-        motion=observe(before, at_us, detection.box_xyxy, detection.confidence, False, window, config.motion),
+        seen_from=frame.view.attitude,
     )
 
 
-def _seen(
-    track: TrackMemory, detection: Detection, at_us: int, ambiguous: bool, window: Window, config: AdvisorConfig
-) -> TrackMemory:
-    settings, box = config.tracker, detection.box_xyxy
-    return msgspec.structs.replace(
-        track,
+def _seen_again(track: TrackMemory, detection: Detection, identity: Identity, frame: _Frame) -> TrackMemory:
+    settings, box = frame.config.tracker, detection.box_xyxy
+    return TrackMemory(
+        identity=identity,
         label=detection.label,
         box=box,
         display_box=_blend(track.display_box, box, settings.box_retain),
         display_confidence=_mix(track.display_confidence, detection.confidence, settings.confidence_retain),
         hits=track.hits + 1,
-        born_us=min(track.born_us, at_us),
-        seen_us=at_us,
-        urgency=_urgency(track, box, at_us, settings),
-        motion=observe(track.motion, at_us, box, detection.confidence, ambiguous, window, config.motion),
-        held=False,
+        seen_us=frame.at_us,
+        urgency=_urgency(track, box, frame.at_us, settings),
+        seen_from=frame.view.attitude,
     )
 
 

@@ -28,12 +28,14 @@ from paani_services.dashboard.requests import (
     read_body,
     read_query,
 )
+from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
 MAX_CLIENTS = 16
 MAX_BODY_BYTES = 4096
 SEND_TIMEOUT_S = 15.0
 HEARTBEAT_S = 5.0
 TOKEN_HEADER = "X-Paani-Token"
+MAX_REPORT_AGE_S = 3.0
 STOP_PATH = "/api/stop"
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -43,10 +45,17 @@ class Server:
     """HTTP in front of the hub and the console."""
 
     def __init__(
-        self, hub: Hub, console: Console, clock: Clock, config: DashboardConfig, pages: dict[str, Page], token: str
+        self,
+        hub: Hub,
+        console: Console,
+        tuner: Tuner,
+        clock: Clock,
+        config: DashboardConfig,
+        pages: dict[str, Page],
+        token: str,
     ) -> None:
-        self._hub, self._console, self._clock, self._config = hub, console, clock, config
-        self._pages, self._token = pages, token
+        self._hub, self._console, self._tuner = hub, console, tuner
+        self._clock, self._config, self._pages, self._token = clock, config, pages, token
 
     def app(self) -> web.Application:
         app = web.Application(middlewares=[self._guard], client_max_size=MAX_BODY_BYTES)
@@ -60,6 +69,10 @@ class Server:
                 web.get("/api/topics", self._topics),
                 web.post(STOP_PATH, self._stop),
                 web.post("/api/arm", self._arm),
+                web.get("/api/tune", self._tuning),
+                web.post("/api/tune/propose", self._propose),
+                web.post("/api/tune/promote", self._promote),
+                web.post("/api/tune/rollback", self._rollback),
             ]
         )
         return app
@@ -95,15 +108,44 @@ class Server:
         return answer({"stopped": True, "kept": kept})
 
     async def _arm(self, request: web.Request) -> web.Response:
-        if not is_same_origin(request.headers.get("Origin"), request.host):
-            return refusal(403, "Origin: only this server's own page may arm", "Origin")
-        if not hmac.compare_digest(request.headers.get(TOKEN_HEADER, "").encode(), self._token.encode()):
-            return refusal(403, f"{TOKEN_HEADER}: not the token of this page; load it again", TOKEN_HEADER)
+        if (stranger := self._stranger(request, "arm")) is not None:
+            return stranger
         read_body(await request.read(), ArmRequest)
         if not await self._console.arm():
             return refusal(409, "not armed: a STOP came meanwhile, or the latch could not be released on disk", "armed")
         self._hub.tell(Event(self._clock.now_us(), "warn", "armed"))
         return answer({"armed": True})
+
+    def _stranger(self, request: web.Request, deed: str) -> web.Response | None:
+        """The refusal for a request that is not of this server's own page, with its token."""
+        if not is_same_origin(request.headers.get("Origin"), request.host):
+            return refusal(403, f"Origin: only this server's own page may {deed}", "Origin")
+        if not hmac.compare_digest(request.headers.get(TOKEN_HEADER, "").encode(), self._token.encode()):
+            return refusal(403, f"{TOKEN_HEADER}: not the token of this page; load it again", TOKEN_HEADER)
+        return None
+
+    async def _propose(self, request: web.Request) -> web.Response:
+        if (stranger := self._stranger(request, "tune")) is not None:
+            return stranger
+        return tuning_answer(await self._tuner.propose(read_body(await request.read(), ProposeRequest).changes))
+
+    async def _promote(self, request: web.Request) -> web.Response:
+        return await self._name(request, m.TuningAct.PROMOTE)
+
+    async def _rollback(self, request: web.Request) -> web.Response:
+        return await self._name(request, m.TuningAct.ROLLBACK)
+
+    async def _name(self, request: web.Request, act: m.TuningAct) -> web.Response:
+        if (stranger := self._stranger(request, "tune")) is not None:
+            return stranger
+        return tuning_answer(await self._tuner.name(act, read_body(await request.read(), ProposalRequest).proposal))
+
+    async def _tuning(self, request: web.Request) -> web.Response:
+        read_query(dict(request.query), NoQuery)
+        shadow, received_us = self._hub.newest(keys.SHADOW.name) or (None, 0)
+        if shadow is None or (self._clock.now_us() - received_us) * 1e-6 > MAX_REPORT_AGE_S:
+            return refusal(503, "the advisor does not report", keys.SHADOW.name)
+        return answer(shadow)
 
     async def _snapshot(self, request: web.Request) -> web.Response:
         wanted = read_query(dict(request.query), SnapshotQuery)
@@ -180,6 +222,13 @@ def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:
         "stance": topic.stance.value,
         "summary": topic.summary,
     }
+
+
+def tuning_answer(shadow: m.Shadow | None) -> web.Response:
+    """The advisor's report as it answered; 409 where it refused, 503 where it was not heard."""
+    if shadow is None:
+        return refusal(503, "the advisor did not answer", keys.SHADOW.name)
+    return answer(shadow, 200 if shadow.refusal is m.TuningRefusal.NONE else 409)
 
 
 def answer(value: object, status: int = 200) -> web.Response:

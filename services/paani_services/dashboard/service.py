@@ -19,6 +19,7 @@ from paani_services.dashboard.hub import Event, Hub
 from paani_services.dashboard.pages import load_pages
 from paani_services.dashboard.server import Server, start_server
 from paani_services.dashboard.settings import Lives, page_operator, page_settings
+from paani_services.dashboard.tuning import Tuner
 
 STATE_PERIOD_S = 0.1  # the eye wants no more of a number
 OPERATOR_PERIOD_S = 0.2
@@ -29,23 +30,27 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     console = Console(bus.publisher(keys.ARMING), folder, clock)
     await console.restore(arm_at_start=config.dashboard.arm_at_start)
-    page = show_page(bus, console, clock, config) if config.dashboard.serve else contextlib.nullcontext()
+    tuner = Tuner(bus.publisher(keys.TUNING), clock)
+    page = show_page(bus, console, tuner, clock, config) if config.dashboard.serve else contextlib.nullcontext()
     async with page:
         with bus.alive():
-            await console.speak_always()
+            async with asyncio.TaskGroup() as speaking:
+                speaking.create_task(console.speak_always())
+                speaking.create_task(tuner.speak_always())
 
 
 @contextlib.asynccontextmanager
-async def show_page(bus: Bus, console: Console, clock: Clock, config: Config) -> AsyncIterator[None]:
+async def show_page(bus: Bus, console: Console, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
     """The web server and what feeds it, while the context lasts."""
     hub = Hub()
     hub.put("dashboard/settings", page_settings(config), clock.now_us(), clock.now_us())
-    async with serving(hub, console, clock, config), asyncio.TaskGroup() as tasks:
+    async with serving(hub, console, tuner, clock, config), asyncio.TaskGroup() as tasks:
         picture_period_s = 1.0 / config.dashboard.picture_rate_hz
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
         feeds.append(forward_while_watched(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
         feeds.append(forward_applied(hub, console, bus.latest(keys.THRUST_APPLIED), clock))
+        feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
         feeds += [show_operator(hub, console, clock), show_lives(hub, bus, clock)]
         running = [tasks.create_task(feed) for feed in feeds]
         try:
@@ -56,11 +61,12 @@ async def show_page(bus: Bus, console: Console, clock: Clock, config: Config) ->
 
 
 @contextlib.asynccontextmanager
-async def serving(hub: Hub, console: Console, clock: Clock, config: Config) -> AsyncIterator[None]:
+async def serving(hub: Hub, console: Console, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
     """The web server, while the context lasts."""
     token = secrets.token_urlsafe(24)
     pages = await asyncio.to_thread(load_pages, token)
-    runner = await start_server(Server(hub, console, clock, config.dashboard, pages, token).app(), config.dashboard)
+    server = Server(hub, console, tuner, clock, config.dashboard, pages, token)
+    runner = await start_server(server.app(), config.dashboard)
     try:
         yield
     finally:
@@ -68,9 +74,10 @@ async def serving(hub: Hub, console: Console, clock: Clock, config: Config) -> A
 
 
 def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:
-    """Every topic that is plain JSON but the plant's answer to a STOP, and every health report."""
+    """Every topic that is plain JSON, but those that answer the operator, and every health report."""
+    answers = (keys.THRUST_APPLIED, keys.SHADOW)
     topics: list[keys.Topic[Any]] = [
-        topic for topic in keys.TOPICS if topic.stance is not keys.Stance.PICTURE and topic is not keys.THRUST_APPLIED
+        topic for topic in keys.TOPICS if topic.stance is not keys.Stance.PICTURE and topic not in answers
     ]
     topics += [keys.health(service) for service in keys.SERVICES]
     return [(topic, bus.latest(topic)) for topic in topics]
@@ -102,6 +109,16 @@ async def forward_applied(hub: Hub, console: Console, inbox: Latest[m.ThrustAppl
         console.hear_applied(value)
         hub.put(keys.THRUST_APPLIED.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(0.5 / keys.THRUST_APPLIED.rate_hz)
+
+
+async def forward_shadow(hub: Hub, tuner: Tuner, inbox: Latest[m.Shadow], clock: Clock) -> None:
+    """What is tried beside the policy: to the page, and to the request that waits for it."""
+    while True:
+        value = await inbox.next()
+        if (event := tuner.hear(value)) is not None:
+            hub.tell(event)
+        hub.put(keys.SHADOW.name, value, inbox.received_us, clock.now_us())
+        await asyncio.sleep(STATE_PERIOD_S)
 
 
 async def show_operator(hub: Hub, console: Console, clock: Clock) -> None:

@@ -1,1 +1,1 @@
-"""How well the gate knows a picture that cannot be used: every fault in every severity, against the segmenter's own error."""
+"""How well the gate knows a picture that cannot be used: every fault, every severity, against the segmenter's error."""

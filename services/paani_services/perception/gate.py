@@ -1,5 +1,10 @@
-"""Is this picture fit to be evidence? A net calls black water, so this is asked first (checklist J19). Pure."""
+"""Is this picture fit to be evidence? A net calls black water, so this is asked first (checklist J19). Pure.
 
+Limits on statistics name what no camera should deliver; a small net, trained on what the segmenter does not survive,
+knows the rest: views without water, mixed-up or turned pictures, rain and drops that hide the scene.
+"""
+
+from collections.abc import Callable
 from typing import NamedTuple
 
 import cv2
@@ -13,6 +18,7 @@ Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
 MIDDLE_WH, SMALL_WH, TILE_PX = (320, 240), (80, 60), 20
+Fitness = Callable[[Bytes], float]
 DARK_LEVEL, BRIGHT_LEVEL = 6, 250  # of 255
 PLAIN_STD, DARK_TILE_STD, DARK_TILE_MEAN = 2.0, 3.0, 40.0
 # J. Immerkaer, Fast Noise Variance Estimation, 1996: a mask that image structure does not answer to.
@@ -47,33 +53,39 @@ class Statistics(NamedTuple):
     rest_mean: float
 
 
-def judge(state: GateState, bgr: Bytes, epoch: int, config: GateConfig) -> tuple[GateState, UnusableCause]:
+def judge(
+    state: GateState, bgr: Bytes, epoch: int, config: GateConfig, fitness: Fitness | None = None
+) -> tuple[GateState, UnusableCause]:
     """Judge one distinct frame; NONE when it is fit.
 
     bgr: uint8 [H, W, 3]. epoch: the frame's; a new one begins the search for a frozen camera again. The caller
     passes each frame once, so that the same picture again is a camera that repeats itself.
+    fitness: from the picture at 320x240, uint8 [240, 320, 3], to 0..1, and not a number where that fails.
     """
     if not config.enabled:
         return state, UnusableCause.NONE
     height, width = bgr.shape[:2]
     if width < config.min_width_px or height < config.min_height_px:
         return GateState(), UnusableCause.WRONG_SIZE
-    middle, small = reduced(bgr)
+    colour, middle, small = reduced(bgr)
     known = state.small if state.epoch == epoch else None
     still = known is not None and float(np.abs(small - known).mean()) < config.frozen_mad
     state = GateState(small, state.same + 1 if still else 1, epoch)
     cause = cause_of(measure(middle, small), config)
     if cause is UnusableCause.NONE and state.same >= config.frozen_frames:
         cause = UnusableCause.FROZEN
+    if cause is UnusableCause.NONE and fitness is not None and not fitness(colour) >= config.min_fitness:
+        cause = UnusableCause.UNFIT
     return state, cause
 
 
-def reduced(bgr: Bytes) -> tuple[Bytes, Floats]:
-    """Luma at 320x240 (uint8) and at 80x60 (float32)."""
+def reduced(bgr: Bytes) -> tuple[Bytes, Bytes, Floats]:
+    """The picture at 320x240 (BGR uint8), its luma (uint8), and luma at 80x60 (float32)."""
     shrinks = bgr.shape[1] >= MIDDLE_WH[0]
-    resized = cv2.resize(bgr, MIDDLE_WH, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
-    middle = np.asarray(cv2.cvtColor(resized, cv2.COLOR_BGR2GRAY), np.uint8)
-    return middle, np.asarray(cv2.resize(middle, SMALL_WH, interpolation=cv2.INTER_AREA), np.float32)
+    interpolation = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    colour = np.asarray(cv2.resize(bgr, MIDDLE_WH, interpolation=interpolation), np.uint8)
+    middle = np.asarray(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY), np.uint8)
+    return colour, middle, np.asarray(cv2.resize(middle, SMALL_WH, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def measure(middle: Bytes, small: Floats) -> Statistics:

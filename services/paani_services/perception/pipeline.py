@@ -23,6 +23,7 @@ from paani_services.perception.decode import decode
 from paani_services.perception.decoding import decoded
 from paani_services.perception.engine import Engine
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
+from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
 from paani_services.perception.preprocess import letterbox, stretch, tables
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
@@ -57,7 +58,7 @@ class Perceiver:
         self._models = ", ".join(engine.info() for engine in engines)
         self._tables = [tables(e.contract.preprocessing.mean, e.contract.preprocessing.std) for e in engines]
         self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
-        self._gate = GateState()
+        self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
         self._counts: dict[tuple[int, ...], Floats] = {}
 
     def perceive(
@@ -104,7 +105,7 @@ class Perceiver:
     def _judge(self, bgr: Bytes | None, header: PictureHeader, age_s: float) -> UnusableCause:
         if bgr is None:
             return UnusableCause.UNDECODABLE
-        self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate)
+        self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate, self._fitness)
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
 
     def _detect(self, bgr: Bytes) -> tuple[tuple[Detection, ...], float]:

@@ -48,6 +48,12 @@ def stretch(bgr: Bytes, height_px: int, width_px: int, table: Floats) -> Floats:
     return _normalised(np.asarray(cv2.resize(bgr, (width_px, height_px)), np.uint8), table)
 
 
+def shrunk(middle: Bytes, height_px: int, width_px: int, table: Floats) -> Floats:
+    """A picture averaged down to the gate's input: float32 [1, 3, H, W] in RGB."""
+    small = cv2.resize(middle, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    return _normalised(np.asarray(small, np.uint8), table)
+
+
 def _normalised(bgr: Bytes, table: Floats) -> Floats:
     tensor = np.empty((1, 3, *bgr.shape[:2]), np.float32)
     for channel, plane in enumerate(reversed(cv2.split(bgr))):

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+
+SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
 
 
 class TrackerConfig(Section, frozen=True):
@@ -23,13 +29,14 @@ class TrackerConfig(Section, frozen=True):
 class MotionConfig(Section, frozen=True):
     history_s: Positive = 1.5  # I5
     max_samples: Size = 24  # I5
-    min_samples: Size = 5  # I6
+    min_samples: SlopeSize = 5  # I6
     min_duration_s: Positive = 0.4  # I6
     max_gap_s: Positive = 0.75  # I16
-    follow_rate: bool = True  # stretch window and gap to the measured period
-    slow_period_s: Positive = 0.3  # a longer period between frames stretches them
+    follow_rate: bool = True  # window and gap reach over at least so many periods between frames
     history_periods: Positive = 6.0
     gap_periods: Positive = 2.5
+    compensate_rotation: bool = True  # tell the boat's own turning apart from motion; I19
+    max_odometry_gap_s: NonNegative = 0.3  # between a picture and the odometry nearest to it
     deadband_per_s: Positive = 0.04  # I3
     margin_floor_per_s: Positive = 0.01  # I2
     margin_factor: Positive = 3.0  # I2

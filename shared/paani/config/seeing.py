@@ -35,26 +35,29 @@ class GateConfig(Section, frozen=True):
     """Usable-picture gate: a picture beyond any of these limits is not evidence. `enabled=false` is the paper (J19).
 
     The limits lie between broken pictures and everything that real cameras deliver, fog, glare and night included.
+    `min_fitness` is what the gate's net must say at least, of 1; 0 leaves the net out.
     """
 
     enabled: bool = True
     min_width_px: Size = 160
     min_height_px: Size = 120
-    dark_mean: NonNegative = 8.0  # of 255
-    dark_frac: Fraction = 0.85  # of pixels at most 6
-    bright_frac: Fraction = 0.60  # of pixels at least 250
-    flat_range: NonNegative = 14.0  # 1st to 99th percentile
+    dark_mean: NonNegative = 3.5  # of 255
+    dark_frac: Fraction = 0.96  # of pixels at most 6
+    bright_frac: Fraction = 0.80  # of pixels at least 250
+    flat_range: NonNegative = 11.0  # 1st to 99th percentile
     flat_frac: Fraction = 0.95  # of tiles without texture
     flat_residual: Fraction = 0.15  # of the variation is not vertical stripes
     noise_correlation: Fraction = 0.25  # of neighbours in the small picture
     noise_sigma: NonNegative = 18.0
-    noise_fineness: NonNegative = 2.2  # fine over coarse edges
-    blur_fineness: NonNegative = 0.29
+    noise_fineness: NonNegative = 2.9  # fine over coarse edges
+    blur_fineness: NonNegative = 0.25
     cover_frac: Fraction = 0.50  # of tiles dark and without texture, beside a bright rest
     cover_rest_mean: NonNegative = 58.0
     cover_total_frac: Fraction = 0.95  # whatever the rest
     frozen_frames: Size = 5  # distinct frames that show the same
     frozen_mad: NonNegative = 0.05  # mean absolute difference of the small pictures
+    model: str = ""  # path of an ONNX file; empty: the shipped model
+    min_fitness: Fraction = 0.0
 
 
 class DetectorConfig(Section, frozen=True):

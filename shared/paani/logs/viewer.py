@@ -96,8 +96,8 @@ class Viewer:
 
     def _evidence(self, evidence: m.Evidence) -> list[Derived]:
         self._size_px = (evidence.width_px, evidence.height_px)
-        line = "" if evidence.usable else f"picture unusable: {evidence.cause}"
-        return self._line("perception", line, evidence.source_us, pb.WARNING)
+        line = "picture usable" if evidence.usable else f"picture unusable: {evidence.cause}"
+        return self._line("perception", line, evidence.source_us, pb.INFO if evidence.usable else pb.WARNING)
 
     def _tracks(self, tracks: m.Tracks) -> list[Derived]:
         width, height = self._size_px
@@ -142,10 +142,10 @@ class Viewer:
     def _line(self, name: str, line: str, at_us: int, level: int, key: object = None) -> list[Derived]:
         """A line of the log when what it says (its key, else the line) has changed."""
         key = line if key is None else key
-        if self._said.get(name, "") == key:
+        if self._said.get(name) == key:
             return []
         self._said[name] = key
-        fields = {"timestamp": pb.timestamp(at_us), "level": level, "message": line or "usable again", "name": name}
+        fields = {"timestamp": pb.timestamp(at_us), "level": level, "message": line, "name": name}
         return [Derived(LINES, at_us, pb.encode(pb.LOG, fields))]
 
 

@@ -32,6 +32,7 @@ class UnusableCause(StrEnum):
     BLURRED = "blurred"
     COVERED = "covered"
     FROZEN = "frozen"
+    UNFIT = "unfit"
     STALE = "stale"
 
 

@@ -1,0 +1,25 @@
+"""The gate's net: how far a picture looks like one that the segmenter can be trusted on."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import GateConfig
+from paani_services.perception.engine import Engine
+from paani_services.perception.gate import Fitness
+from paani_services.perception.preprocess import shrunk, tables
+
+Bytes = NDArray[np.uint8]
+
+
+def load_fitness(config: GateConfig, threads: int) -> Fitness | None:
+    """The net as a function; None where the gate or its net is switched off. Raises UserError naming a bad file."""
+    if not config.enabled or config.min_fitness == 0.0:
+        return None
+    engine = Engine.load("gate", config.model, threads)
+    height, width = engine.contract.input.shape[2:]
+    table = tables(engine.contract.preprocessing.mean, engine.contract.preprocessing.std)
+
+    def fitness(middle: Bytes) -> float:
+        return float(engine.run(shrunk(middle, height, width, table))[0, 0])
+
+    return fitness

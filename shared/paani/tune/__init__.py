@@ -1,0 +1,1 @@
+"""`paani tune`: other parameters beside those in force, then in their place."""
