@@ -17,7 +17,8 @@ Rng = np.random.Generator
 
 # Checklist S8.
 GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
-MIRROR_FRAC = 0.2
+MIRROR_FRAC = 0.3
+CONCRETE_FRAC = 0.12
 
 WATER, OBSTACLE = 0, 1
 
@@ -170,6 +171,23 @@ def obstacle_patch(rng: Rng, picture: Picture, mask: Picture) -> Picture | None:
     return None
 
 
+def concrete(rng: Rng) -> Picture:
+    """A smooth wall: one grey, stained in streaks that run down, sometimes with joints and a wet foot."""
+    height, width = 120, 240
+    wall = np.full((height, width, 3), rng.uniform(50, 215), np.float32) + rng.normal(0, 6, 3).astype(np.float32)
+    streaks = rng.standard_normal((int(rng.integers(1, 4)), int(rng.integers(10, 80))), dtype=np.float32)
+    clouds = rng.standard_normal((int(rng.integers(3, 9)), int(rng.integers(4, 16))), dtype=np.float32)
+    for grid, reach in ((streaks, 18.0), (clouds, 14.0)):
+        wall += np.asarray(cv2.resize(grid, (width, height)), np.float32)[..., None] * rng.uniform(0.1, 1.0) * reach
+    if rng.random() < 0.5:
+        spacing, dark = int(rng.integers(24, 80)), rng.uniform(5, 40)
+        wall[:, ::spacing] -= dark
+        wall[int(rng.integers(10, height)) :: spacing] -= dark
+    if rng.random() < 0.5:
+        wall[int(rng.uniform(0.7, 0.98) * height) :] *= rng.uniform(0.4, 0.8)
+    return add_noise(rng, np.clip(wall, 0, 255).astype(np.uint8), rng.uniform(0, 10))
+
+
 def paste_obstacle(rng: Rng, picture: Picture, mask: Picture, patch: Picture) -> tuple[Picture, Picture]:
     """Stand a patch in the picture: as a wall along one side, receding, or as a block; what it covers is obstacle.
 
@@ -239,12 +257,12 @@ def segmenter_sample(
     rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int], patch: Picture | None = None
 ) -> tuple[Picture, Picture]:
     """Make one training pair of the target size; a patch of obstacle, if given, is pasted in."""
-    if rng.random() < MIRROR_FRAC:
-        picture = mirror_water(rng, picture, mask)
     affine = random_affine(rng, (picture.shape[1], picture.shape[0]), target_wh, tilt_deg=8.0)
     picture, mask = warp_picture(picture, affine, target_wh), warp_mask(mask, affine, target_wh)
     if patch is not None:
         picture, mask = paste_obstacle(rng, picture, mask, patch)
+    if rng.random() < MIRROR_FRAC:
+        picture = mirror_water(rng, picture, mask)
     if rng.random() < 0.8:
         picture = jitter_colour(rng, picture)
     if rng.random() < GLARE_FRAC:

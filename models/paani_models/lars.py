@@ -141,7 +141,7 @@ def write_prediction(folder: Path, name: str, label: Mask) -> None:
 
 
 def read_prediction(path: Path) -> Mask:
-    """A picture in the server's colours -> LaRS classes. Raises UserError naming an unreadable file or other colours."""
+    """A picture in the server's colours -> LaRS classes. Raises UserError naming one unreadable or of other colours."""
     picture = decode_picture(read_bytes(path), path)
     label = np.full(picture.shape[:2], IGNORE, np.uint8)
     for kind, colour in enumerate(COLOURS):

@@ -59,7 +59,7 @@ class Recipe:
     peak_rate: float = 1e-3  # checklist S3
     weight_decay: float = 5e-4  # checklist S3
     warmup_steps: int = 200
-    mosaic_frac: float = 0.5
+    mosaic_frac: float = 0.35
     plain_epochs: int = 4  # the last epochs, without mosaic
     seed: int = 42  # checklist S4
 

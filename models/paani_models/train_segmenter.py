@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from paani_models.augment import obstacle_patch, segmenter_null, segmenter_sample
+from paani_models.augment import CONCRETE_FRAC, concrete, obstacle_patch, segmenter_null, segmenter_sample
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.network_input import segmenter_batch
@@ -172,6 +172,7 @@ class SegmenterTraining:
                 item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
                 wanted = rng.random() < PASTE_FRAC
                 patch = obstacle_patch(rng, donor.picture, donor.mask) if wanted else None
+                patch = concrete(rng) if rng.random() < CONCRETE_FRAC else patch
                 pairs.append(segmenter_sample(rng, item.picture, item.mask, size, patch))
         pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
         return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))

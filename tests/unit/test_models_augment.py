@@ -177,6 +177,12 @@ def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
     assert not mask.any()
 
 
+def test_concrete_is_smooth_grey_and_its_own_every_time() -> None:
+    walls = [augment.concrete(np.random.default_rng(seed)) for seed in range(12)]
+    assert len({wall.tobytes() for wall in walls}) == 12
+    assert all(np.abs(wall.astype(int) - wall.mean(2, keepdims=True)).mean() < 16 for wall in walls)
+
+
 def test_patches_are_cut_from_obstacle_only() -> None:
     picture = np.zeros((288, 384, 3), np.uint8)
     mask = np.zeros((288, 384), np.uint8)

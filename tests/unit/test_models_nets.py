@@ -6,6 +6,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 from paani_models import detector, segmenter  # noqa: E402
+from paani_models.imagenet_segmenter import ImageNetSegmenter  # noqa: E402
 from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
 
 
@@ -100,3 +101,33 @@ def test_candidate_grid_matches_the_output_order() -> None:
     assert centres[41].tolist() == [12.0, 12.0]
     assert centres[1280].tolist() == [8.0, 8.0]
     assert [int((strides == s).sum()) for s in detector.STRIDES] == [1280, 320, 80]
+
+
+def multiply_adds(net: torch.nn.Module) -> int:
+    total = 0
+
+    def count(conv: torch.nn.Module, _inputs: tuple[torch.Tensor, ...], output: torch.Tensor) -> None:
+        nonlocal total
+        assert isinstance(conv, torch.nn.Conv2d)
+        total += output.numel() * conv.weight[0].numel()
+
+    for module in net.modules():
+        if isinstance(module, torch.nn.Conv2d):
+            module.register_forward_hook(count)
+    with torch.no_grad():
+        net.eval()(torch.zeros(1, 3, 256, 320))
+    return total
+
+
+def test_the_shipped_segmenter_costs_less_than_the_papers() -> None:
+    assert multiply_adds(segmenter.Segmenter()) == pytest.approx(357e6, rel=0.01)
+    assert multiply_adds(ImageNetSegmenter()) < 0.75 * multiply_adds(segmenter.Segmenter())
+
+
+def test_the_shipped_segmenter_is_piecewise_constant_over_four_pixels() -> None:
+    """The runtime reads one logit in sixteen (stride 4)."""
+    with torch.no_grad():
+        logits = ImageNetSegmenter().eval()(torch.rand(1, 3, 256, 320))
+    assert tuple(logits.shape) == (1, 3, 256, 320)
+    cells = logits[:, :, ::4, ::4]
+    assert torch.equal(logits, cells.repeat_interleave(4, 2).repeat_interleave(4, 3))

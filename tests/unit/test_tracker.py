@@ -155,7 +155,7 @@ def test_h6_urgency_and_the_diagnostic_stay_apart() -> None:
 )
 def test_i3_i4_states(rate_per_s: float, state: m.MotionState) -> None:
     """I1, I3, I4, U9: expansion, contraction and steady; an interval across the dead band's edge is unknown."""
-    _, _, tracks = play(growing(rate_per_s, 10))
+    _, _, tracks = play(growing(rate_per_s, 10), PAPER)
     track = tracks[-1].tracks[0]
     assert track.motion is state
     assert track.motion_rate_per_s == pytest.approx(rate_per_s, abs=1e-9)

@@ -26,7 +26,7 @@ class ProposeRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which proposal to promote or to take back."""
 
-    proposal: Annotated[str, msgspec.Meta(min_length=1, max_length=32)]
+    proposal: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9]{1,32}$")]
 
 
 class Tuner:

@@ -13,6 +13,7 @@ from paani.errors import UserError
 Bytes = NDArray[np.uint8]
 T = TypeVar("T")
 SIZE_WH = (320, 240)
+SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
 # Mask folders by preference, coded 0 obstacle, 1 water, 2 sky, 255 unknown.
 MASK_FOLDERS = ("masks3", "masks")
 CLASS_OF = np.full(256, 255, np.uint8)
@@ -45,14 +46,18 @@ def sources(folder: Path) -> list[Path]:
     return found
 
 
-def clean_pictures(source: Path, at_most: int) -> list[Bytes]:
-    """Pictures of a source as they are, evenly spread over it."""
-    paths = sorted(p for p in (source / "images").glob("*") if p.suffix.lower() in {".jpg", ".jpeg", ".png"})
+def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Bytes]:
+    """Pictures of a source as they are, evenly spread over it. only: paths below the data folder; None: all."""
+    paths = sorted(
+        path
+        for path in (source / "images").glob("*")
+        if path.suffix.lower() in SUFFIXES and (only is None or _name(source, path) in only)
+    )
     read = (cv2.imread(str(path), cv2.IMREAD_COLOR) for path in spread(paths, at_most))
     return [np.asarray(picture, np.uint8) for picture in read if picture is not None]
 
 
-def scenes(source: Path, at_most: int) -> list[Scene]:
+def scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Scene]:
     """Pictures with masks of all three classes, evenly spread; none where the source has no such masks."""
     manifest = source / "manifest.json"
     try:
@@ -63,8 +68,9 @@ def scenes(source: Path, at_most: int) -> list[Scene]:
     if not folders:
         return []
     found = []
+    items = [item for item in items if only is None or f"{source.name}/{item.file}" in only]
     for item in spread(sorted(items, key=lambda i: i.file), at_most):
-        picture = cv2.imread(str(source / "images" / Path(item.file).name), cv2.IMREAD_COLOR)
+        picture = cv2.imread(str(source / item.file), cv2.IMREAD_COLOR)
         mask = cv2.imread(str(folders[0] / f"{Path(item.file).stem}.png"), cv2.IMREAD_GRAYSCALE)
         if picture is None or mask is None:
             continue
@@ -79,3 +85,7 @@ def spread(items: list[T], at_most: int) -> list[T]:
     if len(items) <= at_most:
         return items
     return [items[round(i * (len(items) - 1) / max(1, at_most - 1))] for i in range(at_most)]
+
+
+def _name(source: Path, path: Path) -> str:
+    return path.relative_to(source.parent).as_posix()

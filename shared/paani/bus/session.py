@@ -38,6 +38,9 @@ def shared_settings(config: BusConfig) -> dict[str, object]:
         "scouting/delay": 0,
         "transport/link/tx/lease": config.lease_ms,
         "transport/link/tx/keep_alive": 4,
+        # Each express message takes a whole batch: with Zenoh's 2, a busy machine lost up to 15 % of commands sent in
+        # pairs; with 16, its most, under 0.4 %.
+        "transport/link/tx/queue/size/real_time": 16,
         "transport/shared_memory/enabled": False,
     }
 

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 from paani.config import Config, decode_config
 from paani.errors import UserError
-from paani.logs.layout import Layout, Span, layout_of, messages_in, span_bytes
+from paani.logs.layout import Layout, Span, messages_in, span_bytes
+from paani.logs.locate import layout_of
 
 SUFFIX = ".mcap"
 CONFIG_FILE = "config.json"
@@ -68,10 +69,11 @@ class Log:
 
     def metadata(self, name: str) -> dict[str, str]:
         """The metadata records of that name; a later part wins where a key repeats. Empty where there is none."""
-        merged: dict[str, str] = {}
-        for part in self._parts:
-            merged |= part.metadata.get(name, {})
-        return merged
+        return {key: value for record in self.metadata_by_part(name) for key, value in record.items()}
+
+    def metadata_by_part(self, name: str) -> tuple[dict[str, str], ...]:
+        """The metadata record of that name in each part that has one."""
+        return tuple(part.metadata[name] for part in self._parts if name in part.metadata)
 
     def records(
         self, topics: Iterable[str] | None = None, start_us: int | None = None, end_us: int | None = None

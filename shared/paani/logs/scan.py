@@ -74,6 +74,18 @@ def unpacked(data: Data, chunk: Found) -> bytes:
     return inside
 
 
+def records_in(inside: bytes) -> Iterator[Found]:
+    """The whole records in an unpacked chunk."""
+    at = 0
+    while at + HEAD.size <= len(inside):
+        opcode, length = HEAD.unpack_from(inside, at)
+        end = at + HEAD.size + length
+        if end > len(inside):
+            return
+        yield Found(opcode, at, end)
+        at = end
+
+
 def stream_of(data: bytes) -> ReadDataStream:
     return ReadDataStream(io.BytesIO(data))
 
@@ -122,7 +134,7 @@ def _fault(data: Data, record: Found) -> str:
 
 def _resume(data: Data, at: int, damaged: Found) -> int:
     """Where reading can go on: after the damaged record, if its length is right, else at the next whole chunk."""
-    if at + HEAD.size < damaged.end < len(data) and damaged.opcode in OPCODES and not _record(data, damaged.end)[1]:
+    if at < damaged.end < len(data) and not _record(data, damaged.end)[1]:
         return damaged.end
     mark = at + MARK_AT + 1
     while (mark := data.find(ZSTD_MARK, mark)) >= 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -109,10 +109,8 @@ class LogWriter:
 
     def abandon(self) -> None:
         """Close without a summary; `repair` adds it later."""
-        try:
+        with contextlib.suppress(OSError):
             self._file.close()
-        except OSError:
-            os.close(self._file.detach().detach().fileno())
 
     def _add(self, channel: int, log_us: int, publish_us: int, sequence: int, data: bytes) -> None:
         self._writer.add_message(channel, log_us * 1000, data, publish_us * 1000, sequence)

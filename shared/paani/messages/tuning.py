@@ -10,14 +10,14 @@ import msgspec
 from paani.messages.advisor import Direction, Reason
 from paani.messages.header import Count, Message, Stamp, Text, Unit
 
-ProposalId = Annotated[str, msgspec.Meta(max_length=32)]
+ProposalId = Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9]{0,32}$")]
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True):
     """One setting: `advisor.policy.center_block_risk` and its value as text."""
 
-    path: Annotated[str, msgspec.Meta(max_length=80)]
-    value: Annotated[str, msgspec.Meta(max_length=40)]
+    path: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9_.]{1,80}$")]
+    value: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.+-]{1,40}$")]
 
 
 Changes = Annotated[tuple[Change, ...], msgspec.Meta(max_length=32)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import msgspec
@@ -14,7 +14,7 @@ from paani.decider import Decider
 from paani.logs.reader import Record
 from paani.replay.difference import Difference, first_difference
 from paani.replay.ledger import LATE_US
-from paani.replay.recompute import Again, Recompute
+from paani.replay.recompute import Again, Excuse, Recompute
 
 SHOWN = 20
 
@@ -34,7 +34,7 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
     messages: sent messages compared, `differing_messages` of them not byte for byte the same. states: recorded states
     compared with the ones computed up to there. before_start: steps that the log's beginning leaves without state or
     input, and outputs sent before the recorder was connected with their publisher; at_end: outputs that the log's end
-    cut off. Both are explained.
+    cut off; lost: steps without state or input, and outputs, that the recorder has counted as lost. All are explained.
     """
 
     service: str
@@ -48,6 +48,7 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
     differing_states: int = 0
     before_start: int = 0
     at_end: int = 0
+    lost: int = 0
     unexplained: tuple[Unexplained, ...] = ()
     differences: tuple[Difference, ...] = ()
     digest: str = ""
@@ -59,13 +60,20 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
 
 
 def check_service(
-    decider: Decider[Any], config: Config, records: Iterable[Record], end_us: int, on_again: OnAgain | None = None
+    decider: Decider[Any],
+    config: Config,
+    records: Iterable[Record],
+    end_us: int,
+    lost: Mapping[str, int],
+    on_again: OnAgain | None = None,
 ) -> ServiceCheck:
     """Compute every step of one service again and compare.
 
-    records: those of `Ledger(decider).topics`, to the log's end at `end_us`. digest: SHA-256 of all bytes computed.
+    records: those of `Ledger(decider).topics`, to the log's end at `end_us`. lost: messages of each topic that the
+    recorder has counted as lost. digest: SHA-256 of all bytes computed.
     """
-    recompute = Recompute(decider, config, evolve=False)
+    recompute = Recompute(decider, config, lost, evolve=False)
+    ledger = recompute.ledger
     result = ServiceCheck(service=decider.service)
     causes: collections.Counter[str] = collections.Counter()
     differences: list[Difference] = []
@@ -77,8 +85,10 @@ def check_service(
         if again.missing_before:
             causes["steps are not in the log"] += again.missing_before
         if again.skip is not None:
-            if again.excused:
+            if again.excuse is Excuse.START:
                 result.before_start += 1
+            elif again.excuse is Excuse.LOST:
+                result.lost += 1
             else:
                 causes[again.skip + (f" ({again.detail})" if again.detail else "")] += 1
             continue
@@ -88,10 +98,12 @@ def check_service(
         for sent, recorded, computed in again.outputs:
             digest.update(computed)
             if recorded is None:
-                if recompute.ledger.precedes(sent.topic, sent.epoch, sent.seq):
+                if ledger.precedes(sent.topic, sent.epoch, sent.seq):
                     result.before_start += 1
                 elif again.given.log_us + LATE_US >= end_us:
                     result.at_end += 1
+                elif recompute.is_lost(sent.topic):
+                    result.lost += 1
                 else:
                     causes[f"{sent.topic} it had sent is not in the log"] += 1
                 continue
@@ -104,9 +116,9 @@ def check_service(
                     differences.append(first_difference(again.given.step.source_us, sent, recorded, computed))
         result.decisions += bool(again.outputs) or differs
         result.differ += differs
-    for topic, _, _ in recompute.ledger.orphans:
+    for topic, _, _ in ledger.orphans:
         causes[f"{topic} belongs to no step in the log"] += 1
-    for topic, count in recompute.ledger.malformed.items():
+    for topic, count in ledger.malformed.items():
         causes[f"{topic} does not decode"] += count
     result.unexplained = tuple(Unexplained(cause=cause, count=count) for cause, count in causes.most_common(SHOWN))
     result.differences = tuple(differences)

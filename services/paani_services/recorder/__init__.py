@@ -1,0 +1,1 @@
+"""Recorder: everything on the bus, into files that survive a crash."""

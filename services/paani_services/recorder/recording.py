@@ -1,0 +1,153 @@
+"""Keeps one file open: fills it, flushes it, begins the next, stays within the disk. Time is passed in."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from paani import keys
+from paani import messages as m
+from paani.config import RecorderConfig
+from paani.logs.folder import free_path, recordings, too_old
+from paani.logs.writer import About, LogWriter
+from paani_services.recorder.backlog import Heard
+from paani_services.recorder.counts import Counts, for_file
+
+MIB = 2**20
+SYNC_S = 5.0  # a loss of power costs at most this
+LOOK_S = 1.0  # between looks at the disk
+AGAIN_S = 5.0  # between attempts to begin after a failure
+
+
+class Recording:
+    """`write` what was heard; `close` at the end. A disk that fails or fills up is a state, never an exception."""
+
+    def __init__(self, settings: RecorderConfig, about: About, topics: Sequence[keys.Topic[Any]]) -> None:
+        self._settings, self._about, self._topics = settings, about, topics
+        self._folder = Path(settings.folder)
+        self._log: LogWriter | None = None
+        self._part = 0
+        self._before: tuple[m.RecordedTopic, ...] = ()
+        self._unsaved: list[str] = []
+        self._flushed_us = self._synced_us = self._looked_us = self._failed_us = 0
+        self.counts = Counts()
+        self.since_us = 0
+        self.problem = ""
+        self.free_bytes = 0
+
+    @property
+    def path(self) -> Path | None:
+        """The file being written."""
+        return self._log.path if self._log is not None else None
+
+    @property
+    def size_bytes(self) -> int:
+        return self._log.size_bytes if self._log is not None else 0
+
+    def write(self, heard: Sequence[Heard], now_us: int) -> None:
+        """Write and do what is due. What cannot be written is counted as dropped."""
+        try:
+            self._keep_house(now_us)
+            if self._log is None:
+                self._drop(heard)
+                return
+            for message in heard:
+                self._log.write(message.topic, message.log_us, message.head, message.data, message.attachment)
+                self._unsaved.append(message.topic.name)
+            if now_us - self._flushed_us >= self._settings.flush_s * 1e6:
+                self._flush(now_us)
+        except OSError as error:
+            self._fail(f"{self._folder}: {error.strerror}", now_us)
+
+    def close(self, heard: Sequence[Heard], now_us: int) -> None:
+        """Write the last of it and finish the file."""
+        self.write(heard, now_us)
+        self._end_part(now_us)
+
+    def _keep_house(self, now_us: int) -> None:
+        settings = self._settings
+        if now_us - self._looked_us >= LOOK_S * 1e6 or self._log is None:
+            self._looked_us = now_us
+            self._look_at_disk(now_us)
+        if self._log is not None:
+            full = self._log.size_bytes >= settings.part_mib * MIB
+            if full or now_us - self._log.started_us >= settings.part_s * 1e6:
+                self._end_part(now_us)
+        if self._log is None and not self.problem:
+            self._begin_part(now_us)
+
+    def _look_at_disk(self, now_us: int) -> None:
+        """Delete what is too old; stop while too little is left, go on when there is room again."""
+        found = recordings(self._folder)
+        kept = sum(recording.size_bytes for recording in found if recording.kept)
+        others = [recording for recording in found if recording.path != self.path]
+        for path in too_old(others, self._settings.budget_mib * MIB - self.size_bytes):
+            path.unlink(missing_ok=True)
+        self.free_bytes = shutil.disk_usage(self._folder).free
+        problem = ""
+        if self.free_bytes < self._settings.min_free_mib * MIB:
+            problem = f"{self.free_bytes // MIB} MiB left on the disk (recorder.min_free_mib)"
+        elif kept + self.size_bytes > self._settings.budget_mib * MIB:
+            problem = f"recordings to be kept fill {kept // MIB} MiB (recorder.budget_mib)"
+        if problem and self._log is not None:
+            self._end_part(now_us)
+        if problem or now_us - self._failed_us >= AGAIN_S * 1e6:
+            self.problem = problem
+
+    def _begin_part(self, now_us: int) -> None:
+        self._part += 1
+        path = free_path(self._folder, now_us, self._part)
+        about = About(
+            version=self._about.version,
+            attachments=self._about.attachments,
+            facts={**self._about.facts, "part": str(self._part)},
+        )
+        self._log = LogWriter(path, about, self._topics, now_us)
+        self.since_us = self.since_us or now_us
+        self._before = self.counts.topics()
+        self._flushed_us = self._synced_us = now_us
+
+    def _flush(self, now_us: int) -> None:
+        assert self._log is not None
+        self._log.flush()
+        self.counts.written(self._unsaved)
+        self._unsaved.clear()
+        self._flushed_us = now_us
+        if now_us - self._synced_us >= SYNC_S * 1e6:
+            self._log.sync()
+            self._synced_us = now_us
+
+    def _end_part(self, now_us: int) -> None:
+        if self._log is None:
+            return
+        try:
+            self._flush(now_us)
+            self._log.finish(for_file(self.counts.topics(), self._before))
+            self._log = None
+        except OSError as error:
+            self._fail(f"{self._log.path}: {error.strerror}", now_us)
+
+    def _fail(self, problem: str, now_us: int) -> None:
+        """Give the file up as it is; a later start repairs it."""
+        self.problem, self._failed_us = problem, now_us
+        if self._log is not None:
+            self._log.abandon()
+            self._log = None
+        for name in self._unsaved:
+            self.counts.dropped(name)
+        self._unsaved.clear()
+
+    def _drop(self, heard: Sequence[Heard]) -> None:
+        for message in heard:
+            self.counts.dropped(message.topic.name)
+
+
+def remove_empty(folder: Path) -> None:
+    """Files of a recorder that died before its first byte hold nothing."""
+    for recording in recordings(folder):
+        if recording.size_bytes == 0:
+            with contextlib.suppress(OSError):
+                recording.path.unlink()
