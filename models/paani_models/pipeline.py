@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import cv2
 import msgspec
 import numpy as np
 import torch
-from tqdm import tqdm
 
 from paani.errors import UserError
 from paani_models import detector_data, evaluate, export, train_detector, train_gate, train_segmenter
@@ -23,13 +21,10 @@ from paani_models.network_input import SIZE_WH, detector_input, gate_input, segm
 from paani_models.pseudo_labels import pseudo_labelled
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
-    DETECTOR_CLASSES,
     RENDERED,
     Sample,
     Source,
     choose,
-    read_boxes,
-    read_pair,
     read_picture,
     read_samples,
 )
@@ -96,23 +91,6 @@ class Plan:
     stages: tuple[str, ...] = ()
     epochs: int | None = None
     peak_rate: float | None = None
-
-
-def prepare(pictures: Pictures) -> None:
-    """Decode every file, validate every box (checklist R8), and print the counts per source and side."""
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    for sample in tqdm(pictures.samples, "reading", unit="picture", mininterval=2.0):
-        row = counts.setdefault((sample.source.name, "held out" if sample.held_out else "train"), Counter())
-        row["pictures"] += 1
-        if sample.mask:
-            read_pair(sample)
-            row["masks"] += 1
-        else:
-            read_picture(sample.picture)
-        if sample.label:
-            row.update(DETECTOR_CLASSES[int(kind)] for kind in read_boxes(sample.label)[:, 0])
-    for (name, side), row in counts.items():
-        sys.stdout.write(f"{name} ({side}): {', '.join(f'{count} {what}' for what, count in row.items())}\n")
 
 
 def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -37,7 +37,8 @@ class Source:
     annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
     drawn: boxes are in ANNOTATIONS, and its sequences go past several places, so ten frame numbers count as one.
-    held_out: sequences for validation; empty means one in eight by name.
+    held_out: sequences for validation; empty means one in eight by name. splits: of a prepared public set, which name
+    their split in the manifest, the splits that are read; all but "train" are held out.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Source:
     own_hull: bool = False
     drawn: bool = False
     held_out: tuple[str, ...] = ()
+    splits: tuple[str, ...] = ()
 
 
 NO_CRAFT = frozenset({"vessel", "buoy"})
@@ -118,6 +120,15 @@ SOURCES = (
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )
 
+_BOXED = Source("waterscenes", "waterscenes", labels="labels", annotated=frozenset(DETECTOR_CLASSES))
+
+# Written by `paani models prepare`, and read only where they are named.
+PREPARED_SOURCES = (
+    replace(_BOXED, splits=("train", "val")),
+    replace(_BOXED, name="waterscenes_test", splits=("test",)),
+    Source("mastr1325_official", "mastr1325_official", masks="masks", splits=("train", "val")),
+)
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -134,6 +145,7 @@ class Sample:
 class _Item(msgspec.Struct):
     file: str
     seq: str = ""
+    split: str = ""
 
 
 class _Manifest(msgspec.Struct):
@@ -146,8 +158,8 @@ def class_mask(coded: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def choose(names: Sequence[str]) -> tuple[Source, ...]:
-    """The sources of the given names; all where none is given. Raises UserError for a name that does not exist."""
-    known = {source.name: source for source in SOURCES}
+    """The sources of the given names; SOURCES where none is given. Raises UserError for a name that does not exist."""
+    known = {source.name: source for source in (*SOURCES, *PREPARED_SOURCES)}
     for name in names:
         if name not in known:
             raise UserError(f"sources: {name!r} is not one of {', '.join(known)}")
@@ -183,7 +195,7 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
     seen: set[str] = set()
     samples = []
     for index, item in enumerate(items):
-        if item.file in seen:
+        if item.file in seen or (source.splits and item.split not in source.splits):
             continue
         seen.add(item.file)
         stem = Path(item.file).stem
@@ -196,7 +208,8 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
             if mask is None:
                 continue
             label = None
-        samples.append(Sample(source, sequence, is_held_out(source, sequence), folder / item.file, mask, label))
+        held_out = item.split != "train" if source.splits else is_held_out(source, sequence)
+        samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label))
     return samples
 
 
@@ -222,7 +235,8 @@ def read_boxes(label: Path) -> NDArray[np.float32]:
             raise UserError(f"{label}:{number}: {error}") from error
         x1, y1 = max(0.0, cx - width / 2), max(0.0, cy - height / 2)
         x2, y2 = min(1.0, cx + width / 2), min(1.0, cy + height / 2)
-        if kind not in range(len(DETECTOR_CLASSES)) or not (x1 < x2 and y1 < y2):
+        known = kind in range(len(DETECTOR_CLASSES)) and np.isfinite((cx, cy, width, height)).all()
+        if not known or not (x1 < x2 and y1 < y2):
             raise UserError(f"{label}:{number}: not a class id and a box inside the picture")
         rows.append((kind, x1, y1, x2, y2))
     return np.array(rows, np.float32).reshape(-1, 5)

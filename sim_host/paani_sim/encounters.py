@@ -71,7 +71,7 @@ class Course(NamedTuple):
 class Look(NamedTuple):
     """One frame: when, how the boat lay, the true range and size, and what the detector says (None: nothing).
 
-    `whole`: the thing is in the picture with all its edges.
+    `whole`: all of the thing is to be seen.
     """
 
     at_s: float
@@ -176,7 +176,7 @@ def _look(given: Course, at_s: float, camera: Camera, jitter: F64, rng: np.rando
     if truth is not None and size_px >= MIN_SIZE_PX and not (hidden or missed) and confidence > 0.4:
         box = _detected(truth, size_px, given.thing, camera, jitter, rng)
     range_m = range_at(given, at_s)
-    return Look(at_s, pose, yaw_rate, range_m, size_px, whole, truth, box, min(confidence, 0.99))
+    return Look(at_s, pose, yaw_rate, range_m, size_px, whole and not hidden, truth, box, min(confidence, 0.99))
 
 
 def _true_box(given: Course, at_s: float, pose: BoatPose, camera: Camera) -> tuple[BoxXyxy | None, bool]:

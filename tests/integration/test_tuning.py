@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import sys
 from collections.abc import AsyncIterator
 from typing import Any
@@ -196,6 +197,6 @@ async def test_tuned_advice_is_computed_again_from_the_ledger(open_as: OpenAs, s
             assert msgspec.json.encode(again) == msgspec.json.encode(recorded)
             if isinstance(recorded, m.Advisory):
                 directions.append(recorded.direction)
-    changed = [a for a, b in zip(directions, directions[1:], strict=False) if a is not b]
+    changed = [a for a, b in itertools.pairwise(directions) if a is not b]
     assert changed[-2:] == [m.Direction.STRAIGHT, m.Direction.LEFT]
     assert directions[-1] is m.Direction.STRAIGHT

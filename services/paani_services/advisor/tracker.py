@@ -56,6 +56,7 @@ class TrackMemory(msgspec.Struct, frozen=True):
 
     `box` is the last one seen there, `display_*` are smoothed (G6, G7), `hits` counts sightings there. `identity` may
     have come from another place when the boat turned, and then has sightings of its own. `seen_from`: how the boat lay.
+    `left`: what was here has been seen elsewhere since, so that nobody is expected from here.
     """
 
     identity: Identity
@@ -68,6 +69,7 @@ class TrackMemory(msgspec.Struct, frozen=True):
     urgency: float
     held: bool = False
     seen_from: Attitude | None = None
+    left: bool = False
 
     @property
     def id(self) -> int:
@@ -137,9 +139,15 @@ def update(state: TrackerState, evidence: Evidence, config: Config) -> TrackerSt
                 _seen_again(track, sound[d], _identity(d, sound[d], state.tracks, kin, new_ids, frame), frame)
             )
         else:
-            identity = Identity(next(new_ids), frame.at_us) if t in continued else track.identity
+            left = t in continued
             tracks.append(
-                msgspec.structs.replace(track, identity=identity, held=True, seen_us=min(track.seen_us, frame.at_us))
+                msgspec.structs.replace(
+                    track,
+                    identity=Identity(next(new_ids), frame.at_us) if left else track.identity,
+                    held=True,
+                    seen_us=min(track.seen_us, frame.at_us),
+                    left=track.left or left,
+                )
             )
     tracks += [
         _first_seen(detection, _identity(d, detection, state.tracks, kin, new_ids, frame), frame)
@@ -177,7 +185,7 @@ def _joined(tracks: tuple[TrackMemory, ...], sound: list[Detection], frame: _Fra
     seen = associate(places, boxes, min_iou)
     if frame.view.attitude is None:
         return seen, seen
-    expected = [turned(track.box, track.seen_from, frame.view) for track in tracks]
+    expected = [None if track.left else turned(track.box, track.seen_from, frame.view) for track in tracks]
     if expected == places:
         return seen, seen
     return seen, kinship(seen, associate(expected, boxes, min_iou))

@@ -44,8 +44,7 @@ class Counts:
                 before = tally.seq if head.epoch == tally.epoch else -1
                 if head.epoch >= tally.epoch and head.seq > before + 1:
                     tally.missing += head.seq - before - 1
-            if (head.epoch, head.seq) > (tally.epoch, tally.seq):
-                tally.epoch, tally.seq = head.epoch, head.seq
+            tally.epoch, tally.seq = max((tally.epoch, tally.seq), (head.epoch, head.seq))
 
     def dropped(self, topic: str, n: int = 1) -> None:
         with self._lock:

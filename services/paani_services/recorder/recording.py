@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import shutil
 from collections.abc import Sequence
@@ -49,18 +50,20 @@ class Recording:
 
     def write(self, heard: Sequence[Heard], now_us: int) -> None:
         """Write and do what is due. What cannot be written is counted as dropped."""
+        left = collections.deque(heard)
         try:
             self._keep_house(now_us)
-            if self._log is None:
-                self._drop(heard)
-                return
-            for message in heard:
-                self._log.write(message.topic, message.log_us, message.head, message.data, message.attachment)
-                self._unsaved.append(message.topic.name)
-            if now_us - self._flushed_us >= self._settings.flush_s * 1e6:
+            while left and self._log is not None:
+                topic = left[0].topic
+                self._log.write(topic, left[0].log_us, left[0].head, left[0].data, left[0].attachment)
+                self._unsaved.append(topic.name)
+                left.popleft()
+            if self._log is not None and now_us - self._flushed_us >= self._settings.flush_s * 1e6:
                 self._flush(now_us)
         except OSError as error:
             self._fail(f"{self._folder}: {error.strerror}", now_us)
+        for message in left:
+            self.counts.dropped(message.topic.name)
 
     def close(self, heard: Sequence[Heard], now_us: int) -> None:
         """Write the last of it and finish the file."""
@@ -139,10 +142,6 @@ class Recording:
         for name in self._unsaved:
             self.counts.dropped(name)
         self._unsaved.clear()
-
-    def _drop(self, heard: Sequence[Heard]) -> None:
-        for message in heard:
-            self.counts.dropped(message.topic.name)
 
 
 def remove_empty(folder: Path) -> None:

@@ -64,6 +64,18 @@ class Bus:
         """Subscribe with a function that Zenoh's thread calls; it must return at once."""
         self._subscribe(topic, callback)
 
+    def on_raw(self, topic: keys.Topic[Any], callback: Callable[[bytes, bytes], None]) -> None:
+        """Subscribe to payloads and attachments as they are, unjudged: for recording what was on the bus.
+
+        Zenoh's thread calls the function; it must return at once.
+        """
+
+        def receive(sample: zenoh.Sample) -> None:
+            attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
+            callback(sample.payload.to_bytes(), attachment)
+
+        self._declare_subscriber(topic, receive)
+
     def latest_picture(self, topic: keys.Topic[m.PictureHeader]) -> Latest[Picture]:
         """Subscribe to pictures pushed on this machine."""
         inbox: Latest[Picture] = Latest(self._clock)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from paani.errors import UserError
 
-NAME = re.compile(r"\d{8}T\d{6}Z-\d+\.mcap")
+NAME = re.compile(r"\d{8}T\d{6}Z-\d+\.mcap(\.damaged)?")  # with what a repair has set aside
 KEEP = ".keep"
 
 
@@ -33,7 +33,7 @@ def free_path(folder: Path, now_us: int, part: int) -> Path:
 def recordings(folder: Path) -> list[Recording]:
     """Every recording of the folder by name, which is by age."""
     found = []
-    for path in sorted(folder.glob("*.mcap"), key=_age):
+    for path in sorted(folder.glob("*.mcap*"), key=_age):
         if NAME.fullmatch(path.name) and path.is_file():
             found.append(Recording(path, path.stat().st_size, path.with_name(path.name + KEEP).exists()))
     return found
@@ -65,5 +65,5 @@ def require_folder(folder: Path) -> None:
 
 
 def _age(path: Path) -> tuple[str, int]:
-    moment, _, part = path.stem.rpartition("-")
+    moment, _, part = path.name.partition(".")[0].rpartition("-")
     return moment, int(part) if part.isdecimal() else 0

@@ -63,7 +63,7 @@ def messages_in(data: bytes, wanted: Container[int]) -> Iterator[tuple[int, int,
 
 
 def span_bytes(path: Path, span: Span) -> tuple[bytes, str]:
-    """The records of a span, unpacked, or none of them and what is wrong: a chunk that fails its checksum is not used."""
+    """The records of a span, unpacked; or nothing, and what is wrong: a chunk that fails its checksum is not used."""
     try:
         with path.open("rb") as file:
             file.seek(span.offset)

@@ -36,17 +36,18 @@ def layout_of(path: Path) -> Layout:
 
 
 def _layout(path: Path, data: mmap.mmap) -> Layout:
-    if data[: len(MAGIC)] != MAGIC:
-        raise UserError(f"{path}: not an MCAP file")
     layout = Layout(path)
+    begins_right = data[: len(MAGIC)] == MAGIC
     try:
-        if _read_summary(layout, data):
+        if begins_right and _read_summary(layout, data):
             return layout
     except DAMAGE as error:
         layout.problems.append(f"summary is damaged ({line_of(error)})")
     problems = layout.problems or ["unfinished (`paani logs repair` mends it)"]
     layout = Layout(path, problems=problems)
     _read_data(layout, data)
+    if not begins_right and not layout.spans:
+        raise UserError(f"{path}: not an MCAP file")
     return layout
 
 

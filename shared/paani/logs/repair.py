@@ -288,7 +288,7 @@ def definitions(data: Data, pieces: list[Found]) -> tuple[dict[int, Schema], dic
         if piece.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             learn(piece.opcode, content(data, piece))
     for number in used - channels.keys():
-        channels[number] = Channel(number, "", {}, 0, f"unknown/{number}")
+        channels[number] = Channel(id=number, topic=f"unknown/{number}", message_encoding="", metadata={}, schema_id=0)
     for channel in channels.values():
         if channel.schema_id not in schemas:
             channel.schema_id = 0
@@ -320,7 +320,7 @@ def _keep(path: Path, original: Path) -> None:
         path.rename(original)
 
 
-def repair_all(folder: Path, but: Path, told_to_stop: Callable[[], bool]) -> list[str]:
+def repair_all(folder: Path, but: Path | None, told_to_stop: Callable[[], bool]) -> list[str]:
     """Repair every unfinished recording of the folder but one; a line for each that was mended or cannot be."""
     told = []
     for path in sorted(folder.glob("*.mcap")):

@@ -11,7 +11,6 @@ from paani.clock import stopwatch_ms
 from paani.config import Config
 from paani.decider import deciders
 from paani.logs.reader import Log
-from paani.messages import Step
 from paani.replay.check import ServiceCheck, check_service
 from paani.replay.ledger import Ledger
 from paani.replay.progress import Progress
@@ -82,8 +81,14 @@ def services_in(log: Log) -> list[str]:
 
 
 def losses(log: Log) -> dict[str, int]:
-    """Messages of each topic that the recorder has counted as dropped or missing."""
+    """Messages of each topic that the recorder has counted as dropped or missing, in all parts together."""
     lost: dict[str, int] = {}
+    for counts in log.metadata_by_part("recorder"):
+        for topic, text in counts.items():
+            for word in text.split():
+                name, _, number = word.partition("=")
+                if name in {"dropped", "missing"} and number.isdecimal():
+                    lost[topic] = lost.get(topic, 0) + int(number)
     return lost
 
 
