@@ -105,7 +105,9 @@ class PicturePublisher(Publisher[m.PictureHeader]):
     def is_watched(self) -> bool:
         """Does anyone subscribe, or has anyone pulled lately? What nobody watches need not be drawn."""
         asked = self._asked_us is not None and self._clock.now_us() - self._asked_us < WATCHED_US
-        return asked or (self._push and bool(self._publisher.matching_status.matching))
+        return asked or (
+            self._push and bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]  # zenoh's stubs
+        )
 
     def _on_query(self, query: zenoh.Query) -> None:
         self._asked_us = self._clock.now_us()

@@ -6,7 +6,8 @@ Memory is bounded: messages are kept for a minute, and what a step had heard for
 from __future__ import annotations
 
 import collections
-from collections.abc import Iterable, Iterator
+import types
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
@@ -20,6 +21,7 @@ KEEP_US = 60_000_000
 LATE_US = 3_000_000  # messages of one moment reach the recorder in any order within this
 
 Name = tuple[str, int, int]  # topic, epoch, seq
+NOTHING: Mapping[Name, bytes] = types.MappingProxyType({})
 
 
 class Given(NamedTuple):
@@ -54,11 +56,13 @@ class _Held:
 class Ledger:
     """`steps` goes once through the records of `topics`; the other attributes are complete after it.
 
+    instead: payloads to give to steps in place of the recorded ones.
     orphans: outputs that no step names, between the first and the last that one does.
     malformed: messages without a readable header, by topic.
     """
 
-    def __init__(self, decider: Decider[Any]) -> None:
+    def __init__(self, decider: Decider[Any], instead: Mapping[Name, bytes] = NOTHING) -> None:
+        self._instead = instead
         self.step_topic = keys.STEPS[decider.service].name
         heard = (*decider.inputs, *decider.own)
         self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in heard}
@@ -134,11 +138,12 @@ class Ledger:
         last = self._newest_heard.get(heard.topic)
         if last is not None and last[:2] == (heard.epoch, heard.seq):
             return last[2], ""
-        held = self._messages.get((heard.topic, heard.epoch, heard.seq))
+        name = heard.topic, heard.epoch, heard.seq
+        held = self._messages.get(name)
         if held is None:
             return None, f"{heard.topic} it had heard is not in the log"
         try:
-            message = self._decoders[heard.topic].decode(held.data)
+            message = self._decoders[heard.topic].decode(self._instead.get(name, held.data))
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             return None, f"{heard.topic} it had heard does not decode: {error}"
         self._newest_heard[heard.topic] = heard.epoch, heard.seq, message

@@ -12,7 +12,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
-from paani.replay.ledger import Given, Ledger
+from paani.replay.ledger import NOTHING, Given, Ledger, Name
 
 
 class Skip(StrEnum):
@@ -51,11 +51,19 @@ class Again(NamedTuple):
 class Recompute:
     """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts.
 
-    lost: messages of each topic that the recorder has counted as lost.
+    lost: messages of each topic that the recorder has counted as lost. instead: as for `Ledger`.
     """
 
-    def __init__(self, decider: Decider[Any], config: Config, lost: Mapping[str, int], *, evolve: bool) -> None:
-        self.ledger = Ledger(decider)
+    def __init__(
+        self,
+        decider: Decider[Any],
+        config: Config,
+        lost: Mapping[str, int],
+        *,
+        evolve: bool,
+        instead: Mapping[Name, bytes] = NOTHING,
+    ) -> None:
+        self.ledger = Ledger(decider, instead)
         self._decider, self._config, self._evolve = decider, config, evolve
         self._producers = {topic.name: topic.producer for topic in decider.outputs}
         self._encoder = msgspec.json.Encoder()

@@ -13,6 +13,7 @@ from paani.decider import Decider
 from paani.logs.reader import Record
 from paani.replay.check import OnAgain
 from paani.replay.difference import differing_fields
+from paani.replay.ledger import Name
 from paani.replay.recompute import Recompute
 from paani.replay.words import why, words
 
@@ -51,15 +52,19 @@ def changes_of(
     records: Iterable[Record],
     start_us: int,
     lost: Mapping[str, int],
+    instead: dict[Name, bytes],
     on_again: OnAgain | None = None,
 ) -> ServiceChanges:
-    """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one known."""
+    """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one known.
+
+    instead: inputs given in place of the recorded ones; what is sent and differs is added to it.
+    """
     decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in decider.outputs}
     open_episodes: dict[str, Episode] = {}
     episodes: list[Episode] = []
     fields: collections.Counter[str] = collections.Counter()
     messages = changed = numbers = skipped = 0
-    for again in Recompute(decider, config, lost, evolve=True).steps(records):
+    for again in Recompute(decider, config, lost, evolve=True, instead=instead).steps(records):
         if on_again is not None:
             on_again(again)
         skipped += again.skip is not None
@@ -70,6 +75,7 @@ def changes_of(
             messages += 1
             if recorded == computed:
                 continue
+            instead[sent.topic, sent.epoch, sent.seq] = computed
             try:
                 before, now = decoders[sent.topic].decode(recorded), decoders[sent.topic].decode(computed)
             except msgspec.MsgspecError:

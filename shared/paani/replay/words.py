@@ -1,4 +1,4 @@
-"""A decision in words: what it says, and why. Numbers are left out, so that words change only when the decision does."""
+"""A decision in words: what it says, and why. Numbers are left out: words change only when the decision does."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ def words(message: m.Message) -> str:
     """What is decided; empty for a message that only carries numbers."""
     match message:
         case m.Advisory():
-            return f"{message.direction} ({message.reason})"
-        case m.NavCommand(enable=True):
-            return f"go {message.direction}"
+            return message.direction.value
         case m.NavCommand():
-            return f"hold ({', '.join(message.inhibits)})"
-        case m.Thrust(enabled=True):
-            return "thrust"
+            return f"go {message.direction}" if message.enable else "hold"
         case m.Thrust():
-            return f"no thrust ({', '.join(message.inhibits)})"
+            return "thrust" if message.enabled else "no thrust"
         case m.Tracks():
             return ", ".join(f"{track.label} #{track.id}" for track in message.tracks if track.accepted) or "no track"
     return ""
 
 
 def why(message: m.Message) -> str:
-    """The reason in a sentence, where the message has one."""
-    return message.explanation if isinstance(message, m.Advisory) else ""
+    """The reason in words, where the message has one."""
+    match message:
+        case m.Advisory():
+            return f"{message.reason}: {message.explanation}"
+        case m.NavCommand(enable=False) | m.Thrust(enabled=False):
+            return ", ".join(message.inhibits)
+    return ""
