@@ -12,6 +12,7 @@ from pathlib import Path
 
 from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+from paani_models.data.command import add_pack_arguments, add_prepare_arguments, make_bundle, prepare, rendered_folder
 
 DATA_VARIABLE = "PAANI_DATA"
 NETS = ("segmenter", "detector")
@@ -30,6 +31,10 @@ def main(argv: list[str]) -> int:
     try:
         if arguments.command == "check":
             return _check(arguments.weights)
+        if arguments.command == "prepare":
+            return prepare(arguments)
+        if arguments.command == "pack":
+            return make_bundle(arguments)
         return _needs_torch(arguments)
     except UserError as error:
         sys.stderr.write(f"paani models: {error}\n")
@@ -46,7 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="compare the model files with their manifest")
     check.add_argument("--weights", type=Path, default=WEIGHTS)
 
-    prepare = commands.add_parser("prepare", help="read every picture, mask and box once and count them")
+    check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
+    add_prepare_arguments(check_data)
+    pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
+    add_pack_arguments(pack)
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
     train.add_argument("net", choices=TRAINED)
     train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
@@ -65,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--record", action="store_true", help="write the figures into the manifest")
     for command in (export, evaluate):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-    for command in (prepare, train, export, evaluate):
+    for command in (check_data, pack, train, export, evaluate):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
@@ -85,10 +93,8 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
     names = [name for name in arguments.sources.split(",") if name]
-    pictures = pipeline.Pictures(arguments.data, names, arguments.rendered)
-    if arguments.command == "prepare":
-        pipeline.prepare(pictures)
-    elif arguments.command == "train":
+    pictures = pipeline.Pictures(arguments.data, names, rendered_folder(arguments.data, arguments.rendered))
+    if arguments.command == "train":
         plan = pipeline.Plan(
             folder=arguments.folder,
             start=arguments.start,

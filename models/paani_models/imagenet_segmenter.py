@@ -118,7 +118,7 @@ class ImageNetSegmenter(nn.Module):
 
     def taps(self, x: Tensor) -> list[Tensor]:
         """Encoder outputs at strides 4, 8, 16, 32 of the encoder's own size (TAP_CHANNELS)."""
-        height, width = x.shape[2:]
+        height, width = _size(x)
         size = (int(height * ENCODER_SCALE), int(width * ENCODER_SCALE))
         x = F.interpolate(x, size=size, mode="bilinear", align_corners=False)
         x = self.stem(x * cast(Tensor, self.scale) + cast(Tensor, self.shift))
@@ -134,9 +134,9 @@ class ImageNetSegmenter(nn.Module):
         *shallow, deepest = taps
         y = self.project(deepest) + F.relu(self.scene(deepest.mean((2, 3), keepdim=True)))
         for lateral, refine, tap in zip(self.laterals, self.refines, reversed(shallow), strict=True):
-            y = refine(F.interpolate(y, size=tap.shape[2:], mode="nearest") + lateral(tap))
+            y = refine(F.interpolate(y, size=_size(tap), mode="nearest") + lateral(tap))
         detail = self.detail(x)
-        y = self.finish(F.interpolate(y, size=detail.shape[2:], mode="bilinear", align_corners=False) + detail)
+        y = self.finish(F.interpolate(y, size=_size(detail), mode="bilinear", align_corners=False) + detail)
         return F.interpolate(self.head(y), scale_factor=4.0, mode="nearest")
 
     def forward(self, x: Tensor) -> Tensor:
@@ -145,6 +145,11 @@ class ImageNetSegmenter(nn.Module):
     def encoder(self) -> nn.ModuleList:
         """The part that `load_imagenet` fills."""
         return nn.ModuleList([self.stem, self.stages])
+
+
+def _size(x: Tensor) -> tuple[int, int]:
+    """Height and width as plain numbers, so that the exported graph is static."""
+    return int(x.shape[2]), int(x.shape[3])
 
 
 def load_imagenet(model: ImageNetSegmenter, path: Path) -> None:

@@ -25,6 +25,7 @@ MISS_FRAC = (0.30, 0.06, 0.015, 0.003)  # of frames: below small, middle and lar
 REFLECTION_FRAC = 0.01  # of frames: the box takes in the mirror image below
 REFLECTING_FRAC, REFLECTING_THINGS = 0.20, 0.15  # and of some things' frames
 MIN_SIZE_PX = 6.0
+SPARE_FRAC = 0.02  # between the edges of picture and thing: no jitter makes it look cut
 DROPPED_FRAC = 0.02  # of frames that never come
 PERIOD_JITTER_FRAC = 0.05
 
@@ -196,7 +197,7 @@ def _true_box(given: Course, at_s: float, pose: BoatPose, camera: Camera) -> tup
         return None, False
     x1, y1 = pixels.min(axis=0) / (camera.width_px, camera.height_px)
     x2, y2 = pixels.max(axis=0) / (camera.width_px, camera.height_px)
-    whole = bool(x1 > 0.01 and y1 > 0.01 and x2 < 0.99 and y2 < 0.99)
+    whole = bool(min(x1, y1) > SPARE_FRAC and max(x2, y2) < 1.0 - SPARE_FRAC)
     cut = (max(x1, 0.0), max(y1, 0.0), min(x2, 1.0), min(y2, 1.0))
     if cut[2] - cut[0] < 1e-3 or cut[3] - cut[1] < 1e-3:
         return None, False

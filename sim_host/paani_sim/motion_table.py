@@ -76,10 +76,10 @@ def motion_table(
     for profile in profiles:
         config = load_config(profile="paper" if profile == "paper" else "paani", sets=SETTINGS[profile])
         for rate_hz in rates_hz:
-            for index, family in enumerate(families):
+            for family in families:
                 tally = _Tally()
                 for number in range(n):
-                    rng = np.random.default_rng([seed, index, number])
+                    rng = np.random.default_rng([seed, list(Family).index(family), number])
                     _encounter(advisor, config, course(family, rng), rate_hz, rng, tally)
                 rows.append(_row(profile, rate_hz, family, tally))
     return rows

@@ -85,7 +85,7 @@ def test_an_unknown_model_is_named() -> None:
 
 def test_check_command_needs_no_torch(capsys: pytest.CaptureFixture[str], copied: Path) -> None:
     assert main(["check", "--weights", str(copied)]) == 0
-    assert "1082467 parameters, ok" in capsys.readouterr().out
+    assert "1362395 parameters, ok" in capsys.readouterr().out
     (copied / "detector.onnx").write_bytes(b"not a net")
     assert main(["check", "--weights", str(copied)]) == 2
     captured = capsys.readouterr()

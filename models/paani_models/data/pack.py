@@ -6,6 +6,7 @@ packed from. The same input gives the same bytes.
 
 from __future__ import annotations
 
+import gzip
 import io
 import tarfile
 from collections.abc import Iterable, Sequence
@@ -23,14 +24,16 @@ from paani_models.data.checked_files import decode_picture, read_bytes
 from paani_models.data.inventory import FolderOf, terms_of
 from paani_models.data.manifest import MANIFEST
 from paani_models.network_input import SIZE_WH
-from paani_models.sources import RENDERED, Sample, Source
+from paani_models.sources import Sample, Source
 
 MEGABYTE = 1_000_000
-QUALITIES = (95, 92, 89, 86, 83, 80, 77, 74, 71, 68, 65, 62, 59, 56, 53, 50)  # below 50 blocks replace texture
+QUALITIES = tuple(range(95, 42, -3))  # below, blocks replace texture
 SAMPLED_EVERY = 8  # pictures encoded at each quality before the choice
 WEIGHTS_FOLDER = "_weights"
 START_FOLDER = "_start"
-_BLOCK = 512
+COMPRESSED = frozenset({".gz", ".tgz"})
+
+_PLAIN_ENTRY, _PACKED_ENTRY = 768, 100  # bytes that a file costs beside its own: header and padding
 
 
 class PackedItem(msgspec.Struct, frozen=True):
@@ -73,7 +76,7 @@ def pack(
     weights: Sequence[Path] = (),
     start: Sequence[Path] = (),
 ) -> Packed:
-    """Write `out`: the pictures of the samples with all of their masks and labels, their manifests, and the weights.
+    """Write `out`, a tar, gzipped where its name says so: pictures with all of their masks and labels, and weights.
 
     Pictures shrink, aspect kept, until they just cover the nets' input, and share the best JPEG quality that fits.
     Raises UserError, leaving nothing behind, for an unreadable file, and where even the lowest quality does not fit.
@@ -83,27 +86,27 @@ def pack(
     other = dict(_other_files(pictures, folders, samples))
     other |= {f"{WEIGHTS_FOLDER}/{path.name}": read_bytes(path) for path in weights}
     other |= {f"{START_FOLDER}/{path.name}": read_bytes(path) for path in start}
+    names = {
+        f"{source.folder}/{picture.relative_to(folders[source.folder])}": picture
+        for picture, source in sorted(pictures.items())
+    }
+    if not names:
+        raise UserError("sources: no picture to pack")
+    compress = out.suffix in COMPRESSED
     budget = int(max_mb * MEGABYTE)
-    fixed = sum(_padded(len(data)) for data in other.values()) + 20 * _BLOCK
-    shrunk: list[tuple[str, NDArray[np.uint8]]] = []
-    for picture, source in tqdm(sorted(pictures.items()), "shrinking", unit="picture", mininterval=2.0):
-        name = f"{source.folder}/{picture.relative_to(folders[source.folder])}"
-        shrunk.append((name, covering(decode_picture(read_bytes(picture), picture))))
-    if fixed + len(shrunk) * 2 * _BLOCK > budget:
+    fixed = len(_archive(other, compress)) + len(names) * (_PACKED_ENTRY if compress else _PLAIN_ENTRY)
+    if fixed >= budget:
         raise UserError(f"{out}: masks, labels and weights alone take {fixed / MEGABYTE:.1f} MB")
-    quality = _likely_quality(shrunk, budget - fixed)
-    while True:
-        encoded = {name: _jpeg(picture, quality) for name, picture in tqdm(shrunk, f"JPEG {quality}", unit="picture")}
-        if fixed + sum(_padded(len(data)) for data in encoded.values()) <= budget:
-            break
-        lower = [each for each in QUALITIES if each < quality]
-        if not lower:
-            raise UserError(f"{out}: {len(shrunk)} pictures do not fit into {max_mb:g} MB; choose fewer sources")
-        quality = lower[0]
-    for folder, root in folders.items():
-        other[f"{folder}/{MANIFEST}"] = _manifest(root, folder, samples, quality)
-    _write(out, {**other, **encoded})
-    return Packed(out.stat().st_size, len(encoded), quality)
+    first = _likely_quality(list(names.values()), budget - fixed)
+    for quality in (each for each in QUALITIES if each <= first):
+        bar = tqdm(names.items(), f"JPEG {quality}", unit="picture", mininterval=2.0)
+        encoded = {name: _jpeg(_shrunk(path), quality) for name, path in bar}
+        listed = {f"{folder}/{MANIFEST}": _manifest(root, folder, samples, quality) for folder, root in folders.items()}
+        archive = _archive({**other, **listed, **encoded}, compress)
+        if len(archive) <= budget:
+            _write(out, archive)
+            return Packed(len(archive), len(encoded), quality)
+    raise UserError(f"{out}: {len(names)} pictures do not fit into {max_mb:g} MB; choose fewer sources")
 
 
 def covering(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -120,16 +123,21 @@ def covering_wh(wh: tuple[int, int]) -> tuple[int, int]:
     return round(wh[0] * scale), round(wh[1] * scale)
 
 
+def _shrunk(path: Path) -> NDArray[np.uint8]:
+    return covering(decode_picture(read_bytes(path), path))
+
+
 def _jpeg(picture: NDArray[np.uint8], quality: int) -> bytes:
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    return bytes(cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes())
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1, cv2.IMWRITE_JPEG_PROGRESSIVE, 1]
+    return bytes(cv2.imencode(".jpg", bgr, options)[1].tobytes())
 
 
-def _likely_quality(shrunk: Sequence[tuple[str, NDArray[np.uint8]]], budget: int) -> int:
-    sampled = shrunk[::SAMPLED_EVERY]
+def _likely_quality(paths: Sequence[Path], budget: int) -> int:
+    sampled = [_shrunk(path) for path in paths[::SAMPLED_EVERY]]
     for quality in QUALITIES:
-        size = sum(_padded(len(_jpeg(picture, quality))) for _, picture in sampled)
-        if size * len(shrunk) <= budget * max(1, len(sampled)):
+        size = sum(len(_jpeg(picture, quality)) for picture in sampled)
+        if size * len(paths) <= budget * len(sampled):
             return quality
     return QUALITIES[-1]
 
@@ -138,7 +146,6 @@ def _other_files(
     pictures: dict[Path, Source], folders: dict[str, Path], samples: Sequence[Sample]
 ) -> Iterable[tuple[str, bytes]]:
     """Every mask, brought to its picture's size, and every label of the folders, the unused kinds included."""
-    sizes = {}
     stems: dict[str, set[str]] = {}
     for picture, source in pictures.items():
         stems.setdefault(source.folder, set()).add(picture.stem)
@@ -151,13 +158,13 @@ def _other_files(
             if path.suffix == ".txt":
                 yield name, path.read_bytes()
             else:
-                yield name, _small_mask(path, sizes)
+                yield name, _small_mask(path)
     missing = next((path for path in wanted if path and not path.is_file()), None)
     if missing is not None:
         raise UserError(f"{missing}: no such file")
 
 
-def _small_mask(path: Path, sizes: dict[Path, tuple[int, int]]) -> bytes:
+def _small_mask(path: Path) -> bytes:
     mask = cv2.imdecode(np.frombuffer(read_bytes(path), np.uint8), cv2.IMREAD_GRAYSCALE)
     if mask is None:
         raise UserError(f"{path}: not a readable mask")
@@ -179,32 +186,28 @@ def _manifest(root: Path, folder: str, samples: Sequence[Sample], quality: int) 
         repo=terms.repo,
         commit=terms.commit,
         licence=terms.licence,
-        provenance=f"pictures shrunk to cover {SIZE_WH[0]}x{SIZE_WH[1]}, JPEG quality {quality}; masks by nearest pixel",
+        provenance=f"shrunk to cover {SIZE_WH[0]}x{SIZE_WH[1]}, JPEG quality {quality}; masks by nearest pixel",
         items=listed,
     )
     return msgspec.json.encode(packed)
 
 
-def _padded(size: int) -> int:
-    return _BLOCK + -(-size // _BLOCK) * _BLOCK
+def _archive(files: dict[str, bytes], compress: bool) -> bytes:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as bundle:
+        for name, data in sorted(files.items()):
+            entry = tarfile.TarInfo(name)
+            entry.size, entry.mode, entry.mtime = len(data), 0o644, 0
+            bundle.addfile(entry, io.BytesIO(data))
+    return gzip.compress(buffer.getvalue(), 6, mtime=0) if compress else buffer.getvalue()
 
 
-def _write(out: Path, files: dict[str, bytes]) -> None:
+def _write(out: Path, archive: bytes) -> None:
     beside = out.with_name(out.name + ".partial")
     try:
-        with tarfile.open(beside, "w", format=tarfile.USTAR_FORMAT) as bundle:
-            for name, data in sorted(files.items()):
-                entry = tarfile.TarInfo(name)
-                entry.size, entry.mode, entry.mtime = len(data), 0o644, 0
-                bundle.addfile(entry, io.BytesIO(data))
+        beside.write_bytes(archive)
         beside.replace(out)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{out}: {error}") from error
+    except OSError as error:
+        raise UserError(f"{out}: {error.strerror}") from error
     finally:
         beside.unlink(missing_ok=True)
-
-
-def rendered_folder(unpacked: Path) -> Path | None:
-    """Where rendered pictures lie in an unpacked bundle, if any were packed."""
-    folder = unpacked / RENDERED
-    return folder if folder.is_dir() else None

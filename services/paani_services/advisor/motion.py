@@ -26,10 +26,14 @@ class Sample(msgspec.Struct, frozen=True):
 
 
 class MotionHistory(msgspec.Struct, frozen=True):
-    """Samples since the last reset, oldest first, and what caused that reset while too few have come since."""
+    """Samples since the last reset, oldest first, and what caused that reset while too few have come since.
+
+    `odd`: the latest sightings of another shape, not yet enough of them to begin again.
+    """
 
     samples: tuple[Sample, ...] = ()
     reset: MotionCause = MotionCause.NONE
+    odd: tuple[Sample, ...] = ()
 
 
 class Sighting(NamedTuple):
@@ -89,8 +93,11 @@ def observe(history: MotionHistory, sighting: Sighting, window: Window, config: 
             return MotionHistory((sample,), MotionCause.TIME_REVERSED)
         if gap_s > window.max_gap_s:
             return MotionHistory((sample,), MotionCause.GAP)
-        if abs(math.log(sample.aspect / last.aspect)) > config.max_aspect_change:
-            return MotionHistory((sample,), MotionCause.SHAPE_CHANGE)
+        if _differs(sample, last, config):
+            odd = (*(s for s in history.odd if not _differs(sample, s, config)), sample)
+            if len(odd) >= config.shape_change_hits:
+                return MotionHistory(odd, MotionCause.SHAPE_CHANGE)
+            return MotionHistory(history.samples, history.reset, odd)
     oldest_us = at_us - round(window.history_s * 1e6)
     kept = tuple(s for s in (*history.samples, sample) if s.at_us >= oldest_us)[-config.max_samples :]
     return MotionHistory(kept, history.reset if len(kept) < config.min_samples else MotionCause.NONE)
@@ -131,6 +138,10 @@ def estimate(history: MotionHistory, at_us: int, window: Window, config: MotionC
         cause = MotionCause.AMBIGUOUS_INTERVAL
     known = state is not MotionState.UNKNOWN
     return Estimate(state, cause, beta, margin, min(quality, config.max_confidence) if known else 0.0)
+
+
+def _differs(a: Sample, b: Sample, config: MotionConfig) -> bool:
+    return abs(math.log(a.aspect / b.aspect)) > config.max_aspect_change
 
 
 def is_clipped(box: BoxXyxy, margin: float) -> bool:

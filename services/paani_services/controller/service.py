@@ -21,7 +21,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     with bus.alive():
         while True:
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(command.next(), silence_s)
+                async with asyncio.timeout(silence_s):
+                    await command.next()
             _, outputs = stepper.decide()
             thrust = stepper.conclude(outputs)[keys.THRUST.name]
             assert isinstance(thrust, Thrust)

@@ -45,7 +45,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 else:
                     stepper.conclude({})
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(wake.wait(), period_s)
+                    async with asyncio.timeout(period_s):
+                        await wake.wait()
                 wake.clear()
 
 

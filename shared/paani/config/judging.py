@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
+RemovalSize = Annotated[int, msgspec.Meta(ge=0, le=3)]  # the work grows with the cube
 SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
 
 
@@ -48,6 +49,7 @@ class MotionConfig(Section, frozen=True):
     min_detection_confidence: Fraction = 0.40
     edge_margin: Fraction = 0.005
     max_aspect_change: Positive = 0.5  # of log(width / height)
+    shape_change_hits: Size = 2  # sightings of another shape before it is believed; I13: the first
 
 
 class RiskConfig(Section, frozen=True):
@@ -84,6 +86,7 @@ class AdvisorConfig(Section, frozen=True):
     evidence_max_age_s: Positive = 0.8  # J16
     lifetime_s: Positive = 3.5  # J16
     max_future_s: NonNegative = 0.1
+    counterfactual_size: RemovalSize = 3  # sets of up to so many pieces of evidence are sought; 0: none
     tracker: TrackerConfig = TrackerConfig()
     motion: MotionConfig = MotionConfig()
     risk: RiskConfig = RiskConfig()

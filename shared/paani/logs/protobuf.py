@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 Fields = Mapping[str, Any]
+_POINT = struct.Struct("<BdBd")
 
 DOUBLE, ENUM, STRING, BYTES, FIXED32, MESSAGE = 1, 14, 9, 12, 7, 11  # descriptor.proto: FieldDescriptorProto.Type
 OPTIONAL, REPEATED = 1, 3
@@ -95,7 +96,9 @@ MESSAGES: dict[str, dict[str, Field]] = {
 
 
 def encode(name: str, fields: Fields) -> bytes:
-    """One message. Messages in fields are mappings, repeated fields sequences; what is zero or empty is left out."""
+    """One message. Messages in fields are mappings, or bytes where they are encoded already; repeated fields are
+    sequences; what is zero or empty is left out.
+    """
     table = MESSAGES[name]
     out = bytearray()
     for field_name, value in fields.items():
@@ -106,15 +109,26 @@ def encode(name: str, fields: Fields) -> bytes:
             continue
         for item in value if field.repeated else (value,):
             if field.kind == MESSAGE:
-                out += _tag(field.number, LEN) + _bytes(encode(field.of, item))
+                inside = item if isinstance(item, bytes) else encode(field.of, item)
+                out += _tag(field.number, LEN) + _bytes(inside)
             elif item or field.repeated:
                 out += _scalar(field, item)
     return bytes(out)
 
 
-def timestamp(time_us: int) -> dict[str, int]:
-    """A google.protobuf.Timestamp."""
-    return {"seconds": time_us // 1_000_000, "nanos": time_us % 1_000_000 * 1000}
+def timestamp(time_us: int) -> bytes:
+    """An encoded google.protobuf.Timestamp."""
+    return encode(TIME, {"seconds": time_us // 1_000_000, "nanos": time_us % 1_000_000 * 1000})
+
+
+def point(x_px: float, y_px: float) -> bytes:
+    """An encoded foxglove.Point2."""
+    return _POINT.pack(1 << 3 | I64, x_px, 2 << 3 | I64, y_px)
+
+
+def colour(r: float, g: float, b: float, a: float) -> bytes:
+    """An encoded foxglove.Color; shares of one."""
+    return encode(COLOR, {"r": r, "g": g, "b": b, "a": a})
 
 
 @functools.cache
@@ -188,6 +202,7 @@ def _int(number: int, value: int) -> bytes:
     return _tag(number, VARINT) + _varint(value)
 
 
+@functools.cache
 def _tag(number: int, wire: int) -> bytes:
     return _varint(number << 3 | wire)
 
@@ -197,6 +212,8 @@ def _bytes(data: bytes) -> bytes:
 
 
 def _varint(value: int) -> bytes:
+    if value <= 0x7F:
+        return bytes((value,))
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)

@@ -16,7 +16,8 @@ GPS, POSE, ANNOTATIONS, LINES = "viewer/gps", "viewer/pose", "viewer/annotations
 CHANNELS = {GPS: pb.LOCATION_FIX, POSE: pb.POSE_IN_FRAME, ANNOTATIONS: pb.IMAGE_ANNOTATIONS, LINES: pb.LOG}
 CAMERA_FRAME, MAP_FRAME, GPS_FRAME = "camera", "map", "gps"
 # As on the dashboard: what counts is orange, what is only held or not yet confirmed is pale.
-ACCEPTED, OTHERS, BACKGROUND = (1.0, 0.71, 0.33, 1.0), (0.6, 0.65, 0.7, 1.0), (0.03, 0.04, 0.05, 0.8)
+ACCEPTED, OTHERS = pb.colour(1.0, 0.71, 0.33, 1.0), pb.colour(0.6, 0.65, 0.7, 1.0)
+BACKGROUND = pb.colour(0.03, 0.04, 0.05, 0.8)
 LINE_PX, FONT_PX = 2.0, 11.0
 
 
@@ -105,8 +106,8 @@ class Viewer:
         boxes, texts = [], []
         for track in tracks.tracks if width and height else ():
             x1, y1, x2, y2 = track.box_xyxy
-            corners = [{"x": x * width, "y": y * height} for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2))]
-            colour = dict(zip("rgba", ACCEPTED if track.accepted and not track.held else OTHERS, strict=True))
+            corners = [pb.point(x * width, y * height) for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2))]
+            colour = ACCEPTED if track.accepted and not track.held else OTHERS
             boxes.append(
                 {
                     "timestamp": time, "type": pb.LINE_LOOP, "points": corners, "outline_color": colour,
@@ -117,7 +118,7 @@ class Viewer:
                 {
                     "timestamp": time, "position": corners[0], "font_size": FONT_PX, "text_color": colour,
                     "text": f"#{track.id} {track.label} {track.confidence:.2f}",
-                    "background_color": dict(zip("rgba", BACKGROUND, strict=True)),
+                    "background_color": BACKGROUND,
                 }
             )  # fmt: skip
         return [

@@ -135,8 +135,67 @@ class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
     track_ids: tuple[Count, ...] = ()
 
 
+class Lane(StrEnum):
+    """A corridor of the picture."""
+
+    LEFT = "left"
+    CENTER = "center"
+    RIGHT = "right"
+
+
+class ChangedBy(StrEnum):
+    """What it takes to change an advised direction.
+
+    NOTHING: it goes straight, so nothing is asked. EVIDENCE: one of the sets given. CLEAR_PICTURES: a turn is kept only
+    until enough pictures were clear. NEW_EVIDENCE: the input is at fault, whatever it shows. MORE_EVIDENCE: no set as
+    small as was sought.
+    """
+
+    NOTHING = "nothing"
+    EVIDENCE = "evidence"
+    CLEAR_PICTURES = "clear_pictures"
+    NEW_EVIDENCE = "new_evidence"
+    MORE_EVIDENCE = "more_evidence"
+
+
+class Limit(StrEnum):
+    """A limit that a number can cross; SIDE_GAIN is how much better the other side must be to be taken."""
+
+    NONE = "none"
+    CENTER_RISK = "center_risk"
+    LEFT_RISK = "left_risk"
+    RIGHT_RISK = "right_risk"
+    SIDE_GAIN = "side_gain"
+
+
+class Removal(msgspec.Struct, frozen=True, kw_only=True):
+    """Evidence without which the direction would be another: tracks, and lanes taken as clear, certain water."""
+
+    direction: Direction
+    track_ids: tuple[Count, ...] = ()
+    water: tuple[Lane, ...] = ()
+
+
+class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
+    """What would change the direction, found by asking the policy again without it.
+
+    removals: the first of the smallest sets, those that lead straight on first; each is known to change the direction.
+    found: how many sets of that size do. judged: how many sets the policy was asked about. left_out: tracks that were
+    too many to be asked about. limit, margin: the nearest limit that would change the direction when crossed alone, and
+    how far the number lies above it (negative: below).
+    """
+
+    changed_by: ChangedBy = ChangedBy.NOTHING
+    removals: tuple[Removal, ...] = ()
+    found: Count = 0
+    judged: Count = 0
+    left_out: Count = 0
+    limit: Limit = Limit.NONE
+    margin: Finite = 0.0
+
+
 class Advisory(Message, frozen=True, kw_only=True):
-    """What the advisor advises and the evidence it used (checklist J11)."""
+    """What the advisor advises, the evidence it used (checklist J11), and what would change it."""
 
     direction: Direction
     reason: Reason
@@ -153,3 +212,4 @@ class Advisory(Message, frozen=True, kw_only=True):
     frame_epoch: Count = 0
     evidence_sent_us: Stamp = 0
     explanation: Text = ""
+    counterfactual: Counterfactual = Counterfactual()
