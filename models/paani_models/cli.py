@@ -11,11 +11,12 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani_models import evaluate_command
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
-from paani_models.data.command import add_pack_arguments, add_prepare_arguments, make_bundle, prepare, rendered_folder
+from paani_models.data import command as data_command
+from paani_models.pictures import Pictures
 
 DATA_VARIABLE = "PAANI_DATA"
-NETS = ("segmenter", "detector")
 TRAINED = ("segmenter", "paper-segmenter", "detector", "gate")
 
 
@@ -32,9 +33,13 @@ def main(argv: list[str]) -> int:
         if arguments.command == "check":
             return _check(arguments.weights)
         if arguments.command == "prepare":
-            return prepare(arguments)
+            if arguments.set != "own":
+                return data_command.prepare_public(arguments)
+            return data_command.prepare_own(_pictures(arguments), arguments.manifest)
         if arguments.command == "pack":
-            return make_bundle(arguments)
+            return data_command.make_bundle(arguments, _pictures(arguments))
+        if arguments.command == "evaluate":
+            return evaluate_command.run(arguments, _pictures(arguments))
         return _needs_torch(arguments)
     except UserError as error:
         sys.stderr.write(f"paani models: {error}\n")
@@ -52,13 +57,17 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("--weights", type=Path, default=WEIGHTS)
 
     check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
-    add_prepare_arguments(check_data)
+    data_command.add_prepare_arguments(check_data)
     pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
-    add_pack_arguments(pack)
+    data_command.add_pack_arguments(pack)
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
     train.add_argument("net", choices=TRAINED)
     train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
-    train.add_argument("--start", type=Path, help="checkpoint, or exported ONNX file, to begin from; for the gate: the segmenter that it guards")
+    train.add_argument(
+        "--start",
+        type=Path,
+        help="checkpoint, or exported ONNX file, to begin from; for the gate: the segmenter that it guards",
+    )
     train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
     train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
@@ -69,8 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("net", choices=TRAINED)
     export.add_argument("--checkpoint", type=Path, required=True)
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
-    evaluate.add_argument("nets", nargs="*", choices=[[], *NETS], default=[])
-    evaluate.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    evaluate_command.add_arguments(evaluate)
     for command in (export, evaluate):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
     for command in (check_data, pack, train, export, evaluate):
@@ -87,13 +95,17 @@ def _check(weights: Path) -> int:
     return 0
 
 
+def _pictures(arguments: argparse.Namespace) -> Pictures:
+    names = [name for name in arguments.sources.split(",") if name]
+    return Pictures(arguments.data, names, arguments.rendered)
+
+
 def _needs_torch(arguments: argparse.Namespace) -> int:
     try:
         from paani_models import pipeline  # noqa: PLC0415 - PyTorch is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
-    names = [name for name in arguments.sources.split(",") if name]
-    pictures = pipeline.Pictures(arguments.data, names, rendered_folder(arguments.data, arguments.rendered))
+    pictures = _pictures(arguments)
     if arguments.command == "train":
         plan = pipeline.Plan(
             folder=arguments.folder,
@@ -105,9 +117,6 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
             peak_rate=arguments.peak_rate,
         )
         pipeline.train(arguments.net, pictures, plan, arguments.threads)
-    elif arguments.command == "export":
-        pipeline.export_net(arguments.net, arguments.checkpoint, arguments.weights, pictures)
     else:
-        for net in arguments.nets or NETS:
-            pipeline.evaluate_net(net, arguments.weights, pictures, record=arguments.record)
+        pipeline.export_net(arguments.net, arguments.checkpoint, arguments.weights, pictures)
     return 0

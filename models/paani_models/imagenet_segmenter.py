@@ -7,7 +7,7 @@ and padding on the bottom and right only before a stride.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -34,6 +34,23 @@ DECODER_CHANNELS = 48
 DETAIL_CHANNELS = 16
 
 
+class PadEnd(torch.autograd.Function):
+    """One row of zeros below and one column to the right; exported with constant pads, which runtimes fold away."""
+
+    @staticmethod
+    def forward(_ctx: object, x: Tensor) -> Tensor:
+        return F.pad(x, (0, 1, 0, 1))
+
+    @staticmethod
+    def backward(_ctx: object, gradient: Tensor) -> Tensor:
+        return gradient[:, :, :-1, :-1]
+
+    @staticmethod
+    def symbolic(graph: Any, x: Any) -> Any:
+        pads = graph.op("Constant", value_t=torch.tensor([0, 0, 0, 0, 0, 0, 1, 1]))
+        return graph.op("Pad", x, pads, mode_s="constant")
+
+
 class FoldedConv(nn.Module):
     """Convolution with bias, TensorFlow's SAME padding, and ReLU6 unless linear."""
 
@@ -52,7 +69,7 @@ class FoldedConv(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         if self.conv.stride[0] == 2:
-            x = F.pad(x, (0, 1, 0, 1))
+            x = cast(Tensor, PadEnd.apply(x))
         y = cast(Tensor, self.conv(x))
         return y if self.linear else F.relu6(y)
 

@@ -7,26 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
-import msgspec
 import numpy as np
 import torch
 
 from paani.errors import UserError
-from paani_models import detector_data, evaluate, export, train_detector, train_gate, train_segmenter
-from paani_models.catalogue import Model, load_catalogue, save_catalogue, verified_path
+from paani_models import detector_data, export, train_detector, train_gate, train_segmenter
+from paani_models.catalogue import verified_path
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
 from paani_models.network_input import SIZE_WH, detector_input, gate_input, segmenter_batch, segmenter_input
+from paani_models.pictures import Pictures
 from paani_models.pseudo_labels import pseudo_labelled
 from paani_models.segmenter import Segmenter
 from paani_models.sources import (
     RENDERED,
-    Sample,
-    Source,
-    choose,
     read_picture,
-    read_samples,
 )
 from paani_models.train_detector import DetectorTraining
 from paani_models.train_gate import GateTraining
@@ -39,45 +35,6 @@ COCO_FILE = "_weights/yolox_nano_coco.onnx"
 COMPARED_PICTURES = 8
 
 IMAGENET_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
-
-
-class Pictures:
-    """The chosen sources below a data folder, and optionally a folder of rendered pictures."""
-
-    def __init__(self, data: Path, names: list[str], rendered: Path | None) -> None:
-        if not data.is_dir():
-            raise UserError(f"{data}: no such folder; set PAANI_DATA or --data")
-        self.data, self.rendered = data, rendered
-        self.sources: tuple[Source, ...] = choose(names)
-        self.samples = read_samples(data, self.sources, rendered)
-
-    def folder(self, source: Source) -> Path:
-        """Where a source lies."""
-        return self.rendered if source.name == RENDERED and self.rendered else self.data / source.folder
-
-    def segmented(self, held_out: bool) -> list[Sample]:
-        """Samples with a mask."""
-        return [s for s in self.samples if s.mask and s.held_out == held_out]
-
-    def boxed(self, held_out: bool) -> list[Sample]:
-        """Samples with boxes; for training also those whose mask tells where nothing floats.
-
-        A picture that is held out for its boxes is not trained on for its mask.
-        """
-        if held_out:
-            return [s for s in self.samples if s.held_out and s.label]
-        kept = {s.picture for s in self.samples if s.held_out and s.label}
-        return [s for s in self.samples if not s.held_out and s.picture not in kept]
-
-    def never_held_out(self) -> list[Sample]:
-        """Every picture that no source holds out, once."""
-        kept = {s.picture for s in self.samples if s.held_out}
-        return list({s.picture: s for s in self.samples if s.picture not in kept}.values())
-
-    def unsegmented(self) -> list[Sample]:
-        """Training samples of the sources that have boxes and no masks, each picture once."""
-        masked = {s.picture for s in self.samples if s.mask}
-        return [s for s in self.samples if not s.source.masks and not s.held_out and s.picture not in masked]
 
 
 @dataclass(frozen=True)
@@ -192,19 +149,3 @@ def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) ->
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )
-
-
-def evaluate_net(net: str, weights: Path, pictures: Pictures, *, record: bool) -> None:
-    """Print one JSON line per figure; with `record` put them into the manifest."""
-    path = verified_path(net, weights)
-    if net == "segmenter":
-        figures = evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
-    else:
-        figures = evaluate.detector_figures(path, pictures.boxed(held_out=True))
-        figures += evaluate.false_alarm_figures(path, pictures.segmented(held_out=True))
-    for figure in figures:
-        sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
-    if record:
-        catalogue = load_catalogue(weights)
-        model: Model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
-        save_catalogue({**catalogue, net: model}, weights)

@@ -58,3 +58,34 @@ def mastr1325(root: Path, runs: tuple[int, ...] = (4, 3, 3)) -> Path:
             mask[:100], mask[100:120], mask[200:] = 2, 4, 1
             write_picture(root / "MaSTr1325_masks_512x384" / f"{number:04}m.png", mask)
     return root
+
+
+def own_data(root: Path, frames: int = 4) -> Path:
+    """A data folder of two sources: dasha (masks; DJI_0035 is held out) and mcoe (boxes; cluster1 is held out)."""
+    dasha, number = [], 0
+    for sequence in ("DJI_0001", "DJI_0035"):
+        for frame in range(frames):
+            number += 1
+            name = f"{sequence}_{frame}"
+            picture = cv2.resize(scene(500 + number), (640, 400), interpolation=cv2.INTER_CUBIC)
+            write_picture(root / "tbiseg_dasha" / "images" / f"{name}.jpg", np.asarray(picture, np.uint8))
+            water = np.zeros((400, 640), np.uint8)
+            water[200:] = 1
+            write_picture(root / "tbiseg_dasha" / "masks" / f"{name}.png", water)
+            water[:100] = 2
+            write_picture(root / "tbiseg_dasha" / "masks3" / f"{name}.png", water)
+            dasha.append(f'{{"file":"images/{name}.jpg","seq":"{sequence}"}}')
+    mcoe = []
+    for cluster in range(frames):
+        name = f"boat{cluster}"
+        write_picture(root / "mcoe_boats" / "images" / f"{name}.jpg", scene(700 + cluster, (360, 300)))
+        label = root / "mcoe_boats" / "labels" / f"{name}.txt"
+        label.parent.mkdir(exist_ok=True)
+        label.write_text("1 .5 .5 .2 .2\n3 .2 .6 .1 .1\n")
+        mcoe.append(f'{{"file":"images/{name}.jpg","seq":"cluster{cluster}"}}')
+    for folder, items in (("tbiseg_dasha", dasha), ("mcoe_boats", mcoe)):
+        terms = '"repo":"someone/water","commit":"abc","licence":"CC0"'
+        (root / folder / "manifest.json").write_text(f'{{{terms},"items":[{",".join(items)}]}}')
+    (root / "_weights").mkdir()
+    (root / "_weights" / "start.bin").write_bytes(bytes(range(256)))
+    return root

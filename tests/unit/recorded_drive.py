@@ -95,10 +95,11 @@ def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: 
     route = m.Route(
         source_us=T0_US, name="a", waypoints=(m.Waypoint(x_m=60.0, y_m=0.0), m.Waypoint(x_m=60.0, y_m=40.0))
     )
-    desk.publish(keys.ROUTE, route)
     for tick in range(round(seconds * 20)):
         desk.now_us = T0_US + tick * 50_000 + dice.randrange(2000)
         at_s = tick * 0.05
+        if tick % 40 == 0:
+            desk.publish(keys.ROUTE, route)
         if restart_at_s is not None and math.isclose(at_s, restart_at_s, abs_tol=0.025):
             desk.restart("advisor")
             desk.restart("controller")
@@ -117,10 +118,12 @@ def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: 
     return desk.records
 
 
-def write_log(path: Path, records: Iterable[Record], config: Config | None = CONFIG, **attachments: bytes) -> Path:
+def write_log(
+    path: Path, records: Iterable[Record], config: Config | None = CONFIG, *, chunked: bool = True, **attachments: bytes
+) -> Path:
     """An MCAP file as a recorder writes it. attachments: `models` is `models.json`."""
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=64 * 1024)
+        writer = Writer(file, chunk_size=64 * 1024, use_chunking=chunked)
         writer.start("paani", "paani 0.1.0")
         schema = writer.register_schema("paani.Any", "jsonschema", b'{"type":"object"}')
         channels: dict[str, int] = {}

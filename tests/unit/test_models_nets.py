@@ -5,6 +5,8 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
+from torch import Tensor, nn  # noqa: E402
+
 from paani_models import detector, segmenter  # noqa: E402
 from paani_models.imagenet_segmenter import ImageNetSegmenter  # noqa: E402
 from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
@@ -103,16 +105,16 @@ def test_candidate_grid_matches_the_output_order() -> None:
     assert [int((strides == s).sum()) for s in detector.STRIDES] == [1280, 320, 80]
 
 
-def multiply_adds(net: torch.nn.Module) -> int:
+def multiply_adds(net: nn.Module) -> int:
     total = 0
 
-    def count(conv: torch.nn.Module, _inputs: tuple[torch.Tensor, ...], output: torch.Tensor) -> None:
+    def count(conv: nn.Module, _inputs: tuple[Tensor, ...], output: Tensor) -> None:
         nonlocal total
-        assert isinstance(conv, torch.nn.Conv2d)
+        assert isinstance(conv, nn.Conv2d)
         total += output.numel() * conv.weight[0].numel()
 
     for module in net.modules():
-        if isinstance(module, torch.nn.Conv2d):
+        if isinstance(module, nn.Conv2d):
             module.register_forward_hook(count)
     with torch.no_grad():
         net.eval()(torch.zeros(1, 3, 256, 320))

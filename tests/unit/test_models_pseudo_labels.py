@@ -14,7 +14,7 @@ from paani_models.sources import IGNORE, Sample, Source  # noqa: E402
 from paani_models.train_segmenter import CACHE_WH, UNSEGMENTED, CachedPicture  # noqa: E402
 
 
-class SureBelow(nn.Module):
+class SureBelow(nn.Module):  # type: ignore[misc]
     """Sky above; below, water where the picture is dark, else undecided between water and obstacle."""
 
     def forward(self, x: Tensor) -> Tensor:

@@ -8,7 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
-from torch import nn  # noqa: E402
+from torch import Tensor, nn  # noqa: E402
 
 from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import WEIGHTS  # noqa: E402
@@ -20,7 +20,7 @@ from paani_models.segmenter import Segmenter  # noqa: E402
 from paani_models.warm_start import load_exported  # noqa: E402
 
 
-def pictures(count: int) -> torch.Tensor:
+def pictures(count: int) -> Tensor:
     return torch.rand((count, 3, 256, 320), generator=torch.Generator().manual_seed(3))
 
 

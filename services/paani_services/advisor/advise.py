@@ -4,13 +4,26 @@ import msgspec
 
 from paani.config import Config
 from paani.geometry import clip
-from paani.messages import Advisory, Direction, Evidence, LaneRisk, Odometry, Reason, Tracks, UnusableCause
+from paani.messages import (
+    Advisory,
+    ChangedBy,
+    Counterfactual,
+    Direction,
+    Evidence,
+    Odometry,
+    Reason,
+    Tracks,
+    UnusableCause,
+)
+from paani_services.advisor.counterfactual import counterfactual
 from paani_services.advisor.explanation import explain
 from paani_services.advisor.policy import Decision, PolicyState, decide
-from paani_services.advisor.risk import LANES, components, obstacles_of
+from paani_services.advisor.risk import LANES, components, obstacles_of, water_of
 from paani_services.advisor.tracker import TrackerState, hear, is_sound, published, update
 
 MAX_AGE_S = 1e6
+ONLY_NEW_EVIDENCE = Counterfactual(changed_by=ChangedBy.NEW_EVIDENCE)
+NOTHING_JUDGED = Decision(Direction.NO_DATA, Reason.NO_EVIDENCE, counterfactual=ONLY_NEW_EVIDENCE)
 
 
 class AdvisorState(msgspec.Struct, frozen=True):
@@ -41,10 +54,17 @@ def advise(
             state = _digest(state, evidence, config)
     known = evidence if future else state.evidence
     if known is None:
-        advisory = Advisory(source_us=now_us, direction=Direction.NO_DATA, reason=Reason.NO_EVIDENCE)
+        advisory = Advisory(
+            source_us=now_us,
+            direction=Direction.NO_DATA,
+            reason=Reason.NO_EVIDENCE,
+            counterfactual=ONLY_NEW_EVIDENCE,
+        )
         tracks = Tracks(source_us=now_us, frame_seq=0, frame_epoch=0)
     else:
-        decision = _stop(Reason.FUTURE_EVIDENCE) if future else _fresh_decision(state, now_us, config)
+        decision = (
+            _stopped(NOTHING_JUDGED, Reason.FUTURE_EVIDENCE) if future else _fresh_decision(state, now_us, config)
+        )
         tracks = published(state.tracker, known, config.advisor)
         advisory = _advisory(decision, known, now_us, config)
     return state, msgspec.structs.replace(advisory, explanation=explain(advisory, tracks.tracks)), tracks
@@ -69,11 +89,14 @@ def _digest(state: AdvisorState, evidence: Evidence, config: Config) -> AdvisorS
     policy = state.policy
     if evidence.usable and fits:
         obstacles = obstacles_of(tracker, config)
-        lanes = {lane: components(evidence, obstacles, lane, config) for lane in LANES}
-        policy, decision = decide(policy, lanes, obstacles, config)
+        water = {lane: water_of(evidence, lane, config) for lane in LANES}
+        lanes = {lane: components(water[lane], obstacles, lane, config) for lane in LANES}
+        policy, decision = decide(state.policy, lanes, obstacles, config)
+        why = counterfactual(state.policy, decision, water, obstacles, config)
+        decision = msgspec.structs.replace(decision, counterfactual=why)
     else:
         policy = msgspec.structs.replace(policy, clear_frames=0)  # no clear frame
-        decision = _stop(Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
+        decision = _stopped(NOTHING_JUDGED, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
     return AdvisorState(tracker, policy, evidence, decision)
 
 
@@ -90,14 +113,14 @@ def _fresh_decision(state: AdvisorState, now_us: int, config: Config) -> Decisio
     assert state.decision is not None
     age_s = (now_us - state.evidence.source_us) * 1e-6
     if age_s > config.advisor.evidence_max_age_s:
-        return msgspec.structs.replace(state.decision, direction=Direction.STOP, reason=Reason.STALE_EVIDENCE)
+        return _stopped(state.decision, Reason.STALE_EVIDENCE)
     if age_s < -config.advisor.max_future_s:
-        return msgspec.structs.replace(state.decision, direction=Direction.STOP, reason=Reason.FUTURE_EVIDENCE)
+        return _stopped(state.decision, Reason.FUTURE_EVIDENCE)
     return state.decision
 
 
-def _stop(reason: Reason) -> Decision:
-    return Decision(Direction.STOP, reason, LaneRisk(), LaneRisk(), LaneRisk())
+def _stopped(decision: Decision, reason: Reason) -> Decision:
+    return msgspec.structs.replace(decision, direction=Direction.STOP, reason=reason, counterfactual=ONLY_NEW_EVIDENCE)
 
 
 def _advisory(decision: Decision, evidence: Evidence, now_us: int, config: Config) -> Advisory:
@@ -118,4 +141,5 @@ def _advisory(decision: Decision, evidence: Evidence, now_us: int, config: Confi
         frame_seq=evidence.frame_seq,
         frame_epoch=evidence.frame_epoch,
         evidence_sent_us=evidence.sent_us,
+        counterfactual=decision.counterfactual,
     )

@@ -1,6 +1,9 @@
-"""One plain sentence for people, made last, from the numbers in the advisory itself (checklist J12). Pure."""
+"""Plain words for people, made last, from the numbers in the advisory itself (checklist J12). Pure.
 
-from paani.messages import Advisory, Direction, LaneRisk, Reason, Track, UnusableCause
+One sentence says what is advised and why, the next what would change it.
+"""
+
+from paani.messages import Advisory, ChangedBy, Direction, Lane, LaneRisk, Reason, Removal, Track, UnusableCause
 
 MANOEUVRE = {
     Direction.STRAIGHT: "Straight on",
@@ -26,11 +29,59 @@ UNUSABLE = {
     UnusableCause.STALE: "was too old to look at",
 }
 NAMED_TRACKS = 3
+INSTEAD = {
+    Direction.STRAIGHT: "go STRAIGHT",
+    Direction.SLIGHT_LEFT: "turn SLIGHTLY LEFT",
+    Direction.SLIGHT_RIGHT: "turn SLIGHTLY RIGHT",
+    Direction.LEFT: "turn LEFT",
+    Direction.RIGHT: "turn RIGHT",
+    Direction.STOP: "STOP",
+    Direction.NO_DATA: "give no advice",
+}
+LANE_NAMES = {Lane.LEFT: "left", Lane.CENTER: "centre", Lane.RIGHT: "right"}
+MAX_LENGTH = 400  # of `Text`
 
 
 def explain(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
-    """Say what is advised and why."""
-    return f"{MANOEUVRE[advisory.direction]}: {_because(advisory, tracks)}."
+    """Say what is advised and why, and what would change it."""
+    why = f"{MANOEUVRE[advisory.direction]}: {_because(advisory, tracks)}."
+    both = f"{why} {_otherwise(advisory, tracks)}".rstrip()
+    return both if len(both) <= MAX_LENGTH else why
+
+
+def _otherwise(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+    found = advisory.counterfactual
+    match found.changed_by:
+        case ChangedBy.EVIDENCE:
+            return _without(found.removals[0], advisory, tracks)
+        case ChangedBy.CLEAR_PICTURES:
+            return "Nothing in the picture asks for it any more."
+        case ChangedBy.NEW_EVIDENCE:
+            return "Only new evidence can change that."
+        case ChangedBy.MORE_EVIDENCE if found.judged:
+            return "No three pieces of evidence, or fewer, decide it."
+        case _:
+            return ""
+
+
+def _without(removal: Removal, advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+    parts = []
+    labels = {track.id: track.label for track in tracks}
+    lanes = {Lane.LEFT: advisory.left, Lane.CENTER: advisory.center, Lane.RIGHT: advisory.right}
+    if removal.track_ids:
+        names = [
+            f"{labels.get(i, 'track')} #{i} ({_and([LANE_NAMES[at] for at in lanes if i in lanes[at].track_ids])})"
+            for i in removal.track_ids
+        ]
+        parts.append(f"without {_and(names)}")
+    if removal.water:
+        parts.append(f"with clear water {_and([LANE_NAMES[lane] for lane in removal.water])}")
+    condition = " and ".join(parts)
+    return f"{condition[0].upper()}{condition[1:]} it would {INSTEAD[removal.direction]}."
+
+
+def _and(names: list[str]) -> str:
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
@@ -78,7 +129,6 @@ def _obstacles(lane: LaneRisk, tracks: tuple[Track, ...]) -> str:
     names = [f"{track.label} #{track.id}" for track in tracks if track.id in lane.track_ids]
     if not names:
         return ""
-    shown = names[:NAMED_TRACKS]
     if len(names) > NAMED_TRACKS:
-        shown.append(f"{len(names) - NAMED_TRACKS} more")
-    return " and ".join(shown) if len(shown) < NAMED_TRACKS else f"{', '.join(shown[:-1])} and {shown[-1]}"
+        names = [*names[:NAMED_TRACKS], f"{len(names) - NAMED_TRACKS} more"]
+    return _and(names)

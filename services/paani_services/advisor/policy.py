@@ -3,9 +3,9 @@
 import msgspec
 
 from paani.config import Config, PolicyConfig
-from paani.messages import Direction, LaneRisk, Reason
-from paani_services.advisor.risk import LANES, Components, Obstacle, lane_span, shared_width
+from paani.messages import BoxXyxy, Counterfactual, Direction, LaneRisk, Reason
 from paani_services.advisor.association import area
+from paani_services.advisor.risk import LANES, Components, Obstacle, lane_span, overlap, shared_width
 
 SEEN_ENOUGH = 0.5  # an obstacle fainter than this has been out of sight too long to occupy a lane
 TURNS = {"left": Direction.LEFT, "right": Direction.RIGHT}
@@ -22,14 +22,31 @@ class PolicyState(msgspec.Struct, frozen=True):
     clear_frames: int = 0
 
 
+class Standing(msgspec.Struct, frozen=True):
+    """All that a direction depends on.
+
+    left, center, right: is the lane blocked. incursion: the side from which obstacles reach into the centre but not its
+    core. better: the side to take if both are free. kept: a turn that has not yet been clear for long enough.
+    """
+
+    left: bool = True
+    center: bool = True
+    right: bool = True
+    incursion: str | None = None
+    better: str = "right"
+    kept: Direction | None = None
+
+
 class Decision(msgspec.Struct, frozen=True):
-    """One direction, why, and the lanes that decided it."""
+    """One direction, why, the lanes that decided it, and what would have changed it."""
 
     direction: Direction
     reason: Reason
-    left: LaneRisk
-    center: LaneRisk
-    right: LaneRisk
+    left: LaneRisk = LaneRisk()
+    center: LaneRisk = LaneRisk()
+    right: LaneRisk = LaneRisk()
+    standing: Standing = Standing()
+    counterfactual: Counterfactual = Counterfactual()
 
 
 def decide(
@@ -44,69 +61,109 @@ def decide(
     """
     policy = config.advisor.policy
     frames, occupied = _occupancy(state, obstacles, config)
-    vessel = _vessel_ahead(obstacles, config)
+    vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     blocked = {
-        lane: occupied[lane] or lanes[lane].risk >= _limit(lane, policy) or (lane == "center" and vessel)
+        lane: occupied[lane] or lanes[lane].risk >= limit_of(lane, policy) or (lane == "center" and vessel)
         for lane in LANES
     }
     judged = {lane: _lane_risk(lanes[lane], occupied[lane], blocked[lane]) for lane in LANES}
     clear_frames = 0 if blocked["center"] else state.clear_frames + 1
-    if not blocked["center"]:
-        direction, reason = _when_clear(state, blocked, clear_frames, policy)
+    risks = {lane: lanes[lane].risk for lane in LANES}
+    standing = Standing(
+        left=blocked["left"],
+        center=blocked["center"],
+        right=blocked["right"],
+        incursion=_edge_incursion(judged["center"], obstacles, config),
+        better=better_side(state, risks, policy),
+        kept=state.turn if clear_frames < policy.clear_frames else None,
+    )
+    direction = direct(standing)
+    if not standing.center:
+        reason = Reason.CENTER_CLEAR if direction is Direction.STRAIGHT else Reason.TURN_RETAINED
+    elif direction is Direction.STOP:
+        reason = _why_no_side(judged, policy)
+    elif standing.incursion is not None:
+        reason = Reason.CENTER_EDGE_INCURSION
+    elif not standing.left and not standing.right and _is_tie(state, risks, policy):
+        reason = Reason.TIE_STARBOARD if state.turn is None else Reason.TIE_KEPT_SIDE
     else:
-        direction, reason = _around(state, judged, obstacles, vessel, config)
+        reason = _why_blocked(judged["center"], vessel, policy)
     turn = direction if direction in SIDE_OF else None
     if direction is Direction.STOP:
         turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
     return PolicyState(frames, turn, clear_frames), Decision(
-        direction, reason, judged["left"], judged["center"], judged["right"]
+        direction, reason, judged["left"], judged["center"], judged["right"], standing
     )
 
 
-def _when_clear(
-    state: PolicyState, blocked: dict[str, bool], clear_frames: int, policy: PolicyConfig
-) -> tuple[Direction, Reason]:
-    """Straight on, but a turn is kept until enough distinct frames were clear (J10)."""
-    if state.turn is not None and clear_frames < policy.clear_frames and not blocked[SIDE_OF[state.turn]]:
-        return state.turn, Reason.TURN_RETAINED
-    return Direction.STRAIGHT, Reason.CENTER_CLEAR
+def direct(standing: Standing) -> Direction:
+    """The direction for what stands where (J5, J8-J10, resolutions 12-14)."""
+    blocked = {"left": standing.left, "right": standing.right}
+    if not standing.center:
+        kept = standing.kept
+        return kept if kept is not None and not blocked[SIDE_OF[kept]] else Direction.STRAIGHT
+    if standing.incursion is not None:
+        away = OTHER[standing.incursion]
+        return Direction.STOP if blocked[away] else SLIGHT_TURNS[away]  # the other way would turn towards it
+    free = [side for side in ("left", "right") if not blocked[side]]
+    if not free:
+        return Direction.STOP
+    return TURNS[standing.better if len(free) == 2 else free[0]]
 
 
-def _around(
-    state: PolicyState, lanes: dict[str, LaneRisk], obstacles: tuple[Obstacle, ...], vessel: bool, config: Config
-) -> tuple[Direction, Reason]:
-    policy = config.advisor.policy
-    permitted = [side for side in ("left", "right") if not lanes[side].blocked]
-    incursion = _edge_incursion(lanes["center"], obstacles, config)
-    if incursion is not None:
-        away = OTHER[incursion]
-        if away in permitted:
-            return SLIGHT_TURNS[away], Reason.CENTER_EDGE_INCURSION
-        permitted = []  # the other way would turn towards it
-    if not permitted:
-        only_occupied = any(
-            lanes[side].occupied and lanes[side].risk < policy.side_block_risk for side in ("left", "right")
-        )
-        return Direction.STOP, Reason.NO_SIDE_UNOCCUPIED if only_occupied else Reason.NO_SAFE_SIDE
-    if len(permitted) == 2:
-        side, tie = _better_side(state, lanes, policy)
-        if tie is not None:
-            return TURNS[side], tie
-    else:
-        side = permitted[0]
-    return TURNS[side], _why_blocked(lanes["center"], vessel, policy)
+def side_held(state: PolicyState, policy: PolicyConfig) -> tuple[str, float]:
+    """The side to take unless the other is better, and by how much it must be (resolution 13)."""
+    if state.turn is None:
+        return "right", policy.tie
+    return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
 
 
-def _better_side(state: PolicyState, lanes: dict[str, LaneRisk], policy: PolicyConfig) -> tuple[str, Reason | None]:
-    """The lower risk; a tie keeps the side already taken, else goes to starboard (resolution 13)."""
-    better = "left" if lanes["left"].risk < lanes["right"].risk else "right"
-    gain = abs(lanes["left"].risk - lanes["right"].risk)
-    side = SIDE_OF[state.turn] if state.turn is not None else None
-    if side is not None and (gain < policy.tie or (side != better and gain < policy.side_change_margin)):
-        return side, Reason.TIE_KEPT_SIDE
-    if gain < policy.tie:
-        return "right", Reason.TIE_STARBOARD
-    return better, None
+def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> str:
+    """The side to take when both are free: the lower risk, but not for a small gain."""
+    held, needed = side_held(state, policy)
+    other = OTHER[held]
+    gain = risks[held] - risks[other]
+    return other if gain > 0.0 and gain >= needed else held
+
+
+def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
+    """Low in the picture and wide enough to occupy the lane (J6)."""
+    policy, span = config.advisor.policy, lane_span(lane, config.perception.corridors)
+    shared = shared_width(obstacle.box, span)
+    return (
+        obstacle.presence >= SEEN_ENOUGH
+        and obstacle.box[3] >= policy.occupancy_bottom
+        and 0.0 < shared >= policy.occupancy_coverage * (span[1] - span[0])
+    )
+
+
+def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
+    """A vessel whose part inside the centre corridor is large (J7)."""
+    share = overlap(obstacle.box, lane_span("center", config.perception.corridors))
+    return (
+        obstacle.craft
+        and obstacle.presence >= SEEN_ENOUGH
+        and 0.0 < area(obstacle.box) * share >= config.advisor.policy.center_vessel_area
+    )
+
+
+def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:
+    """Where a box that overlaps the centre reaches: its core, or only its left or right edge (J9, resolution 12)."""
+    if shared_width(box, (policy.core_left, policy.core_right)) > 0.0:
+        return "core"
+    return "left" if box[2] <= policy.core_left else "right"
+
+
+def limit_of(lane: str, policy: PolicyConfig) -> float:
+    """The risk at which a lane is blocked (J5)."""
+    return policy.center_block_risk if lane == "center" else policy.side_block_risk
+
+
+def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> bool:
+    """The side held is not the better one by a tie's width, and the other is no clear gain."""
+    held, needed = side_held(state, policy)
+    gain = risks[held] - risks[OTHER[held]]
+    return -policy.tie < gain < needed
 
 
 def _why_blocked(center: LaneRisk, vessel: bool, policy: PolicyConfig) -> Reason:
@@ -115,19 +172,24 @@ def _why_blocked(center: LaneRisk, vessel: bool, policy: PolicyConfig) -> Reason
     return Reason.CENTER_VESSEL if vessel and not center.occupied else Reason.CENTER_OCCUPIED
 
 
+def _why_no_side(lanes: dict[str, LaneRisk], policy: PolicyConfig) -> Reason:
+    only_occupied = any(
+        lanes[side].occupied and lanes[side].risk < policy.side_block_risk for side in ("left", "right")
+    )
+    return Reason.NO_SIDE_UNOCCUPIED if only_occupied else Reason.NO_SAFE_SIDE
+
+
 def _edge_incursion(center: LaneRisk, obstacles: tuple[Obstacle, ...], config: Config) -> str | None:
     """The side from which obstacles reach into the corridor but not its core (J9, resolution 12); else None.
 
     Water that blocks by itself, or obstacles on both edges, are no mere incursion.
     """
     policy, weights = config.advisor.policy, config.advisor.risk
-    core = (policy.core_left, policy.core_right)
-    inside = [o for o in obstacles if o.id in center.track_ids]
     water = weights.non_water * center.non_water + weights.uncertainty * center.uncertainty
-    if not inside or water >= policy.center_block_risk or any(shared_width(o.box, core) > 0.0 for o in inside):
+    if water >= policy.center_block_risk:
         return None
-    sides = {"left" if o.box[2] <= policy.core_left else "right" for o in inside}
-    return sides.pop() if len(sides) == 1 else None
+    places = {place_in_center(o.box, policy) for o in obstacles if o.id in center.track_ids}
+    return places.pop() if len(places) == 1 and "core" not in places else None
 
 
 def _occupancy(
@@ -138,34 +200,11 @@ def _occupancy(
     counts: list[int] = []
     occupied: dict[str, bool] = {}
     for lane, before in zip(LANES, state.occupied_frames, strict=True):
-        span = lane_span(lane, config.perception.corridors)
-        filling = [
-            o
-            for o in obstacles
-            if o.presence >= SEEN_ENOUGH
-            and o.box[3] >= policy.occupancy_bottom
-            and shared_width(o.box, span) >= policy.occupancy_coverage * (span[1] - span[0])
-        ]
+        filling = [o for o in obstacles if fills(o, lane, config)]
         count = min(before + 1, policy.occupancy_frames) if filling else 0
         counts.append(count)
         occupied[lane] = count >= policy.occupancy_frames or any(o.danger for o in filling)
     return (counts[0], counts[1], counts[2]), occupied
-
-
-def _vessel_ahead(obstacles: tuple[Obstacle, ...], config: Config) -> bool:
-    """A vessel whose part inside the centre corridor is large (J7)."""
-    center = lane_span("center", config.perception.corridors)
-    return any(
-        o.craft
-        and o.presence >= SEEN_ENOUGH
-        and area(o.box) * shared_width(o.box, center) / (o.box[2] - o.box[0])
-        >= config.advisor.policy.center_vessel_area
-        for o in obstacles
-    )
-
-
-def _limit(lane: str, policy: PolicyConfig) -> float:
-    return policy.center_block_risk if lane == "center" else policy.side_block_risk
 
 
 def _lane_risk(lane: Components, occupied: bool, blocked: bool) -> LaneRisk:

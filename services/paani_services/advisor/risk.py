@@ -102,10 +102,9 @@ def water_of(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
     )
 
 
-def components(evidence: Evidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> Components:
+def components(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> Components:
     """Everything R_j of one corridor is made of."""
     span = lane_span(lane, config.perception.corridors)
-    water = water_of(evidence, lane, config)
     inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
     obstacle = either(o.severity * share * o.presence for o, share in inside)
     urgency = either(o.urgency * share for o, share in inside)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.config import Config
-from paani.messages import Advisory, Evidence, PictureHeader
+from paani.messages import Advisory, Evidence, PictureHeader, Tracks
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.camera.sources import VIDEO_SUFFIXES, Frame, recording
 from paani_services.perception.pipeline import Perceiver
@@ -20,13 +20,15 @@ START_US = 1_000_000
 
 
 class Judgement(NamedTuple):
-    """One frame, what was seen in it (mask None when unusable), and the advice."""
+    """One frame, what was seen in it (mask None when unusable), the advice, and the advisor's memory after it."""
 
     name: str
     bgr: Bytes | None
     mask: Bytes | None
     evidence: Evidence
     advisory: Advisory
+    tracks: Tracks
+    state: AdvisorState
 
 
 def judged(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> Iterator[Judgement]:
@@ -41,17 +43,18 @@ def judged(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> Iter
     state = AdvisorState()
     moving = path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()
     for number, frame in enumerate(recording(path, settings)):
-        evidence, mask = _perceive(perceiver, frame, epoch if moving else epoch + number, number)
         if moving:
-            state, advisory, _ = advise(state, evidence, evidence.source_us, config)
+            evidence, mask = _perceive(perceiver, frame, epoch, number)
+            state, advisory, tracks = advise(state, evidence, evidence.source_us, config)
+            yield Judgement(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
         else:
-            advisory = still_advisory(evidence, config)
-        yield Judgement(frame.name, frame.bgr, mask, evidence, advisory)
+            yield judged_still(frame, epoch + number, perceiver, config, number)
 
 
-def still_advisory(evidence: Evidence, config: Config) -> Advisory:
-    """What the advisor says of a still after it was shown long enough."""
-    state, advisory, _ = advise(AdvisorState(), evidence, evidence.source_us, config)
+def judged_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config, number: int = 0) -> Judgement:
+    """One still on its own, looked at once and presented to a fresh advisor eight times."""
+    evidence, mask = _perceive(perceiver, frame, epoch, number)
+    state, advisory, tracks = advise(AdvisorState(), evidence, evidence.source_us, config)
     for shown in range(1, PRESENTATIONS):
         stamp_us = evidence.source_us + shown * PRESENTATION_US
         again = msgspec.structs.replace(
@@ -60,8 +63,8 @@ def still_advisory(evidence: Evidence, config: Config) -> Advisory:
             media_us=evidence.media_us + shown * PRESENTATION_US,
             frame_seq=evidence.frame_seq + shown,
         )
-        state, advisory, _ = advise(state, again, stamp_us, config)
-    return advisory
+        state, advisory, tracks = advise(state, again, stamp_us, config)
+    return Judgement(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
 
 
 def _perceive(perceiver: Perceiver, frame: Frame, epoch: int, number: int) -> tuple[Evidence, Bytes | None]:

@@ -59,6 +59,10 @@ class Publisher(Generic[T]):
         self._publisher.put(self._encoder.encode(stamped))
         return stamped
 
+    def forward(self, data: bytes) -> None:
+        """Publish an encoded message as it is. For replays: they have a router of their own."""
+        self._publisher.put(data)
+
     def new_epoch(self) -> None:
         """The source began again: receivers forget what came before."""
         self._numbering.new_epoch()
@@ -94,13 +98,17 @@ class PicturePublisher(Publisher[m.PictureHeader]):
     def put_picture(self, header: m.PictureHeader, data: bytes) -> m.PictureHeader:
         """Publish encoded picture bytes; returns the header as sent."""
         stamped = self._stamp(header)
-        attachment = self._encoder.encode(stamped)
-        self._newest = (stamped, attachment, data)
+        self.forward_picture(stamped, data)
+        return stamped
+
+    def forward_picture(self, header: m.PictureHeader, data: bytes) -> None:
+        """Publish encoded picture bytes with the header as it is. For replays: they have a router of their own."""
+        attachment = self._encoder.encode(header)
+        self._newest = (header, attachment, data)
         if self._push:
-            self._publisher.put(data, attachment=attachment, encoding=zenoh.Encoding(stamped.media_type))
+            self._publisher.put(data, attachment=attachment, encoding=zenoh.Encoding(header.media_type))
         self._arrived.set()
         self._arrived = asyncio.Event()
-        return stamped
 
     def is_watched(self) -> bool:
         """Does anyone subscribe, or has anyone pulled lately? What nobody watches need not be drawn."""

@@ -50,19 +50,15 @@ class LogWriter:
         self.path, self.started_us = path, now_us
         self._file = path.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._writer.start(profile=PROFILE, library=f"paani {about.version}")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._viewer = viewer.Viewer()
         self._header = msgspec.json.Decoder(m.PictureHeader)
-        self._writer.add_metadata("paani", {"format": FORMAT, "started_us": str(now_us), **about.facts})
-        for name, data in about.attachments.items():
-            self._writer.add_attachment(now_us * 1000, now_us * 1000, name, "application/json", data)
-        for topic in topics:
-            self._add_topic(topic)
-        for name, kind in viewer.CHANNELS.items():
-            self._add_channel(name, PROTOBUF, kind, "viewer", 0.0)
-        self._file.flush()
+        try:
+            self._begin(about, topics)
+        except OSError:
+            self.abandon()
+            raise
 
     @property
     def size_bytes(self) -> int:
@@ -111,6 +107,18 @@ class LogWriter:
         """Close without a summary; `repair` adds it later."""
         with contextlib.suppress(OSError):
             self._file.close()
+
+    def _begin(self, about: About, topics: Iterable[keys.Topic[Any]]) -> None:
+        self._writer.start(profile=PROFILE, library=f"paani {about.version}")
+        self._writer.add_metadata("paani", {"format": FORMAT, "started_us": str(self.started_us), **about.facts})
+        started_ns = self.started_us * 1000
+        for name, data in about.attachments.items():
+            self._writer.add_attachment(started_ns, started_ns, name, "application/json", data)
+        for topic in topics:
+            self._add_topic(topic)
+        for name, kind in viewer.CHANNELS.items():
+            self._add_channel(name, PROTOBUF, kind, "viewer", 0.0)
+        self._file.flush()
 
     def _add(self, channel: int, log_us: int, publish_us: int, sequence: int, data: bytes) -> None:
         self._writer.add_message(channel, log_us * 1000, data, publish_us * 1000, sequence)

@@ -78,6 +78,7 @@ __all__ = [
     "Reason",
     "RecordedTopic",
     "RecorderState",
+    "Removal",
     "RotationUse",
     "Route",
     "SegmentationSource",

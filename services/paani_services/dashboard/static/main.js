@@ -11,6 +11,7 @@ import { connect } from "./socket.js";
 import { bindOrders, renderOrders, renewToken } from "./stop.js";
 import { Store } from "./store.js";
 import { renderTopbar } from "./topbar.js";
+import { renderTuning } from "./tuning.js";
 import { buildWhy, renderWhy } from "./why.js";
 
 const FRAME_MS = 100;
@@ -54,6 +55,7 @@ function render() {
   renderTopbar(store, open, now);
   renderOrders(store, open, now);
   if (document.hidden) return;
+  renderTuning(store, now);
   renderWhy(store, now);
   renderMotion(store, now);
   renderHealth(store, open, now);

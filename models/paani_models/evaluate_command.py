@@ -1,0 +1,104 @@
+"""`paani models evaluate`: the exported nets on held-out sequences, as figures, as JSON, or into the manifest."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from paani.errors import UserError
+from paani_models import evaluate
+from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
+from paani_models.detector_scores import ScoredBoxes, score_boxes
+from paani_models.estimates import (
+    Evaluation,
+    Measured,
+    box_confusion,
+    box_curves,
+    box_estimates,
+    mask_confusions,
+    mask_estimates,
+)
+from paani_models.pictures import Pictures
+from paani_models.segmenter_scores import ScoredMask, score_masks
+from paani_models.sources import DETECTOR_CLASSES
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Beside --data, --sources, --rendered and --weights."""
+    parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
+    parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    parser.add_argument("--json", type=Path, help="write figures with intervals, per source and sequence, to this file")
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Everything measured on labelled pictures, picture by picture."""
+
+    evaluation: Evaluation
+    masks: list[ScoredMask]
+    boxes: list[ScoredBoxes]
+
+
+def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
+    """Exit 0, or raise UserError."""
+    catalogue = load_catalogue(arguments.weights)
+    for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
+        if net not in catalogue or not is_scored(catalogue[net].classes):
+            raise UserError(f"{arguments.weights}: holds no segmenter or detector named {net!r}")
+        figures = measure(net, arguments.weights, pictures)
+        for figure in figures:
+            sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
+        if arguments.record:
+            catalogue = load_catalogue(arguments.weights)
+            model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
+            save_catalogue({**catalogue, net: model}, arguments.weights)
+    if arguments.json:
+        write(arguments.json, score(arguments.weights, pictures).evaluation)
+    return 0
+
+
+def is_scored(classes: tuple[str, ...]) -> bool:
+    """Whether a model of the manifest marks water or boxes: others are no matter of labelled pictures."""
+    return "water" in classes or classes == DETECTOR_CLASSES
+
+
+def measure(net: str, weights: Path, pictures: Pictures) -> list[Figure]:
+    """The manifest's figures of one net."""
+    path = verified_path(net, weights)
+    if "water" in load_catalogue(weights)[net].classes:
+        return evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
+    return [
+        *evaluate.detector_figures(path, pictures.boxed(held_out=True)),
+        *evaluate.false_alarm_figures(path, pictures.segmented(held_out=True)),
+    ]
+
+
+def score(weights: Path, pictures: Pictures) -> Scored:
+    """The shipped pair, picture by picture. Raises UserError where nothing is held out."""
+    segmented, boxed = pictures.segmented(held_out=True), pictures.boxed(held_out=True)
+    if not segmented and not boxed:
+        raise UserError("sources: nothing is held out")
+    catalogue = load_catalogue(weights)
+    masks = score_masks(verified_path("segmenter", weights), segmented) if segmented else []
+    boxes = score_boxes(verified_path("detector", weights), boxed) if boxed else []
+    evaluation = Evaluation(
+        models=tuple(Measured(name=n, sha256=catalogue[n].sha256) for n in ("segmenter", "detector") if n in catalogue),
+        estimates=(*mask_estimates(masks), *box_estimates(boxes)),
+        curves=box_curves(boxes),
+        confusions=(*mask_confusions(masks), *([box_confusion(boxes)] if boxes else [])),
+    )
+    return Scored(evaluation, masks, boxes)
+
+
+def write(path: Path, evaluation: Evaluation) -> None:
+    """Written beside, then renamed. Raises UserError naming a file that cannot be written."""
+    beside = path.with_name(path.name + ".partial")
+    try:
+        beside.write_bytes(msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")
+        beside.replace(path)
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from error

@@ -1,0 +1,313 @@
+"""Which evidence decided: the smallest sets without which the advice would be another (beyond checklist J13). Pure.
+
+A piece of evidence is an accepted track that overlaps a corridor, or the water of one corridor; water taken away means
+clear, certain water: N = 0 and U = 0. The policy is asked again about the same frame with the same memory, as if the
+pieces had been gone for as long as a turn is kept, because a turn that merely lasts has no evidence of its own.
+
+All sets of one size are judged at once: what stands where is worked out for every set, to the bit as `decide` does it,
+and the policy's own `direct` names the direction. Each set that is reported has then been put to `decide` itself.
+"""
+
+import functools
+import itertools
+import math
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import Config, RiskConfig
+from paani.messages import ChangedBy, Counterfactual, Direction, Lane, LaneEvidence, Limit, Reason, Removal
+from paani_services.advisor.policy import (
+    OTHER,
+    Decision,
+    PolicyState,
+    Standing,
+    better_side,
+    decide,
+    direct,
+    fills,
+    is_vessel_ahead,
+    limit_of,
+    place_in_center,
+    side_held,
+)
+from paani_services.advisor.risk import LANES, Obstacle, components, lane_span, overlap
+
+Flags = NDArray[np.bool_]  # one per set
+Numbers = NDArray[np.float64]  # one per set
+MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
+MAX_SHOWN = 3
+CLEAR_WATER = LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
+SIDES = (None, "left", "right")
+LIMITS = {"left": Limit.LEFT_RISK, "center": Limit.CENTER_RISK, "right": Limit.RIGHT_RISK}
+
+
+class Pieces(NamedTuple):
+    """What may be taken away, in the order of the bits: tracks by id, then lanes from the left."""
+
+    tracks: tuple[Obstacle, ...]
+    water: tuple[str, ...]
+    left_out: int
+
+    @property
+    def count(self) -> int:
+        return len(self.tracks) + len(self.water)
+
+
+def counterfactual(
+    state: PolicyState,
+    decision: Decision,
+    water: dict[str, LaneEvidence],
+    obstacles: tuple[Obstacle, ...],
+    config: Config,
+) -> Counterfactual:
+    """What would have changed the decision on one frame.
+
+    state: the policy's memory before the frame. water, obstacles: what `decision` was made from. The work is bounded:
+    no more than 24 tracks and three lanes, in sets of at most `advisor.counterfactual_size`.
+    """
+    if decision.direction is Direction.STRAIGHT:
+        return Counterfactual()
+    if decision.reason is Reason.TURN_RETAINED:
+        return Counterfactual(changed_by=ChangedBy.CLEAR_PICTURES)
+    limit, margin = nearest_limit(state, decision, obstacles, config)
+    pieces = pieces_of(water, obstacles, config)
+    scene = _scene(state, pieces, water, obstacles, config)
+    judged = 0
+    for size in range(1, min(config.advisor.counterfactual_size, pieces.count) + 1):
+        sets, kept = _sets(pieces.count, size)
+        judged += len(sets)
+        codes = _codes(scene, kept)
+        changing = np.flatnonzero(IS_NOT[decision.direction][codes])
+        if not changing.size:
+            continue
+        straight_first = changing[np.argsort(IS_NOT[Direction.STRAIGHT][codes[changing]], kind="stable")]
+        removals = [
+            _removal(pieces, sets[i], state, water, obstacles, config) for i in straight_first[:MAX_SHOWN].tolist()
+        ]
+        return Counterfactual(
+            changed_by=ChangedBy.EVIDENCE,
+            removals=tuple(removal for removal in removals if removal.direction is not decision.direction),
+            found=changing.size,
+            judged=judged,
+            left_out=pieces.left_out,
+            limit=limit,
+            margin=margin,
+        )
+    return Counterfactual(
+        changed_by=ChangedBy.MORE_EVIDENCE, judged=judged, left_out=pieces.left_out, limit=limit, margin=margin
+    )
+
+
+def direction_without(
+    track_ids: tuple[int, ...],
+    lanes: tuple[str, ...],
+    state: PolicyState,
+    water: dict[str, LaneEvidence],
+    obstacles: tuple[Obstacle, ...],
+    config: Config,
+) -> Direction:
+    """What the policy decides on the same frame without these tracks and without the water of these lanes."""
+    seen = tuple(o for o in obstacles if o.id not in track_ids)
+    parts = {lane: components(CLEAR_WATER if lane in lanes else water[lane], seen, lane, config) for lane in LANES}
+    patient = msgspec.structs.replace(state, clear_frames=config.advisor.policy.clear_frames)
+    return decide(patient, parts, seen, config)[1].direction
+
+
+def pieces_of(water: dict[str, LaneEvidence], obstacles: tuple[Obstacle, ...], config: Config) -> Pieces:
+    """Everything that weighs: what overlaps no corridor, and water that adds no risk, changes nothing."""
+    spans = [lane_span(lane, config.perception.corridors) for lane in LANES]
+    inside = [o for o in obstacles if any(overlap(o.box, span) > 0.0 for span in spans)]
+    inside.sort(key=lambda o: (-o.severity * o.presence, o.id))
+    return Pieces(
+        tracks=tuple(sorted(inside[:MAX_TRACKS], key=lambda o: o.id)),
+        water=tuple(lane for lane in LANES if water[lane].non_water > 0.0 or water[lane].uncertainty > 0.0),
+        left_out=max(0, len(inside) - MAX_TRACKS),
+    )
+
+
+def nearest_limit(
+    state: PolicyState, decision: Decision, obstacles: tuple[Obstacle, ...], config: Config
+) -> tuple[Limit, float]:
+    """The limit that changes the direction when it alone is crossed, and how far the number lies above it.
+
+    A lane that is blocked by more than its risk is not set free by its risk.
+    """
+    policy = config.advisor.policy
+    lanes = {"left": decision.left, "center": decision.center, "right": decision.right}
+    risks = {lane: lanes[lane].risk for lane in LANES}
+    standing = msgspec.structs.replace(decision.standing, kept=None)
+    vessel = any(is_vessel_ahead(o, config) for o in obstacles)
+    found: list[tuple[float, Limit]] = []
+    for lane in LANES:
+        limit = limit_of(lane, policy)
+        margin = risks[lane] - limit
+        if lanes[lane].occupied or (lane == "center" and vessel):
+            continue
+        across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
+        moved = msgspec.structs.replace(standing, better=better_side(state, across, policy), **{lane: margin < 0.0})
+        if direct(moved) is not decision.direction:
+            found.append((margin, LIMITS[lane]))
+    held, needed = side_held(state, policy)
+    other_side = msgspec.structs.replace(standing, better=OTHER[standing.better])
+    if direct(other_side) is not decision.direction:
+        found.append((risks[held] - risks[OTHER[held]] - needed, Limit.SIDE_GAIN))
+    if not found:
+        return Limit.NONE, 0.0
+    margin, nearest = min(found, key=lambda each: abs(each[0]))
+    return nearest, margin
+
+
+class _Lane(NamedTuple):
+    """One corridor. factors: per track inside, in order: its bit (None: stays) and its two factors of E.
+
+    water: the bit of its water (None: adds nothing). occupying: bits of the tracks that occupy it.
+    """
+
+    non_water: float
+    uncertainty: float
+    water: int | None
+    factors: tuple[tuple[int | None, float, float], ...]
+    occupying: tuple[int | None, ...]
+    limit: float
+
+
+class _Scene(NamedTuple):
+    """What every set of pieces is taken from. vessels, places: bits of those ahead, and of those at each place."""
+
+    lanes: dict[str, _Lane]
+    vessels: tuple[int | None, ...]
+    places: dict[str, tuple[int | None, ...]]
+    held: str
+    needed: float
+    weights: RiskConfig
+
+
+def _scene(
+    state: PolicyState,
+    pieces: Pieces,
+    water: dict[str, LaneEvidence],
+    obstacles: tuple[Obstacle, ...],
+    config: Config,
+) -> _Scene:
+    policy = config.advisor.policy
+    bit = {track.id: i for i, track in enumerate(pieces.tracks)}
+    wet = {lane: len(pieces.tracks) + i for i, lane in enumerate(pieces.water)}
+    lanes = {}
+    for lane, before in zip(LANES, state.occupied_frames, strict=True):
+        span = lane_span(lane, config.perception.corridors)
+        inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
+        filling = [o for o in obstacles if fills(o, lane, config)]
+        lasting = before + 1 >= policy.occupancy_frames
+        lanes[lane] = _Lane(
+            non_water=water[lane].non_water,
+            uncertainty=water[lane].uncertainty,
+            water=wet.get(lane),
+            factors=tuple(
+                (bit.get(o.id), 1.0 - o.severity * share * o.presence, 1.0 - o.urgency * share) for o, share in inside
+            ),
+            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
+            limit=limit_of(lane, policy),
+        )
+        if lane == "center":
+            places = [(place_in_center(o.box, policy), bit.get(o.id)) for o, _ in inside]
+    held, needed = side_held(state, policy)
+    return _Scene(
+        lanes=lanes,
+        vessels=tuple(bit.get(o.id) for o in obstacles if is_vessel_ahead(o, config)),
+        places={name: tuple(i for place, i in places if place == name) for name in ("core", "left", "right")},
+        held=held,
+        needed=needed,
+        weights=config.advisor.risk,
+    )
+
+
+def _codes(scene: _Scene, kept: Flags) -> NDArray[np.int64]:
+    """What stands where, for each set; kept: pieces x sets, False where the piece is taken away."""
+    count = kept.shape[1]
+
+    def any_left(bits: tuple[int | None, ...]) -> Flags:
+        if None in bits:
+            return np.ones(count, bool)
+        return np.logical_or.reduce(kept[list(bits)], axis=0)
+
+    def risk(lane: _Lane) -> Numbers:
+        obstacle, urgency = np.ones(count), np.ones(count)
+        for i, of_obstacle, of_urgency in lane.factors:
+            for product, factor in ((obstacle, of_obstacle), (urgency, of_urgency)):
+                if factor != 1.0:
+                    np.multiply(product, factor, out=product, where=True if i is None else kept[i])
+        wet = np.ones(count, bool) if lane.water is None else kept[lane.water]
+        weights = scene.weights
+        return np.minimum(
+            1.0,
+            weights.non_water * np.where(wet, lane.non_water, 0.0)
+            + weights.obstacle * np.clip(1.0 - obstacle, 0.0, 1.0)
+            + weights.urgency * np.clip(1.0 - urgency, 0.0, 1.0)
+            + weights.uncertainty * np.where(wet, lane.uncertainty, 0.0),
+        )
+
+    risks = {name: risk(lane) for name, lane in scene.lanes.items()}
+    blocked = {name: (risks[name] >= lane.limit) | any_left(lane.occupying) for name, lane in scene.lanes.items()}
+    center = scene.lanes["center"]
+    wet = np.ones(count, bool) if center.water is None else kept[center.water]
+    alone = scene.weights.non_water * center.non_water + scene.weights.uncertainty * center.uncertainty
+    core, left, right = (any_left(scene.places[name]) for name in ("core", "left", "right"))
+    edge = (left != right) & ~core & ~(wet & (alone >= center.limit))
+    gain = risks[scene.held] - risks[OTHER[scene.held]]
+    changes = (gain > 0.0) & (gain >= scene.needed)
+    codes: NDArray[np.int64] = (
+        blocked["left"] * 1
+        + (blocked["center"] | any_left(scene.vessels)) * 2
+        + blocked["right"] * 4
+        + (changes != (scene.held == "right")) * 8
+        + np.where(edge, np.where(left, 16, 32), 0)
+    )
+    return codes
+
+
+CODES = 48
+
+
+def _direction_of(code: int) -> Direction:
+    return direct(
+        Standing(
+            left=bool(code & 1),
+            center=bool(code & 2),
+            right=bool(code & 4),
+            better="right" if code & 8 else "left",
+            incursion=SIDES[code >> 4],
+        )
+    )
+
+
+IS_NOT = {
+    direction: np.array([_direction_of(code) is not direction for code in range(CODES)]) for direction in Direction
+}
+
+
+@functools.lru_cache(maxsize=3 * (MAX_TRACKS + len(LANES) + 1))
+def _sets(pieces: int, size: int) -> tuple[tuple[tuple[int, ...], ...], Flags]:
+    """All sets of a size, in order, and which pieces each keeps: pieces x sets."""
+    sets = tuple(itertools.combinations(range(pieces), size))
+    kept = np.ones((pieces, len(sets)), bool)
+    kept[np.array(sets).T, np.arange(len(sets))] = False
+    kept.flags.writeable = False
+    return sets, kept
+
+
+def _removal(
+    pieces: Pieces,
+    bits: tuple[int, ...],
+    state: PolicyState,
+    water: dict[str, LaneEvidence],
+    obstacles: tuple[Obstacle, ...],
+    config: Config,
+) -> Removal:
+    tracks = len(pieces.tracks)
+    ids = tuple(pieces.tracks[i].id for i in bits if i < tracks)
+    lanes = tuple(pieces.water[i - tracks] for i in bits if i >= tracks)
+    direction = direction_without(ids, lanes, state, water, obstacles, config)
+    return Removal(direction=direction, track_ids=ids, water=tuple(Lane(lane) for lane in lanes))

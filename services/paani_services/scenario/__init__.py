@@ -1,0 +1,1 @@
+"""The paper's offline scenarios on anybody's pictures, and generated trajectories."""

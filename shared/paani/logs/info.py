@@ -1,0 +1,198 @@
+"""What a recording holds, for people and for programs."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.logs.folder import KEEP, recordings
+from paani.logs.reader import Log, Record
+from paani.logs.repair import is_finished
+
+DROPPED = re.compile(r"\bdropped=(\d+)")
+MISSING = re.compile(r"\bmissing=(\d+)")
+MIB = 2**20
+
+
+class TopicInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """One channel: its rate while it spoke, its longest silence; dropped by the recorder, missing before it."""
+
+    topic: str
+    messages: int
+    rate_hz: float
+    gap_s: float
+    dropped: int = 0
+    missing: int = 0
+
+
+class ModelInfo(msgspec.Struct, frozen=True):
+    name: str
+    sha256: str
+
+
+class LogInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A recording. `direction_changes_per_min`: how often the advised direction became another; None without advice."""
+
+    path: str
+    files: int
+    size_bytes: int
+    start_us: int
+    duration_s: float
+    facts: dict[str, str]
+    versions: dict[str, str]
+    models: tuple[ModelInfo, ...]
+    topics: tuple[TopicInfo, ...]
+    advisories: int
+    direction_changes_per_min: float | None
+    problems: tuple[str, ...]
+
+
+class Model(msgspec.Struct):
+    name: str
+    sha256: str
+
+
+class Manifest(msgspec.Struct):
+    models: tuple[Model, ...] = ()
+
+
+class Heard:
+    """First, last and longest silence of one channel."""
+
+    def __init__(self, at_us: int) -> None:
+        self.first_us = self.last_us = at_us
+        self.gap_us = 0
+        self.messages = 1
+
+    def hear(self, at_us: int) -> None:
+        self.gap_us = max(self.gap_us, at_us - self.last_us)
+        self.last_us = at_us
+        self.messages += 1
+
+
+def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> LogInfo:
+    """Reads all of it. `seen` is told every record, for whoever shows progress."""
+    heard: dict[str, Heard] = {}
+    directions = Directions()
+    for record in log.records():
+        seen(record)
+        if record.topic in heard:
+            heard[record.topic].hear(record.log_us)
+        else:
+            heard[record.topic] = Heard(record.log_us)
+        if record.topic == keys.ADVISORY.name:
+            directions.take(record.data)
+    duration_s = (log.end_us - log.start_us) * 1e-6
+    lost = log.metadata_by_part("recorder")
+    return LogInfo(
+        path=str(log.path),
+        files=len(log.files),
+        size_bytes=sum(file.stat().st_size for file in log.files),
+        start_us=log.start_us,
+        duration_s=round(duration_s, 3),
+        facts={name: text for name, text in log.metadata("paani").items() if name not in {"started_us", "part"}},
+        versions=_versions(log.attachment("versions.json")),
+        models=_models(log.attachment("models.json")),
+        topics=tuple(
+            TopicInfo(
+                topic=name,
+                messages=one.messages,
+                rate_hz=round((one.messages - 1) * 1e6 / max(one.last_us - one.first_us, 1), 2),
+                gap_s=round(one.gap_us * 1e-6, 3),
+                dropped=_sum(DROPPED, lost, name),
+                missing=_sum(MISSING, lost, name),
+            )
+            for name, one in sorted(heard.items())
+        ),
+        advisories=directions.advisories,
+        direction_changes_per_min=round(60 * directions.changes / duration_s, 2) if directions.advisories else None,
+        problems=tuple(log.problems),
+    )
+
+
+class Directions:
+    """Counts how often the advised direction becomes another."""
+
+    def __init__(self) -> None:
+        self._decoder = msgspec.json.Decoder(m.Advisory)
+        self._last: m.Direction | None = None
+        self.advisories = self.changes = 0
+
+    def take(self, data: bytes) -> None:
+        """One advisory; what cannot be decoded does not count."""
+        try:
+            direction = self._decoder.decode(data).direction
+        except (msgspec.MsgspecError, UnicodeDecodeError):
+            return
+        self.changes += self._last not in {None, direction}
+        self._last = direction
+        self.advisories += 1
+
+
+def text_of(info: LogInfo) -> str:
+    """A page for a terminal."""
+    version = info.versions
+    lines = [
+        f"{info.path}: {info.files} {'file' if info.files == 1 else 'files'}, {info.size_bytes / MIB:.1f} MiB",
+        f"{moment(info.start_us)}, {info.duration_s:.1f} s",
+        ", ".join(f"{name} {text}" for name, text in info.facts.items()),
+        f"paani {version.get('paani', '?')}, commit {version.get('commit') or '?'}",
+        f"Python {version.get('python', '?')}, {version.get('platform', '?')}",
+        *(f"model {model.name} {model.sha256[:16]}" for model in info.models),
+    ]
+    if info.direction_changes_per_min is not None:
+        lines.append(f"{info.advisories} advisories, {info.direction_changes_per_min:g} changes of direction a minute")
+    lines += ["", f"{'topic':<32} {'messages':>9} {'rate [Hz]':>10} {'silent [s]':>11} {'dropped':>8} {'missing':>8}"]
+    lines += [
+        f"{t.topic:<32} {t.messages:>9} {t.rate_hz:>10.2f} {t.gap_s:>11.2f} {t.dropped:>8} {t.missing:>8}"
+        for t in info.topics
+    ]
+    lines += ["", *(f"problem: {problem}" for problem in info.problems)] if info.problems else []
+    return "\n".join(lines) + "\n"
+
+
+def list_text(folder: Path) -> str:
+    """One line for each recording of a folder."""
+    lines = []
+    for path, size, kept in recordings(folder):
+        state = "damaged original" if path.suffix != ".mcap" else "finished" if _whole(path) else "unfinished"
+        lines.append(f"{path.name:<32} {size / MIB:>9.1f} MiB  {state}{f', kept ({KEEP})' if kept else ''}")
+    return "\n".join(lines) + "\n"
+
+
+def moment(at_us: int) -> str:
+    """A stamp in words."""
+    return datetime.datetime.fromtimestamp(at_us * 1e-6, tz=datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def _whole(path: Path) -> bool:
+    try:
+        return is_finished(path)
+    except OSError:
+        return False
+
+
+def _sum(pattern: re.Pattern[str], records: Iterable[dict[str, str]], topic: str) -> int:
+    texts = (record.get(topic, "") for record in records)
+    return sum(int(found[1]) for text in texts if (found := pattern.search(text)))
+
+
+def _versions(data: bytes | None) -> dict[str, str]:
+    try:
+        return msgspec.json.decode(data or b"{}", type=dict[str, str])
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        return {}
+
+
+def _models(data: bytes | None) -> tuple[ModelInfo, ...]:
+    try:
+        manifest = msgspec.json.decode(data or b"{}", type=Manifest)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        return ()
+    return tuple(ModelInfo(model.name, model.sha256) for model in manifest.models)

@@ -1,0 +1,162 @@
+"""The real recorder on a real bus: what was put is in the file, to the byte, and the sums are right."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Queue
+from paani.clock import WallClock
+from paani.logs.reader import open_log
+from paani.logs.repair import is_finished
+from tests.conftest import OpenAs, Spawn, put_raw
+from tests.unit.small_logs import JPEG, unfinished
+
+pytestmark = pytest.mark.integration
+CLOCK = WallClock()
+
+
+def odometry(number: int) -> m.Odometry:
+    return m.Odometry(source_us=CLOCK.now_us(), x_m=float(number), y_m=0.0, yaw_rad=0.0, surge_mps=0.0)
+
+
+async def state_when(states: Queue[m.RecorderState], condition: object) -> m.RecorderState:
+    async with asyncio.timeout(10):
+        while True:
+            state = await states.get()
+            if callable(condition) and condition(state):
+                return state
+
+
+@contextlib.asynccontextmanager
+async def recording(spawn: Spawn, open_as: OpenAs, folder: Path, *sets: str) -> AsyncIterator[Queue[m.RecorderState]]:
+    states = (await open_as("observer")).queue(keys.RECORDER_STATE)
+    async with spawn("recorder", f"recorder.folder={folder}", "recorder.min_free_mib=0", *sets):
+        yield states
+
+
+def one_file(folder: Path) -> Path:
+    [path] = folder.glob("*.mcap")
+    return path
+
+
+async def test_what_was_on_the_bus_is_in_the_file(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+    """P3: produced = written + dropped, by the numbers of the producers."""
+    localization, camera, plant = [await open_as(name) for name in ("localization", "camera", "plant")]
+    async with recording(spawn, open_as, tmp_path / "r") as states:
+        poses, pictures = localization.publisher(keys.ODOMETRY), camera.picture_publisher(keys.PICTURE)
+        truth = plant.publisher(keys.TRUE_POSE)
+        sent: list[bytes] = []
+        for number in range(200):
+            sent.append(msgspec.json.encode(poses.put(odometry(number))))
+            if number % 10 == 0:
+                header = m.PictureHeader(
+                    source_us=CLOCK.now_us(), frame_seq=number, frame_epoch=1, width_px=320, height_px=240
+                )
+                last = pictures.put_picture(header, JPEG)
+            await asyncio.sleep(0.005)
+        truth.put(
+            m.TruePose(
+                source_us=CLOCK.now_us(), sim_us=0, x_m=0, y_m=0, z_m=0, roll_rad=0, pitch_rad=0, yaw_rad=0,
+                surge_mps=0, sway_mps=0, yaw_rate_radps=0,
+            )
+        )  # fmt: skip
+        put_raw(localization, keys.ODOMETRY.name, b"\xff is no message")
+        state = await state_when(
+            states, lambda s: any(t.topic == "localization/odometry" and t.written == 201 for t in s.topics)
+        )
+        assert (state.recording, state.problem, state.dropped, state.missing) == (True, "", 0, 0)
+        assert (tmp_path / "r" / state.file).is_file()
+        assert next(t for t in state.topics if t.topic == "localization/odometry").unreadable == 1
+    path = one_file(tmp_path / "r")
+    assert is_finished(path)
+    log = open_log(path)
+    assert log.problems == []
+    assert [record.data for record in log.records(["localization/odometry"])] == sent
+    assert [record.data for record in log.records(["localization/odometry/unreadable"])] == [b"\xff is no message"]
+    headers = [record.data for record in log.records(["camera/picture/header"])]
+    assert len(headers) == 20
+    assert headers[-1] == msgspec.json.encode(last)
+    assert log.topics["@truth/pose"] == 1
+    assert log.metadata("recorder")["localization/odometry"] == "written=201 dropped=0 missing=0 unreadable=1"
+    assert log.topics["recorder/state"] >= 1
+    assert log.config().recorder.folder == str(tmp_path / "r")
+
+
+async def test_numbers_that_never_came_are_missing(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+    localization = await open_as("localization")
+    async with recording(spawn, open_as, tmp_path) as states:
+        for seq in (0, 1, 2, 7, 8):
+            pose = msgspec.structs.replace(odometry(seq), seq=seq, epoch=3)
+            put_raw(localization, keys.ODOMETRY.name, msgspec.json.encode(pose))
+            await asyncio.sleep(0.02)
+        await state_when(states, lambda s: s.missing == 4)
+    assert open_log(tmp_path).metadata("recorder")["localization/odometry"].startswith("written=5 dropped=0 missing=4")
+
+
+async def test_pictures_go_before_anything_else(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+    """P3: a queue of 20 messages takes bursts of pictures; what was dropped is counted, on the bus and in the file."""
+    localization, camera = [await open_as(name) for name in ("localization", "camera")]
+    async with recording(spawn, open_as, tmp_path, "recorder.queue_messages=20") as states:
+        poses, pictures = localization.publisher(keys.ODOMETRY), camera.picture_publisher(keys.PICTURE)
+        for burst in range(5):
+            for number in range(40):
+                pictures.put_picture(
+                    m.PictureHeader(
+                        source_us=CLOCK.now_us(), frame_seq=number, frame_epoch=burst, width_px=320, height_px=240
+                    ),
+                    JPEG,
+                )
+            poses.put(odometry(burst))
+            await asyncio.sleep(0.2)
+        await state_when(
+            states, lambda s: sum(t.written + t.dropped for t in s.topics if t.topic == "camera/picture") == 200
+        )
+    told = open_log(tmp_path).metadata("recorder")
+    written, dropped, missing, _ = (int(word.partition("=")[2]) for word in told["camera/picture"].split())
+    assert written == open_log(tmp_path).topics["camera/picture"]
+    assert (written + dropped, missing) == (200, 0)
+    assert dropped > 0
+    assert told["localization/odometry"].startswith("written=5 dropped=0")
+
+
+async def test_an_unfinished_file_is_mended_while_the_next_is_written(
+    open_as: OpenAs, spawn: Spawn, tmp_path: Path
+) -> None:
+    torn = unfinished(tmp_path, 40, 10)
+    async with recording(spawn, open_as, tmp_path) as states:
+        await state_when(states, lambda s: s.recording)
+        async with asyncio.timeout(10):
+            while not is_finished(torn):
+                await asyncio.sleep(0.05)
+    assert [record.seq for record in open_log(torn).records(["localization/odometry"])] == list(range(40))
+    assert len(list(tmp_path.glob("*.mcap"))) == 2
+
+
+async def test_a_full_disk_is_said_and_nothing_is_written(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+    bus: Bus = await open_as("observer")
+    states = bus.queue(keys.RECORDER_STATE)
+    async with spawn("recorder", f"recorder.folder={tmp_path}", "recorder.min_free_mib=900000000"):
+        state = await state_when(states, lambda s: not s.recording)
+    assert "recorder.min_free_mib" in state.problem
+    assert list(tmp_path.glob("*.mcap")) == []
+
+
+async def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    (tmp_path / "file").touch()
+    words = [word for setting in private_sets for word in ("--set", setting)]
+    for folder, told in ((tmp_path / "file" / "x", "Not a directory"), ("", "not set")):
+        process = await asyncio.create_subprocess_exec(
+            "timeout", "30", "paani", "recorder", *words, "--set", f'recorder.folder="{folder}"',
+            stderr=asyncio.subprocess.PIPE,
+        )  # fmt: skip
+        _, errors = await process.communicate()
+        assert process.returncode == 2
+        assert told in errors.decode()
