@@ -44,7 +44,7 @@ def of_sums(
 
 
 def of_items(
-    sequences: Sequence[Sequence[Item]], measure: Callable[[list[Item]], float], replicates: int = REPLICATES
+    sequences: Sequence[list[Item]], measure: Callable[[list[Item]], float], replicates: int = REPLICATES
 ) -> tuple[float, float]:
     """The interval of a figure of many items. sequences: the items of each sequence."""
     if len(sequences) < 2:

@@ -57,7 +57,7 @@ class Origin(Record, frozen=True):
 
 
 class Model(Record, frozen=True):
-    """One model file and everything needed to trust and feed it."""
+    """One model file and everything needed to trust and feed it. seed: of its training, where it was trained here."""
 
     name: str
     file: str
@@ -72,6 +72,7 @@ class Model(Record, frozen=True):
     architecture: str
     licence: str
     origins: tuple[Origin, ...] = ()
+    seed: int | None = None
     export_max_abs_diff: float = 0.0
     figures: tuple[Figure, ...] = ()
 

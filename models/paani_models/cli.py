@@ -15,6 +15,7 @@ from paani_models import evaluate_command
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.data import command as data_command
 from paani_models.pictures import Pictures
+from paani_models.report import command as report_command
 
 DATA_VARIABLE = "PAANI_DATA"
 TRAINED = ("segmenter", "paper-segmenter", "detector", "gate")
@@ -40,6 +41,8 @@ def main(argv: list[str]) -> int:
             return data_command.make_bundle(arguments, _pictures(arguments))
         if arguments.command == "evaluate":
             return evaluate_command.run(arguments, _pictures(arguments))
+        if arguments.command == "report":
+            return report_command.run(arguments, _pictures(arguments))
         return _needs_torch(arguments)
     except UserError as error:
         sys.stderr.write(f"paani models: {error}\n")
@@ -79,9 +82,11 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--checkpoint", type=Path, required=True)
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
-    for command in (export, evaluate):
+    report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
+    report_command.add_arguments(report)
+    for command in (export, evaluate, report):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-    for command in (check_data, pack, train, export, evaluate):
+    for command in (check_data, pack, train, export, evaluate, report):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")

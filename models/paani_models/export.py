@@ -30,7 +30,7 @@ from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
 from paani_models.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
-from paani_models.training import load_average
+from paani_models.training import load_average, load_checkpoint
 
 OPSET = 17  # checklist T1
 TOLERANCE = 1e-3  # checklist T2
@@ -126,6 +126,7 @@ def export(
         parameters=parameter_count(net),
         export_max_abs_diff=float(f"{difference:.2e}"),
         origins=origins,
+        seed=load_checkpoint(checkpoint)["recipe"]["seed"],
     )
     catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
     beside.replace(folder / contract.file)

@@ -101,7 +101,8 @@ class DetectorTraining:
         while self.progress.epoch < (self.recipe.epochs if until is None else until):
             box_loss, score_loss = self._train_epoch()
             figures = figures_by_class(self.progress.average.model, self.held_out)
-            record = {"epoch": self.progress.epoch + 1, "box_loss": box_loss, "score_loss": score_loss, **figures}
+            losses = {"box_loss": box_loss, "score_loss": score_loss}
+            record = {"epoch": self.progress.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
             append_record(self.folder / "epochs.jsonl", record)
             ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
             self.progress.finish_epoch(self.folder, recipe, float(np.mean(ap50)) if ap50 else 0.0)

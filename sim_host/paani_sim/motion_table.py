@@ -2,8 +2,9 @@
 
 A moment counts as a *closing* one when, over as long as the rule needs (1.5 s, or six periods between frames if that is
 more), the thing was whole in the picture, at least 16 px in size, and its range shrank by 8 % a second or more, twice
-the estimator's dead band. Misses, gaps and mistaken boxes do not excuse a moment. A state is *wrong* when it says that
-a thing approaches or recedes which did not over that time.
+the estimator's dead band. Missed, dropped and mistaken boxes do not excuse a moment. A state is *wrong* when it says
+that a thing approaches or recedes which did not over the time that the state is measured over, and *late* when it was
+right over that time but no longer over the last half second.
 """
 
 import math
@@ -24,6 +25,8 @@ from paani_sim.eye.camera import Camera
 RATES_HZ = (0.5, 1.0, 2.0, 4.0, 5.0, 10.0)
 MIN_CLOSING_PER_S = 0.08
 MIN_SIZE_PX = 16.0
+STILL_PER_S = 1e-9
+NOW_S = 0.5
 STEP_S = 0.2  # the advisor's own period
 LATENCY_S = 0.25  # from picture to evidence
 YAW_STD_RAD, YAW_RATE_STD_RADPS = 0.002, 0.004
@@ -39,8 +42,8 @@ class MotionRow(msgspec.Struct, frozen=True, kw_only=True):
 
     closing: moments whose truth is that the thing closes in. known_frac: of those, motion not unknown;
     known_tracks_frac: tracks with such moments that were known for at least half of them. judged: moments with any
-    state but unknown, in or out of those; wrong_frac: of those. identities: per thing. causes: of unknown at closing
-    moments, most frequent first.
+    state but unknown, in or out of those; wrong_frac and late_frac: of those. identities: per thing. causes: of unknown
+    at closing moments, most frequent first.
     """
 
     profile: str
@@ -52,13 +55,14 @@ class MotionRow(msgspec.Struct, frozen=True, kw_only=True):
     judged: int
     wrong: int
     wrong_frac: float
+    late_frac: float
     identities: float
     causes: tuple[tuple[m.MotionCause, int], ...]
 
 
 class _Tally:
     def __init__(self) -> None:
-        self.closing = self.known = self.judged = self.wrong = self.identities = self.things = 0
+        self.closing = self.known = self.judged = self.wrong = self.late = self.identities = self.things = 0
         self.tracks = self.known_tracks = 0
         self.causes: Counter[m.MotionCause] = Counter()
 
@@ -89,14 +93,14 @@ def text_of(rows: list[MotionRow]) -> str:
     """The table."""
     lines = [
         f"{'profile':<14} {'rate [Hz]':>9} {'family':<17} {'closing':>7} {'known':>6} {'tracks':>6} {'judged':>7}"
-        f" {'wrong':>12} {'ids':>5}  causes of unknown"
+        f" {'wrong':>12} {'late':>6} {'ids':>5}  causes of unknown"
     ]
     for row in rows:
         causes = ", ".join(f"{cause} {count}" for cause, count in row.causes[:3])
         known = f"{row.known_frac:6.1%} {row.known_tracks_frac:6.1%}" if row.closing else f"{'-':>6} {'-':>6}"
         lines.append(
             f"{row.profile:<14} {row.rate_hz:>9g} {row.family:<17} {row.closing:>7} {known} {row.judged:>7}"
-            f" {row.wrong:>5} {row.wrong_frac:6.2%} {row.identities:>5.2f}  {causes}"
+            f" {row.wrong:>5} {row.wrong_frac:6.2%} {row.late_frac:6.2%} {row.identities:>5.2f}  {causes}"
         )
     return "\n".join(lines) + "\n"
 
@@ -130,9 +134,10 @@ def _encounter(
         motion = m.MotionState.UNKNOWN if track is None else track.motion
         if motion is not m.MotionState.UNKNOWN:
             tally.judged += 1
-            tally.wrong += (motion is m.MotionState.APPROACHING and shrank <= 1e-9) or (
-                motion is m.MotionState.RECEDING and shrank >= -1e-9
-            )
+            if _contradicts(motion, _closing_per_s(given, frame.at_s, tracks.motion_history_s)):
+                tally.wrong += 1
+            elif _contradicts(motion, _closing_per_s(given, frame.at_s, NOW_S)):
+                tally.late += 1
         since = [f for f in frames[: number + 1] if frame.at_s - need_s <= f.at_s]
         if (
             frame.at_s >= need_s
@@ -157,6 +162,12 @@ def _closing_per_s(given: Course, at_s: float, over_s: float) -> float:
     if at_s - start_s < 1e-6:
         return 0.0
     return (math.log(range_at(given, start_s)) - math.log(range_at(given, at_s))) / (at_s - start_s)
+
+
+def _contradicts(motion: m.MotionState, closing_per_s: float) -> bool:
+    if motion is m.MotionState.APPROACHING:
+        return closing_per_s <= STILL_PER_S
+    return motion is m.MotionState.RECEDING and closing_per_s >= -STILL_PER_S
 
 
 def _track_of(frame: Look, tracks: m.Tracks) -> m.Track | None:
@@ -210,6 +221,7 @@ def _row(profile: str, rate_hz: float, family: Family, tally: _Tally) -> MotionR
         judged=tally.judged,
         wrong=tally.wrong,
         wrong_frac=tally.wrong / max(1, tally.judged),
+        late_frac=tally.late / max(1, tally.judged),
         identities=tally.identities / max(1, tally.things),
         causes=tuple(sorted(tally.causes.items(), key=lambda item: (-item[1], item[0]))),
     )

@@ -27,7 +27,7 @@ def test_nothing_yet_is_no_data() -> None:
     _, advisory, tracks = advise(AdvisorState(), None, T0_US, PAANI)
     assert (advisory.direction, advisory.reason) == (D.NO_DATA, R.NO_EVIDENCE)
     assert tracks.tracks == ()
-    assert advisory.explanation == "No advice: nothing has been seen yet."
+    assert advisory.explanation == "No advice: nothing has been seen yet. Only new evidence can change that."
 
 
 @pytest.mark.parametrize(
@@ -144,14 +144,18 @@ def test_j11_everything_that_decided_is_in_the_advisory() -> None:
 def test_j12_the_explanation_is_made_last_from_the_same_numbers() -> None:
     """J12: after hysteresis and after the age override, and it quotes the lanes that decided."""
     state, advice, _ = play([water(0.10, 0.50, 0.40), CLEAR])
-    assert advice[0].explanation == ("Turn left: centre risk 0.50 (limit 0.48); left 0.10, right 0.40 (limit 0.58).")
+    assert advice[0].explanation == (
+        "Turn left: centre risk 0.50 (limit 0.48); left 0.10, right 0.40 (limit 0.58). "
+        "With clear water in the centre it would go STRAIGHT."
+    )
     assert advice[1].explanation == (
-        "Turn left: keeping the turn until the way ahead stays clear, centre risk 0.05 (limit 0.48)."
+        "Turn left: keeping the turn until the way ahead stays clear, centre risk 0.05 (limit 0.48). "
+        "Nothing in the picture asks for it any more."
     )
     _, late, _ = advise(state, state.evidence, T0_US + 2_200_000, PAANI)
-    assert late.explanation == "Stop: the last picture is 2.0 s old."
+    assert late.explanation == "Stop: the last picture is 2.0 s old. Only new evidence can change that."
     black = msgspec.structs.replace(CLEAR, usable=False, cause=m.UnusableCause.BLACK)
-    assert at(black, 0.1).explanation == "Stop: the picture is black."
+    assert at(black, 0.1).explanation == "Stop: the picture is black. Only new evidence can change that."
 
 
 def test_b17_reasons_of_different_kinds_never_share_a_code() -> None:

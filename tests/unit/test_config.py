@@ -55,7 +55,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("rate_hz", "accepted"), [(0.5, False), (2.0, False), (3.0, True)])
 def test_a_rate_that_starves_the_motion_estimator_is_refused_i22(rate_hz: float, accepted: bool) -> None:
-    sets = [f"perception.rate_hz={rate_hz}", "advisor.motion.follow_rate=false"]
+    sets = [f"perception.rate_hz={rate_hz}", "advisor.motion.follow_rate=false", "advisor.motion.history_s=1.5"]
     if accepted:
         load_config(sets=sets)
     else:

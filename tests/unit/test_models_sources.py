@@ -7,7 +7,10 @@ import pytest
 
 from paani.errors import UserError
 from paani_models.cli import data_folder
+from paani_models.pictures import Pictures
 from paani_models.sources import (
+    ANNOTATIONS,
+    DETECTOR_CLASSES,
     SOURCES,
     Source,
     choose,
@@ -82,3 +85,21 @@ def test_no_picture_is_on_both_sides_r8() -> None:
         sides = [{s.picture for s in samples if getattr(s, kind) and s.held_out == side} for side in (True, False)]
         assert sides[0]
         assert not sides[0] & sides[1]
+
+
+def test_every_drawn_box_is_a_pier_inside_its_picture() -> None:
+    drawn = sorted(ANNOTATIONS.glob("*/*.txt"))
+    assert len(drawn) > 100
+    for path in drawn:
+        assert (read_boxes(path)[:, 0] == DETECTOR_CLASSES.index("pier")).all(), path
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_drawn_boxes_belong_to_pictures_and_a_held_out_place_is_not_trained_on() -> None:
+    pictures = Pictures(data_folder(), [], None)
+    labels = {s.label for s in pictures.samples if s.source.drawn}
+    assert labels == set(ANNOTATIONS.glob("*/*.txt"))
+    held_out = {s.picture for s in pictures.boxed(held_out=True) if s.source.drawn}
+    assert 8 <= len(held_out) <= 20
+    assert not held_out & {s.picture for s in pictures.boxed(held_out=False)}

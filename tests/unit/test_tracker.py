@@ -8,10 +8,9 @@ import msgspec
 import pytest
 
 from paani import messages as m
-from paani.config import MotionConfig
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.advisor.association import associate, iou
-from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe, window_for
+from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe
 from paani_services.advisor.tracker import HAZARDS
 from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing
 
@@ -169,8 +168,8 @@ def test_i2_margin_by_hand() -> None:
     for i, y in enumerate((0.0, 0.1, 0.0, 0.1, 0.0)):
         half = 0.1 * math.exp(y)
         xyxy = (0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half)
-        history = observe(history, Sighting(i * 200_000, xyxy, y, 0.8, False), WINDOW, MotionConfig())
-    found = estimate(history, 800_000, WINDOW, MotionConfig())
+        history = observe(history, Sighting(i * 200_000, xyxy, y, 0.8, False), WINDOW, PAPER.advisor.motion)
+    found = estimate(history, 800_000, WINDOW, PAPER.advisor.motion)
     assert found.rate_per_s == pytest.approx(0.0, abs=1e-12)
     assert found.margin_per_s == pytest.approx(0.3)
     assert (found.state, found.cause) == (S.UNKNOWN, C.LOW_QUALITY)  # I7, I8: 0.8 * 5/8 * 1 * .04/.3 = 0.067
@@ -178,13 +177,13 @@ def test_i2_margin_by_hand() -> None:
 
 def test_i5_i6_samples() -> None:
     """I5: 1.5 s and 24 samples at most; I6: five over 0.4 s at least."""
-    _, _, tracks = play(growing(0.3, 5))
+    _, _, tracks = play(growing(0.3, 5), PAPER)
     assert [frame.tracks[0].motion_cause for frame in tracks] == [C.TOO_FEW_SAMPLES] * 4 + [C.NONE]
-    _, _, tracks = play(growing(0.3, 5, 0.05), period_s=0.05)
+    _, _, tracks = play(growing(0.3, 5, 0.05), PAPER, period_s=0.05)
     assert tracks[-1].tracks[0].motion_cause is C.TOO_SHORT
-    state, _, _ = play(growing(0.1, 40, 0.02), period_s=0.02)
+    state, _, _ = play(growing(0.1, 40, 0.02), PAPER, period_s=0.02)
     assert len(state.tracker.tracks[0].identity.motion.samples) == 24
-    state, _, _ = play(growing(0.1, 20))
+    state, _, _ = play(growing(0.1, 20), PAPER)
     assert len(state.tracker.tracks[0].identity.motion.samples) == 8
 
 
@@ -206,8 +205,8 @@ def test_resets_by_the_box(last: m.Detection, cause: m.MotionCause) -> None:
     """I10, I11, I13: each with its code."""
     before = [seeing(box(BUOY, (0.44, 0.44, 0.56, 0.56)))] * 6
     if cause is C.CLIPPED_BY_FRAME:
-        before = [seeing(box(BUOY, (0.01, 0.44, 0.56, 0.56)))] * 6
-    _, _, tracks = play([*before, seeing(last)])
+        before = [seeing(box(BUOY, (0.02, 0.44, 0.56, 0.56)))] * 6
+    _, _, tracks = play([*before, seeing(last)], PAPER)
     assert tracks[5].tracks[0].motion_cause is C.NONE
     assert (tracks[6].tracks[0].motion, tracks[6].tracks[0].motion_cause) == (S.UNKNOWN, cause)
 
@@ -258,10 +257,3 @@ def test_i22_the_papers_rate_starves_the_estimator() -> None:
     assert paper[-1].tracks[0].motion_cause is C.GAP
     _, _, paani = play(frames, PAANI, period_s=2.0)
     assert paani[-1].tracks[0].motion is S.APPROACHING
-
-
-def test_the_window_follows_a_slow_period() -> None:
-    """Resolution 2: max(1.5, 6T) and max(0.75, 2.5T) above 0.3 s."""
-    assert window_for(0.2, MotionConfig()) == WINDOW
-    assert window_for(0.5, MotionConfig()) == Window(3.0, 1.25)
-    assert window_for(0.5, MotionConfig(follow_rate=False)) == WINDOW

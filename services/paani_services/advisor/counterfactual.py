@@ -52,7 +52,7 @@ class Pieces(NamedTuple):
     left_out: int
 
     @property
-    def count(self) -> int:
+    def all(self) -> int:
         return len(self.tracks) + len(self.water)
 
 
@@ -76,8 +76,8 @@ def counterfactual(
     pieces = pieces_of(water, obstacles, config)
     scene = _scene(state, pieces, water, obstacles, config)
     judged = 0
-    for size in range(1, min(config.advisor.counterfactual_size, pieces.count) + 1):
-        sets, kept = _sets(pieces.count, size)
+    for size in range(1, min(config.advisor.counterfactual_size, pieces.all) + 1):
+        sets, kept = _sets(pieces.all, size)
         judged += len(sets)
         codes = _codes(scene, kept)
         changing = np.flatnonzero(IS_NOT[decision.direction][codes])
@@ -211,8 +211,8 @@ def _scene(
             occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
             limit=limit_of(lane, policy),
         )
-        if lane == "center":
-            places = [(place_in_center(o.box, policy), bit.get(o.id)) for o, _ in inside]
+    middle = lane_span("center", config.perception.corridors)
+    places = [(place_in_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]
     held, needed = side_held(state, policy)
     return _Scene(
         lanes=lanes,
@@ -229,9 +229,11 @@ def _codes(scene: _Scene, kept: Flags) -> NDArray[np.int64]:
     count = kept.shape[1]
 
     def any_left(bits: tuple[int | None, ...]) -> Flags:
-        if None in bits:
-            return np.ones(count, bool)
-        return np.logical_or.reduce(kept[list(bits)], axis=0)
+        found: Flags = np.full(count, None in bits)
+        for i in bits:
+            if i is not None:
+                found |= kept[i]
+        return found
 
     def risk(lane: _Lane) -> Numbers:
         obstacle, urgency = np.ones(count), np.ones(count)

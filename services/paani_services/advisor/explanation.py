@@ -39,6 +39,7 @@ INSTEAD = {
     Direction.NO_DATA: "give no advice",
 }
 LANE_NAMES = {Lane.LEFT: "left", Lane.CENTER: "centre", Lane.RIGHT: "right"}
+WATERS = {Lane.LEFT: "on the left", Lane.CENTER: "in the centre", Lane.RIGHT: "on the right"}
 MAX_LENGTH = 400  # of `Text`
 
 
@@ -75,7 +76,7 @@ def _without(removal: Removal, advisory: Advisory, tracks: tuple[Track, ...]) ->
         ]
         parts.append(f"without {_and(names)}")
     if removal.water:
-        parts.append(f"with clear water {_and([LANE_NAMES[lane] for lane in removal.water])}")
+        parts.append(f"with clear water {_and([WATERS[lane] for lane in removal.water])}")
     condition = " and ".join(parts)
     return f"{condition[0].upper()}{condition[1:]} it would {INSTEAD[removal.direction]}."
 

@@ -3,14 +3,13 @@
 import msgspec
 
 from paani.config import Config, PolicyConfig
-from paani.messages import BoxXyxy, Counterfactual, Direction, LaneRisk, Reason
+from paani.messages import SIDE_OF, BoxXyxy, Counterfactual, Direction, LaneRisk, Reason
 from paani_services.advisor.association import area
 from paani_services.advisor.risk import LANES, Components, Obstacle, lane_span, overlap, shared_width
 
 SEEN_ENOUGH = 0.5  # an obstacle fainter than this has been out of sight too long to occupy a lane
 TURNS = {"left": Direction.LEFT, "right": Direction.RIGHT}
 SLIGHT_TURNS = {"left": Direction.SLIGHT_LEFT, "right": Direction.SLIGHT_RIGHT}
-SIDE_OF = {turn: side for turns in (TURNS, SLIGHT_TURNS) for side, turn in turns.items()}
 OTHER = {"left": "right", "right": "left"}
 
 

@@ -16,7 +16,13 @@ PAPER: dict[str, object] = {
     },
     "advisor": {
         "evidence_max_age_s": 3.5,  # J16, M10: the advisory outlives its frame at 0.5 Hz
-        "motion": {"follow_rate": False, "compensate_rotation": False},  # I22, I19
+        "motion": {
+            "follow_rate": False,  # I22
+            "history_s": 1.5,  # I5
+            "min_duration_s": 0.4,  # I6
+            "shape_change_hits": 1,  # I13
+            "compensate_rotation": False,  # I19
+        },
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
     },
     "navigator": {

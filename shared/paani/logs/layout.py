@@ -17,6 +17,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 PROFILE = "paani"
+FORMAT = 1
 MAX_CHUNK_BYTES = 1 << 30
 DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, ArithmeticError, MemoryError, RuntimeError)
 

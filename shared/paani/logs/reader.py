@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from paani.config import Config, decode_config
 from paani.errors import UserError
-from paani.logs.layout import Layout, Span, messages_in, span_bytes
+from paani.logs.layout import FORMAT, PROFILE, Layout, Span, messages_in, span_bytes
 from paani.logs.locate import layout_of
 
 SUFFIX = ".mcap"
@@ -117,6 +117,7 @@ def open_log(path: Path) -> Log:
     for file in files:
         try:
             layout = layout_of(file)
+            _require_known_format(layout)
         except UserError as error:
             if len(files) == 1:
                 raise
@@ -129,6 +130,13 @@ def open_log(path: Path) -> Log:
     parts.sort(key=lambda part: min((span.start_us for span in part.spans), default=0))
     _require_one_drive(path, parts)
     return Log(path, tuple(parts), problems)
+
+
+def _require_known_format(layout: Layout) -> None:
+    """Later formats may say other things in the same words."""
+    told = layout.metadata.get(PROFILE, {}).get("format", "")
+    if told.isdecimal() and int(told) > FORMAT:
+        raise UserError(f"{layout.path}: recorded in format {told}; this program reads up to {FORMAT}")
 
 
 def _require_one_drive(path: Path, parts: list[Layout]) -> None:

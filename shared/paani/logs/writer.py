@@ -16,11 +16,10 @@ from mcap.writer import CompressionType, Writer
 from paani import keys
 from paani import messages as m
 from paani.logs import protobuf, viewer
-from paani.logs.layout import PROFILE
+from paani.logs.layout import FORMAT, PROFILE
 from paani.logs.schema import json_schema
 from paani.messages.header import Count, Stamp
 
-FORMAT = "1"
 CHUNK_BYTES = 256 * 1024
 HEADER, UNREADABLE = "/header", "/unreadable"
 JSON, PROTOBUF = "json", "protobuf"
@@ -110,7 +109,7 @@ class LogWriter:
 
     def _begin(self, about: About, topics: Iterable[keys.Topic[Any]]) -> None:
         self._writer.start(profile=PROFILE, library=f"paani {about.version}")
-        self._writer.add_metadata("paani", {"format": FORMAT, "started_us": str(self.started_us), **about.facts})
+        self._writer.add_metadata("paani", {"format": str(FORMAT), "started_us": str(self.started_us), **about.facts})
         started_ns = self.started_us * 1000
         for name, data in about.attachments.items():
             self._writer.add_attachment(started_ns, started_ns, name, "application/json", data)

@@ -6,6 +6,7 @@ A bounded field cannot carry NaN or infinity: JSON has neither, and the bounds r
 """
 
 from paani.messages.advisor import (
+    SIDE_OF,
     Advisory,
     ChangedBy,
     Counterfactual,
@@ -41,6 +42,7 @@ from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
 
 __all__ = [
+    "SIDE_OF",
     "Advisory",
     "Arming",
     "BoxXyxy",

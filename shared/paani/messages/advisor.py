@@ -101,6 +101,14 @@ class Direction(StrEnum):
     NO_DATA = "NO_DATA"
 
 
+SIDE_OF = {
+    Direction.LEFT: "left",
+    Direction.SLIGHT_LEFT: "left",
+    Direction.RIGHT: "right",
+    Direction.SLIGHT_RIGHT: "right",
+}
+
+
 class Reason(StrEnum):
     """Why this direction. Scores, temporal rules, occupancy, age and input faults never share a code (B17)."""
 

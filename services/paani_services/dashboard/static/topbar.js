@@ -22,6 +22,7 @@ export function renderTopbar(store, open, now) {
     setText(byId("vessel"), `${settings.vessel} · ${settings.domain}`);
     setText(byId("mode"), settings.mode);
     byId("mode").dataset.mode = settings.mode;
+    renderRecord(store, settings.services.includes("recorder"), now);
   }
   renderLink(store, open, now);
   renderAdvice(store, now);
@@ -36,6 +37,17 @@ function renderLink(store, open, now) {
   setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : `live ${fixed(silenceS, 1)} s`);
   setText(byId("link-age"), !open ? "no dashboard" : lost ? "boat silent" : never ? "for the boat" : "link");
   document.title = lost ? "LOST · PAANI" : "PAANI";
+}
+
+/** Only where something is to be recorded. @param {import("./store.js").Store} store @param {boolean} wanted @param {number} now */
+function renderRecord(store, wanted, now) {
+  const chip = byId("record"), state = store.get("recorder/state");
+  const on = store.isFresh("recorder/state", now) && state.recording;
+  chip.hidden = !wanted;
+  chip.dataset.record = !on ? "off" : state.dropped ? "loses" : "on";
+  const lost = on && state.dropped ? `, ${state.dropped} dropped` : "";
+  setText(chip, on ? `REC ${ageText((state.source_us - state.since_us) / 1e6)}${lost}` : "not recording");
+  chip.title = on ? `${state.file}: ${state.written} written, ${state.dropped} dropped, ${state.missing} missing; ${fixed(state.free_bytes / 2 ** 30, 0)} GiB left` : state?.problem || "the recorder is silent";
 }
 
 /** @param {import("./store.js").Store} store @param {number} now */

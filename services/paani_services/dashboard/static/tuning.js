@@ -19,6 +19,12 @@ export function renderTuning(store, now) {
   setText(byId("tuning-last"), last ? `last: ${advice(last, "active")}, tried: ${advice(last, "shadow")}` : "");
 }
 
+/** The configured weights of the risk with those promoted. @param {Record<string, number>} configured @param {any} said */
+export function weightsInForce(configured, said) {
+  const promoted = (said?.active_changes ?? []).filter((/** @type {any} */ change) => change.path.startsWith("advisor.risk."));
+  return { ...configured, ...Object.fromEntries(promoted.map((/** @type {any} */ change) => [change.path.slice(13), Number(change.value)])) };
+}
+
 /** @param {any} said */
 function countsText(said) {
   const differing = `${said.differing} of ${said.frames} frames differ (${fixed(100 * said.differing_frac, 1)} %)`;

@@ -2,6 +2,7 @@
 // Why this advice: the decision's steps, the three lanes' components, the input, the tracks.
 
 import { ageText, byId, fixed, make, reasonText, setFacts, setText, words } from "./text.js";
+import { weightsInForce } from "./tuning.js";
 
 const LANES = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
 const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
@@ -44,7 +45,8 @@ export function renderWhy(store, now) {
   if (!advisory || !settings) return;
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
   renderPath(advisory);
-  for (const [name] of LANES) renderLane(rows[name], advisory[name], name === "center" ? advisory.center_block_risk : advisory.side_block_risk, settings.weights);
+  const weights = weightsInForce(settings.weights, store.get("advisor/shadow"));
+  for (const [name] of LANES) renderLane(rows[name], advisory[name], name === "center" ? advisory.center_block_risk : advisory.side_block_risk, weights);
   renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
   const seen = store.get("advisor/tracks");
   byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));

@@ -1,0 +1,132 @@
+"""The best and the worst pictures, drawn: they go beside the page and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+from paani_models.detection_metrics import CONFIDENCE
+from paani_models.detector_scores import ScoredBoxes
+from paani_models.network_input import letterboxed
+from paani_models.segmenter_scores import OBSTACLE, SKY, WATER, Mask, ScoredMask, read_truth, restrict
+from paani_models.sources import DETECTOR_CLASSES, IGNORE, read_picture
+
+Picture = NDArray[np.uint8]
+
+Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
+
+SHOWN = 8
+_WATER_RGB, _OBSTACLE_RGB, _SKY_RGB, _WRONG_RGB = (0, 114, 178), (230, 159, 0), (204, 121, 167), (220, 0, 0)
+_TRUE_RGB, _FOUND_RGB = (0, 200, 120), (255, 140, 0)
+_WIDTH_PX = 400
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A file beside the page and what stands under it."""
+
+    file: str
+    caption: str
+
+
+def draw_masks(
+    folder: Path, scored: Sequence[ScoredMask], segment: Callable[[Picture, tuple[int, ...]], Mask]
+) -> list[Drawn]:
+    """Tinted by class, pixels that differ from the truth in red. Writes into `folder`/pictures."""
+    drawn = []
+    for index, item in enumerate(scored):
+        picture, truth = read_picture(item.sample.picture), read_truth(item.sample)
+        picture = np.asarray(cv2.resize(picture, (truth.shape[1], truth.shape[0])), np.uint8)
+        label = restrict(segment(picture, truth.shape), item.sample.source)
+        tint = np.zeros_like(picture)
+        for kind, colour in ((WATER, _WATER_RGB), (OBSTACLE, _OBSTACLE_RGB), (SKY, _SKY_RGB)):
+            tint[label == kind] = colour
+        shown = cv2.addWeighted(picture, 0.65, tint, 0.35, 0)
+        wrong = (label != truth) & (truth != IGNORE)
+        shown[wrong] = (0.4 * shown[wrong] + 0.6 * np.array(_WRONG_RGB)).astype(np.uint8)
+        caption = f"{item.sample.source.name}, {item.sample.picture.name}: {item.share_right:.3f}"
+        drawn.append(_save(folder, f"mask_{index:02}_{item.sample.picture.stem}", shown, caption))
+    return drawn
+
+
+def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[Drawn]:
+    """As the net sees them: true boxes thin green, found boxes thick orange with class and score."""
+    drawn = []
+    for index, item in enumerate(scored):
+        shown = np.repeat(np.repeat(letterboxed(read_picture(item.sample.picture)), 2, 0), 2, 1)
+        for kind, *corners in item.truth:
+            _rectangle(shown, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
+        sure = item.found.scores > CONFIDENCE
+        for box, score, kind in zip(
+            item.found.boxes[sure], item.found.scores[sure], item.found.classes[sure], strict=True
+        ):
+            _rectangle(shown, box, _FOUND_RGB, 2, f"{DETECTOR_CLASSES[int(kind)]} {score:.2f}", below=False)
+        mistakes = f"{item.mistakes} mistake{'' if item.mistakes == 1 else 's'}"
+        caption = f"{item.sample.source.name}, {item.sample.picture.name}: {mistakes}"
+        drawn.append(_save(folder, f"boxes_{index:02}_{item.sample.picture.stem}", shown, caption))
+    return drawn
+
+
+def ends_of_masks(scored: Sequence[ScoredMask]) -> tuple[list[ScoredMask], list[ScoredMask]]:
+    """The worst and the best pictures, no more than two of a sequence."""
+    ordered = sorted(scored, key=lambda item: (item.share_right, str(item.sample.picture)))
+    return _varied(ordered), _varied(ordered[::-1])
+
+
+def ends_of_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxes], list[ScoredBoxes]]:
+    """Most mistakes first; and without mistakes, most objects first; no more than two of a sequence."""
+    ordered = sorted(scored, key=lambda item: (-item.mistakes, str(item.sample.picture)))
+    right = [item for item in scored if item.mistakes == 0]
+    return _varied(ordered), _varied(sorted(right, key=lambda item: (-len(item.truth), str(item.sample.picture))))
+
+
+def gallery(drawn: Sequence[Drawn]) -> str:
+    """HTML figures."""
+    return (
+        '<div class="gallery">'
+        + "".join(
+            f'<figure><img loading="lazy" src="{escape(each.file)}" alt="{escape(each.caption)}">'
+            f"<figcaption>{escape(each.caption)}</figcaption></figure>"
+            for each in drawn
+        )
+        + "</div>"
+    )
+
+
+def _varied(ordered: Sequence[Scored]) -> list[Scored]:
+    counts: dict[tuple[str, str], int] = {}
+    kept: list[Scored] = []
+    for item in ordered:
+        key = (item.sample.source.name, item.sample.sequence)
+        counts[key] = counts.get(key, 0) + 1
+        if counts[key] <= 2 and len(kept) < SHOWN:
+            kept.append(item)
+    return kept
+
+
+def _rectangle(
+    picture: Picture, box: NDArray[np.float32], colour: tuple[int, int, int], width: int, text: str, *, below: bool
+) -> None:
+    x1, y1, x2, y2 = (round(2 * float(value)) for value in box)
+    cv2.rectangle(picture, (x1, y1), (x2, y2), colour, width)
+    spot = (x1, min(picture.shape[0] - 4, y2 + 12) if below else max(10, y1 - 4))
+    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 3, cv2.LINE_AA)
+    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.4, colour, 1, cv2.LINE_AA)
+
+
+def _save(folder: Path, stem: str, rgb: Picture, caption: str) -> Drawn:
+    scale = _WIDTH_PX / rgb.shape[1]
+    shown = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    name = f"pictures/{stem}.jpg"
+    (folder / "pictures").mkdir(exist_ok=True)
+    if not cv2.imwrite(str(folder / name), cv2.cvtColor(shown, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 85]):
+        raise UserError(f"{folder / name}: cannot be written")
+    return Drawn(name, caption)

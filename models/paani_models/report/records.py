@@ -1,0 +1,96 @@
+"""Training records and fault measurements, as other commands write them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from paani.errors import UserError
+from paani_models.report.charts import Points, lines
+
+RECORDS = ("epochs.jsonl", "log.jsonl")
+
+
+class FaultCell(msgspec.Struct, frozen=True):
+    """One fault at one severity: of n pictures, how many the gate refused; what the segmenter still reaches."""
+
+    fault: str
+    severity: int
+    n: int
+    rejected: int
+    miou: float
+
+
+class FaultReport(msgspec.Struct, frozen=True):
+    """What `paani faults --json` writes, as far as it is drawn here."""
+
+    cells: tuple[FaultCell, ...]
+
+
+def read_faults(path: Path) -> FaultReport:
+    """Raises UserError naming a file that is missing or malformed."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=FaultReport)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{path}: {error}") from error
+
+
+def read_record(folder: Path) -> list[dict[str, float]]:
+    """Numbers per epoch of a run folder. Raises UserError naming a folder without a record, or a malformed line."""
+    path = next((folder / name for name in RECORDS if (folder / name).is_file()), None)
+    if path is None:
+        raise UserError(f"{folder}: holds neither {' nor '.join(RECORDS)}")
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            row = msgspec.json.decode(line, type=dict[str, object])
+        except msgspec.MsgspecError as error:
+            raise UserError(f"{path}:{number}: {error}") from error
+        rows.append(_numbers(row))
+    return rows
+
+
+def _numbers(row: dict[str, object], prefix: str = "") -> dict[str, float]:
+    """Flat: a number in an object is named `object number`."""
+    found: dict[str, float] = {}
+    for name, value in row.items():
+        if isinstance(value, dict):
+            found |= _numbers(value, f"{prefix}{name} ")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            found[f"{prefix}{name}"] = float(value)
+    return found
+
+
+def training_charts(rows: Sequence[dict[str, float]]) -> str:
+    """Losses on one chart, figures between 0 and 1 on another; of the figures of a class, its AP50."""
+    names = [name for name in dict.fromkeys(name for row in rows for name in row) if name != "epoch"]
+    series: dict[str, Points] = {
+        name: [(row.get("epoch", i + 1), row[name]) for i, row in enumerate(rows) if name in row] for name in names
+    }
+    losses = {name: points for name, points in series.items() if "loss" in name}
+    shown = [name for name in names if name not in losses and (" " not in name or name.endswith(" ap50"))]
+    figures = {name: series[name] for name in shown if all(0 <= y <= 1 for _, y in series[name])}
+    last = max((x for points in series.values() for x, _ in points), default=1.0)
+    charts = []
+    if losses:
+        top = max(y for points in losses.values() for _, y in points)
+        charts.append(lines(losses, "epoch", "loss", (1.0, max(2.0, last)), (0.0, top)))
+    if figures:
+        charts.append(lines(figures, "epoch", "figure", (1.0, max(2.0, last))))
+    return "".join(charts)
+
+
+def fault_charts(report: FaultReport) -> str:
+    """Per fault: share refused by the gate, and the segmenter's mean IoU, over severity."""
+    charts = []
+    for fault in dict.fromkeys(cell.fault for cell in report.cells):
+        cells = [cell for cell in report.cells if cell.fault == fault]
+        series: dict[str, Points] = {
+            "refused": [(cell.severity, cell.rejected / max(1, cell.n)) for cell in cells],
+            "mean IoU": [(cell.severity, cell.miou) for cell in cells],
+        }
+        chart = lines(series, "severity", fault, (1.0, 5.0))
+        charts.append(f"<figure>{chart}<figcaption>{fault.replace('_', ' ')}</figcaption></figure>")
+    return f'<div class="gallery small">{"".join(charts)}</div>'

@@ -1,0 +1,1 @@
+"""One recorded decision, told as a person would."""

@@ -1,0 +1,72 @@
+"""`paani up --record DIR`: the first word of everybody is in it, and the boat needs no recorder."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.config import load_config
+from paani.logs.folder import recordings
+from paani.logs.reader import Log, open_log
+from tests.integration.test_up import READY_S, Up, words_of
+
+DRIVE_S = 4.0
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(180)]
+
+
+def first(log: Log, topic: str) -> bytes:
+    return next(log.records([topic])).data
+
+
+def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    """The recorder is killed on the way: thrust goes on, a new file begins, the old one is mended."""
+    folder, file = tmp_path / "drive", tmp_path / "s.json"
+    up = Up(
+        tmp_path, *words_of(private_sets, "--headless", "--record", str(folder), "--for", "15", "--summary", str(file))
+    )
+    up.until(lambda: "processes alive after" in up.out, READY_S)
+    threading.Event().wait(DRIVE_S)
+    os.kill(up.children()["recorder"], signal.SIGKILL)
+    up.until(lambda: "recorder is back" in up.out, 30.0)
+    assert up.process.wait(60) == 0, (up.out, up.errors)
+    assert up.children() == {}
+    services = json.loads(file.read_text())["services"]
+    assert {name: figures["restarts"] for name, figures in services.items() if figures["restarts"]} == {"recorder": 1}
+    before, after = (open_log(found.path) for found in recordings(folder))
+    assert (before.problems, after.problems) == ([], [])
+    for service in keys.DECIDING_SERVICES:
+        step = msgspec.json.decode(first(before, f"{service}/step"), type=m.Step)
+        assert (step.seq, bool(step.state)) == (0, True), "from its first step everything can be computed again"
+    applied = [
+        msgspec.json.decode(record.data, type=m.ThrustApplied)
+        for log in (before, after)
+        for record in log.records([keys.THRUST_APPLIED.name])
+    ]
+    driven = [one for one in applied if one.zero_cause is m.ZeroCause.NONE]
+    assert driven[0].sent_us < before.end_us < after.start_us < driven[-1].sent_us
+    assert all(one.lost_pulse != "recorder" for one in applied)
+    assert before.config().recorder.folder == str(folder)
+    assert before.topics["camera/picture"] > 0
+    assert "eye/picture" not in before.topics, "the camera relays the same bytes"
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    (tmp_path / "file").touch()
+    up = Up(tmp_path, *words_of(private_sets, "--headless", "--record", str(tmp_path / "file" / "x")))
+    assert up.process.wait(60) == 2, (up.out, up.errors)
+    [line] = up.errors
+    assert f"recorder.folder {tmp_path / 'file' / 'x'}" in line
+    assert up.children() == {}
+
+
+def test_without_a_folder_there_is_no_recorder(tmp_path: Path) -> None:
+    assert "recorder" not in load_config().services
+    assert "recorder" in load_config(sets=(f"recorder.folder={tmp_path}",)).services
