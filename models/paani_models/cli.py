@@ -12,13 +12,14 @@ from pathlib import Path
 
 from paani.errors import UserError
 from paani_models import evaluate_command
+from paani_models.card import card
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.data import command as data_command
 from paani_models.pictures import Pictures
 from paani_models.report import command as report_command
 
 DATA_VARIABLE = "PAANI_DATA"
-TRAINED = ("segmenter", "paper-segmenter", "detector", "gate")
+TRAINED = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
 
 
 def data_folder() -> Path:
@@ -33,6 +34,9 @@ def main(argv: list[str]) -> int:
     try:
         if arguments.command == "check":
             return _check(arguments.weights)
+        if arguments.command == "card":
+            sys.stdout.write(card(load_catalogue(arguments.weights)))
+            return 0
         if arguments.command == "prepare":
             if arguments.set != "own":
                 return data_command.prepare_public(arguments)
@@ -40,6 +44,8 @@ def main(argv: list[str]) -> int:
         if arguments.command == "pack":
             return data_command.make_bundle(arguments, _pictures(arguments))
         if arguments.command == "evaluate":
+            if arguments.lars or arguments.mods:
+                return evaluate_command.run_benchmark(arguments)
             return evaluate_command.run(arguments, _pictures(arguments))
         if arguments.command == "report":
             return report_command.run(arguments, _pictures(arguments))
@@ -48,7 +54,9 @@ def main(argv: list[str]) -> int:
         sys.stderr.write(f"paani models: {error}\n")
         return 2
     except KeyboardInterrupt:
-        sys.stderr.write("stopped; the same command goes on from the last finished epoch\n")
+        resumes = arguments.command == "train"
+        left = "the same command goes on from the last finished epoch" if resumes else "nothing was written"
+        sys.stderr.write(f"stopped; {left}\n")
         return 130
 
 
@@ -58,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="compare the model files with their manifest")
     check.add_argument("--weights", type=Path, default=WEIGHTS)
+
+    model_card = commands.add_parser("card", help="print the model card of a weights folder, as Markdown")
+    model_card.add_argument("--weights", type=Path, default=WEIGHTS)
 
     check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
     data_command.add_prepare_arguments(check_data)

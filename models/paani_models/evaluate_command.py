@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
-from paani_models import evaluate
+from paani_models import benchmarks, evaluate
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
 from paani_models.detector_scores import ScoredBoxes, score_boxes
 from paani_models.estimates import (
@@ -31,6 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources, --rendered and --weights."""
     parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
     parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    parser.add_argument("--lars", type=Path, metavar="ROOT", help="score the segmenter by LaRS's protocol instead")
+    parser.add_argument("--mods", type=Path, metavar="ROOT", help="score both nets by MODS's protocol instead")
+    parser.add_argument(
+        "--predictions", type=Path, help="with --lars or --mods: write masks and boxes in their formats"
+    )
     parser.add_argument("--json", type=Path, help="write figures with intervals, per source and sequence, to this file")
 
 
@@ -48,7 +54,7 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     catalogue = load_catalogue(arguments.weights)
     for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
         if net not in catalogue or not is_scored(catalogue[net].classes):
-            raise UserError(f"{arguments.weights}: holds no segmenter or detector named {net!r}")
+            raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
         figures = measure(net, arguments.weights, pictures)
         for figure in figures:
             sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
@@ -59,6 +65,22 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     if arguments.json:
         write(arguments.json, score(arguments.weights, pictures).evaluation)
     return 0
+
+
+def run_benchmark(arguments: argparse.Namespace) -> int:
+    """Print one JSON object per benchmark. Exit 0, or raise UserError."""
+    segmenter_net = verified_path("segmenter", arguments.weights)
+    if arguments.lars:
+        _print(benchmarks.score_lars(segmenter_net, arguments.lars, arguments.predictions))
+    if arguments.mods:
+        detector_net = verified_path("detector", arguments.weights)
+        _print(benchmarks.score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
+    return 0
+
+
+def _print(figures: dict[str, float]) -> None:
+    rounded = {name: round(value, 3) if math.isfinite(value) else None for name, value in figures.items()}
+    sys.stdout.write(msgspec.json.encode(rounded).decode() + "\n")
 
 
 def is_scored(classes: tuple[str, ...]) -> bool:

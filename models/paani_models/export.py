@@ -31,6 +31,7 @@ from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
 from paani_models.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
 from paani_models.training import load_average, load_checkpoint
+from paani_models.yolo11n import Yolo11n
 
 OPSET = 17  # checklist T1
 TOLERANCE = 1e-3  # checklist T2
@@ -83,6 +84,12 @@ CONTRACTS["gate"] = Model(
     architecture="four strided convolutions, two dense layers",
     licence="weights: for research; see the terms of each training source",
 )
+CONTRACTS["yolo11n"] = msgspec.structs.replace(
+    CONTRACTS["detector"],
+    name="yolo11n",
+    file="yolo11n.onnx",
+    architecture="YOLO11n shape, independent implementation; not affiliated with its authors",
+)
 CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
     CONTRACTS["segmenter"],
     name="paper-segmenter",
@@ -93,7 +100,13 @@ CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
 
 def network(name: str) -> nn.Module:
     """An untrained net of a contract."""
-    nets = {"segmenter": ImageNetSegmenter, "paper-segmenter": Segmenter, "detector": Detector, "gate": Gate}
+    nets = {
+        "segmenter": ImageNetSegmenter,
+        "paper-segmenter": Segmenter,
+        "detector": Detector,
+        "yolo11n": Yolo11n,
+        "gate": Gate,
+    }
     return nets[name]()
 
 
@@ -162,7 +175,7 @@ def largest_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.f
     worst = 0.0
     for x in inputs:
         difference = np.abs(net(torch.from_numpy(x)).numpy() - run(x))
-        if isinstance(net, Detector):
+        if isinstance(net, Detector | Yolo11n):
             height, width = x.shape[2:]
             difference[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
         worst = max(worst, float(difference.max()))

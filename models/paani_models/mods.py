@@ -222,10 +222,10 @@ def from_ours(label: Mask) -> Mask:
 
 
 def write_prediction(folder: Path, method: str, sequence: str, frame: str, label: Mask) -> None:
-    """Write `folder`/METHOD/SEQUENCE/FRAME.png in the benchmark's colours. label: our classes."""
+    """Write `folder`/METHOD/SEQUENCE/FRAME.png in the benchmark's colours. label: MODS's classes."""
     path = folder / method / sequence / f"{Path(frame).stem}.png"
     path.parent.mkdir(parents=True, exist_ok=True)
-    rgb = np.array(COLOURS, np.uint8)[from_ours(label)]
+    rgb = np.array(COLOURS, np.uint8)[label]
     if not cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)):
         raise UserError(f"{path}: cannot be written")
 

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from paani.errors import UserError
-from paani_models import detector_data, export, train_detector, train_gate, train_segmenter
+from paani_models import detector_data, export, train_detector, train_gate, train_segmenter, train_yolo11n
 from paani_models.catalogue import verified_path
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
@@ -27,8 +27,10 @@ from paani_models.sources import (
 from paani_models.train_detector import DetectorTraining
 from paani_models.train_gate import GateTraining
 from paani_models.train_segmenter import SegmenterTraining
+from paani_models.train_yolo11n import Yolo11nTraining
 from paani_models.training import Stage, load_average
 from paani_models.warm_start import load_exported
+from paani_models.yolo11n import Yolo11n
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
@@ -55,6 +57,8 @@ def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
     torch.set_num_threads(threads)
     if net == "detector":
         _train_detector(pictures, plan)
+    elif net == "yolo11n":
+        _train_yolo11n(pictures, plan)
     elif net == "gate":
         _train_gate(pictures, plan)
     else:
@@ -126,6 +130,18 @@ def _train_detector(pictures: Pictures, plan: Plan) -> None:
     DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
 
 
+def _train_yolo11n(pictures: Pictures, plan: Plan) -> None:
+    recipe = train_yolo11n.Recipe()
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    torch.manual_seed(recipe.seed)
+    model = Yolo11n()
+    if plan.start is not None:
+        load_average(model, plan.start)
+    cached = detector_data.read_all(pictures.boxed(held_out=False))
+    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+    Yolo11nTraining(model, recipe, plan.folder, cached, held_out).run()
+
+
 def _train_gate(pictures: Pictures, plan: Plan) -> None:
     """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
     recipe = train_gate.Recipe()
@@ -137,9 +153,9 @@ def _train_gate(pictures: Pictures, plan: Plan) -> None:
 
 def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
-    chosen = pictures.boxed(held_out=True) if net == "detector" else pictures.segmented(held_out=True)
+    chosen = pictures.boxed(held_out=True) if net in ("detector", "yolo11n") else pictures.segmented(held_out=True)
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepared = {"detector": detector_input, "gate": gate_input}.get(net, segmenter_input)
+    prepared = {"detector": detector_input, "yolo11n": detector_input, "gate": gate_input}.get(net, segmenter_input)
     inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")

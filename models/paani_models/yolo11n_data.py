@@ -47,7 +47,11 @@ def paper_example(
     rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int], augmentation: Augmentation
 ) -> Example:
     """One example: of one picture, or a mosaic of four."""
-    example = _mosaic(rng, items, target_wh, augmentation) if len(items) == 4 else _single(rng, items[0], target_wh, augmentation)
+    example = (
+        _mosaic(rng, items, target_wh, augmentation)
+        if len(items) == 4
+        else _single(rng, items[0], target_wh, augmentation)
+    )
     return Example(jitter_hsv(rng, example.picture, augmentation), example.boxes, example.judged)
 
 

@@ -38,6 +38,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/"),
         ("import serial", "services/paani_services/bridge/"),
+        ("from mcap", "shared/paani/logs/"),
     ],
 )
 def test_each_library_has_one_importer(word: str, allowed: str) -> None:

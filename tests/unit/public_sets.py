@@ -61,7 +61,7 @@ def mastr1325(root: Path, runs: tuple[int, ...] = (4, 3, 3)) -> Path:
 
 
 def own_data(root: Path, frames: int = 4) -> Path:
-    """A data folder of two sources: dasha (masks; DJI_0035 is held out) and mcoe (boxes; cluster1 is held out)."""
+    """A data folder of two sources: dasha (masks; DJI_0035 is held out) and mcoe (boxes; cluster6 is held out)."""
     dasha, number = [], 0
     for sequence in ("DJI_0001", "DJI_0035"):
         for frame in range(frames):
@@ -76,7 +76,7 @@ def own_data(root: Path, frames: int = 4) -> Path:
             write_picture(root / "tbiseg_dasha" / "masks3" / f"{name}.png", water)
             dasha.append(f'{{"file":"images/{name}.jpg","seq":"{sequence}"}}')
     mcoe = []
-    for cluster in range(frames):
+    for cluster in range(5, 5 + frames):
         name = f"boat{cluster}"
         write_picture(root / "mcoe_boats" / "images" / f"{name}.jpg", scene(700 + cluster, (360, 300)))
         label = root / "mcoe_boats" / "labels" / f"{name}.txt"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Iterable
+import types
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -119,18 +120,22 @@ def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: 
 
 
 def write_log(
-    path: Path, records: Iterable[Record], config: Config | None = CONFIG, *, chunked: bool = True, **attachments: bytes
+    path: Path,
+    records: Iterable[Record],
+    config: Config | None = CONFIG,
+    *,
+    attached: Mapping[str, bytes] = types.MappingProxyType({}),
+    chunked: bool = True,
 ) -> Path:
-    """An MCAP file as a recorder writes it. attachments: `models` is `models.json`."""
+    """An MCAP file as a recorder writes it."""
+    attachments = {} if config is None else {"config.json": encode_config(config)}
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=64 * 1024, use_chunking=chunked)
         writer.start("paani", "paani 0.1.0")
         schema = writer.register_schema("paani.Any", "jsonschema", b'{"type":"object"}')
         channels: dict[str, int] = {}
-        if config is not None:
-            writer.add_attachment(0, 0, "config.json", "application/json", encode_config(config))
-        for name, data in attachments.items():
-            writer.add_attachment(0, 0, f"{name}.json", "application/json", data)
+        for name, data in {**attachments, **attached}.items():
+            writer.add_attachment(0, 0, name, "application/json", data)
         for topic, log_us, seq, data in records:
             if topic not in channels:
                 channels[topic] = writer.register_channel(topic, "json", schema)

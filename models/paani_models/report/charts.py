@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 WIDTH, HEIGHT = 420, 260
-LEFT, RIGHT, TOP, BOTTOM = 44, 96, 12, 32
+LEFT, RIGHT, TOP, BOTTOM = 44, 96, 24, 32
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")  # tells apart for everyone
 
 Points = Sequence[tuple[float, float]]
@@ -41,6 +41,7 @@ def lines(
         parts.append(f'<text class="tick" x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{y_value:.3g}</text>')
     middle = LEFT + plot_w / 2
     parts.append(f'<text class="label" x="{middle}" y="{HEIGHT - 4}" text-anchor="middle">{escape(x_label)}</text>')
+    parts.append(f'<text class="label" x="2" y="12">{escape(y_label)}</text>')
     ends = []
     for index, (name, points) in enumerate(series.items()):
         if not points:

@@ -17,7 +17,7 @@ from paani_models.detection_metrics import CONFIDENCE
 from paani_models.detector_scores import ScoredBoxes
 from paani_models.network_input import letterboxed
 from paani_models.segmenter_scores import OBSTACLE, SKY, WATER, Mask, ScoredMask, read_truth, restrict
-from paani_models.sources import DETECTOR_CLASSES, IGNORE, read_picture
+from paani_models.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
 
 Picture = NDArray[np.uint8]
 
@@ -26,7 +26,7 @@ Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 SHOWN = 8
 _WATER_RGB, _OBSTACLE_RGB, _SKY_RGB, _WRONG_RGB = (0, 114, 178), (230, 159, 0), (204, 121, 167), (220, 0, 0)
 _TRUE_RGB, _FOUND_RGB = (0, 200, 120), (255, 140, 0)
-_WIDTH_PX = 400
+_WIDTH_PX = 560
 
 
 @dataclass(frozen=True)
@@ -76,13 +76,15 @@ def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[Drawn]:
 
 
 def ends_of_masks(scored: Sequence[ScoredMask]) -> tuple[list[ScoredMask], list[ScoredMask]]:
-    """The worst and the best pictures, no more than two of a sequence."""
+    """The worst and the best photographs, no more than two of a sequence; rendered pictures where there is no other."""
+    scored = _photographs(scored)
     ordered = sorted(scored, key=lambda item: (item.share_right, str(item.sample.picture)))
     return _varied(ordered), _varied(ordered[::-1])
 
 
 def ends_of_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxes], list[ScoredBoxes]]:
-    """Most mistakes first; and without mistakes, most objects first; no more than two of a sequence."""
+    """Most mistakes first; and without mistakes, most objects first; otherwise as `ends_of_masks`."""
+    scored = _photographs(scored)
     ordered = sorted(scored, key=lambda item: (-item.mistakes, str(item.sample.picture)))
     right = [item for item in scored if item.mistakes == 0]
     return _varied(ordered), _varied(sorted(right, key=lambda item: (-len(item.truth), str(item.sample.picture))))
@@ -101,6 +103,10 @@ def gallery(drawn: Sequence[Drawn]) -> str:
     )
 
 
+def _photographs(scored: Sequence[Scored]) -> Sequence[Scored]:
+    return [item for item in scored if item.sample.source.name != RENDERED] or scored
+
+
 def _varied(ordered: Sequence[Scored]) -> list[Scored]:
     counts: dict[tuple[str, str], int] = {}
     kept: list[Scored] = []
@@ -117,9 +123,9 @@ def _rectangle(
 ) -> None:
     x1, y1, x2, y2 = (round(2 * float(value)) for value in box)
     cv2.rectangle(picture, (x1, y1), (x2, y2), colour, width)
-    spot = (x1, min(picture.shape[0] - 4, y2 + 12) if below else max(10, y1 - 4))
-    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 3, cv2.LINE_AA)
-    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.4, colour, 1, cv2.LINE_AA)
+    spot = (x1, min(picture.shape[0] - 4, y2 + 18) if below else max(14, y1 - 5))
+    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 3, cv2.LINE_AA)
+    cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 1, cv2.LINE_AA)
 
 
 def _save(folder: Path, stem: str, rgb: Picture, caption: str) -> Drawn:

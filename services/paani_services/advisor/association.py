@@ -1,4 +1,4 @@
-"""Which box of this picture goes with which of those before: by overlap, and by where the boat's turning put them. Pure."""
+"""Which box goes with which of the picture before: by overlap, and by where the boat's turning put it. Pure."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

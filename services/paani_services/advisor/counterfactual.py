@@ -142,7 +142,7 @@ def nearest_limit(
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     found: list[tuple[float, Limit]] = []
     for lane in LANES:
-        limit = limit_of(lane, policy)
+        limit = limit_of(lane, state, policy)
         margin = risks[lane] - limit
         if lanes[lane].occupied or (lane == "center" and vessel):
             continue
@@ -209,7 +209,7 @@ def _scene(
                 (bit.get(o.id), 1.0 - o.severity * share * o.presence, 1.0 - o.urgency * share) for o, share in inside
             ),
             occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
-            limit=limit_of(lane, policy),
+            limit=limit_of(lane, state, policy),
         )
     middle = lane_span("center", config.perception.corridors)
     places = [(place_in_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]

@@ -14,11 +14,19 @@ OTHER = {"left": "right", "right": "left"}
 
 
 class PolicyState(msgspec.Struct, frozen=True):
-    """What one distinct frame leaves for the next: frames in a row each lane was occupied, the turn in progress."""
+    """What one distinct frame leaves for the next.
+
+    occupied_frames: frames in a row each lane was occupied. turn: the turn in progress. clear_frames: frames in a row
+    the centre was clear. side: that of the last turn, for as long as it counts. straight_frames: frames in a row it
+    went straight. avoiding: it last did anything else.
+    """
 
     occupied_frames: tuple[int, int, int] = (0, 0, 0)
     turn: Direction | None = None
     clear_frames: int = 0
+    side: str | None = None
+    straight_frames: int = 0
+    avoiding: bool = False
 
 
 class Standing(msgspec.Struct, frozen=True):
@@ -62,7 +70,7 @@ def decide(
     frames, occupied = _occupancy(state, obstacles, config)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     blocked = {
-        lane: occupied[lane] or lanes[lane].risk >= limit_of(lane, policy) or (lane == "center" and vessel)
+        lane: occupied[lane] or lanes[lane].risk >= limit_of(lane, state, policy) or (lane == "center" and vessel)
         for lane in LANES
     }
     judged = {lane: _lane_risk(lanes[lane], occupied[lane], blocked[lane]) for lane in LANES}
@@ -84,13 +92,10 @@ def decide(
     elif standing.incursion is not None:
         reason = Reason.CENTER_EDGE_INCURSION
     elif not standing.left and not standing.right and _is_tie(state, risks, policy):
-        reason = Reason.TIE_STARBOARD if state.turn is None else Reason.TIE_KEPT_SIDE
+        reason = Reason.TIE_STARBOARD if state.side is None else Reason.TIE_KEPT_SIDE
     else:
-        reason = _why_blocked(judged["center"], vessel, policy)
-    turn = direction if direction in SIDE_OF else None
-    if direction is Direction.STOP:
-        turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
-    return PolicyState(frames, turn, clear_frames), Decision(
+        reason = _why_blocked(judged["center"], vessel, limit_of("center", state, policy))
+    return _after(state, direction, frames, clear_frames, policy), Decision(
         direction, reason, judged["left"], judged["center"], judged["right"], standing
     )
 
@@ -112,9 +117,9 @@ def direct(standing: Standing) -> Direction:
 
 def side_held(state: PolicyState, policy: PolicyConfig) -> tuple[str, float]:
     """The side to take unless the other is better, and by how much it must be (resolution 13)."""
-    if state.turn is None:
+    if state.side is None:
         return "right", policy.tie
-    return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
+    return state.side, max(policy.tie, policy.side_change_margin)
 
 
 def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> str:
@@ -153,9 +158,25 @@ def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:
     return "left" if box[2] <= policy.core_left else "right"
 
 
-def limit_of(lane: str, policy: PolicyConfig) -> float:
-    """The risk at which a lane is blocked (J5)."""
-    return policy.center_block_risk if lane == "center" else policy.side_block_risk
+def limit_of(lane: str, state: PolicyState, policy: PolicyConfig) -> float:
+    """The risk at which a lane is blocked (J5); to go straight again takes a centre that is clearly below it."""
+    if lane != "center":
+        return policy.side_block_risk
+    return max(0.0, policy.center_block_risk - (policy.release_margin if state.avoiding else 0.0))
+
+
+def _after(
+    state: PolicyState,
+    direction: Direction,
+    occupied_frames: tuple[int, int, int],
+    clear_frames: int,
+    policy: PolicyConfig,
+) -> PolicyState:
+    """Turn and side are remembered through a stop, so that it resumes them; the side, through a short way straight."""
+    straight_frames = state.straight_frames + 1 if direction is Direction.STRAIGHT else 0
+    side = SIDE_OF.get(direction, state.side if straight_frames <= policy.side_memory_frames else None)
+    turn = {Direction.STRAIGHT: None, Direction.STOP: state.turn}.get(direction, direction)
+    return PolicyState(occupied_frames, turn, clear_frames, side, straight_frames, direction is not Direction.STRAIGHT)
 
 
 def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> bool:
@@ -165,8 +186,8 @@ def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -
     return -policy.tie < gain < needed
 
 
-def _why_blocked(center: LaneRisk, vessel: bool, policy: PolicyConfig) -> Reason:
-    if center.risk >= policy.center_block_risk:
+def _why_blocked(center: LaneRisk, vessel: bool, limit: float) -> Reason:
+    if center.risk >= limit:
         return Reason.CENTER_RISK
     return Reason.CENTER_VESSEL if vessel and not center.occupied else Reason.CENTER_OCCUPIED
 

@@ -11,6 +11,8 @@ from paani import messages as m
 from paani.bus import Bus, Picture
 from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
+from paani.runtime import runtime_dir
+from paani_services.perception.journal import FOLDER, Journal
 from paani_services.perception.pipeline import Bytes, Perceiver
 
 
@@ -21,6 +23,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     evidence, masks = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
+    folder = await asyncio.to_thread(runtime_dir, config.bus)
+    journal = Journal(folder / FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
     last, due_us = (-1, -1), 0
 
@@ -29,6 +33,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         roll_rad = roll_at(picture.header.source_us, odometry.value, config.perception.max_roll_age_s)
         found, mask = perceiver.perceive(picture.data, picture.header, age_s, roll_rad)
         return found, mask_picture(mask, picture.header) if mask is not None and masks.is_watched() else None
+
+    def keep(observation: m.Evidence) -> None:
+        if not journal.add(msgspec.json.encode(observation)):
+            bus.count_drop("journal")
 
     try:
         with bus.alive():
@@ -42,6 +50,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 last, due_us = frame, clock.now_us() + period_us
                 found, mask = await loop.run_in_executor(worker, look, picture)
                 sent = evidence.put(found)
+                worker.submit(keep, sent)
                 if mask is not None:
                     masks.put_picture(mask.header, mask.data)
                 bus.note(f"unusable: {sent.cause}" if not sent.usable else sent.models)

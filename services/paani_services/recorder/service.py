@@ -25,7 +25,7 @@ from paani_services.recorder.backlog import Backlog, Heard
 from paani_services.recorder.recording import MIB, Recording, remove_empty
 
 LOG = logging.getLogger(__name__)
-WRITE_S = 0.1
+WRITE_S = 0.2
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:

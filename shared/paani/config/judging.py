@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
+Frames = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
 RemovalSize = Annotated[int, msgspec.Meta(ge=0, le=3)]  # the work grows with the cube
 SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
 
@@ -75,6 +76,8 @@ class PolicyConfig(Section, frozen=True):
     core_right: Fraction = 0.595  # J9
     tie: Fraction = 0.02
     side_change_margin: Fraction = 0.0
+    side_memory_frames: Frames = 0
+    release_margin: Fraction = 0.0
     clear_frames: Size = 2  # J10
 
 

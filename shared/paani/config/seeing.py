@@ -101,6 +101,7 @@ class PerceptionConfig(Section, frozen=True):
     follow_roll: bool = True  # corridors stay level while the boat rolls
     max_roll_rad: NonNegative = 0.35
     max_roll_age_s: Positive = 0.3
+    journal_max_mib: NonNegative = 8.0  # P2: of the observations kept on disk, half an hour at 5 Hz; 0: none
     corridors: CorridorConfig = CorridorConfig()
     gate: GateConfig = GateConfig()
     detections: DetectorConfig = DetectorConfig()

@@ -7,7 +7,7 @@ import { ageText, byId, fixed, make, setText } from "./text.js";
 const SPEAKS = {
   plant: "plant/thrust_applied", eye: "eye/picture", camera: "camera/picture", perception: "perception/evidence",
   advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
-  localization: "localization/odometry", dashboard: "operator/arming",
+  localization: "localization/odometry", dashboard: "operator/arming", recorder: "recorder/state",
 };
 const COLUMNS = 8;
 /** @type {Map<string, HTMLElement[]>} */

@@ -1,0 +1,191 @@
+"""What a decision costs: one step of the advisor, with and without its counterfactual, and its messages as JSON."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.bench.part import Part
+from paani.clock import process_cpu_s, stopwatch_ms
+from paani.config import Config, with_settings
+from paani.decider import Decider, Input, decider_of
+from paani.order_statistics import median, nearest_rank
+
+BOXES = 24  # C9
+START_US, PERIOD_US, AGE_US = 1_000_000_000, 200_000, 100_000
+STEADY_FRAMES = 5  # how long a scene lasts: tracks confirm, lanes become occupied, turns are kept
+WARM_FRAMES = 50
+
+
+class Figures(msgspec.Struct):
+    """Of one way to run a step [ms], and how many sets of evidence its counterfactuals asked about."""
+
+    wall_ms: list[float]
+    cpu_ms: list[float]
+    judged: list[int]
+
+
+def step(config: Config, frames: int) -> Part:
+    """The advisor's whole step on the same crowded pictures, three ways, one after another in each frame."""
+    decider = decider_of("advisor")
+    plain = with_settings(config, ("advisor.counterfactual_size=0",))
+    runs = {
+        "frame": (plain, Figures([], [], [])),
+        "frame, counterfactual": (config, Figures([], [], [])),
+        "republish, counterfactual": (config, Figures([], [], [])),
+    }
+    states = {name: decider.state() for name in runs}
+    republished = "republish, counterfactual"
+    for number, evidence in enumerate(crowded(WARM_FRAMES + frames)):
+        now_us = evidence.source_us + AGE_US
+        for name, (settings, figures) in runs.items():
+            if name == republished:
+                states[name] = states["frame, counterfactual"]
+            states[name], said, wall_ms, cpu_ms = _timed(decider, states[name], evidence, now_us, settings)
+            if number >= WARM_FRAMES:
+                figures.wall_ms.append(wall_ms)
+                figures.cpu_ms.append(cpu_ms)
+                figures.judged.append(0 if name == republished else said.counterfactual.judged)
+    base_ms = median(runs["frame"][1].cpu_ms)
+    return Part(
+        name=f"advisor step, {BOXES} boxes, {frames} frames",
+        columns=("step", "p50 ms", "p95 ms", "p99 ms", "CPU p50", "CPU p95", "CPU p99", "CPU ratio", "sets p50", "max"),
+        rows=tuple(
+            (
+                name,
+                *(nearest_rank(found.wall_ms, percent) for percent in (50, 95, 99)),
+                *(nearest_rank(found.cpu_ms, percent) for percent in (50, 95, 99)),
+                median(found.cpu_ms) / base_ms,
+                nearest_rank(found.judged, 50),
+                max(found.judged),
+            )
+            for name, (_, found) in runs.items()
+        ),
+        note="sets: how many sets of evidence the policy was asked about. Bars: frame p99 2 ms, counterfactual 5 ms.",
+    )
+
+
+def contract(config: Config, rounds: int) -> Part:
+    """Typed JSON beside the paper's shape, JSON text inside a JSON string, for the same messages."""
+    rows = []
+    for message in _messages(config):
+        kind = type(message)
+        shapes = {"typed": _typed(kind), "string": _in_string(kind), "string, json library": _in_string_stdlib()}
+        data = {name: encode(message) for name, (encode, _) in shapes.items()}
+        taken: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in shapes}
+        for _ in range(rounds):
+            for name, (encode, decode) in shapes.items():
+                begin = stopwatch_ms()
+                encode(message)
+                middle = stopwatch_ms()
+                decode(data[name])
+                taken[name][0].append((middle - begin) * 1e3)
+                taken[name][1].append((stopwatch_ms() - middle) * 1e3)
+        both = {name: median(encoding) + median(decoding) for name, (encoding, decoding) in taken.items()}
+        rows += [
+            (
+                kind.__name__,
+                name,
+                len(data[name]),
+                median(taken[name][0]),
+                median(taken[name][1]),
+                len(data[name]) / len(data["typed"]),
+                both[name] / both["typed"],
+            )
+            for name in shapes
+        ]
+    return Part(
+        name=f"message as JSON, {BOXES} boxes, medians of {rounds}",
+        columns=("message", "shape", "bytes", "encode us", "decode us", "bytes ratio", "time ratio"),
+        rows=tuple(rows),
+        note="string: the message's JSON as the text of another JSON object, as in the paper; "
+        "the json library leaves it unchecked.",
+    )
+
+
+def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
+    """Evidence with 24 boxes that hold still for five frames, in water of every kind."""
+    rng = random.Random(seed)
+    boxes: tuple[m.Detection, ...] = ()
+    lanes: tuple[m.LaneEvidence, ...] = ()
+    for number in range(frames):
+        if number % STEADY_FRAMES == 0:
+            boxes = tuple(_box(rng) for _ in range(BOXES))
+            lanes = tuple(m.LaneEvidence(non_water=rng.random() ** 2, uncertainty=0.2 * rng.random()) for _ in range(3))
+        yield m.Evidence(
+            source_us=START_US + number * PERIOD_US,
+            frame_seq=number,
+            frame_epoch=1,
+            width_px=320,
+            height_px=240,
+            usable=True,
+            detections=boxes,
+            left=lanes[0],
+            center=lanes[1],
+            right=lanes[2],
+            segmentation=m.SegmentationSource.LEARNED,
+            navigation_eligible=True,
+        )
+
+
+def _box(rng: random.Random) -> m.Detection:
+    width, height = rng.uniform(0.02, 0.2), rng.uniform(0.02, 0.2)
+    x1, y1 = rng.uniform(0.0, 1.0 - width), rng.uniform(0.25, 1.0 - height)
+    return m.Detection(
+        label=rng.choice(tuple(m.Label)), confidence=rng.uniform(0.4, 1.0), box_xyxy=(x1, y1, x1 + width, y1 + height)
+    )
+
+
+def _timed(
+    decider: Decider[Any], state: Any, evidence: m.Evidence, now_us: int, config: Config
+) -> tuple[Any, m.Advisory, float, float]:
+    inputs = {topic.name: Input() for topic in decider.inputs}
+    inputs[keys.EVIDENCE.name] = Input(evidence, now_us)
+    begin_ms, begin_cpu_s = stopwatch_ms(), process_cpu_s()
+    state, outputs = decider.decide(state, inputs, now_us, config)
+    cpu_ms, wall_ms = (process_cpu_s() - begin_cpu_s) * 1e3, stopwatch_ms() - begin_ms
+    advisory = outputs[keys.ADVISORY.name]
+    assert isinstance(advisory, m.Advisory)
+    return state, advisory, wall_ms, cpu_ms
+
+
+def _messages(config: Config) -> tuple[m.Message, ...]:
+    decider = decider_of("advisor")
+    state, evidence, outputs = decider.state(), None, {}
+    for evidence in crowded(STEADY_FRAMES):
+        inputs = {topic.name: Input() for topic in decider.inputs} | {keys.EVIDENCE.name: Input(evidence)}
+        state, outputs = decider.decide(state, inputs, evidence.source_us + AGE_US, config)
+    assert evidence is not None
+    return evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name]
+
+
+class _String(msgspec.Struct):
+    data: str
+
+
+Codec = tuple[Callable[[Any], bytes], Callable[[bytes], Any]]
+
+
+def _typed(kind: type[m.Message]) -> Codec:
+    return msgspec.json.Encoder().encode, msgspec.json.Decoder(kind).decode
+
+
+def _in_string(kind: type[m.Message]) -> Codec:
+    encoder, outer, inner = msgspec.json.Encoder(), msgspec.json.Decoder(_String), msgspec.json.Decoder(kind)
+    return (
+        lambda message: encoder.encode(_String(encoder.encode(message).decode())),
+        lambda data: inner.decode(outer.decode(data).data),
+    )
+
+
+def _in_string_stdlib() -> Codec:
+    return (
+        lambda message: json.dumps({"data": json.dumps(msgspec.to_builtins(message))}).encode(),
+        lambda data: json.loads(json.loads(data)["data"]),
+    )

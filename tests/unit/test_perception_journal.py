@@ -1,0 +1,70 @@
+"""Perception's own journal is bounded, whatever comes and whatever breaks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from paani.logs.folder import NAME as RECORDING
+from paani_services.perception.journal import FOLDER, NAME, OLDER, Journal
+
+
+def lines(folder: Path) -> list[bytes]:
+    """Oldest first."""
+    files = [folder / OLDER, folder / NAME]
+    return [line for file in files if file.exists() for line in file.read_bytes().splitlines()]
+
+
+def size(folder: Path) -> int:
+    return sum(file.stat().st_size for file in folder.iterdir())
+
+
+def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
+    """P2: perception has its own bounded observation journal."""
+    journal = Journal(tmp_path / "journal", 1000)
+    for number in range(500):
+        assert journal.add(json.dumps({"number": number}).encode())
+        assert size(tmp_path / "journal") <= 1000
+    kept = [json.loads(line)["number"] for line in lines(tmp_path / "journal")]
+    assert kept == list(range(500 - len(kept), 500))
+    assert len(kept) >= 25, "at least the half"
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
+@given(st.lists(st.binary(max_size=300).map(lambda data: data.hex().encode()), max_size=30), st.integers(0, 1000))
+def test_any_lines_in_any_bound(tmp_path: Path, written: list[bytes], max_bytes: int) -> None:
+    """Property: the bound holds, and what is kept is the end of what was taken."""
+    folder = tmp_path / "j"
+    for name in (NAME, OLDER):
+        (folder / name).unlink(missing_ok=True)
+    journal = Journal(folder, max_bytes)
+    taken = [line for line in written if journal.add(line)]
+    if max_bytes // 2 == 0:
+        assert not folder.exists() or size(folder) == 0
+        return
+    kept = lines(folder) if folder.exists() else []
+    assert kept == taken[len(taken) - len(kept) :]
+    assert not folder.exists() or size(folder) <= max_bytes
+
+
+def test_it_goes_on_after_a_crash_in_the_middle_of_a_line(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(b'{"number": 1}\n{"num')
+    Journal(tmp_path, 1000).add(b'{"number": 3}')
+    assert lines(tmp_path) == [b'{"number": 1}', b'{"num', b'{"number": 3}']
+
+
+def test_a_disk_that_fails_costs_lines_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert not Journal(tmp_path / "file" / "journal", 1000).add(b"{}")
+    assert not Journal(tmp_path / "journal", 10).add(b"longer than the bound")
+
+
+def test_its_name_is_its_own() -> None:
+    """P5: journal, process logs, recordings and exported tables are not confused."""
+    assert FOLDER not in {"logs", "credentials"}
+    for name in (NAME, OLDER):
+        assert not RECORDING.fullmatch(name)
+        assert not name.endswith((".log", ".csv", ".mcap"))
