@@ -128,7 +128,7 @@ def outside(rows: Rows, ignored: Flags) -> Rows:
 
 def read_calibration(root: Path, sequence: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Left camera's matrix and distortion. Raises UserError naming a file that is missing or holds neither."""
-    path = root / "calibration" / f"calibration-{sequence.split('-')[0]}.yaml"
+    path = root / "calibration" / f"calibration-{sequence.split('-', maxsplit=1)[0]}.yaml"
     if not path.is_file():
         raise UserError(f"{path}: no such file")
     try:

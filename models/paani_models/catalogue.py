@@ -105,6 +105,36 @@ def save_catalogue(catalogue: dict[str, Model], folder: Path) -> None:
     beside.replace(folder / MANIFEST)
 
 
+IGNORED_CLASS = "-"
+
+
+def described(file: Path, role: str) -> Model:
+    """The contract of a user's model file: what a manifest beside it says of it, else that of the role's shipped model.
+
+    A segmenter names the shipped one's classes in any order; a detector names any of them in any order, and "-" for
+    each of its classes that is to be left out. Raises UserError naming the manifest and its field.
+    """
+    shipped = load_catalogue()[role]
+    manifest = file.parent / MANIFEST
+    if not manifest.is_file():
+        return shipped
+    stated = next((m for m in load_catalogue(file.parent).values() if m.file == file.name), None)
+    if stated is None:
+        return shipped
+    names = [name for name in stated.classes if name != IGNORED_CLASS]
+    unknown = sorted(set(names) - set(shipped.classes))
+    if unknown:
+        raise UserError(f"{manifest}: {file.name}: classes: {unknown[0]!r} is not one of {', '.join(shipped.classes)}")
+    whole = role == "detector" or sorted(stated.classes) == sorted(shipped.classes)
+    if not names or len(set(names)) != len(names) or not whole:
+        raise UserError(f"{manifest}: {file.name}: classes: a {role} has {', '.join(shipped.classes)}, each once")
+    if stated.preprocessing.resize != shipped.preprocessing.resize:
+        raise UserError(f"{manifest}: {file.name}: preprocessing.resize: a {role} has {shipped.preprocessing.resize}")
+    if len(stated.input.shape) != 4 or stated.input.shape[:2] != (1, 3):
+        raise UserError(f"{manifest}: {file.name}: input.shape: {list(stated.input.shape)} is not [1, 3, H, W]")
+    return stated
+
+
 def file_sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file. Raises UserError naming a file that cannot be read."""
     try:

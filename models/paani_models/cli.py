@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models import evaluate_command
+from paani_models import contract_check, evaluate, evaluate_command
 from paani_models.card import card
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.data import command as data_command
@@ -19,6 +19,7 @@ from paani_models.pictures import Pictures
 from paani_models.report import command as report_command
 
 DATA_VARIABLE = "PAANI_DATA"
+NETS = ("segmenter", "detector")
 TRAINED = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
 
 
@@ -33,7 +34,7 @@ def main(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     try:
         if arguments.command == "check":
-            return _check(arguments.weights)
+            return _check_file(arguments) if arguments.model else _check(arguments.weights)
         if arguments.command == "card":
             sys.stdout.write(card(load_catalogue(arguments.weights)))
             return 0
@@ -64,7 +65,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani models", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
 
-    check = commands.add_parser("check", help="compare the model files with their manifest")
+    check = commands.add_parser("check", help="compare the shipped files with their manifest, or judge a file of yours")
+    check.add_argument("model", type=Path, nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
+    check.add_argument("--role", choices=NETS, help="told from the output if not given")
+    check.add_argument("--score", action="store_true", help="also its figures on the held-out pictures of --data")
     check.add_argument("--weights", type=Path, default=WEIGHTS)
 
     model_card = commands.add_parser("card", help="print the model card of a weights folder, as Markdown")
@@ -97,7 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     report_command.add_arguments(report)
     for command in (export, evaluate, report):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-    for command in (check_data, pack, train, export, evaluate, report):
+    for command in (check, check_data, pack, train, export, evaluate, report):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
@@ -109,6 +113,26 @@ def _check(weights: Path) -> int:
         verified_path(name, weights)
         sys.stdout.write(f"{name}: {model.file} {model.size_bytes} bytes, {model.parameters} parameters, ok\n")
     return 0
+
+
+def _check_file(arguments: argparse.Namespace) -> int:
+    """0 where the model can be used, 1 where it cannot."""
+    role = contract_check.role_of(arguments.model, arguments.role)
+    findings = contract_check.inspected(arguments.model, role)
+    for finding in findings:
+        sys.stdout.write(f"{finding.level:8} {finding.text}\n")
+    usable = all(finding.level != "error" for finding in findings)
+    if usable and arguments.score:
+        pictures = _pictures(arguments)
+        if role == "segmenter":
+            figures = evaluate.segmenter_figures(arguments.model, pictures.segmented(held_out=True))
+        else:
+            figures = evaluate.detector_figures(arguments.model, pictures.boxed(held_out=True))
+        for figure in figures:
+            sys.stdout.write(f"{'score':8} {figure.metric} on {figure.source}: {figure.value:.3f} (n {figure.n})\n")
+    use = f"paani up --set perception.{role}={arguments.model}"
+    sys.stdout.write(f"{arguments.model}: {f'can be used: {use}' if usable else 'cannot be used as it is'}\n")
+    return 0 if usable else 1
 
 
 def _pictures(arguments: argparse.Namespace) -> Pictures:

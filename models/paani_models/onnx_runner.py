@@ -12,17 +12,30 @@ from numpy.typing import NDArray
 from paani.errors import UserError
 
 Floats = NDArray[np.float32]
+Session = ort.InferenceSession
 
 
 def open_net(path: Path, threads: int = 2) -> Callable[[Floats], Floats]:
     """A function from input [1,3,H,W] to the first output. Raises UserError naming a file that cannot be loaded."""
+    session = open_session(path, threads)
+    return lambda x: run_net(session, x)
+
+
+def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Session:
+    """A loaded net. Raises UserError naming a file that cannot be loaded."""
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
+    options.log_severity_level = 3
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    if not optimised:
+        options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_DISABLE_ALL
     try:
-        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        return ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
-    name = session.get_inputs()[0].name
-    return lambda x: np.asarray(session.run(None, {name: x})[0], np.float32)
+
+
+def run_net(session: Session, x: Floats) -> Floats:
+    """The first output for one input."""
+    return np.asarray(session.run(None, {session.get_inputs()[0].name: x})[0], np.float32)

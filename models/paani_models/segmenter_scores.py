@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models.network_input import segmenter_input
+from paani_models.catalogue import described
 from paani_models.onnx_runner import Floats, open_net
 from paani_models.segmenter_metrics import class_iou, confusion, edge_counts, f1
 from paani_models.sources import SEGMENTER_CLASSES, WATER_MASKS, Sample, Source, read_mask, read_picture
@@ -51,9 +51,20 @@ def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
 
 
 def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]:
-    """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W]."""
-    run = open_net(net)
-    return lambda picture, shape: as_label(run(segmenter_input(picture)), shape)
+    """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W].
+
+    Size, preprocessing and order of classes are those of the net's contract.
+    """
+    run, contract = open_net(net), described(net, "segmenter")
+    size_wh = contract.input.shape[:1:-1]
+    mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
+    rows = [contract.classes.index(name) for name in SEGMENTER_CLASSES]
+
+    def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> Mask:
+        scaled = (cv2.resize(picture, size_wh).astype(np.float32) / 255.0 - mean) / std
+        return as_label(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
+
+    return segment
 
 
 def as_label(logits: Floats, shape: tuple[int, ...]) -> Mask:

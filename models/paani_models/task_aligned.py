@@ -60,7 +60,7 @@ def assign(boxes: Tensor, scores: Tensor, truth: Tensor, centres: Tensor) -> tup
 
 
 def bins_loss(bins: Tensor, distance: Tensor) -> Tensor:
-    """Cross-entropy with the two bins beside the true distance, weighted by nearness: [..., 4, BINS], [..., 4] -> [...].
+    """Cross-entropy with the two bins beside the true distance, by nearness: [..., 4, BINS], [..., 4] -> [...].
 
     distance: in strides, at least 0; what lies beyond the last bin counts as the last.
     """

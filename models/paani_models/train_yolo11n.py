@@ -94,7 +94,7 @@ class Yolo11nTraining:
         warmup_steps = max(1, round(recipe.warmup_epochs * steps))
         cv_seed = (recipe.seed, epoch)
         self.model.train()
-        losses: list[tuple[float, float, float]] = []
+        losses = []
         batches = Prefetch[Batch](recipe.workers, 2 * recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
         for index, (pictures, truths, judged) in enumerate(tqdm(batches, f"epoch {epoch + 1}/{recipe.epochs}", steps)):
             with torch.autocast(device().type, torch.bfloat16, enabled=device().type == "cuda"):  # S4
@@ -103,7 +103,7 @@ class Yolo11nTraining:
             size = (recipe.side_px, recipe.side_px)
             parts = task_aligned_loss(boxes.float(), bins.float(), logits.float(), known, to_device(judged), size)
             self._update(sum(parts), index == steps - 1, steps * recipe.epochs, warmup_steps)
-            losses.append(tuple(float(part.detach()) for part in parts))
+            losses.append([float(part.detach()) for part in parts])
         box, score, spread = np.mean(losses, 0).round(4).tolist()
         return {"box_loss": box, "score_loss": score, "bins_loss": spread}
 

@@ -41,6 +41,7 @@ def scene(seed: int, tracks: int) -> Scene:
             occupied_frames=(rng.randrange(3), rng.randrange(3), rng.randrange(3)),
             turn=rng.choice((None, *m.SIDE_OF)),
             clear_frames=rng.randrange(3),
+            blocked=(rng.random() < 0.3, rng.random() < 0.3, rng.random() < 0.3),
         ),
         water=water,
         obstacles=tuple(_obstacle(rng, number) for number in rng.sample(range(1, 100), tracks)),

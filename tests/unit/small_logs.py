@@ -28,7 +28,7 @@ def about() -> About:
 
 def odometry(number: int, **changes: Any) -> m.Odometry:
     now_us = START_US + number * STEP_US
-    values = {
+    values: dict[str, Any] = {
         "source_us": now_us, "seq": number, "epoch": 5, "producer": "localization", "sent_us": now_us,
         "x_m": 0.1 * number, "y_m": 0.0, "yaw_rad": 0.0, "surge_mps": 0.5, "latitude_deg": 52.0 + 1e-6 * number,
         "longitude_deg": 4.0, "healthy": True,

@@ -20,8 +20,7 @@ from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, lane, p
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
 D, R, By = m.Direction, m.Reason, m.ChangedBy
-STEADY = load_config(sets=("advisor.policy.side_change_margin=0.15",))
-CONFIGS = st.sampled_from((PAANI, PAPER, STEADY))
+CONFIGS = st.sampled_from((PAANI, PAPER))
 Taken = tuple[tuple[int, ...], tuple[str, ...]]  # track ids, lanes
 
 
@@ -184,12 +183,12 @@ def test_both_a_track_and_the_water_when_each_blocks() -> None:
 
 def test_a_removal_is_what_follows_once_the_evidence_is_gone() -> None:
     """The turn that is kept meanwhile (J10) is no objection: after its frames the boat goes as was said."""
-    state, advice, _ = play([water(0.10, 0.50, 0.40)] * 3)
+    state, advice, _ = play([water(0.20, 0.50, 0.40)] * 3)
     assert advice[2].counterfactual.removals == (
         m.Removal(direction=D.STRAIGHT, water=(m.Lane.CENTER,)),
         m.Removal(direction=D.RIGHT, water=(m.Lane.RIGHT,)),
     )
-    _, after, _ = play([water(0.10, 0.0, 0.40)] * 2, state=state, first_seq=3)
+    _, after, _ = play([water(0.20, 0.0, 0.40)] * 2, state=state, first_seq=3)
     assert [a.direction for a in after] == [D.LEFT, D.STRAIGHT]
     assert after[0].counterfactual.changed_by is By.CLEAR_PICTURES
 

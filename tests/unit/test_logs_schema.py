@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
@@ -10,7 +11,9 @@ import pytest
 
 from paani import keys
 from paani.logs.schema import json_schema
+from paani.logs.viewer import CHANNELS
 
+ROOT = Path(__file__).parents[2]
 SCALARS = {"boolean", "integer", "number", "string"}
 UNKNOWN_WORDS = {"$ref", "$defs", "anyOf", "oneOf", "allOf", "additionalProperties", "patternProperties", "const"}
 
@@ -111,3 +114,25 @@ def test_what_is_open_is_refused_with_its_path(kind: type[msgspec.Struct]) -> No
     field = next(iter(kind.__struct_fields__))
     with pytest.raises(TypeError, match=rf"{kind.__name__}\.{field}"):
         json_schema(kind)
+
+
+def test_the_viewer_s_layout_names_what_is_recorded() -> None:
+    """The layout that ships shows topics and fields that there are."""
+    layout = msgspec.json.decode((ROOT / "deploy" / "viewer" / "foxglove-layout.json").read_bytes())
+    paths = [path["value"] for panel in layout["configById"].values() for path in panel.get("paths", [])] + [
+        layout["configById"]["RawMessages!why"]["topicPath"]
+    ]
+    topics = {topic.name: topic for topic in keys.every_topic()}
+    for path in paths:
+        name, _, field = path.partition(".")
+        assert f".{field}" in viewer_fields(msgspec.json.decode(json_schema(topics[name].type))), path
+    image = layout["configById"]["Image!camera"]["imageMode"]
+    assert topics[image["imageTopic"]].stance is keys.Stance.PICTURE
+    named = {*image["annotations"], *layout["configById"]["3D!pose"]["topics"]}
+    named |= {layout["configById"]["map!track"]["followTopic"], layout["configById"]["RosOut!log"]["topicToRender"]}
+    assert named == set(CHANNELS)
+    assert set(panels(layout["layout"])) == set(layout["configById"])
+
+
+def panels(tree: Any) -> list[str]:
+    return [tree] if isinstance(tree, str) else [*panels(tree["first"]), *panels(tree["second"])]

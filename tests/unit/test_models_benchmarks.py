@@ -85,6 +85,7 @@ def test_mods_is_scored_and_written(tmp_path: Path, capsys: pytest.CaptureFixtur
     figures = msgspec.json.decode(capsys.readouterr().out)
     assert set(figures) >= {"edge_px", "edge_hit", "f1", "f1_zone", "f_by_class", "f_agnostic", "f_zone", "score"}
     written = cv2.imread(str(tmp_path / "out" / "paani" / "kope1-0-10" / "0L.png"))
+    assert written is not None
     assert {tuple(colour) for colour in written.reshape(-1, 3)[:, ::-1].tolist()} <= {
         (0, 0, 0),
         (255, 0, 0),

@@ -12,6 +12,8 @@ from paani.errors import UserError
 from paani_models.cli import main
 from paani_models.data.inventory import detector_leaks, read_everything, segmenter_leaks
 from paani_models.data.pack import QUALITIES, covering_wh, pack
+from paani_models.detector_data import read_boxed
+from paani_models.segmenter_scores import read_truth as read_water
 from paani_models.sources import Sample, Source, choose, read_boxes, read_mask, read_samples
 from tests.unit.public_sets import own_data, scene, write_picture
 
@@ -153,3 +155,11 @@ def test_a_mask_only_neighbour_of_a_held_out_box_is_a_leak(tmp_path: Path) -> No
     seen = read_everything(samples, lambda source: data / source.folder)
     assert [leak.cause for leak in detector_leaks(seen)] == ["file"]
     assert segmenter_leaks(seen) == []
+
+
+def test_everything_that_training_reads_is_there(tmp_path: Path) -> None:
+    there = unpacked(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
+    assert main(["prepare", "--data", str(there), "--sources", ",".join(NAMES)]) == 0
+    for sample in read_samples(there, choose(NAMES)):
+        assert len(read_boxed(sample).boxes) == (2 if sample.label else 0)
+        assert read_water(sample).shape == (256, 410) if sample.mask else sample.label

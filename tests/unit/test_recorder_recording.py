@@ -30,7 +30,8 @@ TOPICS = (keys.ODOMETRY, keys.PICTURE)
 
 
 def settings(folder: Path, **changes: Any) -> RecorderConfig:
-    return RecorderConfig(**({"folder": str(folder), "min_free_mib": 0.0} | changes))
+    values: dict[str, Any] = {"folder": str(folder), "min_free_mib": 0.0}
+    return RecorderConfig(**(values | changes))
 
 
 def heard(number: int, padding: int = 0) -> Heard:

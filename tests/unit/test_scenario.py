@@ -13,13 +13,13 @@ from onnx import TensorProto, helper, numpy_helper
 
 from paani import messages as m
 from paani.cli import main as paani
-from paani.config import Config, load_config
+from paani.config import load_config
 from paani_models.catalogue import load_catalogue
 from paani_services.advisor.advise import advise
 from paani_services.scenario.command import StillsReport, TrajectoriesReport
 from paani_services.scenario.stills import STALE_AGE_S
 from paani_services.scenario.trajectories import families
-from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, box, lane, play, seeing, water
+from tests.unit.advisor_evidence import CLEAR, PAPER, box, lane, play, seeing, water
 from tests.unit.pictures import PICTURES, river
 
 D, R = m.Direction, m.Reason
@@ -28,15 +28,16 @@ MOORED = box(m.Label.BUOY, (0.70, 0.56, 0.95, 0.66), 0.45)
 SIX = ["expansion", "contraction", "steady", "clipped", "gap", "ambiguity"]
 
 
-def beside(detection: m.Detection, risks: tuple[float, float, float], config: Config) -> m.Evidence:
+def beside(detection: m.Detection, risks: tuple[float, float, float]) -> m.Evidence:
     """The detection, and water evidence that brings the three risks to these values."""
-    _, advice, _ = play([msgspec.structs.replace(seeing(detection), left=lane(0), center=lane(0), right=lane(0))] * 8)
+    _, advice, _ = play(
+        [msgspec.structs.replace(seeing(detection), left=lane(0), center=lane(0), right=lane(0))] * 8, PAPER
+    )
     from_box = (advice[-1].left.risk, advice[-1].center.risk, advice[-1].right.risk)
     left, center, right = (lane(risk - part) for risk, part in zip(risks, from_box, strict=True))
     return msgspec.structs.replace(CLEAR, detections=(detection,), left=left, center=center, right=right)
 
 
-@pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
 @pytest.mark.parametrize(
     ("risks", "detection", "direction", "reason"),
     [
@@ -48,7 +49,6 @@ def beside(detection: m.Detection, risks: tuple[float, float, float], config: Co
     ],
 )
 def test_the_papers_rows_at_the_policy(
-    config: Config,
     risks: tuple[float, float, float],
     detection: m.Detection | None,
     direction: m.Direction,
@@ -59,8 +59,8 @@ def test_the_papers_rows_at_the_policy(
     V12: a vessel of confidence .85723 beside the way, its motion unknown because its box is cut by the frame.
     V14: the safer side is occupied.
     """
-    evidence = water(*risks) if detection is None else beside(detection, risks, config)
-    state, advice, tracks = play([evidence] * 8, config, period_s=0.1)
+    evidence = water(*risks) if detection is None else beside(detection, risks)
+    state, advice, tracks = play([evidence] * 8, PAPER, period_s=0.1)
     last = advice[-1]
     assert (last.direction, last.reason) == (direction, reason)
     assert [f"{given.risk:.4f}" for given in (last.left, last.center, last.right)] == [f"{risk:.4f}" for risk in risks]
@@ -69,7 +69,7 @@ def test_the_papers_rows_at_the_policy(
         assert track.confidence == pytest.approx(0.85723)
         assert (track.motion, track.motion_cause) == (m.MotionState.UNKNOWN, m.MotionCause.CLIPPED_BY_FRAME)
         assert not last.right.track_ids
-    _, stale, _ = advise(state, None, last.source_us + round(STALE_AGE_S * 1e6), config)
+    _, stale, _ = advise(state, None, last.source_us + round(STALE_AGE_S * 1e6), PAPER)
     assert (stale.direction, stale.reason) == (D.STOP, R.STALE_EVIDENCE)
 
 

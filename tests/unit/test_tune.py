@@ -78,7 +78,7 @@ def test_status() -> None:
         "tried     7f3a, on 40 frames (promotion needs 50)",
         "          advisor.policy.center_block_risk 0.48 -> 0.46",
         "differs   on 4 frames (10.0%): would move where the boat now stops on 0, would stop where it now moves on 1",
-        "          frame 7.3: STRAIGHT (CENTER_CLEAR), tried: LEFT (CENTER_RISK)",
+        "          frame 3: STRAIGHT (CENTER_CLEAR), tried: LEFT (CENTER_RISK)",
         "refused   2 requests since the advisor started",
     ]
 

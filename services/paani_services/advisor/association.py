@@ -23,7 +23,7 @@ def associate(tracks: Sequence[BoxXyxy | None], detections: Sequence[BoxXyxy], m
         for t, track in enumerate(tracks)
         if track is not None
         for d, detection in enumerate(detections)
-        if (overlap := iou(track, detection)) >= min_iou
+        if track[0] < detection[2] and detection[0] < track[2] and (overlap := iou(track, detection)) >= min_iou
     )
     track_of: dict[int, int] = {}
     paired: set[int] = set()

@@ -142,7 +142,7 @@ def nearest_limit(
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     found: list[tuple[float, Limit]] = []
     for lane in LANES:
-        limit = limit_of(lane, state, policy)
+        limit = lanes[lane].limit
         margin = risks[lane] - limit
         if lanes[lane].occupied or (lane == "center" and vessel):
             continue
@@ -182,6 +182,7 @@ class _Scene(NamedTuple):
     places: dict[str, tuple[int | None, ...]]
     held: str
     needed: float
+    water_limit: float
     weights: RiskConfig
 
 
@@ -220,6 +221,7 @@ def _scene(
         places={name: tuple(i for place, i in places if place == name) for name in ("core", "left", "right")},
         held=held,
         needed=needed,
+        water_limit=policy.center_block_risk,
         weights=config.advisor.risk,
     )
 
@@ -257,7 +259,7 @@ def _codes(scene: _Scene, kept: Flags) -> NDArray[np.int64]:
     wet = np.ones(count, bool) if center.water is None else kept[center.water]
     alone = scene.weights.non_water * center.non_water + scene.weights.uncertainty * center.uncertainty
     core, left, right = (any_left(scene.places[name]) for name in ("core", "left", "right"))
-    edge = (left != right) & ~core & ~(wet & (alone >= center.limit))
+    edge = (left != right) & ~core & ~(wet & (alone >= scene.water_limit))
     gain = risks[scene.held] - risks[OTHER[scene.held]]
     changes = (gain > 0.0) & (gain >= scene.needed)
     codes: NDArray[np.int64] = (

@@ -89,9 +89,12 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     left, center, right = advisory.left, advisory.center, advisory.right
     names = _obstacles(center, tracks)
     by = f" by {names}" if names else ""
-    centre = f"centre risk {center.risk:.2f} (limit {advisory.center_block_risk:.2f})"
+    centre = f"centre risk {center.risk:.2f} (limit {center.limit:.2f})"
     centre += f" with {names} in it" if names else ""
-    sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {advisory.side_block_risk:.2f})"
+    if left.limit == right.limit:
+        sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {left.limit:.2f})"
+    else:
+        sides = f"left {left.risk:.2f} (limit {left.limit:.2f}), right {right.risk:.2f} (limit {right.limit:.2f})"
     match advisory.reason:
         case Reason.NO_EVIDENCE:
             return "nothing has been seen yet"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from paani import portable
 from paani.config import MotionConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, MotionCause, MotionState
@@ -119,11 +120,12 @@ def estimate(history: MotionHistory, at_us: int, window: Window, config: MotionC
     times_s = [(s.at_us - samples[0].at_us) * 1e-6 for s in samples]
     sizes = [s.log_size for s in samples]
     mean_s, mean_size = statistics.fmean(times_s), statistics.fmean(sizes)
-    s_tt = math.fsum((t - mean_s) ** 2 for t in times_s)
+    s_tt = math.fsum((t - mean_s) * (t - mean_s) for t in times_s)
     if s_tt < MIN_VARIANCE_S2:
         return _unknown(MotionCause.TOO_SHORT)
     beta = math.fsum((t - mean_s) * (y - mean_size) for t, y in zip(times_s, sizes, strict=True)) / s_tt
-    sse = math.fsum((y - mean_size - beta * (t - mean_s)) ** 2 for t, y in zip(times_s, sizes, strict=True))
+    rests = [y - mean_size - beta * (t - mean_s) for t, y in zip(times_s, sizes, strict=True)]
+    sse = math.fsum(rest * rest for rest in rests)
     margin = max(config.margin_floor_per_s, config.margin_factor * math.sqrt(sse / ((len(samples) - 2) * s_tt)))
     quality = (
         clip(duration_s / config.full_duration_s, 0.0, 1.0)
@@ -141,7 +143,7 @@ def estimate(history: MotionHistory, at_us: int, window: Window, config: MotionC
 
 
 def _differs(a: Sample, b: Sample, config: MotionConfig) -> bool:
-    return abs(math.log(a.aspect / b.aspect)) > config.max_aspect_change
+    return abs(portable.log(a.aspect / b.aspect)) > config.max_aspect_change
 
 
 def is_clipped(box: BoxXyxy, margin: float) -> bool:

@@ -17,16 +17,13 @@ class PolicyState(msgspec.Struct, frozen=True):
     """What one distinct frame leaves for the next.
 
     occupied_frames: frames in a row each lane was occupied. turn: the turn in progress. clear_frames: frames in a row
-    the centre was clear. side: that of the last turn, for as long as it counts. straight_frames: frames in a row it
-    went straight. avoiding: it last did anything else.
+    the centre was clear. blocked: which lanes were.
     """
 
     occupied_frames: tuple[int, int, int] = (0, 0, 0)
     turn: Direction | None = None
     clear_frames: int = 0
-    side: str | None = None
-    straight_frames: int = 0
-    avoiding: bool = False
+    blocked: tuple[bool, bool, bool] = (False, False, False)
 
 
 class Standing(msgspec.Struct, frozen=True):
@@ -69,11 +66,11 @@ def decide(
     policy = config.advisor.policy
     frames, occupied = _occupancy(state, obstacles, config)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
+    limits = {lane: limit_of(lane, state, policy) for lane in LANES}
     blocked = {
-        lane: occupied[lane] or lanes[lane].risk >= limit_of(lane, state, policy) or (lane == "center" and vessel)
-        for lane in LANES
+        lane: occupied[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
     }
-    judged = {lane: _lane_risk(lanes[lane], occupied[lane], blocked[lane]) for lane in LANES}
+    judged = {lane: _lane_risk(lanes[lane], limits[lane], occupied[lane], blocked[lane]) for lane in LANES}
     clear_frames = 0 if blocked["center"] else state.clear_frames + 1
     risks = {lane: lanes[lane].risk for lane in LANES}
     standing = Standing(
@@ -88,16 +85,18 @@ def decide(
     if not standing.center:
         reason = Reason.CENTER_CLEAR if direction is Direction.STRAIGHT else Reason.TURN_RETAINED
     elif direction is Direction.STOP:
-        reason = _why_no_side(judged, policy)
+        reason = _why_no_side(judged["left"], judged["right"])
     elif standing.incursion is not None:
         reason = Reason.CENTER_EDGE_INCURSION
     elif not standing.left and not standing.right and _is_tie(state, risks, policy):
-        reason = Reason.TIE_STARBOARD if state.side is None else Reason.TIE_KEPT_SIDE
+        reason = Reason.TIE_STARBOARD if state.turn is None else Reason.TIE_KEPT_SIDE
     else:
-        reason = _why_blocked(judged["center"], vessel, limit_of("center", state, policy))
-    return _after(state, direction, frames, clear_frames, policy), Decision(
-        direction, reason, judged["left"], judged["center"], judged["right"], standing
-    )
+        reason = _why_blocked(judged["center"], vessel)
+    turn = direction if direction in SIDE_OF else None
+    if direction is Direction.STOP:
+        turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
+    after = PolicyState(frames, turn, clear_frames, (standing.left, standing.center, standing.right))
+    return after, Decision(direction, reason, judged["left"], judged["center"], judged["right"], standing)
 
 
 def direct(standing: Standing) -> Direction:
@@ -117,9 +116,9 @@ def direct(standing: Standing) -> Direction:
 
 def side_held(state: PolicyState, policy: PolicyConfig) -> tuple[str, float]:
     """The side to take unless the other is better, and by how much it must be (resolution 13)."""
-    if state.side is None:
+    if state.turn is None:
         return "right", policy.tie
-    return state.side, max(policy.tie, policy.side_change_margin)
+    return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
 
 
 def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> str:
@@ -159,24 +158,9 @@ def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:
 
 
 def limit_of(lane: str, state: PolicyState, policy: PolicyConfig) -> float:
-    """The risk at which a lane is blocked (J5); to go straight again takes a centre that is clearly below it."""
-    if lane != "center":
-        return policy.side_block_risk
-    return max(0.0, policy.center_block_risk - (policy.release_margin if state.avoiding else 0.0))
-
-
-def _after(
-    state: PolicyState,
-    direction: Direction,
-    occupied_frames: tuple[int, int, int],
-    clear_frames: int,
-    policy: PolicyConfig,
-) -> PolicyState:
-    """Turn and side are remembered through a stop, so that it resumes them; the side, through a short way straight."""
-    straight_frames = state.straight_frames + 1 if direction is Direction.STRAIGHT else 0
-    side = SIDE_OF.get(direction, state.side if straight_frames <= policy.side_memory_frames else None)
-    turn = {Direction.STRAIGHT: None, Direction.STOP: state.turn}.get(direction, direction)
-    return PolicyState(occupied_frames, turn, clear_frames, side, straight_frames, direction is not Direction.STRAIGHT)
+    """The risk at which a lane is blocked (J5); once blocked, it must be clearly below that to be free again."""
+    limit = policy.center_block_risk if lane == "center" else policy.side_block_risk
+    return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
 
 
 def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> bool:
@@ -186,16 +170,14 @@ def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -
     return -policy.tie < gain < needed
 
 
-def _why_blocked(center: LaneRisk, vessel: bool, limit: float) -> Reason:
-    if center.risk >= limit:
+def _why_blocked(center: LaneRisk, vessel: bool) -> Reason:
+    if center.risk >= center.limit:
         return Reason.CENTER_RISK
     return Reason.CENTER_VESSEL if vessel and not center.occupied else Reason.CENTER_OCCUPIED
 
 
-def _why_no_side(lanes: dict[str, LaneRisk], policy: PolicyConfig) -> Reason:
-    only_occupied = any(
-        lanes[side].occupied and lanes[side].risk < policy.side_block_risk for side in ("left", "right")
-    )
+def _why_no_side(left: LaneRisk, right: LaneRisk) -> Reason:
+    only_occupied = any(side.occupied and side.risk < side.limit for side in (left, right))
     return Reason.NO_SIDE_UNOCCUPIED if only_occupied else Reason.NO_SAFE_SIDE
 
 
@@ -227,7 +209,7 @@ def _occupancy(
     return (counts[0], counts[1], counts[2]), occupied
 
 
-def _lane_risk(lane: Components, occupied: bool, blocked: bool) -> LaneRisk:
+def _lane_risk(lane: Components, limit: float, occupied: bool, blocked: bool) -> LaneRisk:
     return LaneRisk(
         risk=lane.risk,
         non_water=lane.non_water,
@@ -238,4 +220,5 @@ def _lane_risk(lane: Components, occupied: bool, blocked: bool) -> LaneRisk:
         occupied=occupied,
         blocked=blocked,
         track_ids=lane.track_ids,
+        limit=limit,
     )

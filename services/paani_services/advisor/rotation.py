@@ -5,15 +5,18 @@ Body is x forward, y left, z up; positive pitch lowers the bow, positive roll lo
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
 
+from paani import portable
 from paani.config import Config
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, Odometry, RotationUse, TimeBase
 
 Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]  # by rows
 WIDEST_DEG = 170.0  # beyond it a flat picture is no pinhole's
 MIN_FORWARD = 0.05  # of a unit ray: what lies further aside is out of every picture
 MIN_SIDE = 1e-6
@@ -25,7 +28,8 @@ class Lens(msgspec.Struct, frozen=True):
 
     focal_x: float
     focal_y: float
-    down_rad: float
+    cos_down: float
+    sin_down: float
 
 
 class Attitude(msgspec.Struct, frozen=True):
@@ -58,8 +62,10 @@ def lens_of(evidence: Evidence, config: Config) -> Lens | None:
         hfov_deg, down_deg = config.camera.hfov_deg, config.camera.pitch_down_deg
     if not 0.0 < hfov_deg <= WIDEST_DEG or evidence.width_px < 1 or evidence.height_px < 1:
         return None
-    focal_x = 0.5 / math.tan(0.5 * math.radians(hfov_deg))
-    return Lens(focal_x, focal_x * evidence.width_px / evidence.height_px, math.radians(down_deg))
+    focal_x = 0.5 / portable.tan(0.5 * math.radians(hfov_deg))
+    down_rad = math.radians(down_deg)
+    focal_y = focal_x * evidence.width_px / evidence.height_px
+    return Lens(focal_x, focal_y, portable.cos(down_rad), portable.sin(down_rad))
 
 
 def heard(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[Attitude, ...]:
@@ -102,74 +108,93 @@ def view_of(attitudes: tuple[Attitude, ...], evidence: Evidence, config: Config)
     return View(RotationUse.NO_ODOMETRY if attitude is None else RotationUse.KNOWN, lens, attitude)
 
 
-def turned(box: BoxXyxy, before: Attitude | None, view: View) -> BoxXyxy | None:
-    """Where the boat's rotation since `before` took a box, cut to the picture; None where it left it.
+def expected(seen: Sequence[tuple[BoxXyxy, Attitude | None]], view: View) -> list[BoxXyxy | None]:
+    """Where the boat's rotation took boxes seen in these attitudes, cut to the picture; None for what left it.
 
-    The box as it is where the rotation is not known.
+    A box is where it was when the rotation since is not known.
     """
     lens, now = view.lens, view.attitude
-    if before is None or now is None or lens is None or before.epoch != now.epoch:
-        return box
-    yaw_rad = before.yaw_rad - now.yaw_rad
-    corners = [(box[0], box[1]), (box[2], box[1]), (box[0], box[3]), (box[2], box[3])]
-    places = []
-    for x, y in corners:
-        level = _levelled(_ray(x, y, lens), before)
-        place = _seen(_tilted(_yawed(level, yaw_rad), now), lens)
-        if place is None:
-            return None
-        places.append(place)
-    xs, ys = [place[0] for place in places], [place[1] for place in places]
-    x1, x2 = clip(min(xs), 0.0, 1.0), clip(max(xs), 0.0, 1.0)
-    y1, y2 = clip(min(ys), 0.0, 1.0), clip(max(ys), 0.0, 1.0)
-    if x2 - x1 < MIN_SIDE or y2 - y1 < MIN_SIDE:
-        return None
-    return (x1, y1, x2, y2)
+    if lens is None or now is None:
+        return [box for box, _ in seen]
+    turns: dict[Attitude, Matrix] = {}
+    map_from_camera = _map_from_camera(now, lens)
+    places: list[BoxXyxy | None] = []
+    for box, before in seen:
+        if before is None or before.epoch != now.epoch:
+            places.append(box)
+            continue
+        if before not in turns:
+            turns[before] = _transposed_times(map_from_camera, _map_from_camera(before, lens))
+        places.append(_turned(box, turns[before], lens))
+    return places
 
 
 def log_size(box: BoxXyxy, lens: Lens | None) -> float:
     """y = log sqrt(area) (I1); with a lens, of bearing times elevation [rad^2], which turning does not change."""
     if lens is None:
-        return 0.5 * math.log((box[2] - box[0]) * (box[3] - box[1]))
+        return 0.5 * portable.log((box[2] - box[0]) * (box[3] - box[1]))
     x, y = 0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])
-    left, right = (_ray(at, y, lens) for at in (box[0], box[2]))
-    high, low = (_ray(x, at, lens) for at in (box[1], box[3]))
-    wide_rad = math.atan2(left[1], left[0]) - math.atan2(right[1], right[0])
-    tall_rad = math.atan2(high[2], math.hypot(*high[:2])) - math.atan2(low[2], math.hypot(*low[:2]))
-    return 0.5 * math.log(max(wide_rad, MIN_SIDE) * max(tall_rad, MIN_SIDE))
+    left, right, high, low = (_ray(*at, lens) for at in ((box[0], y), (box[2], y), (x, box[1]), (x, box[3])))
+    wide_rad = _angle(right[:2], left[:2])
+    tall_rad = _angle((math.hypot(*low[:2]), low[2]), (math.hypot(*high[:2]), high[2]))
+    return 0.5 * portable.log(max(wide_rad, MIN_SIDE) * max(tall_rad, MIN_SIDE))
 
 
 def _ray(x: float, y: float, lens: Lens) -> Vector:
-    """Direction of a normalised picture point in the body; its length does not matter."""
-    up, cos, sin = (0.5 - y) / lens.focal_y, math.cos(lens.down_rad), math.sin(lens.down_rad)
-    return (cos + sin * up, (0.5 - x) / lens.focal_x, cos * up - sin)
+    """Direction of a normalised picture point in the body at rest; its length does not matter."""
+    up = (0.5 - y) / lens.focal_y
+    return (
+        lens.cos_down + lens.sin_down * up,
+        (0.5 - x) / lens.focal_x,
+        lens.cos_down * up - lens.sin_down,
+    )
 
 
-def _seen(body: Vector, lens: Lens) -> tuple[float, float] | None:
-    """Inverse of `_ray`; None for what is not ahead of the camera."""
-    cos, sin = math.cos(lens.down_rad), math.sin(lens.down_rad)
-    forward, up = cos * body[0] - sin * body[2], sin * body[0] + cos * body[2]
-    if forward < MIN_FORWARD * math.hypot(*body):
-        return None
-    return (0.5 - lens.focal_x * body[1] / forward, 0.5 - lens.focal_y * up / forward)
+def _angle(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """From a to b, counter-clockwise [rad]."""
+    return portable.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
 
 
-def _levelled(body: Vector, attitude: Attitude) -> Vector:
-    """From the body to level axes of the same heading: roll, then pitch undone."""
-    cos, sin = math.cos(attitude.roll_rad), math.sin(attitude.roll_rad)
-    x, y, z = body[0], cos * body[1] - sin * body[2], sin * body[1] + cos * body[2]
-    cos, sin = math.cos(attitude.pitch_rad), math.sin(attitude.pitch_rad)
-    return (cos * x + sin * z, y, cos * z - sin * x)
+def _map_from_camera(attitude: Attitude, lens: Lens) -> Matrix:
+    """The camera's axes (forward, left, up) as columns, in map axes: down, then roll, pitch and yaw."""
+    cy, sy = portable.cos(attitude.yaw_rad), portable.sin(attitude.yaw_rad)
+    cp, sp = portable.cos(attitude.pitch_rad), portable.sin(attitude.pitch_rad)
+    cr, sr = portable.cos(attitude.roll_rad), portable.sin(attitude.roll_rad)
+    body = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    cd, sd = lens.cos_down, lens.sin_down
+    east, north, up = ((cd * x - sd * z, y, sd * x + cd * z) for x, y, z in body)
+    return (east, north, up)
 
 
-def _tilted(level: Vector, attitude: Attitude) -> Vector:
-    """Inverse of `_levelled`."""
-    cos, sin = math.cos(attitude.pitch_rad), math.sin(attitude.pitch_rad)
-    x, y, z = cos * level[0] - sin * level[2], level[1], sin * level[0] + cos * level[2]
-    cos, sin = math.cos(attitude.roll_rad), math.sin(attitude.roll_rad)
-    return (x, cos * y + sin * z, cos * z - sin * y)
+def _transposed_times(a: Matrix, b: Matrix) -> Matrix:
+    first, second, third = (
+        (
+            a[0][i] * b[0][0] + a[1][i] * b[1][0] + a[2][i] * b[2][0],
+            a[0][i] * b[0][1] + a[1][i] * b[1][1] + a[2][i] * b[2][1],
+            a[0][i] * b[0][2] + a[1][i] * b[1][2] + a[2][i] * b[2][2],
+        )
+        for i in range(3)
+    )
+    return (first, second, third)
 
 
-def _yawed(level: Vector, yaw_rad: float) -> Vector:
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return (cos * level[0] - sin * level[1], sin * level[0] + cos * level[1], level[2])
+def _turned(box: BoxXyxy, turn: Matrix, lens: Lens) -> BoxXyxy | None:
+    """The box around where its corners went, cut to the picture; None where a corner is no longer ahead."""
+    (a, b, c), (d, e, f), (g, h, i) = turn
+    xs, ys = [], []
+    for x in (box[0], box[2]):
+        left = (0.5 - x) / lens.focal_x
+        for y in (box[1], box[3]):
+            up = (0.5 - y) / lens.focal_y
+            forward = a + b * left + c * up
+            if forward < MIN_FORWARD * math.sqrt(1.0 + left * left + up * up):
+                return None
+            xs.append(0.5 - lens.focal_x * (d + e * left + f * up) / forward)
+            ys.append(0.5 - lens.focal_y * (g + h * left + i * up) / forward)
+    x1, x2 = clip(min(xs), 0.0, 1.0), clip(max(xs), 0.0, 1.0)
+    y1, y2 = clip(min(ys), 0.0, 1.0), clip(max(ys), 0.0, 1.0)
+    return (x1, y1, x2, y2) if x2 - x1 >= MIN_SIDE and y2 - y1 >= MIN_SIDE else None

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from paani import portable
 from paani.config import AdvisorConfig, Config, TrackerConfig
 from paani.geometry import clip
 from paani.messages import (
@@ -28,7 +29,7 @@ from paani.messages import (
 )
 from paani_services.advisor.association import Pairs, area, associate, kinship
 from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe, window_for
-from paani_services.advisor.rotation import Attitude, View, heard, log_size, turned, view_of
+from paani_services.advisor.rotation import Attitude, View, expected, heard, log_size, view_of
 
 HAZARDS = {  # resolution 22
     Label.PERSON: Hazard.SWIMMER,
@@ -185,10 +186,11 @@ def _joined(tracks: tuple[TrackMemory, ...], sound: list[Detection], frame: _Fra
     seen = associate(places, boxes, min_iou)
     if frame.view.attitude is None:
         return seen, seen
-    expected = [None if track.left else turned(track.box, track.seen_from, frame.view) for track in tracks]
-    if expected == places:
+    turned = expected([(track.box, track.seen_from) for track in tracks], frame.view)
+    if turned == places:
         return seen, seen
-    return seen, kinship(seen, associate(expected, boxes, min_iou))
+    left_out = [None if track.left else place for track, place in zip(tracks, turned, strict=True)]
+    return seen, kinship(seen, associate(left_out, boxes, min_iou))
 
 
 def is_sound(detection: Detection) -> bool:
@@ -207,14 +209,14 @@ def urgency_now(track: TrackMemory, at_us: int, config: TrackerConfig) -> float:
     """Urgency of the last sighting, fading while the box is held (H4)."""
     if not track.held:
         return track.urgency
-    return track.urgency * math.exp(-max(0, at_us - track.seen_us) * 1e-6 / config.urgency_decay_s)
+    return track.urgency * portable.exp(-max(0, at_us - track.seen_us) * 1e-6 / config.urgency_decay_s)
 
 
 def presence(track: TrackMemory, at_us: int, config: TrackerConfig) -> float:
     """How much of the obstacle's weight is left: 1 when seen, fading while held."""
     if not track.held:
         return 1.0
-    return math.exp(-max(0, at_us - track.seen_us) * 1e-6 / config.held_decay_s)
+    return portable.exp(-max(0, at_us - track.seen_us) * 1e-6 / config.held_decay_s)
 
 
 def is_accepted(track: TrackMemory, config: TrackerConfig) -> bool:

@@ -125,7 +125,7 @@ def _speed(
 def _feed_forward(speed_mps: float, config: ControllerConfig) -> float:
     if not config.drag_feed_forward:
         return config.speed_feed_forward * speed_mps
-    drag_n = config.drag_linear * speed_mps + config.drag_quadratic * speed_mps**2
+    drag_n = config.drag_linear * speed_mps + config.drag_quadratic * speed_mps * speed_mps
     return drag_n / (2.0 * config.force_per_unit_n)
 
 

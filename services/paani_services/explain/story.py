@@ -113,7 +113,7 @@ def _track(track: Track, advisory: Advisory) -> str:
 
 def _lanes(advisory: Advisory, config: Config) -> list[str]:
     return [
-        _lane(name, lane, limit, config)
+        _lane(name, lane, lane.limit or limit, config)
         for name, lane, limit in (
             (Lane.LEFT, advisory.left, advisory.side_block_risk),
             (Lane.CENTER, advisory.center, advisory.center_block_risk),

@@ -3,6 +3,8 @@
 While a side is guarded, the way back to the route may not turn towards it: the boat first goes past.
 """
 
+import math
+
 import msgspec
 
 from paani.geometry import wrap_rad
@@ -33,7 +35,7 @@ def watch(guards: Guards, advisory: Advisory, odometry: Odometry, clear_m: float
     def side(occupied: bool, turned_from: bool, before: Guard | None) -> Guard | None:
         if occupied or turned_from:
             return here
-        if before is None or (before.x_m - here.x_m) ** 2 + (before.y_m - here.y_m) ** 2 > clear_m**2:
+        if before is None or math.dist((before.x_m, before.y_m), (here.x_m, here.y_m)) > clear_m:
             return None
         return before
 

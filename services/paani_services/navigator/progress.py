@@ -2,6 +2,7 @@
 
 import math
 
+from paani import portable
 from paani.config import NavigatorConfig
 from paani.messages import Route, Waypoint
 
@@ -50,15 +51,15 @@ def course_rad(route: Route, target: int, position_m: Point, lookahead_m: float)
     """
     start, end = leg_start(route, target), route.waypoints[target]
     if lookahead_m <= 0.0:
-        return math.atan2(end.y_m - position_m[1], end.x_m - position_m[0])
-    leg_rad = math.atan2(end.y_m - start.y_m, end.x_m - start.x_m)
-    return leg_rad - math.atan2(cross_track_m(route, target, position_m), lookahead_m)
+        return portable.atan2(end.y_m - position_m[1], end.x_m - position_m[0])
+    leg_rad = portable.atan2(end.y_m - start.y_m, end.x_m - start.x_m)
+    return leg_rad - portable.atan2(cross_track_m(route, target, position_m), lookahead_m)
 
 
 def _distance_to_leg_m(route: Route, target: int, position_m: Point) -> float:
     start, end = leg_start(route, target), route.waypoints[target]
     along_x, along_y = end.x_m - start.x_m, end.y_m - start.y_m
     from_x, from_y = position_m[0] - start.x_m, position_m[1] - start.y_m
-    part = (from_x * along_x + from_y * along_y) / (along_x**2 + along_y**2)
+    part = (from_x * along_x + from_y * along_y) / (along_x * along_x + along_y * along_y)
     part = min(1.0, max(0.0, part))
     return math.hypot(from_x - part * along_x, from_y - part * along_y)

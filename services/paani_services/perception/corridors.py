@@ -14,6 +14,7 @@ from paani.messages import LaneEvidence
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 STRIDE = 4
+MIN_ROWS = 32
 MIN_COUNTED = 0.5  # a corridor of which less can be seen is unknown, which is blocked
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
 
@@ -27,9 +28,11 @@ class Lanes(NamedTuple):
 def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
     """Class mask and confidence of each cell (E1).
 
-    logits: float32 [1, 3, H, W]. Returns uint8 and float32 [H/4, W/4]: argmax and largest softmax probability.
+    logits: float32 [1, 3, H, W] of water, obstacle, sky. Returns uint8 and float32 [h, w]: argmax and largest softmax
+    probability of every fourth score, or of every one where there are few.
     """
-    scores = logits[0, :, ::STRIDE, ::STRIDE] / np.float32(temperature)
+    stride = STRIDE if logits.shape[2] >= STRIDE * MIN_ROWS else 1
+    scores = logits[0, :, ::stride, ::stride] / np.float32(temperature)
     largest = scores.max(axis=0)
     confidence = 1.0 / np.exp(scores - largest).sum(axis=0)
     return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)

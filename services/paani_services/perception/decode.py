@@ -12,14 +12,24 @@ LABELS = tuple(Label)
 MIN_SIDE = 1e-4  # normalised; a box thinner than this has no size to speak of
 
 
-def decode(output: Floats, place: Letterbox, config: DetectorConfig) -> tuple[Detection, ...]:
+def decode(
+    output: Floats, place: Letterbox, config: DetectorConfig, classes: tuple[str, ...] = LABELS
+) -> tuple[Detection, ...]:
     """Boxes by falling confidence.
+
+    classes: what each score row stands for; a row that is none of our labels is left out.
 
     output: float32 [1, 4 + classes, N], rows cx, cy, w, h in net pixels, then scores in [0, 1]. Non-finite
     candidates are dropped (C5), the threshold is exclusive (C6), at most `nms_input` go into class-agnostic
     suppression (C7, C8), at most `max_boxes` come out (C9), in normalised source coordinates (C10).
     """
     rows = output[0]
+    if classes != LABELS:
+        known = [i for i, name in enumerate(classes) if name in LABELS]
+        labels = [Label(classes[i]) for i in known]
+        rows = rows[[0, 1, 2, 3, *(4 + i for i in known)]]
+    else:
+        labels = list(LABELS)
     with np.errstate(invalid="ignore"):
         confidence = rows[4:].max(axis=0)
         keep = np.flatnonzero(np.isfinite(rows).all(axis=0) & (confidence > config.confidence))
@@ -28,10 +38,10 @@ def decode(output: Floats, place: Letterbox, config: DetectorConfig) -> tuple[De
     solid = (boxes[2] - boxes[0] > MIN_SIDE) & (boxes[3] - boxes[1] > MIN_SIDE)
     ranked, boxes = ranked[solid], boxes[:, solid]
     chosen = suppress(boxes, config.nms_iou)[: config.max_boxes]
-    labels = rows[4:, ranked].argmax(axis=0)
+    kinds = rows[4:, ranked].argmax(axis=0)
     return tuple(
         Detection(
-            label=LABELS[int(labels[i])],
+            label=labels[int(kinds[i])],
             confidence=min(1.0, float(confidence[ranked[i]])),
             box_xyxy=(float(boxes[0, i]), float(boxes[1, i]), float(boxes[2, i]), float(boxes[3, i])),
         )

@@ -7,7 +7,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from paani.errors import UserError
-from paani_models.catalogue import Model, file_sha256, load_catalogue, verified_path
+from paani_models.catalogue import Model, described, file_sha256, load_catalogue, verified_path
 
 Floats = NDArray[np.float32]
 
@@ -20,14 +20,19 @@ class Engine:
         self._input = session.get_inputs()[0].name
         self.contract = contract
 
+    def rows_of(self, classes: tuple[str, ...]) -> list[int] | None:
+        """Where each of the classes stands in the output, as far as it is there; None when all stand in that order."""
+        stated = self.contract.classes
+        return None if stated == classes else [stated.index(name) for name in classes if name in stated]
+
     @classmethod
     def load(cls, role: str, path: str, threads: int) -> "Engine":
-        """The shipped model of a role ("detector", "segmenter"), checksum compared, or a file of the user's.
+        """The shipped model of a role ("detector", "segmenter", "gate"), checksum compared, or a file of the user's.
 
-        Raises UserError naming a file that is missing, corrupt, no ONNX model, or of other shapes than the
-        catalogue states for the role.
+        A manifest beside the user's file may state another size, preprocessing or order of classes. Raises UserError
+        naming a file that is missing, corrupt, no ONNX model, or of other shapes than its contract.
         """
-        contract = load_catalogue()[role]
+        contract = described(Path(path), role) if path else load_catalogue()[role]
         file = Path(path) if path else verified_path(role)
         checksum = file_sha256(file)
         options = ort.SessionOptions()

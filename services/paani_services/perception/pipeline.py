@@ -31,6 +31,7 @@ from paani_services.perception.sight import counted, followed_roll_rad, is_own_h
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 NO_SEGMENTER = "none"
+SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
 class Segmentation(NamedTuple):
@@ -113,7 +114,7 @@ class Perceiver:
         contract = self._detector.contract
         height, width = contract.input.shape[2:]
         tensor, place = letterbox(bgr, height, width, contract.preprocessing.pad_grey, self._tables[0])
-        detections = decode(self._detector.run(tensor), place, self._config.detections)
+        detections = decode(self._detector.run(tensor), place, self._config.detections, contract.classes)
         if self._config.ego_polygon:
             counts = self._counted((64, 80))
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, counts))
@@ -143,7 +144,8 @@ class Perceiver:
             return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
         height, width = self._segmenter.contract.input.shape[2:]
         logits = self._segmenter.run(stretch(bgr, height, width, self._tables[1]))
-        return classify(logits, self._config.temperature)
+        rows = self._segmenter.rows_of(SEGMENTER_CLASSES)
+        return classify(logits if rows is None else logits[:, rows], self._config.temperature)
 
     def _evidence(
         self,

@@ -124,14 +124,15 @@ class Recording:
             self._synced_us = now_us
 
     def _end_part(self, now_us: int) -> None:
-        if self._log is None:
+        log = self._log
+        if log is None:
             return
         try:
             self._flush(now_us)
-            self._log.finish(for_file(self.counts.topics(), self._before))
+            log.finish(for_file(self.counts.topics(), self._before))
             self._log = None
         except OSError as error:
-            self._fail(f"{self._log.path}: {error.strerror}", now_us)
+            self._fail(f"{log.path}: {error.strerror}", now_us)
 
     def _fail(self, problem: str, now_us: int) -> None:
         """Give the file up as it is; a later start repairs it."""

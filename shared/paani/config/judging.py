@@ -8,7 +8,6 @@ import msgspec
 
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
-Frames = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
 RemovalSize = Annotated[int, msgspec.Meta(ge=0, le=3)]  # the work grows with the cube
 SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
 
@@ -75,9 +74,8 @@ class PolicyConfig(Section, frozen=True):
     core_left: Fraction = 0.405  # J9
     core_right: Fraction = 0.595  # J9
     tie: Fraction = 0.02
-    side_change_margin: Fraction = 0.0
-    side_memory_frames: Frames = 0
-    release_margin: Fraction = 0.0
+    side_change_margin: Fraction = 0.15  # measured: 95 % of what the sides' difference changes by between frames
+    release_margin: Fraction = 0.08  # measured: 90 % of what the centre's risk changes by between frames
     clear_frames: Size = 2  # J10
 
 

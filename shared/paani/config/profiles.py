@@ -24,6 +24,7 @@ PAPER: dict[str, object] = {
             "compensate_rotation": False,  # I19
         },
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
+        "policy": {"side_change_margin": 0.0, "release_margin": 0.0},  # J5, resolution 13: thresholds without memory
     },
     "navigator": {
         "acceptance_m": 1.0,  # M2

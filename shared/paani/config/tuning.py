@@ -6,7 +6,12 @@ import msgspec
 
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
 
-SECTIONS = {"policy": PolicyConfig, "risk": RiskConfig, "tracker": TrackerConfig, "motion": MotionConfig}
+SECTIONS: dict[str, type[msgspec.Struct]] = {
+    "policy": PolicyConfig,
+    "risk": RiskConfig,
+    "tracker": TrackerConfig,
+    "motion": MotionConfig,
+}
 FIXED = frozenset({"advisor.tracker.max_tracks", "advisor.motion.max_samples"})  # more of these would slow the advice
 TUNABLE = (
     frozenset(

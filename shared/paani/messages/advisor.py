@@ -130,7 +130,10 @@ class Reason(StrEnum):
 
 
 class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
-    """R_j and the four numbers it was made from (checklist J4), with the overrides that apply."""
+    """R_j and the four numbers it was made from (checklist J4), with the overrides that apply.
+
+    limit: the risk at which this lane is blocked in this frame; lower where it already was.
+    """
 
     risk: Unit = 1.0
     non_water: Unit = 1.0
@@ -141,6 +144,7 @@ class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
     occupied: bool = False
     blocked: bool = True
     track_ids: tuple[Count, ...] = ()
+    limit: Unit = 0.0
 
 
 class Lane(StrEnum):

@@ -54,7 +54,7 @@ def status_text(shadow: Shadow, config: AdvisorConfig) -> str:
 def disagreement_text(found: Disagreement) -> str:
     """One frame, what is advised and what would be."""
     return (
-        f"frame {found.frame_epoch}.{found.frame_seq}: {found.active_direction} ({found.active_reason}),"
+        f"frame {found.frame_seq}: {found.active_direction} ({found.active_reason}),"
         f" tried: {found.shadow_direction} ({found.shadow_reason})"
     )
 

@@ -46,7 +46,7 @@ export function renderWhy(store, now) {
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
   renderPath(advisory);
   const weights = weightsInForce(settings.weights, store.get("advisor/shadow"));
-  for (const [name] of LANES) renderLane(rows[name], advisory[name], name === "center" ? advisory.center_block_risk : advisory.side_block_risk, weights);
+  for (const [name] of LANES) renderLane(rows[name], advisory[name], advisory[name].limit || (name === "center" ? advisory.center_block_risk : advisory.side_block_risk), weights);
   renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
   const seen = store.get("advisor/tracks");
   byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));

@@ -1,0 +1,128 @@
+"""Cross-layer equalisation (Nagel et al. 2019): channels rescaled between layers so that one scale suits them all.
+
+ReLU, addition, nearest and linear resizing and pooling commute with a positive factor per channel. So whatever such
+steps connect, the convolutions that write into it may be divided, and those that read from it multiplied, by any
+factors: the net computes the same. Batch norm must be folded already, as export does. Graphs are changed in place.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import numpy_helper
+
+Floats = NDArray[np.float32]
+
+ROUNDS = 30
+SETTLED = 1e-3  # largest logarithm of a factor that still counts as a change
+# Steps that keep channels apart and commute with a positive factor, and which of their inputs carry the picture.
+_COMMUTING = {"Relu": 1, "Resize": 1, "MaxPool": 1, "AveragePool": 1, "GlobalAveragePool": 1, "ReduceMean": 1, "Add": 2}
+
+
+@dataclass
+class _Group:
+    """Tensors that share their channels' factors, and the convolutions at their ends."""
+
+    writers: list[onnx.NodeProto] = field(default_factory=list)
+    readers: list[onnx.NodeProto] = field(default_factory=list)
+    closed: bool = True
+
+
+def equalise(model: onnx.ModelProto) -> int:
+    """Equalise all groups of channels that can be; how many there are. The outputs change by rounding alone."""
+    weights = {t.name: numpy_helper.to_array(t).astype(np.float32) for t in model.graph.initializer}
+    groups = [group for group in _groups(model.graph, weights) if group.closed and group.writers and group.readers]
+    for _ in range(ROUNDS):
+        if max((_balance(group, weights) for group in groups), default=0.0) < SETTLED:
+            break
+    touched = {name for group in groups for conv in (*group.writers, *group.readers) for name in conv.input[1:]}
+    for tensor in model.graph.initializer:
+        if tensor.name in touched:
+            tensor.CopyFrom(numpy_helper.from_array(np.ascontiguousarray(weights[tensor.name]), tensor.name))
+    return len(groups)
+
+
+def _groups(graph: onnx.GraphProto, weights: dict[str, Floats]) -> list[_Group]:
+    parent: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while parent.setdefault(name, name) != name:
+            name = parent[name]
+        return name
+
+    def carried(node: onnx.NodeProto) -> list[str]:
+        return list(node.input)[: _COMMUTING.get(node.op_type, 0)]
+
+    uses: dict[str, int] = defaultdict(int)
+    for node in graph.node:
+        for name in node.input:
+            uses[name] += 1
+        for name in carried(node):
+            parent[root(name)] = root(node.output[0])
+    found: dict[str, _Group] = defaultdict(_Group)
+    for end in (*graph.input, *graph.output):
+        found[root(end.name)].closed = False
+    for node in graph.node:
+        if node.op_type == "Conv" and _is_plain(node, weights, uses):
+            found[root(node.input[0])].readers.append(node)
+            found[root(node.output[0])].writers.append(node)
+            continue
+        inside = carried(node)
+        for name in (*node.input[len(inside) :], *([] if inside else node.output)):
+            found[root(name)].closed = False
+        if any(name in weights for name in inside):
+            found[root(node.output[0])].closed = False
+    return list(found.values())
+
+
+def _is_plain(conv: onnx.NodeProto, weights: dict[str, Floats], uses: dict[str, int]) -> bool:
+    """Dense or depthwise, with weights of its own."""
+    if any(name not in weights or uses[name] > 1 for name in conv.input[1:]):
+        return False
+    return _is_depthwise(conv, weights) or _split(conv) == 1
+
+
+def _split(conv: onnx.NodeProto) -> int:
+    return next((int(a.i) for a in conv.attribute if a.name == "group"), 1)
+
+
+def _is_depthwise(conv: onnx.NodeProto, weights: dict[str, Floats]) -> bool:
+    weight = weights[conv.input[1]]
+    return _split(conv) == weight.shape[0] and weight.shape[1] == 1
+
+
+def _balance(group: _Group, weights: dict[str, Floats]) -> float:
+    """One step; the largest logarithm of a factor."""
+    written = np.max([_relative(weights[conv.input[1]], 0) for conv in group.writers], 0)
+    read = np.max([_relative(weights[conv.input[1]], _input_axis(conv, weights)) for conv in group.readers], 0)
+    usable = (written > 0) & (read > 0)
+    factor = np.sqrt(np.divide(written, read, out=np.ones_like(written), where=usable))
+    factor[~usable] = 1.0
+    for conv in group.writers:
+        for name in conv.input[1:]:
+            weights[name] = weights[name] / _along(factor, 0, weights[name].ndim)
+    for conv in group.readers:
+        name = conv.input[1]
+        weights[name] = weights[name] * _along(factor, _input_axis(conv, weights), weights[name].ndim)
+    return float(np.abs(np.log(factor)).max())
+
+
+def _input_axis(conv: onnx.NodeProto, weights: dict[str, Floats]) -> int:
+    return 0 if _is_depthwise(conv, weights) else 1
+
+
+def _relative(weight: Floats, axis: int) -> Floats:
+    """Largest absolute weight of each channel, as a share of the largest of all."""
+    others = tuple(a for a in range(weight.ndim) if a != axis)
+    largest = np.abs(weight).max(axis=others)
+    return np.asarray(largest / max(float(largest.max()), 1e-12), np.float32)
+
+
+def _along(factor: Floats, axis: int, ndim: int) -> Floats:
+    shape = [1] * ndim
+    shape[axis] = -1
+    return factor.reshape(shape)
