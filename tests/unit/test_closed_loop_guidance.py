@@ -58,6 +58,7 @@ class Lockstep:
         self.nav, self.ctl = NavState(), ControlState()
         self.adapter = ThrustAdapter(config.plant.adapter, DOMAIN)
         self.direction = Direction.STRAIGHT
+        self.advisory: Advisory | None = None  # said instead of a bare direction
         self.armed = True
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
@@ -93,7 +94,7 @@ class Lockstep:
 
     def _guide(self, now_us: int) -> None:
         arming = Arming(source_us=now_us, armed=self.armed)
-        advisory = Advisory(source_us=now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
+        advisory = self.advisory or Advisory(source_us=now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
         heard = NavigatorHeard(
             advisory=advisory,
             advisory_us=now_us,

@@ -19,7 +19,7 @@ from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.logs.repair import Interrupted, is_finished, repair, repair_all
 from paani.logs.scan import Damage, Found, scan
-from tests.unit.small_logs import NAME, finished, unfinished
+from tests.unit.small_logs import NAME, begin, finished, unfinished
 
 N, EVERY = 60, 10
 MANY = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -219,15 +219,17 @@ def test_an_interrupted_repair_leaves_the_file_as_it_was(tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_all_of_a_folder_but_the_one_in_use(tmp_path: Path) -> None:
-    used = unfinished(tmp_path, name="20250101T000000Z-1.mcap")
+def test_all_of_a_folder_but_what_is_being_written(tmp_path: Path) -> None:
+    used = begin(tmp_path, name="20250101T000000Z-1.mcap")
     torn = unfinished(tmp_path, name="20250101T000001Z-1.mcap")
     whole_one = finished(tmp_path, name="20250101T000002Z-1.mcap")
     foreign = write(tmp_path, b"something else")
-    told = repair_all(tmp_path, used, lambda: False)
+    told = repair_all(tmp_path, lambda: False)
     assert len(told) == 2
     assert foreign.name in told[0]
     assert told[1].startswith(f"{torn.name}: repaired")
-    assert not is_finished(used)
+    assert not is_finished(used.path)
+    used.finish({})
+    assert is_finished(used.path)
     assert is_finished(torn)
     assert is_finished(whole_one)

@@ -11,7 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from paani.errors import UserError
+from paani_models.cli import data_folder
 from paani_models.data.leaks import Fingerprint, distance, find_leaks, fingerprint, refuse_leaks
+from paani_models.sources import SOURCES, read_picture, read_samples
 from tests.unit.public_sets import scene
 
 
@@ -89,6 +91,23 @@ def test_more_pairs_are_counted() -> None:
     pictures = [printed(scene(1), name, split) for name, split in (("a", "train"), ("b", "val"), ("c", "val"))]
     with pytest.raises(UserError, match=r"\(and 1 more pairs\)"):
         refuse_leaks(find_leaks(pictures))
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_on_real_pictures_copies_are_found_and_strangers_are_not() -> None:
+    """Every sixth picture against a disguised copy of itself, and against every other source."""
+    samples = {sample.picture: sample for sample in read_samples(data_folder(), SOURCES)}
+    found, originals = 0, []
+    for index, sample in enumerate(list(samples.values())[::6]):
+        picture = read_picture(sample.picture)
+        disguise = list(DISGUISES.values())[index % len(DISGUISES)]
+        place = sample.source.folder.split("_")[0]  # two folders of one maker show the same views
+        originals.append(printed(picture, sample.picture.name, place))
+        copy = printed(np.asarray(disguise(picture), np.uint8), "copy", "val")
+        found += bool(find_leaks([originals[-1], copy]))
+    assert found >= 0.97 * len(originals) > 500
+    assert find_leaks(originals) == []
 
 
 def test_distance_counts_bits() -> None:

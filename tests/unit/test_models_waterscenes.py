@@ -41,8 +41,22 @@ def test_the_seven_classes_map_to_four_r4() -> None:
 
 
 def test_the_papers_constants_r1_r2() -> None:
-    assert (42, 10_000) == (SEED, TRAIN_IMAGES)
+    assert SEED == 42
+    assert TRAIN_IMAGES == 10_000
     assert set(RARE) == {BUOY, SAILOR, KAYAK}
+
+
+def test_lists_of_the_official_sizes_give_the_papers_pictures_r1(tmp_path: Path) -> None:
+    """54,120 ids, of which 70, 20 and 10 % are for training, validation and test: 26,236 are prepared."""
+    ids = [f"{number:06}" for number in range(1, 54_121)]
+    for split, part in (("train", ids[:37_884]), ("val", ids[37_884:48_708]), ("test", ids[48_708:])):
+        (tmp_path / f"{split}.txt").write_text("\n".join(part))
+    lists = read_lists(tmp_path)
+    boxes = {identity: [of(BUOY if number % 10 == 0 else SHIP)] for number, identity in enumerate(lists["train"])}
+    chosen = select_train(boxes)
+    assert (len(chosen), len(lists["val"]), len(lists["test"])) == (10_000, 10_824, 5_412)
+    assert len(chosen) + len(lists["val"]) + len(lists["test"]) == 26_236
+    assert sum(boxes[identity][0].kind == BUOY for identity in chosen) == 3_789
 
 
 def test_a_miniature_is_counted_by_split_r1_r3_r5_r6_r7(tmp_path: Path) -> None:

@@ -78,9 +78,9 @@ def test_atan2(y: float, x: float) -> None:
 
 def test_what_is_no_number_is_treated_as_the_library_does() -> None:
     assert portable.exp(-1e9) == portable.exp(-math.inf) == 0.0
-    for wrong in (lambda: portable.log(0.0), lambda: portable.log(-1.0), lambda: portable.sin(math.inf)):
+    for function, number in ((portable.log, 0.0), (portable.log, -1.0), (portable.sin, math.inf)):
         with pytest.raises(ValueError, match=r"math domain error|expected a positive input"):
-            wrong()
+            function(number)
     with pytest.raises(OverflowError):
         portable.exp(1e4)
     assert math.isnan(portable.atan2(math.nan, 1.0))

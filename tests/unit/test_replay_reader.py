@@ -148,22 +148,22 @@ def test_a_damaged_chunk_costs_itself_alone(tmp_path: Path, whole: bytes) -> Non
     assert not report.is_exact
 
 
-def damage(draw: st.DrawFn, whole: bytes) -> bytes:
+def damage(data: st.DataObject, whole: bytes) -> bytes:
     """Flipped, overwritten, cut, taken out or doubled, in up to four places."""
     damaged = bytearray(whole)
-    for _ in range(draw(st.integers(1, 4))):
-        at = draw(st.integers(0, max(0, len(damaged) - 1)))
-        match draw(st.sampled_from(["flip", "write", "cut", "remove", "double"])):
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, max(0, len(damaged) - 1)))
+        match data.draw(st.sampled_from(["flip", "write", "cut", "remove", "double"])):
             case "flip" if damaged:
-                damaged[at] ^= 1 << draw(st.integers(0, 7))
+                damaged[at] ^= 1 << data.draw(st.integers(0, 7))
             case "write":
-                damaged[at : at + 8] = draw(st.binary(min_size=8, max_size=8))
+                damaged[at : at + 8] = data.draw(st.binary(min_size=8, max_size=8))
             case "cut":
                 del damaged[at:]
             case "remove":
-                del damaged[at : at + draw(st.integers(1, 5000))]
+                del damaged[at : at + data.draw(st.integers(1, 5000))]
             case "double":
-                damaged[at:at] = damaged[at : at + draw(st.integers(1, 5000))]
+                damaged[at:at] = damaged[at : at + data.draw(st.integers(1, 5000))]
     return bytes(damaged)
 
 
@@ -172,7 +172,7 @@ def damage(draw: st.DrawFn, whole: bytes) -> bytes:
 def test_no_damage_raises_anything_but_a_user_error(tmp_path: Path, whole: bytes, data: st.DataObject) -> None:
     """What is read is what was written, and a replay ends with a verdict."""
     with contextlib.suppress(UserError):
-        log = opened(tmp_path, damage(data.draw, whole))
+        log = opened(tmp_path, damage(data, whole))
         read = list(log.records())
         assert set(read) <= set(RECORDS)
         config = log.config()
@@ -187,7 +187,7 @@ def test_no_damage_raises_anything_but_a_user_error(tmp_path: Path, whole: bytes
 def test_nor_does_damage_that_no_checksum_finds(tmp_path: Path, bare: bytes, data: st.DataObject) -> None:
     """Payloads, ledger and states as damaged as they come: decisions differ or cannot be computed, nothing crashes."""
     with contextlib.suppress(UserError):
-        log = opened(tmp_path, damage(data.draw, bare))
+        log = opened(tmp_path, damage(data, bare))
         config = log.config()
         check_text(check_log(log, config))
         change_text(change_log(log, config, ("advisor.policy.center_block_risk=0.3",), (), chained=True))

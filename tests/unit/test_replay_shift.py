@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.decider import decider_of
 from paani.replay.check import check_service
 from paani.replay.ledger import Ledger
+from paani.replay.recompute import Losses
 from paani.replay.shift import Shift
 from tests.unit.recorded_drive import CONFIG, T0_US, drive
 
@@ -56,7 +57,7 @@ def test_a_moved_drive_is_still_exact(service: str) -> None:
     moved = [record._replace(data=LATER.moved(record.data)) for record in drive(14.0)]
     decider = decider_of(service)
     records = [r for r in moved if r.topic in Ledger(decider).topics]
-    result = check_service(decider, CONFIG, records, records[-1].log_us, {})
+    result = check_service(decider, CONFIG, records, records[-1].log_us, Losses({}))
     assert result.is_exact, (result.unexplained, result.differences)
     assert result.states == 1
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
@@ -15,7 +15,9 @@ from paani.logs.reader import Log
 
 BEFORE_US, AFTER_US = 5_000_000, 3_000_000  # where the rest of a decision is looked for
 
-T = TypeVar("T", bound=m.Message)
+AROUND: tuple[keys.Topic[Any], ...] = (
+    keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.COMMAND, keys.THRUST, keys.THRUST_APPLIED,
+)  # fmt: skip
 
 
 class Moment(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,8 +58,7 @@ def last_change_us(log: Log) -> int:
 
 def moment_at(log: Log, at_us: int) -> Moment:
     """The decision in force at a time. Raises UserError where there is none."""
-    around = [keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.COMMAND, keys.THRUST, keys.THRUST_APPLIED]
-    found = _messages(log, around, at_us - BEFORE_US, at_us + AFTER_US)
+    found = _messages(log, AROUND, at_us - BEFORE_US, at_us + AFTER_US)
     advisories = [(log_us, a) for log_us, a in found[keys.ADVISORY.name] if log_us <= at_us]
     if not advisories:
         span_s = (log.end_us - log.start_us) * 1e-6

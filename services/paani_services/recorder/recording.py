@@ -19,7 +19,7 @@ from paani_services.recorder.counts import Counts, for_file
 
 MIB = 2**20
 SYNC_S = 5.0  # a loss of power costs at most this
-LOOK_S = 1.0  # between looks at the disk
+LOOK_S = 5.0  # between looks at the disk
 AGAIN_S = 5.0  # between attempts to begin after a failure
 
 

@@ -46,7 +46,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         with bus.alive():
             async with asyncio.TaskGroup() as group:
                 group.create_task(tell(bus, clock, state, recording, backlog))
-                group.create_task(mend(folder, recording.path, stop))
+                group.create_task(mend(folder, stop))
                 while True:
                     await loop.run_in_executor(worker, recording.write, backlog.drain(), clock.now_us())
                     await asyncio.sleep(WRITE_S)
@@ -82,9 +82,9 @@ async def tell(
         await asyncio.sleep(1.0 / keys.RECORDER_STATE.rate_hz)
 
 
-async def mend(folder: Path, current: Path | None, stop: threading.Event) -> None:
+async def mend(folder: Path, stop: threading.Event) -> None:
     """Repair what earlier recorders left unfinished, while this one already records."""
-    for line in await asyncio.to_thread(repair_all, folder, current, stop.is_set):
+    for line in await asyncio.to_thread(repair_all, folder, stop.is_set):
         LOG.warning("%s", line)
 
 

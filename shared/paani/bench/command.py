@@ -18,6 +18,7 @@ from paani.bench.steadiness import steadiness
 from paani.bench.table import Machine, bench_of, text_of
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
+from paani.replay.bench import replay
 from paani.up.command import seconds, up_sets
 from paani.up.display import Display
 from paani.up.drive import Outcome, drive
@@ -51,7 +52,7 @@ def main(argv: list[str]) -> int:
         action="append",
         default=[],
         metavar="LOG",
-        help="count changes of direction on recordings",
+        help="count changes of direction on recordings, and decide them again",
     )
     judgement.add_argument("--only", action="append", default=[], metavar="PART", help="these parts alone")
     add_config_arguments(judgement)
@@ -91,6 +92,7 @@ def _judgement(options: argparse.Namespace) -> int:
     }
     if options.drive:
         parts["dithering"] = lambda: steadiness(options.drive)
+        parts["replay"] = lambda: replay(options.drive)
     parts |= installed_parts()
     for name in options.only:
         if name not in parts:

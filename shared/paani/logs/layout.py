@@ -22,6 +22,7 @@ MAX_CHUNK_BYTES = 1 << 30
 DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, ArithmeticError, MemoryError, RuntimeError)
 
 _HEAD = struct.Struct("<BQ")
+_HEAD_AND_CHANNEL = struct.Struct("<BQH")
 _MESSAGE = struct.Struct("<HIQQ")
 
 
@@ -50,17 +51,13 @@ class Layout(msgspec.Struct):
 
 def messages_in(data: bytes, wanted: Container[int]) -> Iterator[tuple[int, int, int, bytes]]:
     """(channel id, sequence, log time [ns], payload) of every whole message of the wanted channels, as they lie."""
-    at, end = 0, len(data)
-    while at + _HEAD.size <= end:
-        opcode, length = _HEAD.unpack_from(data, at)
-        body = at + _HEAD.size
-        at = body + length
-        if at > end:
-            return
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE.size:
-            number, sequence, log_ns, _ = _MESSAGE.unpack_from(data, body)
-            if number in wanted:
-                yield number, sequence, log_ns, data[body + _MESSAGE.size : at]
+    at, end, message, read = 0, len(data), Opcode.MESSAGE.value, _HEAD_AND_CHANNEL.unpack_from
+    while at + _HEAD_AND_CHANNEL.size <= end:
+        opcode, length, number = read(data, at)
+        start, at = at, at + _HEAD.size + length
+        if opcode == message and number in wanted and at <= end and length >= _MESSAGE.size:
+            _, sequence, log_ns, _ = _MESSAGE.unpack_from(data, start + _HEAD.size)
+            yield number, sequence, log_ns, data[start + _HEAD.size + _MESSAGE.size : at]
 
 
 def span_bytes(path: Path, span: Span) -> tuple[bytes, str]:

@@ -50,6 +50,15 @@ class Log:
         return dict(sorted(counts.items()))
 
     @property
+    def begun_us(self) -> tuple[int, ...]:
+        """When each recording in this log began: a folder may hold several, where the recorder began again."""
+        return tuple(
+            min(span.start_us for span in part.spans)
+            for number, part in enumerate(self._parts)
+            if part.spans and (number == 0 or part.metadata.get("paani", {}).get("part") == "1")
+        )
+
+    @property
     def files(self) -> tuple[Path, ...]:
         return tuple(part.path for part in self._parts)
 

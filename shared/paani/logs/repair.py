@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import contextlib
+import fcntl
 import mmap
 import os
 import struct
@@ -58,6 +59,10 @@ class Interrupted(Exception):
     """Told to stop; the file is as it was."""
 
 
+class InUse(UserError):
+    """A recorder has the file open."""
+
+
 def is_finished(path: Path) -> bool:
     """Does the file end as a finished recording does? Raises OSError."""
     with path.open("rb") as file:
@@ -72,14 +77,17 @@ def is_finished(path: Path) -> bool:
 def repair(path: Path, told_to_stop: Callable[[], bool] = lambda: False) -> Repaired:
     """Write what can be read beside the file, then put it in the file's place.
 
-    Raises UserError naming the file for what is no recording of ours or cannot be read or written, Interrupted.
+    Raises UserError naming the file for what is no recording of ours or cannot be read or written, InUse, Interrupted.
     """
     try:
         with path.open("rb") as file:
             if not file.seek(0, os.SEEK_END):
                 raise UserError(f"{path}: empty file")
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
                 return _repair(path, data, told_to_stop)
+    except BlockingIOError as error:
+        raise InUse(f"{path}: is being written") from error
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from error
 
@@ -320,18 +328,18 @@ def _keep(path: Path, original: Path) -> None:
         path.rename(original)
 
 
-def repair_all(folder: Path, but: Path | None, told_to_stop: Callable[[], bool]) -> list[str]:
-    """Repair every unfinished recording of the folder but one; a line for each that was mended or cannot be."""
+def repair_all(folder: Path, told_to_stop: Callable[[], bool]) -> list[str]:
+    """Repair every unfinished recording that nobody writes; a line for each that was mended or cannot be."""
     told = []
     for path in sorted(folder.glob("*.mcap")):
-        if path == but:
-            continue
         with contextlib.suppress(OSError):
             if is_finished(path):
                 continue
         try:
             repaired = repair(path, told_to_stop)
             told.append(f"{path.name}: repaired, {repaired.messages} messages")
+        except InUse:
+            continue
         except UserError as error:
             told.append(str(error))
         except Interrupted:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -54,6 +55,7 @@ class LogWriter:
         self._viewer = viewer.Viewer()
         self._header = msgspec.json.Decoder(m.PictureHeader)
         try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until this process ends: nobody repairs it
             self._begin(about, topics)
         except OSError:
             self.abandon()

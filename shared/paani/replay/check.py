@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import msgspec
@@ -14,7 +14,7 @@ from paani.decider import Decider
 from paani.logs.reader import Record
 from paani.replay.difference import Difference, first_difference
 from paani.replay.ledger import LATE_US
-from paani.replay.recompute import Again, Excuse, Recompute
+from paani.replay.recompute import Again, Excuse, Losses, Recompute
 
 SHOWN = 20
 
@@ -64,15 +64,14 @@ def check_service(
     config: Config,
     records: Iterable[Record],
     end_us: int,
-    lost: Mapping[str, int],
+    losses: Losses,
     on_again: OnAgain | None = None,
 ) -> ServiceCheck:
     """Compute every step of one service again and compare.
 
-    records: those of `Ledger(decider).topics`, to the log's end at `end_us`. lost: messages of each topic that the
-    recorder has counted as lost. digest: SHA-256 of all bytes computed.
+    records: those of `Ledger(decider).topics`, to the log's end at `end_us`. digest: SHA-256 of all bytes computed.
     """
-    recompute = Recompute(decider, config, lost, evolve=False)
+    recompute = Recompute(decider, config, losses, evolve=False)
     ledger = recompute.ledger
     result = ServiceCheck(service=decider.service)
     causes: collections.Counter[str] = collections.Counter()
@@ -98,7 +97,7 @@ def check_service(
         for sent, recorded, computed in again.outputs:
             digest.update(computed)
             if recorded is None:
-                if ledger.precedes(sent.topic, sent.epoch, sent.seq):
+                if ledger.precedes(sent.topic, sent.epoch, sent.seq) or recompute.begins_by(again.given.log_us):
                     result.before_start += 1
                 elif again.given.log_us + LATE_US >= end_us:
                     result.at_end += 1

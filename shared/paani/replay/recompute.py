@@ -12,7 +12,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
-from paani.replay.ledger import NOTHING, Given, Ledger, Name
+from paani.replay.ledger import LATE_US, NOTHING, Given, Ledger, Name
 
 
 class Skip(StrEnum):
@@ -30,6 +30,13 @@ class Excuse(StrEnum):
 
     START = "the log begins later than what it needs"
     LOST = "what it needs was lost, as the recorder says"
+
+
+class Losses(NamedTuple):
+    """Messages of each topic that the recorder has counted as lost, and when each recording of the log began [us]."""
+
+    counted: Mapping[str, int]
+    begun_us: tuple[int, ...] = ()
 
 
 class Again(NamedTuple):
@@ -51,14 +58,14 @@ class Again(NamedTuple):
 class Recompute:
     """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts.
 
-    lost: messages of each topic that the recorder has counted as lost. instead: as for `Ledger`.
+    losses: what the recorder knows of its gaps. instead: as for `Ledger`.
     """
 
     def __init__(
         self,
         decider: Decider[Any],
         config: Config,
-        lost: Mapping[str, int],
+        losses: Losses,
         *,
         evolve: bool,
         instead: Mapping[Name, bytes] = NOTHING,
@@ -69,9 +76,12 @@ class Recompute:
         self._encoder = msgspec.json.Encoder()
         self._states = msgspec.json.Decoder(type(decider.state()))
         self._state: Any = None
-        self._reason, self._excuse = Skip.BEFORE_STATE, Excuse.START
+        self._reason = Skip.BEFORE_STATE
+        self._excuse: Excuse | None = Excuse.START
         self._last: m.Step | None = None
-        self._lost = dict(lost)
+        self._lost = dict(losses.counted)
+        self._begun_us = losses.begun_us
+        self._last_us = 0
 
     def steps(self, records: Iterable[Record]) -> Iterator[Again]:
         """Every step that the log has, in order."""
@@ -79,18 +89,25 @@ class Recompute:
             last, step = self._last, given.step
             if last is not None and (step.epoch, step.seq) <= (last.epoch, last.seq):
                 continue  # the same twice
-            self._last = step
+            self._last, last_us, self._last_us = step, self._last_us, given.log_us
             missing = 0
             if last is not None:
+                begun = any(last_us < at_us <= given.log_us for at_us in self._begun_us)
                 same = step.epoch == last.epoch
                 missing = step.seq - (last.seq + 1 if same else 0)
-                excuse = Excuse.LOST if self.is_lost(self.ledger.step_topic, missing) else None
+                excuse = Excuse.START if begun else None
+                if missing and not begun and self.is_lost(self.ledger.step_topic, missing):
+                    excuse = Excuse.LOST
                 if not same:  # the process began again
                     self._state, self._reason, self._excuse = None, Skip.AFTER_BREAK, excuse
                 elif missing:
                     self._lose(Skip.AFTER_BREAK, excuse)
                 missing = missing if excuse is None else 0
             yield self._again(given)._replace(missing_before=missing)
+
+    def begins_by(self, log_us: int) -> bool:
+        """Whether a recording began shortly before, so that what belongs to a step may not be in it."""
+        return any(0 <= log_us - at_us <= LATE_US for at_us in self._begun_us)
 
     def is_lost(self, topic: str, count: int = 1) -> bool:
         """Whether the recorder has counted as many more messages of a topic as lost."""
@@ -114,7 +131,7 @@ class Recompute:
         if self._state is None:
             return Again(given, skip=self._reason, excuse=self._excuse)
         if given.inputs is None:
-            excuse = Excuse.START if given.early else None
+            excuse = Excuse.START if given.early or self.begins_by(given.log_us) else None
             if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
                 excuse = Excuse.LOST
             self._lose(Skip.AFTER_BREAK, excuse)

@@ -8,7 +8,7 @@ import itertools
 import math
 import os
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from typing import Any
 
 import msgspec
@@ -196,7 +196,7 @@ async def _opened(stack: contextlib.AsyncExitStack, config: Config, user: str) -
     return bus
 
 
-async def _unless_moving(observer: Bus, work: Any) -> Republished:
+async def _unless_moving(observer: Bus, work: Coroutine[Any, Any, Republished]) -> Republished:
     """Await the work; stop it when something that can move a boat joins this bus."""
 
     async def mover() -> str:

@@ -15,7 +15,7 @@ from paani.logs.reader import Log
 from paani.replay.check import OnAgain, ServiceCheck, check_service
 from paani.replay.ledger import Ledger, Name
 from paani.replay.progress import Progress
-from paani.replay.recompute import Again
+from paani.replay.recompute import Again, Losses
 from paani.replay.whatif import ServiceChanges, changes_of
 
 
@@ -63,7 +63,7 @@ class ChangeReport(msgspec.Struct, frozen=True, kw_only=True):
 def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckReport:
     """Compute every service's decisions again. Steps of services that are not installed are named."""
     began_ms = stopwatch_ms()
-    lost = losses(log)
+    losses = losses_of(log)
     chosen = _installed(log)
     with Progress("checking") as progress:
         checks = tuple(
@@ -72,7 +72,7 @@ def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckRep
                 config,
                 log.records(Ledger(decider).topics),
                 log.end_us,
-                lost,
+                losses,
                 _shown(progress, log, decider.service, number, len(chosen)),
             )
             for number, decider in enumerate(chosen)
@@ -94,7 +94,7 @@ def change_log(
 ) -> ChangeReport:
     """Decide everything again with changed settings. Raises UserError for a setting that is wrong."""
     began_ms = stopwatch_ms()
-    changed, lost = with_settings(config, sets), losses(log)
+    changed, losses = with_settings(config, sets), losses_of(log)
     chosen = _installed(log)
     instead: dict[Name, bytes] = {}
     with Progress("deciding") as progress:
@@ -104,7 +104,7 @@ def change_log(
                 changed,
                 log.records(Ledger(decider).topics),
                 log.start_us,
-                lost,
+                losses,
                 instead if chained else {},
                 _shown(progress, log, decider.service, number, len(chosen)),
             )
@@ -142,8 +142,8 @@ def services_in(log: Log) -> set[str]:
     return {topic.removesuffix(suffix) for topic in log.topics if topic.endswith(suffix)}
 
 
-def losses(log: Log) -> dict[str, int]:
-    """Messages of each topic that the recorder has counted as dropped or missing, in all parts together."""
+def losses_of(log: Log) -> Losses:
+    """What the recorder has counted as dropped or missing, in all parts together, and when it began."""
     lost: dict[str, int] = {}
     for counts in log.metadata_by_part("recorder"):
         for topic, text in counts.items():
@@ -151,4 +151,4 @@ def losses(log: Log) -> dict[str, int]:
                 name, _, number = word.partition("=")
                 if name in {"dropped", "missing"} and number.isdecimal():
                     lost[topic] = lost.get(topic, 0) + int(number)
-    return lost
+    return Losses(lost, log.begun_us)

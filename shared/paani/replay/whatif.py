@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -14,7 +14,7 @@ from paani.logs.reader import Record
 from paani.replay.check import OnAgain
 from paani.replay.difference import differing_fields
 from paani.replay.ledger import Name
-from paani.replay.recompute import Recompute
+from paani.replay.recompute import Losses, Recompute
 from paani.replay.words import why, words
 
 GAP_US = 1_000_000  # changed decisions further apart are two episodes
@@ -51,7 +51,7 @@ def changes_of(
     config: Config,
     records: Iterable[Record],
     start_us: int,
-    lost: Mapping[str, int],
+    losses: Losses,
     instead: dict[Name, bytes],
     on_again: OnAgain | None = None,
 ) -> ServiceChanges:
@@ -64,7 +64,7 @@ def changes_of(
     episodes: list[Episode] = []
     fields: collections.Counter[str] = collections.Counter()
     messages = changed = numbers = skipped = 0
-    for again in Recompute(decider, config, lost, evolve=True, instead=instead).steps(records):
+    for again in Recompute(decider, config, losses, evolve=True, instead=instead).steps(records):
         if on_again is not None:
             on_again(again)
         skipped += again.skip is not None
