@@ -56,8 +56,7 @@ def main(argv: list[str]) -> int:
         return 2
     except KeyboardInterrupt:
         resumes = arguments.command == "train"
-        left = "the same command goes on from the last finished epoch" if resumes else "nothing was written"
-        sys.stderr.write(f"stopped; {left}\n")
+        sys.stderr.write(f"stopped{'; the same command goes on from the last finished epoch' if resumes else ''}\n")
         return 130
 
 

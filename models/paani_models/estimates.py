@@ -8,16 +8,18 @@ from typing import TypeVar
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from paani_models.bootstrap import of_items, of_sums
 from paani_models.detection_metrics import RECALL_STEPS, Judged, ap50, curve50, summary
 from paani_models.detector_scores import ScoredBoxes, annotating, confusion_counts
 from paani_models.evidence import Evidence
 from paani_models.segmenter_scores import ScoredMask, added, mask_measures
-from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Source
+from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, Source
 
 Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 
+ALARMS = "false_alarms_per_picture"
 AP_REPLICATES = 200  # an average precision sorts every box again
 
 
@@ -116,6 +118,27 @@ def box_estimates(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
     return tuple(e for e in estimates if math.isfinite(e.value))
 
 
+def alarm_estimates(samples: Sequence[Sample], alarms: Sequence[int]) -> tuple[Estimate, ...]:
+    """Boxes per picture of classes that a source does not show, with interval, then per sequence."""
+    estimates = []
+    for source in dict.fromkeys(sample.source for sample in samples):
+        groups: dict[str, list[int]] = {}
+        for sample, count in zip(samples, alarms, strict=True):
+            if sample.source == source:
+                groups.setdefault(f"{source.name}/{sample.sequence}", []).append(count)
+        sums = np.array([(sum(counts), len(counts)) for counts in groups.values()], np.int64)
+        low, high = of_sums(sums, _rate)
+        n = int(sums[:, 1].sum())
+        estimates.append(_estimate(ALARMS, source.name, _rate(sums.sum(0)), n, low, high, len(groups)))
+        for sequence, row in zip(groups, sums, strict=True):
+            estimates.append(_estimate(ALARMS, source.name, _rate(row), int(row[1]), sequence=sequence))
+    return tuple(estimates)
+
+
+def _rate(sums: NDArray[np.int64]) -> float:
+    return float(sums[0] / sums[1])
+
+
 def box_curves(scored: Sequence[ScoredBoxes]) -> tuple[Curve, ...]:
     """One curve per class over all sources that annotate it."""
     curves = []
@@ -144,7 +167,7 @@ def box_confusion(scored: Sequence[ScoredBoxes]) -> Confusion:
     return _confusion("all", (*DETECTOR_CLASSES, "nothing"), confusion_counts(scored))
 
 
-def _confusion(source: str, classes: tuple[str, ...], counts: np.ndarray) -> Confusion:
+def _confusion(source: str, classes: tuple[str, ...], counts: NDArray[np.int64]) -> Confusion:
     return Confusion(source=source, classes=classes, counts=tuple(tuple(int(n) for n in row) for row in counts))
 
 

@@ -13,10 +13,11 @@ import msgspec
 from paani.errors import UserError
 from paani_models import benchmarks, evaluate
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
-from paani_models.detector_scores import ScoredBoxes, score_boxes
+from paani_models.detector_scores import ScoredBoxes, false_alarms, score_boxes
 from paani_models.estimates import (
     Evaluation,
     Measured,
+    alarm_estimates,
     box_confusion,
     box_curves,
     box_estimates,
@@ -107,9 +108,11 @@ def score(weights: Path, pictures: Pictures) -> Scored:
     catalogue = load_catalogue(weights)
     masks = score_masks(verified_path("segmenter", weights), segmented) if segmented else []
     boxes = score_boxes(verified_path("detector", weights), boxed) if boxed else []
+    rivers = [sample for sample in segmented if sample.source.empty_of]
+    alarms = alarm_estimates(rivers, false_alarms(verified_path("detector", weights), rivers)) if rivers else ()
     evaluation = Evaluation(
         models=tuple(Measured(name=n, sha256=catalogue[n].sha256) for n in ("segmenter", "detector") if n in catalogue),
-        estimates=(*mask_estimates(masks), *box_estimates(boxes)),
+        estimates=(*mask_estimates(masks), *box_estimates(boxes), *alarms),
         curves=box_curves(boxes),
         confusions=(*mask_confusions(masks), *([box_confusion(boxes)] if boxes else [])),
     )

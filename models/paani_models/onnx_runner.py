@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnxruntime as ort
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from paani.errors import UserError
 
 Floats = NDArray[np.float32]
-Session = ort.InferenceSession
+Session = Any  # onnxruntime is untyped
 
 
 def open_net(path: Path, threads: int = 2) -> Callable[[Floats], Floats]:

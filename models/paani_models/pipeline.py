@@ -80,7 +80,7 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
 
 
 def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
-    recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.Recipe()
+    recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.PAPER_RECIPE
     recipe = replace(
         recipe,
         stages=parse_stages(plan.stages) or recipe.stages,

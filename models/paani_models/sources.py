@@ -199,7 +199,7 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
             continue
         seen.add(item.file)
         stem = Path(item.file).stem
-        sequence = item.seq if named else f"run{index // _RUN_LENGTH}"
+        sequence = item.seq if named or source.splits else f"run{index // _RUN_LENGTH}"
         mask = folder / source.masks / f"{stem}.png" if source.masks else None
         label = folder / source.labels / f"{stem}.txt" if source.labels else None
         if source.drawn:

@@ -56,6 +56,7 @@ class Recipe:
     peak_rate: float = 2e-3
     weight_decay: float = 1e-4  # checklist S7
     warmup_steps: int = 100
+    final_frac: float = 0.01
     rendered_frac: float = 0.2
     seed: int = 42  # checklist S7
 
@@ -63,6 +64,10 @@ class Recipe:
     def epochs(self) -> int:
         """Length of the training."""
         return sum(stage.epochs for stage in self.stages)
+
+
+# Checklist S6, S7: 50 epochs at full size, batches of 16, AdamW at 3e-4 with a cosine down to nothing.
+PAPER_RECIPE = Recipe(stages=(Stage(50, 256, 320),), peak_rate=3e-4, warmup_steps=0, final_frac=0.0)
 
 
 @dataclass(frozen=True)
@@ -150,7 +155,7 @@ class SegmenterTraining:
         title = f"epoch {epoch + 1}/{recipe.epochs} {stage.width_px}x{stage.height_px}"
         for pictures, masks in tqdm(Prefetch[tuple[Tensor, Tensor]]()(make, steps), title, steps, mininterval=5.0):
             loss = self._loss(to_device(pictures), to_device(masks))
-            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps)
+            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps, recipe.final_frac)
             progress.update(loss, rate, clip_norm=5.0)
             losses.append(loss.item())
         return float(np.mean(losses))

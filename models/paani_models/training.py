@@ -40,12 +40,12 @@ def stage_of(stages: tuple[Stage, ...], epoch: int) -> Stage:
     raise IndexError(epoch)
 
 
-def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int) -> float:
-    """Linear warm-up, then cosine down to one hundredth of the peak (checklist S3)."""
+def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int, final_frac: float = 0.01) -> float:
+    """Linear warm-up, then cosine down to a share of the peak: one hundredth (checklist S3) unless told."""
     if step < warmup_steps:
         return peak * (step + 1) / warmup_steps
     progress = (step - warmup_steps) / max(1, total_steps - warmup_steps)
-    return peak * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, progress))))
+    return peak * (final_frac + (1.0 - final_frac) * 0.5 * (1.0 + math.cos(math.pi * min(1.0, progress))))
 
 
 class AveragedWeights:

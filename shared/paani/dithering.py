@@ -6,24 +6,36 @@ from collections.abc import Iterable
 
 import msgspec
 
-from paani.messages import SIDE_OF, Advisory, Direction
+from paani.messages import SIDE_OF, Advisory, Direction, Reason
 
 STILL = (Direction.STOP, Direction.NO_DATA)
+FAULTS = frozenset(
+    {
+        Reason.STALE_EVIDENCE,
+        Reason.FUTURE_EVIDENCE,
+        Reason.UNUSABLE_IMAGE,
+        Reason.MALFORMED_EVIDENCE,
+        Reason.NO_EVIDENCE,
+    }
+)
 PAUSE_S = 5.0  # longer silence, a restart or time going backwards parts one run from the next
 
 
 class Dithering(msgspec.Struct, frozen=True, kw_only=True):
     """Changes in a run of advisories, and how many that is a minute (0 where no time passed).
 
-    changes: a direction other than the one before. side_flips: a turn to the other side than the last turn, with no
+    changes: a direction other than the one before; interruptions: those of them that begin or end with a fault of the
+    input, which no policy can help. side_flips: a turn to the other side than the last turn, with no
     STRAIGHT between. stop_go_flips: from a direction that moves the boat to one that does not, or back.
     """
 
     seconds: float = 0.0
     changes: int = 0
+    interruptions: int = 0
     side_flips: int = 0
     stop_go_flips: int = 0
     changes_per_min: float = 0.0
+    interruptions_per_min: float = 0.0
     side_flips_per_min: float = 0.0
     stop_go_flips_per_min: float = 0.0
 
@@ -32,28 +44,33 @@ def dithering(advice: Iterable[Advisory]) -> Dithering:
     """Count over advisories in the order they were given, republished ones and all."""
     last: Advisory | None = None
     side: str | None = None
-    elapsed_us = changes = side_flips = stop_go = 0
+    elapsed_us = changes = interruptions = side_flips = stop_go = 0
     for given in advice:
         gap_us = _given_us(given) - _given_us(last) if last is not None else -1
         if last is None or given.epoch != last.epoch or not 0 <= gap_us <= PAUSE_S * 1e6:
             last, side = given, SIDE_OF.get(given.direction)
             continue
         elapsed_us += gap_us
-        changes += given.direction is not last.direction
+        if given.direction is not last.direction:
+            changes += 1
+            interruptions += given.reason in FAULTS or last.reason in FAULTS
         stop_go += (given.direction in STILL) is not (last.direction in STILL)
         turned = SIDE_OF.get(given.direction)
         side_flips += turned is not None and side is not None and turned != side
         if turned is not None or given.direction is Direction.STRAIGHT:
             side = turned
         last = given
-    minutes = elapsed_us / 60e6
-    per_minute = (round(n / minutes, 3) if minutes else 0.0 for n in (changes, side_flips, stop_go))
+    per_min = 60e6 / elapsed_us if elapsed_us else 0.0
     return Dithering(
         seconds=elapsed_us * 1e-6,
         changes=changes,
+        interruptions=interruptions,
         side_flips=side_flips,
         stop_go_flips=stop_go,
-        **dict(zip(("changes_per_min", "side_flips_per_min", "stop_go_flips_per_min"), per_minute, strict=True)),
+        changes_per_min=round(changes * per_min, 3),
+        interruptions_per_min=round(interruptions * per_min, 3),
+        side_flips_per_min=round(side_flips * per_min, 3),
+        stop_go_flips_per_min=round(stop_go * per_min, 3),
     )
 
 

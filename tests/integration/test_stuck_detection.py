@@ -10,12 +10,13 @@ import msgspec
 import pytest
 
 from paani import messages as m
+from paani.config import load_config
 from paani.geometry import wrap_rad
 from paani_services.advisor.advise import AdvisorState, advise
 from tests.unit.advisor_evidence import box, seeing
-from tests.unit.test_closed_loop_guidance import Lockstep, load_config, open_water
+from tests.unit.test_closed_loop_guidance import Lockstep, open_water
 
-pytestmark = pytest.mark.integration
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
 CAP_DEG, OVERSHOOT_DEG = 90.0, 7.0
 STILL_MPS = 0.02
 
@@ -63,7 +64,7 @@ def test_the_papers_boat_goes_round_and_round(boats: list[Lockstep]) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_no_stuck_box_spins_the_boat(boats: list[Lockstep], seed: int) -> None:
-    """Wherever it is, however it flickers: no further than the cap either way."""
+    """Wherever it is and whatever is advised: no further than the cap either way."""
     rng = random.Random(seed)
     width, height = rng.uniform(0.1, 0.6), rng.uniform(0.2, 0.5)
     x1, y1 = rng.uniform(0.25, 0.75 - width / 2.0) - width / 4.0, rng.uniform(0.3, 0.95 - height)

@@ -19,6 +19,7 @@ from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
+from paani.tune.client import TOKEN
 from tests.conftest import OpenAs, Spawn, put_raw
 from tests.unit.advisor_evidence import water
 
@@ -127,6 +128,24 @@ async def test_a_restarted_advisor_is_back_at_its_configuration(
             assert (await until(advisory, lambda a: a.frame_seq > 0)).direction is m.Direction.STRAIGHT
             _, out, _ = await tune(private_sets, "status")
             assert "in force  the configuration" in out
+
+
+async def test_nobody_arms_while_a_request_waits_for_the_advisor(spawn: Spawn, config: Config) -> None:
+    """What is promoted wants an arming after it, never one that overtakes it."""
+    page = f"http://127.0.0.1:{config.dashboard.port}"
+    async with spawn("dashboard"), aiohttp.ClientSession() as client:
+        async with client.get(page) as answer:
+            token = TOKEN.search(await answer.text())
+        assert token is not None
+        ours = {"Origin": page, "X-Paani-Token": token[1]}
+        asking = asyncio.create_task(client.post(f"{page}/api/tune/promote", json={"proposal": "7f3a"}, headers=ours))
+        await asyncio.sleep(0.5)
+        async with client.post(f"{page}/api/arm", json={"held_ms": 1500}, headers=ours) as answer:
+            assert (answer.status, (await answer.json())["field"]) == (409, "armed")
+        async with await asking as answer:
+            assert (answer.status, (await answer.json())["field"]) == (503, keys.SHADOW.name)
+        async with client.post(f"{page}/api/arm", json={"held_ms": 1500}, headers=ours) as answer:
+            assert answer.status == 200
 
 
 async def test_only_the_dashboard_may_tune_and_nonsense_is_counted(

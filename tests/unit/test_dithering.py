@@ -45,7 +45,7 @@ def test_a_republish_is_dated_by_its_age() -> None:
     first = said([D.LEFT])[0]
     late = msgspec.structs.replace(first, direction=D.STOP, reason=m.Reason.STALE_EVIDENCE, evidence_age_s=2.0)
     found = dithering([first, late])
-    assert (found.seconds, found.changes, found.stop_go_flips) == (2.0, 1, 1)
+    assert (found.seconds, found.changes, found.interruptions, found.stop_go_flips) == (2.0, 1, 1, 1)
 
 
 def test_a_pause_a_restart_and_time_going_back_begin_again() -> None:

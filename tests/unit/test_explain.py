@@ -91,13 +91,9 @@ def test_the_chain_is_followed_to_what_this_advice_became(log: Path) -> None:
 def test_lanes_carry_their_numbers_and_thresholds(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     at_us, advisory = next((at, a) for at, a in ADVISORIES if a.direction is m.Direction.LEFT)
     _, out, _ = paani(capsys, "explain", log, "--at", f"{(at_us - open_log(log).start_us) * 1e-6 + 0.001:.3f}")
-    for lane, limit in (
-        (advisory.left, advisory.side_block_risk),
-        (advisory.center, advisory.center_block_risk),
-        (advisory.right, advisory.side_block_risk),
-    ):
-        sign = ">=" if lane.risk >= limit else "<"
-        assert f"risk {lane.risk:.2f} {sign} {limit:.2f} {'blocked' if lane.blocked else 'free'}" in out
+    for lane in (advisory.left, advisory.center, advisory.right):
+        sign = ">=" if lane.risk >= lane.limit else "<"
+        assert f"risk {lane.risk:.2f} {sign} {lane.limit:.2f} {'blocked' if lane.blocked else 'free'}" in out
         assert f"0.55 x {lane.non_water:.2f} not water" in out
     assert "LEFT" in out
     assert "steer " in out

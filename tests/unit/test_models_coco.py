@@ -26,9 +26,10 @@ def random_case(seed: int, pictures: int) -> tuple[list[Found], list[np.ndarray]
         truth = random_boxes(rng, int(rng.integers(0, 7)))
         near = truth[rng.random(len(truth)) < 0.8]
         moved = near + rng.normal(0, 4, near.shape).astype(np.float32)
-        boxes = np.vstack([np.sort(moved.reshape(-1, 2, 2), 1).reshape(-1, 4), random_boxes(rng, 3)])
+        ordered = np.sort(moved.reshape(-1, 2, 2), 1).reshape(-1, 4)
+        boxes = np.vstack([ordered, random_boxes(rng, 3)]).astype(np.float32)
         scores = rng.permutation(len(boxes) * 100)[: len(boxes)].astype(np.float32) / 1000
-        found.append(Found(boxes, scores + np.float32(seed % 7), rng.integers(0, 2, len(boxes))))
+        found.append(Found(boxes, scores, rng.integers(0, 2, len(boxes))))
         kinds = rng.integers(0, 2, len(truth)).astype(np.float32)
         truths.append(np.hstack([kinds[:, None], truth]))
     return found, truths
@@ -39,7 +40,8 @@ def coco(found: list[Found], truths: list[np.ndarray], kind: int) -> tuple[float
 
     def rows(boxes: np.ndarray) -> list[list[float]]:
         wide = boxes.astype(np.float64)
-        return np.hstack([wide[:, :2], wide[:, 2:] - wide[:, :2]]).tolist()
+        listed: list[list[float]] = np.hstack([wide[:, :2], wide[:, 2:] - wide[:, :2]]).tolist()
+        return listed
 
     annotations, results = [], []
     for picture, (f, truth) in enumerate(zip(found, truths, strict=True), 1):

@@ -116,7 +116,7 @@ REFUSALS: dict[str, tuple[Callable[[Path], None], str]] = {
 @pytest.mark.parametrize("name", REFUSALS)
 def test_what_is_wrong_is_named_and_nothing_is_half_written(name: str, tmp_path: Path) -> None:
     spoil, message = REFUSALS[name]
-    raw = mastr1325(tmp_path / "raw")
+    raw = mastr1325(tmp_path / "raw", (2,))
     spoil(raw)
     with pytest.raises(UserError, match=message):
         prepare(raw, tmp_path / "out")

@@ -165,6 +165,7 @@ def test_masks_are_written_as_the_benchmark_reads_them(tmp_path: Path) -> None:
     assert from_ours(np.array([0, 1, 2], np.uint8)).tolist() == [WATER, OBSTACLE, SKY]
     write_prediction(tmp_path, "paani", "kope100", "00006790L.jpg", np.array([[WATER, OBSTACLE, SKY]], np.uint8))
     written = cv2.imread(str(tmp_path / "paani" / "kope100" / "00006790L.png"))
+    assert written is not None
     assert written[0, :, ::-1].tolist() == [[255, 0, 0], [0, 0, 0], [0, 255, 0]]
 
 

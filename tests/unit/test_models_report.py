@@ -17,6 +17,7 @@ from paani_models.detection_metrics import Found
 from paani_models.detector_scores import ScoredBoxes, confusion_counts
 from paani_models.estimates import (
     Evaluation,
+    alarm_estimates,
     box_confusion,
     box_curves,
     box_estimates,
@@ -79,6 +80,14 @@ def test_boxes_are_estimated_per_class_u1() -> None:
     assert found["vessel_recall_at_0.40", "all", ""].value == pytest.approx(2 / 3, abs=1e-4)
     assert found["vessel_ap50", "river", "a"].value == 1.0
     assert ("pier_ap50", "river", "") not in found
+
+
+def test_false_alarms_are_a_rate_per_picture() -> None:
+    samples = [sample("a", DASHA), sample("a", DASHA), sample("b", DASHA), sample("b", DASHA)]
+    whole, first, second = alarm_estimates(samples, [0, 1, 3, 4])
+    assert (whole.value, whole.low, whole.high, whole.n) == (2.0, 0.5, 3.5, 4)
+    assert (first.value, second.value) == (0.5, 3.5)
+    assert "per picture on rivers" in page(Content(Evaluation(estimates=(whole, first, second))))
 
 
 def test_a_curve_ends_at_the_reached_recall_u1() -> None:
@@ -188,6 +197,9 @@ def test_a_whole_report_of_a_miniature(data: Path, tmp_path: Path) -> None:
         msgspec.json.encode(Findings(evidence=Evidence.BOARD, findings=(finding(Evidence.BOARD),)))
     )
     out = tmp_path / "report"
+    (out / "pictures").mkdir(parents=True)
+    for name in ("index.html", "pictures/old.jpg"):
+        (out / name).write_text("of an earlier report")
     assert report(data, out, "--evidence", str(tmp_path / "board.json")) == 0
     text = (out / "index.html").read_text()
     named = set(re.findall(r'src="([^"]+)"', text))

@@ -21,6 +21,7 @@ from paani_models.train_segmenter import CACHE_WH, CachedPicture, SegmenterTrain
 from paani_models.training import (  # noqa: E402
     AveragedWeights,
     Prefetch,
+    Progress,
     Stage,
     learning_rate,
     load_checkpoint,
@@ -117,6 +118,18 @@ def test_learning_rate_warms_up_and_ends_at_one_hundredth_s3() -> None:
     assert rates[0] == pytest.approx(0.1)
     assert max(rates) == rates[10] == pytest.approx(1.0)
     assert rates[100] == pytest.approx(0.01)
+
+
+def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
+    """50 epochs, batch 16, 320x256; AdamW at 3e-4, decay 1e-4, cosine over all 50 epochs to zero; seed 42."""
+    recipe = train_segmenter.PAPER_RECIPE
+    assert recipe.stages == (Stage(50, 256, 320),)
+    assert (recipe.epochs, recipe.batch, recipe.seed) == (50, 16, 42)
+    assert (recipe.peak_rate, recipe.weight_decay) == (3e-4, 1e-4)
+    rates = [learning_rate(recipe.peak_rate, s, 500, recipe.warmup_steps, recipe.final_frac) for s in (0, 250, 500)]
+    assert rates == pytest.approx([3e-4, 1.5e-4, 0.0], abs=1e-12)
+    progress = Progress(Segmenter(), recipe.peak_rate, recipe.weight_decay)
+    assert isinstance(progress.optimiser, torch.optim.AdamW)
 
 
 def test_stage_of() -> None:

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.errors import UserError
+from paani_models.cli import main
 from paani_models.data.checked_files import Box
 from paani_models.data.manifest import BoxCounts, count_boxes, counts_table, load_manifest
 from paani_models.data.waterscenes import (
@@ -27,7 +28,7 @@ from paani_models.data.waterscenes import (
     read_lists,
     select_train,
 )
-from paani_models.sources import DETECTOR_CLASSES, read_boxes
+from paani_models.sources import DETECTOR_CLASSES, choose, read_boxes, read_samples
 from tests.unit.public_sets import scene, waterscenes, write_picture
 
 
@@ -72,6 +73,20 @@ def test_a_miniature_is_counted_by_split_r1_r3_r5_r6_r7(tmp_path: Path) -> None:
     raw = (tmp_path / "raw" / "detection" / "yolo").glob("*.txt")
     rows = {path.stem: len(path.read_text().splitlines()) for path in raw}
     assert [len(boxes) for boxes in kept] == [rows[Path(item.file).stem] for item in manifest.items]
+
+
+def test_a_prepared_set_is_trained_on_by_name_and_watched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest, _ = prepare(waterscenes(tmp_path / "raw"), tmp_path / "waterscenes", train_images=4)
+    sides = {
+        name: [sample.held_out for sample in read_samples(tmp_path, choose([name]))]
+        for name in ("waterscenes", "waterscenes_test")
+    }
+    assert sides == {"waterscenes": [False] * 4 + [True], "waterscenes_test": [True]}
+    command = ["prepare", "--data", str(tmp_path), "--sources", "waterscenes,waterscenes_test"]
+    assert main(command) == 0
+    write_picture(tmp_path / "waterscenes" / manifest.items[0].file, scene(99))
+    assert main(command) == 2
+    assert f"{manifest.items[0].file}: differs from its manifest" in capsys.readouterr().err
 
 
 def test_the_counts_print_as_the_papers_table_r5() -> None:

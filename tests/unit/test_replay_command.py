@@ -166,3 +166,16 @@ def test_settings_can_be_those_of_the_paper(capsys: pytest.CaptureFixture[str], 
     code, out, _ = paani(capsys, "replay", file, "--check")
     assert code == 0, out
     assert msgspec.json.decode(encode_config(config)) != msgspec.json.decode(encode_config(CONFIG))
+
+
+def test_the_bench_gives_the_speed_of_a_check(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
+    file = tmp_path / "b.json"
+    code, out, _ = paani(capsys, "bench", "judgement", "--only", "replay", "--drive", log, "--json", file)
+    assert code == 0
+    assert "x real time" in out
+    (part,) = json.loads(file.read_text())["parts"]
+    row = dict(zip(part["columns"], part["rows"][0], strict=True))
+    assert row["drive"] == log.name
+    assert row["decisions"] > 300
+    assert row["differ"] == 0
+    assert row["log [s]"] / row["took [s]"] == pytest.approx(row["x real time"], rel=0.2, abs=1)

@@ -15,8 +15,9 @@ from paani.errors import UserError
 Picture = NDArray[np.uint8]
 
 MIN_SIDE_PX = 16  # below the deepest stride of either net there is nothing to learn from
-EDGE_SLACK = 0.01  # makers round to pixels; a box may pass the picture's edge by this share of it
-_ENDINGS = {b"\xff\xd8": (b"\xff\xd9", 1024), b"\x89P": (b"IEND", 16)}
+EDGE_SLACK = 0.01  # makers round to pixels; a box that passes the picture's edge by this share of it is clipped
+MIN_SIDE_FRAC = 1e-4  # a fifth of a pixel of a wide picture; less is a slip of the maker
+_ENDINGS = {b"\xff\xd8": (b"\xff\xd9", 1024), b"\x89P": (b"IEND\xaeB`\x82", 16)}
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def sha256(data: bytes) -> str:
 
 def decode_picture(data: bytes, path: Path) -> Picture:
     """RGB uint8 [H,W,3]. Raises UserError naming what is no picture, or one too small to show anything."""
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    picture = _decoded(data, cv2.IMREAD_COLOR)
     if picture is None:
         raise UserError(f"{path}: not a readable picture")
     if min(picture.shape[:2]) < MIN_SIDE_PX:
@@ -65,7 +66,7 @@ def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, i
     Raises UserError naming a file that is no picture, has colours or more than 8 bits, another size than `wh`, or a
     code outside `codes`.
     """
-    mask = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    mask = _decoded(data, cv2.IMREAD_UNCHANGED)
     if mask is None:
         raise UserError(f"{path}: not a readable mask")
     if mask.ndim == 3 and (mask == mask[..., :1]).all():
@@ -80,11 +81,19 @@ def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, i
     return np.asarray(mask, np.uint8)
 
 
+def _decoded(data: bytes, flags: int) -> NDArray[np.generic] | None:
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:  # larger than the decoder's own limit
+        return None
+    return None if picture is None else np.asarray(picture)
+
+
 def read_yolo(path: Path, kinds: int) -> tuple[Box, ...]:
     """Rows `class cx cy width height`, all shares of the picture (checklist R8).
 
     Raises UserError naming file and line of a row that is malformed or not finite, of an unknown class, and of a box
-    without area or outside the picture.
+    without area or outside the picture. Boxes end inside it.
     """
     try:
         text = path.read_text(encoding="ascii")
@@ -106,10 +115,14 @@ def _row(line: str, place: str, kinds: int) -> Box:
         raise UserError(f"{place}: unknown class {kind:g}")
     if not (0.0 < width <= 1.0 and 0.0 < height <= 1.0):
         raise UserError(f"{place}: a box without area, or larger than the picture")
-    low, high = min(cx - width / 2, cy - height / 2), max(cx + width / 2, cy + height / 2)
-    if low < -EDGE_SLACK or high > 1.0 + EDGE_SLACK:
+    ends = np.array(((cx - width / 2, cy - height / 2), (cx + width / 2, cy + height / 2)))
+    if ends.min() < -EDGE_SLACK or ends.max() > 1.0 + EDGE_SLACK:
         raise UserError(f"{place}: a box outside the picture")
-    return Box(int(kind), cx, cy, width, height)
+    low, high = np.clip(ends, 0.0, 1.0)
+    if (high - low).min() < MIN_SIDE_FRAC:
+        raise UserError(f"{place}: a box without area inside the picture")
+    centre, size = (low + high) / 2, high - low
+    return Box(int(kind), float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
 
 
 def refuse(mistakes: list[str]) -> None:

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from paani.errors import UserError
 from paani_models.data.checked_files import decode_picture, read_bytes, refuse, sha256
 from paani_models.data.leaks import Fingerprint, Leak, find_leaks, fingerprint
-from paani_models.data.manifest import Entry, MaskKind, SourceManifest
+from paani_models.data.manifest import Entry, MaskKind, SourceManifest, load_manifest
 from paani_models.sources import DETECTOR_CLASSES, RENDERED, Sample, Source, read_boxes, read_mask
 
 FolderOf = Callable[[Source], Path]
@@ -40,13 +40,19 @@ def read_everything(samples: Sequence[Sample], folder_of: FolderOf) -> list[Seen
     """Decode every picture, mask and label once.
 
     Raises UserError naming the first bad file and counting the others: missing, truncated or unreadable pictures and
-    masks, a mask of another size than its picture, a bad box (checklist R8).
+    masks, a mask of another size than its picture, a bad box (checklist R8), a picture of a prepared public set whose
+    checksum is no longer that of its manifest.
     """
     seen: list[Seen] = []
     mistakes: list[str] = []
+    prepared = {s.source: folder_of(s.source) for s in samples if s.source.splits}
+    sums = {folder / e.file: e.sha256 for folder in prepared.values() for e in load_manifest(folder).items}
     for sample in tqdm(samples, "reading", unit="picture", mininterval=2.0):
         try:
-            seen.append(_read(sample, folder_of(sample.source)))
+            item = _read(sample, folder_of(sample.source))
+            if sums.get(sample.picture, item.entry.sha256) != item.entry.sha256:
+                raise UserError(f"{sample.picture}: differs from its manifest")
+            seen.append(item)
         except UserError as error:
             mistakes.append(str(error))
     refuse(mistakes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,10 +12,12 @@ from paani_models.catalogue import verified_path
 from paani_models.evaluate_command import score, write
 from paani_models.evidence import Evidence, Finding, read_findings
 from paani_models.pictures import Pictures
-from paani_models.report.overlays import draw_boxes, draw_masks, ends_of_boxes, ends_of_masks
+from paani_models.report.overlays import PICTURES, draw_boxes, draw_masks, ends_of_boxes, ends_of_masks
 from paani_models.report.page import Content, page
 from paani_models.report.records import read_faults, read_record
 from paani_models.segmenter_scores import segmenter
+
+PAGE = "index.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +44,8 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     except OSError as error:
         raise UserError(f"{out}: {error.strerror}") from error
     scored = score(arguments.weights, pictures)
+    if (out / PAGE).is_file():
+        shutil.rmtree(out / PICTURES, ignore_errors=True)
     worst_masks, best_masks = ends_of_masks(scored.masks)
     worst_boxes, best_boxes = ends_of_boxes(scored.boxes)
     segment = segmenter(verified_path("segmenter", arguments.weights))
@@ -56,10 +61,10 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
         best_boxes=boxes[len(worst_boxes) :],
     )
     write(out / "evaluation.json", scored.evaluation)
-    beside = out / "index.html.partial"
+    beside = out / f"{PAGE}.partial"
     beside.write_text(page(content), encoding="utf-8")
-    beside.replace(out / "index.html")
-    sys.stdout.write(f"{out / 'index.html'}\n")
+    beside.replace(out / PAGE)
+    sys.stdout.write(f"{out / PAGE}\n")
     return 0
 
 

@@ -24,6 +24,7 @@ Picture = NDArray[np.uint8]
 Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 
 SHOWN = 8
+PICTURES = "pictures"
 _WATER_RGB, _OBSTACLE_RGB, _SKY_RGB, _WRONG_RGB = (0, 114, 178), (230, 159, 0), (204, 121, 167), (220, 0, 0)
 _TRUE_RGB, _FOUND_RGB = (0, 200, 120), (255, 140, 0)
 _WIDTH_PX = 560
@@ -95,7 +96,8 @@ def gallery(drawn: Sequence[Drawn]) -> str:
     return (
         '<div class="gallery">'
         + "".join(
-            f'<figure><img loading="lazy" src="{escape(each.file)}" alt="{escape(each.caption)}">'
+            f'<figure><a href="{escape(each.file)}">'
+            f'<img loading="lazy" src="{escape(each.file)}" alt="{escape(each.caption)}"></a>'
             f"<figcaption>{escape(each.caption)}</figcaption></figure>"
             for each in drawn
         )
@@ -131,8 +133,8 @@ def _rectangle(
 def _save(folder: Path, stem: str, rgb: Picture, caption: str) -> Drawn:
     scale = _WIDTH_PX / rgb.shape[1]
     shown = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
-    name = f"pictures/{stem}.jpg"
-    (folder / "pictures").mkdir(exist_ok=True)
+    name = f"{PICTURES}/{stem}.jpg"
+    (folder / PICTURES).mkdir(exist_ok=True)
     if not cv2.imwrite(str(folder / name), cv2.cvtColor(shown, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 85]):
         raise UserError(f"{folder / name}: cannot be written")
     return Drawn(name, caption)

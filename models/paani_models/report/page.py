@@ -9,12 +9,19 @@ from importlib.resources import files
 from string import Template
 
 from paani_models.detection_metrics import RECALL_STEPS
-from paani_models.estimates import Estimate, Evaluation
+from paani_models.estimates import ALARMS, Estimate, Evaluation
 from paani_models.evidence import TITLES, Evidence, Finding, sections
 from paani_models.report.charts import Points, lines
 from paani_models.report.overlays import Drawn, gallery
 from paani_models.report.records import FaultReport, fault_charts, training_charts
-from paani_models.report.tables import box_table, confusion_table, findings_table, mask_table, sequence_table
+from paani_models.report.tables import (
+    box_table,
+    confusion_table,
+    findings_table,
+    mask_table,
+    rate_table,
+    sequence_table,
+)
 from paani_models.sources import DETECTOR_CLASSES
 
 MASK_KEY = (
@@ -23,7 +30,8 @@ MASK_KEY = (
 )
 BOX_KEY = (
     '<p class="key"><span style="background:#00c878"></span>boxed by people'
-    '<span style="background:#ff8c00"></span>found at confidence 0.40</p>'
+    '<span style="background:#ff8c00"></span>found at confidence 0.40; only classes that a '
+    "source boxes count as mistakes</p>"
 )
 
 
@@ -59,7 +67,8 @@ def page(content: Content) -> str:
 
 def _labelled(content: Content) -> str:
     estimates = content.evaluation.estimates
-    masks = [e for e in estimates if not e.metric.startswith(DETECTOR_CLASSES)]
+    masks = [e for e in estimates if not e.metric.startswith((*DETECTOR_CLASSES, ALARMS))]
+    alarms = [e for e in estimates if e.metric == ALARMS]
     boxes = [e for e in estimates if e.metric.startswith(DETECTOR_CLASSES)]
     parts = [
         "<p>Held-out sequences only. Intervals hold 95 % and come from drawing whole sequences again, with a fixed "
@@ -69,6 +78,8 @@ def _labelled(content: Content) -> str:
         parts += _segmenter(content, masks)
     if boxes:
         parts += _detector(content, boxes)
+    if alarms:
+        parts.append("<h3>Detector: boxes per picture on rivers that show no craft</h3>" + rate_table(alarms))
     if content.faults:
         parts.append("<h3>Gate: pictures that cannot be used</h3>")
         parts.append(

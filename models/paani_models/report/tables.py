@@ -61,6 +61,16 @@ def sequence_table(estimates: Sequence[Estimate], metric: str) -> str:
     return _table("<th>source</th><th>sequence</th><th>n</th><th>value</th>", rows)
 
 
+def rate_table(estimates: Sequence[Estimate]) -> str:
+    """One rate per source with its interval."""
+    rows = [
+        f"<tr><th>{escape(e.source)}</th><td>{e.n}</td><td>{e.sequences}</td><td>{_cell(e)}</td></tr>"
+        for e in estimates
+        if not e.sequence
+    ]
+    return _table("<th>source</th><th>pictures</th><th>sequences</th><th>per picture</th>", rows)
+
+
 def confusion_table(confusion: Confusion) -> str:
     """Shares of each row, the count in the tooltip; rows are the truth."""
     head = "".join(f"<th>{escape(name)}</th>" for name in confusion.classes)

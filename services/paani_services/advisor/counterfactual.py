@@ -73,6 +73,8 @@ def counterfactual(
     if decision.reason is Reason.TURN_RETAINED:
         return Counterfactual(changed_by=ChangedBy.CLEAR_PICTURES)
     limit, margin = nearest_limit(state, decision, obstacles, config)
+    if config.advisor.counterfactual_size == 0:
+        return Counterfactual(changed_by=ChangedBy.MORE_EVIDENCE, limit=limit, margin=margin)
     pieces = pieces_of(water, obstacles, config)
     scene = _scene(state, pieces, water, obstacles, config)
     judged = 0

@@ -131,23 +131,19 @@ def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfi
 
 def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
     """Low in the picture and wide enough to occupy the lane (J6)."""
-    policy, span = config.advisor.policy, lane_span(lane, config.perception.corridors)
-    shared = shared_width(obstacle.box, span)
-    return (
-        obstacle.presence >= SEEN_ENOUGH
-        and obstacle.box[3] >= policy.occupancy_bottom
-        and 0.0 < shared >= policy.occupancy_coverage * (span[1] - span[0])
-    )
+    policy = config.advisor.policy
+    if obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
+        return False
+    span = lane_span(lane, config.perception.corridors)
+    return 0.0 < shared_width(obstacle.box, span) >= policy.occupancy_coverage * (span[1] - span[0])
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
     """A vessel whose part inside the centre corridor is large (J7)."""
+    if not obstacle.craft or obstacle.presence < SEEN_ENOUGH:
+        return False
     share = overlap(obstacle.box, lane_span("center", config.perception.corridors))
-    return (
-        obstacle.craft
-        and obstacle.presence >= SEEN_ENOUGH
-        and 0.0 < area(obstacle.box) * share >= config.advisor.policy.center_vessel_area
-    )
+    return 0.0 < area(obstacle.box) * share >= config.advisor.policy.center_vessel_area
 
 
 def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:

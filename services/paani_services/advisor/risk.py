@@ -52,7 +52,8 @@ def shared_width(box: BoxXyxy, span: tuple[float, float]) -> float:
 
 def overlap(box: BoxXyxy, span: tuple[float, float]) -> float:
     """Fraction of the box's width inside the corridor (J2, resolution 7): two lanes may both count it."""
-    return clip(shared_width(box, span) / (box[2] - box[0]), 0.0, 1.0)
+    shared = shared_width(box, span)
+    return min(1.0, shared / (box[2] - box[0])) if shared > 0.0 else 0.0
 
 
 def either(values: Iterable[float]) -> float:

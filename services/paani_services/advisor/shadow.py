@@ -72,7 +72,7 @@ class TuningState(msgspec.Struct, frozen=True):
 
 
 def tuned(config: Config, parameters: Parameters) -> Config:
-    """The configuration to judge by; its other parts stay as they are, and so does what it cannot be combined with."""
+    """The configuration to judge by; unchanged where it contradicts the changes, as other settings in a replay may."""
     if not parameters.changes:
         return config
     judged = _advisor_config(config, parameters.changes)

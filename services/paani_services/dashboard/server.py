@@ -111,6 +111,8 @@ class Server:
         if (stranger := self._stranger(request, "arm")) is not None:
             return stranger
         read_body(await request.read(), ArmRequest)
+        if self._tuner.is_asking:
+            return refusal(409, "not armed: a tuning request waits for the advisor", "armed")
         if not await self._console.arm():
             return refusal(409, "not armed: a STOP came meanwhile, or the latch could not be released on disk", "armed")
         self._hub.tell(Event(self._clock.now_us(), "warn", "armed"))

@@ -45,6 +45,11 @@ class Tuner:
             self._publisher.put(self._request)
             await asyncio.sleep(1.0 / keys.TUNING.rate_hz)
 
+    @property
+    def is_asking(self) -> bool:
+        """Whether a request waits for the advisor: what is in force may be about to change."""
+        return self._asking.locked()
+
     async def propose(self, changes: tuple[m.Change, ...]) -> m.Shadow | None:
         """Ask for a trial under a new name; the advisor's answer, None when it gives none."""
         return await self._ask(m.TuningAct.PROPOSE, secrets.token_hex(2), changes)

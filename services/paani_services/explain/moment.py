@@ -21,13 +21,13 @@ AROUND: tuple[keys.Topic[Any], ...] = (
 
 
 class Moment(msgspec.Struct, frozen=True, kw_only=True):
-    """One decision. What the log has not is None. `since_us`: when the direction before was first advised."""
+    """One decision. What the log has not is None. before: the direction before, first advised at `before_us`."""
 
     at_us: int
     start_us: int
     advisory: m.Advisory
-    before: m.Advisory | None
-    since_us: int
+    before: str
+    before_us: int
     tracks: m.Tracks | None
     evidence: m.Evidence | None
     order: m.NavCommand | None
@@ -65,10 +65,6 @@ def moment_at(log: Log, at_us: int) -> Moment:
         raise UserError(f"{log.path}: no advice at {(at_us - log.start_us) * 1e-6:.1f} s (it has 0 to {span_s:.1f} s)")
     log_us, advisory = advisories[-1]
     runs = list(_runs(log, log_us))
-    before_us = runs[-2].begin_us if len(runs) > 1 else 0
-    before = _first(
-        (a for at, a in reversed(found[keys.ADVISORY.name]) if at < log_us and a.direction != advisory.direction)
-    )
     frame = (advisory.frame_epoch, advisory.frame_seq)
     order = _first(o for _, o in found[keys.COMMAND.name] if o.advisory_sent_us == advisory.sent_us)
     thrust = _first(t for _, t in found[keys.THRUST.name] if order and t.command_sent_us == order.sent_us)
@@ -80,8 +76,8 @@ def moment_at(log: Log, at_us: int) -> Moment:
         at_us=log_us,
         start_us=log.start_us,
         advisory=advisory,
-        before=before,
-        since_us=before_us,
+        before=runs[-2].direction if len(runs) > 1 else "",
+        before_us=runs[-2].begin_us if len(runs) > 1 else 0,
         tracks=_last(t for at, t in found[keys.TRACKS.name] if (t.frame_epoch, t.frame_seq) == frame),
         evidence=_first(e for _, e in found[keys.EVIDENCE.name] if (e.frame_epoch, e.frame_seq) == frame),
         order=order,

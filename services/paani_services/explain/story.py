@@ -50,9 +50,8 @@ def _title(moment: Moment) -> str:
     utc = datetime.datetime.fromtimestamp(moment.at_us * 1e-6, tz=datetime.UTC)
     text = f"{utc:%Y-%m-%d %H:%M:%S}.{utc.microsecond // 100_000} UTC, {_since_start(moment, moment.at_us)}: "
     text += f"{advisory.direction} ({advisory.reason})"
-    if moment.since_us:
-        before = f"{moment.before.direction} " if moment.before is not None else "another direction "
-        text += f"; {before}from {_since_start(moment, moment.since_us)}"
+    if moment.before:
+        text += f"; before that {moment.before} from {_since_start(moment, moment.before_us)}"
     return text
 
 

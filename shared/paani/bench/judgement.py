@@ -19,7 +19,9 @@ from paani.order_statistics import median, nearest_rank
 
 BOXES = 24  # C9
 START_US, PERIOD_US, AGE_US = 1_000_000_000, 200_000, 100_000
-STEADY_FRAMES = 5  # how long a scene lasts: tracks confirm, lanes become occupied, turns are kept
+STEADY_FRAMES = 5  # how long the water stays as it is: lanes become occupied, turns are kept
+DRIFT = 0.004  # how far a box moves between frames
+REPLACED = 2  # boxes that go, and others that come, with each change of the water
 WARM_FRAMES = 50
 
 
@@ -110,14 +112,15 @@ def contract(config: Config, rounds: int) -> Part:
 
 
 def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
-    """Evidence with 24 boxes that hold still for five frames, in water of every kind."""
+    """Evidence with 24 boxes that drift, a few of which come and go, in water of every kind."""
     rng = random.Random(seed)
-    boxes: tuple[m.Detection, ...] = ()
+    boxes = [_box(rng) for _ in range(BOXES)]
     lanes: tuple[m.LaneEvidence, ...] = ()
     for number in range(frames):
         if number % STEADY_FRAMES == 0:
-            boxes = tuple(_box(rng) for _ in range(BOXES))
+            boxes = [*boxes[REPLACED:], *(_box(rng) for _ in range(REPLACED))]
             lanes = tuple(m.LaneEvidence(non_water=rng.random() ** 2, uncertainty=0.2 * rng.random()) for _ in range(3))
+        boxes = [_drifted(box, rng) for box in boxes]
         yield m.Evidence(
             source_us=START_US + number * PERIOD_US,
             frame_seq=number,
@@ -125,7 +128,7 @@ def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
             width_px=320,
             height_px=240,
             usable=True,
-            detections=boxes,
+            detections=tuple(boxes),
             left=lanes[0],
             center=lanes[1],
             right=lanes[2],
@@ -134,7 +137,16 @@ def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
         )
 
 
+def _drifted(box: m.Detection, rng: random.Random) -> m.Detection:
+    x1, y1, x2, y2 = box.box_xyxy
+    dx, dy = rng.uniform(-DRIFT, DRIFT), rng.uniform(-DRIFT, DRIFT)
+    dx, dy = min(max(dx, -x1), 1.0 - x2), min(max(dy, -y1), 1.0 - y2)
+    moved = (max(0.0, x1 + dx), max(0.0, y1 + dy), min(1.0, x2 + dx), min(1.0, y2 + dy))
+    return msgspec.structs.replace(box, box_xyxy=moved)
+
+
 def _box(rng: random.Random) -> m.Detection:
+    """Far and small, or near and large, anywhere below the horizon."""
     width, height = rng.uniform(0.02, 0.2), rng.uniform(0.02, 0.2)
     x1, y1 = rng.uniform(0.0, 1.0 - width), rng.uniform(0.25, 1.0 - height)
     return m.Detection(
@@ -157,12 +169,13 @@ def _timed(
 
 def _messages(config: Config) -> tuple[m.Message, ...]:
     decider = decider_of("advisor")
-    state, evidence, outputs = decider.state(), None, {}
+    state: Any = decider.state()
+    said: tuple[m.Message, ...] = ()
     for evidence in crowded(STEADY_FRAMES):
         inputs = {topic.name: Input() for topic in decider.inputs} | {keys.EVIDENCE.name: Input(evidence)}
         state, outputs = decider.decide(state, inputs, evidence.source_us + AGE_US, config)
-    assert evidence is not None
-    return evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name]
+        said = (evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name])
+    return said
 
 
 class _String(msgspec.Struct):

@@ -18,29 +18,47 @@ from paani.errors import UserError
 from paani.logs.reader import open_log
 
 STEP_US = 200_000  # J17: between pictures the advice is given again
+PROMPT_US = 100_000  # from picture to evidence: a machine that was busy while recording is not the policy's doing
 READ = (keys.EVIDENCE, keys.ODOMETRY)
-MARGIN = "advisor.policy.side_change_margin"
-MARGINS = (0.0, 0.05, 0.1, 0.15, 0.2)
+STEADYING = ("advisor.policy.release_margin", "advisor.policy.side_change_margin")
+WITHOUT = tuple(f"{path}=0" for path in STEADYING)
 
 
 def steadiness(drives: list[Path]) -> Part:
-    """Every drive judged by `paper` and by `paani`, and by `paani` with other margins. Raises UserError."""
-    settings = {"paper": load_config(profile="paper"), "paani": load_config()}
-    settings |= {f"margin {margin:g}": load_config(sets=(f"{MARGIN}={margin}",)) for margin in MARGINS}
+    """Every drive judged by `paper`, by `paani`, and by `paani` without what steadies it. Raises UserError."""
+    settings = {
+        "paper": load_config(profile="paper"),
+        "paani, both margins 0": load_config(sets=WITHOUT),
+        "paani, release margin 0": load_config(sets=WITHOUT[:1]),
+        "paani, side change margin 0": load_config(sets=WITHOUT[1:]),
+        "paani": load_config(),
+    }
     rows = []
     for drive in drives:
-        heard = tuple(_heard(drive))
+        heard = tuple(sorted(_heard(drive), key=lambda each: each[0]))
         for name, config in settings.items():
             found = dithering(advice(heard, config))
             rows.append((
-                drive.name, name, round(found.seconds), found.changes, found.side_flips, found.stop_go_flips,
-                found.changes_per_min, found.side_flips_per_min, found.stop_go_flips_per_min,
+                drive.name, name, round(found.seconds), found.changes, found.interruptions, found.side_flips,
+                found.stop_go_flips, found.changes_per_min, found.side_flips_per_min, found.stop_go_flips_per_min,
             ))  # fmt: skip
     return Part(
         name="dithering",
-        columns=("drive", "constants", "s", "changes", "side", "stop-go", "changes/min", "side/min", "stop-go/min"),
+        columns=(
+            "drive",
+            "constants",
+            "s",
+            "changes",
+            "by input",
+            "side",
+            "stop-go",
+            "/min",
+            "side/min",
+            "stop-go/min",
+        ),
         rows=tuple(rows),
-        note=f"the same evidence through each; 'margin' is `paani` with another {MARGIN}.",
+        note="the same evidence through each, 0.1 s after its picture. "
+        "by input: changes that begin or end with late or unusable pictures.",
     )
 
 
@@ -70,6 +88,7 @@ def _heard(drive: Path) -> Iterator[tuple[int, m.Message]]:
     decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in READ}
     for record in open_log(drive).records([topic.name for topic in READ]):
         try:
-            yield record.log_us, decoders[record.topic].decode(record.data)
+            message = decoders[record.topic].decode(record.data)
         except msgspec.MsgspecError as error:
             raise UserError(f"{drive}: {record.topic} {record.seq}: {error}") from error
+        yield (message.source_us + PROMPT_US if isinstance(message, m.Evidence) else record.log_us), message

@@ -50,13 +50,16 @@ class Log:
         return dict(sorted(counts.items()))
 
     @property
-    def begun_us(self) -> tuple[int, ...]:
-        """When each recording in this log began: a folder may hold several, where the recorder began again."""
-        return tuple(
-            min(span.start_us for span in part.spans)
-            for number, part in enumerate(self._parts)
-            if part.spans and (number == 0 or part.metadata.get("paani", {}).get("part") == "1")
-        )
+    def recordings(self) -> tuple[tuple[int, int], ...]:
+        """First and last moment of each recording in this log: a folder has several where the recorder began again."""
+        found: list[tuple[int, int]] = []
+        for part in self._parts:
+            if part.spans:
+                start_us, end_us = min(s.start_us for s in part.spans), max(s.end_us for s in part.spans)
+                if found and part.metadata.get("paani", {}).get("part") != "1":
+                    start_us = found.pop()[0]
+                found.append((start_us, end_us))
+        return tuple(found)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -95,7 +98,10 @@ class Log:
             for span in part.spans
             if (end_us is None or span.start_us <= end_us) and (start_us is None or span.end_us >= start_us)
         ]
-        for record in _in_order(spans, functools.partial(self._span, wanted=wanted)):
+        records = _in_order(spans, functools.partial(self._span, wanted=wanted))
+        if start_us is None and end_us is None:
+            yield from records
+        for record in records:
             if (start_us is None or record.log_us >= start_us) and (end_us is None or record.log_us <= end_us):
                 yield record
 
@@ -164,7 +170,8 @@ def _in_order(spans: list[tuple[Span, Layout]], read: functools.partial[list[Rec
         while cut < len(held) and held[cut].log_us < span.start_us:
             cut += 1
         yield from held[:cut]
-        held = list(heapq.merge(held[cut:], read(part, span), key=_log_us))
+        new = read(part, span)
+        held = new if cut == len(held) else list(heapq.merge(held[cut:], new, key=_log_us))
     yield from held
 
 

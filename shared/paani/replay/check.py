@@ -13,7 +13,6 @@ from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
 from paani.replay.difference import Difference, first_difference
-from paani.replay.ledger import LATE_US
 from paani.replay.recompute import Again, Excuse, Losses, Recompute
 
 SHOWN = 20
@@ -32,9 +31,9 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
     """One service. A decision is a step that sent something and could be computed again.
 
     messages: sent messages compared, `differing_messages` of them not byte for byte the same. states: recorded states
-    compared with the ones computed up to there. before_start: steps that the log's beginning leaves without state or
-    input, and outputs sent before the recorder was connected with their publisher; at_end: outputs that the log's end
-    cut off; lost: steps without state or input, and outputs, that the recorder has counted as lost. All are explained.
+    compared with the ones computed up to there. Explained are before_start: steps that the log's beginning leaves
+    without state or input; at_edges: outputs without their step, or steps without their outputs, where a recording
+    begins or ends; lost: the same where the recorder has counted losses.
     """
 
     service: str
@@ -47,7 +46,7 @@ class ServiceCheck(msgspec.Struct, kw_only=True):
     states: int = 0
     differing_states: int = 0
     before_start: int = 0
-    at_end: int = 0
+    at_edges: int = 0
     lost: int = 0
     unexplained: tuple[Unexplained, ...] = ()
     differences: tuple[Difference, ...] = ()
@@ -63,13 +62,12 @@ def check_service(
     decider: Decider[Any],
     config: Config,
     records: Iterable[Record],
-    end_us: int,
     losses: Losses,
     on_again: OnAgain | None = None,
 ) -> ServiceCheck:
     """Compute every step of one service again and compare.
 
-    records: those of `Ledger(decider).topics`, to the log's end at `end_us`. digest: SHA-256 of all bytes computed.
+    records: those of `Ledger(decider).topics`. digest: SHA-256 of all bytes computed.
     """
     recompute = Recompute(decider, config, losses, evolve=False)
     ledger = recompute.ledger
@@ -97,10 +95,9 @@ def check_service(
         for sent, recorded, computed in again.outputs:
             digest.update(computed)
             if recorded is None:
-                if ledger.precedes(sent.topic, sent.epoch, sent.seq) or recompute.begins_by(again.given.log_us):
-                    result.before_start += 1
-                elif again.given.log_us + LATE_US >= end_us:
-                    result.at_end += 1
+                early = ledger.precedes(sent.topic, sent.epoch, sent.seq)
+                if early or losses.at_edge(again.given.log_us):
+                    result.at_edges += 1
                 elif recompute.is_lost(sent.topic):
                     result.lost += 1
                 else:
@@ -115,8 +112,11 @@ def check_service(
                     differences.append(first_difference(again.given.step.source_us, sent, recorded, computed))
         result.decisions += bool(again.outputs) or differs
         result.differ += differs
-    for topic, _, _ in ledger.orphans:
-        causes[f"{topic} belongs to no step in the log"] += 1
+    for log_us, (topic, _, _) in ledger.orphans:
+        if losses.at_edge(log_us):
+            result.at_edges += 1
+        else:
+            causes[f"{topic} belongs to no step in the log"] += 1
     for topic, count in ledger.malformed.items():
         causes[f"{topic} does not decode"] += count
     result.unexplained = tuple(Unexplained(cause=cause, count=count) for cause, count in causes.most_common(SHOWN))

@@ -18,6 +18,7 @@ from paani.decider import Decider, Input
 from paani.logs.reader import Record
 
 KEEP_US = 60_000_000
+FORGET_EVERY_US = 1_000_000
 LATE_US = 3_000_000  # messages of one moment reach the recorder in any order within this
 
 Name = tuple[str, int, int]  # topic, epoch, seq
@@ -57,7 +58,7 @@ class Ledger:
     """`steps` goes once through the records of `topics`; the other attributes are complete after it.
 
     instead: payloads to give to steps in place of the recorded ones.
-    orphans: outputs that no step names, between the first and the last that one does.
+    orphans: outputs that no step names, and when they came, between the first and the last that one does.
     malformed: messages without a readable header, by topic.
     """
 
@@ -69,13 +70,15 @@ class Ledger:
         self._empty = {topic.name: Input() for topic in decider.inputs}
         self._outputs = {topic.name for topic in decider.outputs}
         self.topics = frozenset((self.step_topic, *self._decoders, *self._outputs))
-        self.orphans: list[Name] = []
+        self.orphans: list[tuple[int, Name]] = []
         self.malformed: collections.Counter[str] = collections.Counter()
         self._messages: dict[Name, _Held] = {}
+        self._order: collections.deque[Name] = collections.deque()
+        self._forget_us = 0
         self._newest_heard: dict[str, tuple[int, int, Any]] = {}
         self._first: dict[str, dict[int, int]] = {}  # topic: epoch: first seq recorded
         self._claimed: dict[tuple[str, int], tuple[int, int]] = {}  # (topic, epoch): lowest and highest seq
-        self._unclaimed: list[Name] = []
+        self._unclaimed: list[tuple[int, Name]] = []
 
     def steps(self, records: Iterable[Record]) -> Iterator[Given]:
         """Every step in the order recorded, each a few seconds of log later than it came."""
@@ -88,17 +91,18 @@ class Ledger:
                     waiting.append((log_us, step_decoder.decode(data)))
                 else:
                     name = head.decode(data)
-                    self._messages.setdefault((topic, name.epoch, name.seq), _Held(data, log_us))
-                    self._first.setdefault(topic, {}).setdefault(name.epoch, name.seq)
+                    self._keep((topic, name.epoch, name.seq), _Held(data, log_us))
             except (msgspec.MsgspecError, UnicodeDecodeError):
                 self.malformed[topic] += 1
             while waiting and waiting[0][0] + LATE_US <= log_us:
                 yield self._given(*waiting.popleft())
-            self._forget(log_us - KEEP_US)
+            if log_us >= self._forget_us:
+                self._forget(log_us - KEEP_US)
+                self._forget_us = log_us + FORGET_EVERY_US
         while waiting:
             yield self._given(*waiting.popleft())
         self._forget(None)
-        self.orphans = [name for name in self._unclaimed if self._is_between(name)]
+        self.orphans = [(at_us, name) for at_us, name in self._unclaimed if self._is_between(name)]
 
     def precedes(self, topic: str, epoch: int, seq: int) -> bool:
         """Whether a message was sent before the first one that the recorder got from its publisher."""
@@ -149,17 +153,26 @@ class Ledger:
         self._newest_heard[heard.topic] = heard.epoch, heard.seq, message
         return message, ""
 
+    def _keep(self, name: Name, held: _Held) -> None:
+        """Note a message; of two with one name the first counts."""
+        if name in self._messages:
+            return
+        self._messages[name] = held
+        self._order.append(name)
+        topic, epoch, seq = name
+        self._first.setdefault(topic, {}).setdefault(epoch, seq)
+
     def _forget(self, before_us: int | None) -> None:
         """Drop messages older than this (None: all), noting outputs that no step has named."""
-        messages = self._messages
-        while messages:
-            name = next(iter(messages))
-            held = messages[name]
+        while self._order:
+            name = self._order[0]
+            held = self._messages[name]
             if before_us is not None and held.log_us >= before_us:
                 return
-            del messages[name]
+            self._order.popleft()
+            del self._messages[name]
             if name[0] in self._outputs and not held.claimed:
-                self._unclaimed.append(name)
+                self._unclaimed.append((held.log_us, name))
 
     def _is_between(self, name: Name) -> bool:
         topic, epoch, seq = name

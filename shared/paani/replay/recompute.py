@@ -33,10 +33,16 @@ class Excuse(StrEnum):
 
 
 class Losses(NamedTuple):
-    """Messages of each topic that the recorder has counted as lost, and when each recording of the log began [us]."""
+    """Messages of each topic that the recorder has counted as lost, and when each recording began and ended [us]."""
 
     counted: Mapping[str, int]
-    begun_us: tuple[int, ...] = ()
+    recordings: tuple[tuple[int, int], ...]
+
+    def at_edge(self, log_us: int) -> bool:
+        """Whether a recording began or ended about then, so that what belongs together may not be in it together."""
+        return any(
+            0 <= log_us - start_us <= LATE_US or 0 <= end_us - log_us <= LATE_US for start_us, end_us in self.recordings
+        )
 
 
 class Again(NamedTuple):
@@ -56,7 +62,9 @@ class Again(NamedTuple):
 
 
 class Recompute:
-    """`steps` goes through the records once. `evolve`: settings are changed, so recorded states are only starts.
+    """`steps` goes through the records once.
+
+    evolve: settings are changed, so a recorded state is only taken up at the start and after a break.
 
     losses: what the recorder knows of its gaps. instead: as for `Ledger`.
     """
@@ -80,7 +88,7 @@ class Recompute:
         self._excuse: Excuse | None = Excuse.START
         self._last: m.Step | None = None
         self._lost = dict(losses.counted)
-        self._begun_us = losses.begun_us
+        self._losses = losses
         self._last_us = 0
 
     def steps(self, records: Iterable[Record]) -> Iterator[Again]:
@@ -92,7 +100,7 @@ class Recompute:
             self._last, last_us, self._last_us = step, self._last_us, given.log_us
             missing = 0
             if last is not None:
-                begun = any(last_us < at_us <= given.log_us for at_us in self._begun_us)
+                begun = any(last_us < start_us <= given.log_us for start_us, _ in self._losses.recordings)
                 same = step.epoch == last.epoch
                 missing = step.seq - (last.seq + 1 if same else 0)
                 excuse = Excuse.START if begun else None
@@ -104,10 +112,6 @@ class Recompute:
                     self._lose(Skip.AFTER_BREAK, excuse)
                 missing = missing if excuse is None else 0
             yield self._again(given)._replace(missing_before=missing)
-
-    def begins_by(self, log_us: int) -> bool:
-        """Whether a recording began shortly before, so that what belongs to a step may not be in it."""
-        return any(0 <= log_us - at_us <= LATE_US for at_us in self._begun_us)
 
     def is_lost(self, topic: str, count: int = 1) -> bool:
         """Whether the recorder has counted as many more messages of a topic as lost."""
@@ -131,7 +135,7 @@ class Recompute:
         if self._state is None:
             return Again(given, skip=self._reason, excuse=self._excuse)
         if given.inputs is None:
-            excuse = Excuse.START if given.early or self.begins_by(given.log_us) else None
+            excuse = Excuse.START if given.early or self._losses.at_edge(given.log_us) else None
             if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
                 excuse = Excuse.LOST
             self._lose(Skip.AFTER_BREAK, excuse)
@@ -160,7 +164,5 @@ class Recompute:
         )
 
     def _lose(self, reason: Skip, excuse: Excuse | None) -> None:
-        """The state is not known any more. With changed settings it goes on: the recorded one is not ours."""
-        if self._evolve and self._state is not None:
-            return
+        """The state is not known any more, until the next one recorded."""
         self._state, self._reason, self._excuse = None, reason, excuse

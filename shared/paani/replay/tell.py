@@ -14,7 +14,7 @@ def check_text(report: CheckReport) -> str:
     for s in report.services:
         apart = [f"{s.before_start} before the start"] if s.before_start else []
         apart += [f"{s.lost} lost on the way to the recorder"] if s.lost else []
-        apart += [f"{s.at_end} cut off at the end"] if s.at_end else []
+        apart += [f"{s.at_edges} where a recording begins or ends"] if s.at_edges else []
         lines.append(
             f"{s.service:<14} {s.steps:>7} {s.decisions:>9} {s.differ:>6} {s.messages:>8} {s.states:>6}  "
             + (", ".join(apart) or "-")

@@ -71,7 +71,6 @@ def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckRep
                 decider,
                 config,
                 log.records(Ledger(decider).topics),
-                log.end_us,
                 losses,
                 _shown(progress, log, decider.service, number, len(chosen)),
             )
@@ -151,4 +150,4 @@ def losses_of(log: Log) -> Losses:
                 name, _, number = word.partition("=")
                 if name in {"dropped", "missing"} and number.isdecimal():
                     lost[topic] = lost.get(topic, 0) + int(number)
-    return Losses(lost, log.begun_us)
+    return Losses(lost, log.recordings)

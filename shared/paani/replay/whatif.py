@@ -55,7 +55,8 @@ def changes_of(
     instead: dict[Name, bytes],
     on_again: OnAgain | None = None,
 ) -> ServiceChanges:
-    """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one known.
+    """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one recorded,
+    and from the next one after a break.
 
     instead: inputs given in place of the recorded ones; what is sent and differs is added to it.
     """

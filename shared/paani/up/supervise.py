@@ -25,7 +25,7 @@ RECORDER = "recorder"
 STOP_RECORDER_S, STOP_ROUTER_S, KILL_S = 0.9, 0.4, 0.3
 STOP_S = 1.3
 GIVE_UP_FAILURES = 5  # ends in a row of a process that was never alive
-NICE = {EYE: 5, RECORDER: 5}  # drawing and writing yield to the control chain
+NICE = {EYE: 5}  # drawing yields to the control chain
 USER_MISTAKE = 2
 # One thread for each native library: the processes are the parallelism.
 CHILD_ENVIRONMENT = {
