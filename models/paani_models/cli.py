@@ -50,6 +50,8 @@ def main(argv: list[str]) -> int:
             return evaluate_command.run(arguments, _pictures(arguments))
         if arguments.command == "report":
             return report_command.run(arguments, _pictures(arguments))
+        if arguments.command == "quantise":
+            return _quantise(arguments)
         return _needs_torch(arguments)
     except UserError as error:
         sys.stderr.write(f"paani models: {error}\n")
@@ -100,7 +102,9 @@ def _parser() -> argparse.ArgumentParser:
     report_command.add_arguments(report)
     for command in (export, evaluate, report):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-    for command in (check, check_data, pack, train, export, evaluate, report):
+    quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
+    add_quantise_arguments(quantise)
+    for command in (check, check_data, pack, train, export, evaluate, report, quantise):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")

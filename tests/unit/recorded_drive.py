@@ -15,6 +15,7 @@ from mcap.writer import Writer
 
 from paani import keys
 from paani import messages as m
+from paani.bus.stepping import STATE_EVERY_US
 from paani.config import Config, encode_config, load_config
 from paani.decider import Decider, Input, deciders
 from paani.logs.reader import Record
@@ -22,7 +23,6 @@ from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, water
 
 T0_US = 1_800_000_000_000_000
 CONFIG = load_config()
-STATE_EVERY_US = 10_000_000
 
 
 class Desk:

@@ -28,7 +28,7 @@ def random_case(seed: int, pictures: int) -> tuple[list[Found], list[np.ndarray]
         moved = near + rng.normal(0, 4, near.shape).astype(np.float32)
         ordered = np.sort(moved.reshape(-1, 2, 2), 1).reshape(-1, 4)
         boxes = np.vstack([ordered, random_boxes(rng, 3)]).astype(np.float32)
-        scores = rng.permutation(len(boxes) * 100)[: len(boxes)].astype(np.float32) / 1000
+        scores = (rng.permutation(len(boxes) * 100)[: len(boxes)] / 1000).astype(np.float32)
         found.append(Found(boxes, scores, rng.integers(0, 2, len(boxes))))
         kinds = rng.integers(0, 2, len(truth)).astype(np.float32)
         truths.append(np.hstack([kinds[:, None], truth]))

@@ -37,7 +37,9 @@ def test_boxes_are_corners_clipped_to_the_picture(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_boxes(label), [[1, 0.4, 0.3, 0.6, 0.7], [3, 0, 0.4, 0.15, 0.6]], atol=1e-6)
 
 
-@pytest.mark.parametrize("text", ["4 .5 .5 .1 .1", "1 .5 .5 0 .1", "1 .5 .5 .1", "1 .5 x .1 .1", "1 1.5 .5 .1 .1", "1 nan .5 .1 .1"])
+@pytest.mark.parametrize(
+    "text", ["4 .5 .5 .1 .1", "1 .5 .5 0 .1", "1 .5 .5 .1", "1 .5 x .1 .1", "1 1.5 .5 .1 .1", "1 nan .5 .1 .1"]
+)
 def test_bad_boxes_are_refused_with_their_line_r8(tmp_path: Path, text: str) -> None:
     label = tmp_path / "a.txt"
     label.write_text(f"1 .5 .5 .1 .1\n{text}\n")

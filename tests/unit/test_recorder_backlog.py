@@ -14,7 +14,7 @@ from paani_services.recorder.counts import Counts, for_file
 
 def heard(number: int, *, picture: bool, size: int = 10) -> Heard:
     topic = keys.PICTURE if picture else keys.IMU
-    return Heard(number, topic, number, Head(source_us=0, seq=number), b"x" * size, b"")
+    return Heard(topic, number, Head(source_us=0, seq=number), b"x" * size, b"")
 
 
 def test_pictures_go_first_the_oldest_of_them_first() -> None:
@@ -23,16 +23,16 @@ def test_pictures_go_first_the_oldest_of_them_first() -> None:
     gone = []
     for number, picture in enumerate((False, True, True, False, False, False, False)):
         gone += backlog.put(heard(number, picture=picture))
-    assert [one.number for one in gone] == [1, 2, 0]
-    assert [one.number for one in backlog.drain()] == [3, 4, 5, 6]
+    assert [one.log_us for one in gone] == [1, 2, 0]
+    assert [one.log_us for one in backlog.drain()] == [3, 4, 5, 6]
     assert len(backlog) == 0
 
 
 def test_bytes_are_bounded_too() -> None:
     backlog = Backlog(max_messages=100, max_bytes=1000)
     assert backlog.put(heard(0, picture=True, size=600)) == []
-    assert [one.number for one in backlog.put(heard(1, picture=False, size=600))] == [0]
-    assert [one.number for one in backlog.put(heard(2, picture=False, size=5000))] == [1, 2]
+    assert [one.log_us for one in backlog.put(heard(1, picture=False, size=600))] == [0]
+    assert [one.log_us for one in backlog.put(heard(2, picture=False, size=5000))] == [1, 2]
     assert backlog.drain() == []
 
 
@@ -48,9 +48,9 @@ def test_nothing_is_lost_without_being_named(messages: list[tuple[bool, int]], c
     for number, (picture, length) in enumerate(messages):
         gone += backlog.put(heard(number, picture=picture, size=length))
         assert len(backlog) <= count
-    kept = [one.number for one in backlog.drain()]
+    kept = [one.log_us for one in backlog.drain()]
     assert kept == sorted(kept)
-    assert sorted(kept + [one.number for one in gone]) == list(range(len(messages)))
+    assert sorted(kept + [one.log_us for one in gone]) == list(range(len(messages)))
 
 
 def test_gaps_in_the_numbers_are_missing() -> None:

@@ -37,7 +37,7 @@ def settings(folder: Path, **changes: Any) -> RecorderConfig:
 
 def heard(number: int, padding: int = 0) -> Heard:
     data = msgspec.json.encode(odometry(number)) + b" " * padding
-    return Heard(number, keys.ODOMETRY, START_US + number * STEP_US, read_head(data), data, b"")
+    return Heard(keys.ODOMETRY, START_US + number * STEP_US, read_head(data), data, b"")
 
 
 def now_us(number: int) -> int:

@@ -59,7 +59,7 @@ def test_a_moved_drive_is_still_exact(service: str) -> None:
     records = [r for r in moved if r.topic in Ledger(decider).topics]
     result = check_service(decider, CONFIG, records, Losses({}, ()))
     assert result.is_exact, (result.unexplained, result.differences)
-    assert result.states == 1
+    assert result.states > 5
 
 
 def test_any_bytes_go_through() -> None:

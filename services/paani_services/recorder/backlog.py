@@ -11,9 +11,8 @@ from paani.logs.writer import Head
 
 
 class Heard(NamedTuple):
-    """One message as it came: which of all (`number`), when [us], and its bytes."""
+    """One message as it came, when [us], and its bytes."""
 
-    number: int
     topic: keys.Topic[Any]
     log_us: int
     head: Head | None
@@ -26,7 +25,7 @@ class Heard(NamedTuple):
 
 
 class Backlog:
-    """Filled on Zenoh's threads, drained by the writer."""
+    """Filled on the event loop, drained for the writer's thread."""
 
     def __init__(self, max_messages: int, max_bytes: int) -> None:
         self._max_messages, self._max_bytes = max_messages, max_bytes
@@ -51,15 +50,15 @@ class Backlog:
             return gone
 
     def drain(self) -> list[Heard]:
-        """All that waits, in the order it came."""
+        """All that waits, by the time it came."""
         with self._lock:
             heard = [*self._pictures, *self._others]
             self._pictures.clear()
             self._others.clear()
             self._size_bytes = 0
-        heard.sort(key=_number)
+        heard.sort(key=_log_us)
         return heard
 
 
-def _number(heard: Heard) -> int:
-    return heard.number
+def _log_us(heard: Heard) -> int:
+    return heard.log_us

@@ -26,7 +26,7 @@ class Tally(msgspec.Struct):
 
 
 class Counts:
-    """All topics. Safe to call from Zenoh's threads and the writer's."""
+    """All topics. Safe to call from the event loop and the writer's thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

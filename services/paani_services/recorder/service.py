@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import functools
-import itertools
 import logging
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -25,7 +23,8 @@ from paani_services.recorder.backlog import Backlog, Heard
 from paani_services.recorder.recording import MIB, Recording, remove_empty
 
 LOG = logging.getLogger(__name__)
-WRITE_S = 0.2
+LISTEN_S, WRITE_S = 0.1, 0.2
+HELD_S, SPARE = 10.0, 32  # what Zenoh keeps of a topic between two looks
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -41,34 +40,43 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     loop, worker, stop = asyncio.get_running_loop(), ThreadPoolExecutor(1, "write"), threading.Event()
     await loop.run_in_executor(worker, recording.write, (), clock.now_us())
     state = bus.publisher(keys.RECORDER_STATE)
-    subscribe(bus, clock, topics, recording, backlog)
+    listener = Listener(bus, topics, recording, backlog)
     try:
         with bus.alive():
             async with asyncio.TaskGroup() as group:
                 group.create_task(tell(bus, clock, state, recording, backlog))
                 group.create_task(mend(folder, stop))
+                group.create_task(listener.listen())
                 while True:
                     await loop.run_in_executor(worker, recording.write, backlog.drain(), clock.now_us())
                     await asyncio.sleep(WRITE_S)
     finally:
         stop.set()
+        listener.take()
         await loop.run_in_executor(worker, recording.close, backlog.drain(), clock.now_us())
         worker.shutdown(wait=False)
 
 
-def subscribe(bus: Bus, clock: Clock, topics: list[keys.Topic[Any]], recording: Recording, backlog: Backlog) -> None:
+class Listener:
     """Whatever comes on these topics waits in the backlog."""
-    numbers, counts = itertools.count(), recording.counts
 
-    def hear(topic: keys.Topic[Any], data: bytes, attachment: bytes) -> None:
-        log_us = clock.now_us()
-        head = read_head(attachment if topic.stance is keys.Stance.PICTURE else data)
-        counts.heard(topic.name, head)
-        for gone in backlog.put(Heard(next(numbers), topic, log_us, head, data, attachment)):
-            counts.dropped(gone.topic.name)
+    def __init__(self, bus: Bus, topics: list[keys.Topic[Any]], recording: Recording, backlog: Backlog) -> None:
+        self._counts, self._backlog = recording.counts, backlog
+        self._inboxes = [(topic, bus.raw(topic, round(HELD_S * topic.rate_hz) + SPARE)) for topic in topics]
 
-    for topic in topics:
-        bus.on_raw(topic, functools.partial(hear, topic))
+    async def listen(self) -> None:
+        while True:
+            self.take()
+            await asyncio.sleep(LISTEN_S)
+
+    def take(self) -> None:
+        """Count and keep what has come since the last time."""
+        for topic, inbox in self._inboxes:
+            for log_us, data, attachment in inbox.drain():
+                head = read_head(attachment if topic.stance is keys.Stance.PICTURE else data)
+                self._counts.heard(topic.name, head)
+                for gone in self._backlog.put(Heard(topic, log_us, head, data, attachment)):
+                    self._counts.dropped(gone.topic.name)
 
 
 async def tell(

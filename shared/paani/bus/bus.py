@@ -16,6 +16,7 @@ from paani import messages as m
 from paani.bus.admission import Admission
 from paani.bus.inbox import Inbox, Latest, Queue
 from paani.bus.publish import LONG_POLL_S, PicturePublisher, Publisher
+from paani.bus.raw import RawInbox
 from paani.bus.session import open_client
 from paani.clock import Clock
 from paani.config import BusConfig
@@ -64,17 +65,9 @@ class Bus:
         """Subscribe with a function that Zenoh's thread calls; it must return at once."""
         self._subscribe(topic, callback)
 
-    def on_raw(self, topic: keys.Topic[Any], callback: Callable[[bytes, bytes], None]) -> None:
-        """Subscribe to payloads and attachments as they are, unjudged: for recording what was on the bus.
-
-        Zenoh's thread calls the function; it must return at once.
-        """
-
-        def receive(sample: zenoh.Sample) -> None:
-            attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
-            callback(sample.payload.to_bytes(), attachment)
-
-        self._declare_subscriber(topic, receive)
+    def raw(self, topic: keys.Topic[Any], depth: int) -> RawInbox:
+        """Subscribe to what is on the topic as it is, unjudged."""
+        return RawInbox(self._session, self._key(topic), depth, self._clock)
 
     def latest_picture(self, topic: keys.Topic[m.PictureHeader]) -> Latest[Picture]:
         """Subscribe to pictures pushed on this machine."""

@@ -15,7 +15,7 @@ from paani.config import Config
 from paani.decider import Decider, Input, Outputs
 
 S = TypeVar("S")
-STATE_EVERY_US = 10_000_000
+STATE_EVERY_US = 2_000_000  # a message lost on the way to the recorder costs a replay no more steps than this
 
 
 class Stepper(Generic[S]):

@@ -32,7 +32,7 @@ class SentMessage(msgspec.Struct, frozen=True, kw_only=True):
 class Step(Message, frozen=True, kw_only=True):
     """One call of a decider; `source_us` is the time it was given.
 
-    `state`: the decider's state before the call as JSON; empty but for the first step and one every ten seconds,
+    `state`: the decider's state before the call as JSON; empty but for the first step and one every two seconds,
     from which the following steps can be computed again.
     """
 
