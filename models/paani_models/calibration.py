@@ -1,4 +1,4 @@
-"""Pictures that an INT8 net is calibrated on: training pictures, never those that decide about it (checklist T4, T6)."""
+"""Pictures that an INT8 net is calibrated on: never those that decide about it (checklist T4, T6)."""
 
 from __future__ import annotations
 

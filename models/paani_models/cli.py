@@ -103,7 +103,12 @@ def _parser() -> argparse.ArgumentParser:
     for command in (export, evaluate, report):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
     quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
-    add_quantise_arguments(quantise)
+    quantise.add_argument("net", choices=NETS)
+    quantise.add_argument("--recipe", choices=("paper", "equalised"), default="equalised")
+    quantise.add_argument("--model", type=Path, metavar="FILE", help="FP32 ONNX file; the shipped one if not given")
+    quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
+    quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
+    quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
     for command in (check, check_data, pack, train, export, evaluate, report, quantise):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
@@ -141,6 +146,14 @@ def _check_file(arguments: argparse.Namespace) -> int:
 def _pictures(arguments: argparse.Namespace) -> Pictures:
     names = [name for name in arguments.sources.split(",") if name]
     return Pictures(arguments.data, names, arguments.rendered)
+
+
+def _quantise(arguments: argparse.Namespace) -> int:
+    try:
+        from paani_models import quantise_command  # noqa: PLC0415 - onnx is not on the board
+    except ModuleNotFoundError as error:
+        raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    return quantise_command.run(arguments, _pictures(arguments))
 
 
 def _needs_torch(arguments: argparse.Namespace) -> int:

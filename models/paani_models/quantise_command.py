@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
 import msgspec
 
@@ -75,16 +74,6 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     beside.replace(target.with_suffix(".json"))
     sys.stdout.write(_text(record))
     return 0 if verdict.accepted else 1
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Beside --data, --sources and --rendered."""
-    parser.add_argument("net", choices=("segmenter", "detector"))
-    parser.add_argument("--recipe", choices=tuple(RECIPES), default="equalised")
-    parser.add_argument("--model", type=Path, metavar="FILE", help="FP32 ONNX file; the shipped one if not given")
-    parser.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
-    parser.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures listed here")
-    parser.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
 
 
 def _text(record: PrecisionRecord) -> str:

@@ -37,7 +37,8 @@ class Source:
     annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
     drawn: boxes are in ANNOTATIONS, and its sequences go past several places, so ten frame numbers count as one.
-    held_out: sequences for validation; empty means one in eight by name. splits: of a prepared public set, which name
+    held_out: sequences for validation; empty means one in eight by name. twins: pictures of held-out sequences that
+    show what a training picture shows; they are left out. splits: of a prepared public set, which name
     their split in the manifest, the splits that are read; all but "train" are held out.
     """
 
@@ -52,6 +53,7 @@ class Source:
     own_hull: bool = False
     drawn: bool = False
     held_out: tuple[str, ...] = ()
+    twins: frozenset[str] = frozenset()
     splits: tuple[str, ...] = ()
 
 
@@ -73,12 +75,26 @@ SOURCES = (
         water_only=True,
         own_hull=True,
         held_out=("open_image",),
+        twins=frozenset({"open_image_001"}),
     ),
     Source("tbiseg_dasha", "tbiseg_dasha", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("DJI_0035",)),
     Source("bath_river", "bath_river", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("run3", "run8")),
     Source("mastr1325", "mastr1325_val_recovered", masks="masks", soft_edges=True, held_out=("run2",)),
-    Source("oasis", "oasis_recovered", masks="masks", soft_edges=True, held_out=("OASIs/type2",)),
-    Source("mcoe_boats", "mcoe_boats", labels="labels", annotated=frozenset({"vessel", "buoy"})),
+    Source(
+        "oasis",
+        "oasis_recovered",
+        masks="masks",
+        soft_edges=True,
+        held_out=("OASIs/type2",),
+        twins=frozenset({"OASIs_type2_008", "OASIs_type2_009", "OASIs_type2_010", "OASIs_type2_011"}),
+    ),
+    Source(
+        "mcoe_boats",
+        "mcoe_boats",
+        labels="labels",
+        annotated=frozenset({"vessel", "buoy"}),
+        twins=frozenset({"sailing-boat-mastes-rigging-boat-sail-se-983933"}),
+    ),
     Source(
         "hsu_shore_tiles",
         "hsu_shore_tiles",
@@ -99,6 +115,7 @@ SOURCES = (
         labels="labels",
         annotated=frozenset({"buoy"}),
         held_out=("run6",),
+        twins=frozenset({"120L", "121L", "121R", "122L", "123L"}),
     ),
     Source(
         "tunai_sooke",
@@ -116,6 +133,7 @@ SOURCES = (
         annotated=frozenset({"pier"}),
         drawn=True,
         held_out=("dock_image_07", "dock_image_08", "dock_image_09"),  # one place, seen nowhere else
+        twins=frozenset({"dock_image_070", "dock_image_074", "dock_image_076"}),
     ),
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )
@@ -199,6 +217,8 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
             continue
         seen.add(item.file)
         stem = Path(item.file).stem
+        if stem in source.twins:
+            continue
         sequence = item.seq if named or source.splits else f"run{index // _RUN_LENGTH}"
         mask = folder / source.masks / f"{stem}.png" if source.masks else None
         label = folder / source.labels / f"{stem}.txt" if source.labels else None

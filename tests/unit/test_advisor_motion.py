@@ -110,7 +110,7 @@ SIGHTING = st.builds(
 WINDOWS = st.builds(Window, st.floats(0.5, 20.0), st.floats(0.1, 6.0))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(SIGHTING, max_size=60), WINDOWS, st.booleans())
 def test_unknown_has_a_cause_and_only_unknown(sightings: list[Sighting], window: Window, in_order: bool) -> None:
     """Every `unknown` has its cause; at most 24 samples within the window; the confidence stays within its cap."""
@@ -223,14 +223,14 @@ def hear(frames: list[tuple[m.Evidence, m.Odometry | None]], config: Config) -> 
     return state
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(moments(ANY, ANY), st.sampled_from([PAANI, PAPER]))
 def test_no_box_no_time_and_no_odometry_is_too_bad(frames: list[Any], config: Config) -> None:
     """NaN, inverted, empty and outlying boxes, time and epochs in any order: bounded, and no exception."""
     hear(frames, config)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(moments(UNIT, FINITE), st.sampled_from([PAANI, PAPER]))
 def test_a_state_survives_json_exactly(frames: list[Any], config: Config) -> None:
     """Whatever the wire lets through: the ledger's state is the state."""

@@ -10,10 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani import keys
 from paani import messages as m
 from paani.config import Config, load_config
+from paani.decider import Input
 from paani.geometry import wrap_rad
 from paani_services.advisor.advise import AdvisorState, advise
+from paani_services.advisor.decide import DECIDER
 from paani_services.advisor.rotation import (
     ATTITUDES_KEPT,
     Attitude,
@@ -186,6 +189,18 @@ def test_the_tracks_say_what_was_known_of_the_turning(
     assert (view_of(state, frame, config).attitude is not None) == (use is U.KNOWN)
 
 
+def test_the_decider_hears_odometry() -> None:
+    """What the ledger and a replay must know: odometry is an input of the step."""
+    assert keys.ODOMETRY in DECIDER.inputs
+    heard_now = {topic.name: Input() for topic in DECIDER.inputs} | {keys.EVIDENCE.name: Input(CLEAR, T0_US)}
+    for odometry_now, use in ((None, U.NO_ODOMETRY), (odometry(T0_US, 0.0), U.KNOWN)):
+        given_now = heard_now | {keys.ODOMETRY.name: Input(odometry_now, T0_US)}
+        _, said = DECIDER.decide(DECIDER.state(), given_now, T0_US + 100_000, PAANI)
+        tracks = said[keys.TRACKS.name]
+        assert isinstance(tracks, m.Tracks)
+        assert tracks.rotation is use
+
+
 def sweep(config: Config, rate_radps: float, period_s: float, count: int = 2) -> list[m.Tracks]:
     """Tracks while the boat turns in place before `count` buoys in a row; frames a period apart, odometry at 10 Hz."""
     state, found = AdvisorState(), []
@@ -235,7 +250,7 @@ STEP = st.tuples(
 FEW = ["advisor.tracker.max_tracks=5"]
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(STEP, min_size=1, max_size=10), st.booleans())
 def test_i20_compensation_removes_no_obstacle_and_lowers_no_risk(
     steps: list[tuple[list[m.Detection], int, float, float, float, int, bool]], few: bool

@@ -112,9 +112,13 @@ def check_service(
                     differences.append(first_difference(again.given.step.source_us, sent, recorded, computed))
         result.decisions += bool(again.outputs) or differs
         result.differ += differs
+    orphans: collections.Counter[str] = collections.Counter()
     for log_us, (topic, _, _) in ledger.orphans:
+        orphans[topic] += 1
         if losses.at_edge(log_us):
             result.at_edges += 1
+        elif orphans[topic] <= recompute.lost_steps:
+            result.lost += 1
         else:
             causes[f"{topic} belongs to no step in the log"] += 1
     for topic, count in ledger.malformed.items():

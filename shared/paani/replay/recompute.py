@@ -65,8 +65,7 @@ class Recompute:
     """`steps` goes through the records once.
 
     evolve: settings are changed, so a recorded state is only taken up at the start and after a break.
-
-    losses: what the recorder knows of its gaps. instead: as for `Ledger`.
+    losses: what the recorder knows of its gaps. instead: as for `Ledger`. lost_steps: steps it has counted as lost.
     """
 
     def __init__(
@@ -90,6 +89,7 @@ class Recompute:
         self._lost = dict(losses.counted)
         self._losses = losses
         self._last_us = 0
+        self.lost_steps = 0
 
     def steps(self, records: Iterable[Record]) -> Iterator[Again]:
         """Every step that the log has, in order."""
@@ -105,7 +105,7 @@ class Recompute:
                 missing = step.seq - (last.seq + 1 if same else 0)
                 excuse = Excuse.START if begun else None
                 if missing and not begun and self.is_lost(self.ledger.step_topic, missing):
-                    excuse = Excuse.LOST
+                    excuse, self.lost_steps = Excuse.LOST, self.lost_steps + missing
                 if not same:  # the process began again
                     self._state, self._reason, self._excuse = None, Skip.AFTER_BREAK, excuse
                 elif missing:
