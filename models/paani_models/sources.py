@@ -37,8 +37,8 @@ class Source:
     annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
     drawn: boxes are in ANNOTATIONS, and its sequences go past several places, so ten frame numbers count as one.
-    held_out: sequences for validation; empty means one in eight by name. twins: pictures of held-out sequences that
-    show what a training picture shows; they are left out. splits: of a prepared public set, which name
+    held_out: sequences for validation; empty means one in eight by name. twins: pictures
+    that show what a picture of the other side shows; they are left out. splits: of a prepared public set, which name
     their split in the manifest, the splits that are read; all but "train" are held out.
     """
 
@@ -75,7 +75,7 @@ SOURCES = (
         water_only=True,
         own_hull=True,
         held_out=("open_image",),
-        twins=frozenset({"open_image_001"}),
+        twins=frozenset({"open_image_001", "dock_image_068", "dock_image_072"}),
     ),
     Source("tbiseg_dasha", "tbiseg_dasha", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("DJI_0035",)),
     Source("bath_river", "bath_river", masks="masks3", water_only=True, empty_of=NO_CRAFT, held_out=("run3", "run8")),
@@ -133,7 +133,6 @@ SOURCES = (
         annotated=frozenset({"pier"}),
         drawn=True,
         held_out=("dock_image_07", "dock_image_08", "dock_image_09"),  # one place, seen nowhere else
-        twins=frozenset({"dock_image_070", "dock_image_074", "dock_image_076"}),
     ),
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )

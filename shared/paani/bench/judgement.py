@@ -66,7 +66,7 @@ def step(config: Config, frames: int) -> Part:
             )
             for name, figures in found.items()
         ),
-        note=f"a step is pure: it is taken {REPEATS} times and the quickest counts. sets: of evidence that were judged.",
+        note=f"a step is pure: it is taken {REPEATS} times and the quickest counts. sets: of evidence, judged.",
     )
 
 
