@@ -77,7 +77,8 @@ class Boat:
             m.Advisory(
                 source_us=now_us, direction=m.Direction.RIGHT, reason=m.Reason.CENTER_RISK, left=blocked,
                 center=blocked, right=clear, contributing_track_ids=(4,), frame_seq=judged, frame_epoch=1,
-                explanation="Turn right: centre risk 0.80 (limit 0.48); left 0.80, right 0.25 (limit 0.58).",
+                explanation="Turn right: centre risk 0.80 (limit 0.48); left 0.80, right 0.25 (limit 0.58). "
+                "Without buoy #4 (left and centre) it would go STRAIGHT.",
             )
         )  # fmt: skip
         armed = self.arming.value is not None and self.arming.value.armed

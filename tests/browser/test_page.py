@@ -91,6 +91,7 @@ async def test_the_overlay_lies_on_its_own_frame(
 
         assert await page.inner_text("#advice-word") == "RIGHT"
         assert "centre risk 0.80" in await page.inner_text("#explanation")
+        assert "Without buoy #4 (left and centre) it would go STRAIGHT." in await page.inner_text("#explanation")
         assert await page.evaluate("[...document.querySelectorAll('.lane .verdict')].map(e => e.textContent)") == [
             "blocked", "blocked", "clear",
         ]  # fmt: skip

@@ -31,6 +31,10 @@ async def test_a_ledger_of_steps_gives_the_same_thrust_again(open_as: OpenAs, co
     }
     stepper = Stepper(controller, CLOCK, config, CONTROLLER)
     command, odometry = navigator.publisher(keys.COMMAND), localization.publisher(keys.ODOMETRY)
+    while not (log[keys.ODOMETRY.name].received and log[keys.COMMAND.name].received):  # until the observer hears both
+        odometry.put(m.Odometry(source_us=CLOCK.now_us(), x_m=0, y_m=0, yaw_rad=0, surge_mps=0))
+        command.put(m.NavCommand(source_us=CLOCK.now_us(), enable=False, heading_rad=0, speed_mps=0))
+        await asyncio.sleep(0.05)
     for number in range(STEPS):
         now_us = CLOCK.now_us()
         odometry.put(m.Odometry(source_us=now_us, x_m=0.1 * number, y_m=0.0, yaw_rad=0.3, surge_mps=0.1, healthy=True))

@@ -58,6 +58,24 @@ def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, p
     assert "eye/picture" not in before.topics, "the camera relays the same bytes"
 
 
+def test_a_folder_that_goes_away_stops_nothing_and_is_told_at_the_end(
+    tmp_path: Path, private_sets: tuple[str, ...]
+) -> None:
+    """The recorder can no longer be started; the drive goes on to its end and says so."""
+    folder, file = tmp_path / "drive", tmp_path / "s.json"
+    words = ("--headless", "--record", str(folder), "--for", "8", "--summary", str(file))
+    up = Up(tmp_path, *words_of(private_sets, *words))
+    up.until(lambda: "processes alive after" in up.out, READY_S)
+    folder.rename(tmp_path / "elsewhere")
+    folder.touch()
+    os.kill(up.children()["recorder"], signal.SIGKILL)
+    assert up.process.wait(60) == 1, (up.out, up.errors)
+    assert up.errors == ["paani: not alive at the end: recorder"]
+    summary = json.loads(file.read_text())
+    assert summary["duration_s"] > 7.0
+    assert {name for name, figures in summary["services"].items() if figures["restarts"]} == {"recorder"}
+
+
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     (tmp_path / "file").touch()
     up = Up(tmp_path, *words_of(private_sets, "--headless", "--record", str(tmp_path / "file" / "x")))

@@ -12,7 +12,7 @@ from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk
 Bytes = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
-WIDTH_PX, BANNER_PX, LINE_PX = 800, 118, 24
+WIDTH_PX, BANNER_PX, LINE_PX = 800, 142, 24
 TINTS = np.array([(230, 200, 40), (40, 140, 255), (120, 50, 20)], np.float32)  # BGR: water, obstacle, sky
 TINT_SHARE = 0.32
 INK, PAPER = (245, 245, 245), (28, 24, 22)
@@ -88,6 +88,6 @@ def _banner(evidence: Evidence, advisory: Advisory) -> Bytes:
         reason += f" ({evidence.cause.replace('_', ' ')})"
     (width, _), _ = cv2.getTextSize(reason, FONT, 0.7, 1)
     cv2.putText(banner, reason, (WIDTH_PX - width - 14, 40), FONT, 0.7, INK, 1, cv2.LINE_AA)
-    for i, line in enumerate(textwrap.wrap(advisory.explanation, 105)[:2]):
+    for i, line in enumerate(textwrap.wrap(advisory.explanation, 105)[:3]):
         cv2.putText(banner, line, (14, 80 + i * LINE_PX), FONT, 0.6, INK, 1, cv2.LINE_AA)
     return banner

@@ -23,7 +23,7 @@ STEADY_FRAMES = 5  # how long the water stays as it is: lanes become occupied, t
 DRIFT = 0.004  # how far a box moves between frames
 REPLACED = 2  # boxes that go, and others that come, with each change of the water
 WARM_FRAMES = 50
-REPEATS = 3
+REPEATS = 5
 FRAME, EXPLAINED, REPUBLISHED = "frame", "frame, counterfactual", "republish"
 
 
@@ -143,11 +143,13 @@ def _drifted(box: m.Detection, rng: random.Random) -> m.Detection:
 
 
 def _box(rng: random.Random) -> m.Detection:
-    """Far and small, or near and large, anywhere below the horizon."""
-    width, height = rng.uniform(0.02, 0.2), rng.uniform(0.02, 0.2)
-    x1, y1 = rng.uniform(0.0, 1.0 - width), rng.uniform(0.25, 1.0 - height)
+    """As in a harbour: most are far and small."""
+    size, bottom = 0.02 + 0.2 * rng.random() ** 4, 0.32 + 0.4 * rng.random() ** 4
+    x1 = rng.uniform(0.0, 1.0 - size)
     return m.Detection(
-        label=rng.choice(tuple(m.Label)), confidence=rng.uniform(0.4, 1.0), box_xyxy=(x1, y1, x1 + width, y1 + height)
+        label=rng.choice(tuple(m.Label)),
+        confidence=rng.uniform(0.4, 1.0),
+        box_xyxy=(x1, bottom - size, x1 + size, bottom),
     )
 
 
