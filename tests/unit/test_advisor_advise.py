@@ -167,7 +167,7 @@ def test_j12_the_explanation_is_made_last_from_the_same_numbers() -> None:
         "With clear water in the centre it would go STRAIGHT."
     )
     assert advice[1].explanation == (
-        "Turn left: keeping the turn until the way ahead stays clear, centre risk 0.05 (limit 0.40). "
+        "Turn left: keeping the turn until the way ahead stays clear, centre risk 0.05 (limit 0.48). "
         "Nothing in the picture asks for it any more."
     )
     _, late, _ = advise(state, state.evidence, T0_US + 2_200_000, PAANI)

@@ -52,6 +52,8 @@ def test_a_blocked_lane_is_free_again_only_clearly_below_its_limit() -> None:
     assert [a.direction for a in abrupt] == [D.STRAIGHT, D.LEFT, D.LEFT, D.STRAIGHT, D.STRAIGHT, D.STRAIGHT]
     assert [a.center.limit for a in steady] == pytest.approx([0.48, 0.48, 0.40, 0.40, 0.40, 0.48])
     assert all(a.center.limit == a.center_block_risk for a in abrupt)
+    assert "centre risk 0.45 (limit 0.40)" in steady[2].explanation
+    assert "centre risk 0.48 (limit 0.48)" in steady[1].explanation
     _, sides, _ = play([water(0.60, 0.60, 0.60), water(0.55, 0.60, 0.60), water(0.49, 0.60, 0.60)])
     assert [a.direction for a in sides] == [D.STOP, D.STOP, D.LEFT]
 

@@ -11,17 +11,20 @@ import pytest
 
 from paani.config import GateConfig, load_config
 from paani.messages import UnusableCause
+from paani.picture_faults import spoilt
+from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
 from tests.unit.pictures import PICTURES, noisy, river
 
 C = UnusableCause
 ON = GateConfig()
+FITNESS = load_fitness(ON, 1)
 
 
 @pytest.mark.parametrize(("name", "causes"), [
     ("black", {C.BLACK}),
     ("black_with_noise", {C.BLACK}),
-    ("nearly_black", {C.BLACK}),
+    ("nearly_black", {C.BLACK, C.FLAT}),
     ("white", {C.WHITE}),
     ("overexposed", {C.WHITE}),
     ("grey", {C.FLAT}),
@@ -32,8 +35,8 @@ ON = GateConfig()
     ("white_noise", {C.NOISE}),
     ("salt_and_pepper", {C.NOISE}),
     ("river_in_strong_noise", {C.NOISE}),
-    ("blurred", {C.BLURRED}),
-    ("gradient", {C.BLURRED, C.FLAT}),
+    ("blurred", {C.BLURRED, C.UNFIT}),
+    ("gradient", {C.BLURRED, C.FLAT, C.UNFIT}),
     ("covered_60", {C.COVERED}),
     ("covered_80", {C.COVERED}),
 ])  # fmt: skip
@@ -43,14 +46,28 @@ def test_what_no_camera_should_see(name: str, causes: set[UnusableCause], size_w
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_NEAREST)
     if name == "white_noise":
         picture = np.random.default_rng(2).integers(0, 256, (size_wh[1], size_wh[0], 3), np.uint8)
-    assert judge(GateState(), picture, 1, ON)[1] in causes
+    assert judge(GateState(), picture, 1, ON, FITNESS)[1] in causes
     coded = cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1], cv2.IMREAD_COLOR)
-    assert judge(GateState(), np.asarray(coded, np.uint8), 1, ON)[1] in causes
+    assert judge(GateState(), np.asarray(coded, np.uint8), 1, ON, FITNESS)[1] in causes
 
 
 @pytest.mark.parametrize("name", ["river", "river_in_fog", "river_at_dusk", "river_in_light_noise"])
 def test_what_cameras_see(name: str) -> None:
-    assert judge(GateState(), PICTURES[name], 1, ON)[1] is C.NONE
+    assert judge(GateState(), PICTURES[name], 1, ON, FITNESS)[1] is C.NONE
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_only_the_net_knows(seed: int) -> None:
+    """A turned or shuffled picture has sound statistics: only the net knows that no boat sees this."""
+    mask = np.zeros((240, 320), np.uint8)
+    for name in ("tilted", "shuffled"):
+        picture, _ = spoilt(name, river(), mask, 5, np.random.default_rng(seed))
+        assert judge(GateState(), picture, 1, ON)[1] is C.NONE
+        assert judge(GateState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
+
+
+def test_a_net_that_says_no_number_refuses() -> None:
+    assert judge(GateState(), river(), 1, ON, lambda _: float("nan"))[1] is C.UNFIT
 
 
 def test_wrong_size() -> None:

@@ -61,7 +61,7 @@ def test_pictures_and_full_lines(folder: Path, tmp_path: Path, capsys: pytest.Ca
     assert sorted(p.name for p in out.iterdir()) == ["black.jpg", "river.jpg", "white.jpg", "white_noise.jpg"]
     drawn = cv2.imread(str(out / "river.jpg"))
     assert drawn is not None
-    assert drawn.shape == (718, 800, 3)
+    assert drawn.shape == (742, 800, 3)
 
 
 def test_the_paper_goes_on_in_the_dark(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -89,12 +89,13 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     left, center, right = advisory.left, advisory.center, advisory.right
     names = _obstacles(center, tracks)
     by = f" by {names}" if names else ""
-    centre = f"centre risk {center.risk:.2f} (limit {center.limit:.2f})"
+    centre = f"centre risk {center.risk:.2f} (limit {_limit(center, advisory.center_block_risk):.2f})"
     centre += f" with {names} in it" if names else ""
-    if left.limit == right.limit:
-        sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {left.limit:.2f})"
+    limits = [_limit(side, advisory.side_block_risk) for side in (left, right)]
+    if limits[0] == limits[1]:
+        sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {limits[0]:.2f})"
     else:
-        sides = f"left {left.risk:.2f} (limit {left.limit:.2f}), right {right.risk:.2f} (limit {right.limit:.2f})"
+        sides = f"left {left.risk:.2f} (limit {limits[0]:.2f}), right {right.risk:.2f} (limit {limits[1]:.2f})"
     match advisory.reason:
         case Reason.NO_EVIDENCE:
             return "nothing has been seen yet"
@@ -126,6 +127,11 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"{centre} and the safer side is occupied, {sides}"
         case _:
             return f"{centre}; {sides}"
+
+
+def _limit(lane: LaneRisk, nominal: float) -> float:
+    """The lane's own limit where that made the difference."""
+    return lane.limit if lane.limit <= lane.risk < nominal else nominal
 
 
 def _obstacles(lane: LaneRisk, tracks: tuple[Track, ...]) -> str:

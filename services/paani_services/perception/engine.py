@@ -26,18 +26,19 @@ class Engine:
         return None if stated == classes else [stated.index(name) for name in classes if name in stated]
 
     @classmethod
-    def load(cls, role: str, path: str, threads: int) -> "Engine":
+    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False) -> "Engine":
         """The shipped model of a role ("detector", "segmenter", "gate"), checksum compared, or a file of the user's.
 
         A manifest beside the user's file may state another size, preprocessing or order of classes. Raises UserError
         naming a file that is missing, corrupt, no ONNX model, or of other shapes than its contract.
+        spinning: idle threads wait busily; two models that do so get in each other's way.
         """
         contract = described(Path(path), role) if path else load_catalogue()[role]
         file = Path(path) if path else verified_path(role)
         checksum = file_sha256(file)
         options = ort.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         options.log_severity_level = 3
         try:
             session = ort.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])

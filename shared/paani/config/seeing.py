@@ -57,7 +57,7 @@ class GateConfig(Section, frozen=True):
     frozen_frames: Size = 5  # distinct frames that show the same
     frozen_mad: NonNegative = 0.05  # mean absolute difference of the small pictures
     model: str = ""  # path of an ONNX file; empty: the shipped model
-    min_fitness: Fraction = 0.0
+    min_fitness: Fraction = 0.1  # measured: `paani faults`, of 650 clean held-out pictures 3 are refused
 
 
 class DetectorConfig(Section, frozen=True):

@@ -1,0 +1,1 @@
+"""`paani bench eyes`."""
