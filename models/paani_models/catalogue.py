@@ -19,11 +19,11 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tensor(Record, frozen=True):
-    """One input or output of a net: static shape, float32."""
+    """One input or output of a net: static shape. A uint8 input is RGB bytes [1, H, W, 3], which the net scales."""
 
     name: str
     shape: tuple[int, ...]
-    dtype: Literal["float32"] = "float32"
+    dtype: Literal["float32", "uint8"] = "float32"
 
 
 class Preprocessing(Record, frozen=True):
@@ -75,6 +75,12 @@ class Model(Record, frozen=True):
     seed: int | None = None
     export_max_abs_diff: float = 0.0
     figures: tuple[Figure, ...] = ()
+
+    @property
+    def size_hw(self) -> tuple[int, int]:
+        """Height and width of the input, in pixels."""
+        height, width = self.input.shape[1:3] if self.input.dtype == "uint8" else self.input.shape[2:]
+        return height, width
 
 
 class _Manifest(Record, frozen=True):
@@ -130,8 +136,9 @@ def described(file: Path, role: str) -> Model:
         raise UserError(f"{manifest}: {file.name}: classes: a {role} has {', '.join(shipped.classes)}, each once")
     if stated.preprocessing.resize != shipped.preprocessing.resize:
         raise UserError(f"{manifest}: {file.name}: preprocessing.resize: a {role} has {shipped.preprocessing.resize}")
-    if len(stated.input.shape) != 4 or stated.input.shape[:2] != (1, 3):
-        raise UserError(f"{manifest}: {file.name}: input.shape: {list(stated.input.shape)} is not [1, 3, H, W]")
+    shape, wanted = stated.input.shape, "[1, H, W, 3]" if stated.input.dtype == "uint8" else "[1, 3, H, W]"
+    if len(shape) != 4 or (shape[0], shape[3 if stated.input.dtype == "uint8" else 1]) != (1, 3):
+        raise UserError(f"{manifest}: {file.name}: input.shape: {list(shape)} is not {wanted}")
     return stated
 
 

@@ -20,6 +20,7 @@ Floats = NDArray[np.float32]
 MAX_DIFFERENCE = 1e-3  # T2
 RUNS = 15
 MAX_WATER_IN_NOTHING = 0.05
+_KINDS = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -67,8 +68,8 @@ def inspected(path: Path, role: str) -> list[Finding]:
 
 def _shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
     for what, ends, wanted in (
-        ("input", session.get_inputs(), contract.input.shape),
-        ("output", session.get_outputs(), contract.output.shape),
+        ("input", session.get_inputs(), contract.input),
+        ("output", session.get_outputs(), contract.output),
     ):
         if len(ends) != 1:
             yield Finding("error", f"{len(ends)} {what}s, the contract has one")
@@ -76,13 +77,13 @@ def _shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
         shape, kind = tuple(ends[0].shape), ends[0].type
         if any(not isinstance(side, int) for side in shape):
             yield Finding("error", f"{what} {list(shape)} is not static: export with fixed sizes and batch 1")
-        elif kind != "tensor(float)":
-            yield Finding("error", f"{what} is {kind}, the contract has tensor(float)")
-        elif shape != wanted:
+        elif kind != _KINDS[wanted.dtype]:
+            yield Finding("error", f"{what} is {kind}, the contract has {_KINDS[wanted.dtype]}")
+        elif shape != wanted.shape:
             hint = "a manifest.json beside the file may state another size" if what == "input" else _classes_hint(role)
-            yield Finding("error", f"{what} is {list(shape)}, the contract has {list(wanted)}; {hint}")
+            yield Finding("error", f"{what} is {list(shape)}, the contract has {list(wanted.shape)}; {hint}")
         else:
-            yield Finding("ok", f"{what} {list(shape)} float32")
+            yield Finding("ok", f"{what} {list(shape)} {wanted.dtype}")
     yield Finding("ok", f"classes {', '.join(contract.classes)} ({contract.preprocessing.resize})")
 
 
@@ -114,7 +115,7 @@ def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Fi
         yield Finding("error", f"scores from {scores.min():.2f} to {scores.max():.2f} are no probabilities")
     else:
         yield Finding("ok", f"scores from {scores.min():.3f} to {scores.max():.3f}")
-    height, width = contract.input.shape[2:]
+    height, width = contract.size_hw
     if boxes.max() <= 2.0:
         yield Finding("error", "boxes end at 2: they seem normalised, the contract has input pixels")
     elif not (0.0 <= np.median(boxes[0]) <= width and 0.0 <= np.median(boxes[1]) <= height):
@@ -126,14 +127,14 @@ def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Fi
 def _difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
     difference = np.abs(one - other)
     if role == "detector":
-        height, width = contract.input.shape[2:]
+        height, width = contract.size_hw
         difference[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
     return float(difference.max())
 
 
-def _pictures(contract: Model) -> dict[str, Floats]:
+def _pictures(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
     """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
-    height, width = contract.input.shape[2:]
+    height, width = contract.size_hw
     rng = np.random.default_rng(0)
     river = np.full((height, width, 3), (200, 190, 180), np.uint8)
     river[height * 2 // 5 :] = (110, 120, 100)
@@ -145,6 +146,8 @@ def _pictures(contract: Model) -> dict[str, Floats]:
         "noise": rng.integers(0, 256, river.shape).astype(np.uint8),
         "a river": river,
     }
+    if contract.input.dtype == "uint8":
+        return {name: picture[None] for name, picture in drawn.items()}
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
     return {
         name: np.ascontiguousarray(((picture.astype(np.float32) / 255.0 - mean) / std).transpose(2, 0, 1)[None])

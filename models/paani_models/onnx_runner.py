@@ -37,6 +37,6 @@ def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Ses
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
 
 
-def run_net(session: Session, x: Floats) -> Floats:
+def run_net(session: Session, x: Floats | NDArray[np.uint8]) -> Floats:
     """The first output for one input."""
     return np.asarray(session.run(None, {session.get_inputs()[0].name: x})[0], np.float32)

@@ -54,7 +54,7 @@ RECIPES = {
 }
 
 
-class _Inputs(CalibrationDataReader):  # type: ignore[misc]
+class _Inputs(CalibrationDataReader):
     def __init__(self, name: str, inputs: Sequence[Floats]) -> None:
         self._next: Iterator[dict[str, Floats]] = iter([{name: x} for x in inputs])
 
@@ -93,10 +93,21 @@ def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[Floats]) 
             per_channel=recipe.per_channel,
             **options,
         )
+        _drop_unused(beside)
         beside.replace(target)
     finally:
         for left in (float_net, beside):
             left.unlink(missing_ok=True)
+
+
+def _drop_unused(path: Path) -> None:
+    """Constants that only float steps used would each be announced at every start."""
+    model = onnx.load(str(path))
+    used = {name for node in model.graph.node for name in node.input}
+    kept = [tensor for tensor in model.graph.initializer if tensor.name in used]
+    del model.graph.initializer[:]
+    model.graph.initializer.extend(kept)
+    onnx.save(model, str(path))
 
 
 def kept_float(model: onnx.ModelProto, recipe: Recipe) -> list[str]:

@@ -30,7 +30,7 @@ Floats = np.ndarray[Any, np.dtype[np.float32]]
 SHAPE = (1, 3, 16, 16)
 
 
-def conv(name: str, source: str, groups: int = 1, kernel: int = 1) -> onnx.NodeProto:
+def conv(name: str, source: str, groups: int = 1, kernel: int = 1) -> Any:
     return helper.make_node(
         "Conv",
         [source, f"{name}.w", f"{name}.b"],

@@ -41,7 +41,8 @@ def with_statistics() -> Yolo11n:
     net = Yolo11n().train()
     with torch.no_grad():
         net(torch.rand(2, 3, 64, 64))
-    return net.eval()
+    net.eval()
+    return net
 
 
 def test_fused_parameters_c12() -> None:

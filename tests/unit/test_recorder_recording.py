@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import resource
 import shutil
 import signal
@@ -239,3 +240,16 @@ def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
         reader = make_reader(file, validate_crcs=True)
         found = [one.sequence for _, channel, one in reader.iter_messages(topics=[keys.ODOMETRY.name])]
     assert found == list(range(31))
+
+
+def test_what_is_finished_and_what_is_open_goes_to_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(os, "fdatasync", lambda fd: synced.append(Path(f"/proc/self/fd/{fd}").resolve().name))
+    recording = Recording(settings(tmp_path, part_s=1.0), make_about(Config()), TOPICS)
+    record(recording, range(30))
+    recording.sync()
+    assert sorted(synced) == names(tmp_path)
+    recording.close([], now_us(30))
+    synced.clear()
+    recording.sync()
+    assert synced == [names(tmp_path)[-1]], "the last, now that it is finished; the others are on the disk"

@@ -53,7 +53,7 @@ def explain(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
 def _otherwise(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     found = advisory.counterfactual
     match found.changed_by:
-        case ChangedBy.EVIDENCE:
+        case ChangedBy.EVIDENCE if found.removals:
             return _without(found.removals[0], advisory, tracks)
         case ChangedBy.CLEAR_PICTURES:
             return "Nothing in the picture asks for it any more."

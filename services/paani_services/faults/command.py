@@ -19,7 +19,7 @@ from paani_services.perception.corridors import classify
 from paani_services.perception.engine import Engine
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
-from paani_services.perception.preprocess import stretch, tables
+from paani_services.perception.preprocess import stretch, tables_for
 
 Bytes = NDArray[np.uint8]
 
@@ -39,13 +39,12 @@ class Eyes:
         """Raises UserError for a model that cannot be used."""
         self._config = config
         self._segmenter = Engine.load("segmenter", config.segmenter, config.intra_op_threads)
-        preprocessing = self._segmenter.contract.preprocessing
-        self._table = tables(preprocessing.mean, preprocessing.std)
+        self._table = tables_for(self._segmenter.contract)
         self._fitness = load_fitness(config.gate, config.intra_op_threads)
 
     def segment(self, bgr: Bytes) -> Bytes:
         """Classes uint8 [64, 80]."""
-        height, width = self._segmenter.contract.input.shape[2:]
+        height, width = self._segmenter.contract.size_hw
         return classify(self._segmenter.run(stretch(bgr, height, width, self._table)), self._config.temperature)[0]
 
     def judge(self, bgr: Bytes) -> UnusableCause:

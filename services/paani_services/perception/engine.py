@@ -10,6 +10,8 @@ from paani.errors import UserError
 from paani_models.catalogue import Model, described, file_sha256, load_catalogue, verified_path
 
 Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+ORT_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
 class Engine:
@@ -47,12 +49,12 @@ class Engine:
         ends = ((session.get_inputs(), contract.input), (session.get_outputs(), contract.output))
         for found, wanted in ends:
             shapes = [(tuple(end.shape), end.type) for end in found]
-            if shapes != [(wanted.shape, "tensor(float)")]:
-                raise UserError(f"{file}: {role} must have float32 {list(wanted.shape)}, found {shapes}")
+            if shapes != [(wanted.shape, ORT_TYPES[wanted.dtype])]:
+                raise UserError(f"{file}: {role} must have {wanted.dtype} {list(wanted.shape)}, found {shapes}")
         return cls(session, contract, f"{role} {checksum[:12]}")
 
-    def run(self, tensor: Floats) -> Floats:
-        """One inference: float32 of the contract's input shape to its output shape."""
+    def run(self, tensor: Floats | Bytes) -> Floats:
+        """One inference: the contract's input to its output."""
         return np.asarray(self._session.run(None, {self._input: tensor})[0], np.float32)
 
     def info(self) -> str:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from paani.config import GateConfig
 from paani_services.perception.engine import Engine
 from paani_services.perception.gate import Fitness
-from paani_services.perception.preprocess import shrunk, tables
+from paani_services.perception.preprocess import shrunk, tables_for
 
 Bytes = NDArray[np.uint8]
 
@@ -16,8 +16,8 @@ def load_fitness(config: GateConfig, threads: int) -> Fitness | None:
     if not config.enabled or config.min_fitness == 0.0:
         return None
     engine = Engine.load("gate", config.model, threads)
-    height, width = engine.contract.input.shape[2:]
-    table = tables(engine.contract.preprocessing.mean, engine.contract.preprocessing.std)
+    height, width = engine.contract.size_hw
+    table = tables_for(engine.contract)
 
     def fitness(middle: Bytes) -> float:
         return float(engine.run(shrunk(middle, height, width, table))[0, 0])

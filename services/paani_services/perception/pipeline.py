@@ -25,7 +25,7 @@ from paani_services.perception.engine import Engine
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
-from paani_services.perception.preprocess import letterbox, stretch, tables
+from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
 
 Bytes = NDArray[np.uint8]
@@ -57,7 +57,7 @@ class Perceiver:
         )
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
-        self._tables = [tables(e.contract.preprocessing.mean, e.contract.preprocessing.std) for e in engines]
+        self._tables = [tables_for(engine.contract) for engine in engines]
         self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
         self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
         self._counts: dict[tuple[int, ...], Floats] = {}
@@ -112,7 +112,7 @@ class Perceiver:
     def _detect(self, bgr: Bytes) -> tuple[tuple[Detection, ...], float]:
         start_ms = self._stopwatch_ms()
         contract = self._detector.contract
-        height, width = contract.input.shape[2:]
+        height, width = contract.size_hw
         tensor, place = letterbox(bgr, height, width, contract.preprocessing.pad_grey, self._tables[0])
         detections = decode(self._detector.run(tensor), place, self._config.detections, contract.classes)
         if self._config.ego_polygon:
@@ -142,7 +142,7 @@ class Perceiver:
         """Mask and confidence; a confidence that is not finite where there is no segmenter."""
         if self._segmenter is None:
             return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
-        height, width = self._segmenter.contract.input.shape[2:]
+        height, width = self._segmenter.contract.size_hw
         logits = self._segmenter.run(stretch(bgr, height, width, self._tables[1]))
         rows = self._segmenter.rows_of(SEGMENTER_CLASSES)
         return classify(logits if rows is None else logits[:, rows], self._config.temperature)

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani_models.catalogue import Model
+
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
@@ -31,8 +33,17 @@ def tables(mean: tuple[float, float, float], std: tuple[float, float, float]) ->
     return np.asarray(scaled, np.float32)
 
 
-def letterbox(bgr: Bytes, height_px: int, width_px: int, pad_grey: int, table: Floats) -> tuple[Floats, Letterbox]:
-    """Aspect kept, bilinear, centred on grey: float32 [1, 3, H, W] in RGB, and where the picture lies in it."""
+def tables_for(contract: Model) -> Floats | None:
+    """`tables` of a net; None for one that takes bytes and scales them itself."""
+    if contract.input.dtype == "uint8":
+        return None
+    return tables(contract.preprocessing.mean, contract.preprocessing.std)
+
+
+def letterbox(
+    bgr: Bytes, height_px: int, width_px: int, pad_grey: int, table: Floats | None
+) -> tuple[Floats | Bytes, Letterbox]:
+    """Aspect kept, bilinear, centred on grey: a net's input as `stretch` gives it, and where the picture lies in it."""
     source_h, source_w = bgr.shape[:2]
     scale = min(width_px / source_w, height_px / source_h)
     inner_w, inner_h = max(1, round(source_w * scale)), max(1, round(source_h * scale))
@@ -43,18 +54,20 @@ def letterbox(bgr: Bytes, height_px: int, width_px: int, pad_grey: int, table: F
     return _normalised(boxed, table), Letterbox(inner_w / source_w, inner_h / source_h, left, top, source_w, source_h)
 
 
-def stretch(bgr: Bytes, height_px: int, width_px: int, table: Floats) -> Floats:
-    """Fills the input, bilinear: float32 [1, 3, H, W] in RGB."""
+def stretch(bgr: Bytes, height_px: int, width_px: int, table: Floats | None) -> Floats | Bytes:
+    """Fills the input, bilinear: float32 [1, 3, H, W] in RGB, or uint8 [1, H, W, 3] in RGB without a table."""
     return _normalised(np.asarray(cv2.resize(bgr, (width_px, height_px)), np.uint8), table)
 
 
-def shrunk(middle: Bytes, height_px: int, width_px: int, table: Floats) -> Floats:
-    """A picture averaged down to the gate's input: float32 [1, 3, H, W] in RGB."""
+def shrunk(middle: Bytes, height_px: int, width_px: int, table: Floats | None) -> Floats | Bytes:
+    """A picture averaged down to the gate's input, as `stretch` gives it."""
     small = cv2.resize(middle, (width_px, height_px), interpolation=cv2.INTER_AREA)
     return _normalised(np.asarray(small, np.uint8), table)
 
 
-def _normalised(bgr: Bytes, table: Floats) -> Floats:
+def _normalised(bgr: Bytes, table: Floats | None) -> Floats | Bytes:
+    if table is None:
+        return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)[None]
     tensor = np.empty((1, 3, *bgr.shape[:2]), np.float32)
     for channel, plane in enumerate(reversed(cv2.split(bgr))):
         cv2.LUT(plane, table[channel], dst=tensor[0, channel])

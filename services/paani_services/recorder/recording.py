@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import contextlib
+import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +19,6 @@ from paani_services.recorder.backlog import Heard
 from paani_services.recorder.counts import Counts, for_file
 
 MIB = 2**20
-SYNC_S = 5.0  # a loss of power costs at most this
 LOOK_S = 5.0  # between looks at the disk
 AGAIN_S = 5.0  # between attempts to begin after a failure
 
@@ -33,7 +33,8 @@ class Recording:
         self._part = 0
         self._before: tuple[m.RecordedTopic, ...] = ()
         self._unsaved: list[str] = []
-        self._flushed_us = self._synced_us = self._looked_us = self._failed_us = 0
+        self._finished: collections.deque[Path] = collections.deque()
+        self._flushed_us = self._looked_us = self._failed_us = 0
         self.counts = Counts()
         self.since_us = 0
         self.problem = ""
@@ -69,6 +70,16 @@ class Recording:
         """Write the last of it and finish the file."""
         self.write(heard, now_us)
         self._end_part(now_us)
+
+    def sync(self) -> None:
+        """Have the system write to the disk what is in the files. May take long: for a thread of its own."""
+        paths = [self.path] if self.path is not None else []
+        with contextlib.suppress(IndexError):
+            while True:
+                paths.append(self._finished.popleft())
+        for path in paths:
+            with contextlib.suppress(OSError), path.open("rb") as file:
+                os.fdatasync(file.fileno())
 
     def _keep_house(self, now_us: int) -> None:
         settings = self._settings
@@ -111,7 +122,7 @@ class Recording:
         self._log = LogWriter(path, about, self._topics, now_us)
         self.since_us = self.since_us or now_us
         self._before = self.counts.topics()
-        self._flushed_us = self._synced_us = now_us
+        self._flushed_us = now_us
 
     def _flush(self, now_us: int) -> None:
         assert self._log is not None
@@ -119,9 +130,6 @@ class Recording:
         self.counts.written(self._unsaved)
         self._unsaved.clear()
         self._flushed_us = now_us
-        if now_us - self._synced_us >= SYNC_S * 1e6:
-            self._log.sync()
-            self._synced_us = now_us
 
     def _end_part(self, now_us: int) -> None:
         log = self._log
@@ -131,6 +139,7 @@ class Recording:
             self._flush(now_us)
             log.finish(for_file(self.counts.topics(), self._before))
             self._log = None
+            self._finished.append(log.path)
         except OSError as error:
             self._fail(f"{log.path}: {error.strerror}", now_us)
 

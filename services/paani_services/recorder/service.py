@@ -24,6 +24,7 @@ from paani_services.recorder.recording import MIB, Recording, remove_empty
 
 LOG = logging.getLogger(__name__)
 LISTEN_S, WRITE_S = 0.1, 0.2
+SYNC_S = 5.0  # a loss of power costs at most this
 HELD_S, SPARE = 10.0, 32  # what Zenoh keeps of a topic between two looks
 
 
@@ -47,6 +48,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 group.create_task(tell(bus, clock, state, recording, backlog))
                 group.create_task(mend(folder, stop))
                 group.create_task(listener.listen())
+                group.create_task(sync(recording))
                 while True:
                     await loop.run_in_executor(worker, recording.write, backlog.drain(), clock.now_us())
                     await asyncio.sleep(WRITE_S)
@@ -88,6 +90,13 @@ async def tell(
         state.put(now)
         bus.note(now.problem or f"{now.file}: {now.written} written, {now.dropped} dropped")
         await asyncio.sleep(1.0 / keys.RECORDER_STATE.rate_hz)
+
+
+async def sync(recording: Recording) -> None:
+    """Beside the writing, which a slow disk must not hold up."""
+    while True:
+        await asyncio.sleep(SYNC_S)
+        await asyncio.to_thread(recording.sync)
 
 
 async def mend(folder: Path, stop: threading.Event) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -92,16 +91,10 @@ class LogWriter:
         """Close the chunk and hand everything to the system: a crash of this process costs nothing before it."""
         self._writer.flush()
 
-    def sync(self) -> None:
-        """Have the system write it down: a loss of power costs nothing before it."""
-        os.fdatasync(self._file.fileno())
-
     def finish(self, counts: Mapping[str, str]) -> None:
         """Write counts and summary, and close."""
         self._writer.add_metadata("recorder", dict(counts))
         self._writer.finish()
-        self._file.flush()
-        self.sync()
         self._file.close()
 
     def abandon(self) -> None:
