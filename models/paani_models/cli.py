@@ -97,7 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
     export.add_argument("net", choices=TRAINED)
-    export.add_argument("--checkpoint", type=Path, required=True)
+    exported = export.add_mutually_exclusive_group(required=True)
+    exported.add_argument("--checkpoint", type=Path)
+    exported.add_argument("--untrained", action="store_true", help="random weights, to measure the speed of its shape")
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
@@ -177,6 +179,8 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
         from paani_models import pipeline  # noqa: PLC0415 - PyTorch is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    if arguments.command == "export" and arguments.untrained:
+        return pipeline.export_untrained_net(arguments.net, arguments.weights)
     pictures = _pictures(arguments)
     if arguments.command == "train":
         plan = pipeline.Plan(

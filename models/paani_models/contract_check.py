@@ -47,14 +47,14 @@ def inspected(path: Path, role: str) -> list[Finding]:
     findings = list(_shapes(session, contract, role))
     if any(finding.level == "error" for finding in findings):
         return findings
-    inputs = _pictures(contract)
+    inputs = drawn_inputs(contract)
     outputs = {name: run_net(session, tensor) for name, tensor in inputs.items()}
     broken = [name for name, output in outputs.items() if not np.isfinite(output).all()]
     if broken:
         return [*findings, Finding("error", f"output is not finite on a picture of {', '.join(broken)}")]
     findings += _segmenter_ranges(outputs, contract) if role == "segmenter" else _detector_ranges(outputs, contract)
     plain = open_session(path, 1, optimised=False)
-    worst = max(_difference(outputs[name], run_net(plain, tensor), role, contract) for name, tensor in inputs.items())
+    worst = max(difference(outputs[name], run_net(plain, tensor), role, contract) for name, tensor in inputs.items())
     level = "ok" if worst <= MAX_DIFFERENCE else "error"
     findings.append(Finding(level, f"optimised and plain graph differ by {worst:.1e} (at most {MAX_DIFFERENCE:.0e})"))
     scene = inputs["a river"]
@@ -124,7 +124,8 @@ def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Fi
         yield Finding("ok", "boxes are centre, width and height in input pixels")
 
 
-def _difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
+def difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
+    """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
     difference = np.abs(one - other)
     if role == "detector":
         height, width = contract.size_hw
@@ -132,7 +133,7 @@ def _difference(one: Floats, other: Floats, role: str, contract: Model) -> float
     return float(difference.max())
 
 
-def _pictures(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
+def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
     """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
     height, width = contract.size_hw
     rng = np.random.default_rng(0)

@@ -31,7 +31,7 @@ from paani_models.onnx_runner import open_net
 from paani_models.segmenter import Segmenter, parameter_count
 from paani_models.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
 from paani_models.training import load_average, load_checkpoint
-from paani_models.yolo11n import Yolo11n
+from paani_models.yolo11n import FUSED_PARAMETERS, Yolo11n
 
 OPSET = 17  # checklist T1
 TOLERANCE = 1e-3  # checklist T2
@@ -124,6 +124,26 @@ def export(
     """
     net = network(name)
     load_average(net, checkpoint)
+    return _placed(name, net, folder, inputs, origins, load_checkpoint(checkpoint)["recipe"]["seed"])
+
+
+def export_untrained(name: str, folder: Path) -> Model:
+    """Write a net of random weights and its manifest entry: as fast as a trained one, and good for nothing else."""
+    seed = 42
+    torch.manual_seed(seed)
+    shape = CONTRACTS[name].input.shape
+    noise = np.random.default_rng(seed).random(shape, dtype=np.float32)
+    return _placed(name, network(name).eval(), folder, [noise], (), seed)
+
+
+def _placed(
+    name: str,
+    net: nn.Module,
+    folder: Path,
+    inputs: Sequence[NDArray[np.float32]],
+    origins: tuple[Origin, ...],
+    seed: int,
+) -> Model:
     contract = CONTRACTS[name]
     folder.mkdir(parents=True, exist_ok=True)
     beside = folder / f"{contract.file}.partial"
@@ -136,10 +156,10 @@ def export(
         contract,
         sha256=file_sha256(beside),
         size_bytes=beside.stat().st_size,
-        parameters=parameter_count(net),
+        parameters=FUSED_PARAMETERS if isinstance(net, Yolo11n) else parameter_count(net),
         export_max_abs_diff=float(f"{difference:.2e}"),
         origins=origins,
-        seed=load_checkpoint(checkpoint)["recipe"]["seed"],
+        seed=seed,
     )
     catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
     beside.replace(folder / contract.file)

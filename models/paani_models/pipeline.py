@@ -12,7 +12,7 @@ import torch
 
 from paani.errors import UserError
 from paani_models import detector_data, export, train_detector, train_gate, train_segmenter, train_yolo11n
-from paani_models.catalogue import verified_path
+from paani_models.catalogue import WEIGHTS, verified_path
 from paani_models.detector import Detector, load_yolox
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
@@ -149,6 +149,15 @@ def _train_gate(pictures: Pictures, plan: Plan) -> None:
     drawn = [sample for sample in pictures.segmented(held_out=False) if sample.source.name != RENDERED]
     segmenter = plan.start or verified_path("segmenter")
     GateTraining(plan.folder, drawn, pictures.never_held_out(), segmenter, recipe).run()
+
+
+def export_untrained_net(net: str, weights: Path) -> int:
+    """Write the ONNX file and its manifest entry. Raises UserError rather than write among the shipped weights."""
+    if weights.resolve() == WEIGHTS.resolve():
+        raise UserError("--untrained: name a folder with --weights; the shipped nets stay")
+    model = export.export_untrained(net, weights)
+    sys.stdout.write(f"{weights / model.file}: {model.size_bytes} bytes, random weights\n")
+    return 0
 
 
 def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:

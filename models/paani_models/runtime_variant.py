@@ -83,10 +83,11 @@ def _once_per_cell(model: onnx.ModelProto) -> Tensor:
         return Tensor(graph.output[0].name, _shape(graph.output[0]))
     inferred = onnx.shape_inference.infer_shapes(model).graph
     cells = next(value for value in inferred.value_info if value.name == last.input[0])
+    shape = (*_shape(graph.output[0])[:2], *_shape(cells)[2:])
     graph.node.remove(last)
     del graph.output[:]
-    graph.output.append(cells)
-    return Tensor(cells.name, _shape(cells))
+    graph.output.append(helper.make_tensor_value_info(cells.name, TensorProto.FLOAT, shape))
+    return Tensor(cells.name, shape)
 
 
 def _shape(value: onnx.ValueInfoProto) -> tuple[int, ...]:

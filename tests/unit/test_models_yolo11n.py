@@ -10,16 +10,23 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
+from paani import messages as m  # noqa: E402
+from paani.clock import stopwatch_ms  # noqa: E402
+from paani.config import PerceptionConfig  # noqa: E402
 from paani.errors import UserError  # noqa: E402
 from paani_models import train_detector  # noqa: E402
+from paani_models.catalogue import load_catalogue  # noqa: E402
 from paani_models.detector import candidate_grid  # noqa: E402
 from paani_models.detector_data import BoxedPicture  # noqa: E402
-from paani_models.export import CONTRACTS, largest_difference, write_onnx  # noqa: E402
+from paani_models.export import CONTRACTS, export_untrained, largest_difference, write_onnx  # noqa: E402
 from paani_models.task_aligned import assign, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
 from paani_models.train_yolo11n import Recipe, Yolo11nTraining  # noqa: E402
 from paani_models.training import load_checkpoint  # noqa: E402
 from paani_models.yolo11n import FUSED_PARAMETERS, Head, Yolo11n, fused  # noqa: E402
 from paani_models.yolo11n_data import Augmentation, jitter_hsv, paper_example  # noqa: E402
+from paani_services.perception.engine import Engine  # noqa: E402
+from paani_services.perception.pipeline import Perceiver  # noqa: E402
+from tests.unit.pictures import river  # noqa: E402
 
 COLOURS = ((220, 40, 40), (40, 220, 40), (230, 230, 40), (240, 240, 240))
 
@@ -174,7 +181,6 @@ def test_jitter_stays_within_its_gains_and_is_seeded_s5() -> None:
 def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
     """Four pictures, learnt by heart. The normalisations follow quickly, as a long training would let them."""
     torch.manual_seed(0)
-    torch.set_num_threads(1)
     items = [picture(kind, kind) for kind in range(4)]
     recipe = Recipe(
         epochs=epochs,
@@ -228,3 +234,20 @@ def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.Mo
     run.recipe = replace(run.recipe, peak_rate=0.0, warmup_bias_rate=0.0, patience=1)
     run.run()
     assert run.progress.epoch == 2
+
+
+def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:
+    """Any file of the contract, with the manifest that export writes beside it."""
+    export_untrained("yolo11n", tmp_path)
+    model = load_catalogue(tmp_path)["yolo11n"]
+    assert model.parameters == FUSED_PARAMETERS
+    own = Perceiver(PerceptionConfig(detector=str(tmp_path / "yolo11n.onnx")), stopwatch_ms)
+    header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
+    evidence, _ = own.perceive(river(), header, 0.0)
+    assert evidence.usable
+    assert f"detector {model.sha256[:12]}" in evidence.models
+    graph = onnx.load(str(tmp_path / "yolo11n.onnx"))
+    graph.opset_import[0].version = 99
+    onnx.save(graph, str(tmp_path / "newer.onnx"))
+    with pytest.raises(UserError, match=r"newer\.onnx: not an ONNX model that can run here"):
+        Engine.load("detector", str(tmp_path / "newer.onnx"), 1)

@@ -37,6 +37,7 @@ from paani_services.advisor.risk import LANES, Obstacle, components, lane_span, 
 
 Flags = NDArray[np.bool_]  # one per set
 Numbers = NDArray[np.float64]  # one per set
+Factors = tuple[tuple[int | None, float], ...]  # of a product: the bit of a piece (None: it stays) and its factor
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
 MAX_SHOWN = 3
 CLEAR_WATER = LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
@@ -79,15 +80,16 @@ def counterfactual(
     scene = _scene(state, pieces, water, obstacles, config)
     judged = 0
     for size in range(1, min(config.advisor.counterfactual_size, pieces.all) + 1):
-        sets, kept = _sets(pieces.all, size)
-        judged += len(sets)
-        codes = _codes(scene, kept)
+        sets = _sets_of(pieces.all, size)
+        judged += len(sets.members)
+        codes = _codes(scene, sets)
         changing = np.flatnonzero(IS_NOT[decision.direction][codes])
         if not changing.size:
             continue
         straight_first = changing[np.argsort(IS_NOT[Direction.STRAIGHT][codes[changing]], kind="stable")]
         removals = [
-            _removal(pieces, sets[i], state, water, obstacles, config) for i in straight_first[:MAX_SHOWN].tolist()
+            _removal(pieces, sets.members[i], state, water, obstacles, config)
+            for i in straight_first[:MAX_SHOWN].tolist()
         ]
         return Counterfactual(
             changed_by=ChangedBy.EVIDENCE,
@@ -163,7 +165,7 @@ def nearest_limit(
 
 
 class _Lane(NamedTuple):
-    """One corridor. factors: per track inside, in order: its bit (None: stays) and its two factors of E.
+    """One corridor. obstacles, urgencies: the factors of E for the tracks inside, in order.
 
     water: the bit of its water (None: adds nothing). occupying: bits of the tracks that occupy it.
     """
@@ -171,9 +173,18 @@ class _Lane(NamedTuple):
     non_water: float
     uncertainty: float
     water: int | None
-    factors: tuple[tuple[int | None, float, float], ...]
+    obstacles: Factors
+    urgencies: Factors
     occupying: tuple[int | None, ...]
     limit: float
+
+
+class _Sets(NamedTuple):
+    """All sets of a size, in order; kept: pieces x sets, False where taken; taking: the sets that take each piece."""
+
+    members: tuple[tuple[int, ...], ...]
+    kept: Flags
+    taking: tuple[NDArray[np.intp], ...]
 
 
 class _Scene(NamedTuple):
@@ -208,9 +219,8 @@ def _scene(
             non_water=water[lane].non_water,
             uncertainty=water[lane].uncertainty,
             water=wet.get(lane),
-            factors=tuple(
-                (bit.get(o.id), 1.0 - o.severity * share * o.presence, 1.0 - o.urgency * share) for o, share in inside
-            ),
+            obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
+            urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
             occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
             limit=limit_of(lane, state, policy),
         )
@@ -228,9 +238,9 @@ def _scene(
     )
 
 
-def _codes(scene: _Scene, kept: Flags) -> NDArray[np.int64]:
-    """What stands where, for each set; kept: pieces x sets, False where the piece is taken away."""
-    count = kept.shape[1]
+def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
+    """What stands where, for each set."""
+    count, kept = len(sets.members), sets.kept
 
     def any_left(bits: tuple[int | None, ...]) -> Flags:
         found: Flags = np.full(count, None in bits)
@@ -239,19 +249,25 @@ def _codes(scene: _Scene, kept: Flags) -> NDArray[np.int64]:
                 found |= kept[i]
         return found
 
+    def product(factors: Factors) -> Numbers:
+        found = np.ones(count)
+        for i, factor in factors:
+            if i is None:
+                found *= factor
+            else:
+                without = found[sets.taking[i]]
+                found *= factor
+                found[sets.taking[i]] = without
+        return found
+
     def risk(lane: _Lane) -> Numbers:
-        obstacle, urgency = np.ones(count), np.ones(count)
-        for i, of_obstacle, of_urgency in lane.factors:
-            for product, factor in ((obstacle, of_obstacle), (urgency, of_urgency)):
-                if factor != 1.0:
-                    np.multiply(product, factor, out=product, where=True if i is None else kept[i])
         wet = np.ones(count, bool) if lane.water is None else kept[lane.water]
         weights = scene.weights
         return np.minimum(
             1.0,
             weights.non_water * np.where(wet, lane.non_water, 0.0)
-            + weights.obstacle * np.clip(1.0 - obstacle, 0.0, 1.0)
-            + weights.urgency * np.clip(1.0 - urgency, 0.0, 1.0)
+            + weights.obstacle * np.clip(1.0 - product(lane.obstacles), 0.0, 1.0)
+            + weights.urgency * np.clip(1.0 - product(lane.urgencies), 0.0, 1.0)
             + weights.uncertainty * np.where(wet, lane.uncertainty, 0.0),
         )
 
@@ -295,13 +311,12 @@ IS_NOT = {
 
 
 @functools.lru_cache(maxsize=3 * (MAX_TRACKS + len(LANES) + 1))
-def _sets(pieces: int, size: int) -> tuple[tuple[tuple[int, ...], ...], Flags]:
-    """All sets of a size, in order, and which pieces each keeps: pieces x sets."""
-    sets = tuple(itertools.combinations(range(pieces), size))
-    kept = np.ones((pieces, len(sets)), bool)
-    kept[np.array(sets).T, np.arange(len(sets))] = False
+def _sets_of(pieces: int, size: int) -> _Sets:
+    members = tuple(itertools.combinations(range(pieces), size))
+    kept = np.ones((pieces, len(members)), bool)
+    kept[np.array(members).T, np.arange(len(members))] = False
     kept.flags.writeable = False
-    return sets, kept
+    return _Sets(members, kept, tuple(np.flatnonzero(~row) for row in kept))
 
 
 def _removal(

@@ -58,7 +58,7 @@ class Perceiver:
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
         self._tables = [tables_for(engine.contract) for engine in engines]
-        self._beside = ThreadPoolExecutor(1, "detector") if config.concurrent else None
+        self._beside = ThreadPoolExecutor(1, "segmenter") if config.concurrent else None
         self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
         self._counts: dict[tuple[int, ...], Floats] = {}
 
@@ -74,6 +74,11 @@ class Perceiver:
         start_ms = self._stopwatch_ms()
         bgr = decoded(data)
         decoded_ms = self._stopwatch_ms()
+        roll_rad = followed_roll_rad(roll_rad, self._config.max_roll_rad) if self._config.follow_roll else 0.0
+        # The segmenter takes longest, so it begins beside the gate; its answer to a refused picture is dropped.
+        segmenting = None
+        if self._beside and bgr is not None and age_s <= self._config.max_frame_age_s:
+            segmenting = self._beside.submit(self._segment, bgr, roll_rad)
         cause = self._judge(bgr, header, age_s)
         gated_ms = self._stopwatch_ms()
         timing = InferenceTiming(
@@ -81,14 +86,8 @@ class Perceiver:
         )
         if bgr is None or cause is not UnusableCause.NONE:
             return self._evidence(header, bgr, cause, (), None, timing, start_ms), None
-        roll_rad = followed_roll_rad(roll_rad, self._config.max_roll_rad) if self._config.follow_roll else 0.0
-        if self._beside is not None:
-            detecting = self._beside.submit(self._detect, bgr)
-            segmentation = self._segment(bgr, roll_rad)
-            detections, detector_ms = detecting.result()
-        else:
-            detections, detector_ms = self._detect(bgr)  # B4: detector, then segmenter
-            segmentation = self._segment(bgr, roll_rad)
+        detections, detector_ms = self._detect(bgr)
+        segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: one after the other
         timing = msgspec.structs.replace(
             timing,
             detector_ms=detector_ms,

@@ -1,4 +1,4 @@
-"""`paani bench chain`, `paani bench judgement`, `paani bench recorder`."""
+"""`paani bench chain`, `paani bench judgement`, `paani bench recorder`, and those of other packages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 from paani.bench.judgement import contract, step
-from paani.bench.part import Part, installed_parts, part_text
+from paani.bench.part import Part, installed_commands, installed_parts, part_text
 from paani.bench.recorder import recorder
 from paani.bench.steadiness import steadiness
 from paani.bench.table import Machine, bench_of, text_of
@@ -34,8 +34,13 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
 
 def main(argv: list[str]) -> int:
     """Run one benchmark and print its figures."""
+    others = installed_commands()
+    if argv and argv[0] in others:
+        return int(others[argv[0]].load()(argv[1:]))
     parser = argparse.ArgumentParser(prog="paani bench", description="Measure, and print the figures side by side.")
-    benches = parser.add_subparsers(dest="what", required=True, metavar="chain | judgement | recorder")
+    benches = parser.add_subparsers(
+        dest="what", required=True, metavar=" | ".join(["chain", "judgement", "recorder", *others])
+    )
     chain = benches.add_parser("chain", help="the whole loop, from the picture to the thrust")
     chain.add_argument("--world", help="river or lake (default: river)")
     chain.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")

@@ -1,13 +1,14 @@
 """One table of figures, and where others put theirs.
 
 A package adds a table to `paani bench judgement` with an entry point in the group `paani.benches`: a function without
-arguments that gives a `Part`.
+arguments that gives a `Part`. It adds a benchmark of its own with one in the group `paani.bench_commands`: a function
+of the words that follow the benchmark's name, `def main(argv: list[str]) -> int`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 import msgspec
 
@@ -26,6 +27,11 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
 def installed_parts() -> dict[str, Callable[[], Part]]:
     """What is installed, by name."""
     return {point.name: point.load() for point in sorted(entry_points(group="paani.benches"), key=lambda p: p.name)}
+
+
+def installed_commands() -> dict[str, EntryPoint]:
+    """Benchmarks of other packages, not loaded yet, by name."""
+    return {point.name: point for point in entry_points(group="paani.bench_commands")}
 
 
 def part_text(part: Part) -> str:

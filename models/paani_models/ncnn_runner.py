@@ -1,0 +1,108 @@
+"""Run a net that was converted for ncnn: the one place that imports ncnn, and what stands beside the files it runs.
+
+`NET.onnx` has `NET.ncnn.param`, `NET.ncnn.bin` and `NET.ncnn.json` beside it; `paani models convert` writes them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+from paani_models.catalogue import Record, file_sha256
+
+Floats = NDArray[np.float32]
+INPUT, OUTPUT = "in0", "out0"
+_SMALL = ("use_fp16_packed", "use_fp16_storage", "use_fp16_arithmetic", "use_bf16_packed", "use_bf16_storage")
+
+
+class Conversion(Record, frozen=True):
+    """The files' checksums, the model they were made from, and how far their answers lie from its.
+
+    max_difference: over `pictures`; scores and logits as they are, boxes as shares of the input's sides.
+    """
+
+    source_sha256: str
+    param_sha256: str
+    bin_sha256: str
+    max_difference: float
+    pictures: int
+
+
+class NcnnFiles(msgspec.Struct, frozen=True):
+    """Where a model's converted files are, whether or not they are there."""
+
+    param: Path
+    bin: Path
+    record: Path
+
+
+def files_of(model: Path) -> NcnnFiles:
+    """The names beside a model file."""
+    return NcnnFiles(*(model.with_suffix(f".ncnn.{ending}") for ending in ("param", "bin", "json")))
+
+
+def converted(model: Path) -> NcnnFiles:
+    """The files beside a model, checksums just compared: ncnn itself dies of some that are damaged.
+
+    Raises UserError naming the file that is missing, corrupt or made from another model, and the command that makes it.
+    """
+    files, remedy = files_of(model), f"make it with: paani models convert {model}"
+    for path in (files.param, files.bin, files.record):
+        if not path.is_file():
+            raise UserError(f"{path}: missing; {remedy}")
+    try:
+        record = msgspec.json.decode(files.record.read_bytes(), type=Conversion)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{files.record}: {error}; {remedy}") from error
+    if record.source_sha256 != file_sha256(model):
+        raise UserError(f"{files.param}: made from another {model.name}; {remedy}")
+    for path, sha256 in ((files.param, record.param_sha256), (files.bin, record.bin_sha256)):
+        if file_sha256(path) != sha256:
+            raise UserError(f"{path}: corrupt (SHA-256 differs from {files.record.name}); {remedy}")
+    return files
+
+
+def release() -> str | None:
+    """The version of ncnn; None where it is not installed."""
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read once by its thread pool, which else waits busily
+    try:
+        import ncnn  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError:
+        return None
+    return str(ncnn.__version__)
+
+
+def open_ncnn(files: NcnnFiles, threads: int) -> Callable[[Floats], Floats]:
+    """A function from input [1,C,H,W] to the output with a leading 1, computed in float32. The calls release the GIL.
+
+    Raises UserError where ncnn is not installed, or naming a file that it does not read.
+    """
+    if release() is None:
+        raise UserError("ncnn is not installed; install the extra paani[ncnn]")
+    import ncnn  # noqa: PLC0415 - an extra
+
+    net = ncnn.Net()
+    for option in _SMALL:  # half precision moves logits by more than 1e-3
+        setattr(net.opt, option, False)
+    net.opt.use_vulkan_compute = False
+    net.opt.num_threads = threads
+    if net.load_param(str(files.param)) != 0:
+        raise UserError(f"{files.param}: not a net that ncnn {release()} can run")
+    if net.load_model(str(files.bin)) != 0:
+        raise UserError(f"{files.bin}: not the weights of {files.param.name}")
+
+    def run(x: Floats) -> Floats:
+        extractor = net.create_extractor()
+        taken = extractor.input(INPUT, ncnn.Mat(np.ascontiguousarray(x[0], np.float32)))
+        failed, output = extractor.extract(OUTPUT) if taken == 0 else (taken, None)
+        if failed != 0:
+            raise UserError(f"{files.param}: does not run from {INPUT} to {OUTPUT}")
+        return np.array(output, np.float32)[None]
+
+    return run

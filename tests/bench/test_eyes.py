@@ -1,0 +1,88 @@
+"""`paani bench eyes` prints what it promises; the figures are for reading."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+
+from paani.config import CorridorConfig, DetectorConfig
+from paani.errors import UserError
+from paani_services.bench import paper_shaped
+from paani_services.bench.command import Eyes, main, text
+from paani_services.bench.eyes import Row, measured, ratios, rows
+from paani_services.perception.corridors import classify, summarise
+from paani_services.perception.engine import Engine
+from tests.unit.pictures import river
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
+
+
+def test_bench_eyes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    for seed in range(3):
+        cv2.imwrite(str(folder / f"{seed}.png"), river(seed))
+    assert main(["--rounds", "2", "--folder", str(folder), "--json", str(tmp_path / "eyes.json")]) == 0
+    report = msgspec.json.decode((tmp_path / "eyes.json").read_bytes(), type=Eyes)
+    names = {row.name for row in report.rows}
+    assert {"gate", "letterbox", "stretch", "detector, 1 thread", "segmenter, 1 thread", "boxes", "corridors"} <= names
+    assert {"two bare runs, 2 threads", "pipeline, concurrent", "pipeline, sequential, 2 threads"} <= names
+    assert all(row.n == 2 and 0 < row.least_ms <= row.median_ms <= row.p95_ms for row in report.rows)
+    assert report.ratios[0].bar == 0.90
+    assert report.pictures + report.refused == 3
+    assert report.footprint.rss_mib > 0
+    printed = capsys.readouterr().out
+    assert printed == text(report)
+    assert all(name in printed for name in names)
+
+
+def test_measured_runs_everything_in_turn() -> None:
+    """Each round runs every step once, on the next picture; the first rounds do not count."""
+    seen: list[tuple[str, int]] = []
+    pictures = [np.full((1, 1, 3), value, np.uint8) for value in (1, 2)]
+    steps = {name: lambda p, name=name: seen.append((name, int(p[0, 0, 0]))) for name in ("a", "b")}
+    ticks = iter(range(1000))
+    *_, (_, taken) = measured(steps, pictures, 3, lambda: float(next(ticks)))
+    assert seen[:4] == [("a", seen[0][1]), ("b", seen[0][1]), ("a", seen[2][1]), ("b", seen[2][1])]
+    assert seen[0][1] != seen[2][1]
+    assert rows(taken) == (Row("a", 1.0, 1.0, 1.0, 3), Row("b", 1.0, 1.0, 1.0, 3))
+
+
+def test_ratios_of_what_was_measured() -> None:
+    found = [Row("pipeline, concurrent", 8.0, 9.0, 12.0, 5), Row("two bare runs, 2 threads", 10.0, 12.0, 15.0, 5)]
+    (ratio,) = ratios(found, [])
+    assert (ratio.medians, ratio.least, ratio.bar) == (0.75, 0.8, 0.90)
+
+
+def test_the_papers_shape_sees_what_perception_sees() -> None:
+    """It is a fair comparison: the same networks, the same corridors, to the width of a cell."""
+    segmenter = Engine.load("segmenter", "", 1)
+    logits = segmenter.run(paper_shaped.stretched(river()))
+    config = CorridorConfig()
+    ours = summarise(*classify(logits, 1.0), config)
+    theirs = paper_shaped.lanes(logits, config)
+    for mine, (non_water, uncertainty, clear_width) in zip(ours, theirs, strict=True):
+        assert mine.non_water == pytest.approx(non_water, abs=0.02)
+        assert mine.uncertainty == pytest.approx(uncertainty, abs=0.02)
+        assert mine.clear_width == pytest.approx(clear_width, abs=0.06)
+    candidates = np.zeros((1, 8, 1680), np.float32)
+    candidates[0, :, 0] = (100, 100, 50, 40, 0.9, 0, 0, 0)
+    candidates[0, :, 1] = (102, 100, 50, 40, 0, 0.8, 0, 0)
+    candidates[0, :, 2] = (200, 100, 50, 40, 0, 0.8, 0, 0)
+    assert [score for _, score in paper_shaped.boxes(candidates, DetectorConfig())] == pytest.approx([0.9, 0.8])
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--folder", "absent"], "--folder absent: no such folder"),
+        (["--with", "absent"], r"--with absent: no detector\*\.onnx"),
+    ],
+)
+def test_mistakes_are_one_line(words: list[str], named: str) -> None:
+    with pytest.raises(UserError, match=named):
+        main(words)
