@@ -82,6 +82,12 @@ class Model(Record, frozen=True):
         height, width = self.input.shape[1:3] if self.input.dtype == "uint8" else self.input.shape[2:]
         return height, width
 
+    def rows_of(self, classes: tuple[str, ...]) -> list[int] | None:
+        """Where each of the classes stands in the output, as far as it is there; None when all stand in that order."""
+        return (
+            None if self.classes == classes else [self.classes.index(name) for name in classes if name in self.classes]
+        )
+
 
 class _Manifest(Record, frozen=True):
     models: tuple[Model, ...]
@@ -140,6 +146,11 @@ def described(file: Path, role: str) -> Model:
     if len(shape) != 4 or (shape[0], shape[3 if stated.input.dtype == "uint8" else 1]) != (1, 3):
         raise UserError(f"{manifest}: {file.name}: input.shape: {list(shape)} is not {wanted}")
     return stated
+
+
+def chosen(role: str, path: str) -> tuple[Model, Path]:
+    """Contract and file of a user's model, or, without a path, of the role's shipped one, its checksum compared."""
+    return (described(Path(path), role), Path(path)) if path else (load_catalogue()[role], verified_path(role))
 
 
 def file_sha256(path: Path) -> str:

@@ -42,6 +42,10 @@ def main(argv: list[str]) -> int:
             if arguments.set != "own":
                 return data_command.prepare_public(arguments)
             return data_command.prepare_own(_pictures(arguments), arguments.manifest)
+        if arguments.command == "held-out":
+            held = {s.picture.relative_to(arguments.data) for s in _pictures(arguments).samples if s.held_out}
+            sys.stdout.write("".join(f"{path.as_posix()}\n" for path in sorted(held)))
+            return 0
         if arguments.command == "pack":
             return data_command.make_bundle(arguments, _pictures(arguments))
         if arguments.command == "evaluate":
@@ -77,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     model_card = commands.add_parser("card", help="print the model card of a weights folder, as Markdown")
     model_card.add_argument("--weights", type=Path, default=WEIGHTS)
 
+    held_out = commands.add_parser("held-out", help="list the held-out pictures, for `paani faults --pictures`")
     check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
     data_command.add_prepare_arguments(check_data)
     pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
@@ -116,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
     quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
     quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
-    for command in (check, check_data, pack, train, export, evaluate, report, quantise):
+    for command in (check, held_out, check_data, pack, train, export, evaluate, report, quantise):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")

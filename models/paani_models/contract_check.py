@@ -126,11 +126,11 @@ def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Fi
 
 def difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
     """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
-    difference = np.abs(one - other)
+    apart = np.abs(one - other)
     if role == "detector":
         height, width = contract.size_hw
-        difference[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
-    return float(difference.max())
+        apart[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
+    return float(apart.max())
 
 
 def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:

@@ -25,6 +25,7 @@ from paani_models.estimates import (
     mask_estimates,
 )
 from paani_models.pictures import Pictures
+from paani_models.report.records import gate_figures, read_faults
 from paani_models.segmenter_scores import ScoredMask, score_masks
 from paani_models.sources import DETECTOR_CLASSES
 
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources, --rendered and --weights."""
     parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
     parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="the gate's figures, from `paani faults --json`")
     parser.add_argument("--lars", type=Path, metavar="ROOT", help="score the segmenter by LaRS's protocol instead")
     parser.add_argument("--mods", type=Path, metavar="ROOT", help="score both nets by MODS's protocol instead")
     parser.add_argument(
@@ -53,19 +55,27 @@ class Scored:
 def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     """Exit 0, or raise UserError."""
     catalogue = load_catalogue(arguments.weights)
+    if arguments.faults:
+        _report("gate", gate_figures(read_faults(arguments.faults)), arguments)
+        return 0
     for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
         if net not in catalogue or not is_scored(catalogue[net].classes):
             raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
-        figures = measure(net, arguments.weights, pictures)
-        for figure in figures:
-            sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
-        if arguments.record:
-            catalogue = load_catalogue(arguments.weights)
-            model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
-            save_catalogue({**catalogue, net: model}, arguments.weights)
+        _report(net, measure(net, arguments.weights, pictures), arguments)
     if arguments.json:
         write(arguments.json, score(arguments.weights, pictures).evaluation)
     return 0
+
+
+def _report(net: str, figures: list[Figure], arguments: argparse.Namespace) -> None:
+    for figure in figures:
+        sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
+    if arguments.record:
+        catalogue = load_catalogue(arguments.weights)
+        if net not in catalogue:
+            raise UserError(f"{arguments.weights}: no model named {net!r}")
+        model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
+        save_catalogue({**catalogue, net: model}, arguments.weights)
 
 
 def run_benchmark(arguments: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ def multiply_adds(path: Path) -> int:
     Raises UserError naming a file that is not ONNX or whose shapes are not static.
     """
     try:
-        model = onnx.shape_inference.infer_shapes(onnx.load(str(path)))
+        model = onnx.shape_inference.infer_shapes(onnx.load(str(path)), data_prop=True)
     except Exception as error:
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
     graph = model.graph

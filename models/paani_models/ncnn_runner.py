@@ -17,6 +17,7 @@ from paani.errors import UserError
 from paani_models.catalogue import Record, file_sha256
 
 Floats = NDArray[np.float32]
+Run = Callable[[Floats], Floats]
 INPUT, OUTPUT = "in0", "out0"
 _SMALL = ("use_fp16_packed", "use_fp16_storage", "use_fp16_arithmetic", "use_bf16_packed", "use_bf16_storage")
 
@@ -78,7 +79,7 @@ def release() -> str | None:
     return str(ncnn.__version__)
 
 
-def open_ncnn(files: NcnnFiles, threads: int) -> Callable[[Floats], Floats]:
+def open_ncnn(files: NcnnFiles, threads: int) -> Run:
     """A function from input [1,C,H,W] to the output with a leading 1, computed in float32. The calls release the GIL.
 
     Raises UserError where ncnn is not installed, or naming a file that it does not read.

@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from paani.config import CorridorConfig, DetectorConfig
+from paani.config import CorridorConfig, DetectorConfig, load_config
 from paani.errors import UserError
 from paani_services.bench import paper_shaped
 from paani_services.bench.command import Eyes, main, text
 from paani_services.bench.eyes import Row, measured, ratios, rows
 from paani_services.perception.corridors import classify, summarise
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import OnnxEngine
 from tests.unit.pictures import river
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -60,7 +60,7 @@ def test_ratios_of_what_was_measured() -> None:
 
 def test_the_papers_shape_sees_what_perception_sees() -> None:
     """It is a fair comparison: the same networks, the same corridors, to the width of a cell."""
-    segmenter = Engine.load("segmenter", "", 1)
+    segmenter = OnnxEngine.load("segmenter", "", 1)
     logits = segmenter.run(paper_shaped.stretched(river()))
     config = CorridorConfig()
     ours = summarise(*classify(logits, 1.0), config)
@@ -74,6 +74,15 @@ def test_the_papers_shape_sees_what_perception_sees() -> None:
     candidates[0, :, 1] = (102, 100, 50, 40, 0, 0.8, 0, 0)
     candidates[0, :, 2] = (200, 100, 50, 40, 0, 0.8, 0, 0)
     assert [score for _, score in paper_shaped.boxes(candidates, DetectorConfig())] == pytest.approx([0.9, 0.8])
+
+
+def test_the_paper_runs_two_threads_within_a_step_and_one_between_c14_d11() -> None:
+    config = load_config(profile="paper").perception
+    assert config.intra_op_threads == 2
+    assert not config.concurrent
+    for role in ("detector", "segmenter"):
+        options = OnnxEngine.load(role, "", config.intra_op_threads)._session.get_session_options()
+        assert (options.intra_op_num_threads, options.inter_op_num_threads) == (2, 1)
 
 
 @pytest.mark.parametrize(

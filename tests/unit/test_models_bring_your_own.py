@@ -18,7 +18,7 @@ from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani_models.catalogue import Model, Preprocessing, Tensor, load_catalogue, save_catalogue, verified_path
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.pipeline import Perceiver
 from tests.unit.pictures import river
 
@@ -100,7 +100,7 @@ def test_without_a_manifest_the_shipped_contract_holds(tmp_path: Path, capsys: p
     assert "input is [1, 3, 96, 160], the contract has [1, 3, 256, 320]; a manifest.json beside the file" in said
     assert "cannot be used as it is" in said
     with pytest.raises(UserError, match=r"own\.onnx: segmenter must have float32"):
-        Engine.load("segmenter", str(path), 1)
+        OnnxEngine.load("segmenter", str(path), 1)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_a_manifest_that_cannot_be(foreign: Path, changes: dict[str, Any], named
     own = msgspec.structs.replace(stated("lake.onnx", ("sky", "obstacle", "water")), **changes)
     save_catalogue({"lake": own}, foreign.parent)
     with pytest.raises(UserError, match=named):
-        Engine.load("segmenter", str(foreign), 1)
+        OnnxEngine.load("segmenter", str(foreign), 1)
 
 
 def probabilities() -> np.ndarray:

@@ -29,7 +29,7 @@ def copied(tmp_path: Path) -> Path:
 
 def test_both_models_are_shipped_with_their_class_orders_c2_d6() -> None:
     catalogue = load_catalogue()
-    assert set(catalogue) == {"segmenter", "detector"}
+    assert set(catalogue) == {"segmenter", "detector", "gate"}
     assert catalogue["segmenter"].classes == ("water", "obstacle", "sky")
     assert catalogue["detector"].classes == ("person", "vessel", "pier", "buoy")
 

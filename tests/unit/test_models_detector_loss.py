@@ -16,6 +16,8 @@ from paani_models.detector_loss import (  # noqa: E402
     judged_candidates,
 )
 
+pytestmark = pytest.mark.train
+
 SIZE_HW = (64, 64)
 CELLS = (8, 8)
 CANDIDATES = 64 + 16 + 4

@@ -20,6 +20,8 @@ from paani_models.imagenet_segmenter import (  # noqa: E402
 from paani_models.pipeline import IMAGENET_FILE  # noqa: E402
 from paani_models.segmenter import Segmenter  # noqa: E402
 
+pytestmark = pytest.mark.train
+
 IMAGENET = data_folder() / IMAGENET_FILE
 
 

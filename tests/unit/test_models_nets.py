@@ -11,6 +11,8 @@ from paani_models import detector, segmenter  # noqa: E402
 from paani_models.imagenet_segmenter import ImageNetSegmenter  # noqa: E402
 from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
 
+pytestmark = pytest.mark.train
+
 
 def test_segmenter_parameters_d9() -> None:
     assert segmenter.parameter_count(segmenter.Segmenter()) == 1_082_467

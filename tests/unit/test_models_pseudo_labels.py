@@ -13,6 +13,8 @@ from paani_models.pseudo_labels import pseudo_labelled, without_box_cores  # noq
 from paani_models.sources import IGNORE, Sample, Source  # noqa: E402
 from paani_models.train_segmenter import CACHE_WH, UNSEGMENTED, CachedPicture  # noqa: E402
 
+pytestmark = pytest.mark.train
+
 
 class SureBelow(nn.Module):  # type: ignore[misc]
     """Sky above; below, water where the picture is dark, else undecided between water and obstacle."""

@@ -26,6 +26,8 @@ from paani_models.quantise import PAPER, RECIPES, decoding, quantise  # noqa: E4
 from paani_models.sources import Sample, Source  # noqa: E402
 from tests.unit.pictures import river  # noqa: E402
 
+pytestmark = pytest.mark.train
+
 Floats = np.ndarray[Any, np.dtype[np.float32]]
 SHAPE = (1, 3, 16, 16)
 

@@ -20,7 +20,7 @@ from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import Tensor, load_catalogue, save_catalogue, verified_path  # noqa: E402
 from paani_models.cli import data_folder  # noqa: E402
 from paani_models.runtime_variant import write_variant  # noqa: E402
-from paani_services.perception.engine import Engine  # noqa: E402
+from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
 from tests.unit.pictures import PICTURES, river  # noqa: E402
 
@@ -101,7 +101,7 @@ def test_a_manifest_that_belies_its_net_is_refused(tmp_path: Path) -> None:
     own = msgspec.structs.replace(shipped, file="own.onnx", input=Tensor("input", (1, 256, 320, 3), "uint8"))
     save_catalogue({"own": own}, tmp_path)
     with pytest.raises(UserError, match=r"own\.onnx: segmenter must have uint8 \[1, 256, 320, 3\]"):
-        Engine.load("segmenter", str(tmp_path / "own.onnx"), 1)
+        OnnxEngine.load("segmenter", str(tmp_path / "own.onnx"), 1)
     save_catalogue({"own": msgspec.structs.replace(own, input=Tensor("input", (1, 3, 256, 320), "uint8"))}, tmp_path)
     with pytest.raises(UserError, match=r"input\.shape: \[1, 3, 256, 320\] is not \[1, H, W, 3\]"):
-        Engine.load("segmenter", str(tmp_path / "own.onnx"), 1)
+        OnnxEngine.load("segmenter", str(tmp_path / "own.onnx"), 1)

@@ -19,6 +19,8 @@ from paani_models.onnx_runner import open_net  # noqa: E402
 from paani_models.segmenter import Segmenter  # noqa: E402
 from paani_models.warm_start import load_exported  # noqa: E402
 
+pytestmark = pytest.mark.train
+
 
 def pictures(count: int) -> Tensor:
     return torch.rand((count, 3, 256, 320), generator=torch.Generator().manual_seed(3))

@@ -12,7 +12,7 @@ onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
 from paani import messages as m  # noqa: E402
 from paani.clock import stopwatch_ms  # noqa: E402
-from paani.config import PerceptionConfig  # noqa: E402
+from paani.config import DetectorConfig, PerceptionConfig  # noqa: E402
 from paani.errors import UserError  # noqa: E402
 from paani_models import train_detector  # noqa: E402
 from paani_models.catalogue import load_catalogue  # noqa: E402
@@ -24,9 +24,13 @@ from paani_models.train_yolo11n import Recipe, Yolo11nTraining  # noqa: E402
 from paani_models.training import load_checkpoint  # noqa: E402
 from paani_models.yolo11n import FUSED_PARAMETERS, Head, Yolo11n, fused  # noqa: E402
 from paani_models.yolo11n_data import Augmentation, jitter_hsv, paper_example  # noqa: E402
+from paani_services.perception.decode import decode  # noqa: E402
 from paani_services.perception.engine import Engine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
+from paani_services.perception.preprocess import Letterbox  # noqa: E402
 from tests.unit.pictures import river  # noqa: E402
+
+pytestmark = pytest.mark.train
 
 COLOURS = ((220, 40, 40), (40, 220, 40), (230, 230, 40), (240, 240, 240))
 
@@ -251,3 +255,14 @@ def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:
     onnx.save(graph, str(tmp_path / "newer.onnx"))
     with pytest.raises(UserError, match=r"newer\.onnx: not an ONNX model that can run here"):
         Engine.load("detector", str(tmp_path / "newer.onnx"), 1)
+
+
+def test_rows_beyond_the_classes_are_no_boxes_c11() -> None:
+    """An export with mask coefficients is read for its boxes; the manifest leaves the other rows out. Ours has none."""
+    rows = np.zeros((1, 4 + 4 + 32, 3), np.float32)
+    rows[0, :6, 0] = (160, 128, 40, 30, 0.1, 0.9)
+    rows[0, 8:] = 7.0
+    classes = (*CONTRACTS["yolo11n"].classes, *["-"] * 32)
+    found = decode(rows, Letterbox(1.0, 1.0, 0, 0, 320, 256), DetectorConfig(), classes)
+    assert [(d.label, d.confidence) for d in found] == [(m.Label.VESSEL, pytest.approx(0.9))]
+    assert CONTRACTS["yolo11n"].output.shape[1] == 4 + len(CONTRACTS["yolo11n"].classes)

@@ -9,7 +9,7 @@ import zlib
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -74,6 +74,7 @@ def test_what_is_no_picture(data: bytes) -> None:
     assert decoded(data) is None
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300), st.integers(0, 10_000), st.sampled_from(sorted(FORMS)))
 def test_damage_never_raises(noise: bytes, at: int, form: str) -> None:
     data = bytearray(FORMS[form])

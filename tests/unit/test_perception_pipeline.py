@@ -15,7 +15,7 @@ from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, load_config
 from paani.errors import UserError
 from paani_models.catalogue import verified_path
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.pipeline import Perceiver
 from tests.unit.pictures import PICTURES, noisy, river
 
@@ -110,11 +110,11 @@ def test_f2_without_a_segmenter() -> None:
 def test_a_missing_or_corrupt_model_is_the_users_to_mend(tmp_path: Path) -> None:
     missing = tmp_path / "none.onnx"
     with pytest.raises(UserError, match=r"none\.onnx"):
-        Engine.load("detector", str(missing), 1)
+        OnnxEngine.load("detector", str(missing), 1)
     corrupt = tmp_path / "corrupt.onnx"
     corrupt.write_bytes(verified_path("detector").read_bytes()[:1000])
     with pytest.raises(UserError, match=r"corrupt\.onnx"):
-        Engine.load("detector", str(corrupt), 1)
+        OnnxEngine.load("detector", str(corrupt), 1)
 
 
 def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
@@ -122,8 +122,8 @@ def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "swapped.onnx"
     shutil.copy(verified_path("segmenter"), file)
     with pytest.raises(UserError, match=r"swapped\.onnx: detector must have"):
-        Engine.load("detector", str(file), 1)
-    assert Engine.load("segmenter", str(file), 1).info().startswith("segmenter ")
+        OnnxEngine.load("detector", str(file), 1)
+    assert OnnxEngine.load("segmenter", str(file), 1).info().startswith("segmenter ")
 
 
 def test_j19_the_paper_accepts_black() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani_models.catalogue import Figure
 from paani_models.report.charts import Points, lines
 
 RECORDS = ("epochs.jsonl", "log.jsonl")
@@ -23,10 +24,28 @@ class FaultCell(msgspec.Struct, frozen=True):
     miou: float
 
 
+class FaultTotals(msgspec.Struct, frozen=True):
+    """Shares over the cells whose verdict is settled, and over clean pictures."""
+
+    false_accept_frac: float
+    false_reject_frac: float
+    clean_reject_frac: float
+
+
+class CleanSource(msgspec.Struct, frozen=True):
+    """n clean pictures of a source, and how many of them the gate refused."""
+
+    source: str
+    n: int
+    rejected: int
+
+
 class FaultReport(msgspec.Struct, frozen=True):
-    """What `paani faults --json` writes, as far as it is drawn here."""
+    """What `paani faults --json` writes, as far as it is used here."""
 
     cells: tuple[FaultCell, ...]
+    clean: tuple[CleanSource, ...] = ()
+    totals: FaultTotals | None = None
 
 
 def read_faults(path: Path) -> FaultReport:
@@ -35,6 +54,23 @@ def read_faults(path: Path) -> FaultReport:
         return msgspec.json.decode(path.read_bytes(), type=FaultReport)
     except (OSError, msgspec.MsgspecError) as error:
         raise UserError(f"{path}: {error}") from error
+
+
+def gate_figures(report: FaultReport) -> list[Figure]:
+    """The manifest's figures of the gate; n counts pictures."""
+    figures = [
+        Figure("clean_refused_frac", source.source, round(source.rejected / source.n, 4), source.n)
+        for source in report.clean
+        if source.n
+    ]
+    if report.totals is not None:
+        spoilt, clean = sum(cell.n for cell in report.cells), sum(source.n for source in report.clean)
+        figures += [
+            Figure("unfit_accepted_frac", "spoilt", round(report.totals.false_accept_frac, 4), spoilt),
+            Figure("fit_refused_frac", "spoilt", round(report.totals.false_reject_frac, 4), spoilt),
+            Figure("clean_refused_frac", "all", round(report.totals.clean_reject_frac, 4), clean),
+        ]
+    return figures
 
 
 def read_record(folder: Path) -> list[dict[str, float]]:

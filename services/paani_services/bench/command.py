@@ -70,6 +70,7 @@ def main(argv: list[str]) -> int:
     if not pictures:
         raise UserError("the gate refuses every picture, so there is nothing to time")
     candidates = [_candidate(folder) for folder in options.others]
+    held = _footprint(config)
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
     timed = steps(config.perception, candidates, options.paper_pair, stopwatch_ms)
     taken: dict[str, list[float]] = {}
@@ -89,7 +90,7 @@ def main(argv: list[str]) -> int:
         refused=given - len(pictures),
         rows=found,
         ratios=ratios(found, candidates),
-        footprint=_footprint(config),
+        footprint=held,
         model_bytes=_bytes(candidates),
     )
     sys.stdout.write(text(report))

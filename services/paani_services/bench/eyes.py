@@ -14,7 +14,7 @@ from paani.order_statistics import median, nearest_rank
 from paani_services.bench import paper_shaped
 from paani_services.perception.corridors import classify, summarise
 from paani_services.perception.decode import decode
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import OnnxEngine, engine_named
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
 from paani_services.perception.pipeline import Perceiver
@@ -144,8 +144,8 @@ def steps(
 
 def _stages(config: PerceptionConfig) -> dict[str, Step]:
     """The pipeline's own steps, one thread each, on the picture at hand; later ones on what a first picture gave."""
-    detector = Engine.load("detector", config.detector, 1)
-    segmenter = Engine.load("segmenter", config.segmenter, 1)
+    detector = engine_named(config.engine).load("detector", config.detector, 1)
+    segmenter = engine_named(config.engine).load("segmenter", config.segmenter, 1)
     table_d, table_s = tables_for(detector.contract), tables_for(segmenter.contract)
     (height, width), (rows_s, columns_s) = detector.contract.size_hw, segmenter.contract.size_hw
     grey = detector.contract.preprocessing.pad_grey
@@ -168,8 +168,8 @@ def _stages(config: PerceptionConfig) -> dict[str, Step]:
 
 
 def _bare(config: PerceptionConfig, threads: int) -> Step:
-    detector = Engine.load("detector", config.detector, threads)
-    segmenter = Engine.load("segmenter", config.segmenter, threads)
+    detector = engine_named(config.engine).load("detector", config.detector, threads)
+    segmenter = engine_named(config.engine).load("segmenter", config.segmenter, threads)
     inputs = [np.zeros(e.contract.input.shape, e.contract.input.dtype) for e in (detector, segmenter)]
 
     def both(_: Bytes) -> None:
@@ -193,6 +193,6 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
 
 
 def _paper_shaped(config: PerceptionConfig) -> Step:
-    detector = Engine.load("detector", config.detector, 2, spinning=True)
-    segmenter = Engine.load("segmenter", config.segmenter, 2, spinning=True)
+    detector = OnnxEngine.load("detector", config.detector, 2, spinning=True)
+    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True)
     return lambda bgr: paper_shaped.perceive(bgr, detector.run, segmenter.run, config.detections, config.corridors)

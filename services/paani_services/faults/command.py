@@ -16,7 +16,7 @@ from paani_services.faults.corpus import clean_pictures, scenes, sources
 from paani_services.faults.curves import curves
 from paani_services.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
 from paani_services.perception.corridors import classify
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import engine_named
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
 from paani_services.perception.preprocess import stretch, tables_for
@@ -38,7 +38,7 @@ class Eyes:
     def __init__(self, config: PerceptionConfig) -> None:
         """Raises UserError for a model that cannot be used."""
         self._config = config
-        self._segmenter = Engine.load("segmenter", config.segmenter, config.intra_op_threads)
+        self._segmenter = engine_named(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
         self._table = tables_for(self._segmenter.contract)
         self._fitness = load_fitness(config.gate, config.intra_op_threads)
 

@@ -1,42 +1,72 @@
-"""Runs an ONNX model on the CPU: the one place in the services that imports onnxruntime."""
+"""What runs a model on the CPU. The one place in the services that imports onnxruntime, and only once it is needed."""
 
-from pathlib import Path
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Protocol, Self
 
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
 
+from paani.config import EngineName
 from paani.errors import UserError
-from paani_models.catalogue import Model, described, file_sha256, load_catalogue, verified_path
+from paani_models.catalogue import Model, chosen, file_sha256
+from paani_services.perception.ncnn_engine import NcnnEngine
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 ORT_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
-class Engine:
-    """One loaded model: `load`, `run`, `info`."""
+class Engine(Protocol):
+    """One loaded model and its contract."""
 
-    def __init__(self, session: ort.InferenceSession, contract: Model, name: str) -> None:
+    contract: Model
+
+    @classmethod
+    def load(cls, role: str, path: str, threads: int) -> Self:
+        """The shipped model of a role ("detector", "segmenter", "gate"), checksum compared, or a file of the user's.
+
+        A manifest beside the user's file may state another size, preprocessing or order of classes. Raises UserError
+        naming a file that is missing, corrupt, no model, or of other shapes than its contract.
+        """
+        ...
+
+    def run(self, tensor: Floats | Bytes) -> Floats:
+        """One inference: the contract's input to its output. Other threads go on meanwhile."""
+        ...
+
+    def info(self) -> str:
+        """Role, the beginning of the model file's checksum, and the engine where it is not onnxruntime."""
+        ...
+
+
+def engine_named(name: EngineName) -> type[Engine]:
+    """The engine of `perception.engine`."""
+    return NcnnEngine if name == "ncnn" else OnnxEngine
+
+
+def check_onnxruntime(release: str) -> None:
+    """Raises UserError for a release that must not even be imported."""
+    if release.split(".")[:2] == ["1", "21"]:
+        raise UserError(
+            f"onnxruntime {release}: dies of an illegal instruction on ARM Cortex-A53; install 1.22 or later"
+        )
+
+
+class OnnxEngine:
+    """An ONNX file, by onnxruntime."""
+
+    def __init__(self, session: Any, contract: Model, name: str) -> None:
         self._session, self._name = session, name
         self._input = session.get_inputs()[0].name
         self.contract = contract
 
-    def rows_of(self, classes: tuple[str, ...]) -> list[int] | None:
-        """Where each of the classes stands in the output, as far as it is there; None when all stand in that order."""
-        stated = self.contract.classes
-        return None if stated == classes else [stated.index(name) for name in classes if name in stated]
-
     @classmethod
-    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False) -> "Engine":
-        """The shipped model of a role ("detector", "segmenter", "gate"), checksum compared, or a file of the user's.
+    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False) -> Self:
+        """As any engine. spinning: idle threads wait busily; two models that do so get in each other's way."""
+        check_onnxruntime(_installed())
+        import onnxruntime as ort  # noqa: PLC0415 - a release that is refused would end the process here
 
-        A manifest beside the user's file may state another size, preprocessing or order of classes. Raises UserError
-        naming a file that is missing, corrupt, no ONNX model, or of other shapes than its contract.
-        spinning: idle threads wait busily; two models that do so get in each other's way.
-        """
-        contract = described(Path(path), role) if path else load_catalogue()[role]
-        file = Path(path) if path else verified_path(role)
+        contract, file = chosen(role, path)
         checksum = file_sha256(file)
         options = ort.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
@@ -60,3 +90,11 @@ class Engine:
     def info(self) -> str:
         """Role and the beginning of the file's checksum."""
         return self._name
+
+
+def _installed() -> str:
+    """The release of onnxruntime; empty for one that was built here and states none."""
+    try:
+        return version("onnxruntime")
+    except PackageNotFoundError:
+        return ""

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.config import GateConfig
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.gate import Fitness
 from paani_services.perception.preprocess import shrunk, tables_for
 
@@ -15,7 +15,7 @@ def load_fitness(config: GateConfig, threads: int) -> Fitness | None:
     """The net as a function; None where the gate or its net is switched off. Raises UserError naming a bad file."""
     if not config.enabled or config.min_fitness == 0.0:
         return None
-    engine = Engine.load("gate", config.model, threads)
+    engine = OnnxEngine.load("gate", config.model, threads)
     height, width = engine.contract.size_hw
     table = tables_for(engine.contract)
 

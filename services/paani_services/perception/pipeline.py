@@ -21,7 +21,7 @@ from paani.messages import (
 from paani_services.perception.corridors import Lanes, classify, summarise
 from paani_services.perception.decode import decode
 from paani_services.perception.decoding import decoded
-from paani_services.perception.engine import Engine
+from paani_services.perception.engine import engine_named
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
@@ -49,11 +49,12 @@ class Perceiver:
     def __init__(self, config: PerceptionConfig, stopwatch_ms: Callable[[], float]) -> None:
         """Raises UserError for a model that cannot be used."""
         self._config, self._stopwatch_ms = config, stopwatch_ms
-        self._detector = Engine.load("detector", config.detector, config.intra_op_threads)
+        engine = engine_named(config.engine)
+        self._detector = engine.load("detector", config.detector, config.intra_op_threads)
         self._segmenter = (
             None
             if config.segmenter == NO_SEGMENTER
-            else Engine.load("segmenter", config.segmenter, config.intra_op_threads)
+            else engine.load("segmenter", config.segmenter, config.intra_op_threads)
         )
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
@@ -143,7 +144,7 @@ class Perceiver:
             return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
         height, width = self._segmenter.contract.size_hw
         logits = self._segmenter.run(stretch(bgr, height, width, self._tables[1]))
-        rows = self._segmenter.rows_of(SEGMENTER_CLASSES)
+        rows = self._segmenter.contract.rows_of(SEGMENTER_CLASSES)
         return classify(logits if rows is None else logits[:, rows], self._config.temperature)
 
     def _evidence(

@@ -4,7 +4,7 @@ from paani.config.guiding import ControllerConfig, LocalizationConfig, Navigator
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.recording import RecorderConfig
-from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, GateConfig, PerceptionConfig
+from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, EngineName, GateConfig, PerceptionConfig
 from paani.config.simulating import (
     AdapterConfig,
     DynamicsConfig,
@@ -26,6 +26,7 @@ __all__ = [
     "DashboardConfig",
     "DetectorConfig",
     "DynamicsConfig",
+    "EngineName",
     "EyeConfig",
     "GateConfig",
     "LocalizationConfig",

@@ -10,6 +10,7 @@ from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
 FieldOfView = Annotated[float, msgspec.Meta(ge=0.0, le=170.0)]
 Tilt = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+EngineName = Literal["onnxruntime", "ncnn"]
 
 
 class CameraConfig(Section, frozen=True):
@@ -86,11 +87,16 @@ class CorridorConfig(Section, frozen=True):
 
 
 class PerceptionConfig(Section, frozen=True):
-    """`ego_polygon`: corners of the own hull in the picture, normalised; what lies in it is no evidence."""
+    """`ego_polygon`: corners of the own hull in the picture, normalised; what lies in it is no evidence.
+
+    `engine` runs both nets; `ncnn` needs the files that `paani models convert` makes, and is chosen by
+    `paani models bench` on the machine itself. The gate's net always runs by onnxruntime.
+    """
 
     rate_hz: Positive = 5.0
     max_frame_age_s: Positive = 0.8  # J16, judged at inference start
     concurrent: bool = True
+    engine: EngineName = "onnxruntime"
     intra_op_threads: Size = 1
     segmenter: str = ""  # path of an ONNX file; empty: the shipped model; "none": the fallback alone (F1)
     detector: str = ""  # path of an ONNX file; empty: the shipped model

@@ -1,0 +1,43 @@
+"""Runs a converted model by ncnn, which small ARM boards do faster."""
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.errors import UserError
+from paani_models.catalogue import Model, chosen, file_sha256
+from paani_models.ncnn_runner import Run, converted, open_ncnn
+
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+
+class NcnnEngine:
+    """One model, by the converted files beside it."""
+
+    def __init__(self, run: Run, contract: Model, name: str) -> None:
+        self._run, self._name = run, name
+        self.contract = contract
+
+    @classmethod
+    def load(cls, role: str, path: str, threads: int) -> Self:
+        """As any engine; also raises UserError where the converted files are missing or not those of this model."""
+        contract, file = chosen(role, path)
+        if contract.input.dtype != "float32":
+            raise UserError(f"{file}: takes {contract.input.dtype}; ncnn runs float32 models alone")
+        files = converted(file)
+        run = open_ncnn(files, threads)
+        shape = run(np.zeros(contract.input.shape, np.float32)).shape
+        if shape != contract.output.shape:
+            raise UserError(f"{files.param}: {role} must give {list(contract.output.shape)}, found {list(shape)}")
+        return cls(run, contract, f"{role} {file_sha256(file)[:12]} ncnn")
+
+    def run(self, tensor: Floats | Bytes) -> Floats:
+        """One inference: the contract's input to its output."""
+        return self._run(np.asarray(tensor, np.float32))
+
+    def info(self) -> str:
+        """Role, the beginning of the checksum of the model that was converted, and "ncnn"."""
+        return self._name
