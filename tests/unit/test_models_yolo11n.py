@@ -25,7 +25,7 @@ from paani_models.training import load_checkpoint  # noqa: E402
 from paani_models.yolo11n import FUSED_PARAMETERS, Head, Yolo11n, fused  # noqa: E402
 from paani_models.yolo11n_data import Augmentation, jitter_hsv, paper_example  # noqa: E402
 from paani_services.perception.decode import decode  # noqa: E402
-from paani_services.perception.engine import Engine  # noqa: E402
+from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
 from paani_services.perception.preprocess import Letterbox  # noqa: E402
 from tests.unit.pictures import river  # noqa: E402
@@ -254,7 +254,7 @@ def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:
     graph.opset_import[0].version = 99
     onnx.save(graph, str(tmp_path / "newer.onnx"))
     with pytest.raises(UserError, match=r"newer\.onnx: not an ONNX model that can run here"):
-        Engine.load("detector", str(tmp_path / "newer.onnx"), 1)
+        OnnxEngine.load("detector", str(tmp_path / "newer.onnx"), 1)
 
 
 def test_rows_beyond_the_classes_are_no_boxes_c11() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import socket
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,15 @@ async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> N
     plan = await make_plan(load_config(sets=(*private_sets, *own)))
     assert plan.config.navigator.route == "mine.toml"
     assert plan.config.localization.origin_lat_lon_deg == (10.0, 20.0)
+
+
+async def test_p4_a_start_runs_no_survey_benchmark_or_recorder(private_sets: tuple[str, ...]) -> None:
+    """P4: they are commands, or run only when asked for."""
+    commands = {point.name for point in entry_points(group="paani.commands")}
+    plan = await make_plan(load_config(sets=private_sets))
+    assert {"bench", "scenario", "logs"} <= commands
+    assert not commands & set(plan.services)
+    assert "recorder" not in plan.services
 
 
 async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_path: Path) -> None:
