@@ -84,9 +84,8 @@ class Model(Record, frozen=True):
 
     def rows_of(self, classes: tuple[str, ...]) -> list[int] | None:
         """Where each of the classes stands in the output, as far as it is there; None when all stand in that order."""
-        return (
-            None if self.classes == classes else [self.classes.index(name) for name in classes if name in self.classes]
-        )
+        stated = self.classes
+        return None if stated == classes else [stated.index(name) for name in classes if name in stated]
 
 
 class _Manifest(Record, frozen=True):

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models import contract_check, evaluate, evaluate_command
+from paani_models import contract_check, engine_command, evaluate, evaluate_command
 from paani_models.card import card
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.data import command as data_command
@@ -56,6 +56,10 @@ def main(argv: list[str]) -> int:
             return report_command.run(arguments, _pictures(arguments))
         if arguments.command == "quantise":
             return _quantise(arguments)
+        if arguments.command == "convert":
+            return engine_command.convert(arguments)
+        if arguments.command == "bench":
+            return engine_command.bench(arguments)
         if arguments.command == "variant":
             return _variant(arguments.weights, arguments.out)
         return _needs_torch(arguments)
@@ -114,6 +118,11 @@ def _parser() -> argparse.ArgumentParser:
     variant = commands.add_parser("variant", help="the same nets, taking pictures as bytes: a little faster")
     variant.add_argument("--out", type=Path, required=True, help="folder for nets and manifest")
     variant.add_argument("--weights", type=Path, default=WEIGHTS)
+    convert = commands.add_parser("convert", help="ONNX to ncnn, compared on real pictures; needs pnnx")
+    engine_command.add_convert_arguments(convert)
+    bench = commands.add_parser("bench", help="which engine runs the nets faster on this machine")
+    engine_command.add_bench_arguments(bench)
+    bench.add_argument("--weights", type=Path, default=WEIGHTS)
     quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
     quantise.add_argument("net", choices=NETS)
     quantise.add_argument("--recipe", choices=("paper", "equalised"), default="equalised")
@@ -121,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
     quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
     quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
-    for command in (check, held_out, check_data, pack, train, export, evaluate, report, quantise):
+    for command in (check, held_out, check_data, pack, train, export, evaluate, report, quantise, convert, bench):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")

@@ -147,10 +147,13 @@ def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
         "noise": rng.integers(0, 256, river.shape).astype(np.uint8),
         "a river": river,
     }
+    return {name: as_input(picture, contract) for name, picture in drawn.items()}
+
+
+def as_input(picture: NDArray[np.uint8], contract: Model) -> Floats | NDArray[np.uint8]:
+    """A net-sized RGB picture [H,W,3] as the net takes it."""
     if contract.input.dtype == "uint8":
-        return {name: picture[None] for name, picture in drawn.items()}
+        return picture[None]
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
-    return {
-        name: np.ascontiguousarray(((picture.astype(np.float32) / 255.0 - mean) / std).transpose(2, 0, 1)[None])
-        for name, picture in drawn.items()
-    }
+    scaled = (picture.astype(np.float32) / 255.0 - mean) / std
+    return np.ascontiguousarray(scaled.transpose(2, 0, 1)[None])

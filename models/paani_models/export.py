@@ -133,7 +133,13 @@ def export_untrained(name: str, folder: Path) -> Model:
     torch.manual_seed(seed)
     shape = CONTRACTS[name].input.shape
     noise = np.random.default_rng(seed).random(shape, dtype=np.float32)
-    return _placed(name, network(name).eval(), folder, [noise], (), seed)
+    net = network(name).train()
+    for module in net.modules():
+        if isinstance(module, nn.BatchNorm2d):
+            module.momentum = 1.0
+    with torch.no_grad():
+        net(torch.from_numpy(noise))  # without statistics the numbers shrink from step to step until they slow it down
+    return _placed(name, net.eval(), folder, [noise], (), seed)
 
 
 def _placed(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import subprocess
 import tempfile
@@ -17,11 +16,10 @@ from onnx import helper, numpy_helper
 
 from paani.errors import UserError
 from paani_models.catalogue import MANIFEST, Model, described, file_sha256, load_catalogue, save_catalogue
-from paani_models.contract_check import MAX_DIFFERENCE, difference
-from paani_models.ncnn_runner import Conversion, NcnnFiles, files_of, open_ncnn
-from paani_models.onnx_runner import open_net
+from paani_models.contract_check import MAX_DIFFERENCE
+from paani_models.engine_parity import Inputs, parity
+from paani_models.ncnn_runner import Conversion, NcnnFiles, files_of
 
-Floats = NDArray[np.float32]
 PNNX_LIMIT_S = 600.0
 NO_PNNX = (
     "no pnnx to be run: `pip install --no-deps pnnx` into an environment of its own, "
@@ -29,7 +27,7 @@ NO_PNNX = (
 )
 
 
-def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Mapping[str, Floats]) -> Conversion:
+def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Inputs) -> Conversion:
     """Write the ncnn files of a float32 model into `folder`, the model and its manifest entry too if it is elsewhere.
 
     inputs: the pictures on which both must agree to MAX_DIFFERENCE; else nothing is written. Raises UserError naming
@@ -51,33 +49,28 @@ def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Ma
             param_sha256=file_sha256(made.param),
             bin_sha256=file_sha256(made.bin),
             max_difference=diff,
-            pictures=len(inputs),
+            inputs=len(inputs),
         )
         made.record.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
-        folder.mkdir(parents=True, exist_ok=True)
-        target = folder / source.name
-        wanted = files_of(target)
-        if target.resolve() != source.resolve():
-            _place(source, target)
-            known = load_catalogue(folder) if (folder / MANIFEST).exists() else {}
-            save_catalogue({**known, role: msgspec.structs.replace(contract, name=role, file=source.name)}, folder)
-        for have, place in ((made.param, wanted.param), (made.bin, wanted.bin), (made.record, wanted.record)):
-            _place(have, place)
+        try:
+            _deliver(source, msgspec.structs.replace(contract, name=role, file=source.name), made, folder)
+        except OSError as error:
+            raise UserError(f"{folder}: {error.strerror}") from error
     return record
 
 
-def parity(
-    source: Path, files: NcnnFiles, role: str, contract: Model, inputs: Mapping[str, Floats], threads: int = 1
-) -> float:
-    """The largest difference of both engines' answers; boxes as shares of the input's sides; inf for other shapes."""
-    plain, other = open_net(source, threads), open_ncnn(files, threads)
-    worst = 0.0
-    for x in inputs.values():
-        expected, found = plain(x), other(x)
-        if expected.shape != found.shape or not np.isfinite(found).all():
-            return math.inf
-        worst = max(worst, difference(found, expected, role, contract))
-    return worst
+def _deliver(source: Path, entry: Model, made: NcnnFiles, folder: Path) -> None:
+    """The record last: without it the files are not used."""
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / source.name
+    wanted = files_of(target)
+    if target.resolve() != source.resolve():
+        _place(source, target)
+        known = load_catalogue(folder) if (folder / MANIFEST).exists() else {}
+        entry = msgspec.structs.replace(entry, sha256=file_sha256(target), size_bytes=target.stat().st_size)
+        save_catalogue({**known, entry.name: entry}, folder)
+    for have, place in ((made.param, wanted.param), (made.bin, wanted.bin), (made.record, wanted.record)):
+        _place(have, place)
 
 
 def _place(have: Path, place: Path) -> None:

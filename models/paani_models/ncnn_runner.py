@@ -19,20 +19,21 @@ from paani_models.catalogue import Record, file_sha256
 Floats = NDArray[np.float32]
 Run = Callable[[Floats], Floats]
 INPUT, OUTPUT = "in0", "out0"
+NOT_INSTALLED = "ncnn is not installed; install the extra paani[ncnn]"
 _SMALL = ("use_fp16_packed", "use_fp16_storage", "use_fp16_arithmetic", "use_bf16_packed", "use_bf16_storage")
 
 
 class Conversion(Record, frozen=True):
     """The files' checksums, the model they were made from, and how far their answers lie from its.
 
-    max_difference: over `pictures`; scores and logits as they are, boxes as shares of the input's sides.
+    max_difference: over `inputs` pictures; scores and logits as they are, boxes as shares of the input's sides.
     """
 
     source_sha256: str
     param_sha256: str
     bin_sha256: str
     max_difference: float
-    pictures: int
+    inputs: int
 
 
 class NcnnFiles(msgspec.Struct, frozen=True):
@@ -85,7 +86,7 @@ def open_ncnn(files: NcnnFiles, threads: int) -> Run:
     Raises UserError where ncnn is not installed, or naming a file that it does not read.
     """
     if release() is None:
-        raise UserError("ncnn is not installed; install the extra paani[ncnn]")
+        raise UserError(NOT_INSTALLED)
     import ncnn  # noqa: PLC0415 - an extra
 
     net = ncnn.Net()

@@ -70,13 +70,13 @@ class Split(nn.Module):
 
     def __init__(self, cin: int, cout: int, deep: bool, inner_frac: float = 0.5) -> None:
         super().__init__()
-        inner = int(cout * inner_frac)
+        self.inner = inner = int(cout * inner_frac)
         self.open = Conv(cin, 2 * inner)
         self.block = Partial(inner) if deep else Residual(inner, inner // 2)
         self.join = Conv(3 * inner, cout)
 
     def forward(self, x: Tensor) -> Tensor:
-        kept, last = self.open(x).chunk(2, 1)
+        kept, last = self.open(x).split([self.inner, self.inner], 1)
         return cast(Tensor, self.join(torch.cat([kept, last, self.block(last)], 1)))
 
 
@@ -118,13 +118,13 @@ class SplitAttention(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        half = channels // 2
+        self.half = half = channels // 2
         self.open, self.join = Conv(channels, channels), Conv(channels, channels)
         self.attention = Attention(half, max(1, half // 64))
         self.dense = nn.Sequential(Conv(half, 2 * half), Conv(2 * half, half, linear=True))
 
     def forward(self, x: Tensor) -> Tensor:
-        past, through = self.open(x).chunk(2, 1)
+        past, through = self.open(x).split([self.half, self.half], 1)
         through = through + self.attention(through)
         return cast(Tensor, self.join(torch.cat([past, through + self.dense(through)], 1)))
 

@@ -14,22 +14,23 @@ from numpy.typing import NDArray
 
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
-from paani.config import Config
+from paani.config import Config, PerceptionConfig
 from paani.errors import UserError
-from paani_models.catalogue import load_catalogue
+from paani_models.catalogue import verified_path
 from paani_services.bench.eyes import Candidate, Ratio, Row, fit, measured, ratios, rows, steps
 from paani_services.bench.footprint import Footprint
+from paani_services.bench.scene import SIZE_WH, drawn
+from paani_services.bench.work import Work, work
 from paani_services.perception.decoding import decoded
 
 Bytes = NDArray[np.uint8]
 SUFFIXES = {".jpg", ".jpeg", ".png"}
 MAX_PICTURES = 64
-SIZE_WH = (320, 240)  # A8
 RSS_BAR_MIB = 200.0
 
 
 class Eyes(msgspec.Struct, frozen=True):
-    """What `--json` writes. `footprint` is of a process of its own; `model_bytes` are of pairs, the shipped one first.
+    """What `--json` writes. `footprint` is of a process of its own; `work` is of pairs of nets, the first in use.
 
     `refused`: pictures that the gate did not let through, and that were left out.
     """
@@ -42,7 +43,7 @@ class Eyes(msgspec.Struct, frozen=True):
     rows: tuple[Row, ...]
     ratios: tuple[Ratio, ...]
     footprint: Footprint
-    model_bytes: dict[str, int]
+    work: tuple[Work, ...]
 
 
 def main(argv: list[str]) -> int:
@@ -64,7 +65,7 @@ def main(argv: list[str]) -> int:
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     config = config_from(options)
-    pictures = _read(options.folder) if options.folder else [_drawn(seed) for seed in range(8)]
+    pictures = _read(options.folder) if options.folder else [drawn(seed) for seed in range(8)]
     given = len(pictures)
     pictures = fit(pictures, config.perception)
     if not pictures:
@@ -91,7 +92,7 @@ def main(argv: list[str]) -> int:
         rows=found,
         ratios=ratios(found, candidates),
         footprint=held,
-        model_bytes=_bytes(candidates),
+        work=_work(config.perception, candidates, options.paper_pair),
     )
     sys.stdout.write(text(report))
     if options.json:
@@ -115,7 +116,15 @@ def text(report: Eyes) -> str:
         "",
         f"perceiving alone holds {held.rss_mib:.1f} MiB (bar {RSS_BAR_MIB:.0f}); "
         f"{held.growth_mib:+.2f} MiB over the last of {held.frames} frames",
-        "model bytes: " + ", ".join(f"{name} {size}" for name, size in report.model_bytes.items()),
+        *(
+            f"{work.name}: {work.bytes} bytes"
+            + (
+                ""
+                if work.multiply_adds is None
+                else f", {work.multiply_adds / 1e6:.0f} million multiply-adds a picture"
+            )
+            for work in report.work
+        ),
         f"{report.pictures} pictures, {report.refused} left out; {report.cores} cores, "
         f"load {report.load_before:.2f} before and {report.load_after:.2f} after",
     ]
@@ -151,19 +160,6 @@ def _read(folder: Path) -> list[Bytes]:
     return found
 
 
-def _drawn(seed: int) -> Bytes:
-    """Sky, textured banks, rippled water: fit to be evidence, so that every step has its work."""
-    rng = np.random.default_rng(seed)
-    width, height = SIZE_WH
-    level = np.linspace(0.0, 1.0, height)[:, None, None]
-    scene = np.where(level < 0.4, (220, 190, 160) - 60 * level, (120, 110, 80) - 50 * level) * np.ones((1, width, 1))
-    scene += (level >= 0.4) * 18.0 * cv2.resize(rng.normal(0, 1, (height // 3, width // 12)), SIZE_WH)[..., None]
-    leaves = cv2.resize(rng.normal(0, 1, (height // 2, width // 2)), SIZE_WH)[60:110, :, None]
-    scene[60:110, : width // 3] = (40, 80, 50) + 25 * leaves[:, : width // 3]
-    scene[60:110, -width // 3 :] = (40, 80, 50) + 25 * leaves[:, -width // 3 :]
-    return np.clip(scene + rng.normal(0, 2, scene.shape), 0, 255).astype(np.uint8)
-
-
 def _footprint(config: Config) -> Footprint:
     """Of a child, so that what the measurement itself holds does not count."""
     child = subprocess.run(
@@ -175,15 +171,18 @@ def _footprint(config: Config) -> Footprint:
     return msgspec.json.decode(child.stdout, type=Footprint)
 
 
-def _bytes(candidates: Sequence[Candidate]) -> dict[str, int]:
-    shipped = {name: load_catalogue()[name].size_bytes for name in ("detector", "segmenter")}
-    sizes = {"shipped": sum(shipped.values())}
+def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair: Path | None) -> tuple[Work, ...]:
+    given = {"detector": config.detector, "segmenter": config.segmenter}
+    used = {role: Path(path) if path else verified_path(role) for role, path in given.items()}
+    found = [work("nets in use", used.values())]
     for candidate in candidates:
-        paths = {"detector": candidate.detector, "segmenter": candidate.segmenter}
-        sizes[candidate.name] = sum(
-            Path(path).stat().st_size if path else shipped[role] for role, path in paths.items()
+        other = {"detector": candidate.detector, "segmenter": candidate.segmenter}
+        found.append(
+            work(candidate.name, (Path(path) if path else verified_path(role) for role, path in other.items()))
         )
-    return sizes
+    if paper_pair is not None:
+        found.append(work("paper's pair", (paper_pair / "yolo11n.onnx", paper_pair / "paper-segmenter.onnx")))
+    return tuple(found)
 
 
 def _count(word: str) -> int:

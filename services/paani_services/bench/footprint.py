@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 import msgspec
-import numpy as np
 
 from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, decode_config
 from paani.messages import PictureHeader
+from paani_services.bench.scene import drawn
 from paani_services.perception.pipeline import Perceiver
 
 SETTLED, FRAMES = 40, 240
@@ -29,16 +29,15 @@ def resident_mib() -> float:
 
 
 def footprint(config: PerceptionConfig) -> Footprint:
-    """Perceive noise over a gradient, a new one each time."""
-    perceiver, rng = Perceiver(config, stopwatch_ms), np.random.default_rng(0)
-    scene = np.repeat(np.repeat(np.linspace(30, 220, 240)[:, None, None], 320, 1), 3, 2)
+    """Perceive drawn pictures in turn."""
+    perceiver, pictures = Perceiver(config, stopwatch_ms), [drawn(seed) for seed in range(8)]
     settled = 0.0
     for frame in range(FRAMES):
         if frame == SETTLED:
             settled = resident_mib()
-        picture = np.clip(scene + rng.normal(0.0, 4.0, scene.shape), 0, 255).astype(np.uint8)
         header = PictureHeader(source_us=0, frame_seq=frame, frame_epoch=0, width_px=320, height_px=240)
-        perceiver.perceive(picture, header, 0.0)
+        evidence, _ = perceiver.perceive(pictures[frame % len(pictures)], header, 0.0)
+        assert evidence.usable
     perceiver.close()
     held = resident_mib()
     return Footprint(round(held, 1), round(held - settled, 2))

@@ -47,9 +47,7 @@ def engine_named(name: EngineName) -> type[Engine]:
 def check_onnxruntime(release: str) -> None:
     """Raises UserError for a release that must not even be imported."""
     if release.split(".")[:2] == ["1", "21"]:
-        raise UserError(
-            f"onnxruntime {release}: dies of an illegal instruction on ARM Cortex-A53; install 1.22 or later"
-        )
+        raise UserError(f"onnxruntime {release}: is an illegal instruction to ARM Cortex-A53; install 1.22 or later")
 
 
 class OnnxEngine:

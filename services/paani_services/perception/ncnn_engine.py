@@ -1,6 +1,5 @@
 """Runs a converted model by ncnn, which small ARM boards do faster."""
 
-from pathlib import Path
 from typing import Self
 
 import numpy as np

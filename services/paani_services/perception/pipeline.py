@@ -1,7 +1,7 @@
 """One picture through the gate and both models to evidence."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import NamedTuple
 
 import msgspec
@@ -61,6 +61,7 @@ class Perceiver:
         self._tables = [tables_for(engine.contract) for engine in engines]
         self._beside = ThreadPoolExecutor(1, "segmenter") if config.concurrent else None
         self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
+        self._begun: list[Future[Segmentation]] = []
         self._counts: dict[tuple[int, ...], Floats] = {}
 
     def perceive(
@@ -79,7 +80,9 @@ class Perceiver:
         # The segmenter takes longest, so it begins beside the gate; its answer to a refused picture is dropped.
         segmenting = None
         if self._beside and bgr is not None and age_s <= self._config.max_frame_age_s:
+            wait(self._begun)  # so that work never piles up, however fast pictures are refused
             segmenting = self._beside.submit(self._segment, bgr, roll_rad)
+            self._begun = [segmenting]
         cause = self._judge(bgr, header, age_s)
         gated_ms = self._stopwatch_ms()
         timing = InferenceTiming(
