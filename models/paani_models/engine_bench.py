@@ -13,6 +13,7 @@ from paani.order_statistics import median, nearest_rank
 from paani_models.catalogue import Model, load_catalogue, verified_path
 from paani_models.contract_check import drawn_inputs
 from paani_models.engine_parity import Inputs, parity
+from paani_models.multiply_adds import multiply_adds
 from paani_models.ncnn_runner import Run, converted, files_of, open_ncnn
 from paani_models.onnx_runner import open_net
 
@@ -50,7 +51,7 @@ class Timed(msgspec.Struct, frozen=True):
 
 
 class NetCost(msgspec.Struct, frozen=True):
-    """What a net weighs, and costs per frame. multiply_adds: None where onnx, which counts them, is not installed."""
+    """What a net weighs, and costs per frame. multiply_adds: None where onnx, which tells them, is not installed."""
 
     net: str
     onnx_bytes: int
@@ -161,16 +162,8 @@ def costs(nets: Mapping[str, Net]) -> tuple[NetCost, ...]:
         files = files_of(net.file)
         there = files.param.is_file() and files.bin.is_file()
         size = files.param.stat().st_size + files.bin.stat().st_size if there else None
-        found.append(NetCost(role, net.file.stat().st_size, size, _multiply_adds(net.file), PAPER_MULTIPLY_ADDS[role]))
+        found.append(NetCost(role, net.file.stat().st_size, size, multiply_adds(net.file), PAPER_MULTIPLY_ADDS[role]))
     return tuple(found)
-
-
-def _multiply_adds(file: Path) -> int | None:
-    try:
-        from paani_models.multiply_adds import multiply_adds  # noqa: PLC0415 - onnx is not on the board
-    except ModuleNotFoundError:
-        return None
-    return multiply_adds(file)
 
 
 def agreements_of(nets: Mapping[str, Net], inputs: Mapping[str, Inputs]) -> tuple[Agreement, ...]:

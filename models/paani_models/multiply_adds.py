@@ -2,37 +2,41 @@
 
 from __future__ import annotations
 
-import math
+from math import prod
 from pathlib import Path
-
-import onnx
 
 from paani.errors import UserError
 
 
-def multiply_adds(path: Path) -> int:
-    """Multiply-adds of one run: convolutions and matrix products, which are all but a few per cent of the work.
+def multiply_adds(path: Path) -> int | None:
+    """Multiply-adds of one run of the convolutions and dense layers, which are all but a few per cent of the work.
 
-    Raises UserError naming a file that is not ONNX or whose shapes are not static.
+    None where the onnx package is not installed, or a shape is not static. Raises UserError naming a file that is not
+    ONNX.
     """
     try:
-        model = onnx.shape_inference.infer_shapes(onnx.load(str(path)), data_prop=True)
+        import onnx  # noqa: PLC0415 - not on the board
+    except ModuleNotFoundError:
+        return None
+    try:
+        graph = onnx.shape_inference.infer_shapes(onnx.load(str(path)), data_prop=True).graph
     except Exception as error:
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
-    graph = model.graph
-    shapes = {tensor.name: tuple(tensor.dims) for tensor in graph.initializer}
-    for value in (*graph.input, *graph.value_info, *graph.output):
-        shapes[value.name] = tuple(side.dim_value for side in value.type.tensor_type.shape.dim)
+    weights = {tensor.name: tuple(tensor.dims) for tensor in graph.initializer}
+    for node in graph.node:  # a quantised weight reaches its layer through a step of its own
+        if node.op_type == "DequantizeLinear" and node.input[0] in weights:
+            weights[node.output[0]] = weights[node.input[0]]
+    shapes = {
+        value.name: [int(side.dim_value) for side in value.type.tensor_type.shape.dim]
+        for value in (*graph.value_info, *graph.output)
+    }
     total = 0
     for node in graph.node:
-        if node.op_type not in {"Conv", "Gemm", "MatMul"}:
+        if node.op_type not in {"Conv", "Gemm"}:
             continue
-        outputs = math.prod(shapes.get(node.output[0], (0,)))
-        if outputs == 0:
-            raise UserError(f"{path}: the shape of {node.output[0]!r} is not static")
-        if node.op_type == "Conv":
-            total += outputs * math.prod(shapes[node.input[1]][1:])
-        else:
-            transposed = any(a.name == "transA" and a.i for a in node.attribute)
-            total += outputs * shapes[node.input[0]][-2 if transposed else -1]
+        outputs, weight = prod(shapes.get(node.output[0], [0])), weights.get(node.input[1])
+        if outputs == 0 or weight is None:
+            return None
+        transposed = node.op_type == "Conv" or any(a.name == "transB" and a.i for a in node.attribute)
+        total += outputs * (prod(weight[1:]) if transposed else weight[0])
     return total

@@ -13,7 +13,7 @@ from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, file_sha256, load_catalogue, save_catalogue, verified_path
 from paani_models.cli import main
 from paani_models.contract_check import MAX_DIFFERENCE
-from paani_models.engine_bench import Agreement, Case, EngineReport, Timed, choice, measured, rows
+from paani_models.engine_bench import PAPER_MULTIPLY_ADDS, Agreement, Case, EngineReport, Timed, choice, measured, rows
 
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[dev]")
 pytest.importorskip("ncnn", reason="needs the extra paani[ncnn]")
@@ -26,9 +26,9 @@ def test_multiply_adds_by_hand(tmp_path: Path) -> None:
     assert multiply_adds(small_segmenter(tmp_path / "own.onnx")) == 3 * 256 * 320 * 3
 
 
-def test_a_frame_costs_half_of_the_papers_pair() -> None:
-    assert multiply_adds(verified_path("detector")) < 0.5 * 631e6
-    assert multiply_adds(verified_path("segmenter")) < 0.7 * 357e6
+def test_a_frame_costs_less_than_half_of_the_papers_pair() -> None:
+    total = sum(multiply_adds(verified_path(role)) or 1e9 for role in PAPER_MULTIPLY_ADDS)
+    assert total < 0.5 * sum(PAPER_MULTIPLY_ADDS.values())
 
 
 def test_multiply_adds_need_a_readable_static_net(tmp_path: Path) -> None:
@@ -36,8 +36,7 @@ def test_multiply_adds_need_a_readable_static_net(tmp_path: Path) -> None:
     for value in (*model.graph.input, *model.graph.output):
         value.type.tensor_type.shape.dim[2].dim_param = "rows"
     onnx.save(model, str(tmp_path / "own.onnx"))
-    with pytest.raises(UserError, match="not static"):
-        multiply_adds(tmp_path / "own.onnx")
+    assert multiply_adds(tmp_path / "own.onnx") is None
     (tmp_path / "own.onnx").write_bytes(b"no net")
     with pytest.raises(UserError, match=r"own\.onnx"):
         multiply_adds(tmp_path / "own.onnx")
