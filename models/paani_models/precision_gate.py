@@ -24,6 +24,7 @@ Floats = NDArray[np.float32]
 MAX_LOSS_POINTS = 1.0
 MAX_TIME_RATIO = 1.0
 MIN_SCORE_RATIO = 0.5  # of the best score that FP32 gives: below it the net is blind
+MAX_SCORE = 1.001
 SCORE_ROWS = 4  # of a detector's output, where the scores begin
 TIMED_RUNS, WARM_RUNS = 60, 5
 THREADS = 2
@@ -94,6 +95,8 @@ def verdict(
     """
     if best_score is not None and float_best_score and not best_score >= MIN_SCORE_RATIO * float_best_score:
         return Verdict(False, f"blind: best score {best_score:.3f} where FP32 gives {float_best_score:.3f}")
+    if best_score is not None and best_score > MAX_SCORE:
+        return Verdict(False, f"blind: best score {best_score:.3f} is no probability")
     if not loss_points <= MAX_LOSS_POINTS:
         return Verdict(False, f"loses {loss_points:.2f} points of {metric}, more than {MAX_LOSS_POINTS:g}")
     change = f"gains {-loss_points:.2f}" if loss_points < 0 else f"loses {loss_points:.2f}"

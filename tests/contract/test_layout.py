@@ -34,7 +34,7 @@ def test_one_file_one_job(path: Path) -> None:
     [
         ("import zenoh", "shared/paani/bus/"),
         ("import onnxruntime", "services/paani_services/perception/engine.py models/paani_models/onnx_runner.py"),
-        ("import ncnn", "models/paani_models/ncnn_runner.py"),
+        ("ncnn.Net(", "models/paani_models/ncnn_runner.py"),
         ("import mujoco", "sim_host/paani_sim/"),
         ("filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/"),

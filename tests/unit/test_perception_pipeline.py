@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import cv2
 import msgspec
@@ -132,3 +134,24 @@ def test_j19_the_paper_accepts_black() -> None:
     evidence, _ = perceiver(paper).perceive(jpeg(PICTURES["black"]), HEADER, 0.0)
     assert evidence.usable
     assert not paper.concurrent
+
+
+def test_refused_pictures_leave_no_work_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The segmenter begins beside the gate; however fast pictures are refused, one run at most is under way."""
+    eyes, begun = perceiver(), []
+    submit = ThreadPoolExecutor.submit
+
+    def watched(pool: ThreadPoolExecutor, *call: Any) -> Future[Any]:
+        begun.append(submit(pool, *call))
+        return begun[-1]
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", watched)
+    for epoch in range(20):
+        header = msgspec.structs.replace(HEADER, frame_epoch=epoch)
+        assert not eyes.perceive(PICTURES["black"], header, 0.0)[0].usable
+        assert sum(not work.done() for work in begun) <= 1
+    assert len(begun) == 20
+    assert eyes.perceive(river(), HEADER, 0.81)[0].cause is m.UnusableCause.STALE
+    assert len(begun) == 20, "what is too old costs nothing more"
+    assert eyes.perceive(river(), msgspec.structs.replace(HEADER, frame_epoch=99), 0.0)[0].usable
+    eyes.close()

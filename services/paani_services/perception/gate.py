@@ -92,15 +92,14 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
     """Statistics of one picture, from its two reductions."""
     fine = middle.astype(np.float32)
     low, high = np.percentile(small, (1, 99))
-    tiles = fine.reshape(MIDDLE_WH[1] // TILE_PX, TILE_PX, MIDDLE_WH[0] // TILE_PX, TILE_PX)
-    tile_mean, tile_std = tiles.mean((1, 3)), tiles.std((1, 3))
+    tile_mean, tile_std = _tiles(middle)
     covered = (tile_std < DARK_TILE_STD) & (tile_mean < DARK_TILE_MEAN)
     centred = small - small.mean()
     variance = float((centred * centred).mean()) + 1e-6
     return Statistics(
         mean=float(small.mean()),
-        dark_frac=float((middle <= DARK_LEVEL).mean()),
-        bright_frac=float((middle >= BRIGHT_LEVEL).mean()),
+        dark_frac=cv2.countNonZero(cv2.inRange(middle, 0, DARK_LEVEL)) / middle.size,
+        bright_frac=cv2.countNonZero(cv2.inRange(middle, BRIGHT_LEVEL, 255)) / middle.size,
         range=float(high - low),
         plain_frac=float((tile_std < PLAIN_STD).mean()),
         upright_residual=float((small - small.mean(axis=0)).std() / (small.std() + 1e-3)),
@@ -142,6 +141,13 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
 
 def _edges(luma: Floats) -> float:
     """Mean absolute central difference, both ways."""
-    across = np.abs(luma[:, 2:] - luma[:, :-2]).mean()
-    down = np.abs(luma[2:] - luma[:-2]).mean()
+    across = cv2.norm(luma[:, 2:], luma[:, :-2], cv2.NORM_L1) / luma[:, 2:].size
+    down = cv2.norm(luma[2:], luma[:-2], cv2.NORM_L1) / luma[2:].size
     return float(across + down) / 4.0
+
+
+def _tiles(middle: Bytes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation of each tile."""
+    luma, size = middle.astype(np.float64), (MIDDLE_WH[0] // TILE_PX, MIDDLE_WH[1] // TILE_PX)
+    mean, square = (cv2.resize(x, size, interpolation=cv2.INTER_AREA) for x in (luma, luma * luma))
+    return np.asarray(mean, np.float64), np.sqrt(np.maximum(square - mean * mean, 0.0))
