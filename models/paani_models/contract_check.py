@@ -20,6 +20,7 @@ Floats = NDArray[np.float32]
 MAX_DIFFERENCE = 1e-3  # T2
 RUNS = 15
 MAX_WATER_IN_NOTHING = 0.05
+_QUANTISED = b"QuantizeLinear"
 _KINDS = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
@@ -55,8 +56,13 @@ def inspected(path: Path, role: str) -> list[Finding]:
     findings += _segmenter_ranges(outputs, contract) if role == "segmenter" else _detector_ranges(outputs, contract)
     plain = open_session(path, 1, optimised=False)
     worst = max(difference(outputs[name], run_net(plain, tensor), role, contract) for name, tensor in inputs.items())
-    level = "ok" if worst <= MAX_DIFFERENCE else "error"
-    findings.append(Finding(level, f"optimised and plain graph differ by {worst:.1e} (at most {MAX_DIFFERENCE:.0e})"))
+    if _QUANTISED in path.read_bytes():
+        note = "8-bit steps are rounded elsewhere in the plain graph; `paani models quantise` judges by score"
+        findings.append(Finding("warning", f"optimised and plain graph differ by {worst:.1e}: {note}"))
+    else:
+        level = "ok" if worst <= MAX_DIFFERENCE else "error"
+        text = f"optimised and plain graph differ by {worst:.1e} (at most {MAX_DIFFERENCE:.0e})"
+        findings.append(Finding(level, text))
     scene = inputs["a river"]
     took_ms = []
     for _ in range(RUNS):

@@ -13,7 +13,7 @@ from paani.config import CorridorConfig, DetectorConfig, load_config
 from paani.errors import UserError
 from paani_services.bench import paper_shaped
 from paani_services.bench.command import Eyes, main, text
-from paani_services.bench.eyes import Row, measured, ratios, rows
+from paani_services.bench.eyes import Row, Step, measured, ratios, rows
 from paani_services.perception.corridors import classify, summarise
 from paani_services.perception.engine import OnnxEngine
 from tests.unit.pictures import river
@@ -44,7 +44,11 @@ def test_measured_runs_everything_in_turn() -> None:
     """Each round runs every step once, on the next picture; the first rounds do not count."""
     seen: list[tuple[str, int]] = []
     pictures = [np.full((1, 1, 3), value, np.uint8) for value in (1, 2)]
-    steps = {name: lambda p, name=name: seen.append((name, int(p[0, 0, 0]))) for name in ("a", "b")}
+
+    def step(name: str) -> Step:
+        return lambda p: seen.append((name, int(p[0, 0, 0])))
+
+    steps = {name: step(name) for name in ("a", "b")}
     ticks = iter(range(1000))
     *_, (_, taken) = measured(steps, pictures, 3, lambda: float(next(ticks)))
     assert seen[:4] == [("a", seen[0][1]), ("b", seen[0][1]), ("a", seen[2][1]), ("b", seen[2][1])]
