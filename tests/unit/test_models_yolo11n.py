@@ -208,7 +208,6 @@ def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
     return run
 
 
-@pytest.mark.train
 def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
     small_run(tmp_path, 12).run()
@@ -219,7 +218,6 @@ def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.Mo
     assert rows[-1]["score"] > 0.5
 
 
-@pytest.mark.train
 def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
     small_run(tmp_path / "whole", 2).run()
@@ -232,7 +230,6 @@ def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytes
         small_run(tmp_path / "broken", 3).run()
 
 
-@pytest.mark.train
 def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
     run = small_run(tmp_path, 5)
