@@ -36,7 +36,7 @@ def update_golden(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-golden"))
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="session")
 def no_blocking_calls() -> Iterator[None]:
     """Our code may not block the event loop; the detector watches only our packages."""
     with blockbuster_ctx(["paani", "paani_services", "paani_sim"]):
