@@ -13,6 +13,7 @@ import msgspec
 
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
+from paani.whole_file import write_whole
 from paani_models import engine_bench
 from paani_models.catalogue import described, verified_path
 from paani_models.contract_check import MAX_DIFFERENCE, role_of
@@ -99,7 +100,7 @@ def bench(arguments: argparse.Namespace) -> int:
     )
     sys.stdout.write(engine_bench.text(report))
     if arguments.json:
-        _write(arguments.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n")
+        write_whole(arguments.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
     return 0
 
 
@@ -122,15 +123,6 @@ def _held_out(arguments: argparse.Namespace) -> list[Path]:
     names = [name for name in arguments.sources.split(",") if name]
     samples = Pictures(arguments.data, names, arguments.rendered).samples
     return [sample.picture for sample in samples if sample.held_out]
-
-
-def _write(path: Path, data: bytes) -> None:
-    beside = path.with_name(f"{path.name}.partial")
-    try:
-        beside.write_bytes(data)
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"--json {path}: {error.strerror}") from error
 
 
 def _count(text: str) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.whole_file import write_whole
 from paani_models import benchmarks, evaluate
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
 from paani_models.detector_scores import ScoredBoxes, false_alarms, score_boxes
@@ -131,9 +132,4 @@ def score(weights: Path, pictures: Pictures) -> Scored:
 
 def write(path: Path, evaluation: Evaluation) -> None:
     """Written beside, then renamed. Raises UserError naming a file that cannot be written."""
-    beside = path.with_name(path.name + ".partial")
-    try:
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from error
+    write_whole(path, msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")

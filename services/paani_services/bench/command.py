@@ -16,6 +16,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config, PerceptionConfig
 from paani.errors import UserError
+from paani.whole_file import write_whole
 from paani_models.catalogue import verified_path
 from paani_services.bench.eyes import Candidate, Ratio, Row, fit, measured, ratios, rows, steps
 from paani_services.bench.footprint import Footprint
@@ -96,7 +97,7 @@ def main(argv: list[str]) -> int:
     )
     sys.stdout.write(text(report))
     if options.json:
-        _write(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n")
+        write_whole(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
     return 0
 
 
@@ -190,15 +191,6 @@ def _count(word: str) -> int:
     if count < 1:
         raise argparse.ArgumentTypeError("must be at least 1")
     return count
-
-
-def _write(file: Path, data: bytes) -> None:
-    beside = file.with_name(f".{file.name}.partial")
-    try:
-        beside.write_bytes(data)
-        beside.replace(file)
-    except OSError as error:
-        raise UserError(f"--json {file}: {error.strerror}") from error
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani.messages import UnusableCause
+from paani.whole_file import write_whole
 from paani_services.faults.corpus import clean_pictures, scenes, sources
 from paani_services.faults.curves import curves
 from paani_services.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
@@ -83,7 +84,7 @@ def main(argv: list[str]) -> int:
     sys.stdout.write(table(report))
     for path, text in ((options.json, _json(report)), (options.svg, curves(cells))):
         if path is not None:
-            _write(path, text)
+            write_whole(path, text.encode())
     return 0
 
 
@@ -113,12 +114,3 @@ def _listed(path: Path) -> frozenset[str]:
 
 def _json(report: Report) -> str:
     return msgspec.json.format(msgspec.json.encode(report), indent=1).decode() + "\n"
-
-
-def _write(path: Path, text: str) -> None:
-    beside = path.with_name(f".{path.name}.partial")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from error

@@ -12,6 +12,7 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Text
 from paani.replay.progress import Progress
+from paani.whole_file import write_whole
 from paani_services.look.judgement import PRESENTATION_US, PRESENTATIONS, Judgement
 from paani_services.perception.pipeline import Perceiver
 from paani_services.scenario.stills import Row, Skipped, Stale, probed, row_of, shown, stills_of
@@ -60,7 +61,7 @@ def main(argv: list[str]) -> int:
         if report.skipped:
             text += f"{len(report.skipped)} of {len(report.skipped) + len(report.rows) - 1} pictures skipped\n"
     if options.json is not None:
-        _write(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n")
+        write_whole(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
     sys.stdout.write(text)
     return 0
 
@@ -91,16 +92,6 @@ def stills_report(paths: list[Path], config: Config) -> StillsReport:
         stale=probed(judgements, config),
         skipped=tuple(skipped),
     )
-
-
-def _write(file: Path, data: bytes) -> None:
-    """Beside, then renamed. Raises UserError."""
-    beside = file.with_name(f".{file.name}.partial")
-    try:
-        beside.write_bytes(data)
-        beside.replace(file)
-    except OSError as error:
-        raise UserError(f"--json {file}: {error.strerror}") from error
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -23,6 +23,7 @@ from paani.up.command import seconds, up_sets
 from paani.up.display import Display
 from paani.up.drive import Outcome, drive
 from paani.up.plan import make_plan
+from paani.whole_file import write_whole
 
 
 class Judgement(msgspec.Struct, frozen=True, kw_only=True):
@@ -112,7 +113,7 @@ def _judgement(options: argparse.Namespace) -> int:
         f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
     )
     if options.json:
-        _write(options.json, msgspec.json.encode(Judgement(machine=machine, parts=tuple(done))))
+        write_whole(options.json, msgspec.json.encode(Judgement(machine=machine, parts=tuple(done))) + b"\n", "--json")
     return 0
 
 
@@ -131,17 +132,8 @@ def _recorder(options: argparse.Namespace) -> int:
         f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
     )
     if options.json:
-        _write(options.json, msgspec.json.encode(Judgement(machine=machine, parts=(part,))))
+        write_whole(options.json, msgspec.json.encode(Judgement(machine=machine, parts=(part,))) + b"\n", "--json")
     return 0
-
-
-def _write(file: Path, data: bytes) -> None:
-    beside = file.with_name(f".{file.name}.part")
-    try:
-        beside.write_bytes(data + b"\n")
-        beside.replace(file)
-    except OSError as error:
-        raise UserError(f"--json {file}: {error.strerror}") from error
 
 
 def _count(text: str) -> int:

@@ -21,6 +21,7 @@ from paani.replay.provenance import provenance_of
 from paani.replay.republish import Republishing, replay_config, republish, topics_of
 from paani.replay.tell import change_text, check_text
 from paani.replay.verify import ChangeReport, CheckReport, change_log, check_log
+from paani.whole_file import write_whole
 
 ROUTER = "bus.router=tcp/127.0.0.1:7448"  # beside the live bus
 LISTENING = ("bus.", "dashboard.")  # settings that matter to a republished drive
@@ -47,12 +48,7 @@ def main(argv: list[str]) -> int:
 
 def write_json(path: Path, report: msgspec.Struct) -> None:
     """Beside the file first, then renamed. Raises UserError."""
-    beside = path.with_name(f".{path.name}.beside")
-    try:
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"--json {path}: {error.strerror}") from error
+    write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--json")
 
 
 def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:

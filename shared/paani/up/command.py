@@ -16,6 +16,7 @@ from paani.up.display import Display
 from paani.up.drive import Outcome, drive
 from paani.up.plan import make_plan
 from paani.up.summary import Report
+from paani.whole_file import write_whole
 
 
 def main(argv: list[str]) -> int:
@@ -35,12 +36,7 @@ def main(argv: list[str]) -> int:
 
 def write_report(path: Path, report: Report) -> None:
     """Beside the file first, then renamed. Raises UserError."""
-    beside = path.with_name(f".{path.name}.beside")
-    try:
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"--summary {path}: {error.strerror}") from error
+    write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--summary")
 
 
 def up_sets(*, world: str | None, camera: str | None, headless: bool, record: Path | None = None) -> tuple[str, ...]:
