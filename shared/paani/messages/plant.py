@@ -81,7 +81,10 @@ class ThrustApplied(Message, frozen=True, kw_only=True):
 
 
 class TruePose(Message, frozen=True, kw_only=True):
-    """Simulator truth, under the verbatim `@truth` chunk: for the eye, the dashboard and scoring only."""
+    """Simulator truth, under the verbatim `@truth` chunk: for the eye, the dashboard and scoring only.
+
+    `actors_along_m` is how far down its path each moving thing is, in the world's order; empty: as far as time says.
+    """
 
     sim_us: Stamp
     x_m: Finite
@@ -96,3 +99,4 @@ class TruePose(Message, frozen=True, kw_only=True):
     distance_m: NonNegative = 0.0
     collisions: Count = 0
     in_contact: bool = False
+    actors_along_m: tuple[Finite, ...] = ()

@@ -3,17 +3,25 @@
 from collections.abc import Callable
 
 from paani.errors import UserError
+from paani_sim.worlds.faults import Fault, FaultKind
 from paani_sim.worlds.lake import lake
 from paani_sim.worlds.river import river
+from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.world import (
     Actor,
+    Bank,
+    Behaviour,
+    Current,
     Kind,
     Light,
     Obstacle,
     Pose2,
+    Waves,
     Wind,
     World,
+    actor_at,
     actor_pose,
+    along_at,
 )
 
 WORLDS: dict[str, Callable[[], World]] = {"lake": lake, "river": river}
@@ -29,12 +37,22 @@ def load_world(name: str) -> World:
 __all__ = [
     "WORLDS",
     "Actor",
+    "Bank",
+    "Behaviour",
+    "Current",
+    "Fault",
+    "FaultKind",
     "Kind",
     "Light",
     "Obstacle",
     "Pose2",
+    "Scenario",
+    "Task",
+    "Waves",
     "Wind",
     "World",
+    "actor_at",
     "actor_pose",
+    "along_at",
     "load_world",
 ]

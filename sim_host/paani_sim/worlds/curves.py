@@ -11,6 +11,11 @@ def closed_length_m(points_m: Points) -> float:
     return float(np.linalg.norm(np.roll(points_m, -1, axis=0) - points_m, axis=1).sum())
 
 
+def open_length_m(points_m: Points) -> float:
+    """Length of the open line `(n, 2)`."""
+    return float(np.linalg.norm(np.diff(points_m, axis=0), axis=1).sum())
+
+
 def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Points:
     """`count` points at equal arc length along the closed polygon, the first `start_m` along."""
     ring = np.vstack([points_m, points_m[:1]])
@@ -21,13 +26,20 @@ def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Point
 
 def point_along_closed(points_m: Points, distance_m: float) -> tuple[float, float, float]:
     """`(x_m, y_m, yaw_rad)` at `distance_m` (wrapped) along the closed polygon."""
-    ring = np.vstack([points_m, points_m[:1]])
-    steps = np.diff(ring, axis=0)
+    return _point_along(np.vstack([points_m, points_m[:1]]), distance_m % closed_length_m(points_m))
+
+
+def point_along_open(points_m: Points, distance_m: float) -> tuple[float, float, float]:
+    """`(x_m, y_m, yaw_rad)` at `distance_m` (held within its ends) along the open line."""
+    return _point_along(points_m, min(max(distance_m, 0.0), open_length_m(points_m)))
+
+
+def _point_along(line_m: Points, at_m: float) -> tuple[float, float, float]:
+    steps = np.diff(line_m, axis=0)
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
-    at_m = distance_m % arc_m[-1]
     leg = min(int(np.searchsorted(arc_m, at_m, side="right")) - 1, len(steps) - 1)
     part = (at_m - arc_m[leg]) / (arc_m[leg + 1] - arc_m[leg])
-    x_m, y_m = ring[leg] + part * steps[leg]
+    x_m, y_m = line_m[leg] + part * steps[leg]
     return float(x_m), float(y_m), float(np.arctan2(steps[leg, 1], steps[leg, 0]))
 
 
