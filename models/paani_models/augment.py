@@ -19,6 +19,7 @@ Rng = np.random.Generator
 GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
 MIRROR_FRAC = 0.3
 CONCRETE_FRAC = 0.12
+LAND_FRAC = 0.15  # tries; about one in three pictures has such a part
 
 WATER, OBSTACLE = 0, 1
 
@@ -158,6 +159,25 @@ def cut_out(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture
     picture[y : y + h, x : x + w] = rng.integers(0, 256, 3)
     mask[y : y + h, x : x + w] = IGNORE
     return picture, mask
+
+
+def land_crop(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture] | None:
+    """A part of the picture without any water, at least 60 % obstacle; None where eight tries find none.
+
+    What a boat against a bank sees: land down to the bottom of the picture.
+    """
+    height, width = mask.shape
+    for _ in range(8):
+        h, w = int(rng.integers(height // 5, height // 2)), int(rng.integers(width // 4, width))
+        y, x = int(rng.integers(height - h)), int(rng.integers(width - w))
+        part = mask[y : y + h, x : x + w]
+        if (
+            not (part == WATER).any()
+            and (part == OBSTACLE).mean() >= 0.6
+            and (part[-h // 4 :] == OBSTACLE).mean() > 0.9
+        ):
+            return picture[y : y + h, x : x + w], part
+    return None
 
 
 def obstacle_patch(rng: Rng, picture: Picture, mask: Picture) -> Picture | None:

@@ -6,8 +6,8 @@ import torch
 from torch import Tensor, nn
 
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
-WIDTHS = (12, 20, 28, 40)
-HIDDEN = 32
+WIDTHS = (16, 28, 40, 56)
+HIDDEN = 48
 
 
 class Gate(nn.Module):

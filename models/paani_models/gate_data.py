@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.picture_faults import FAULTS, MOVES, SEVERITIES, above_water, spoilt
+from paani_models.augment import land_crop
 from paani_models.gate import INPUT_HEIGHT_PX, INPUT_WIDTH_PX
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import Sample, read_pair, read_picture
 
 Bytes = NDArray[np.uint8]
 MIDDLE_WH = (320, 240)
+DRY_VIEWS = 3  # tries for each scene, beside the view of all that is above its water
 MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # mIoU of a cell below and above which the verdict is settled
 
 
@@ -80,8 +82,8 @@ def examples(
 ) -> tuple[Bytes, NDArray[np.float32]]:
     """Net inputs uint8 [N,3,120,160] and what they should say, float32 [N]: 1 fit, 0 not.
 
-    clean: BGR uint8 [240,320,3], all fit. Of the settled cells, `per_scene` are drawn for each scene; one view
-    without water comes with it.
+    clean: BGR uint8 [240,320,3], all fit. Of the settled cells, `per_scene` are drawn for each scene; views without
+    water come with it.
     """
     inputs, fits = [], []
 
@@ -102,6 +104,10 @@ def examples(
         dry = above_water(one.picture, one.mask)
         if dry is not None:
             add(dry, False)
+        for _ in range(DRY_VIEWS):
+            part = land_crop(rng, one.picture, one.mask)
+            if part is not None:
+                add(np.asarray(cv2.resize(part[0], MIDDLE_WH, interpolation=cv2.INTER_LINEAR), np.uint8), False)
     return np.stack(inputs), np.array(fits, np.float32)
 
 

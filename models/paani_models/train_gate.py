@@ -23,6 +23,7 @@ from paani_models.onnx_runner import open_net
 from paani_models.sources import Sample
 from paani_models.training import Progress, append_record, learning_rate, to_device
 
+MOVED_FRAC = 0.6
 MEASURED_SCENES = 84  # enough for a cell's mIoU to one or two points
 
 
@@ -30,11 +31,11 @@ MEASURED_SCENES = 84  # enough for a cell's mIoU to one or two points
 class Recipe:
     """Everything that decides a gate training besides the pictures and the segmenter whose errors it learns."""
 
-    epochs: int = 10
+    epochs: int = 24
     batch: int = 64
     peak_rate: float = 2e-3
     weight_decay: float = 1e-3
-    per_scene: int = 16
+    per_scene: int = 32
     seed: int = 42
 
 
@@ -108,6 +109,8 @@ class GateTraining:
         pictures[flips] = pictures[flips, :, :, ::-1]
         gains = rng.uniform(0.9, 1.1, (len(chosen), 1, 1, 1)).astype(np.float32)
         pictures = np.clip(pictures * gains, 0.0, 1.0)
+        for index in np.flatnonzero(rng.random(len(chosen)) < MOVED_FRAC):
+            pictures[index] = _moved(pictures[index], rng)
         x = to_device(torch.from_numpy(np.ascontiguousarray(pictures)))
         return x, to_device(torch.from_numpy(self.fits[chosen][:, None]))
 
@@ -125,3 +128,13 @@ class GateTraining:
         )
         fit = self.fits > 0.5
         return {"refused": float((said[fit] < 0.5).mean()), "accepted": float((said[~fit] >= 0.5).mean())}
+
+
+def _moved(picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
+    """Shifted by up to a twelfth of the picture and zoomed by up to a tenth; what comes in repeats the border."""
+    channels, height, width = picture.shape
+    zoom = rng.uniform(0.9, 1.1)
+    across, down = (rng.uniform(-1.0, 1.0) * size / 12.0 for size in (width, height))
+    to = np.array([[zoom, 0.0, across], [0.0, zoom, down]], np.float32)
+    planes = [cv2.warpAffine(p, to, (width, height), borderMode=cv2.BORDER_REPLICATE) for p in picture]
+    return np.stack(planes).reshape(channels, height, width).astype(np.float32)

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from paani_models.augment import CONCRETE_FRAC, concrete, obstacle_patch, segmenter_null, segmenter_sample
+from paani_models.augment import (
+    CONCRETE_FRAC,
+    LAND_FRAC,
+    concrete,
+    land_crop,
+    obstacle_patch,
+    segmenter_null,
+    segmenter_sample,
+)
 from paani_models.distillation import Distillation
 from paani_models.imagenet_segmenter import ImageNetSegmenter
 from paani_models.network_input import segmenter_batch
@@ -175,10 +183,12 @@ class SegmenterTraining:
                 pairs.append(segmenter_null(rng, size))
             else:
                 item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
+                shown = land_crop(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
+                picture, mask = shown or (item.picture, item.mask)
                 wanted = rng.random() < PASTE_FRAC
                 patch = obstacle_patch(rng, donor.picture, donor.mask) if wanted else None
                 patch = concrete(rng) if rng.random() < CONCRETE_FRAC else patch
-                pairs.append(segmenter_sample(rng, item.picture, item.mask, size, patch))
+                pairs.append(segmenter_sample(rng, picture, mask, size, patch))
         pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
         return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))
 

@@ -83,6 +83,7 @@ def test_a_bad_picture_is_a_value(data: bytes, cause: m.UnusableCause) -> None:
     assert (evidence.usable, evidence.cause, evidence.navigation_eligible) == (False, cause, False)
     assert evidence.detections == ()
     assert evidence.center.non_water == 1.0
+    assert evidence.water_edge == ()
     assert mask is None
 
 

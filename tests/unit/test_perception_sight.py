@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import CorridorConfig, load_config
 from paani.errors import UserError
-from paani_services.perception.corridors import OBSTACLE, SKY, WATER, summarise
+from paani_services.perception.corridors import OBSTACLE, SKY, WATER, summarise, water_edge
 from paani_services.perception.service import roll_at
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
 
@@ -84,6 +84,43 @@ def test_a_corridor_that_cannot_be_seen_is_blocked() -> None:
     lanes = summarise(np.zeros((HEIGHT, WIDTH), np.uint8), SURE, CorridorConfig(), counted(hull, HEIGHT, WIDTH))
     assert lanes.center == m.LaneEvidence()
     assert lanes.left.non_water == lanes.right.non_water == 0.0
+
+
+def test_where_the_water_ends_in_each_column() -> None:
+    """The lower edge of what lies lowest above the water, however much water shows again behind it."""
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[:16] = SKY
+    mask[32:40, 10] = OBSTACLE  # water again above it
+    mask[63, 11] = OBSTACLE
+    mask[:, 12] = WATER
+    edge = water_edge(mask, ALL)
+    assert edge[:10] == (0.25,) * 10
+    assert edge[10:14] == (40 / 64, 1.0, 0.0, 0.25)
+
+
+def test_the_own_hull_does_not_end_the_water() -> None:
+    """Skipped where it lies in front of water; a column of nothing else has no water."""
+    hull = np.ones((HEIGHT, WIDTH), np.float32)
+    hull[48:, 20:30], hull[:, 40] = 0.0, 0.0
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[hull == 0.0] = OBSTACLE
+    mask[40:48, 29] = OBSTACLE
+    edge = water_edge(mask, hull)
+    assert edge[20:29] == (0.0,) * 9
+    assert (edge[29], edge[40]) == (48 / 64, 1.0)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.floats(0.0, 1.0))
+def test_no_water_below_the_edge_is_anything_else(seed: int, bare: int, watery: float) -> None:
+    """Below its edge each column is water or own hull, and just above it is not."""
+    random = np.random.default_rng(seed)
+    mask = np.where(random.random((HEIGHT, WIDTH)) < watery, WATER, OBSTACLE).astype(np.uint8)
+    counts = np.ones((HEIGHT, WIDTH), np.float32)
+    counts[HEIGHT - bare :, ::3] = 0.0
+    for column, edge in enumerate(water_edge(mask, counts)):
+        row = round(edge * HEIGHT)
+        assert set(mask[row:, column][counts[row:, column] > 0].tolist()) <= {WATER}
+        assert row == 0 or mask[row - 1, column] != WATER or not counts[:, column].any()
 
 
 @pytest.mark.parametrize(

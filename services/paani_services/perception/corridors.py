@@ -56,6 +56,20 @@ def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig, counts
     )
 
 
+def water_edge(mask: Bytes, counts: Floats) -> tuple[float, ...]:
+    """Where the water that begins at the picture's bottom ends, for each column: see `Evidence.water_edge`.
+
+    mask: uint8 [h, w], as the picture is, not levelled. counts: how much of each cell is not own hull, [h, w].
+    A column of nothing but own hull has no water.
+    """
+    height = mask.shape[0]
+    hull = counts < MIN_COUNTED
+    ends = (mask != WATER) & ~hull
+    lowest = height - ends[::-1].argmax(axis=0)  # its lower edge, in cells from the top
+    edge = np.where(ends.any(axis=0), lowest, np.where(hull.all(axis=0), height, 0))
+    return tuple((edge / height).tolist())
+
+
 def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:
     """How much of each of `cells` equal cells of [0, 1] lies in [start, end]: [cells] in [0, 1]."""
     edges = np.arange(cells + 1) / cells

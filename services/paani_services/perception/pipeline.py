@@ -18,7 +18,7 @@ from paani.messages import (
     SegmentationSource,
     UnusableCause,
 )
-from paani_services.perception.corridors import Lanes, classify, summarise
+from paani_services.perception.corridors import Lanes, classify, summarise, water_edge
 from paani_services.perception.decode import decode
 from paani_services.perception.decoding import decoded
 from paani_services.perception.engine import engine_named
@@ -35,9 +35,10 @@ SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
 class Segmentation(NamedTuple):
-    """Mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), its corridors, who drew it, and how long it took."""
+    """Mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), its water's edge and corridors, who drew it, time taken."""
 
     mask: Bytes
+    edge: tuple[float, ...]
     lanes: Lanes
     source: SegmentationSource
     took_ms: float
@@ -137,9 +138,10 @@ class Perceiver:
             source, mask = SegmentationSource.FALLBACK, colour_mask(bgr)
             confidence = np.full(mask.shape, CONFIDENCE, np.float32)
         aspect = bgr.shape[1] / bgr.shape[0]
-        flat = level(mask, confidence, self._counted(mask.shape), roll_rad, aspect)
+        counts = self._counted(mask.shape)
+        flat = level(mask, confidence, counts, roll_rad, aspect)
         lanes = summarise(flat.mask, flat.confidence, self._config.corridors, flat.counts)
-        return Segmentation(mask, lanes, source, self._stopwatch_ms() - start_ms)
+        return Segmentation(mask, water_edge(mask, counts), lanes, source, self._stopwatch_ms() - start_ms)
 
     def _learned_mask(self, bgr: Bytes) -> tuple[Bytes, Floats]:
         """Mask and confidence; a confidence that is not finite where there is no segmenter."""
@@ -182,4 +184,5 @@ class Perceiver:
             confidence_threshold=self._config.detections.confidence,
             timing=msgspec.structs.replace(timing, total_ms=self._stopwatch_ms() - start_ms),
             models=self._models,
+            water_edge=segmentation.edge if segmentation else (),
         )

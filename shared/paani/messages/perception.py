@@ -74,6 +74,9 @@ class Evidence(Message, frozen=True, kw_only=True):
     """What perception saw in one picture (checklist B5).
 
     `roll_rad`: the roll the corridors were levelled by. Boxes lie in the picture as it is.
+    `water_edge`: for each column of the mask as it is, left to right, the lower edge of the first cell that is not
+    water, from the bottom up and own hull skipped, as a fraction of the picture's height from its top. 1: no water at
+    the bottom of that column; 0: water to the top. Empty: no mask.
     """
 
     frame_seq: Count
@@ -94,3 +97,4 @@ class Evidence(Message, frozen=True, kw_only=True):
     models: Text = ""
     media_us: Stamp = 0
     roll_rad: Finite = 0.0
+    water_edge: tuple[Unit, ...] = ()

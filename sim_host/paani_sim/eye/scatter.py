@@ -34,8 +34,13 @@ def gap_m(obstacle: Obstacle, x_m: float, y_m: float) -> float:
     return float(np.hypot(max(ahead, 0.0), max(aside, 0.0)))
 
 
+NEAR_BANK_FRAC = 0.15
+
+
 def random_pose(world: World, rng: np.random.Generator) -> BoatPose:
-    """The boat somewhere in the water near the route, clear of things, looking down open water."""
+    """The boat somewhere in the water near the route, clear of things, looking down open water or into a bank."""
+    if rng.random() < NEAR_BANK_FRAC:
+        return _nose_to_bank(world, rng)
     while True:
         along = world.route_m[rng.integers(len(world.route_m))]
         x_m, y_m = along + rng.normal(0.0, 7.0, 2)
@@ -57,6 +62,22 @@ def random_pose(world: World, rng: np.random.Generator) -> BoatPose:
             roll_rad=float(np.clip(rng.normal(0.0, 0.035), -0.14, 0.14)),
             pitch_rad=float(np.clip(rng.normal(0.0, 0.02), -0.06, 0.06)),
         )
+
+
+def _nose_to_bank(world: World, rng: np.random.Generator) -> BoatPose:
+    """The boat with its bow 0.3 to 3.5 m from a bank that it looks into, up to 60 degrees aslant."""
+    shore_m = world.shore_m
+    edge = int(rng.integers(len(shore_m)))
+    along = shore_m[(edge + 1) % len(shore_m)] - shore_m[edge]
+    outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+    x_m, y_m = shore_m[edge] + 0.5 * along - float(rng.uniform(0.95, 4.1)) * outward
+    return BoatPose(
+        float(x_m),
+        float(y_m),
+        float(np.arctan2(outward[1], outward[0]) + rng.uniform(-np.pi / 3, np.pi / 3)),
+        roll_rad=float(np.clip(rng.normal(0.0, 0.035), -0.14, 0.14)),
+        pitch_rad=float(np.clip(rng.normal(0.0, 0.02), -0.06, 0.06)),
+    )
 
 
 def scatter(world: World, pose: BoatPose, rng: np.random.Generator) -> list[Obstacle]:

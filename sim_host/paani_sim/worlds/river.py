@@ -1,11 +1,12 @@
 """A meandering river with banks, a bridge, piers, buoys, moored and moving boats, and people.
 
-Everything is placed in channel coordinates: `along_m` down the centre line, `left_m` to its left.
+Everything is placed in channel coordinates; `along_m` is the centre line's x.
 """
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, normals_left, resample_closed
+from paani_sim.worlds.channel import Channel
+from paani_sim.worlds.curves import Points, resample_closed
 from paani_sim.worlds.world import Actor, Kind, Light, Obstacle, Pose2, Wind, World
 
 CHANNEL_START_M = -150.0
@@ -19,7 +20,7 @@ BRIDGE_ALONG_M = 196.0
 
 def river() -> World:
     """Build the river."""
-    channel = Channel()
+    channel = _channel()
     route_m = _route(channel)
     x_m, y_m = route_m[0]
     east_m, north_m = route_m[1] - route_m[0]
@@ -35,73 +36,20 @@ def river() -> World:
         actors=_actors(channel),
         wind=Wind(speed_mps=1.8, toward_rad=0.5),
         light=Light(sky="cloudy", sun_azimuth_rad=1.9, sun_elevation_rad=0.65, seed=5),
+        channel_m=channel.centre_m,
     )
 
 
-class Channel:
-    """Centre line and half width, sampled every metre."""
-
-    def __init__(self) -> None:
-        self._along_m = np.arange(CHANNEL_START_M, CHANNEL_END_M + 1.0)
-        x = self._along_m
-        bend_m = 24.0 * np.sin(x / 46.0) + 5.0 * np.sin(x / 25.0 + 1.0)
-        ends_m = 0.004 * (np.maximum(0.0, x - 285.0) ** 2 + np.maximum(0.0, -30.0 - x) ** 2)
-        self._centre_m = np.column_stack([x, bend_m + ends_m])
-        self._left = normals_left(self._centre_m, closed=False)
-        wide_m = 11.0 * np.exp(-(((x - 12.0) / 26.0) ** 2))
-        wide_m += 12.0 * np.exp(-(((x - 262.0) / 30.0) ** 2))
-        wide_m += 6.0 * np.exp(-(((x - 120.0) / 34.0) ** 2))
-        narrow_m = 4.2 * np.exp(-(((x - BRIDGE_ALONG_M) / 20.0) ** 2))
-        self._half_width_m = 11.6 + wide_m - narrow_m + 0.6 * np.sin(x / 11.0)
-
-    def half_width_m(self, along_m: float) -> float:
-        """Half of the channel's width there."""
-        return float(np.interp(along_m, self._along_m, self._half_width_m))
-
-    def at(self, along_m: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
-        """Pose in the map, heading down the channel plus `turn_rad`."""
-        centre = [np.interp(along_m, self._along_m, self._centre_m[:, k]) for k in (0, 1)]
-        left = np.array([np.interp(along_m, self._along_m, self._left[:, k]) for k in (0, 1)])
-        left /= np.hypot(*left)
-        x_m, y_m = centre + left_m * left
-        yaw_rad = float(np.arctan2(-left[0], left[1])) + turn_rad
-        return Pose2(float(x_m), float(y_m), yaw_rad)
-
-    def shore_m(self) -> Points:
-        """The water's edge as one closed polygon, counter-clockwise, about 3 m a step."""
-        pick = np.arange(0, len(self._along_m), 3)
-        offset = self._left[pick] * self._half_width_m[pick, None]
-        right, left = self._centre_m[pick] - offset, self._centre_m[pick] + offset
-        return np.vstack([right, left[::-1]])
-
-    def lane_m(self, first_m: float, last_m: float, lane_frac: float) -> Points:
-        """A line down (or up) the channel at `lane_frac` of its width left of the centre."""
-        step = 1.0 if last_m > first_m else -1.0
-        return np.array(
-            [
-                self.at(along_m, 2.0 * lane_frac * self.half_width_m(along_m))[:2]
-                for along_m in np.arange(first_m, last_m + 0.5 * step, step)
-            ]
-        )
-
-    def loop_m(self, first_m: float, last_m: float, lane_frac: float) -> Points:
-        """Down the channel on the starboard side and back on the other, with round ends."""
-        turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)[1:-1]
-
-        def half_turn(along_m: float, toward: float) -> Points:
-            reach_m = 2.0 * lane_frac * self.half_width_m(along_m)
-            return np.array(
-                [self.at(along_m + toward * 0.8 * reach_m * np.cos(a), toward * reach_m * np.sin(a))[:2] for a in turn]
-            )
-
-        return np.vstack(
-            [
-                self.lane_m(first_m, last_m, -lane_frac),
-                half_turn(last_m, 1.0),
-                self.lane_m(last_m, first_m, lane_frac),
-                half_turn(first_m, -1.0),
-            ]
-        )
+def _channel() -> Channel:
+    x = np.arange(CHANNEL_START_M, CHANNEL_END_M + 1.0)
+    bend_m = 24.0 * np.sin(x / 46.0) + 5.0 * np.sin(x / 25.0 + 1.0)
+    ends_m = 0.004 * (np.maximum(0.0, x - 285.0) ** 2 + np.maximum(0.0, -30.0 - x) ** 2)
+    wide_m = 11.0 * np.exp(-(((x - 12.0) / 26.0) ** 2))
+    wide_m += 12.0 * np.exp(-(((x - 262.0) / 30.0) ** 2))
+    wide_m += 6.0 * np.exp(-(((x - 120.0) / 34.0) ** 2))
+    narrow_m = 4.2 * np.exp(-(((x - BRIDGE_ALONG_M) / 20.0) ** 2))
+    half_width_m = 11.6 + wide_m - narrow_m + 0.6 * np.sin(x / 11.0)
+    return Channel(x, np.column_stack([x, bend_m + ends_m]), half_width_m)
 
 
 def _route(channel: Channel) -> Points:
@@ -111,11 +59,7 @@ def _route(channel: Channel) -> Points:
 
 
 def _obstacles(channel: Channel) -> tuple[Obstacle, ...]:
-    at, half = channel.at, channel.half_width_m
-
-    def bank(along_m: float, side: float, out_m: float, turn_rad: float = 0.0) -> Pose2:
-        """`out_m` beyond the water's edge on the `side` (+1 left, -1 right; negative: afloat)."""
-        return at(along_m, side * (half(along_m) + out_m), turn_rad)
+    at, half, bank = channel.at, channel.half_width_m, channel.bank
 
     def off_lane(along_m: float, side: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
         """`left_m` to the left of the route's lane on that side of the centre line."""
