@@ -85,6 +85,10 @@ ROUTE = Topic(
     name="navigator/route", type=m.Route, producer="navigator", rate_hz=0.5, fresh_s=10.0,
     stance=Stance.STATE, summary="the route being followed",
 )
+MISSION = Topic(
+    name="navigator/mission", type=m.Mission, producer="navigator", rate_hz=0.5, fresh_s=10.0,
+    stance=Stance.STATE, summary="the legs of the mission, and the fence",
+)
 THRUST = Topic(
     name="controller/thrust", type=m.Thrust, producer="controller", rate_hz=10.0, fresh_s=0.5,
     stance=Stance.COMMAND, summary="normalised thrust of the two fans",
@@ -144,8 +148,9 @@ STEPS = {
 }
 
 TOPICS: tuple[Topic[Any], ...] = (
-    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, THRUST, LOCAL_ODOMETRY,
-    ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, RECORDER_STATE, *STEPS.values(),
+    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, RECORDER_STATE,
+    *STEPS.values(),
 )
 # fmt: on
 

@@ -64,7 +64,7 @@ def test_the_eye_states_the_lens_of_simulated_pictures_alone() -> None:
     recording = msgspec.structs.replace(CLEAR, time_base=m.TimeBase.MEDIA)
     webcam, known = (
         load_config(sets=["camera.source=webcam"]),
-        load_config(sets=["camera.source=webcam", "camera.hfov_deg=60"]),
+        load_config(sets=["camera.source=webcam", "calibration.hfov_deg=60"]),
     )
     assert lens_of(recording, PAANI) is None
     assert lens_of(CLEAR, webcam) is None
@@ -175,7 +175,7 @@ def test_only_new_and_healthy_odometry_is_heard() -> None:
         (PAPER, m.TimeBase.CAPTURE, 0.1, U.OFF),
         (load_config(sets=["camera.source=webcam"]), m.TimeBase.CAPTURE, 0.1, U.UNKNOWN_LENS),
         (PAANI, m.TimeBase.MEDIA, 0.1, U.UNKNOWN_LENS),
-        (load_config(sets=["camera.source=x.mp4", "camera.hfov_deg=60"]), m.TimeBase.MEDIA, 0.1, U.RECORDING),
+        (load_config(sets=["camera.source=x.mp4", "calibration.hfov_deg=60"]), m.TimeBase.MEDIA, 0.1, U.RECORDING),
     ],
 )
 def test_the_tracks_say_what_was_known_of_the_turning(

@@ -54,12 +54,12 @@ class View(NamedTuple):
 def lens_of(evidence: Evidence, config: Config) -> Lens | None:
     """The camera's lens; None where its field of view is not known. Pixels are taken for square.
 
-    The simulator's camera is the eye; any other is what `camera.hfov_deg` says, a recording included.
+    The simulator's camera is the eye; any other is what `calibration` says, a recording included.
     """
     if config.camera.source == "sim" and evidence.time_base is TimeBase.CAPTURE:
         hfov_deg, down_deg = config.eye.hfov_deg, config.eye.pitch_down_deg
     else:
-        hfov_deg, down_deg = config.camera.hfov_deg, config.camera.pitch_down_deg
+        hfov_deg, down_deg = config.calibration.hfov_deg, config.calibration.pitch_down_deg
     if not 0.0 < hfov_deg <= WIDEST_DEG or evidence.width_px < 1 or evidence.height_px < 1:
         return None
     focal_x = 0.5 / portable.tan(0.5 * math.radians(hfov_deg))

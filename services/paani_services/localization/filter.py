@@ -1,9 +1,11 @@
 """A planar extended Kalman filter. The only file that imports filterpy, which takes seconds.
 
-State x = [px, py, psi, u, v, b]: map position [m], yaw [rad], surge and sway [m/s], gyro bias [rad/s].
+State x = [px, py, psi, u, v, b, gx, gy, c, wx, wy]: map position [m], yaw [rad], surge and sway through the water [m/s],
+gyro bias [rad/s], slow error of the GPS position [m], compass bias [rad], the water's own drift in the map [m/s].
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,142 +15,193 @@ from paani.geometry import wrap_rad
 
 Array = npt.NDArray[np.float64]
 
-PX, PY, PSI, U, V, B = range(6)
-ACCEL_STD_MPS2 = 0.08  # what the averaged, levelled accelerometer misses, per square root second
+PX, PY, PSI, U, V, B, GX, GY, C, WX, WY = range(11)
+SIZE = 11
+OWN = 6  # the local filter knows these; the rest describe GPS, compass and water
+
+# Per square root second.
+POSITION_STD_M = 0.01
 GYRO_STD_RADPS = 0.01
+ACCEL_STD_MPS2 = 0.05  # what the levelled accelerometer misses: 0.3 degrees of tilt
 BIAS_STD_RADPS = 2e-4
-POSITION_STD_M = 0.02
+COMPASS_STD_RAD = 2e-4
+DRIFT_STD_MPS = 0.3  # currents of rivers, and the leeway that wind gives a small hull
+DRIFT_TIME_S = 300.0
+
+
+class Verdict(NamedTuple):
+    """`nis`: squared Mahalanobis distance of the innovation; `taken` false: it lay outside the gate."""
+
+    taken: bool
+    nis: float
 
 
 class PlanarFilter:
     """Predicts with gyro and accelerometer; corrects with whatever the caller has."""
 
-    def __init__(self, x: Array, std: Array) -> None:
-        """Start at state `x` (6,) with standard deviations `std` (6,)."""
-        self._ekf = ExtendedKalmanFilter(dim_x=6, dim_z=2)
+    def __init__(self, x: Array, std: Array, gps_wander_s: float = 60.0) -> None:
+        """Start at state `x` (11,) with standard deviations `std` (11,).
+
+        A yaw whose compass bias is unknown came from that compass: the two err against each other.
+        Where `std` is zero from `OWN` on, there is no GPS to describe, and those states stay as they are.
+        """
+        self._ekf = ExtendedKalmanFilter(dim_x=SIZE, dim_z=2)
         self._ekf.x = np.array(x, dtype=np.float64)
         self._ekf.P = np.diag(np.square(std))
+        self._ekf.P[PSI, PSI] += std[C] ** 2
+        self._ekf.P[PSI, C] = self._ekf.P[C, PSI] = -(std[C] ** 2)
+        self._gps_wander_s = gps_wander_s
+        self._has_gps = bool(np.any(np.asarray(std[OWN:]) > 0.0))
+        self._jacobian = np.eye(SIZE)
+        self._noise = np.zeros((SIZE, SIZE))
 
     @property
     def x(self) -> Array:
-        """State (6,)."""
+        """State (11,)."""
         return np.asarray(self._ekf.x)
 
     @property
     def std(self) -> Array:
-        """Standard deviation of each state (6,)."""
+        """Standard deviation of each state (11,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the state (6, 6)."""
+        """Covariance of the state (11, 11), symmetric."""
         return np.asarray(self._ekf.P)
 
-    def predict(self, yaw_rate_radps: float, ahead_mps2: float, left_mps2: float, step_s: float) -> None:
-        """Advance by `step_s` with the measured yaw rate and level acceleration along body axes."""
-        px, py, psi, u, v, b = self._ekf.x.tolist()
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """Velocity over ground in the map frame [m/s]."""
+        _, _, psi, u, v, *_, wx, wy = self._ekf.x.tolist()
+        sin, cos = math.sin(psi), math.cos(psi)
+        return u * cos - v * sin + wx, u * sin + v * cos + wy
+
+    def predict(
+        self, yaw_rate_radps: float, ahead_mps2: float, left_mps2: float, step_s: float, gps_std_m: float = 0.0
+    ) -> None:
+        """Advance by `step_s` with the measured yaw rate and level acceleration along body axes.
+
+        `gps_std_m`: how far the receiver's slow error strays in the long run.
+        """
+        px, py, psi, u, v, b, gx, gy, c, wx, wy = self._ekf.x.tolist()
         rate = yaw_rate_radps - b
         sin, cos = math.sin(psi), math.cos(psi)
-        self._ekf.x = np.array(
-            [
-                px + (u * cos - v * sin) * step_s,
-                py + (u * sin + v * cos) * step_s,
-                wrap_rad(psi + rate * step_s),
-                u + (ahead_mps2 + rate * v) * step_s,
-                v + (left_mps2 - rate * u) * step_s,
-                b,
-            ]
-        )
-        jacobian = np.eye(6)
-        jacobian[PX, PSI], jacobian[PX, U], jacobian[PX, V] = (
-            -(u * sin + v * cos) * step_s,
-            cos * step_s,
-            -sin * step_s,
-        )
-        jacobian[PY, PSI], jacobian[PY, U], jacobian[PY, V] = (
-            (u * cos - v * sin) * step_s,
-            sin * step_s,
-            cos * step_s,
-        )
-        jacobian[PSI, B] = -step_s
-        jacobian[U, V], jacobian[U, B] = rate * step_s, -v * step_s
-        jacobian[V, U], jacobian[V, B] = -rate * step_s, u * step_s
-        noise_std = [
-            POSITION_STD_M,
-            POSITION_STD_M,
-            GYRO_STD_RADPS,
-            ACCEL_STD_MPS2,
-            ACCEL_STD_MPS2,
-            BIAS_STD_RADPS,
-        ]
-        noise = np.diag(np.square(noise_std) * step_s)
-        self._ekf.P = jacobian @ self._ekf.P @ jacobian.T + noise
+        vx, vy = u * cos - v * sin, u * sin + v * cos
+        stray = math.exp(-step_s / self._gps_wander_s)
+        drift = math.exp(-step_s / DRIFT_TIME_S)
+        self._ekf.x = np.array([
+            px + (vx + wx) * step_s,
+            py + (vy + wy) * step_s,
+            wrap_rad(psi + rate * step_s),
+            u + (ahead_mps2 + rate * v) * step_s,
+            v + (left_mps2 - rate * u) * step_s,
+            b,
+            gx * stray,
+            gy * stray,
+            c,
+            wx * drift,
+            wy * drift,
+        ])  # fmt: skip
+        f = self._jacobian
+        f[PX, PSI], f[PX, U], f[PX, V], f[PX, WX] = -vy * step_s, cos * step_s, -sin * step_s, step_s
+        f[PY, PSI], f[PY, U], f[PY, V], f[PY, WY] = vx * step_s, sin * step_s, cos * step_s, step_s
+        f[PSI, B] = -step_s
+        f[U, V], f[U, B] = rate * step_s, -v * step_s
+        f[V, U], f[V, B] = -rate * step_s, u * step_s
+        f[GX, GX] = f[GY, GY] = stray
+        f[WX, WX] = f[WY, WY] = drift
+        self._ekf.P = f @ self._ekf.P @ f.T + self._growth(step_s, gps_std_m, stray, drift)
 
-    def correct_position(self, x_m: float, y_m: float, std_m: float, gate2: float) -> bool:
-        """GPS position; False if it lies outside the gate and was refused."""
-        jacobian = np.zeros((2, 6))
-        jacobian[0, PX] = jacobian[1, PY] = 1.0
-        predicted = self._ekf.x[:2]
-        return self._correct(np.array([x_m, y_m]), predicted, jacobian, std_m, gate2)
+    def correct_position(self, x_m: float, y_m: float, std_m: float, gate2: float) -> Verdict:
+        """GPS position, which shows the boat and the receiver's slow error together."""
+        px, py, *_ = x = self._ekf.x.tolist()
+        jacobian = np.zeros((2, SIZE))
+        jacobian[0, PX] = jacobian[0, GX] = jacobian[1, PY] = jacobian[1, GY] = 1.0
+        return self._correct(np.array([x_m - px - x[GX], y_m - py - x[GY]]), jacobian, std_m, gate2)
 
-    def correct_velocity(self, vx_mps: float, vy_mps: float, std_mps: float, gate2: float) -> bool:
-        """GPS velocity in the map frame; False if refused."""
-        _, _, psi, u, v, _ = self._ekf.x.tolist()
+    def correct_velocity(
+        self, vx_mps: float, vy_mps: float, std_mps: float, gate2: float, *, turns: bool = True
+    ) -> Verdict:
+        """Velocity over ground in the map frame. `turns` false: it says nothing of the heading."""
+        _, _, psi, u, v, *_ = self._ekf.x.tolist()
         sin, cos = math.sin(psi), math.cos(psi)
-        predicted = np.array([u * cos - v * sin, u * sin + v * cos])
-        jacobian = np.zeros((2, 6))
-        jacobian[0, PSI], jacobian[0, U], jacobian[0, V] = -predicted[1], cos, -sin
-        jacobian[1, PSI], jacobian[1, U], jacobian[1, V] = predicted[0], sin, cos
-        return self._correct(np.array([vx_mps, vy_mps]), predicted, jacobian, std_mps, gate2)
+        predicted_x, predicted_y = self.velocity
+        jacobian = np.zeros((2, SIZE))
+        jacobian[0, U], jacobian[0, V], jacobian[0, WX] = cos, -sin, 1.0
+        jacobian[1, U], jacobian[1, V], jacobian[1, WY] = sin, cos, 1.0
+        if turns:
+            jacobian[0, PSI], jacobian[1, PSI] = -u * sin - v * cos, u * cos - v * sin
+        return self._correct(np.array([vx_mps - predicted_x, vy_mps - predicted_y]), jacobian, std_mps, gate2)
 
-    def correct_yaw(self, yaw_rad: float, std_rad: float, gate2: float) -> bool:
-        """Compass heading, compared around the circle; False if refused."""
-        return self._correct_state(PSI, yaw_rad, std_rad, gate2)
+    def correct_yaw(self, yaw_rad: float, std_rad: float, gate2: float) -> Verdict:
+        """Compass heading, compared around the circle."""
+        x = self._ekf.x
+        jacobian = np.zeros((1, SIZE))
+        jacobian[0, PSI] = jacobian[0, C] = 1.0
+        return self._correct(np.array([wrap_rad(yaw_rad - float(x[PSI] + x[C]))]), jacobian, std_rad, gate2)
 
     def correct_surge(self, surge_mps: float, std_mps: float) -> None:
         """A belief about the speed ahead, for want of a measurement."""
-        self._correct_state(U, surge_mps, std_mps, math.inf)
+        self._believe(U, surge_mps, std_mps)
 
     def correct_sway(self, sway_mps: float, std_mps: float) -> None:
-        """A hull goes where it points: sway is about zero."""
-        self._correct_state(V, sway_mps, std_mps, math.inf)
+        """A hull goes through the water where it points: sway is about zero."""
+        self._believe(V, sway_mps, std_mps)
 
-    def _correct_state(self, index: int, value: float, std: float, gate2: float) -> bool:
-        jacobian = np.zeros((1, 6))
+    def move_to(self, x_m: float, y_m: float, std_m: float, noise_m: float) -> None:
+        """Begin at a fix with slow error `std_m` and noise `noise_m`; keep what is not position."""
+        anew = [PX, PY, GX, GY]
+        self._ekf.x[anew] = (x_m, y_m, 0.0, 0.0)
+        self._ekf.P[anew, :] = 0.0
+        self._ekf.P[:, anew] = 0.0
+        self._ekf.P[anew, anew] = std_m**2
+        self._ekf.P[[PX, PY], [PX, PY]] += noise_m**2
+        self._ekf.P[[PX, PY], [GX, GY]] = self._ekf.P[[GX, GY], [PX, PY]] = -(std_m**2)
+
+    def loosen(self, std: Array) -> None:
+        """Know each state less well by `std` (11,)."""
+        self._ekf.P = self._ekf.P + np.diag(np.square(std))
+
+    def _growth(self, step_s: float, gps_std_m: float, stray: float, drift: float) -> Array:
+        """What one step adds to the covariance."""
+        diagonal = [
+            POSITION_STD_M**2 * step_s,
+            POSITION_STD_M**2 * step_s,
+            GYRO_STD_RADPS**2 * step_s,
+            ACCEL_STD_MPS2**2 * step_s,
+            ACCEL_STD_MPS2**2 * step_s,
+            BIAS_STD_RADPS**2 * step_s,
+        ]
+        if self._has_gps:
+            wander = gps_std_m**2 * (1.0 - stray * stray)
+            water = DRIFT_STD_MPS**2 * (1.0 - drift * drift)
+            diagonal += [wander, wander, COMPASS_STD_RAD**2 * step_s, water, water]
+        np.fill_diagonal(self._noise, diagonal + [0.0] * (SIZE - len(diagonal)))
+        return self._noise
+
+    def _believe(self, index: int, value: float, std: float) -> None:
+        jacobian = np.zeros((1, SIZE))
         jacobian[0, index] = 1.0
-        return self._correct(
-            np.array([value]),
-            self._ekf.x[index : index + 1],
-            jacobian,
-            std,
-            gate2,
-            circular=index == PSI,
-        )
+        self._correct(np.array([value - float(self._ekf.x[index])]), jacobian, std, math.inf)
 
-    def _correct(
-        self,
-        z: Array,
-        predicted: Array,
-        jacobian: Array,
-        std: float,
-        gate2: float,
-        *,
-        circular: bool = False,
-    ) -> bool:
+    def _correct(self, residual: Array, jacobian: Array, std: float, gate2: float) -> Verdict:
         """One update unless the squared Mahalanobis distance of the innovation exceeds `gate2`."""
-        residual = z - predicted
-        if circular:
-            residual = np.array([wrap_rad(float(residual[0]))])
-        covariance = jacobian @ self._ekf.P @ jacobian.T + np.eye(len(z)) * std**2
-        if float(residual @ np.linalg.solve(covariance, residual)) > gate2:
-            return False
-        self._ekf.dim_z = len(z)
+        noise = np.eye(len(residual)) * std**2
+        if math.isfinite(gate2):
+            nis = float(residual @ np.linalg.solve(jacobian @ self._ekf.P @ jacobian.T + noise, residual))
+            if not nis <= gate2:
+                return Verdict(False, nis)
+        else:
+            nis = 0.0
+        self._ekf.dim_z = len(residual)
         self._ekf.update(
-            z,
+            residual,
             HJacobian=lambda _: jacobian,
-            Hx=lambda _: predicted,
-            R=std**2,
-            residual=lambda *_: residual,
+            Hx=lambda _: 0.0,
+            R=noise,
+            residual=lambda measured, _: measured,
         )
         self._ekf.x[PSI] = wrap_rad(float(self._ekf.x[PSI]))
-        return True
+        self._ekf.P = 0.5 * (self._ekf.P + self._ekf.P.T)
+        return Verdict(True, nis)

@@ -1,8 +1,10 @@
-"""The navigator as a decider: advisory, odometry, clock, arming and its own route in; one order out."""
+"""The navigator as a decider: advisory, odometry, clock, arming and its own mission in; one order out."""
 
 from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
+from paani.messages import Mission, Route
+from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
 
 
@@ -20,16 +22,26 @@ def decide(state: NavState, inputs: Inputs, now_us: int, config: Config) -> tupl
         arming=arming.message,
         arming_us=arming.received_us,
     )
-    route = inputs[keys.ROUTE.name].message if keys.ROUTE.name in inputs else None
-    state, order = navigate(state, heard, route, now_us, config.bus.domain, config.navigator)
+    state, order = navigate(state, heard, _mission(inputs), now_us, config.bus.domain, config.navigator)
     return state, {keys.COMMAND.name: order}
+
+
+def _mission(inputs: Inputs) -> Mission | None:
+    """The mission, or the route alone; None without either."""
+    for topic in (keys.MISSION, keys.ROUTE):
+        message = inputs[topic.name].message if topic.name in inputs else None
+        if isinstance(message, Mission):
+            return message
+        if isinstance(message, Route):
+            return route_alone(message)
+    return None
 
 
 DECIDER = Decider(
     service="navigator",
     state=NavState,
     inputs=(keys.ADVISORY, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
-    own=(keys.ROUTE,),
+    own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,
 )

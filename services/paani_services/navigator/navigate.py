@@ -1,4 +1,4 @@
-"""From advice, route and estimate to one order. Pure: no clock, no bus, no logging.
+"""From advice, mission and estimate to one order. Pure: no clock, no bus, no logging.
 
 Every gate that is shut is named in the order's `inhibits`; an order that moves has none.
 """
@@ -8,27 +8,29 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
+from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
     Arming,
     Direction,
     Inhibit,
+    Mission,
     NavCommand,
     Odometry,
-    Route,
     SimTime,
 )
+from paani_services.navigator.crab import Crab, learned, paused
+from paani_services.navigator.fence import bounded_speed, is_allowed
+from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
-from paani_services.navigator.progress import course_rad, cross_track_m, first_target, is_reached
 from paani_services.navigator.turning import TURNS, Turn, continuous_heading, latched
 
 
 class NavState(msgspec.Struct, frozen=True):
-    """What one call leaves for the next. `target` is the waypoint steered for, None before the first."""
+    """What one call leaves for the next."""
 
-    target: int | None = None
-    reached: int = 0
-    finished: bool = False
+    progress: Progress = Progress()
+    crab: Crab = Crab()
     turn: Turn | None = None
     guards: Guards = Guards()
     sim_us: int = -1
@@ -51,7 +53,7 @@ class Heard(msgspec.Struct, frozen=True):
 def navigate(
     state: NavState,
     heard: Heard,
-    route: Route | None,
+    mission: Mission | None,
     now_us: int,
     domain: int,
     config: NavigatorConfig,
@@ -59,29 +61,31 @@ def navigate(
     """One step. The order carries the advisory's `source_us` and the plant's newest stamp."""
     state = _watch_clock(state, heard, now_us)
     inhibits = _gates(state, heard, now_us, domain, config)
-    if route is None:
+    if mission is None:
         inhibits.append(Inhibit.NO_ROUTE)
     state = _forget_turn(state, heard)
     odometry, advisory = heard.odometry, heard.advisory
-    if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or route is None:
+    if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
         return state, _order(state, heard, now_us, inhibits)
 
     position_m = (odometry.x_m, odometry.y_m)
-    if state.target is None:
-        state = msgspec.structs.replace(state, target=first_target(route, position_m))
     direction = advisory.direction if advisory is not None else Direction.NO_DATA
     if advisory is not None and config.clear_m > 0.0:
         state = msgspec.structs.replace(state, guards=watch(state.guards, advisory, odometry, config.clear_m))
-    heading_rad = odometry.yaw_rad
-    speed_mps = config.cruise_mps
-    if not inhibits and direction is Direction.STRAIGHT:
-        state = _advance(state, route, position_m, config)
-        if state.finished:
-            inhibits.append(Inhibit.ROUTE_FINISHED)
-    target = state.target or 0
+    straight = not inhibits and direction is Direction.STRAIGHT
+    scene = Scene(odometry, heard.arming, state.sim_us, free=not inhibits, straight=straight)
+    state = _pursue(state, mission, scene, config)
+    wanted = aim(state.progress, mission, state.crab, position_m, config)
+    if wanted.inhibit is not None:
+        inhibits.append(wanted.inhibit)
+    if not is_allowed(mission.fence, position_m) and not config.fence_return:
+        inhibits.append(Inhibit.OUTSIDE_FENCE)
+    leg = words(state.progress, mission)
     if inhibits:
-        return state, _order(state, heard, now_us, inhibits, cross_m=cross_track_m(route, target, position_m))
+        return _paused(state, now_us), _order(state, heard, now_us, inhibits, cross_m=wanted.cross_track_m, leg=leg)
+    speed_mps, heading_rad = wanted.speed_mps, odometry.yaw_rad
     if direction in TURNS:
+        state = _paused(state, now_us)
         speed_mps *= config.turn_speed_frac
         if config.latch_turns:
             turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config)
@@ -92,10 +96,32 @@ def navigate(
         else:
             heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
     else:
-        heading_rad = guarded_course(course_rad(route, target, position_m, config.lookahead_m), state.guards)
+        heading_rad = guarded_course(wanted.course_rad, state.guards)
+        state = _learned(state, wanted, now_us, config, on_course=heading_rad == wrap_rad(wanted.course_rad))
+    bounded_mps = bounded_speed(mission.fence, odometry, heading_rad, speed_mps, config)
+    if bounded_mps is None:
+        inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, _order(
-        state, heard, now_us, inhibits, heading_rad, speed_mps, cross_track_m(route, target, position_m)
+        state, heard, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=wanted.cross_track_m, leg=leg
     )
+
+
+def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorConfig) -> NavState:
+    """The mission's step; another leg learns anew what pushes the boat."""
+    progress = follow(state.progress, mission, scene, config)
+    crab = state.crab if progress.leg == state.progress.leg else Crab()
+    return msgspec.structs.replace(state, progress=progress, crab=crab)
+
+
+def _learned(state: NavState, wanted: Aim, now_us: int, config: NavigatorConfig, *, on_course: bool) -> NavState:
+    if wanted.track is None or config.lookahead_m <= 0.0 or not on_course:
+        return _paused(state, now_us)
+    crab = learned(state.crab, wanted.track, wanted.target, wanted.cross_track_m, now_us, config)
+    return msgspec.structs.replace(state, crab=crab)
+
+
+def _paused(state: NavState, now_us: int) -> NavState:
+    return msgspec.structs.replace(state, crab=paused(state.crab, now_us))
 
 
 def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
@@ -109,7 +135,7 @@ def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
     if state.sim_us < 0:
         return msgspec.structs.replace(state, sim_us=sim_us)
     if sim_us < state.sim_us:
-        return NavState(reached=state.reached, sim_us=sim_us)
+        return NavState(progress=Progress(reached=state.progress.reached), sim_us=sim_us)
     return msgspec.structs.replace(state, sim_us=sim_us, advanced_us=now_us)
 
 
@@ -163,21 +189,6 @@ def _forget_turn(state: NavState, heard: Heard) -> NavState:
     return state
 
 
-def _advance(state: NavState, route: Route, position_m: tuple[float, float], config: NavigatorConfig) -> NavState:
-    """Count the waypoints reached; only called while going straight, so turns keep theirs (M1, M3)."""
-    target, reached, finished = state.target or 0, state.reached, state.finished
-    last = len(route.waypoints) - 1
-    for _ in route.waypoints:
-        if finished or not is_reached(route, target, position_m, config):
-            break
-        reached += 1
-        if target == last and not route.repeat:
-            finished = True
-        else:
-            target = (target + 1) % (last + 1)
-    return msgspec.structs.replace(state, target=target, reached=reached, finished=finished)
-
-
 def _order(
     state: NavState,
     heard: Heard,
@@ -185,7 +196,9 @@ def _order(
     inhibits: list[Inhibit],
     heading_rad: float = 0.0,
     speed_mps: float = 0.0,
+    *,
     cross_m: float = 0.0,
+    leg: str = "",
 ) -> NavCommand:
     advisory = heard.advisory
     enable = not inhibits
@@ -197,8 +210,10 @@ def _order(
         echo_us=heard.clock.stamp_us if heard.clock is not None else 0,
         inhibits=tuple(inhibits),
         direction=advisory.direction if advisory is not None else Direction.NO_DATA,
-        waypoint_index=state.target or 0,
-        waypoints_reached=state.reached,
+        waypoint_index=state.progress.target or 0,
+        waypoints_reached=state.progress.reached,
         cross_track_m=cross_m,
         advisory_sent_us=advisory.sent_us if advisory is not None else 0,
+        leg_index=state.progress.leg,
+        leg=leg,
     )

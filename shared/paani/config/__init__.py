@@ -3,6 +3,7 @@
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
+from paani.config.planning import CalibrationConfig, PlannerConfig, calibration_of
 from paani.config.recording import RecorderConfig
 from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, EngineName, GateConfig, PerceptionConfig
 from paani.config.simulating import (
@@ -19,6 +20,7 @@ __all__ = [
     "AdapterConfig",
     "AdvisorConfig",
     "BusConfig",
+    "CalibrationConfig",
     "CameraConfig",
     "Config",
     "ControllerConfig",
@@ -33,6 +35,7 @@ __all__ = [
     "MotionConfig",
     "NavigatorConfig",
     "PerceptionConfig",
+    "PlannerConfig",
     "PlantConfig",
     "PolicyConfig",
     "RecorderConfig",
@@ -41,6 +44,7 @@ __all__ = [
     "TrackerConfig",
     "TuningConfig",
     "WorldConfig",
+    "calibration_of",
     "decode_config",
     "encode_config",
     "load_config",

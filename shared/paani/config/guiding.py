@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from paani.config.planning import PlannerConfig
 from paani.config.section import Fraction, NonNegative, Positive, Section
 
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
@@ -18,6 +19,7 @@ class LocalizationConfig(Section, frozen=True):
     rate_hz: Positive = 20.0  # L1, L3
     origin_lat_lon_deg: tuple[Latitude, Longitude] | None = None
     gate_mahalanobis2: Positive = 25.0
+    gps_wander_s: Positive = 60.0  # over which a receiver's error forgets itself; `SensorsConfig.gps_bias_time_s`
     calibration_s: NonNegative = 1.0
     max_gps_age_s: Positive = 3.0
     max_imu_age_s: Positive = 0.3
@@ -28,13 +30,27 @@ class LocalizationConfig(Section, frozen=True):
 
 
 class NavigatorConfig(Section, frozen=True):
-    """`route` is the path of a route file; empty: no route, no motion."""
+    """`route`, `mission` and `fence` are paths of files (formats: navigator/README.md).
+
+    Neither route nor mission: no motion. Without a mission the route alone is followed; without a fence there is none.
+    """
 
     route: str = ""
+    mission: str = ""
+    fence: str = ""
     rate_hz: Positive = 10.0
     acceptance_m: Positive = 1.5
     pass_abeam_m: NonNegative = 6.0  # a waypoint left behind within this distance counts; 0: never
     lookahead_m: NonNegative = 4.0  # line of sight along the leg; 0: plain waypoint bearing (M4)
+    # Gain of the integral against wind and current, sigma of Borhaug, Pavlov and Pettersen, CDC 2008; 0: none.
+    # A quarter of the cruise speed damps the line critically.
+    crab_gain_mps: NonNegative = 0.15
+    max_crab_deg: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] = 40.0  # holds against a drift of 0.64 of the speed
+    station_speed_frac: Fraction = 0.5  # of cruise, back to a station the boat drifted off
+    station_inner_frac: Fraction = 0.5  # of the station's radius: once adrift, driven back this far in
+    fence_margin_m: NonNegative = 1.5  # kept to the fence beside the way to stop; GPS bias is 0.8 m per axis
+    fence_stop_s: Positive = 5.0  # way to stop over speed
+    fence_return: bool = False  # outside the fence, obey orders that lead straight back in
     cruise_mps: Positive = 0.6
     turn_speed_frac: Fraction = 0.5  # M7
     turn_deg: Positive = 25.0  # M5
@@ -49,6 +65,7 @@ class NavigatorConfig(Section, frozen=True):
     clock_max_age_s: Positive = 0.4
     arming_max_age_s: Positive = 1.0
     max_future_s: NonNegative = 0.1
+    planner: PlannerConfig = PlannerConfig()
 
 
 class ControllerConfig(Section, frozen=True):

@@ -30,9 +30,16 @@ PAPER: dict[str, object] = {
         "acceptance_m": 1.0,  # M2
         "pass_abeam_m": 0.0,  # M2
         "lookahead_m": 0.0,  # M4
+        "crab_gain_mps": 0.0,  # M4
         "cruise_mps": 0.15,  # M7
         "clear_m": 0.0,
         "latch_turns": False,  # M5: continuous
+        "planner": {  # Q: a prototype beside the evaluated configuration
+            "use": False,
+            "hidden_s": 0.0,  # Q3
+            "speed_mps": 0.4,  # Q5
+            "lookahead_s": 3.0,  # Q4
+        },
     },
     "controller": {
         "max_speed_mps": 0.30,  # N2

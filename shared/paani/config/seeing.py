@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-import msgspec
+from typing import Literal
 
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
-FieldOfView = Annotated[float, msgspec.Meta(ge=0.0, le=170.0)]
-Tilt = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 EngineName = Literal["onnxruntime", "ncnn"]
 
 
@@ -17,8 +13,6 @@ class CameraConfig(Section, frozen=True):
     """`source`: `sim`, `webcam`, `webcam:N`, or a picture, folder or video path.
 
     A single picture is a camera that always shows the same: the gate calls it frozen.
-    `hfov_deg`, `pitch_down_deg`: horizontal field of view (0: unknown) and how far it looks down, of a camera fixed to
-    the boat; the simulator's camera is `eye`.
     """
 
     source: str = "sim"
@@ -28,8 +22,6 @@ class CameraConfig(Section, frozen=True):
     width_px: Size = 320  # A8
     height_px: Size = 240  # A8
     jpeg_quality: Size = 85
-    hfov_deg: FieldOfView = 0.0
-    pitch_down_deg: Tilt = 0.0
 
 
 class GateConfig(Section, frozen=True):

@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.judging import AdvisorConfig
+from paani.config.planning import CalibrationConfig
 from paani.config.recording import RecorderConfig
 from paani.config.section import Positive, Section
 from paani.config.seeing import CameraConfig, PerceptionConfig
@@ -43,6 +44,7 @@ class Config(Section, frozen=True):
     profile: Literal["paani", "paper"] = "paani"
     bus: BusConfig = BusConfig()
     camera: CameraConfig = CameraConfig()
+    calibration: CalibrationConfig = CalibrationConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advisor: AdvisorConfig = AdvisorConfig()
     localization: LocalizationConfig = LocalizationConfig()

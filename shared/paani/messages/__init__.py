@@ -28,6 +28,7 @@ from paani.messages.decision import HeardMessage, SentMessage, Step
 from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
+from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
 from paani.messages.perception import (
     Detection,
     Evidence,
@@ -55,6 +56,7 @@ __all__ = [
     "Disagreement",
     "DropCount",
     "Evidence",
+    "FenceArea",
     "Finite",
     "GpsFix",
     "Hazard",
@@ -64,12 +66,16 @@ __all__ = [
     "InferenceTiming",
     "Inhibit",
     "InputHealth",
+    "Keep",
     "Label",
     "Lane",
     "LaneEvidence",
     "LaneRisk",
+    "LegKind",
     "Limit",
     "Message",
+    "Mission",
+    "MissionLeg",
     "MotionCause",
     "MotionState",
     "NavCommand",

@@ -26,6 +26,9 @@ class Inhibit(StrEnum):
     TURN_CAPPED = "TURN_CAPPED"
     NO_ROUTE = "NO_ROUTE"
     ROUTE_FINISHED = "ROUTE_FINISHED"
+    HOLDING = "HOLDING"
+    MISSION_DONE = "MISSION_DONE"
+    OUTSIDE_FENCE = "OUTSIDE_FENCE"
     WRONG_DOMAIN = "WRONG_DOMAIN"
     NO_COMMAND = "NO_COMMAND"
     STALE_COMMAND = "STALE_COMMAND"
@@ -49,6 +52,8 @@ class NavCommand(Message, frozen=True, kw_only=True):
     waypoints_reached: Count = 0
     cross_track_m: Finite = 0.0
     advisory_sent_us: Stamp = 0
+    leg_index: Count = 0
+    leg: Text = ""
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True):
@@ -85,7 +90,11 @@ class Arming(Message, frozen=True, kw_only=True):
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """Estimated pose and body velocities; an estimate, never simulator truth (checklist L4)."""
+    """Estimated pose and body velocities; an estimate, never simulator truth (checklist L4).
+
+    nis: squared Mahalanobis distance of the newest GPS position from the expected one, 2 on average if the stated
+    spread is right; 0: none yet. refused_fixes: how many lay too far off to be used, since the estimate began.
+    """
 
     x_m: Finite
     y_m: Finite
@@ -101,3 +110,5 @@ class Odometry(Message, frozen=True, kw_only=True):
     longitude_deg: Finite = 0.0
     roll_rad: Finite = 0.0
     pitch_rad: Finite = 0.0
+    nis: NonNegative = 0.0
+    refused_fixes: Count = 0

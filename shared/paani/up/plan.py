@@ -12,7 +12,7 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from paani.bus.routing import require_free
-from paani.config import Config
+from paani.config import Config, calibration_of
 from paani.errors import UserError
 from paani.runtime import runtime_dir
 
@@ -31,7 +31,8 @@ async def make_plan(config: Config) -> Plan:
     """Complete the settings. Raises UserError for what can be known before anything starts.
 
     The world's route and origin are handed to navigator and localization unless they have their own.
-    With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse.
+    With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse; with `sim` the
+    calibration is the eye's, unless another is given as valid.
     """
     require_free(config.bus.router)
     await _require_source(config.camera.source)
@@ -45,7 +46,8 @@ async def make_plan(config: Config) -> Plan:
         localization = replace(localization, origin_lat_lon_deg=origin_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
-        return Plan(config.services, config)
+        calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
+        return Plan(config.services, replace(config, calibration=calibration))
     adapter = config.plant.adapter
     adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
     config = replace(config, plant=replace(config.plant, adapter=adapter))

@@ -2,22 +2,10 @@
 
 import numpy as np
 
+from paani_sim.eye.barges import barge, narrowboat, tug, workboat
+from paani_sim.eye.hull import DARK, HULLS, TIMBER, WHITE, hull
 from paani_sim.eye.mesh import GLASS, WOOD, Mesh, Rgb, box, ellipsoid, loft, merge, placed, rod
 from paani_sim.eye.people import person
-
-WHITE: Rgb = (0.93, 0.93, 0.90)
-DARK: Rgb = (0.10, 0.11, 0.12)
-HULLS: tuple[Rgb, ...] = (
-    WHITE,
-    (0.13, 0.22, 0.40),
-    (0.70, 0.13, 0.12),
-    (0.88, 0.86, 0.78),
-    (0.12, 0.33, 0.24),
-    (0.95, 0.72, 0.15),
-    (0.22, 0.24, 0.27),
-    (0.40, 0.62, 0.78),
-)
-TIMBER: Rgb = (0.50, 0.34, 0.20)
 
 
 def boat(look: str, length_m: float, width_m: float, height_m: float, variant: int) -> list[Mesh]:
@@ -28,9 +16,11 @@ def boat(look: str, length_m: float, width_m: float, height_m: float, variant: i
         "kayak": _kayak,
         "cruiser": _cruiser,
         "sailboat": _sailboat,
-        "workboat": _workboat,
-        "barge": _barge,
+        "workboat": workboat,
+        "barge": barge,
         "pontoonboat": _pontoonboat,
+        "narrowboat": narrowboat,
+        "tug": tug,
     }[look]
     return build(length_m, width_m, height_m, HULLS[variant % len(HULLS)], variant)
 
@@ -44,62 +34,16 @@ BOAT_LOOKS = (
     "workboat",
     "barge",
     "pontoonboat",
+    "narrowboat",
+    "tug",
 )
-
-
-def _hull(
-    length_m: float,
-    width_m: float,
-    freeboard_m: float,
-    topside: Rgb,
-    *,
-    bottom: Rgb = (0.25, 0.10, 0.09),
-    stripe: Rgb | None = None,
-    bow_power: float = 2.2,
-    stern: float = 0.8,
-    deck: Rgb | None = (0.80, 0.78, 0.72),
-    material: int = 0,
-) -> Mesh:
-    """A lofted hull with sheer; `stern` is the transom's share of the beam; open without `deck`."""
-    at = np.linspace(0.0, 1.0, 13)
-    half = np.where(
-        at < 0.45,
-        stern + (1.0 - stern) * np.sin(0.5 * np.pi * at / 0.45),
-        1.0 - np.clip((at - 0.45) / 0.55, 0.0, 1.0) ** bow_power,
-    )
-    half = 0.5 * width_m * np.maximum(half, 0.015)
-    sheer = freeboard_m * (1.0 + 0.45 * np.clip((at - 0.4) / 0.6, 0.0, 1.0) ** 2)
-    rake = 0.10 * length_m * np.clip((at - 0.5) / 0.5, 0.0, 1.0) ** 2
-    depth = np.array([-0.25, 0.0, 0.10, 0.75, 0.92, 1.0])
-    flare = np.array([0.70, 0.86, 0.89, 0.98, 1.0, 1.0])
-    x = (0.9 * at - 0.5)[:, None] * length_m + rake[:, None] * np.clip(depth, 0.0, 1.0)[None] ** 0.8
-    y = half[:, None] * flare[None]
-    z = np.where(depth < 0.0, depth * 1.2, depth * sheer[:, None])
-    rows = np.array([bottom, bottom, topside, topside, stripe or topside, stripe or topside])
-    colours = np.broadcast_to(rows[None], (13, 6, 3))
-    skin = np.stack([x, y, np.broadcast_to(z, x.shape)], axis=-1)
-    other = skin * np.array([1.0, -1.0, 1.0])
-    parts = [loft(skin[::-1], colours, material), loft(other, colours, material)]
-    transom = np.stack([skin[0], other[0]])
-    parts.append(loft(transom, np.broadcast_to(rows[None], (2, 6, 3)), material))
-    if deck is None:
-        floor = skin[:, 3] * np.array([1.0, 0.86, 1.0]) - [0.0, 0.0, 0.55 * freeboard_m]
-        rim = skin[:, -1] * np.array([1.0, 0.95, 1.0])
-        inner: Rgb = (0.62 * topside[0], 0.60 * topside[1], 0.56 * topside[2])
-        for sign in (1.0, -1.0):
-            flip = np.array([1.0, sign, 1.0])
-            parts.append(loft(np.stack([rim * flip, floor * flip]), inner, material))
-        parts.append(loft(np.stack([floor, floor * [1.0, -1.0, 1.0]]), inner, material))
-    else:
-        parts.append(loft(np.stack([skin[:, -1], other[:, -1]]), deck))
-    return merge(*parts)
 
 
 def _rowboat(length: float, width: float, height: float, rgb: Rgb, variant: int) -> list[Mesh]:
     wooden = variant % 2 == 0
     topside = TIMBER if wooden else rgb
     free = min(0.45, height)
-    hull = _hull(
+    shell = hull(
         length,
         width,
         free,
@@ -109,7 +53,7 @@ def _rowboat(length: float, width: float, height: float, rgb: Rgb, variant: int)
         bow_power=1.8,
         material=WOOD if wooden else 0,
     )
-    parts = [hull]
+    parts = [shell]
     for x in (-0.28, 0.02, 0.28):
         thwart = box((0.22, 0.86 * width, 0.04), (0.58, 0.42, 0.26), WOOD)
         parts.append(placed(thwart, (x * length, 0.0, 0.72 * free)))
@@ -178,7 +122,7 @@ def _kayak(length: float, width: float, height: float, rgb: Rgb, variant: int) -
 def _cruiser(length: float, width: float, height: float, rgb: Rgb, variant: int) -> list[Mesh]:
     free = 0.36 * height
     accent = HULLS[(variant + 1) % len(HULLS)] if rgb == WHITE else WHITE
-    parts = [_hull(length, width, free, rgb, stripe=accent, stern=0.9)]
+    parts = [hull(length, width, free, rgb, stripe=accent, stern=0.9)]
     cabin_l, cabin_h = 0.34 * length, height - 1.15 * free
     at = np.array([[-0.5, 1.0], [0.42, 1.0], [0.26, 0.0], [-0.44, 0.0]])
     for low, high, rgb_part, material in (
@@ -234,7 +178,7 @@ def _cruiser(length: float, width: float, height: float, rgb: Rgb, variant: int)
 
 def _sailboat(length: float, width: float, height: float, rgb: Rgb, variant: int) -> list[Mesh]:
     free = 0.12 * length
-    parts = [_hull(length, width, free, rgb, stripe=DARK, stern=0.65, deck=(0.78, 0.70, 0.55))]
+    parts = [hull(length, width, free, rgb, stripe=DARK, stern=0.65, deck=(0.78, 0.70, 0.55))]
     cabin = placed(box((0.36 * length, 0.5 * width, 0.34), WHITE), (0.04 * length, 0, free + 0.15))
     window = box((0.28 * length, 0.51 * width, 0.13), (0.09, 0.11, 0.13), GLASS)
     parts += [cabin, placed(window, (0.04 * length, 0.0, free + 0.2))]
@@ -270,80 +214,6 @@ def _sailboat(length: float, width: float, height: float, rgb: Rgb, variant: int
     else:
         roll = ellipsoid((0.22 * length, 0.13, 0.16), cover)
         parts.append(placed(roll, (-0.12 * length, 0.0, boom_z + 0.14)))
-    return [merge(*parts)]
-
-
-def _workboat(length: float, width: float, height: float, rgb: Rgb, variant: int) -> list[Mesh]:
-    free = 0.32 * height
-    parts = [
-        _hull(
-            length,
-            width,
-            free,
-            rgb,
-            stripe=DARK,
-            stern=0.92,
-            bow_power=3.0,
-            deck=(0.46, 0.47, 0.44),
-        )
-    ]
-    house_h = height - free
-    house = box((0.24 * length, 0.62 * width, house_h), (0.90, 0.88, 0.80))
-    glass = box((0.245 * length, 0.63 * width, 0.32 * house_h), (0.09, 0.11, 0.13), GLASS)
-    roof = box((0.30 * length, 0.72 * width, 0.08), (0.80, 0.30, 0.12))
-    x = 0.12 * length
-    parts += [
-        placed(house, (x, 0.0, free + 0.5 * house_h)),
-        placed(glass, (x, 0.0, free + 0.70 * house_h)),
-        placed(roof, (x, 0.0, free + house_h)),
-        rod((x, 0, height), (x, 0, height + 1.3), 0.04, DARK),
-    ]
-    for k in range(4):
-        for side in (1.0, -1.0):
-            tyre = placed(
-                ellipsoid((0.24, 0.10, 0.24), (0.06, 0.06, 0.06)),
-                ((-0.36 + 0.2 * k) * length, side * 0.5 * width, 0.6 * free),
-            )
-            parts.append(tyre)
-    parts.append(
-        placed(
-            box((0.16 * length, 0.4 * width, 0.5), (0.30, 0.42, 0.30)),
-            (-0.28 * length, 0.0, free + 0.25),
-        )
-    )
-    return [merge(*parts)]
-
-
-def _barge(length: float, width: float, height: float, rgb: Rgb, variant: int) -> list[Mesh]:
-    free = 0.34 * height
-    hull_rgb: Rgb = DARK if variant % 2 == 0 else rgb
-    parts = [
-        _hull(
-            length,
-            width,
-            free,
-            hull_rgb,
-            stripe=(0.75, 0.62, 0.25),
-            stern=0.9,
-            bow_power=5.0,
-            deck=(0.30, 0.30, 0.32),
-        )
-    ]
-    house_l, house_h = 0.66 * length, height - free
-    sides = HULLS[(variant + 4) % len(HULLS)]
-    cabin = box((house_l, 0.78 * width, house_h), sides)
-    roof = box((house_l + 0.3, 0.84 * width, 0.06), (0.62, 0.60, 0.55))
-    parts += [
-        placed(cabin, (-0.06 * length, 0.0, free + 0.5 * house_h)),
-        placed(roof, (-0.06 * length, 0.0, free + house_h)),
-    ]
-    for k in range(6):
-        pane = box((0.07 * house_l, 0.79 * width, 0.36 * house_h), (0.10, 0.12, 0.13), GLASS)
-        x = -0.06 * length + (k - 2.5) * 0.15 * house_l
-        parts.append(placed(pane, (x, 0.0, free + 0.58 * house_h)))
-    for k in range(3):
-        pot = ellipsoid((0.3, 0.3, 0.22), (0.25, 0.38, 0.15))
-        parts.append(placed(pot, ((-0.2 + 0.14 * k) * length, 0.2, height + 0.12)))
     return [merge(*parts)]
 
 

@@ -155,7 +155,9 @@ def draw_chunks(gl: ModuleType, batch: Batch, first: npt.NDArray[np.int64], coun
     gl.glMultiDrawElements(gl.GL_TRIANGLES, count.astype(np.int32), gl.GL_UNSIGNED_INT, offsets, len(first))
 
 
-def make_texture(gl: ModuleType, picture: npt.NDArray[np.uint8], unit: int, *, wrap_v: bool = True) -> int:
+def make_texture(
+    gl: ModuleType, picture: npt.NDArray[np.uint8], unit: int, *, wrap_u: bool = True, wrap_v: bool = True
+) -> int:
     """Upload `(h, w, c)` (or `(layers, h, w, c)`) with mip levels and leave it bound to `unit`."""
     layered = picture.ndim == 4
     kind = gl.GL_TEXTURE_2D_ARRAY if layered else gl.GL_TEXTURE_2D
@@ -183,11 +185,9 @@ def make_texture(gl: ModuleType, picture: npt.NDArray[np.uint8], unit: int, *, w
     gl.glGenerateMipmap(kind)
     gl.glTexParameteri(kind, gl.GL_TEXTURE_MIN_FILTER, gl.GL_LINEAR_MIPMAP_LINEAR)
     gl.glTexParameteri(kind, gl.GL_TEXTURE_MAG_FILTER, gl.GL_LINEAR)
-    if layered:
-        gl.glTexParameteri(kind, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_EDGE)
-        gl.glTexParameteri(kind, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_EDGE)
-    elif not wrap_v:
-        gl.glTexParameteri(kind, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_EDGE)
+    for wraps, axis in ((wrap_u, gl.GL_TEXTURE_WRAP_S), (wrap_v, gl.GL_TEXTURE_WRAP_T)):
+        if not wraps:
+            gl.glTexParameteri(kind, axis, gl.GL_CLAMP_TO_EDGE)
     return int(texture)
 
 

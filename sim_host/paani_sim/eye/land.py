@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from paani_sim.eye import sprites
+from paani_sim.eye.buildings import house
 from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
-from paani_sim.eye.structures import house
+from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, quay
 from paani_sim.worlds.curves import Points, clearance_m, normals_left, resample_closed
-from paani_sim.worlds.world import Kind, World
+from paani_sim.worlds.world import Bank, Kind, World
 
 F64 = npt.NDArray[np.float64]
 REACH_M = 460.0
@@ -30,18 +31,21 @@ class Land:
 def make_land(world: World) -> Land:
     """The land of a world, the same for the same seed."""
     rng = np.random.default_rng([world.seed, 1])
-    field = _Noise(rng)
+    field = _Field(rng, world.bank)
+    edge = quay(world, np.random.default_rng([world.seed, 4])) if world.bank is Bank.QUAY else ()
+    near = edge or (_shore_strip(world, field),)
     return Land(
-        ground=merge(_shore_strip(world, field), _far_ground(world, field), _hills(world, field)),
+        ground=merge(*near, _far_ground(world, field), _hills(world, field)),
         houses=_houses(world, field, rng),
         plants=_plants(world, field, rng),
     )
 
 
-class _Noise:
-    """Smooth noise of position, about -1..1, from a handful of waves."""
+class _Field:
+    """Smooth noise of position, about -1..1, from a handful of waves; and what the land's edge is made of."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, bank: Bank) -> None:
+        self.bank = bank
         self._angle = rng.uniform(0.0, 2.0 * np.pi, (3, 6))
         self._phase = rng.uniform(0.0, 2.0 * np.pi, (3, 6))
 
@@ -54,18 +58,22 @@ class _Noise:
         return total / 3.0
 
 
-def ground_height_m(field: _Noise, xy_m: F64, clear_m: F64) -> F64:
-    """Height of the ground `clear_m` from the shore: a steep foot, a gentle bank, hills far off."""
-    clear = clear_m + 0.25 * field.at(xy_m, 5.0)
+def ground_height_m(field: _Field, xy_m: F64, clear_m: F64) -> F64:
+    """Height of the ground `clear_m` from the shore: a steep foot or a wall, a gentle bank, hills far off."""
+    quayed = field.bank is Bank.QUAY
+    clear = clear_m if quayed else clear_m + 0.25 * field.at(xy_m, 5.0)
     inland = np.maximum(-clear, 0.0)
-    rough = field.at(xy_m, 24.0, 1) * np.clip(inland / 8.0, 0.0, 1.0) * 0.5
+    rough = field.at(xy_m, 24.0, 1) * np.clip((inland - PAVED_M * quayed) / 8.0, 0.0, 1.0) * 0.5
     rise = np.clip((inland - 50.0) / 260.0, 0.0, 1.0)
     hills = rise**2 * (3.0 - 2.0 * rise) * (16.0 + 10.0 * field.at(xy_m, 300.0, 2))
+    if quayed:
+        behind = np.maximum(inland - PAVED_M, 0.0)
+        return np.where(inland > 0.0, QUAY_TOP_M + 0.02 * behind + 0.4 * rough + hills, -2.0)
     dry = 0.75 * (1.0 - np.exp(-inland / 1.6)) + 0.035 * inland + rough + hills
     return np.where(clear > 0.0, np.maximum(-0.45 * clear, -2.0), dry)
 
 
-def _ground_rgb(field: _Noise, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
+def _ground_rgb(field: _Field, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
     """Mud and stones by the water, then grass in patches, then woodland."""
     dry = 0.5 + 0.5 * np.clip(field.at(xy_m, 30.0, 2), -1.0, 1.0)
     grass = np.array([0.28, 0.32, 0.15]) + dry[:, None] * np.array([0.14, 0.08, 0.05])
@@ -79,7 +87,7 @@ def _ground_rgb(field: _Noise, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
     return lit
 
 
-def _surface(field: _Noise, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
+def _surface(field: _Field, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
     """Ground over a grid `(rows, columns, 2)` of known clearance, `sink_m` lower than it is."""
     rows, columns = grid_xy.shape[:2]
     flat = grid_xy.reshape(-1, 2)
@@ -89,7 +97,7 @@ def _surface(field: _Noise, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
     return loft(points, rgb.reshape(rows, columns, 3), LAND)
 
 
-def _shore_strip(world: World, field: _Noise) -> Mesh:
+def _shore_strip(world: World, field: _Field) -> Mesh:
     shore = resample_closed(world.shore_m, int(len(world.shore_m) * 1.3))
     outward = -normals_left(shore, closed=True)
     ring = np.vstack([shore, shore[:1]])
@@ -98,18 +106,18 @@ def _shore_strip(world: World, field: _Noise) -> Mesh:
     return _surface(field, grid, clearance_m(world.shore_m, grid.reshape(-1, 2)), 0.0)
 
 
-def _far_ground(world: World, field: _Noise) -> Mesh:
+def _far_ground(world: World, field: _Field) -> Mesh:
     low, high = world.shore_m.min(axis=0) - REACH_M, world.shore_m.max(axis=0) + REACH_M
     x, y = np.arange(low[0], high[0], COARSE_M), np.arange(low[1], high[1], COARSE_M)
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     clear = clearance_m(world.shore_m, grid.reshape(-1, 2))
     sheet = _surface(field, grid, clear, 0.12)
-    dry = clear < -4.0
+    dry = clear < (-PAVED_M if field.bank is Bank.QUAY else -4.0)
     triangles = grid_triangles(len(x), len(y))
     return Mesh(sheet.vertices, triangles[dry[triangles].all(axis=1)])
 
 
-def _hills(world: World, field: _Noise) -> Mesh:
+def _hills(world: World, field: _Field) -> Mesh:
     """A ring of wooded hills that closes every view."""
     middle = 0.5 * (world.shore_m.min(axis=0) + world.shore_m.max(axis=0))
     half = 0.5 * np.ptp(world.shore_m, axis=0)
@@ -125,18 +133,20 @@ def _hills(world: World, field: _Noise) -> Mesh:
     return loft(points, rgb, LAND)
 
 
-def _houses(world: World, field: _Noise, rng: np.random.Generator) -> tuple[Mesh, ...]:
+def _houses(world: World, field: _Field, rng: np.random.Generator) -> tuple[Mesh, ...]:
     shore = resample_closed(world.shore_m, 400)
     outward = -normals_left(shore, closed=True)
     found: list[Mesh] = []
-    taken: list[Points] = []
+    quayed = field.bank is Bank.QUAY
+    near_m, far_m, most, apart_m = (PAVED_M + 5.5, 34.0, 30, 17.0) if quayed else (16.0, 46.0, 14, 20.0)
+    taken: list[Points] = [np.array(o.pose[:2]) for o in world.obstacles if o.kind is Kind.OTHER]
     for _ in range(160):
         index = int(rng.integers(400))
-        spot = shore[index] + outward[index] * rng.uniform(16.0, 46.0)
+        spot = shore[index] + outward[index] * rng.uniform(near_m, far_m)
         clear = clearance_m(world.shore_m, spot[None])
-        if clear[0] > -14.0:
+        if clear[0] > 2.0 - near_m:
             continue
-        if any(np.hypot(*(spot - other)) < 20.0 for other in taken):
+        if any(np.hypot(*(spot - other)) < apart_m for other in taken):
             continue
         taken.append(spot)
         z = float(ground_height_m(field, spot[None], clear)[0])
@@ -149,7 +159,7 @@ def _houses(world: World, field: _Noise, rng: np.random.Generator) -> tuple[Mesh
                 yaw_rad=along + float(rng.normal(0.0, 0.25)),
             )
         )
-        if len(found) == 14:
+        if len(found) == most:
             break
     return tuple(found)
 
@@ -180,15 +190,20 @@ _SOWN = (
 )
 
 
-def _plants(world: World, field: _Noise, rng: np.random.Generator) -> npt.NDArray[np.float32]:
+def _plants(world: World, field: _Field, rng: np.random.Generator) -> npt.NDArray[np.float32]:
     """Reeds and bushes at the edge, trees behind, woodland to the hills; open meadows between."""
     shore = resample_closed(world.shore_m, 4000)
     outward = -normals_left(shore, closed=True)
     open_kinds = (Kind.PERSON, Kind.PIER, Kind.OTHER)
     keep_free = np.array([o.pose[:2] for o in world.obstacles if o.kind in open_kinds]).reshape(-1, 2)
     rows = []
+    quayed = world.bank is Bank.QUAY
     for sown in _SOWN:
         near, far = sown.inland_m
+        if quayed:
+            if far <= PAVED_M:
+                continue
+            near = max(near, PAVED_M + 1.0)
         index = rng.integers(len(shore), size=sown.plants * 2)
         xy = shore[index] + outward[index] * rng.uniform(near, far, len(index))[:, None]
         xy = xy[field.at(xy, sown.patch_m, sown.layers[0] % 3) > sown.bar]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 F32 = npt.NDArray[np.float32]
 Rgb = tuple[float, float, float]
 
-PAINT, LAND, WOOD, ROCK, GLASS, FACADE = range(6)
+PAINT, LAND, WOOD, ROCK, GLASS, FACADE, BRICK, STONE, PAVING = range(9)
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,11 +29,12 @@ from paani_sim.eye.scene import (
 )
 from paani_sim.eye.sky import Sky, paint_sky
 from paani_sim.eye.sprites import paint_sprites
+from paani_sim.eye.surfaces import SPAN_M, surface_tiles
 from paani_sim.eye.waves import mean_square_slope, noise_tile, slope_tile
-from paani_sim.worlds.world import Light, Obstacle, Wind, World, actor_pose
+from paani_sim.worlds.world import Light, Obstacle, Wind, World, actor_at, along_at
 
 F32 = npt.NDArray[np.float32]
-_NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _MAIN = 0, 1, 2, 3, 4, 6
+_NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _MAIN, _SURFACES = 0, 1, 2, 3, 4, 6, 8
 _FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
 _QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
 _IDENTITY = np.eye(4, dtype=np.float32)
@@ -85,6 +86,7 @@ class Eye:
                 ("panorama", _SKY),
                 ("sprites", _SPRITES),
                 ("slopes", _SLOPES),
+                ("surfaces", _SURFACES),
                 ("mirrorView", _MIRROR),
             ):
                 program.sampler(name, unit)
@@ -94,7 +96,8 @@ class Eye:
     def _upload(self) -> None:
         gl, scene = self._gl, self.scene
         g.make_texture(gl, noise_tile(self.world.seed), _NOISE)
-        g.make_texture(gl, paint_sprites(self.world.seed, self.world.season_frac), _SPRITES)
+        g.make_texture(gl, paint_sprites(self.world.seed, self.world.season_frac), _SPRITES, wrap_u=False, wrap_v=False)
+        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES)
         g.make_texture(gl, slope_tile(self.world.seed), _SLOPES)
         width, height = self.camera.width_px, self.camera.height_px
         self._mirror = g.make_target(gl, width, height, _MIRROR)
@@ -129,6 +132,7 @@ class Eye:
             "slopeRms": float(np.sqrt(mean_square_slope(wind.speed_mps))),
             "bodyRgb": body,
             "flow": np.zeros(2, np.float32),
+            "tilesPerMetre": np.divide(1.0, SPAN_M[1:], dtype=np.float32),
         }
 
     def place(self, obstacles: Sequence[Obstacle]) -> None:
@@ -140,14 +144,17 @@ class Eye:
         self._extra = g.make_batch(self._gl, rows.rows, ROW_WIDTHS, rows.order)
         self.things = (*self.scene.things, *things)
 
-    def render(self, pose: BoatPose, t_s: float) -> Picture:
-        """The picture at simulated time `t_s`, actors and waves included."""
-        self._draw(pose, t_s)
+    def render(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Picture:
+        """The picture at simulated time `t_s`, waves included.
+
+        Actors are `actors_along_m` down their paths, in the world's order; empty: as far as time says.
+        """
+        self._draw(pose, t_s, actors_along_m)
         return Picture(self._develop(t_s))
 
-    def render_labelled(self, pose: BoatPose, t_s: float) -> Labelled:
+    def render_labelled(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Labelled:
         """The picture with its class mask and the boxes of what is visible."""
-        self._draw(pose, t_s)
+        self._draw(pose, t_s, actors_along_m)
         labels = g.read_target(self._gl, self._main, 1)
         rows, columns = (
             ((np.arange(count) + 0.5) * self._scale).astype(int)
@@ -164,7 +171,7 @@ class Eye:
             bgr = cv2.resize(bgr, size, interpolation=cv2.INTER_AREA)
         return self._lens.apply(np.asarray(bgr, np.uint8), round(t_s * 1000.0))
 
-    def _draw(self, pose: BoatPose, t_s: float) -> None:
+    def _draw(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float]) -> None:
         gl = self._gl
         self._context.make_current()
         position, _ = look_from(pose, self.camera)
@@ -179,17 +186,19 @@ class Eye:
             "heading": pose.yaw_rad,
             "screen": np.array([self._main.width_px, self._main.height_px], np.float32),
         }
+        along_m = actors_along_m or [along_at(actor, t_s) for actor in self.world.actors]
+        moved = [(_model(*actor_at(actor, m)), batch) for (actor, batch), m in zip(self._actors, along_m, strict=True)]
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthFunc(gl.GL_LEQUAL)
         gl.glEnable(gl.GL_CLIP_DISTANCE0)
         self._begin(self._mirror, labels=False)
-        self._draw_solids(shared, t_s, -1.0)
+        self._draw_solids(shared, moved, -1.0)
         gl.glActiveTexture(gl.GL_TEXTURE0 + _MIRROR)
         gl.glBindTexture(gl.GL_TEXTURE_2D, self._mirror.colour)
         gl.glGenerateMipmap(gl.GL_TEXTURE_2D)
         gl.glDisable(gl.GL_CLIP_DISTANCE0)
         self._begin(self._main, labels=True)
-        self._draw_solids(shared, t_s, 1.0)
+        self._draw_solids(shared, moved, 1.0)
         self._programs["water"].use(**shared)
         g.draw(gl, self._screen)
         self._programs["sky"].use(**shared)
@@ -204,11 +213,11 @@ class Eye:
         gl.glClearColor(0.0, 0.0, 0.0, 0.0)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
 
-    def _draw_solids(self, shared: dict[str, float | F32], t_s: float, flip: float) -> None:
+    def _draw_solids(self, shared: dict[str, float | F32], moved: list[tuple[F32, g.Batch]], flip: float) -> None:
         gl, solid = self._gl, self._programs["solid"]
         solid.use(**shared, flip=flip, mapFromModel=_IDENTITY)
-        for actor, batch in self._actors:
-            solid.use(mapFromModel=_model(*actor_pose(actor, t_s)))
+        for model, batch in moved:
+            solid.use(mapFromModel=model)
             g.draw(gl, batch)
         solid.use(mapFromModel=_IDENTITY)
         if self._extra is not None:

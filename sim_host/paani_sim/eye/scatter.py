@@ -22,6 +22,8 @@ BOAT_SIZES_M = {
     "workboat": (6.0, 9.0, 0.36, 2.7),
     "barge": (10.0, 17.0, 0.20, 2.3),
     "pontoonboat": (5.5, 8.0, 0.38, 2.5),
+    "narrowboat": (10.0, 18.0, 0.14, 1.8),
+    "tug": (9.0, 15.0, 0.32, 6.0),
 }  # length from, to; beam over length; height
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from paani_sim.eye.boats import boat
+from paani_sim.eye.buildings import crane, warehouse
 from paani_sim.eye.land import make_land
 from paani_sim.eye.mesh import Mesh, placed
 from paani_sim.eye.people import person
@@ -106,6 +107,10 @@ def _build(thing: Obstacle | Actor) -> list[Mesh]:
         return [pier(thing.look, *size, thing.variant)]
     if thing.kind is Kind.PERSON:
         return [person(thing.look, thing.height_m, thing.variant)]
+    if thing.look == "crane":
+        return [crane(*size, thing.variant)]
+    if thing.look == "warehouse":
+        return [warehouse(*size, thing.variant)]
     base_z_m = thing.base_z_m if isinstance(thing, Obstacle) else 0.0
     return [bridge(thing.length_m, thing.width_m, base_z_m, thing.height_m)]
 

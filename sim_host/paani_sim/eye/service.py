@@ -44,9 +44,10 @@ def pose_of(truth: m.TruePose) -> BoatPose:
     return BoatPose(truth.x_m, truth.y_m, truth.yaw_rad, truth.z_m, truth.roll_rad, truth.pitch_rad)
 
 
-def jpeg(eye: Eye, pose: BoatPose, t_s: float, quality: int) -> bytes:
+def jpeg(eye: Eye, pose: BoatPose, t_s: float, quality: int, actors_along_m: tuple[float, ...] = ()) -> bytes:
     """One encoded picture."""
-    _, data = cv2.imencode(".jpg", eye.render(pose, t_s).bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    picture = eye.render(pose, t_s, actors_along_m)
+    _, data = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
 
 
@@ -69,7 +70,13 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     frame_seq = 0
                 epoch = truth.epoch
                 data = await loop.run_in_executor(
-                    gl_thread, jpeg, eye, pose_of(truth), truth.sim_us * 1e-6, settings.jpeg_quality
+                    gl_thread,
+                    jpeg,
+                    eye,
+                    pose_of(truth),
+                    truth.sim_us * 1e-6,
+                    settings.jpeg_quality,
+                    truth.actors_along_m,
                 )
                 header = m.PictureHeader(
                     source_us=truth.source_us,

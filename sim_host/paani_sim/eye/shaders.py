@@ -33,11 +33,11 @@ SOLID_VERTEX = (
 layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 paint; layout(location = 3) in float number;
 uniform mat4 clipFromMap; uniform mat4 mapFromModel;
-out vec3 world; out vec3 facing; out vec3 tint; out vec3 hazeTint;
+out vec3 world; out vec3 place; out vec3 facing; out vec3 tint; out vec3 hazeTint;
 flat out int kind; flat out float id;
 void main() {
     vec4 p = mapFromModel * vec4(position, 1.0);
-    world = p.xyz; facing = mat3(mapFromModel) * normal; tint = paint.rgb * paint.rgb;
+    world = p.xyz; place = position; facing = mat3(mapFromModel) * normal; tint = paint.rgb * paint.rgb;
     kind = int(paint.a + 0.5); id = number;
     hazeTint = hazeLight(p.xyz - eye);
     gl_ClipDistance[0] = flip < 0.0 ? p.z : 1.0;
@@ -46,38 +46,43 @@ void main() {
 """
 )
 
-# The software rasteriser runs every branch, so the surfaces share two noise samples.
+# The software rasteriser runs every branch, so the surfaces share two samples.
 SOLID_FRAGMENT = (
     _COMMON
     + """
-in vec3 world; in vec3 facing; in vec3 tint; in vec3 hazeTint;
+in vec3 world; in vec3 place; in vec3 facing; in vec3 tint; in vec3 hazeTint;
 flat in int kind; flat in float id;
+uniform sampler2DArray surfaces; uniform vec3 tilesPerMetre;
 layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
 void main() {
     vec3 toEye = eye - world; float range = length(toEye);
     vec3 n = normalize(facing), v = toEye / range;
     if (dot(n, vec3(v.xy, v.z * flip)) < 0.0) n = -n;
     bool land = kind == 1, wood = kind == 2, rock = kind == 3, glass = kind == 4, facade = kind == 5;
-    float across = world.x + 0.8 * world.y;
-    vec2 wall = vec2(abs(n.x) > abs(n.y) ? world.y : world.x, world.z);
-    vec2 wide = land ? world.xy * 0.021 : wood ? vec2(across, world.z * 4.0) * 0.9
-        : facade ? wall * 0.1 : vec2(across, world.z) * 0.5;
-    vec2 fine = land ? world.xy * 0.17 : vec2(across, world.z) * 0.23;
-    vec4 a = texture(noiseTile, wide), b = texture(noiseTile, fine);
+    bool laid = kind >= 6;
+    float across = place.x + 0.8 * place.y;
+    vec2 wall = vec2(abs(n.x) > abs(n.y) ? place.y : place.x, place.z);
+    vec2 course = abs(n.z) > 0.7 ? place.xy : vec2(dot(place.xy, normalize(vec2(-n.y, n.x))), place.z);
+    vec2 wide = land ? place.xy * 0.021 : wood ? vec2(across, place.z * 4.0) * 0.9
+        : facade ? wall * 0.1 : laid ? course * tilesPerMetre[kind - 6] : vec2(across, place.z) * 0.5;
+    vec2 fine = land ? place.xy * 0.17 : laid ? course * 0.07 : vec2(across, place.z) * 0.23;
+    vec4 a = texture(surfaces, vec3(wide, laid ? float(kind - 5) : 0.0)), b = texture(noiseTile, fine);
     float stain = land ? 0.35 + 0.55 * a.g + 0.6 * b.b + 0.35 * b.r + 0.5 * (b.a - 0.5)
         : wood ? 0.55 + 0.9 * a.b
         : rock ? (0.45 + 0.6 * b.g + 0.5 * b.b) * mix(0.45, 1.0, smoothstep(0.05, 0.55, world.z))
-        : 0.84 + 0.32 * a.g;
+        : laid ? 2.0 * a.g * (0.62 + 0.5 * b.g + 0.26 * b.r) : 0.84 + 0.32 * a.g;
     vec2 cell = fract(wall * vec2(0.42, 0.38));
     bool pane = facade && abs(cell.x - 0.5) < 0.2 && abs(cell.y - 0.55) < 0.24 && abs(n.z) < 0.5;
     vec3 dry = mix(vec3(1.0), vec3(1.35, 1.08, 0.7), land ? clamp(a.r * 2.0 - 0.9, 0.0, 1.0) : 0.0);
     vec3 albedo = pane ? vec3(0.02, 0.025, 0.03) : tint * stain * dry;
+    float slime = laid ? 1.0 - smoothstep(0.10, 0.34, world.z - 0.35 * (b.b - 0.5)) : 0.0;
+    albedo = mix(albedo, vec3(0.030, 0.042, 0.016) * (0.5 + a.g), 0.85 * slime);
     n = land ? normalize(n + vec3(b.b - 0.5, b.g - 0.5, 0.0) * 1.1) : n;
     albedo *= mix(0.55, 1.0, smoothstep(-0.02, 0.14, world.z));
     float direct = max(dot(n, sun), 0.0);
     vec3 light = sunRgb * direct + skyRgb * (0.62 + 0.38 * n.z) + 0.10 * sunRgb * (0.5 - 0.5 * n.z);
     vec3 shade = albedo * light;
-    float gloss = glass ? 0.45 : pane ? 0.35 : land || wood || rock ? 0.0 : 0.05;
+    float gloss = glass ? 0.45 : pane ? 0.35 : land || wood || rock || laid ? 0.0 : 0.05;
     vec3 mirrored = reflect(-v, n);
     float edge = gloss + gloss * 4.0 * pow(1.0 - max(dot(n, v), 0.0), 5.0);
     shade += edge * mix(hazeTint, skyRgb, clamp(abs(mirrored.z) * 1.5, 0.0, 1.0)) * 0.8;

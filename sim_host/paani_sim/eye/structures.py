@@ -1,10 +1,10 @@
-"""Buoys, piers, the bridge and houses as meshes: centred on the origin, water at z = 0."""
+"""Buoys, piers and the bridge as meshes: centred on the origin, water at z = 0."""
 
 import numpy as np
 
 from paani_sim.eye.mesh import (
-    FACADE,
     ROCK,
+    STONE,
     WOOD,
     Mesh,
     Rgb,
@@ -25,7 +25,7 @@ BUOY_RGB: tuple[Rgb, ...] = (
     (0.10, 0.10, 0.11),
 )
 BUOY_LOOKS = ("can", "cone", "sphere", "pillar", "spar")
-PIER_LOOKS = ("jetty", "pontoon", "quay")
+PIER_LOOKS = ("jetty", "pontoon", "quay", "quay_steps", "finger")
 TIMBER: Rgb = (0.47, 0.39, 0.30)
 CONCRETE: Rgb = (0.62, 0.61, 0.58)
 STEEL: Rgb = (0.30, 0.32, 0.34)
@@ -92,7 +92,7 @@ def buoy(look: str, width_m: float, height_m: float, variant: int) -> Mesh:
 
 def pier(look: str, length_m: float, width_m: float, height_m: float, variant: int) -> Mesh:
     """A pier along x, its head toward +x."""
-    build = {"jetty": _jetty, "pontoon": _pontoon, "quay": _quay}[look]
+    build = {"jetty": _jetty, "pontoon": _pontoon, "quay": _quay, "quay_steps": _steps, "finger": _finger}[look]
     return build(length_m, width_m, height_m, variant)
 
 
@@ -183,6 +183,50 @@ def _quay(length: float, width: float, height: float, variant: int) -> Mesh:
     return merge(*parts)
 
 
+def _steps(length: float, width: float, height: float, variant: int) -> Mesh:
+    """Stone steps from the top, at -x, down into the water at +x, between low walls."""
+    tone = 1.0 - 0.1 * (variant % 3)
+    stone: Rgb = (0.60 * tone, 0.57 * tone, 0.51 * tone)
+    count = max(3, round((height + 0.3) / 0.20))
+    going = length / count
+    parts = []
+    for k in range(count):
+        top = height - k * (height + 0.3) / count
+        tread = box((going + 0.02, width, top + 0.8), stone, STONE)
+        parts.append(placed(tread, (-0.5 * length + (k + 0.5) * going, 0.0, 0.5 * (top - 0.8))))
+    for side in (1.0, -1.0):
+        y = side * (0.5 * width - 0.12)
+        post_z = height + 0.9
+        rail = rod((-0.5 * length, y, post_z), (0.5 * length, y, 0.9), 0.035, STEEL)
+        parts += [rail, *(rod((x * length, y, -0.3), (x * length, y, z), 0.035, STEEL) for x, z in _rail_posts(post_z))]
+    return merge(*parts)
+
+
+def _rail_posts(top_m: float) -> tuple[tuple[float, float], ...]:
+    """Where along the steps posts stand, and how high their rail is there."""
+    return tuple((x, 0.9 + (0.5 - x) * (top_m - 0.9)) for x in (-0.48, 0.0, 0.48))
+
+
+def _finger(length: float, width: float, height: float, variant: int) -> Mesh:
+    """A narrow floating finger: grey deck, floats under it, fendered edge, cleats, a pile at its head."""
+    deck: Rgb = (0.64, 0.62, 0.58) if variant % 2 == 0 else (0.52, 0.45, 0.36)
+    parts = [
+        placed(box((length, width, 0.12), deck, WOOD), (0.0, 0.0, height - 0.06)),
+        placed(box((length + 0.04, width + 0.10, 0.10), (0.10, 0.10, 0.11)), (0.0, 0.0, height - 0.16)),
+    ]
+    for x in np.linspace(-0.42, 0.42, max(2, round(length / 2.5))):
+        float_ = box((1.0, 0.9 * width, height + 0.1), (0.22, 0.26, 0.34))
+        parts.append(placed(float_, (float(x) * length, 0.0, 0.5 * height - 0.2)))
+        for side in (1.0, -1.0):
+            cleat = box((0.24, 0.06, 0.09), STEEL)
+            parts.append(placed(cleat, (float(x) * length, side * 0.42 * width, height + 0.04)))
+    pile = rod((0.5 * length - 0.2, 0.0, -0.8), (0.5 * length - 0.2, 0.0, height + 1.6), 0.11, STEEL, 8)
+    cap = rod(
+        (0.5 * length - 0.2, 0.0, height + 1.55), (0.5 * length - 0.2, 0.0, height + 1.75), 0.13, (0.9, 0.9, 0.88), 8
+    )
+    return merge(*parts, pile, cap)
+
+
 def bridge(length_m: float, width_m: float, base_z_m: float, height_m: float) -> Mesh:
     """A road bridge along x with a flat arch below and abutments on both banks."""
     deck_z = base_z_m + 0.5
@@ -203,35 +247,4 @@ def bridge(length_m: float, width_m: float, base_z_m: float, height_m: float) ->
         block = box((3.0, width_m + 0.6, deck_z + 1.5), stone, ROCK)
         parts.append(placed(block, (side * (0.5 * length_m - 0.6), 0.0, 0.5 * deck_z - 0.75)))
     parts.append(placed(box((length_m, 0.05, 0.05), STEEL), (0, 0, base_z_m + height_m)))
-    return merge(*parts)
-
-
-def house(width_m: float, depth_m: float, wall_m: float, variant: int) -> Mesh:
-    """A house with a gable roof, long side along x, ground at z = 0."""
-    walls: tuple[Rgb, ...] = (
-        (0.86, 0.82, 0.74),
-        (0.70, 0.42, 0.32),
-        (0.90, 0.90, 0.88),
-        (0.78, 0.70, 0.52),
-    )
-    roofs: tuple[Rgb, ...] = ((0.45, 0.20, 0.15), (0.28, 0.28, 0.30), (0.36, 0.24, 0.18))
-    wall, roof = walls[variant % 4], roofs[variant % 3]
-    half_w, half_d, ridge = 0.5 * width_m + 0.4, 0.5 * depth_m + 0.5, wall_m + 0.42 * depth_m
-    body = placed(box((width_m, depth_m, wall_m + 2.0), wall, FACADE), (0, 0, 0.5 * wall_m - 1.0))
-    parts = [body]
-    for side in (1.0, -1.0):
-        eaves = [(-half_w, side * half_d, wall_m - 0.2), (half_w, side * half_d, wall_m - 0.2)]
-        top = [(-half_w, 0.0, ridge), (half_w, 0.0, ridge)]
-        parts.append(loft(np.array([eaves, top] if side > 0 else [top, eaves]), roof, WOOD))
-        gable = np.array(
-            [
-                [(side * 0.5 * width_m, -0.5 * depth_m, wall_m - 0.1)] * 2,
-                [
-                    (side * 0.5 * width_m, 0.0, ridge - 0.1),
-                    (side * 0.5 * width_m, 0.5 * depth_m, wall_m - 0.1),
-                ],
-            ]
-        )
-        parts.append(loft(gable, wall))
-    parts.append(placed(box((0.7, 0.7, 1.6), (0.45, 0.25, 0.2)), (0.25 * width_m, 0.0, ridge)))
     return merge(*parts)

@@ -1,4 +1,4 @@
-"""The paper's surface dynamics: drag, buoyancy, restoring moments and two fans. Pure scalar maths.
+"""Surface dynamics: drag, buoyancy, restoring moments, added mass, wind and two fans. Pure scalar maths.
 
 Body frame: x forward, y left, z up. Scalars rather than arrays: one call per simulation step.
 """
@@ -6,10 +6,13 @@ Body frame: x forward, y left, z up. Scalars rather than arrays: one call per si
 import math
 from typing import NamedTuple
 
-from paani.config import DynamicsConfig
 from paani.geometry import clip
+from paani_sim.vessels import Vessel
+from paani_sim.water.surroundings import CALM, Surroundings
+from paani_sim.water.waves import GRAVITY_MPS2
+from paani_sim.water.wind import wind_force
 
-GRAVITY_MPS2 = 9.81
+WATER_DENSITY_KGPM3 = 1000.0
 
 
 class HullState(NamedTuple):
@@ -46,41 +49,79 @@ class Attitude(NamedTuple):
 Wrench = tuple[float, float, float, float, float, float]
 
 
-def wrench(state: HullState, fans: Fans, config: DynamicsConfig) -> Wrench:
+def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = CALM) -> Wrench:
     """Force in the map frame [N] and moment in the body frame [N m], without gravity.
 
-    Drag opposes surge, sway and yaw with F = -c1 v - c2 |v| v (K5). Heave is
-    clip(m g + k (z_e - z) - d z', 0, F_max) (K6). Roll and pitch are restored and damped (K7).
+    Drag opposes surge, sway and yaw through the water with F = -c1 v - c2 |v| v (K5). Heave is
+    clip(m g + k (z_e - z) - d z', 0, F_max) (K6), roll and pitch are restored and damped (K7), all three against
+    the water's surface. Its slope pulls the hull downhill (Froude-Krylov); its envelope pushes it along (Maruo 1960;
+    varying slowly as in Newman 1974). Added mass in surge and sway, with its Coriolis force in the plane, makes the
+    force what the bare mass needs for the acceleration of both; that of the other axes is the model's armature.
     """
     forward_x, forward_y, forward_z, left_x, left_y, left_z = _body_axes(state)
-    surge_mps = forward_x * state.vx_mps + forward_y * state.vy_mps + forward_z * state.vz_mps
-    sway_mps = left_x * state.vx_mps + left_y * state.vy_mps + left_z * state.vz_mps
+    drag, buoyancy, hull = vessel.drag, vessel.buoyancy, vessel.hull
+    vx_mps, vy_mps = state.vx_mps - around.current_x_mps, state.vy_mps - around.current_y_mps
+    surge_mps = forward_x * vx_mps + forward_y * vy_mps + forward_z * state.vz_mps
+    sway_mps = left_x * vx_mps + left_y * vy_mps + left_z * state.vz_mps
     yaw_rate = state.yaw_rate_radps
 
+    weight_n = hull.mass_kg * GRAVITY_MPS2
     thrust_n = fans.left_n + fans.right_n
-    ahead_n = thrust_n - _drag(surge_mps, config.surge_linear, config.surge_quadratic)
-    sideways_n = -_drag(sway_mps, config.sway_linear, config.sway_quadratic)
+    ahead_n = thrust_n - _drag(surge_mps, drag.surge_linear, drag.surge_quadratic) - weight_n * around.slope_ahead
+    sideways_n = -_drag(sway_mps, drag.sway_linear, drag.sway_quadratic) - weight_n * around.slope_left
+    port_nm = 0.5 * vessel.fans.spacing_m * (fans.right_n - fans.left_n)
+    port_nm -= _drag(yaw_rate, drag.yaw_linear, drag.yaw_quadratic)
 
-    weight_n = config.mass_kg * GRAVITY_MPS2
+    if vessel.wave_reflection_frac:
+        drift_npm2 = 0.5 * WATER_DENSITY_KGPM3 * GRAVITY_MPS2 * hull.length_m * vessel.wave_reflection_frac**2
+        ahead_n += drift_npm2 * (forward_x * around.envelope_x_m2 + forward_y * around.envelope_y_m2)
+        sideways_n += drift_npm2 * (left_x * around.envelope_x_m2 + left_y * around.envelope_y_m2)
+
+    if vessel.windage.lateral_area_m2 or vessel.windage.frontal_area_m2:
+        air_x_mps, air_y_mps = around.wind_x_mps - state.vx_mps, around.wind_y_mps - state.vy_mps
+        wind = wind_force(
+            forward_x * air_x_mps + forward_y * air_y_mps,
+            left_x * air_x_mps + left_y * air_y_mps,
+            vessel.windage,
+            hull.length_m,
+        )
+        ahead_n += wind[0]
+        sideways_n += wind[1]
+        port_nm += wind[2]
+
+    added = vessel.added_mass
+    if added.surge_ratio or added.sway_ratio:
+        coriolis = (added.sway_ratio - added.surge_ratio) * hull.mass_kg * yaw_rate
+        ahead_n = (ahead_n + coriolis * sway_mps) / (1.0 + added.surge_ratio)
+        sideways_n = (sideways_n + coriolis * surge_mps) / (1.0 + added.sway_ratio)
+
     up_n = clip(
         weight_n
-        + config.heave_stiffness_n_per_m * (config.equilibrium_z_m - state.z_m)
-        - config.heave_damping * state.vz_mps,
+        + buoyancy.heave_stiffness * (buoyancy.equilibrium_z_m + around.elevation_m - state.z_m)
+        - buoyancy.heave_damping * (state.vz_mps - around.elevation_rate_mps),
         0.0,
-        config.max_buoyancy_weights * weight_n,
+        buoyancy.max_weights * weight_n,
     )
-
     angles = attitude(state.qw, state.qx, state.qy, state.qz)
-    stiffness, damping = config.tilt_stiffness_nm_per_rad, config.tilt_damping
     return (
         forward_x * ahead_n + left_x * sideways_n,
         forward_y * ahead_n + left_y * sideways_n,
         forward_z * ahead_n + left_z * sideways_n + up_n,
-        -stiffness * angles.roll_rad - damping * state.roll_rate_radps,
-        -stiffness * angles.pitch_rad - damping * state.pitch_rate_radps + config.fan_height_m * thrust_n,
-        0.5 * config.fan_spacing_m * (fans.right_n - fans.left_n)
-        - _drag(yaw_rate, config.yaw_linear, config.yaw_quadratic),
+        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad)
+        - buoyancy.roll_damping * state.roll_rate_radps,
+        -buoyancy.pitch_stiffness * (around.slope_ahead + angles.pitch_rad)
+        - buoyancy.pitch_damping * state.pitch_rate_radps
+        + vessel.fans.height_m * thrust_n,
+        port_nm,
     )
+
+
+def lagging(fans: Fans, order: Fans, lag_s: float, step_s: float) -> Fans:
+    """The fans' forces one step later: a first-order approach to what is ordered."""
+    if lag_s == 0.0:
+        return order
+    part = 1.0 - math.exp(-step_s / lag_s)
+    return Fans(fans.left_n + part * (order.left_n - fans.left_n), fans.right_n + part * (order.right_n - fans.right_n))
 
 
 def attitude(qw: float, qx: float, qy: float, qz: float) -> Attitude:

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 
 from paani.errors import UserError
+from paani_sim.worlds.canal import canal
 from paani_sim.worlds.faults import Fault, FaultKind
+from paani_sim.worlds.harbour import harbour
 from paani_sim.worlds.lake import lake
 from paani_sim.worlds.river import river
 from paani_sim.worlds.scenario import Scenario, Task
@@ -24,7 +26,7 @@ from paani_sim.worlds.world import (
     along_at,
 )
 
-WORLDS: dict[str, Callable[[], World]] = {"lake": lake, "river": river}
+WORLDS: dict[str, Callable[[], World]] = {"lake": lake, "river": river, "canal": canal, "harbour": harbour}
 
 
 def load_world(name: str) -> World:

@@ -52,6 +52,33 @@ def normals_left(points_m: Points, *, closed: bool) -> Points:
     return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
+def corners(points_m: Points, within_m: float) -> Points:
+    """The closed polygon without the points that lie within `within_m` of the straight line past them."""
+    kept = [0]
+    first = 0
+    count = len(points_m)
+    while first < count:
+        last = first + 1
+        while last < count and _straight(points_m, first, last + 1, within_m):
+            last += 1
+        if last >= count:
+            break
+        kept.append(last)
+        first = last
+    return points_m[kept]
+
+
+def _straight(points_m: Points, first: int, last: int, within_m: float) -> bool:
+    """Whether everything between two points of the closed polygon lies close to the line from one to the other."""
+    between = points_m[first + 1 : last] - points_m[first]
+    way = points_m[last % len(points_m)] - points_m[first]
+    length_m = float(np.hypot(*way))
+    if length_m == 0.0:
+        return False
+    off_m = np.abs(between[:, 0] * way[1] - between[:, 1] * way[0]) / length_m
+    return bool(off_m.max() <= within_m)
+
+
 def inside(polygon_m: Points, points_m: Points) -> npt.NDArray[np.bool_]:
     """Even-odd test of `(m, 2)` points against the closed polygon `(n, 2)`."""
     x, y = points_m[:, 0, None], points_m[:, 1, None]

@@ -6,17 +6,10 @@ Gravity is -9.81 and there is no fluid: buoyancy, drag and thrust are the plant'
 import mujoco
 import numpy as np
 
-from paani_sim.worlds.curves import Points
+from paani_sim.worlds.curves import Points, corners
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
 
 TIMESTEP_S = 0.01
-BOAT_MASS_KG = 12.4  # checklist K4
-BOAT_INERTIA_KGM2 = (0.86, 1.45, 2.05)
-BOAT_REST_Z_M = 0.177  # checklist K6: height of the body's origin at rest
-HULL_HALF_LENGTH_M = 0.65
-HULL_SPACING_M = 0.57
-HULL_RADIUS_M = 0.09
-HULL_Z_M = -0.12
 
 BOAT_BIT = 1  # what the boat is; solids look for it
 SOLID_BIT = 2  # what everything else is; the boat looks for it
@@ -28,12 +21,15 @@ _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SITE = mujoco.mjtObj.mjOBJ_SITE
 
 _SUNK_M = 1.0  # solids reach this far under water
+_STRAIGHT_M = 0.02  # a shore that bends less is straight
 _BANK_HALF_HEIGHT_M = 1.2
 _BANK_HALF_THICKNESS_M = 0.6
 
 
-def build_spec(world: World, *, visual: bool = False) -> mujoco.MjSpec:
+def build_spec(world: World, vessel: Vessel | None = None, *, visual: bool = False) -> mujoco.MjSpec:
     """Build the model, not yet compiled (no Python callback may be installed while compiling).
+
+    `vessel` None: the paper's.
 
     Body `boat` on joint `boat_free` with geoms `hull_port`, `hull_starboard`, site `imu` and
     sensors `accelerometer`, `gyro` (body frame, SI). Geoms `bank_<n>`, one geom per obstacle and
@@ -45,7 +41,7 @@ def build_spec(world: World, *, visual: bool = False) -> mujoco.MjSpec:
     spec.option.timestep = TIMESTEP_S
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0.0, 0.0, -9.81]
-    _add_boat(spec, world)
+    _add_boat(spec, world, vessel or load_vessel("paper"))
     _add_banks(spec, world.shore_m)
     for obstacle in world.obstacles:
         _add_obstacle(spec, obstacle)
@@ -56,27 +52,27 @@ def build_spec(world: World, *, visual: bool = False) -> mujoco.MjSpec:
     return spec
 
 
-def _add_boat(spec: mujoco.MjSpec, world: World) -> None:
-    yaw = world.start.yaw_rad
+def _add_boat(spec: mujoco.MjSpec, world: World, vessel: Vessel) -> None:
+    hull, yaw = vessel.hull, world.start.yaw_rad
     boat = spec.worldbody.add_body(
         name="boat",
-        pos=[world.start.x_m, world.start.y_m, BOAT_REST_Z_M],
+        pos=[world.start.x_m, world.start.y_m, vessel.buoyancy.equilibrium_z_m],
         quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
-        mass=BOAT_MASS_KG,
+        mass=hull.mass_kg,
         ipos=[0.0, 0.0, 0.0],
         iquat=[1.0, 0.0, 0.0, 0.0],
-        inertia=list(BOAT_INERTIA_KGM2),
+        inertia=[hull.roll_inertia_kgm2, hull.pitch_inertia_kgm2, hull.yaw_inertia_kgm2],
         explicitinertial=True,
     )
     boat.add_freejoint(name="boat_free")
-    reach_m = HULL_HALF_LENGTH_M - HULL_RADIUS_M
+    reach_m = 0.5 * hull.length_m - hull.radius_m
     for name, side in (("hull_port", 0.5), ("hull_starboard", -0.5)):
-        y_m = side * HULL_SPACING_M
+        y_m = side * hull.spacing_m
         boat.add_geom(
             name=name,
             type=_CAPSULE,
-            fromto=[-reach_m, y_m, HULL_Z_M, reach_m, y_m, HULL_Z_M],
-            size=[HULL_RADIUS_M, 0.0, 0.0],
+            fromto=[-reach_m, y_m, hull.axis_z_m, reach_m, y_m, hull.axis_z_m],
+            size=[hull.radius_m, 0.0, 0.0],
             contype=BOAT_BIT,
             conaffinity=SOLID_BIT,
             friction=[0.3, 0.005, 0.0001],
@@ -92,9 +88,10 @@ def _add_boat(spec: mujoco.MjSpec, world: World) -> None:
 
 
 def _add_banks(spec: mujoco.MjSpec, shore_m: Points) -> None:
-    """One box behind each stretch of the shore, overlapping its neighbours."""
-    ends_m = np.roll(shore_m, -1, axis=0)
-    for number, (start, end) in enumerate(zip(shore_m, ends_m, strict=True)):
+    """One box behind each straight stretch of the shore, overlapping its neighbours."""
+    starts_m = corners(shore_m, _STRAIGHT_M)
+    ends_m = np.roll(starts_m, -1, axis=0)
+    for number, (start, end) in enumerate(zip(starts_m, ends_m, strict=True)):
         along = end - start
         length_m = float(np.hypot(*along))
         outward = np.array([along[1], -along[0]]) / length_m

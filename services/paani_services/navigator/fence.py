@@ -1,0 +1,154 @@
+"""Where the boat may be, and how fast it may go towards the edge of it. Pure plane geometry in the map frame.
+
+Allowed is what lies inside at least one area that keeps in, where there are any, and inside none that keeps out.
+The edge itself is not allowed.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from paani import portable
+from paani.config import NavigatorConfig
+from paani.geometry import wrap_rad
+from paani.messages import FenceArea, Keep, Odometry
+from paani_services.navigator.progress import Point
+
+DRIFTING_MPS = 0.1  # below it the course over ground is noise
+CREEP_MPS = 0.05  # a slower order would not move the boat
+BACK_RAD = math.radians(60.0)  # an order this far from the nearest way in still leads in
+NUDGE_M = 0.01
+
+Fence = tuple[FenceArea, ...]
+
+
+def is_allowed(fence: Fence, at_m: Point) -> bool:
+    """Inside an area that keeps in, if there is one, and in none that keeps out."""
+    inner = [area for area in fence if area.keep is Keep.IN]
+    if inner and not any(contains(area, at_m) for area in inner):
+        return False
+    return not any(contains(area, at_m) or _on_edge(area, at_m) for area in fence if area.keep is Keep.OUT)
+
+
+def contains(area: FenceArea, at_m: Point) -> bool:
+    """Whether a ray to the east crosses the polygon's edge an odd number of times."""
+    x_m, y_m = at_m
+    inside = False
+    for (x1, y1), (x2, y2) in _edges(area):
+        if (y1 > y_m) != (y2 > y_m) and x_m < (x2 - x1) * (y_m - y1) / (y2 - y1) + x1:
+            inside = not inside
+    return inside
+
+
+def distance_m(fence: Fence, at_m: Point) -> float:
+    """To the nearest edge of any area, infinite without a fence."""
+    return min(
+        (math.dist(at_m, _nearest(at_m, *edge)) for area in fence for edge in _edges(area)),
+        default=math.inf,
+    )
+
+
+def room_m(fence: Fence, from_m: Point, to_m: Point) -> float:
+    """How far along the straight way between two points everything is allowed; infinite if all of it is."""
+    length_m = math.dist(from_m, to_m)
+    if not is_allowed(fence, from_m):
+        return 0.0
+    cuts = sorted(cut for area in fence for edge in _edges(area) for cut in _crossings(from_m, to_m, *edge))
+    for cut, beyond in pairwise((*cuts, 1.0)):
+        middle = 0.5 * (cut + beyond)
+        if not is_allowed(fence, _between(from_m, to_m, middle)):
+            return cut * length_m
+    return math.inf if is_allowed(fence, to_m) else length_m
+
+
+def way_back_rad(fence: Fence, at_m: Point) -> float | None:
+    """Direction of the nearest allowed point from one that is not; None where there is none."""
+    found = sorted(
+        (_nearest(at_m, *edge) for area in fence for edge in _edges(area)), key=lambda point: math.dist(at_m, point)
+    )
+    for x_m, y_m in found:
+        rad = portable.atan2(y_m - at_m[1], x_m - at_m[0])
+        if is_allowed(fence, (x_m + NUDGE_M * portable.cos(rad), y_m + NUDGE_M * portable.sin(rad))):
+            return rad
+    return None
+
+
+def bounded_speed(
+    fence: Fence, odometry: Odometry, heading_rad: float, speed_mps: float, config: NavigatorConfig
+) -> float | None:
+    """The speed at which the ordered heading may be sailed, or None where the boat may not move.
+
+    Towards the edge the speed falls so that `fence_margin_m` and the way to stop (`fence_stop_s` times the speed)
+    always fit before it; a boat whose course over ground no longer leaves room for the way to stop gets no thrust.
+    Outside, nothing moves, unless `fence_return` and the heading leads to the nearest way in.
+    """
+    if not fence:
+        return speed_mps
+    here = (odometry.x_m, odometry.y_m)
+    if not is_allowed(fence, here):
+        return _speed_outside(fence, here, heading_rad, speed_mps, config)
+    cosine, sine = portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad)
+    east_mps = odometry.surge_mps * cosine - odometry.sway_mps * sine
+    north_mps = odometry.surge_mps * sine + odometry.sway_mps * cosine
+    if math.hypot(east_mps, north_mps) > DRIFTING_MPS:
+        stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
+        if room_m(fence, here, stops_at) < math.inf:
+            return None
+    reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
+    ahead = (here[0] + reach_m * portable.cos(heading_rad), here[1] + reach_m * portable.sin(heading_rad))
+    allowed_mps = (room_m(fence, here, ahead) - config.fence_margin_m) / config.fence_stop_s
+    return min(speed_mps, allowed_mps) if allowed_mps >= min(CREEP_MPS, speed_mps) else None
+
+
+def first_leg_outside(fence: Fence, points_m: tuple[Point, ...], margin_m: float) -> int | None:
+    """Index of the first point that is not allowed, nearer than `margin_m` to the edge, or left across it."""
+    for number, point in enumerate(points_m):
+        if not is_allowed(fence, point) or distance_m(fence, point) < margin_m:
+            return number
+        if number + 1 < len(points_m) and room_m(fence, point, points_m[number + 1]) < math.inf:
+            return number
+    return None
+
+
+def _speed_outside(
+    fence: Fence, here: Point, heading_rad: float, speed_mps: float, config: NavigatorConfig
+) -> float | None:
+    back_rad = way_back_rad(fence, here) if config.fence_return else None
+    if back_rad is None or abs(wrap_rad(heading_rad - back_rad)) > BACK_RAD:
+        return None
+    return speed_mps
+
+
+def _edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
+    last = area.corners[-1]
+    for corner in area.corners:
+        yield (last.x_m, last.y_m), (corner.x_m, corner.y_m)
+        last = corner
+
+
+def _nearest(at_m: Point, start: Point, end: Point) -> Point:
+    """Point of the edge nearest to `at_m`."""
+    along_x, along_y = end[0] - start[0], end[1] - start[1]
+    part = ((at_m[0] - start[0]) * along_x + (at_m[1] - start[1]) * along_y) / (along_x**2 + along_y**2)
+    return _between(start, end, min(1.0, max(0.0, part)))
+
+
+def _on_edge(area: FenceArea, at_m: Point) -> bool:
+    return any(_nearest(at_m, *edge) == at_m for edge in _edges(area))
+
+
+def _between(start: Point, end: Point, part: float) -> Point:
+    return start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
+
+
+def _crossings(from_m: Point, to_m: Point, start: Point, end: Point) -> Iterator[float]:
+    """Where on the way, from 0 to 1, it meets the edge; a way along the edge meets it at the edge's ends."""
+    way_x, way_y = to_m[0] - from_m[0], to_m[1] - from_m[1]
+    edge_x, edge_y = end[0] - start[0], end[1] - start[1]
+    to_x, to_y = start[0] - from_m[0], start[1] - from_m[1]
+    cross = way_x * edge_y - way_y * edge_x
+    if cross == 0.0:
+        return
+    part, along = (to_x * edge_y - to_y * edge_x) / cross, (to_x * way_y - to_y * way_x) / cross
+    if 0.0 <= part <= 1.0 and -1e-9 <= along <= 1.0 + 1e-9:
+        yield part

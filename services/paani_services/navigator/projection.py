@@ -1,0 +1,98 @@
+"""From the picture to the water: a pinhole's rays meet the surface (checklist Q1). Pure, the same bits everywhere.
+
+Body is x forward, y left, z up with its origin on the water; positive pitch lowers the bow, positive roll starboard.
+Elementary arithmetic alone, element by element: no reduction whose order could differ.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani import portable
+from paani.config import CalibrationConfig
+
+F64 = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]  # by rows
+LEVEL = 1e-6  # a ray that falls less than this per unit meets no water
+
+
+class Station(NamedTuple):
+    """Where the boat is in the map, and how it lies."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    roll_rad: float
+    pitch_rad: float
+
+
+class Lens(NamedTuple):
+    """Map-from-camera rotation (camera axes: out, right, down), where the camera is [m], focal lengths and centre.
+
+    Focal lengths and centre are in picture widths and heights.
+    """
+
+    turn: Matrix
+    at_m: Vector
+    focal: tuple[float, float]
+    centre: tuple[float, float]
+
+
+class Rays(NamedTuple):
+    """Unit directions along the water in the map [n], and how far below the horizontal each ray leads (its tangent)."""
+
+    east: F64
+    north: F64
+    fall: F64
+
+
+def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
+    """Yaw about z, then pitch about y, then roll about x."""
+    cr, sr = portable.cos(roll_rad), portable.sin(roll_rad)
+    cp, sp = portable.cos(pitch_rad), portable.sin(pitch_rad)
+    cy, sy = portable.cos(yaw_rad), portable.sin(yaw_rad)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def lens_at(station: Station, calibration: CalibrationConfig, aspect: float) -> Lens:
+    """The calibrated camera of a boat that lies so. aspect: picture width over height, pixels square."""
+    body = rotation(station.roll_rad, station.pitch_rad, station.yaw_rad)
+    mount = rotation(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
+    turn = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
+    ahead, above = calibration.forward_m, calibration.height_m
+    east, north, up = (row[0] * ahead + row[2] * above for row in body)
+    focal = 0.5 / portable.tan(0.5 * math.radians(calibration.hfov_deg))
+    at_m = (station.x_m + east, station.y_m + north, up)
+    return Lens(turn, at_m, (focal, focal * aspect), calibration.centre_frac)
+
+
+def rays(lens: Lens, u: F64, v: F64) -> Rays:
+    """The rays r = R K^-1 [u, v, 1] of points of the picture (fractions of width and height), Q1's first half."""
+    right = (u - lens.centre[0]) / lens.focal[0]
+    down = (v - lens.centre[1]) / lens.focal[1]
+    east, north, up = (row[0] + row[1] * right + row[2] * down for row in lens.turn)
+    along = np.sqrt(east * east + north * north)
+    along = np.where(along > LEVEL, along, LEVEL)
+    return Rays(east / along, north / along, -up / along)
+
+
+def ranges_m(lens: Lens, given: Rays, max_range_m: float) -> F64:
+    """How far along the water from below the camera each ray meets it, Q1's second half; infinity where it does not.
+
+    Rejected are rays at or above the horizon, and those that meet the water beyond `max_range_m`.
+    """
+    meets = given.fall > LEVEL
+    range_m = lens.at_m[2] / np.where(meets, given.fall, 1.0)
+    return np.where(meets & (range_m <= max_range_m), range_m, np.inf)
+
+
+def _product(a: Matrix, b: Matrix) -> Matrix:
+    rows = tuple(tuple(row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j] for j in range(3)) for row in a)
+    return rows  # type: ignore[return-value]  # three by three

@@ -1,0 +1,90 @@
+"""Where the camera is on the boat, and the metric planner's settings. Ids in comments are checklist ids."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from paani.config.section import Fraction, NonNegative, Positive, Section
+from paani.config.simulating import EyeConfig
+
+FieldOfView = Annotated[float, msgspec.Meta(ge=0.0, le=170.0)]
+Tilt = Annotated[float, msgspec.Meta(ge=-60.0, le=60.0)]
+Offset = Annotated[float, msgspec.Meta(ge=-50.0, le=50.0)]
+Height = Annotated[float, msgspec.Meta(ge=0.0, le=30.0)]
+Angle = Annotated[float, msgspec.Meta(gt=0.0, le=180.0)]
+
+
+class CalibrationConfig(Section, frozen=True):
+    """A pinhole with square pixels, fixed to the boat; the simulator's own is `calibration_of` the eye.
+
+    `hfov_deg`: horizontal field of view (0: unknown); the focal length is 0.5 / tan(hfov / 2) picture widths.
+    `centre_frac`: where the optical axis meets the picture, of its width and height from the top left.
+    `height_m`: above the water, boat at rest; `forward_m`: ahead of the point whose position the odometry gives.
+    Mount: `pitch_down_deg` looks down, `roll_deg` starboard down, `yaw_deg` to port.
+    `valid`: somebody measured all of it; the metric planner acts on nothing less. `measured_by`: who, or what.
+    """
+
+    valid: bool = False
+    hfov_deg: FieldOfView = 0.0
+    centre_frac: tuple[Fraction, Fraction] = (0.5, 0.5)
+    height_m: Height = 0.0
+    forward_m: Offset = 0.0
+    pitch_down_deg: Tilt = 0.0
+    roll_deg: Tilt = 0.0
+    yaw_deg: Tilt = 0.0
+    measured_by: Annotated[str, msgspec.Meta(max_length=200)] = ""
+
+    def __post_init__(self) -> None:
+        """What is valid says how wide the camera sees, and from how high."""
+        for name in ("hfov_deg", "height_m"):
+            if self.valid and getattr(self, name) <= 0.0:
+                raise ValueError(f"valid: {name} is not known")
+
+
+def calibration_of(eye: EyeConfig) -> CalibrationConfig:
+    """What the simulator's camera is."""
+    return CalibrationConfig(
+        valid=eye.hfov_deg <= 170.0 and eye.camera_height_m <= 30.0,
+        hfov_deg=min(eye.hfov_deg, 170.0),
+        height_m=min(eye.camera_height_m, 30.0),
+        forward_m=eye.camera_forward_m,
+        pitch_down_deg=eye.pitch_down_deg,
+        measured_by="the simulator",
+    )
+
+
+class PlannerConfig(Section, frozen=True):
+    """The metric planner: what lies on the water around the boat, and where it may go. It acts on a valid calibration.
+
+    `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone.
+    `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
+    `lookahead_s`: what lies on the course beyond `horizon_s` is avoided early but forbids nothing.
+    `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
+    """
+
+    use: bool = True
+    max_range_m: Positive = 8.0  # one mask row is 1.2 m there, seen from 0.9 m
+    horizon_slack_deg: NonNegative = 4.0
+    free_s: Positive = 0.8  # Q3
+    occupied_s: Positive = 2.0  # Q3
+    hidden_s: NonNegative = 8.0
+    thickness_m: Positive = 0.4  # of what ends the water, away from the boat
+    max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
+    jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten
+    horizon_s: Positive = 3.0  # Q4
+    step_s: Positive = 0.2  # Q4
+    lookahead_s: Positive = 8.0
+    speed_mps: Positive = 0.6  # cap while the planner steers; the paper has 0.4 (Q5)
+    yaw_rate_radps: Positive = 0.35  # Q5
+    accel_mps2: Positive = 0.2  # Q5
+    turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
+    hull_radius_m: Positive = 0.55  # Q6
+    margin_m: NonNegative = 0.25  # Q6
+    drift_mps: NonNegative = 0.15  # Q6
+    stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
+    replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
+    span_deg: Angle = 120.0  # headings to either side of the wanted course
+    spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
+    max_turn_deg: Angle = 180.0  # of a run of turns, beyond `navigator.max_total_turn_deg` on water seen free alone

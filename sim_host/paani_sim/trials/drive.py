@@ -1,0 +1,246 @@
+"""One drive: plant, sensors, estimator, eyes and board in lockstep on a simulated clock.
+
+The plant steps at its own rate, the estimator at `localization.rate_hz`, the eyes as often as a picture is looked at;
+evidence reaches the board `perception_latency_s` after its picture was taken, everything else at once.
+"""
+
+from __future__ import annotations
+
+import cv2
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.config import Config
+from paani.cores import estimator_of
+from paani_sim.plant.adapter import Applied, ThrustAdapter
+from paani_sim.plant.plant import Plant, PlantDiverged
+from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
+from paani_sim.trials.board import Board
+from paani_sim.trials.eyes import Eyes, Sight
+from paani_sim.trials.outbox import START_US, Outbox, Tap
+from paani_sim.trials.policies import look_hz, time_scale
+from paani_sim.trials.route_progress import Along
+from paani_sim.trials.states import Phase, Why
+from paani_sim.trials.track import Track
+from paani_sim.worlds import FaultKind, Scenario
+from paani_sim.worlds.faults import active
+
+PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`paani bench chain`), about 100 ms
+READY_LIMIT_S = 20.0
+MIN_READY_S = 2.0
+ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
+END_M = 1.5  # an open route is done this near its end: the navigator's acceptance radius
+
+
+class Drive:
+    """`step` until `phase` is FINISHED; `why` then says how it ended. `close` when done."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        config: Config,
+        eyes: Eyes | None,
+        *,
+        tap: Tap | None = None,
+        perception_latency_s: float = PERCEPTION_LATENCY_S,
+    ) -> None:
+        """eyes None: nobody looks, the advice is always to go straight on."""
+        world = scenario.world
+        self.scenario, self.config = scenario, config
+        self._eyes = eyes
+        self.plant = Plant(world, config.plant, scenario.seed)
+        origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
+        self._estimator = estimator_of(
+            msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg)
+        )
+        self._out = Outbox(config.bus.domain, tap)
+        waypoints = tuple(m.Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist())
+        route = m.Route(source_us=0, name=world.name[:100], waypoints=waypoints, repeat=world.route_closed)
+        self.board = Board(config, route, self._out, blind=eyes is None)
+        self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
+        self.applied: Applied = self.adapter.decide(START_US)
+        self.along = Along(world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m))
+        self.goal_m = self._goal_m()
+        self.limit_s = scenario.task.time_limit_s * time_scale(config)
+        self.track = Track()
+        self.phase, self.why, self.error = Phase.READY, Why.NONE, ""
+        self.running_us = 0  # when the boat was armed
+        rate = 1.0 / config.plant.step_s
+        sensors = config.plant.sensors
+        self._every = {
+            what: max(1, round(rate / hz))
+            for what, hz in {
+                "imu": sensors.imu_rate_hz,
+                "gps": sensors.gps_rate_hz,
+                "estimate": config.localization.rate_hz,
+                "report": config.plant.publish_rate_hz,
+                "look": look_hz(config),
+                "arming": ARMING_HZ,
+                "pulse": PULSE_HZ,
+                "sample": SAMPLE_HZ,
+            }.items()
+        }
+        self._late_us = round(perception_latency_s * 1e6)
+        self._samples: list[m.ImuSample] = []
+        self._fix: m.GpsFix | None = None
+        self._odometry: m.Odometry | None = None
+        self._coming: list[tuple[int, m.Evidence]] = []
+        self._frames = 0
+        self._in_force: m.Thrust | None = None
+        self._since_us = START_US
+
+    @property
+    def now_us(self) -> int:
+        """The drive's clock: every stamp in its messages is of it."""
+        return START_US + self.plant.sim_us
+
+    @property
+    def elapsed_s(self) -> float:
+        """Simulated time since the boat was armed."""
+        return (self.now_us - self.running_us) * 1e-6 if self.running_us else 0.0
+
+    def run(self) -> None:
+        """To the end."""
+        while self.phase is not Phase.FINISHED:
+            self.step()
+
+    def step(self) -> None:
+        """One step of the plant, and all that it sets off. A diverging integration ends the drive."""
+        self.applied = self.adapter.decide(self.now_us)
+        try:
+            self.plant.step(self.applied.left_n, self.applied.right_n)
+        except PlantDiverged as error:
+            self.error = str(error)
+            self._finish(Why.DIVERGED)
+            return
+        now_us = self.now_us
+        linked = not active(self.scenario.faults, FaultKind.LINK_LOSS, self.plant.sim_us * 1e-6)
+        self._measure(now_us)
+        self._estimate(now_us, linked=linked)
+        self._look(now_us, linked=linked)
+        self._supervise(now_us, linked=linked)
+        thrust = self.board.step(now_us)
+        if thrust is not None and linked:
+            self.adapter.offer(thrust, now_us)
+        self._report(now_us)
+        self._advance(now_us)
+
+    def close(self) -> None:
+        """Release the plant and the eyes."""
+        self.plant.close()
+        if self._eyes is not None:
+            self._eyes.close()
+
+    def _goal_m(self) -> float:
+        length_m = self.along.length_m
+        rest_m = length_m if self.scenario.world.route_closed else length_m - self.along.start_arc_m - END_M
+        return min(self.scenario.task.distance_m or rest_m, rest_m)
+
+    def _is_due(self, what: str) -> bool:
+        return self.plant.steps % self._every[what] == 0
+
+    def _measure(self, now_us: int) -> None:
+        if self._is_due("imu"):
+            self._samples.append(self._out.put(keys.IMU, imu_message(self.plant, now_us), now_us))
+        if self._is_due("gps"):
+            self._fix = self._out.put(keys.GPS, gps_message(self.plant, now_us), now_us)
+
+    def _estimate(self, now_us: int, *, linked: bool) -> None:
+        if not self._is_due("estimate"):
+            return
+        local, odometry = self._estimator.step(self._samples, self._fix, now_us)
+        self._samples, self._fix = [], None
+        if self._out.tap is not None:
+            self._out.put(keys.LOCAL_ODOMETRY, local, now_us)
+        self._odometry = self._out.put(keys.ODOMETRY, odometry, now_us)
+        if linked:
+            self.board.hear(keys.ODOMETRY, self._odometry, now_us)
+
+    def _look(self, now_us: int, *, linked: bool) -> None:
+        if self._coming and now_us >= self._coming[0][0]:
+            evidence = self._out.put(keys.EVIDENCE, self._coming.pop(0)[1], now_us)
+            self.track.evidence(evidence, now_us)
+            self.board.hear(keys.EVIDENCE, evidence, now_us)
+        if self._eyes is None or not linked or not self._is_due("look"):
+            return
+        header = m.PictureHeader(
+            source_us=now_us,
+            frame_seq=self._frames,
+            frame_epoch=self._out.epoch,
+            width_px=self.config.eye.width_px,
+            height_px=self.config.eye.height_px,
+        )
+        roll_rad = self._odometry.roll_rad if self._odometry is not None else 0.0
+        sight = self._eyes.look(pose_message(self.plant, now_us), header, roll_rad)
+        if sight is None:
+            return
+        self._frames += 1
+        self._coming.append((now_us + self._late_us, sight.evidence))
+        if self._out.tap is not None:
+            self._show(sight, header, now_us)
+
+    def _show(self, sight: Sight, header: m.PictureHeader, now_us: int) -> None:
+        """Picture and mask, for the recording."""
+        if sight.bgr is not None:
+            quality = [cv2.IMWRITE_JPEG_QUALITY, self.config.camera.jpeg_quality]
+            self._out.put(keys.PICTURE, header, now_us, cv2.imencode(".jpg", sight.bgr, quality)[1].tobytes())
+        if sight.mask is not None:
+            height, width = sight.mask.shape
+            named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
+            self._out.put(keys.MASK, named, now_us, cv2.imencode(".png", sight.mask)[1].tobytes())
+
+    def _supervise(self, now_us: int, *, linked: bool) -> None:
+        """The operator's word, the pulses, and the plant's clock."""
+        if self._is_due("arming"):
+            arming = m.Arming(source_us=now_us, armed=self.phase is Phase.RUNNING)
+            arming = self._out.put(keys.ARMING, arming, now_us)
+            self.adapter.hear_arming(arming, now_us)
+            if linked:
+                self.board.hear(keys.ARMING, arming, now_us)
+        if self._is_due("pulse"):
+            for service in self.config.plant.adapter.require_pulses:
+                if linked or service not in keys.BOARD_SERVICES:
+                    self.adapter.hear_pulse(service, now_us)
+        if self._is_due("report"):
+            clock = m.SimTime(source_us=now_us, sim_us=self.plant.sim_us, stamp_us=now_us)
+            clock = self._out.put(keys.SIM_TIME, clock, now_us)
+            if linked:
+                self.board.hear(keys.SIM_TIME, clock, now_us)
+
+    def _report(self, now_us: int) -> None:
+        """What the last gate does, and truth."""
+        in_force = self.adapter.command if self.applied.zero_cause is m.ZeroCause.NONE else None
+        if in_force is not self._in_force:
+            self._in_force, self._since_us = in_force, now_us
+        self.track.thrust(self.applied, in_force, now_us)
+        if self._out.tap is not None and self._is_due("report"):
+            self._out.put(keys.TRUE_POSE, pose_message(self.plant, now_us), now_us)
+            applied = applied_message(self.adapter, self.applied, now_us, self._since_us)
+            self._out.put(keys.THRUST_APPLIED, applied, now_us)
+
+    def _advance(self, now_us: int) -> None:
+        """The state machine, and the samples that are scored."""
+        if self._is_due("sample"):
+            self.along.update(self.plant.position_m)
+            if self.phase is Phase.RUNNING:
+                self.track.sample(self.plant, self.along, self.board, self.applied)
+        if self.phase is Phase.READY:
+            waited_s = self.plant.sim_us * 1e-6
+            if waited_s >= MIN_READY_S and self._is_ready():
+                self.phase, self.running_us = Phase.RUNNING, now_us
+            elif waited_s >= READY_LIMIT_S:
+                self._finish(Why.NOT_READY)
+        elif self.along.best_m >= self.goal_m:
+            self._finish(Why.COMPLETED)
+        elif self.elapsed_s >= self.limit_s:
+            self._finish(Why.TIME_LIMIT)
+
+    def _is_ready(self) -> bool:
+        """Nothing but the operator's word is missing, or what the eyes advise."""
+        command = self.board.command
+        waiting = {m.Inhibit.NOT_ARMED, m.Inhibit.ADVISED_STOP}
+        return command is not None and bool(command.inhibits) and waiting.issuperset(command.inhibits)
+
+    def _finish(self, why: Why) -> None:
+        self.phase, self.why = Phase.FINISHED, why

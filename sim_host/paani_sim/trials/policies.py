@@ -1,0 +1,45 @@
+"""What may drive the boat in a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+import msgspec
+
+from paani.config import Config, load_config
+
+NOMINAL_MPS = Config().navigator.cruise_mps
+
+
+class Policy(StrEnum):
+    """Who sees and who decides.
+
+    PAANI: camera and deciders of the profile `paani`. PAPER: those of the profile `paper`, at its rates and speed.
+    BLIND: follows the route without looking. ORACLE: `paani` with evidence from truth instead of pictures.
+    """
+
+    PAANI = "paani"
+    PAPER = "paper"
+    BLIND = "blind"
+    ORACLE = "oracle"
+
+
+CAMERA = frozenset({Policy.PAANI, Policy.PAPER})
+
+
+def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
+    """Its settings. threads: the two nets side by side, for a drive that has two cores; what they say is the same."""
+    config = load_config(profile="paper" if policy is Policy.PAPER else "paani", sets=sets)
+    perception = msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1)
+    return msgspec.structs.replace(config, perception=perception)
+
+
+def time_scale(config: Config) -> float:
+    """A scenario's time limit is for the default cruising speed; who is told to go slower has longer."""
+    return NOMINAL_MPS / config.navigator.cruise_mps
+
+
+def look_hz(config: Config) -> float:
+    """How often a picture is taken that is also looked at."""
+    return min(config.eye.rate_hz, config.camera.rate_hz, config.perception.rate_hz)

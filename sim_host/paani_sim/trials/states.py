@@ -1,0 +1,21 @@
+"""The states of a drive."""
+
+from enum import StrEnum
+
+
+class Phase(StrEnum):
+    """READY waits, disarmed, until the boat could go; RUNNING is armed."""
+
+    READY = "ready"
+    RUNNING = "running"
+    FINISHED = "finished"
+
+
+class Why(StrEnum):
+    """How a drive ended. Only COMPLETED is a success; touching something does not end a drive."""
+
+    NONE = "none"
+    COMPLETED = "completed"
+    TIME_LIMIT = "time_limit"
+    DIVERGED = "diverged"
+    NOT_READY = "not_ready"

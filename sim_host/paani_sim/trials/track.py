@@ -1,0 +1,104 @@
+"""What is kept of a drive while it runs, to be scored when it is over."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from paani import messages as m
+from paani_sim.plant.adapter import Applied
+from paani_sim.plant.plant import Plant
+from paani_sim.trials.board import Board
+from paani_sim.trials.route_progress import Along
+
+
+class Sample(NamedTuple):
+    """Ten times a second while the boat is armed."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    surge_mps: float
+    off_m: float
+    left_n: float
+    right_n: float
+    collisions: int
+    in_contact: bool
+    actors_along_m: tuple[float, ...]
+
+
+class Halt(NamedTuple):
+    """From when on the boat was ordered not to move, and why: the advice's reason where that was it."""
+
+    t_s: float
+    reason: str
+    ended_s: float | None = None
+
+
+class Applying(NamedTuple):
+    """When the fans were set to another force: the moment [us], whether to none, and the picture behind it [us]."""
+
+    at_us: int
+    is_zero: bool
+    picture_us: int
+
+
+class Track:
+    """Fills while the drive runs."""
+
+    def __init__(self) -> None:
+        self.samples: list[Sample] = []
+        self.halts: list[Halt] = []
+        self.advisories: list[m.Advisory] = []
+        self.applied: list[Applying] = []
+        self.unusable: list[tuple[int, m.UnusableCause]] = []  # picture's stamp and cause
+        self.work_j = 0.0
+        self._in_force: m.Thrust | None = None
+        self._was_zero = True
+
+    def evidence(self, evidence: m.Evidence, now_us: int) -> None:
+        """One picture's evidence reached the board."""
+        if not evidence.usable:
+            self.unusable.append((evidence.source_us, evidence.cause))
+
+    def thrust(self, applied: Applied, in_force: m.Thrust | None, now_us: int) -> None:
+        """What the fans do in this step, and the command behind it."""
+        is_zero = applied.left_n == 0.0 and applied.right_n == 0.0
+        picture_us = in_force.source_us if in_force is not None else 0
+        before_us = self._in_force.source_us if self._in_force is not None else 0
+        if is_zero is not self._was_zero or picture_us != before_us:
+            self.applied.append(Applying(now_us, is_zero, picture_us))
+        self._in_force, self._was_zero = in_force, is_zero
+
+    def sample(self, plant: Plant, along: Along, board: Board, applied: Applied) -> None:
+        """Take one."""
+        t_s = plant.sim_us * 1e-6
+        x_m, y_m = plant.position_m
+        surge_mps = plant.velocity[0]
+        if self.samples:
+            self.work_j += (applied.left_n + applied.right_n) * max(0.0, surge_mps) * (t_s - self.samples[-1].t_s)
+        self.samples.append(
+            Sample(
+                t_s, x_m, y_m, plant.attitude.yaw_rad, surge_mps, along.off_m, applied.left_n, applied.right_n,
+                plant.collisions, plant.in_contact, (),
+            )
+        )  # fmt: skip
+        advisory, command = board.advisory, board.command
+        if advisory is not None and (not self.advisories or advisory is not self.advisories[-1]):
+            self.advisories.append(advisory)
+        if command is not None:
+            self._watch_halts(t_s, command, advisory)
+
+    def _watch_halts(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
+        halted = bool(self.halts) and self.halts[-1].ended_s is None
+        if command.enable:
+            if halted:
+                self.halts[-1] = self.halts[-1]._replace(ended_s=t_s)
+            return
+        first = command.inhibits[0]
+        reason = advisory.reason.value if first is m.Inhibit.ADVISED_STOP and advisory else first.value
+        if halted and self.halts[-1].reason == reason:
+            return
+        if halted:
+            self.halts[-1] = self.halts[-1]._replace(ended_s=t_s)
+        self.halts.append(Halt(t_s, reason))

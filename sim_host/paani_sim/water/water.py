@@ -1,0 +1,121 @@
+"""The water and air about one hull, from moment to moment: waves, wakes, current and wind together."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from paani_sim.vessels import Vessel
+from paani_sim.water.current import CurrentField
+from paani_sim.water.surroundings import CALM, Surroundings
+from paani_sim.water.wakes import REACH, Maker, Packet, Wakes
+from paani_sim.water.waves import Response, hull_response, wind_sea
+from paani_sim.water.wind import Gusts
+from paani_sim.worlds.world import World
+
+SURFACE_EVERY_S = 0.02  # the shortest waves felt take 0.4 s
+DRIFT_EVERY_S = 0.1  # gusts, current, heading towards the waves
+WITHIN_M = 1.0  # how far boat and packets come closer in that time
+
+
+class Train(NamedTuple):
+    """One regular wave with what the hull feels of it."""
+
+    kx_radpm: float
+    ky_radpm: float
+    omega_radps: float
+    phase_rad: float
+    elevation_m: float
+    slope_ahead: float
+    slope_left: float
+    amplitude_m: float
+
+
+class Water:
+    """Surroundings of a hull that moves; equal seeds and calls give equal surroundings."""
+
+    def __init__(self, world: World, vessel: Vessel, makers: int, seed: np.random.SeedSequence) -> None:
+        """`makers`: how many vessels `pass_by` will be told of."""
+        waves, gusts = seed.spawn(2)
+        wind = world.wind
+        self._length_m, self._spacing_m = vessel.hull.length_m, vessel.hull.spacing_m
+        self._sea = wind_sea(wind.speed_mps, wind.toward_rad, world.waves.fetch_m, np.random.default_rng(waves))
+        self._gusts = Gusts(wind, DRIFT_EVERY_S, np.random.default_rng(gusts))
+        self._current = CurrentField(world)
+        self._wakes = Wakes(makers)
+        self._toward = math.cos(wind.toward_rad), math.sin(wind.toward_rad)
+        self._drift_s = self._surface_s = -math.inf
+        self._trains: list[Train] = []
+        self._packets: list[tuple[Packet, Response]] = []
+        self._now = CALM
+
+    def pass_by(self, makers: Sequence[Maker], at_s: float) -> None:
+        """Where the other vessels are now."""
+        self._wakes.pass_by(makers, at_s)
+
+    def about(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> Surroundings:
+        """What surrounds the hull; to be asked with rising `at_s` [simulated s]."""
+        if at_s - self._drift_s >= DRIFT_EVERY_S - 1e-9:
+            self._drift_s = at_s
+            self._drift(x_m, y_m, yaw_rad, at_s)
+        if (self._trains or self._packets) and at_s - self._surface_s >= SURFACE_EVERY_S - 1e-9:
+            self._surface_s = at_s
+            self._now = _surface(self._now, self._trains, self._packets, self._toward, (x_m, y_m, at_s))
+        return self._now
+
+    def _drift(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> None:
+        self._trains = []
+        for wave in self._sea:
+            felt = self._felt(wave.kx_radpm, wave.ky_radpm, yaw_rad)
+            self._trains.append(
+                Train(
+                    *wave[1:],
+                    *(wave.amplitude_m * part for part in felt),
+                    wave.amplitude_m,
+                )
+            )
+        packets = self._wakes.near(x_m, y_m, at_s, WITHIN_M)
+        self._packets = [(packet, self._felt(packet.kx_radpm, packet.ky_radpm, yaw_rad)) for packet in packets]
+        self._now = Surroundings(
+            *self._current.at(x_m, y_m), *self._gusts.velocity_mps, *(self._now[4:] if self._trains or packets else ())
+        )
+        self._gusts.advance()
+
+    def _felt(self, kx_radpm: float, ky_radpm: float, yaw_rad: float) -> Response:
+        return hull_response(kx_radpm, ky_radpm, yaw_rad, self._length_m, self._spacing_m)
+
+
+def _surface(
+    now: Surroundings,
+    trains: list[Train],
+    packets: list[tuple[Packet, Response]],
+    toward: tuple[float, float],
+    here: tuple[float, float, float],
+) -> Surroundings:
+    """`now` with the surface as it is here."""
+    x_m, y_m, at_s = here
+    cos, sin = math.cos, math.sin
+    elevation = rate = ahead = left = crest = quarter = 0.0
+    for kx, ky, omega, phase, lift, slope_ahead, slope_left, amplitude in trains:
+        angle = kx * x_m + ky * y_m - omega * at_s + phase
+        c, s = cos(angle), sin(angle)
+        elevation += lift * c
+        rate += lift * omega * s
+        ahead -= slope_ahead * s
+        left -= slope_left * s
+        crest += amplitude * c
+        quarter += amplitude * s
+    for packet, felt in packets:
+        px, py, since_s = x_m - packet.x_m, y_m - packet.y_m, at_s - packet.at_s
+        off_m = math.hypot(px - packet.vx_mps * since_s, py - packet.vy_mps * since_s)
+        if off_m < REACH * packet.spread_m:
+            a = packet.amplitude_m * math.exp(-0.5 * (off_m / packet.spread_m) ** 2)
+            angle = packet.kx_radpm * px + packet.ky_radpm * py - packet.omega_radps * since_s
+            c, s = a * cos(angle), a * sin(angle)
+            elevation += felt.elevation * c
+            rate += felt.elevation * packet.omega_radps * s
+            ahead -= felt.slope_ahead_pm * s
+            left -= felt.slope_left_pm * s
+    envelope_m2 = crest * crest + quarter * quarter
+    return Surroundings(*now[:4], elevation, rate, ahead, left, envelope_m2 * toward[0], envelope_m2 * toward[1])

@@ -1,0 +1,202 @@
+"""A harbour: a basin with quays, finger pontoons and moorings behind a mole, and the road outside its entrance."""
+
+import numpy as np
+
+from paani_sim.worlds.curves import Points, closed_length_m, resample_closed
+from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
+
+LEG_M = 7.5
+QUAY_M = 0.9  # height of the quay
+EAST_M, NORTH_M, WEST_M = 82.0, 92.0, -80.0  # the basin's quays; the mole's inner face is y = 0
+MOLE_M = 9.0  # thickness of the mole
+ENTRANCE_M = (9.0, 29.0)
+BERTHS_M = (-58.0, -44.0, -30.0, -16.0, -2.0, 12.0)  # where the finger pontoons leave the north quay
+FINGER_M = 11.0
+FACE_STEP_M = 4.0
+
+CORNERS_M = (
+    (ENTRANCE_M[0], 0.0),
+    (ENTRANCE_M[0], -MOLE_M),
+    (-40.0, -MOLE_M),
+    (-84.0, -16.0),
+    (-100.0, -42.0),
+    (-84.0, -72.0),
+    (-34.0, -88.0),
+    (38.0, -90.0),
+    (92.0, -74.0),
+    (106.0, -44.0),
+    (88.0, -14.0),
+    (52.0, -MOLE_M),
+    (ENTRANCE_M[1], -MOLE_M),
+    (ENTRANCE_M[1], 0.0),
+    (EAST_M, 0.0),
+    (EAST_M, 58.0),
+    (64.0, 72.0),
+    (64.0, NORTH_M),
+    (-70.0, NORTH_M),
+    (WEST_M, 82.0),
+    (WEST_M, 0.0),
+)
+ROUTE_M = (
+    (15.0, 0.0),
+    (15.0, -12.0),
+    (6.0, -30.0),
+    (-34.0, -34.0),
+    (-70.0, -42.0),
+    (-40.0, -66.0),
+    (20.0, -70.0),
+    (70.0, -60.0),
+    (76.0, -34.0),
+    (34.0, -27.0),
+    (23.0, -12.0),
+    (23.0, 2.0),
+    (34.0, 14.0),
+    (62.0, 18.0),
+    (68.0, 46.0),
+    (46.0, 64.0),
+    (0.0, 68.0),
+    (-48.0, 68.0),
+    (-66.0, 56.0),
+    (-66.0, 20.0),
+    (-44.0, 10.0),
+    (-4.0, 14.0),
+    (13.0, 12.0),
+)
+
+
+def harbour() -> World:
+    """Build the harbour."""
+    route_m = _route()
+    x_m, y_m = route_m[0]
+    east_m, north_m = route_m[1] - route_m[0]
+    return World(
+        name="harbour",
+        seed=23,
+        origin_lat_deg=43.2951,
+        origin_lon_deg=5.3652,
+        shore_m=_shore(),
+        route_m=route_m,
+        start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
+        obstacles=(*_berths(), *_obstacles()),
+        actors=_actors(),
+        wind=Wind(speed_mps=2.5, toward_rad=1.2),
+        light=Light(sky="clear", sun_azimuth_rad=-1.4, sun_elevation_rad=0.8, seed=4),
+        water_rgb=(0.18, 0.27, 0.29),
+        season_frac=0.1,
+        bank=Bank.QUAY,
+        waves=Waves(fetch_m=120.0),
+    )
+
+
+def _shore() -> Points:
+    """The corners, with a point about every `FACE_STEP_M` between them; counter-clockwise."""
+    corners = np.array(CORNERS_M)
+    faces = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        steps = max(1, round(float(np.hypot(*(end - start))) / FACE_STEP_M))
+        faces.append(start + np.arange(steps)[:, None] / steps * (end - start))
+    return np.vstack(faces)
+
+
+def _route() -> Points:
+    """The corners cut three times (Chaikin), then legs of equal length."""
+    ring = np.array(ROUTE_M)
+    for _ in range(3):
+        after = np.roll(ring, -1, axis=0)
+        ring = np.stack([0.75 * ring + 0.25 * after, 0.25 * ring + 0.75 * after], axis=1).reshape(-1, 2)
+    return resample_closed(ring, round(closed_length_m(ring) / LEG_M), start_m=8.0)
+
+
+def _berths() -> tuple[Obstacle, ...]:
+    """Finger pontoons square to the north quay, with a boat beside most of them."""
+    south = -0.5 * np.pi
+    boats = (
+        ("sailboat", 7.2, 2.3, 9.5),
+        ("cruiser", 6.8, 2.3, 2.1),
+        ("sailboat", 6.6, 2.1, 8.5),
+        ("dinghy", 3.6, 1.6, 0.9),
+        ("cruiser", 7.4, 2.5, 2.3),
+        ("sailboat", 7.6, 2.4, 10.0),
+    )
+    middle_m = NORTH_M - 0.5 * FINGER_M
+    fingers = tuple(
+        Obstacle(f"finger_{k}", Kind.PIER, "pontoon", Pose2(x_m, middle_m, south), FINGER_M, 1.6, 0.45, 0.0, k % 2)
+        for k, x_m in enumerate(BERTHS_M)
+    )
+    moored = tuple(
+        Obstacle(
+            f"berth_{k}",
+            Kind.VESSEL,
+            look,
+            Pose2(x_m + 1.2 + 0.5 * width_m, NORTH_M - 1.2 - 0.5 * length_m, south),
+            length_m,
+            width_m,
+            height_m,
+            0.0,
+            k,
+        )
+        for k, (x_m, (look, length_m, width_m, height_m)) in enumerate(zip(BERTHS_M, boats, strict=True))
+    )
+    return (*fingers, *moored)
+
+
+def _obstacles() -> tuple[Obstacle, ...]:
+    vessel, person, buoy, pier = Kind.VESSEL, Kind.PERSON, Kind.BUOY, Kind.PIER
+    north = 0.5 * np.pi
+    return (
+        Obstacle("steps_east", pier, "quay", Pose2(EAST_M - 0.4, 14.0, north), 4.0, 1.2, 0.5),
+        Obstacle("pontoon_west", pier, "pontoon", Pose2(WEST_M + 1.4, 30.0, north), 12.0, 2.2, 0.45),
+        Obstacle("jetty_outer", pier, "jetty", Pose2(-58.0, -14.4, -1.4), 8.0, 1.8, 0.8),
+        Obstacle("barge_quay", vessel, "barge", Pose2(EAST_M - 2.0, 30.0, north), 16.0, 3.2, 2.6, 0.0, 1),
+        Obstacle("tug_quay", vessel, "workboat", Pose2(EAST_M - 1.9, 47.0, -north), 9.0, 3.0, 3.0),
+        Obstacle("fisher_mole", vessel, "workboat", Pose2(48.0, 1.8, 0.0), 7.4, 2.6, 2.7, 0.0, 3),
+        Obstacle("barge_mole", vessel, "barge", Pose2(-30.0, 2.0, 0.0), 14.0, 3.0, 2.2, 0.0, 2),
+        Obstacle("cruiser_west", vessel, "cruiser", Pose2(WEST_M + 3.8, 30.0, north), 6.4, 2.2, 2.0, 0.0, 2),
+        Obstacle("sail_mooring", vessel, "sailboat", Pose2(-34.0, 42.0, 1.2), 7.0, 2.2, 9.0, 0.0, 1),
+        Obstacle("sail_mooring_2", vessel, "sailboat", Pose2(-10.0, 36.0, 1.2), 6.4, 2.1, 8.0, 0.0, 3),
+        Obstacle("rowboat_mooring", vessel, "rowboat", Pose2(18.0, 42.0, 1.2), 3.8, 1.4, 0.6, 0.0, 1),
+        Obstacle("cruiser_lane", vessel, "cruiser", Pose2(10.0, 66.0, 0.4), 6.2, 2.2, 2.0, 0.0, 4),
+        Obstacle("sail_road", vessel, "sailboat", Pose2(-12.0, -67.2, 0.9), 7.4, 2.3, 9.5, 0.0, 2),
+        Obstacle("dinghy_road", vessel, "dinghy", Pose2(44.0, -44.0, 0.9), 3.4, 1.6, 0.9, 0.0, 1),
+        Obstacle("mooring_1", buoy, "sphere", Pose2(-30.6, 46.4, 0.0), 0.8, 0.8, 0.7, 0.0, 4),
+        Obstacle("mooring_2", buoy, "sphere", Pose2(-6.8, 40.2, 0.0), 0.8, 0.8, 0.7, 0.0, 3),
+        Obstacle("mooring_3", buoy, "sphere", Pose2(36.0, 38.0, 0.0), 0.8, 0.8, 0.7, 0.0, 2),
+        Obstacle("mooring_lane", buoy, "sphere", Pose2(-66.2, 40.0, 0.0), 0.8, 0.8, 0.7, 0.0, 3),
+        Obstacle("port_hand", buoy, "can", Pose2(19.4, -20.0, 0.0), 0.8, 0.8, 1.4),
+        Obstacle("starboard_hand", buoy, "cone", Pose2(33.0, -16.0, 0.0), 0.8, 0.8, 1.4, 0.0, 1),
+        Obstacle("road_mark", buoy, "pillar", Pose2(60.0, -61.6, 0.0), 0.9, 0.9, 2.4, 0.0, 2),
+        Obstacle("angler_mole", person, "standing", Pose2(2.0, -2.0, 1.5), 0.5, 0.5, 1.75, QUAY_M),
+        Obstacle("angler_head", person, "sitting", Pose2(31.0, -3.0, 2.6), 0.6, 0.6, 1.2, QUAY_M, 2),
+        Obstacle("walker_mole", person, "walking", Pose2(-56.0, -4.0, 0.1), 0.5, 0.5, 1.7, QUAY_M, 1),
+        Obstacle("walker_east", person, "walking", Pose2(EAST_M + 1.6, 22.0, 1.5), 0.5, 0.5, 1.8, QUAY_M, 3),
+        Obstacle("docker", person, "standing", Pose2(EAST_M + 1.2, 40.0, 3.1), 0.5, 0.5, 1.8, QUAY_M, 5),
+        Obstacle("couple_a", person, "standing", Pose2(-20.0, NORTH_M + 1.4, -1.6), 0.5, 0.5, 1.7, QUAY_M, 4),
+        Obstacle("couple_b", person, "standing", Pose2(-19.0, NORTH_M + 1.2, -1.8), 0.5, 0.5, 1.8, QUAY_M, 6),
+        Obstacle("walker_north", person, "walking", Pose2(34.0, NORTH_M + 1.8, 0.0), 0.5, 0.5, 1.75, QUAY_M, 2),
+        Obstacle("sitter_west", person, "sitting", Pose2(WEST_M + 1.2, 27.0, 0.1), 0.6, 0.6, 1.2, 0.45, 1),
+        Obstacle("swimmer", person, "swimming", Pose2(-72.0, -24.0, 0.6), 1.1, 0.6, 0.4, 0.0, 4),
+    )
+
+
+def _actors() -> tuple[Actor, ...]:
+    """A dinghy that circles among the moorings, and a boat that crosses the road outside."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    dinghy_m = ring * [17.0, 9.0] + [26.0, 53.0]
+    road_m = (ring * [50.0, 11.0] + [10.0, -47.0])[::-1].copy()
+    return (
+        Actor("boat_under_way", Kind.VESSEL, "cruiser", road_m, 1.1, 6.0, 2.1, 1.9, 20.0, 2),
+        Actor(
+            "dinghy_under_way",
+            Kind.VESSEL,
+            "dinghy",
+            dinghy_m,
+            0.8,
+            3.4,
+            1.5,
+            0.9,
+            10.0,
+            1,
+            behaviour=Behaviour.GIVES_WAY,
+        ),
+    )

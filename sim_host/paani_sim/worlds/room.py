@@ -1,0 +1,85 @@
+"""Room to pass: how far things are from points, and whether a boat can get from one end of its way to the other."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from paani_sim.worlds.curves import Points, clearance_m
+from paani_sim.worlds.way import Way
+from paani_sim.worlds.world import Actor, Obstacle, Pose2, World, actor_pose
+
+F64 = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+HEADROOM_M = 2.0  # a thing whose foot is higher can be passed underneath
+SIDE_M = 14.0
+NEAR_M = 5.0
+GRID_M = 0.5
+STEP_S = 4.0
+FINALLY_S = 1e5
+
+
+def footprint_gap_m(thing: Obstacle | Actor, pose: Pose2, points_m: Points) -> F64:
+    """Distance `(n,)` from the points `(n, 2)` to the thing's footprint at `pose`; zero inside."""
+    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
+    rel = points_m - np.array(pose[:2])
+    own = np.abs(np.column_stack([rel[:, 0] * cos + rel[:, 1] * sin, rel[:, 1] * cos - rel[:, 0] * sin]))
+    half = 0.5 * np.array([thing.length_m, thing.width_m])
+    gap_m: F64 = np.linalg.norm(np.maximum(own - half, 0.0), axis=1)
+    return gap_m
+
+
+def fixed_gap_m(obstacles: Iterable[Obstacle], points_m: Points) -> F64:
+    """Distance `(n,)` from each point to the nearest obstacle that a boat cannot pass underneath."""
+    gap_m = np.full(len(points_m), np.inf)
+    for obstacle in obstacles:
+        if obstacle.base_z_m <= HEADROOM_M:
+            gap_m = np.minimum(gap_m, footprint_gap_m(obstacle, obstacle.pose, points_m))
+    return gap_m
+
+
+class Lattice:
+    """Points on and beside the first `length_m` of a way, with their distance to shore and obstacles."""
+
+    def __init__(self, world: World, way: Way, length_m: float) -> None:
+        self._along_m = np.arange(0.0, length_m + 0.5 * GRID_M, GRID_M)
+        left_m = np.arange(-SIDE_M, SIDE_M + 0.5 * GRID_M, GRID_M)
+        self._shape = (len(self._along_m), len(left_m))
+        self._lane = np.abs(left_m) < 0.25
+        self._near = np.abs(left_m) <= NEAR_M
+        self.points_m = np.array([way.at(float(a), float(b))[:2] for a in self._along_m for b in left_m])
+        self.shore_gap_m = clearance_m(world.shore_m, self.points_m)
+
+    def is_passable(
+        self, obstacles: Sequence[Obstacle], actors: Sequence[Actor], room_m: float, boat_mps: float
+    ) -> bool:
+        """Whether a gap `room_m` wide leads on at any time, from where a boat at `boat_mps` then is or somewhat before.
+
+        With the actors where they finally are it leads from the start, and the way's last point is free.
+        """
+        still_m = np.minimum(self.shore_gap_m, fixed_gap_m(obstacles, self.points_m))
+        half_m = 0.5 * room_m
+        nominal_s = float(self._along_m[-1]) / boat_mps
+        for t_s in np.arange(0.0, nominal_s + STEP_S, STEP_S):
+            first = int(np.searchsorted(self._along_m, boat_mps * t_s - 5.0))
+            if not _leads_on(self._free(still_m, actors, float(t_s), half_m)[first:], self._near):
+                return False
+        at_last = self._free(still_m, actors, FINALLY_S, half_m)
+        return _leads_on(at_last, self._lane) and bool(at_last[-1, self._lane].all())
+
+    def _free(self, still_m: F64, actors: Sequence[Actor], t_s: float, half_m: float) -> Flags:
+        gap_m = still_m
+        for actor in actors:
+            gap_m = np.minimum(gap_m, footprint_gap_m(actor, actor_pose(actor, t_s), self.points_m))
+        return (gap_m >= half_m).reshape(self._shape)
+
+
+def _leads_on(free: Flags, from_columns: Flags) -> bool:
+    """Whether free cells connect these columns of the first row with the last row, never going back."""
+    if not len(free):
+        return True
+    reached = free[0] & from_columns
+    for row in free[1:]:
+        number = np.cumsum(np.diff(row.astype(np.int8), prepend=0) == 1) * row  # runs of free cells, from 1
+        reached = row & np.isin(number, np.unique(number[reached & row]))
+    return bool(reached.any())

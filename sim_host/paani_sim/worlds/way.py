@@ -1,0 +1,55 @@
+"""The boat's way: a route in coordinates along and to the left of it, also before its start and beyond its end."""
+
+import dataclasses
+
+import numpy as np
+
+from paani_sim.worlds.curves import Points, point_along_closed, point_along_open
+from paani_sim.worlds.world import Pose2, World
+
+LEG_M = 7.5
+
+
+class Way:
+    """`along_m` 0 is the boat's start. Around an open route's ends it goes straight on."""
+
+    def __init__(self, route_m: Points, *, closed: bool, first_m: float = 0.0) -> None:
+        self._route_m = route_m
+        self._closed = closed
+        self._first_m = first_m
+        self._length_m = float(np.linalg.norm(np.diff(route_m, axis=0), axis=1).sum())
+
+    def at(self, along_m: float, left_m: float = 0.0, turn_rad: float = 0.0) -> Pose2:
+        """Pose in the map, heading along the way plus `turn_rad`."""
+        distance_m = self._first_m + along_m
+        if self._closed:
+            x_m, y_m, yaw_rad = point_along_closed(self._route_m, distance_m)
+            beyond_m = 0.0
+        else:
+            x_m, y_m, yaw_rad = point_along_open(self._route_m, distance_m)
+            beyond_m = min(distance_m, 0.0) + max(distance_m - self._length_m, 0.0)
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        return Pose2(
+            float(x_m + beyond_m * cos - left_m * sin),
+            float(y_m + beyond_m * sin + left_m * cos),
+            yaw_rad + turn_rad,
+        )
+
+    def line_m(self, first_m: float, last_m: float, left_m: float = 0.0) -> Points:
+        """Points about every metre from `first_m` to `last_m`, either way, `left_m` to the left of the way."""
+        count = max(2, round(abs(last_m - first_m)) + 1)
+        return np.array([self.at(float(along_m), left_m)[:2] for along_m in np.linspace(first_m, last_m, count)])
+
+
+def stretch(world: World, from_m: float, length_m: float) -> World:
+    """The world with an open route: `length_m` of its own from `from_m` on, the boat at its beginning."""
+    way = Way(world.route_m, closed=world.route_closed, first_m=from_m)
+    legs = max(1, int(np.ceil(length_m / LEG_M)))
+    route_m = np.array([way.at(float(along_m))[:2] for along_m in np.linspace(0.0, length_m, legs + 1)])
+    return dataclasses.replace(world, route_m=route_m, route_closed=False, start=start_of(route_m))
+
+
+def start_of(route_m: Points) -> Pose2:
+    """The pose on the first waypoint, heading for the second."""
+    (x_m, y_m), (east_m, north_m) = route_m[0], route_m[1] - route_m[0]
+    return Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m)))
