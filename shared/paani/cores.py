@@ -36,9 +36,7 @@ class Perceiving(Protocol):
 class Estimating(Protocol):
     """Both filters, as `paani_services.localization` has them."""
 
-    def step(
-        self, samples: Sequence[m.ImuSample], fix: m.GpsFix | None, now_us: int
-    ) -> tuple[m.Odometry, m.Odometry]:
+    def step(self, samples: Sequence[m.ImuSample], fix: m.GpsFix | None, now_us: int) -> tuple[m.Odometry, m.Odometry]:
         """Local and global odometry after these samples, oldest first, and perhaps a new fix."""
         ...
 

@@ -21,6 +21,7 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
+from paani_services.navigator.mission import Progress, route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
 
 NOW_US = 20_000_000
@@ -31,7 +32,12 @@ SQUARE = Route(
     name="square",
     waypoints=tuple(Waypoint(x_m=x, y_m=y) for x, y in ((0, 0), (10, 0), (10, 10), (0, 10))),
 )
-RUNNING = NavState(target=1, sim_us=1000, advanced_us=NOW_US - 50_000)
+HERE = Waypoint(x_m=3.0, y_m=0.0)
+RUNNING = NavState(progress=Progress(target=1, began=HERE), sim_us=1000, advanced_us=NOW_US - 50_000)
+
+
+def at_waypoint(target: int, reached: int = 0) -> NavState:
+    return msgspec.structs.replace(RUNNING, progress=Progress(target=target, began=HERE, reached=reached))
 
 
 def heard(now_us: int = NOW_US, /, **changes: object) -> Heard:
@@ -59,7 +65,7 @@ def pose(x_m: float, y_m: float, yaw_rad: float = 0.0, source_us: int = NOW_US) 
 def run(
     config: NavigatorConfig, given_heard: Heard, state: NavState = RUNNING, now_us: int = NOW_US
 ) -> tuple[NavState, NavCommand]:
-    return navigate(state, given_heard, SQUARE, now_us, 43, config)
+    return navigate(state, given_heard, route_alone(SQUARE), now_us, 43, config)
 
 
 class Drill:
@@ -75,7 +81,7 @@ class Drill:
             advisory=advice(direction, self.now_us),
             odometry=msgspec.structs.replace(at, source_us=self.now_us),
         )
-        self.state, command = navigate(self.state, given_heard, route, self.now_us, 43, self.config)
+        self.state, command = navigate(self.state, given_heard, route_alone(route), self.now_us, 43, self.config)
         return command
 
 
@@ -182,11 +188,11 @@ def test_an_occupied_side_is_kept_off_while_going_straight() -> None:
     occupied = msgspec.structs.replace(advice(Direction.STRAIGHT), right=LaneRisk(occupied=True))
     at = pose(3.0, 2.0)
     given_heard = heard(drill.now_us, advisory=occupied, odometry=at)
-    _, command = navigate(RUNNING, given_heard, SQUARE, drill.now_us, 43, PAANI)
+    _, command = navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAANI)
     assert command.heading_rad == 0.0
     open_water = heard(drill.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
-    assert navigate(RUNNING, open_water, SQUARE, drill.now_us, 43, PAANI)[1].heading_rad < 0.0
-    assert navigate(RUNNING, given_heard, SQUARE, drill.now_us, 43, PAPER)[1].heading_rad < 0.0
+    assert navigate(RUNNING, open_water, route_alone(SQUARE), drill.now_us, 43, PAANI)[1].heading_rad < 0.0
+    assert navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAPER)[1].heading_rad < 0.0
 
 
 def test_m2_acceptance_radius_and_m3_repeat() -> None:
@@ -220,14 +226,14 @@ def test_waypoint_left_abeam_counts_in_paani_only() -> None:
 
 def test_joins_the_route_at_the_nearest_leg() -> None:
     """A navigator that restarts goes on where the boat is; nothing counts as reached."""
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, target=None))
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
     order = drill.order(Direction.STRAIGHT, pose(6.0, 9.5))
     assert (order.waypoint_index, order.waypoints_reached) == (3, 0)
 
 
 def test_route_without_repeat_ends() -> None:
     route = msgspec.structs.replace(SQUARE, repeat=False)
-    drill = Drill(PAPER, msgspec.structs.replace(RUNNING, target=3))
+    drill = Drill(PAPER, at_waypoint(3))
     order = drill.order(Direction.STRAIGHT, pose(0.2, 10.0), route)
     assert (order.inhibits, order.waypoints_reached) == ((Inhibit.ROUTE_FINISHED,), 1)
     assert not drill.order(Direction.STRAIGHT, pose(5.0, 5.0), route).enable
@@ -283,7 +289,7 @@ def test_no_route_no_motion() -> None:
 
 def test_m9_m11_clock_must_advance_and_a_reset_must_advance_again() -> None:
     """M9, M11: a paused clock stops the boat, and so does one that jumped back."""
-    state, now_us = NavState(target=1), NOW_US
+    state, now_us = NavState(), NOW_US
     enabled = []
     for sim_us in (100, 150, 150, 150, 150, 150, 200, 10, 60):
         clock = SimTime(source_us=now_us, sim_us=sim_us, stamp_us=1)
@@ -294,7 +300,7 @@ def test_m9_m11_clock_must_advance_and_a_reset_must_advance_again() -> None:
 
 
 def test_after_a_reset_the_boat_joins_the_route_anew() -> None:
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, target=3, reached=8))
+    drill = Drill(PAANI, at_waypoint(3, reached=8))
     back = heard(clock=SimTime(source_us=NOW_US, sim_us=5, stamp_us=1))
     drill.state, order = run(PAANI, back, drill.state)
     assert order.inhibits == (Inhibit.CLOCK_STOPPED,)

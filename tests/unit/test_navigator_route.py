@@ -48,10 +48,26 @@ def test_metres(tmp_path: Path) -> None:
 
 
 def test_geodetic(tmp_path: Path) -> None:
-    route = load_route(written(tmp_path, GEODETIC))
+    route = load_route(written(tmp_path, GEODETIC), (47.65, 9.48))
     assert route.waypoints[0].x_m == 0.0
     assert route.waypoints[1].y_m == pytest.approx(100.07, abs=0.1)
     assert not route.repeat
+
+
+def test_a_latitude_needs_to_know_where_the_map_lies(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"waypoints\[0\]: latitude_deg needs localization.origin_lat_lon_deg"):
+        load_route(written(tmp_path, GEODETIC))
+
+
+def test_a_route_lies_where_it_says_whatever_the_origin_of_the_map(tmp_path: Path) -> None:
+    """Metres from the file's origin and latitudes alike are moved onto a map with another origin."""
+    north_deg = (47.651, 9.48)
+    in_metres = "origin = {latitude_deg = 47.65, longitude_deg = 9.48}\n" + METRES
+    here = load_route(written(tmp_path, GEODETIC), north_deg)
+    there = load_route(written(tmp_path, in_metres), north_deg)
+    assert here.waypoints[0].y_m == pytest.approx(-111.2, abs=0.1)
+    assert there.waypoints[0].y_m == pytest.approx(here.waypoints[0].y_m)
+    assert load_route(written(tmp_path, in_metres), (47.65, 9.48)) == load_route(written(tmp_path, METRES))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from paani.config import DynamicsConfig, PlantConfig
+import paani_sim.vessels
+from paani.config import PlantConfig
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.worlds import World, load_world
 
@@ -128,8 +129,11 @@ def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
 def test_divergence_names_itself(open_plant: OpenPlant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """MuJoCo would reset the boat and write a log file; neither happens."""
     monkeypatch.chdir(tmp_path)
-    config = PlantConfig(dynamics=DynamicsConfig(tilt_damping=1e9, heave_damping=1e9))
-    plant = open_plant(config=config)
+    paper = (Path(paani_sim.vessels.__file__).parent / "paper.toml").read_text(encoding="utf-8")
+    file = tmp_path / "stiff.toml"
+    file.write_text(paper.replace("_damping = 24.0", "_damping = 1e9").replace("_damping = 90.0", "_damping = 1e9"))
+    plant = open_plant(config=PlantConfig(vessel=str(file)))
+    file.unlink()
     plant.place(0.0, 0.0, 0.0, z_m=0.2)
     with pytest.raises(PlantDiverged, match="not finite"):
         drive(plant, 2000, 1e8)

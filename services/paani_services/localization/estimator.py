@@ -4,28 +4,46 @@ Values in, values out; time comes with the samples. An estimate is never simulat
 """
 
 import math
-import statistics
+from collections import Counter
 from collections.abc import Sequence
 
+import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from paani.config import LocalizationConfig
-from paani.geometry import enu_from_geodetic, geodetic_from_enu
+from paani.geometry import clip, enu_from_geodetic, geodetic_from_enu
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.calibration import gyro_bias
-from paani_services.localization.filter import PSI, PX, PY, PlanarFilter, U, V
+from paani_services.localization.filter import PSI, PX, PY, SIZE, WX, WY, B, C, PlanarFilter, U, V
+from paani_services.localization.intake import MAX_FUTURE_S, usable_fix, usable_samples
+from paani_services.localization.levelling import level, mean_level
+from paani_services.localization.rest import Felt, RestWatch, Shown
 
-GRAVITY_MPS2 = 9.81
 MAX_SAMPLE_GAP_S = 0.1  # the boat is not predicted across a longer gap between IMU samples
 NOMINAL_GAP_S = 0.01
-YAW_STD_RAD = 0.03  # compass noise of one averaged step; its bias is floored below
-YAW_FLOOR_RAD = 0.02  # an unknown constant compass bias
-GPS_SPEED_STD_MPS = 0.07
-SWAY_STD_MPS = 0.15
+UNSEEN_SPEED_MPS, UNSEEN_TURN_RADPS = 0.5, 0.3  # what the boat may have done in a gap
+YAW_STD_RAD = 0.02  # compass noise of one step
+YAW_GATE2 = 9.0  # the compass is heard twenty times a second: a refusal costs little
+YAW_FLOOR_RAD = 0.02  # no compass is mounted better
+COMPASS_BIAS_STD_RAD = 0.05  # 3 degrees: a small compass on a small boat, adjusted
+COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long: compass or gyro has changed by about so much
+COURSE_MPS = 0.3  # slower, the course over ground tells no heading
+# How much of a fix's spread changes from fix to fix is learnt; the rest wanders. At first, and at least:
+GPS_NOISE_FRAC, MIN_GPS_NOISE_FRAC = 1.0 / 4.0, 1.0 / 16.0
+NOISE_FIXES = 50
+GPS_SPEED_PER_S = 1.0 / 16.0  # spread of the speed for that of the position: 0.05 m/s for 0.8 m
+SWAY_STD_MPS = 1.4  # at 20 Hz as much as 0.1 m/s for 5 s on end
+LOCAL_SWAY_STD_MPS = 0.15
 LOCAL_SPEED_STD_MPS = 2.0  # the local filter's surge fades towards zero instead of running away
+REST_STD_MPS = 0.03
+SPEED_DOUBT_MPS = 0.3
 CONVERGED_FIXES = 5
+RETURN_FIXES = 3  # after an outage, before the position may be believed again
 DOUBTFUL_FIXES = 3  # refused in a row: one of the two is wrong
-REFUSED_FIXES = 10  # refused in a row: the filter is wrong, not the receiver
+REFUSED_FIXES = 10  # refused in a row, and of one mind: the filter is wrong, not the receiver
+MAX_LAG_S = 1.0  # of a fix behind the IMU
+MAX_RANGE_M = 50_000.0  # from the origin: beyond, a plane is no map
 
 
 class Estimator:
@@ -34,6 +52,8 @@ class Estimator:
     def __init__(self, config: LocalizationConfig) -> None:
         self._config = config
         self._origin_deg = config.origin_lat_lon_deg
+        self.drops = Counter[str]()
+        """Messages not used, by cause, since the process began."""
         self._reset()
 
     def _reset(self) -> None:
@@ -44,8 +64,15 @@ class Estimator:
         self._last_imu: ImuSample | None = None
         self._last_fix: GpsFix | None = None
         self._bias = gyro_bias(())
+        self._rest = RestWatch()
         self._accepted = 0
         self._refused = 0
+        self._of_one_mind: list[tuple[float, float]] = []  # the latest refused fixes, as long as they agree [m]
+        self._refused_in_all = 0
+        self._speeds_refused = 0
+        self._compass_refused_s = 0.0
+        self._noise_frac2 = GPS_NOISE_FRAC**2
+        self._nis = 0.0
         self._slow_since_us: int | None = None
 
     def step(self, samples: Sequence[ImuSample], fix: GpsFix | None, now_us: int) -> tuple[Odometry, Odometry]:
@@ -53,14 +80,19 @@ class Estimator:
 
         Both are unhealthy until the gyro is calibrated and, for the global one, the position has
         converged; and again whenever GPS or IMU is older than its limit or the spread is too large.
-        A new epoch of the IMU starts everything anew.
+        Messages that are not finite, late, repeated or from the future are dropped and counted in `drops`.
+        A new epoch of the IMU, or a clock set back, starts everything anew.
         """
+        if self._last_imu is not None and self._last_imu.source_us > now_us + MAX_FUTURE_S * 1e6:
+            self._reset()
+        samples = usable_samples(samples, self._last_imu, now_us, self.drops)
         if samples:
             if self._last_imu is not None and samples[-1].epoch != self._last_imu.epoch:
                 self._reset()
             self._move(samples)
-        if fix is not None and fix.fix:
-            self._take_fix(fix)
+        usable = None if fix is None else usable_fix(fix, self._last_fix, now_us, self.drops)
+        if usable is not None:
+            self._take_fix(usable)
         self._watch_speed(now_us)
         imu_fresh = self._is_fresh(self._last_imu, self._config.max_imu_age_s, now_us)
         return self._local_odometry(now_us, imu_fresh), self._global_odometry(now_us, imu_fresh)
@@ -73,23 +105,44 @@ class Estimator:
             return
         before_us = self._last_imu.source_us if self._last_imu else 0
         step_s = (newest.source_us - before_us) * 1e-6
-        if not 0.0 < step_s <= MAX_SAMPLE_GAP_S * len(samples):
+        if step_s > MAX_SAMPLE_GAP_S * len(samples):
+            self._bridge(step_s)
             step_s = NOMINAL_GAP_S * len(samples)
         self._last_imu = newest
-        yaw_rate = statistics.fmean(sample.gyro_z_radps for sample in samples)
-        ahead = statistics.fmean(sample.accel_x_mps2 + GRAVITY_MPS2 * math.sin(sample.pitch_rad) for sample in samples)
-        left = statistics.fmean(
-            sample.accel_y_mps2 - GRAVITY_MPS2 * math.sin(sample.roll_rad) * math.cos(sample.pitch_rad)
-            for sample in samples
-        )
-        for each in (self._local, self._global):
-            if each is None:
-                continue
-            each.predict(yaw_rate, ahead, left, step_s)
-            if newest.orientation_available:
-                each.correct_yaw(newest.yaw_rad, YAW_STD_RAD, math.inf)
-            each.correct_sway(0.0, SWAY_STD_MPS)
+        ahead, left, yaw_rate = mean_level(samples)
+        self._rest.feel(Felt(newest.source_us, ahead, left, yaw_rate - float(self._local.x[B])))
+        self._local.predict(yaw_rate, ahead, left, step_s)
+        if newest.orientation_available:
+            self._local.correct_yaw(newest.yaw_rad, YAW_STD_RAD, math.inf)
+        self._local.correct_sway(0.0, LOCAL_SWAY_STD_MPS)
         self._local.correct_surge(0.0, LOCAL_SPEED_STD_MPS)
+        if self._global is None or self._last_fix is None:
+            return
+        self._global.predict(yaw_rate, ahead, left, step_s, self._last_fix.position_std_m)
+        if newest.orientation_available:
+            self._hear_compass(self._global, newest.yaw_rad, step_s)
+        self._global.correct_sway(0.0, SWAY_STD_MPS)
+        if self._rest.at_rest:
+            self._global.correct_velocity(0.0, 0.0, REST_STD_MPS, math.inf, turns=False)
+
+    def _hear_compass(self, heard: PlanarFilter, yaw_rad: float, step_s: float) -> None:
+        """Where compass and gyro part for good, neither is known: the course over ground will tell."""
+        if heard.correct_yaw(yaw_rad, YAW_STD_RAD, YAW_GATE2).taken:
+            self._compass_refused_s = 0.0
+            return
+        self._compass_refused_s += step_s
+        if self._compass_refused_s >= COMPASS_DOUBT_S:
+            heard.loosen(_std(psi=COMPASS_DOUBT_RAD, c=COMPASS_DOUBT_RAD))
+            self._compass_refused_s = 0.0
+
+    def _bridge(self, gap_s: float) -> None:
+        """Nothing was felt for `gap_s`: the boat may have gone and turned anywhere near."""
+        speed_mps, turn_rad = UNSEEN_SPEED_MPS, min(UNSEEN_TURN_RADPS * gap_s, math.pi)
+        for each in (self._local, self._global):
+            if each is not None:
+                each.loosen(_std(p=speed_mps * gap_s, psi=turn_rad, speed=speed_mps))
+        self._rest = RestWatch()
+        self._accepted = min(self._accepted, CONVERGED_FIXES - RETURN_FIXES)
 
     def _calibrate(self, samples: Sequence[ImuSample]) -> None:
         self._calibration += samples
@@ -98,53 +151,93 @@ class Estimator:
             return
         self._bias = gyro_bias(self._calibration)
         self._calibration.clear()
-        self._local = PlanarFilter(
-            np.array([0.0, 0.0, newest.yaw_rad, 0.0, 0.0, self._bias.radps]),
-            np.array([0.01, 0.01, self._initial_yaw_std_rad(newest), 0.2, 0.1, self._bias.std_radps]),
-        )
+        x = np.zeros(SIZE)
+        x[[PSI, B]] = newest.yaw_rad, self._bias.radps
+        std = _std(p=0.01, psi=_initial_yaw_std_rad(newest), speed=0.2, b=self._bias.std_radps)
+        self._local = PlanarFilter(x, std)
 
     def _take_fix(self, fix: GpsFix) -> None:
         if self._local is None or self._last_imu is None:
             return
-        if self._origin_deg is None:
-            self._origin_deg = (fix.latitude_deg, fix.longitude_deg)
-        self._last_fix = fix
-        x_m, y_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *self._origin_deg)
-        if self._global is None or self._refused >= REFUSED_FIXES:
-            self._start_global(x_m, y_m, fix)
+        origin_deg = self._origin_deg or (fix.latitude_deg, fix.longitude_deg)
+        x_m, y_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *origin_deg)
+        lag_s = (self._last_imu.source_us - fix.source_us) * 1e-6
+        if math.hypot(x_m, y_m) > MAX_RANGE_M:
+            self.drops["gps_far"] += 1
             return
-        gate2 = self._config.gate_mahalanobis2
-        if self._global.correct_position(x_m, y_m, fix.position_std_m, gate2):
-            self._accepted, self._refused = self._accepted + 1, 0
-        else:
-            self._refused += 1
+        if abs(lag_s) > MAX_LAG_S:
+            self.drops["gps_out_of_step"] += 1
+            return
+        self._origin_deg = origin_deg
+        lost = self._last_fix is not None and (
+            (fix.source_us - self._last_fix.source_us) * 1e-6 > self._config.max_gps_age_s
+        )
+        if lost:
+            self._accepted = min(self._accepted, CONVERGED_FIXES - RETURN_FIXES)
+        self._last_fix = fix
         vx_mps, vy_mps = fix.sog_mps * math.cos(fix.cog_rad), fix.sog_mps * math.sin(fix.cog_rad)
-        self._global.correct_velocity(vx_mps, vy_mps, GPS_SPEED_STD_MPS, gate2)
+        std_m, std_mps = fix.position_std_m, fix.position_std_m * GPS_SPEED_PER_S
+        self._rest.show(Shown(fix.source_us, x_m, y_m, vx_mps, vy_mps, std_m, std_mps))
+        if self._global is None:
+            self._global = self._start_global(vx_mps, vy_mps, std_mps)
+            self._place(self._global, x_m, y_m, fix)
+            return
+        vx_now, vy_now = self._global.velocity
+        x_m, y_m = x_m + vx_now * lag_s, y_m + vy_now * lag_s
+        self._correct_position(self._global, x_m, y_m, fix)
+        if not self._rest.at_rest:
+            self._correct_speed(self._global, vx_mps, vy_mps, std_mps)
 
-    def _start_global(self, x_m: float, y_m: float, fix: GpsFix) -> None:
+    def _correct_position(self, heard: PlanarFilter, x_m: float, y_m: float, fix: GpsFix) -> None:
+        noise_m = fix.position_std_m * math.sqrt(self._noise_frac2)
+        expected_x_m, expected_y_m, expected_std_m = heard.expected_fix
+        taken, nis = heard.correct_position(x_m, y_m, noise_m, self._config.gate_mahalanobis2)
+        self._nis = min(nis, 1e9)
+        if taken:
+            off2_m2 = 0.5 * ((x_m - expected_x_m) ** 2 + (y_m - expected_y_m) ** 2)
+            seen = (off2_m2 - expected_std_m**2) / fix.position_std_m**2
+            learnt = self._noise_frac2 + (seen - self._noise_frac2) / NOISE_FIXES
+            self._noise_frac2 = clip(learnt, MIN_GPS_NOISE_FRAC**2, 1.0)
+            self._accepted, self._refused = self._accepted + 1, 0
+            self._of_one_mind.clear()
+            return
+        self._refused += 1
+        self._refused_in_all += 1
+        if self._of_one_mind and math.dist(self._of_one_mind[-1], (x_m, y_m)) > 2.0 * fix.position_std_m + fix.sog_mps:
+            self._of_one_mind.clear()
+        self._of_one_mind.append((x_m, y_m))
+        if len(self._of_one_mind) >= REFUSED_FIXES:
+            self._place(heard, x_m, y_m, fix)
+
+    def _correct_speed(self, heard: PlanarFilter, vx_mps: float, vy_mps: float, std_mps: float) -> None:
+        turns = math.hypot(*heard.velocity) >= COURSE_MPS
+        if heard.correct_velocity(vx_mps, vy_mps, std_mps, self._config.gate_mahalanobis2, turns=turns).taken:
+            self._speeds_refused = 0
+            return
+        self._speeds_refused += 1
+        if self._speeds_refused >= DOUBTFUL_FIXES:
+            heard.loosen(_std(speed=SPEED_DOUBT_MPS))
+            self._speeds_refused = 0
+
+    def _start_global(self, vx_mps: float, vy_mps: float, std_mps: float) -> PlanarFilter:
         assert self._local is not None
         assert self._last_imu is not None
         yaw_rad = float(self._local.x[PSI])
-        surge_mps = fix.sog_mps * math.cos(fix.cog_rad - yaw_rad)
-        self._global = PlanarFilter(
-            np.array([x_m, y_m, yaw_rad, surge_mps, 0.0, self._bias.radps]),
-            np.array(
-                [
-                    fix.position_std_m,
-                    fix.position_std_m,
-                    self._initial_yaw_std_rad(self._last_imu),
-                    0.2,
-                    0.1,
-                    self._bias.std_radps,
-                ]
-            ),
-        )
+        x = np.zeros(SIZE)
+        x[[PSI, B]] = yaw_rad, self._bias.radps
+        x[U] = vx_mps * math.cos(yaw_rad) + vy_mps * math.sin(yaw_rad)
+        std = _std(psi=_initial_yaw_std_rad(self._last_imu), speed=0.2 + std_mps, b=self._bias.std_radps)
+        std[[C, WX, WY]] = COMPASS_BIAS_STD_RAD, 0.3, 0.3
+        return PlanarFilter(x, std, self._config.gps_wander_s)
+
+    def _place(self, placed: PlanarFilter, x_m: float, y_m: float, fix: GpsFix) -> None:
+        """Believe the receiver about the place, and nothing of it until more fixes agree."""
+        placed.move_to(x_m, y_m, fix.position_std_m, fix.position_std_m * math.sqrt(self._noise_frac2))
+        self._of_one_mind.clear()
         self._accepted = self._refused = 0
 
     def _watch_speed(self, now_us: int) -> None:
-        if self._global is None or float(np.hypot(self._global.x[U], self._global.x[V])) > (
-            self._config.stopped_speed_mps
-        ):
+        if self._global is None or math.hypot(*self._global.velocity) > self._config.stopped_speed_mps:
             self._slow_since_us = None
         elif self._slow_since_us is None:
             self._slow_since_us = now_us
@@ -161,40 +254,46 @@ class Estimator:
     def _global_odometry(self, now_us: int, imu_fresh: bool) -> Odometry:
         if self._global is None or self._last_fix is None or self._origin_deg is None:
             return self._nothing(now_us)
-        floor_m = self._last_fix.position_std_m
-        odometry = self._odometry(self._global, now_us, healthy=False, floor_m=floor_m)
+        odometry = self._odometry(self._global, now_us, healthy=imu_fresh)
+        position_std_m = max(odometry.position_std_m, self._last_fix.position_std_m)
         healthy = (
-            imu_fresh
+            odometry.healthy
             and self._is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
             and self._accepted >= CONVERGED_FIXES
             and self._refused < DOUBTFUL_FIXES
-            and odometry.position_std_m <= self._config.max_position_std_m
+            and position_std_m <= self._config.max_position_std_m
             and odometry.yaw_std_rad <= self._config.max_yaw_std_rad
         )
-        return self._odometry(self._global, now_us, healthy=healthy, floor_m=floor_m)
+        latitude_deg, longitude_deg = geodetic_from_enu(odometry.x_m, odometry.y_m, *self._origin_deg)
+        return msgspec.structs.replace(
+            odometry,
+            position_std_m=position_std_m,
+            healthy=healthy,
+            latitude_deg=latitude_deg,
+            longitude_deg=longitude_deg,
+            nis=self._nis,
+            refused_fixes=self._refused_in_all,
+        )
 
-    def _odometry(self, source: PlanarFilter, now_us: int, *, healthy: bool, floor_m: float = 0.0) -> Odometry:
-        x, std = source.x.tolist(), source.std.tolist()
-        latitude_deg, longitude_deg = 0.0, 0.0
-        if source is self._global and self._origin_deg is not None:
-            latitude_deg, longitude_deg = geodetic_from_enu(x[PX], x[PY], *self._origin_deg)
-        last = self._last_imu
+    def _odometry(self, source: PlanarFilter, now_us: int, *, healthy: bool) -> Odometry:
+        x, std, last = source.x.tolist(), source.std.tolist(), self._last_imu
+        vx_mps, vy_mps = source.velocity
+        sin, cos = math.sin(x[PSI]), math.cos(x[PSI])
+        tilted = last is not None and last.orientation_available
         return Odometry(
             source_us=last.source_us if last else now_us,
             x_m=x[PX],
             y_m=x[PY],
             yaw_rad=x[PSI],
-            surge_mps=x[U],
-            sway_mps=x[V],
-            yaw_rate_radps=last.gyro_z_radps - x[-1] if last else 0.0,
-            position_std_m=max(math.hypot(std[PX], std[PY]) / math.sqrt(2.0), floor_m),
+            surge_mps=vx_mps * cos + vy_mps * sin,
+            sway_mps=vy_mps * cos - vx_mps * sin,
+            yaw_rate_radps=level(last).yaw_rate_radps - x[B] if last else 0.0,
+            position_std_m=math.hypot(std[PX], std[PY]) / math.sqrt(2.0),
             yaw_std_rad=max(std[PSI], YAW_FLOOR_RAD),
             healthy=healthy and all(map(math.isfinite, x + std)),
             stopped=self._is_stopped(now_us),
-            latitude_deg=latitude_deg,
-            longitude_deg=longitude_deg,
-            roll_rad=last.roll_rad if last and last.orientation_available else 0.0,
-            pitch_rad=last.pitch_rad if last and last.orientation_available else 0.0,
+            roll_rad=last.roll_rad if last and tilted else 0.0,
+            pitch_rad=last.pitch_rad if last and tilted else 0.0,
         )
 
     @staticmethod
@@ -202,9 +301,18 @@ class Estimator:
         return Odometry(source_us=now_us, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.0)
 
     @staticmethod
-    def _initial_yaw_std_rad(sample: ImuSample) -> float:
-        return YAW_STD_RAD if sample.orientation_available else math.pi
-
-    @staticmethod
     def _is_fresh(message: ImuSample | GpsFix | None, limit_s: float, now_us: int) -> bool:
         return message is not None and (now_us - message.source_us) * 1e-6 <= limit_s
+
+
+def _initial_yaw_std_rad(sample: ImuSample) -> float:
+    return YAW_STD_RAD if sample.orientation_available else math.pi
+
+
+def _std(
+    p: float = 0.0, psi: float = 0.0, speed: float = 0.0, b: float = 0.0, c: float = 0.0
+) -> npt.NDArray[np.float64]:
+    """Standard deviations of a state: position, yaw, both speeds, gyro and compass bias."""
+    std = np.zeros(SIZE)
+    std[[PX, PY, PSI, U, V, B, C]] = p, p, psi, speed, speed, b, c
+    return std

@@ -77,6 +77,14 @@ class PlanarFilter:
         sin, cos = math.sin(psi), math.cos(psi)
         return u * cos - v * sin + wx, u * sin + v * cos + wy
 
+    @property
+    def expected_fix(self) -> tuple[float, float, float]:
+        """Where the next GPS position should lie [m], and its standard deviation without the receiver's noise."""
+        p = self._ekf.P
+        variance = p[PX, PX] + p[PY, PY] + p[GX, GX] + p[GY, GY] + 2.0 * (p[PX, GX] + p[PY, GY])
+        x = self._ekf.x.tolist()
+        return x[PX] + x[GX], x[PY] + x[GY], math.sqrt(max(0.5 * float(variance), 0.0))
+
     def predict(
         self, yaw_rate_radps: float, ahead_mps2: float, left_mps2: float, step_s: float, gps_std_m: float = 0.0
     ) -> None:
@@ -115,10 +123,10 @@ class PlanarFilter:
 
     def correct_position(self, x_m: float, y_m: float, std_m: float, gate2: float) -> Verdict:
         """GPS position, which shows the boat and the receiver's slow error together."""
-        px, py, *_ = x = self._ekf.x.tolist()
+        expected_x_m, expected_y_m, _ = self.expected_fix
         jacobian = np.zeros((2, SIZE))
         jacobian[0, PX] = jacobian[0, GX] = jacobian[1, PY] = jacobian[1, GY] = 1.0
-        return self._correct(np.array([x_m - px - x[GX], y_m - py - x[GY]]), jacobian, std_m, gate2)
+        return self._correct(np.array([x_m - expected_x_m, y_m - expected_y_m]), jacobian, std_m, gate2)
 
     def correct_velocity(
         self, vx_mps: float, vy_mps: float, std_mps: float, gate2: float, *, turns: bool = True

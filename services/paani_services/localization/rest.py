@@ -2,8 +2,8 @@
 
 A receiver at a quay shows speeds of decimetres a second, for minutes at a time, and a position that wanders by metres.
 No boat starts to move without its IMU feeling it, so rest is kept against the receiver: until the IMU feels a push or a
-turn, or speed and place of the fixes both leave what the receiver's own error explains. To find rest again takes more:
-a quiet IMU, and a mean speed near zero by any receiver's standard.
+turn, or speed and place of the fixes both leave what the receiver's own error explains. To find rest after motion was
+felt takes more: a quiet IMU, and a mean speed near zero by any receiver's standard.
 """
 
 import math
@@ -61,7 +61,7 @@ class RestWatch:
         while felt.at_us - self._felt[0].at_us > QUIET_S * 1e6:
             self._felt.popleft()
         if self.at_rest and self._is_disturbed():
-            self._leave()
+            self._leave(felt_it=True)
 
     def show(self, fix: Shown) -> None:
         """One fix."""
@@ -78,19 +78,21 @@ class RestWatch:
         x_m, y_m = self._place_m
         strayed = math.hypot(fix.x_m - x_m, fix.y_m - y_m) / fix.std_m
         if strayed > STRAYED_SIGMAS or (strayed > 1.0 and _sigmas(recent) > LOST_SIGMAS):
-            self._leave()
+            self._leave(felt_it=False)
             return
         since_s = (fix.at_us - self._shown[-2].at_us) * 1e-6 if len(self._shown) > 1 else 0.0
         follow = 1.0 - math.exp(-since_s / SETTLE_S)
         self._place_m = (x_m + follow * (fix.x_m - x_m), y_m + follow * (fix.y_m - y_m))
 
     def _look_for_rest(self, recent: list[Shown]) -> None:
-        """A boat never felt to move is believed to lie still as long as its receiver allows that."""
+        """A boat never felt to move is believed to lie still as soon as its receiver allows that."""
         shown = self._shown
-        fresh = not self._has_moved and _sigmas(recent) <= LOST_SIGMAS
-        self._has_moved = not fresh or self._is_disturbed()
-        if self._is_disturbed() or self._felt[-1].at_us - self._felt[0].at_us < 0.9 * QUIET_S * 1e6:
+        if self._felt[-1].at_us - self._felt[0].at_us < 0.9 * QUIET_S * 1e6:
             return
+        if self._is_disturbed():
+            self._has_moved = True
+            return
+        fresh = not self._has_moved and _sigmas(recent) <= LOST_SIGMAS
         mean_mps = math.hypot(fmean(each.vx_mps for each in shown), fmean(each.vy_mps for each in shown))
         settled = shown[-1].at_us - shown[0].at_us >= 0.7 * FOUND_S * 1e6
         if fresh or (settled and mean_mps < FOUND_MPS and _sigmas(shown) < FOUND_SIGMAS):
@@ -99,13 +101,14 @@ class RestWatch:
             self._usual = fmean(ahead), fmean(left)
             self._place_m = fmean(each.x_m for each in shown), fmean(each.y_m for each in shown)
 
-    def _leave(self) -> None:
-        self.at_rest, self._has_moved = False, True
+    def _leave(self, *, felt_it: bool) -> None:
+        self.at_rest, self._has_moved = False, self._has_moved or felt_it
+        self._usual = (0.0, 0.0)
         self._shown.clear()
         self._felt.clear()
 
     def _is_disturbed(self) -> bool:
-        """Shaken, pushed or turned."""
+        """Shaken, pushed or turned; or without the noise that an IMU has while it works."""
         at_us, ahead, left, yaw_rate = zip(*self._felt, strict=True)
         push_mps2 = math.hypot(fmean(ahead) - self._usual[0], fmean(left) - self._usual[1])
         if self.at_rest:
@@ -114,8 +117,8 @@ class RestWatch:
             pushed = push_mps2 > MAX_TILT_MPS2
         return (
             pushed
-            or max(ahead) - min(ahead) > MAX_ACCEL_RANGE_MPS2
-            or max(left) - min(left) > MAX_ACCEL_RANGE_MPS2
+            or not 0.0 < max(ahead) - min(ahead) <= MAX_ACCEL_RANGE_MPS2
+            or not 0.0 < max(left) - min(left) <= MAX_ACCEL_RANGE_MPS2
             or abs(fmean(yaw_rate)) > MAX_TURN_RADPS
         )
 

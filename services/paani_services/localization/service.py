@@ -1,6 +1,7 @@
 """Localization process: IMU and GPS in, local and global odometry out."""
 
 import asyncio
+from collections import Counter
 
 from paani import keys
 from paani.bus import Bus
@@ -17,7 +18,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     local, odometry = bus.publisher(keys.LOCAL_ODOMETRY), bus.publisher(keys.ODOMETRY)
     estimator = Estimator(config.localization)
     period_us = round(1e6 / config.localization.rate_hz)
-    seen = None
+    seen, counted = None, Counter[str]()
     with bus.alive():
         due_us = clock.now_us()
         while True:
@@ -27,5 +28,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             local_now, global_now = estimator.step(imu.drain(), fix, now_us)
             local.put(local_now)
             odometry.put(global_now)
+            for cause, n in (estimator.drops - counted).items():
+                bus.count_drop(cause, n)
+            counted = estimator.drops.copy()
             due_us = max(due_us + period_us, now_us)
             await asyncio.sleep(max(0, due_us - clock.now_us()) * 1e-6)

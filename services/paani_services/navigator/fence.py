@@ -11,7 +11,7 @@ from itertools import pairwise
 from paani import portable
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
-from paani.messages import FenceArea, Keep, Odometry
+from paani.messages import FenceArea, Keep, Odometry, Waypoint
 from paani_services.navigator.progress import Point
 
 DRIFTING_MPS = 0.1  # below it the course over ground is noise
@@ -100,14 +100,27 @@ def bounded_speed(
     return min(speed_mps, allowed_mps) if allowed_mps >= min(CREEP_MPS, speed_mps) else None
 
 
-def first_leg_outside(fence: Fence, points_m: tuple[Point, ...], margin_m: float) -> int | None:
-    """Index of the first point that is not allowed, nearer than `margin_m` to the edge, or left across it."""
-    for number, point in enumerate(points_m):
-        if not is_allowed(fence, point) or distance_m(fence, point) < margin_m:
-            return number
-        if number + 1 < len(points_m) and room_m(fence, point, points_m[number + 1]) < math.inf:
-            return number
+def trouble(
+    fence: Fence, waypoints: tuple[Waypoint, ...], margin_m: float, *, repeat: bool = False
+) -> tuple[int, str] | None:
+    """The first waypoint that is not allowed, or whose leg to the next is not or comes nearer than the margin."""
+    points = [(waypoint.x_m, waypoint.y_m) for waypoint in waypoints]
+    for number, point in enumerate(points):
+        if not is_allowed(fence, point):
+            return number, "is outside the fence"
+        if not _is_clear(fence, point, point, margin_m):
+            return number, f"is nearer than {margin_m} m to the fence"
+    for number, (start, end) in enumerate(pairwise((*points, points[0]) if repeat else points)):
+        if room_m(fence, start, end) < math.inf:
+            return number, "the leg to the next leaves the fence"
+        if not _is_clear(fence, start, end, margin_m):
+            return number, f"the leg to the next comes nearer than {margin_m} m to the fence"
     return None
+
+
+def segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
+    """Whether two pieces of line touch or cross."""
+    return _apart_m(one, other) == 0.0
 
 
 def _speed_outside(
@@ -129,8 +142,37 @@ def _edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
 def _nearest(at_m: Point, start: Point, end: Point) -> Point:
     """Point of the edge nearest to `at_m`."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
-    part = ((at_m[0] - start[0]) * along_x + (at_m[1] - start[1]) * along_y) / (along_x**2 + along_y**2)
+    length2 = along_x * along_x + along_y * along_y
+    if length2 == 0.0:
+        return start
+    part = ((at_m[0] - start[0]) * along_x + (at_m[1] - start[1]) * along_y) / length2
     return _between(start, end, min(1.0, max(0.0, part)))
+
+
+def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
+    """Nothing within the margin of the allowed way is an edge, but for edges between two areas that keep in."""
+    return not any(
+        _apart_m((start, end), edge) < margin_m and _is_border(fence, edge) for area in fence for edge in _edges(area)
+    )
+
+
+def _is_border(fence: Fence, edge: tuple[Point, Point]) -> bool:
+    """Whether somewhere along the edge one side of it is not allowed: at its middle or just inside its ends."""
+    (x1, y1), (x2, y2) = edge
+    length_m = math.dist(*edge)
+    left = (-(y2 - y1) / length_m * NUDGE_M, (x2 - x1) / length_m * NUDGE_M)
+    middles = (_between(*edge, part) for part in (0.01, 0.25, 0.5, 0.75, 0.99))
+    return not all(
+        is_allowed(fence, (x_m + side * left[0], y_m + side * left[1])) for x_m, y_m in middles for side in (-1.0, 1.0)
+    )
+
+
+def _apart_m(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
+    """Distance between two pieces of line; 0 where they meet."""
+    if any(True for _ in _crossings(*one, *other)):
+        return 0.0
+    ends = [(point, other) for point in one] + [(point, one) for point in other]
+    return min(math.dist(point, _nearest(point, *edge)) for point, edge in ends)
 
 
 def _on_edge(area: FenceArea, at_m: Point) -> bool:
@@ -147,7 +189,7 @@ def _crossings(from_m: Point, to_m: Point, start: Point, end: Point) -> Iterator
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     to_x, to_y = start[0] - from_m[0], start[1] - from_m[1]
     cross = way_x * edge_y - way_y * edge_x
-    if cross == 0.0:
+    if cross == 0.0:  # side by side, or no way at all: what lies between other cuts is asked in its middle
         return
     part, along = (to_x * edge_y - to_y * edge_x) / cross, (to_x * way_y - to_y * way_x) / cross
     if 0.0 <= part <= 1.0 and -1e-9 <= along <= 1.0 + 1e-9:

@@ -4,7 +4,9 @@ Body is x forward, y left, z up with its origin on the water; positive pitch low
 Elementary arithmetic alone, element by element: no reduction whose order could differ.
 """
 
+import functools
 import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,8 @@ from paani import portable
 from paani.config import CalibrationConfig
 
 F64 = NDArray[np.float64]
-Vector = tuple[float, float, float]
+Number = float | F64
+Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]  # by rows
 LEVEL = 1e-6  # a ray that falls less than this per unit meets no water
 
@@ -32,21 +35,53 @@ class Station(NamedTuple):
 class Lens(NamedTuple):
     """Map-from-camera rotation (camera axes: out, right, down), where the camera is [m], focal lengths and centre.
 
-    Focal lengths and centre are in picture widths and heights.
+    Focal lengths and centre are in picture widths and heights. Of several pictures at once, each number is a column.
     """
 
     turn: Matrix
     at_m: Vector
-    focal: tuple[float, float]
+    focal: tuple[Number, Number]
     centre: tuple[float, float]
 
 
 class Rays(NamedTuple):
-    """Unit directions along the water in the map [n], and how far below the horizontal each ray leads (its tangent)."""
+    """Unit directions along the water in the map, and how far below the horizontal each ray leads (its tangent)."""
 
     east: F64
     north: F64
     fall: F64
+
+
+@functools.lru_cache(maxsize=64)
+def lens_at(station: Station, calibration: CalibrationConfig, aspect: float) -> Lens:
+    """The calibrated camera of a boat that lies so. aspect: picture width over height, pixels square."""
+    body = rotation(station.roll_rad, station.pitch_rad, station.yaw_rad)
+    mount = rotation(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
+    turn = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
+    ahead, above = calibration.forward_m, calibration.height_m
+    east, north, up = (row[0] * ahead + row[2] * above for row in body)
+    focal = 0.5 / portable.tan(0.5 * math.radians(calibration.hfov_deg))
+    at_m = (station.x_m + east, station.y_m + north, up)
+    return Lens(turn, at_m, (focal, focal * aspect), calibration.centre_frac)
+
+
+def together(lenses: Sequence[Lens]) -> Lens:
+    """The lenses of several pictures as one, its numbers [pictures, 1]; they share the centre."""
+
+    def column(numbers: Iterable[Number]) -> F64:
+        return np.array(list(numbers))[:, None]
+
+    first, second, third = (
+        (
+            column(lens.turn[row][0] for lens in lenses),
+            column(lens.turn[row][1] for lens in lenses),
+            column(lens.turn[row][2] for lens in lenses),
+        )
+        for row in range(3)
+    )
+    east, north, up = (column(lens.at_m[axis] for lens in lenses) for axis in range(3))
+    focal_x, focal_y = (column(lens.focal[axis] for lens in lenses) for axis in range(2))
+    return Lens((first, second, third), (east, north, up), (focal_x, focal_y), lenses[0].centre)
 
 
 def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
@@ -61,20 +96,11 @@ def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
     )
 
 
-def lens_at(station: Station, calibration: CalibrationConfig, aspect: float) -> Lens:
-    """The calibrated camera of a boat that lies so. aspect: picture width over height, pixels square."""
-    body = rotation(station.roll_rad, station.pitch_rad, station.yaw_rad)
-    mount = rotation(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
-    turn = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
-    ahead, above = calibration.forward_m, calibration.height_m
-    east, north, up = (row[0] * ahead + row[2] * above for row in body)
-    focal = 0.5 / portable.tan(0.5 * math.radians(calibration.hfov_deg))
-    at_m = (station.x_m + east, station.y_m + north, up)
-    return Lens(turn, at_m, (focal, focal * aspect), calibration.centre_frac)
-
-
 def rays(lens: Lens, u: F64, v: F64) -> Rays:
-    """The rays r = R K^-1 [u, v, 1] of points of the picture (fractions of width and height), Q1's first half."""
+    """The rays r = R K^-1 [u, v, 1] of points of the picture, Q1's first half.
+
+    u, v: fractions of width and height, [n] or [pictures, n].
+    """
     right = (u - lens.centre[0]) / lens.focal[0]
     down = (v - lens.centre[1]) / lens.focal[1]
     east, north, up = (row[0] + row[1] * right + row[2] * down for row in lens.turn)
@@ -90,9 +116,16 @@ def ranges_m(lens: Lens, given: Rays, max_range_m: float) -> F64:
     """
     meets = given.fall > LEVEL
     range_m = lens.at_m[2] / np.where(meets, given.fall, 1.0)
-    return np.where(meets & (range_m <= max_range_m), range_m, np.inf)
+    return np.where(meets & (range_m > 0.0) & (range_m <= max_range_m), range_m, np.inf)
 
 
 def _product(a: Matrix, b: Matrix) -> Matrix:
-    rows = tuple(tuple(row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j] for j in range(3)) for row in a)
-    return rows  # type: ignore[return-value]  # three by three
+    first, second, third = (
+        (
+            row[0] * b[0][0] + row[1] * b[1][0] + row[2] * b[2][0],
+            row[0] * b[0][1] + row[1] * b[1][1] + row[2] * b[2][1],
+            row[0] * b[0][2] + row[1] * b[1][2] + row[2] * b[2][2],
+        )
+        for row in a
+    )
+    return first, second, third

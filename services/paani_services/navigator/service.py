@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -13,15 +12,14 @@ from paani.bus import Bus, Latest, Stepper
 from paani.clock import Clock
 from paani.config import Config
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.route import load_route
+from paani_services.navigator.mission_file import first_route, load_task
 
 EARLY_US = 5_000  # a wake-up this much before the period is over is on time
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Order at `rate_hz`, and at once when the evidence, the advice or a gate changes."""
-    file = config.navigator.route
-    route = await asyncio.to_thread(load_route, Path(file)) if file else None
+    route, mission = await asyncio.to_thread(load_task, config.navigator, config.localization.origin_lat_lon_deg)
     stepper = Stepper(bus, clock, config, DECIDER)
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
@@ -33,8 +31,12 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
                 now_us = clock.now_us()
-                if route is not None and now_us - route_us >= 1e6 / keys.ROUTE.rate_hz:
-                    stepper.publish_own(keys.ROUTE, msgspec.structs.replace(route, source_us=now_us))
+                if now_us - route_us >= 1e6 / keys.ROUTE.rate_hz:
+                    if mission is not None:
+                        stepper.publish_own(keys.MISSION, msgspec.structs.replace(mission, source_us=now_us))
+                        route = first_route(mission, stepper.state.progress.leg) or route
+                    if route is not None:
+                        stepper.publish_own(keys.ROUTE, msgspec.structs.replace(route, source_us=now_us))
                     route_us = now_us
                 now_us, outputs = stepper.decide()
                 order = outputs[keys.COMMAND.name]

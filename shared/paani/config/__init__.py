@@ -8,7 +8,6 @@ from paani.config.recording import RecorderConfig
 from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, EngineName, GateConfig, PerceptionConfig
 from paani.config.simulating import (
     AdapterConfig,
-    DynamicsConfig,
     EyeConfig,
     PlantConfig,
     SensorsConfig,
@@ -27,7 +26,6 @@ __all__ = [
     "CorridorConfig",
     "DashboardConfig",
     "DetectorConfig",
-    "DynamicsConfig",
     "EngineName",
     "EyeConfig",
     "GateConfig",

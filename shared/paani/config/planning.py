@@ -58,14 +58,18 @@ def calibration_of(eye: EyeConfig) -> CalibrationConfig:
 class PlannerConfig(Section, frozen=True):
     """The metric planner: what lies on the water around the boat, and where it may go. It acts on a valid calibration.
 
+    `blind_m`: what no picture shows beside the boat counts as water that far, unless something was last seen in it; a
+    camera that is blind beyond it leaves the rest unknown.
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `lookahead_s`: what lies on the course beyond `horizon_s` is avoided early but forbids nothing.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
+    `verified_m`: a way known this far may turn the boat beyond `navigator.max_total_turn_deg`, up to `max_turn_deg`.
     """
 
     use: bool = True
     max_range_m: Positive = 8.0  # one mask row is 1.2 m there, seen from 0.9 m
+    blind_m: NonNegative = 3.0
     horizon_slack_deg: NonNegative = 4.0
     free_s: Positive = 0.8  # Q3
     occupied_s: Positive = 2.0  # Q3
@@ -78,6 +82,7 @@ class PlannerConfig(Section, frozen=True):
     lookahead_s: Positive = 8.0
     speed_mps: Positive = 0.6  # cap while the planner steers; the paper has 0.4 (Q5)
     yaw_rate_radps: Positive = 0.35  # Q5
+    yaw_accel_radps2: Positive = 0.35
     accel_mps2: Positive = 0.2  # Q5
     turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
     hull_radius_m: Positive = 0.55  # Q6
@@ -87,4 +92,5 @@ class PlannerConfig(Section, frozen=True):
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
     span_deg: Angle = 120.0  # headings to either side of the wanted course
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
-    max_turn_deg: Angle = 180.0  # of a run of turns, beyond `navigator.max_total_turn_deg` on water seen free alone
+    verified_m: Positive = 3.5
+    max_turn_deg: Angle = 180.0  # of a run of turns

@@ -16,26 +16,6 @@ class WorldConfig(Section, frozen=True):
     wind_mps: NonNegative = 2.0
 
 
-class DynamicsConfig(Section, frozen=True):
-    """The paper's surface dynamics (K4-K7); F_max is three times the weight."""
-
-    mass_kg: Positive = 12.4
-    surge_linear: NonNegative = 4.0
-    surge_quadratic: NonNegative = 20.0
-    sway_linear: NonNegative = 20.0
-    sway_quadratic: NonNegative = 80.0
-    yaw_linear: NonNegative = 4.0
-    yaw_quadratic: NonNegative = 25.0
-    equilibrium_z_m: Positive = 0.177
-    heave_stiffness_n_per_m: Positive = 650.0
-    heave_damping: NonNegative = 90.0
-    max_buoyancy_weights: Positive = 3.0
-    tilt_stiffness_nm_per_rad: Positive = 90.0
-    tilt_damping: NonNegative = 24.0
-    fan_spacing_m: Positive = 0.60
-    fan_height_m: NonNegative = 0.12
-
-
 class SensorsConfig(Section, frozen=True):
     gps_rate_hz: Positive = 5.0
     gps_bias_std_m: NonNegative = 0.8
@@ -64,7 +44,7 @@ class AdapterConfig(Section, frozen=True):
 class PlantConfig(Section, frozen=True):
     step_s: Positive = 0.01
     publish_rate_hz: Positive = 20.0
-    dynamics: DynamicsConfig = DynamicsConfig()
+    vessel: str = "paper"  # its name among the vessels, or a TOML file of the same form
     sensors: SensorsConfig = SensorsConfig()
     adapter: AdapterConfig = AdapterConfig()
 

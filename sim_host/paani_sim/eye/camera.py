@@ -18,7 +18,7 @@ FAR_M = 3000.0
 
 @dataclass(frozen=True)
 class BoatPose:
-    """Where the boat's origin is in the map, and how it lies: roll, then pitch, then yaw."""
+    """Where the boat's origin is in the map, how it lies (roll, then pitch, then yaw), and how fast it turns."""
 
     x_m: float
     y_m: float
@@ -26,11 +26,16 @@ class BoatPose:
     z_m: float = REST_Z_M
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
+    yaw_rate_radps: float = 0.0
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole on the boat. At rest (origin at 0.177 m) it looks from 0.9 m above the water."""
+    """A camera on the boat. At rest (origin at 0.177 m) it looks from 0.9 m above the water.
+
+    `k1` and `k2` are the radial terms of Brown's lens model, over focal length: barrel below zero; a pinhole at zero.
+    `shutter_s` is how long a picture is exposed while the boat turns.
+    """
 
     width_px: int = 320
     height_px: int = 240
@@ -38,6 +43,9 @@ class Camera:
     forward_m: float = 0.55
     up_m: float = 0.723
     down_deg: float = 6.0
+    k1: float = 0.0
+    k2: float = 0.0
+    shutter_s: float = 0.0
 
     @property
     def focal_px(self) -> float:
@@ -71,10 +79,26 @@ def view_projection(pose: BoatPose, camera: Camera) -> F64:
     return projection @ view
 
 
+def distort(points: F64, camera: Camera) -> F64:
+    """Where the lens puts what a pinhole sees at `points` `(n, 2)`; both from the middle, over focal length."""
+    square = (points**2).sum(axis=1, keepdims=True)
+    return points * (1.0 + camera.k1 * square + camera.k2 * square**2)
+
+
 def project(points_m: F64, pose: BoatPose, camera: Camera) -> F64:
     """Pixel positions `(n, 2)` of map points `(n, 3)`; NaN for points behind the camera."""
     clip = np.column_stack([points_m, np.ones(len(points_m))]) @ view_projection(pose, camera).T
     depth = np.where(clip[:, 3] > NEAR_M, clip[:, 3], np.nan)
     u = (0.5 + 0.5 * clip[:, 0] / depth) * camera.width_px
     v = (0.5 - 0.5 * clip[:, 1] / depth) * camera.height_px
-    return np.column_stack([u, v])
+    if camera.k1 == 0.0 and camera.k2 == 0.0:
+        return np.column_stack([u, v])
+    middle = 0.5 * np.array([camera.width_px, camera.height_px])
+    seen: F64 = distort((np.column_stack([u, v]) - middle) / camera.focal_px, camera) * camera.focal_px + middle
+    return seen
+
+
+def metres(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Distance along the optical axis of values of the depth buffer (0 near, 1 far); infinite for the far end."""
+    ahead = 2.0 * FAR_M * NEAR_M / (FAR_M + NEAR_M - (2.0 * depth.astype(np.float64) - 1.0) * (FAR_M - NEAR_M))
+    return np.where(depth >= 1.0, np.inf, ahead).astype(np.float32)

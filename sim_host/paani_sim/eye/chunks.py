@@ -24,6 +24,9 @@ class Chunks:
 
 def make_chunks(place_m: F64, order: U32, reach_m: F64) -> Chunks:
     """Sort triangles into square cells; vertex k at `place_m[k]` `(n, 2)` draws up to `reach_m[k]` around."""
+    if len(order) == 0:
+        none = np.zeros(0, np.int64)
+        return Chunks(order, none, none, np.zeros((0, 2)), np.zeros(0))
     triangles = order.reshape(-1, 3)
     middle = place_m[triangles].mean(axis=1)
     cell = np.floor(middle / CELL_M).astype(np.int64)
@@ -39,10 +42,12 @@ def make_chunks(place_m: F64, order: U32, reach_m: F64) -> Chunks:
     return Chunks(corners.reshape(-1).astype(np.uint32), 3 * first, 3 * count, centre, radius)
 
 
-def visible(chunks: Chunks, eye_m: F64, heading_rad: float, half_angle_rad: float) -> npt.NDArray[np.int64]:
-    """Numbers of the chunks that reach into the wedge `half_angle_rad` either side, nearest first."""
+def visible(
+    chunks: Chunks, eye_m: F64, heading_rad: float, half_angle_rad: float, within_m: float = np.inf
+) -> npt.NDArray[np.int64]:
+    """Numbers of the chunks that reach into the wedge `half_angle_rad` either side and nearer, nearest first."""
     offset = chunks.centre_m - eye_m[:2]
-    inside = np.ones(len(offset), bool)
+    inside = np.hypot(offset[:, 0], offset[:, 1]) < chunks.radius_m + within_m
     for side in (1.0, -1.0):
         edge = heading_rad + side * half_angle_rad
         inward = side * np.array([np.sin(edge), -np.cos(edge)])

@@ -57,11 +57,10 @@ class Batch:
 
 @dataclass(frozen=True)
 class Target:
-    """A frame buffer with a colour and a label picture and depth."""
+    """A frame buffer with a colour picture, perhaps a label picture, and depth."""
 
     frame: int
     colour: int
-    label: int
     width_px: int
     height_px: int
 
@@ -191,27 +190,20 @@ def make_texture(
     return int(texture)
 
 
-def make_target(gl: ModuleType, width_px: int, height_px: int, unit: int) -> Target:
-    """A frame buffer whose colour picture stays bound to `unit`."""
+def make_target(
+    gl: ModuleType, width_px: int, height_px: int, unit: int, *, slots: int = 2, fine: bool = False
+) -> Target:
+    """A frame buffer whose colour picture stays bound to `unit`; `fine`: it holds half floats, without mip levels."""
     frame = gl.glGenFramebuffers(1)
     gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, frame)
+    inside, number = (gl.GL_RGBA16F, gl.GL_FLOAT) if fine else (gl.GL_RGBA8, gl.GL_UNSIGNED_BYTE)
     pictures = []
-    for slot, at in ((0, unit), (1, unit + 1)):
+    for slot in range(slots):
         texture = gl.glGenTextures(1)
-        gl.glActiveTexture(gl.GL_TEXTURE0 + at)
+        gl.glActiveTexture(gl.GL_TEXTURE0 + unit + slot)
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
-        gl.glTexImage2D(
-            gl.GL_TEXTURE_2D,
-            0,
-            gl.GL_RGBA8,
-            width_px,
-            height_px,
-            0,
-            gl.GL_RGBA,
-            gl.GL_UNSIGNED_BYTE,
-            None,
-        )
-        smooth = gl.GL_LINEAR_MIPMAP_LINEAR if slot == 0 else gl.GL_NEAREST
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, inside, width_px, height_px, 0, gl.GL_RGBA, number, None)
+        smooth = gl.GL_LINEAR if fine else gl.GL_LINEAR_MIPMAP_LINEAR if slot == 0 else gl.GL_NEAREST
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, smooth)
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, gl.GL_LINEAR)
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_EDGE)
@@ -222,7 +214,21 @@ def make_target(gl: ModuleType, width_px: int, height_px: int, unit: int) -> Tar
     gl.glBindRenderbuffer(gl.GL_RENDERBUFFER, depth)
     gl.glRenderbufferStorage(gl.GL_RENDERBUFFER, gl.GL_DEPTH_COMPONENT24, width_px, height_px)
     gl.glFramebufferRenderbuffer(gl.GL_FRAMEBUFFER, gl.GL_DEPTH_ATTACHMENT, gl.GL_RENDERBUFFER, depth)
-    return Target(int(frame), pictures[0], pictures[1], width_px, height_px)
+    return Target(int(frame), pictures[0], width_px, height_px)
+
+
+def begin_target(gl: ModuleType, target: Target, slots: int) -> None:
+    """Draw into the first `slots` pictures of a target from now on, cleared."""
+    gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.frame)
+    aim_target(gl, slots)
+    gl.glViewport(0, 0, target.width_px, target.height_px)
+    gl.glClearColor(0.0, 0.0, 0.0, 0.0)
+    gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
+
+
+def aim_target(gl: ModuleType, slots: int) -> None:
+    """Draw into the first `slots` pictures of the current target."""
+    gl.glDrawBuffers(2, [gl.GL_COLOR_ATTACHMENT0, gl.GL_COLOR_ATTACHMENT1 if slots > 1 else gl.GL_NONE])
 
 
 def read_target(gl: ModuleType, target: Target, slot: int) -> npt.NDArray[np.uint8]:
@@ -232,4 +238,12 @@ def read_target(gl: ModuleType, target: Target, slot: int) -> npt.NDArray[np.uin
     data = np.empty((target.height_px, target.width_px, 4), np.uint8)
     order = gl.GL_BGRA if slot == 0 else gl.GL_RGBA
     gl.glReadPixels(0, 0, target.width_px, target.height_px, order, gl.GL_UNSIGNED_BYTE, data)
+    return data[::-1]
+
+
+def read_depth(gl: ModuleType, target: Target) -> npt.NDArray[np.float32]:
+    """The depth buffer `(h, w)`, 0 near to 1 far, top row first."""
+    gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.frame)
+    data = np.empty((target.height_px, target.width_px), np.float32)
+    gl.glReadPixels(0, 0, target.width_px, target.height_px, gl.GL_DEPTH_COMPONENT, gl.GL_FLOAT, data)
     return data[::-1]

@@ -16,6 +16,7 @@ MIN_SIDE_PX = 3
 MIN_PIXELS = 10
 
 U8 = npt.NDArray[np.uint8]
+F32 = npt.NDArray[np.float32]
 
 
 class VisibleBox(NamedTuple):
@@ -32,14 +33,18 @@ class VisibleBox(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """A picture with `mask` `(h, w)` uint8 (0 obstacle, 1 water, 2 sky) and visible boxes."""
+    """A picture with `mask` `(h, w)` uint8 (0 obstacle, 1 water, 2 sky), visible boxes and depth.
+
+    `depth_m` `(h, w)` float32 is the distance along the camera's axis, infinite for the sky.
+    """
 
     bgr: U8
     mask: U8
     boxes: tuple[VisibleBox, ...]
+    depth_m: F32
 
 
-def read_labels(bgr: U8, labels: U8, things: Sequence[Thing]) -> Labelled:
+def read_labels(bgr: U8, labels: U8, depth_m: F32, things: Sequence[Thing]) -> Labelled:
     """Decode a label picture `(h, w, 4)`: a number's low byte first, then its high byte."""
     number = labels[..., 0].astype(np.int32) + 256 * labels[..., 1].astype(np.int32)
     mask = np.full(number.shape, OBSTACLE_CODE, np.uint8)
@@ -59,7 +64,7 @@ def read_labels(bgr: U8, labels: U8, things: Sequence[Thing]) -> Labelled:
         box = _box(np.isin(number, numbers))
         if box is not None:
             boxes.append(VisibleBox(thing.id, thing.kind, *box))
-    return Labelled(bgr, mask, tuple(boxes))
+    return Labelled(bgr, mask, tuple(boxes), depth_m)
 
 
 def _box(visible: npt.NDArray[np.bool_]) -> tuple[int, int, int, int, int] | None:

@@ -9,22 +9,24 @@ import numpy.typing as npt
 from paani_sim.eye import sprites
 from paani_sim.eye.buildings import house
 from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
-from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, quay
+from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, furniture, quay
 from paani_sim.worlds.curves import Points, clearance_m, normals_left, resample_closed
 from paani_sim.worlds.world import Bank, Kind, World
 
 F64 = npt.NDArray[np.float64]
 REACH_M = 460.0
 ROWS_M = (-4.0, -1.6, -0.5, 0.0, 0.35, 0.9, 1.8, 3.2, 5.5, 9.0, 14.0, 21.0)
-COARSE_M = 14.0
+COARSE_M, FAR_CELLS = 14.0, 3  # cells of the ground behind the banks; how many make one beyond `FAR_M`
+FAR_M = 84.0
 
 
 @dataclass(frozen=True, eq=False)
 class Land:
-    """`ground` and `houses` meshes; `plants` `(n, 7)`: x, y, z, width, height, layer, shade."""
+    """`ground`, `houses` and small `details` as meshes; `plants` `(n, 7)`: x, y, z, width, height, layer, shade."""
 
     ground: Mesh
     houses: tuple[Mesh, ...]
+    details: tuple[Mesh, ...]
     plants: npt.NDArray[np.float32]
 
 
@@ -32,10 +34,12 @@ def make_land(world: World) -> Land:
     """The land of a world, the same for the same seed."""
     rng = np.random.default_rng([world.seed, 1])
     field = _Field(rng, world.bank)
-    edge = quay(world, np.random.default_rng([world.seed, 4])) if world.bank is Bank.QUAY else ()
-    near = edge or (_shore_strip(world, field),)
+    edge_rng = np.random.default_rng([world.seed, 4])
+    quayed = world.bank is Bank.QUAY
+    edge = quay(world, edge_rng) if quayed else _shore_strip(world, field)
     return Land(
-        ground=merge(*near, _far_ground(world, field), _hills(world, field)),
+        details=furniture(world, edge_rng) if quayed else (),
+        ground=merge(edge, *_far_ground(world, field), _hills(world, field)),
         houses=_houses(world, field, rng),
         plants=_plants(world, field, rng),
     )
@@ -106,15 +110,26 @@ def _shore_strip(world: World, field: _Field) -> Mesh:
     return _surface(field, grid, clearance_m(world.shore_m, grid.reshape(-1, 2)), 0.0)
 
 
-def _far_ground(world: World, field: _Field) -> Mesh:
+def _far_ground(world: World, field: _Field) -> tuple[Mesh, Mesh]:
+    """Ground behind the banks on a grid, coarser far from the water."""
     low, high = world.shore_m.min(axis=0) - REACH_M, world.shore_m.max(axis=0) + REACH_M
-    x, y = np.arange(low[0], high[0], COARSE_M), np.arange(low[1], high[1], COARSE_M)
-    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    clear = clearance_m(world.shore_m, grid.reshape(-1, 2))
-    sheet = _surface(field, grid, clear, 0.12)
-    dry = clear < (-PAVED_M if field.bank is Bank.QUAY else -4.0)
-    triangles = grid_triangles(len(x), len(y))
-    return Mesh(sheet.vertices, triangles[dry[triangles].all(axis=1)])
+    count = np.ceil((high - low) / (COARSE_M * FAR_CELLS)).astype(int) * FAR_CELLS + 1
+    x, y = (low[k] + COARSE_M * np.arange(count[k]) for k in (0, 1))
+    fine = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    coarse = fine[::FAR_CELLS, ::FAR_CELLS]
+    clear = clearance_m(world.shore_m, fine.reshape(-1, 2)).reshape(fine.shape[:2])
+    rough = clear[::FAR_CELLS, ::FAR_CELLS].reshape(-1)
+    is_far = rough[grid_triangles(*coarse.shape[:2])].max(axis=1) < -FAR_M
+    far_cells = is_far.reshape(-1, 2).all(axis=1).reshape(coarse.shape[0] - 1, coarse.shape[1] - 1)
+    near_cells = ~np.kron(far_cells, np.ones((FAR_CELLS, FAR_CELLS), bool))
+    edge_m = -PAVED_M if field.bank is Bank.QUAY else -4.0
+    near = _surface(field, fine, clear.reshape(-1), 0.12)
+    far = _surface(field, coarse, rough, 0.12)
+    dry = (clear.reshape(-1)[near.triangles] < edge_m).all(axis=1) & np.repeat(near_cells.reshape(-1), 2)
+    return (
+        Mesh(near.vertices, near.triangles[dry]),
+        Mesh(far.vertices, far.triangles[np.repeat(far_cells.reshape(-1), 2)]),
+    )
 
 
 def _hills(world: World, field: _Field) -> Mesh:

@@ -26,12 +26,12 @@ GROUND: tuple[Rgb, ...] = ((0.50, 0.47, 0.43), (0.55, 0.54, 0.52), (0.46, 0.40, 
 IRON: Rgb = (0.13, 0.14, 0.15)
 
 
-def quay(world: World, rng: np.random.Generator) -> tuple[Mesh, ...]:
-    """The wall with its coping, the paved ground, and the quay's furniture."""
+def quay(world: World, rng: np.random.Generator) -> Mesh:
+    """The wall with its coping, and the paved ground."""
     ring = _divided(world.shore_m)
     wall_rgb, wall_material = WALLS[int(rng.integers(len(WALLS)))]
     ground_rgb = GROUND[int(rng.integers(len(GROUND)))]
-    return (_wall(ring, wall_rgb, wall_material), _paved(world, ring, ground_rgb), *_furniture(world, rng))
+    return merge(_wall(ring, wall_rgb, wall_material), _paved(world, ring, ground_rgb))
 
 
 def _divided(shore_m: Points) -> Points:
@@ -101,7 +101,7 @@ def _paved(world: World, ring: Points, rgb: Rgb) -> Mesh:
     return merge(*parts)
 
 
-def _furniture(world: World, rng: np.random.Generator) -> list[Mesh]:
+def furniture(world: World, rng: np.random.Generator) -> tuple[Mesh, ...]:
     """Fenders and ladders on the wall, bollards and lamp posts on the edge, here and there a bench."""
     length = closed_length_m(world.shore_m)
     found: list[Mesh] = []
@@ -120,7 +120,7 @@ def _furniture(world: World, rng: np.random.Generator) -> list[Mesh]:
             if out_m > 0.0 and clearance_m(world.shore_m, spot[None])[0] > -0.8 * out_m:
                 continue
             found.append(placed(build(), (float(spot[0]), float(spot[1]), QUAY_TOP_M), yaw_rad=yaw))
-    return found
+    return tuple(found)
 
 
 # Along the wall is x, the water lies at +y, the ground at z = 0.

@@ -6,35 +6,35 @@ slope, wind, mirror image and sky. Deterministic for world, pose, time and light
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
+from types import ModuleType, TracebackType
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from paani_sim.eye import gl as g
-from paani_sim.eye import shaders
-from paani_sim.eye.camera import BoatPose, Camera, look_from, view_projection
+from paani_sim.eye import ripples, shaders
+from paani_sim.eye.afloat import ride, sea_of
+from paani_sim.eye.camera import BoatPose, Camera, look_from, metres, view_projection
 from paani_sim.eye.chunks import Chunks, make_chunks, visible
 from paani_sim.eye.labels import Labelled, read_labels
-from paani_sim.eye.lens import Lens
-from paani_sim.eye.scene import (
-    FIRST_THING,
-    PLANT_WIDTHS,
-    ROW_WIDTHS,
-    Scene,
-    Thing,
-    make_scene,
-    obstacle_rows,
-)
+from paani_sim.eye.lens import NEUTRAL, Lens
+from paani_sim.eye.mesh import rotation
+from paani_sim.eye.optics import Optics
+from paani_sim.eye.rain import Rain
+from paani_sim.eye.scene import FIRST_THING, PLANT_WIDTHS, ROW_WIDTHS, Own, Rows, Scene, Thing, make_scene, place
 from paani_sim.eye.sky import Sky, paint_sky
 from paani_sim.eye.sprites import paint_sprites
-from paani_sim.eye.surfaces import SPAN_M, surface_tiles
-from paani_sim.eye.waves import mean_square_slope, noise_tile, slope_tile
-from paani_sim.worlds.world import Light, Obstacle, Wind, World, actor_at, along_at
+from paani_sim.eye.surfaces import surface_tiles
+from paani_sim.eye.waves import noise_tile, slope_tile
+from paani_sim.eye.weather import Uniforms, uniforms
+from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_at, along_at
 
 F32 = npt.NDArray[np.float32]
-_NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _MAIN, _SURFACES = 0, 1, 2, 3, 4, 6, 8
+_NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
+DETAILS_WITHIN_M = 80.0
+MIRRORED_WITHIN_M = 160.0
 _FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
 _QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
 _IDENTITY = np.eye(4, dtype=np.float32)
@@ -47,12 +47,25 @@ class Picture:
     bgr: npt.NDArray[np.uint8]
 
 
+class _Solid:
+    """Triangles with one place: drawn chunk by chunk, those ahead."""
+
+    def __init__(self, gl: ModuleType, rows: Rows, widths: tuple[int, ...], reach_m: npt.NDArray[np.float64]) -> None:
+        self.chunks: Chunks = make_chunks(rows.rows[:, :2].astype(float), rows.order, reach_m)
+        self.batch = g.make_batch(gl, rows.rows, widths, self.chunks.order)
+
+
+class _Afloat(NamedTuple):
+    thing: Obstacle | Actor
+    batch: g.Batch
+
+
 class Eye:
     """Off-screen renderer of one world. Make, use and close it in one thread.
 
     `supersample` renders that many times larger each way and averages. `camera` (of the same size)
-    and `exposure` may be changed between pictures.
-    Raises `UserError` where OpenGL is missing.
+    and `exposure` may be changed between pictures. `balance` is the camera's gain of blue, green and red.
+    Raises `UserError` where OpenGL is missing or the camera's lens cannot be.
     """
 
     def __init__(
@@ -62,21 +75,28 @@ class Eye:
         *,
         supersample: float = 1.5,
         exposure: float = 1.1,
+        balance: tuple[float, float, float] = NEUTRAL,
         context: g.Context | None = None,
     ) -> None:
         self.world = world
         self.camera = camera or Camera()
         self._scale = supersample
         self.exposure = exposure
+        self._optics = Optics(self.camera, supersample)
+        self._optics_of = self.camera
         self._owned = context is None
         self._context = context or g.Context()
         self._gl = gl = self._context.gl
         self.scene: Scene = make_scene(world)
         self.things: tuple[Thing, ...] = self.scene.things
-        self._lens = Lens(self.camera.width_px, self.camera.height_px, world.seed)
+        width, height = self.camera.width_px, self.camera.height_px
+        self._lens = Lens(width, height, world.seed, balance)
+        self._rain = Rain(width, height, world.seed)
         self._programs = {
             "solid": g.Program(gl, shaders.SOLID_VERTEX, shaders.SOLID_FRAGMENT),
             "plant": g.Program(gl, shaders.PLANT_VERTEX, shaders.PLANT_FRAGMENT),
+            "stir": g.Program(gl, shaders.PATCH_VERTEX, shaders.STIR_FRAGMENT),
+            "shade": g.Program(gl, shaders.PATCH_VERTEX, shaders.SHADE_FRAGMENT),
             "sky": g.Program(gl, shaders.SCREEN_VERTEX, shaders.SKY_FRAGMENT),
             "water": g.Program(gl, shaders.WATER_VERTEX, shaders.WATER_FRAGMENT),
         }
@@ -86,8 +106,9 @@ class Eye:
                 ("panorama", _SKY),
                 ("sprites", _SPRITES),
                 ("slopes", _SLOPES),
-                ("surfaces", _SURFACES),
                 ("mirrorView", _MIRROR),
+                ("stirred", _STIRRED),
+                ("surfaces", _SURFACES),
             ):
                 program.sampler(name, unit)
         self._upload()
@@ -96,53 +117,61 @@ class Eye:
     def _upload(self) -> None:
         gl, scene = self._gl, self.scene
         g.make_texture(gl, noise_tile(self.world.seed), _NOISE)
-        g.make_texture(gl, paint_sprites(self.world.seed, self.world.season_frac), _SPRITES, wrap_u=False, wrap_v=False)
-        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES)
+        sprites = paint_sprites(self.world.seed, self.world.season_frac)
+        g.make_texture(gl, sprites, _SPRITES, wrap_u=False, wrap_v=False)
         g.make_texture(gl, slope_tile(self.world.seed), _SLOPES)
+        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES)
         width, height = self.camera.width_px, self.camera.height_px
-        self._mirror = g.make_target(gl, width, height, _MIRROR)
+        self._mirror = g.make_target(gl, width, height, _MIRROR, slots=1)
+        self._stirred = g.make_target(gl, width, height, _STIRRED, slots=1, fine=True)
         self._main = g.make_target(gl, round(width * self._scale), round(height * self._scale), _MAIN)
-        still, plants = scene.still, scene.plants
-        place_m, reach_m = plants.rows[:, :2].astype(float), 0.5 * plants.rows[:, 3].astype(float)
-        self._still_chunks = make_chunks(still.rows[:, :2].astype(float), still.order, np.zeros(len(still.rows)))
-        self._plant_chunks = make_chunks(place_m, plants.order, reach_m)
-        self._still = g.make_batch(gl, still.rows, ROW_WIDTHS, self._still_chunks.order)
-        self._plants = g.make_batch(gl, plants.rows, PLANT_WIDTHS, self._plant_chunks.order)
-        self._actors = [(actor, g.make_batch(gl, rows.rows, ROW_WIDTHS, rows.order)) for actor, rows in scene.actors]
+        self._still = _Solid(gl, scene.still, ROW_WIDTHS, np.zeros(len(scene.still.rows)))
+        self._details = _Solid(gl, scene.details, ROW_WIDTHS, np.zeros(len(scene.details.rows)))
+        self._plants = _Solid(gl, scene.plants, PLANT_WIDTHS, 0.5 * scene.plants.rows[:, 3].astype(float))
+        self._afloat, self._actors = self._bring(scene.afloat), self._bring(scene.actors)
         self._screen = g.make_batch(gl, _FLAT, (2,), _QUAD)
-        self._extra: g.Batch | None = None
+        self._shades: _Solid | None = None
+        self._extra: tuple[Obstacle, ...] = ()
+        self._extra_still: g.Batch | None = None
+        self._extra_afloat: list[_Afloat] = []
         self._sky_texture: int | None = None
 
+    def _bring(self, owned: Sequence[Own]) -> list[_Afloat]:
+        return [_Afloat(o.thing, g.make_batch(self._gl, o.rows.rows, ROW_WIDTHS, o.rows.order)) for o in owned]
+
     def set_weather(self, light: Light, wind: Wind) -> None:
-        """Change sky, sun and wind."""
+        """Change sky, sun, rain and wind."""
         self._context.make_current()
         self._sky: Sky = paint_sky(light)
         if self._sky_texture is not None:
             self._gl.glDeleteTextures(1, [self._sky_texture])
         self._sky_texture = g.make_texture(self._gl, self._sky.panorama, _SKY, wrap_v=False)
-        way = np.array([np.cos(wind.toward_rad), np.sin(wind.toward_rad)], np.float32)
-        body = np.asarray(self.world.water_rgb, np.float32) ** 2
-        self._weather: dict[str, float | F32] = {
-            "sun": self._sky.sun_direction,
-            "sunRgb": self._sky.sun_rgb,
-            "skyRgb": self._sky.ambient_rgb,
-            "hazeRgb": self._sky.horizon_rgb,
-            "visibility": light.visibility_m,
-            "windWay": way,
-            "slopeRms": float(np.sqrt(mean_square_slope(wind.speed_mps))),
-            "bodyRgb": body,
-            "flow": np.zeros(2, np.float32),
-            "tilesPerMetre": np.divide(1.0, SPAN_M[1:], dtype=np.float32),
-        }
+        self._light = light
+        self._sea = sea_of(wind, self.world.waves)
+        self._weather: Uniforms = uniforms(self.world, light, wind, self._sky)
+        self._cast = ripples.cast_by(self._sky.sun_direction)
+        self._lay_shades()
+
+    def _lay_shades(self) -> None:
+        if self._shades is not None:
+            g.drop_batch(self._gl, self._shades.batch)
+        standing = ripples.standing_shadows((*self.world.obstacles, *self._extra), self._cast)
+        rows = np.concatenate([ripples.tree_shadows(self.scene.grown, self._cast), standing]).astype(np.float32)
+        patches = Rows(rows, ripples.patch_order(len(rows)))
+        self._shades = _Solid(self._gl, patches, ripples.PATCH_WIDTHS, np.zeros(len(rows)))
 
     def place(self, obstacles: Sequence[Obstacle]) -> None:
         """Add obstacles to those of the world, in place of any added before."""
         self._context.make_current()
-        if self._extra is not None:
-            g.drop_batch(self._gl, self._extra)
-        rows, things = obstacle_rows(obstacles, FIRST_THING + len(self.scene.things))
-        self._extra = g.make_batch(self._gl, rows.rows, ROW_WIDTHS, rows.order)
-        self.things = (*self.scene.things, *things)
+        for batch in [self._extra_still, *(a.batch for a in self._extra_afloat)]:
+            if batch is not None:
+                g.drop_batch(self._gl, batch)
+        new = place(obstacles, FIRST_THING + len(self.scene.things))
+        self._extra = tuple(obstacles)
+        self._extra_still = g.make_batch(self._gl, new.still.rows, ROW_WIDTHS, new.still.order)
+        self._extra_afloat = self._bring(new.afloat)
+        self.things = (*self.scene.things, *new.things)
+        self._lay_shades()
 
     def render(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Picture:
         """The picture at simulated time `t_s`, waves included.
@@ -150,33 +179,30 @@ class Eye:
         Actors are `actors_along_m` down their paths, in the world's order; empty: as far as time says.
         """
         self._draw(pose, t_s, actors_along_m)
-        return Picture(self._develop(t_s))
+        return Picture(self._develop(pose, t_s))
 
     def render_labelled(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Labelled:
-        """The picture with its class mask and the boxes of what is visible."""
+        """The picture with its class mask, the boxes of what is visible, and depth."""
         self._draw(pose, t_s, actors_along_m)
-        labels = g.read_target(self._gl, self._main, 1)
-        rows, columns = (
-            ((np.arange(count) + 0.5) * self._scale).astype(int)
-            for count in (self.camera.height_px, self.camera.width_px)
-        )
-        labels = labels[rows[:, None], columns[None, :]]
-        return read_labels(self._develop(t_s), labels, self.things)
+        labels = np.asarray(self._optics.nearest(g.read_target(self._gl, self._main, 1)), np.uint8)
+        depth = np.asarray(self._optics.nearest(g.read_depth(self._gl, self._main)), np.float32)
+        return read_labels(self._develop(pose, t_s), labels, metres(depth), self.things)
 
-    def _develop(self, t_s: float) -> npt.NDArray[np.uint8]:
+    def _develop(self, pose: BoatPose, t_s: float) -> npt.NDArray[np.uint8]:
         raw = g.read_target(self._gl, self._main, 0)
-        size = (self.camera.width_px, self.camera.height_px)
-        bgr = cv2.cvtColor(raw, cv2.COLOR_BGRA2BGR)
-        if self._scale != 1.0:
-            bgr = cv2.resize(bgr, size, interpolation=cv2.INTER_AREA)
-        return self._lens.apply(np.asarray(bgr, np.uint8), round(t_s * 1000.0))
+        bgr = self._optics.picture(np.asarray(cv2.cvtColor(raw, cv2.COLOR_BGRA2BGR), np.uint8))
+        bgr = self._rain.apply(bgr, self._light.rain_mmph, t_s)
+        smear_px = self.camera.focal_px * pose.yaw_rate_radps * self.camera.shutter_s
+        return self._lens.apply(bgr, round(t_s * 1000.0), smear_px=smear_px)
 
     def _draw(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float]) -> None:
-        gl = self._gl
+        if self._optics_of != self.camera:
+            self._optics, self._optics_of = Optics(self.camera, self._scale), self.camera
+        gl, camera = self._gl, self._optics.pinhole
         self._context.make_current()
-        position, _ = look_from(pose, self.camera)
-        clip = view_projection(pose, self.camera)
-        shared: dict[str, float | F32] = {
+        position, _ = look_from(pose, camera)
+        clip = view_projection(pose, camera)
+        shared: Uniforms = {
             **self._weather,
             "exposure": self.exposure,
             "clipFromMap": clip.astype(np.float32),
@@ -186,51 +212,93 @@ class Eye:
             "heading": pose.yaw_rad,
             "screen": np.array([self._main.width_px, self._main.height_px], np.float32),
         }
-        along_m = actors_along_m or [along_at(actor, t_s) for actor in self.world.actors]
-        moved = [(_model(*actor_at(actor, m)), batch) for (actor, batch), m in zip(self._actors, along_m, strict=True)]
+        moved, stir = self._moved(t_s, actors_along_m, position)
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthFunc(gl.GL_LEQUAL)
         gl.glEnable(gl.GL_CLIP_DISTANCE0)
-        self._begin(self._mirror, labels=False)
+        g.begin_target(gl, self._mirror, 1)
         self._draw_solids(shared, moved, -1.0)
         gl.glActiveTexture(gl.GL_TEXTURE0 + _MIRROR)
         gl.glBindTexture(gl.GL_TEXTURE_2D, self._mirror.colour)
         gl.glGenerateMipmap(gl.GL_TEXTURE_2D)
         gl.glDisable(gl.GL_CLIP_DISTANCE0)
-        self._begin(self._main, labels=True)
+        self._draw_stir(shared, stir)
+        g.begin_target(gl, self._main, 2)
         self._draw_solids(shared, moved, 1.0)
         self._programs["water"].use(**shared)
         g.draw(gl, self._screen)
         self._programs["sky"].use(**shared)
         g.draw(gl, self._screen)
 
-    def _begin(self, target: g.Target, *, labels: bool) -> None:
-        gl = self._gl
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.frame)
-        slots = [gl.GL_COLOR_ATTACHMENT0, gl.GL_COLOR_ATTACHMENT1 if labels else gl.GL_NONE]
-        gl.glDrawBuffers(2, slots)
-        gl.glViewport(0, 0, target.width_px, target.height_px)
-        gl.glClearColor(0.0, 0.0, 0.0, 0.0)
-        gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
+    def _moved(
+        self, t_s: float, actors_along_m: Sequence[float], eye_m: npt.NDArray[np.float64]
+    ) -> tuple[list[tuple[F32, g.Batch]], F32]:
+        """Where every floating thing near enough is now, and the patches it leaves on the water."""
+        found: list[tuple[F32, g.Batch]] = []
+        patches = [np.zeros((0, ripples.COLUMNS))]
+        along_m = actors_along_m or [along_at(actor, t_s) for actor in self.world.actors]
+        places = [(a, a.thing.pose) for a in (*self._afloat, *self._extra_afloat) if isinstance(a.thing, Obstacle)]
+        for a, m in zip(self._actors, along_m, strict=True):
+            if isinstance(a.thing, Actor):
+                places.append((a, actor_at(a.thing, m)))
+                patches.append(ripples.wake(a.thing, m))
+        for a, pose in places:
+            found.append((_model(pose, *ride(self._sea, a.thing, pose, t_s)), a.batch))
+            if np.hypot(pose.x_m - eye_m[0], pose.y_m - eye_m[1]) < DETAILS_WITHIN_M:
+                patches.append(ripples.floating_shadow(a.thing, pose, self._cast))
+        return found, np.concatenate(patches).astype(np.float32)
 
-    def _draw_solids(self, shared: dict[str, float | F32], moved: list[tuple[F32, g.Batch]], flip: float) -> None:
+    def _draw_stir(self, shared: Uniforms, patches: F32) -> None:
+        gl = self._gl
+        g.begin_target(gl, self._stirred, 1)
+        if len(patches) == 0:
+            return
+        batch = g.make_batch(gl, patches, ripples.PATCH_WIDTHS, ripples.patch_order(len(patches)))
+        gl.glDisable(gl.GL_DEPTH_TEST)
+        gl.glEnable(gl.GL_BLEND)
+        gl.glBlendFunc(gl.GL_ONE, gl.GL_ONE)
+        self._programs["stir"].use(**shared)
+        g.draw(gl, batch)
+        gl.glDisable(gl.GL_BLEND)
+        gl.glEnable(gl.GL_DEPTH_TEST)
+        g.drop_batch(gl, batch)
+
+    def _draw_solids(self, shared: Uniforms, moved: list[tuple[F32, g.Batch]], flip: float) -> None:
         gl, solid = self._gl, self._programs["solid"]
+        mirrored = flip < 0.0
         solid.use(**shared, flip=flip, mapFromModel=_IDENTITY)
         for model, batch in moved:
             solid.use(mapFromModel=model)
             g.draw(gl, batch)
         solid.use(mapFromModel=_IDENTITY)
-        if self._extra is not None:
-            g.draw(gl, self._extra)
-        self._draw_ahead(self._still, self._still_chunks, shared)
+        if self._extra_still is not None:
+            g.draw(gl, self._extra_still)
+        self._draw_ahead(self._details, shared, DETAILS_WITHIN_M)
+        self._draw_ahead(self._still, shared, MIRRORED_WITHIN_M if mirrored else np.inf)
+        if not mirrored and self._shades is not None:
+            self._draw_shades(self._shades, shared)
         self._programs["plant"].use(**shared, flip=flip)
-        self._draw_ahead(self._plants, self._plant_chunks, shared)
+        self._draw_ahead(self._plants, shared, np.inf)
 
-    def _draw_ahead(self, batch: g.Batch, chunks: Chunks, shared: dict[str, float | F32]) -> None:
+    def _draw_shades(self, shades: _Solid, shared: Uniforms) -> None:
+        """Darken the ground; its labels stay."""
+        gl = self._gl
+        g.aim_target(gl, 1)
+        gl.glEnable(gl.GL_BLEND)
+        gl.glBlendFunc(gl.GL_ZERO, gl.GL_ONE_MINUS_SRC_ALPHA)
+        gl.glDepthMask(False)
+        self._programs["shade"].use(**shared)
+        self._draw_ahead(shades, shared, DETAILS_WITHIN_M)
+        gl.glDepthMask(True)
+        gl.glDisable(gl.GL_BLEND)
+        g.aim_target(gl, 2)
+
+    def _draw_ahead(self, solid: _Solid, shared: Uniforms, within_m: float) -> None:
         """What of a batch can be in the picture, with room for the roll."""
-        half_rad = np.arctan(1.35 * np.tan(0.5 * np.radians(self.camera.hfov_deg)))
-        found = visible(chunks, np.asarray(shared["eye"], float), float(shared["heading"]), float(half_rad))
-        g.draw_chunks(self._gl, batch, chunks.first[found], chunks.count[found])
+        half_rad = np.arctan(1.35 * np.tan(0.5 * np.radians(self._optics.pinhole.hfov_deg)))
+        eye_m, heading_rad = np.asarray(shared["eye"], float), float(shared["heading"])
+        found = visible(solid.chunks, eye_m, heading_rad, float(half_rad), within_m)
+        g.draw_chunks(self._gl, solid.batch, solid.chunks.first[found], solid.chunks.count[found])
 
     def close(self) -> None:
         """Free the OpenGL context, where this eye made it."""
@@ -249,9 +317,8 @@ class Eye:
         self.close()
 
 
-def _model(x_m: float, y_m: float, yaw_rad: float) -> F32:
-    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
-    return np.array(
-        [[cos, -sin, 0.0, x_m], [sin, cos, 0.0, y_m], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
-        np.float32,
-    )
+def _model(pose: Pose2, up_m: float, roll_rad: float, pitch_rad: float) -> F32:
+    model = np.eye(4, dtype=np.float32)
+    model[:3, :3] = rotation(roll_rad, pitch_rad, pose.yaw_rad)
+    model[:3, 3] = (pose.x_m, pose.y_m, up_m)
+    return model

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from paani_sim.eye.afloat import floats
 from paani_sim.eye.boats import boat
 from paani_sim.eye.buildings import crane, warehouse
 from paani_sim.eye.land import make_land
@@ -39,13 +40,35 @@ class Rows(NamedTuple):
     order: U32
 
 
+class Own(NamedTuple):
+    """A thing that moves, and its rows in its own frame."""
+
+    thing: Obstacle | Actor
+    rows: Rows
+
+
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """Everything the renderer uploads once. `actors` pair with their rows in the actor's frame."""
+class Placed:
+    """Obstacles: what stands still, in the map; what floats; and their numbers."""
 
     still: Rows
-    actors: tuple[tuple[Actor, Rows], ...]
+    afloat: tuple[Own, ...]
+    things: tuple[Thing, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything the renderer uploads once; `details` are too small to be seen from afar.
+
+    `plants` are cards, `grown` `(n, 7)` what they stand for: x, y, z, width, height, layer, shade.
+    """
+
+    still: Rows
+    details: Rows
+    afloat: tuple[Own, ...]
+    actors: tuple[Own, ...]
     plants: Rows
+    grown: F32
     things: tuple[Thing, ...]
 
 
@@ -53,31 +76,44 @@ def make_scene(world: World) -> Scene:
     """Build the scene of a world. Numbers follow the order of obstacles, then actors."""
     land = make_land(world)
     ground = [numbered(part, LAND) for part in (land.ground, *land.houses)]
-    still, things = obstacle_rows(world.obstacles, FIRST_THING)
+    stands = place(world.obstacles, FIRST_THING)
+    things = list(stands.things)
     actors = []
     for actor in world.actors:
         parts = _build(actor)
         new = _things(actor, len(parts), FIRST_THING + len(things))
-        rows = join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))
+        actors.append(Own(actor, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
         things += new
-        actors.append((actor, rows))
-    return Scene(join([*ground, still]), tuple(actors), _plant_rows(land.plants), tuple(things))
+    details = join(numbered(part, LAND) for part in land.details)
+    return Scene(
+        join([*ground, stands.still]),
+        details,
+        stands.afloat,
+        tuple(actors),
+        _plant_rows(land.plants),
+        land.plants,
+        tuple(things),
+    )
 
 
-def obstacle_rows(obstacles: Iterable[Obstacle], first: int) -> tuple[Rows, list[Thing]]:
-    """Rows of obstacles where they stand, numbered from `first`."""
-    rows: list[Rows] = []
+def place(obstacles: Iterable[Obstacle], first: int) -> Placed:
+    """Rows of obstacles where they stand or float, numbered from `first`."""
+    still: list[Rows] = []
+    afloat: list[Own] = []
     things: list[Thing] = []
     for obstacle in obstacles:
         parts = _build(obstacle)
         new = _things(obstacle, len(parts), first + len(things))
+        things += new
+        if floats(obstacle):
+            afloat.append(Own(obstacle, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
+            continue
         pose = obstacle.pose
         foot_m = 0.0 if obstacle.look == "bridge" else obstacle.base_z_m
         for part, thing in zip(parts, new, strict=True):
             there = placed(part, (pose.x_m, pose.y_m, foot_m), yaw_rad=pose.yaw_rad)
-            rows.append(numbered(there, thing.number))
-        things += new
-    return join(rows), things
+            still.append(numbered(there, thing.number))
+    return Placed(join(still), tuple(afloat), tuple(things))
 
 
 def numbered(part: Mesh, number: int) -> Rows:

@@ -165,6 +165,54 @@ void main() {
 """
 )
 
+PATCH_VERTEX = (
+    _COMMON
+    + """
+layout(location = 0) in vec3 place; layout(location = 1) in vec2 corner;
+layout(location = 2) in vec4 numbers; layout(location = 3) in vec2 toward;
+uniform mat4 clipFromMap;
+out vec2 at; out float clear; flat out vec4 what; out vec2 way;
+void main() {
+    at = corner; what = numbers; way = toward;
+    clear = 1.0 - haze(distance(place, eye));
+    gl_Position = clipFromMap * vec4(place, 1.0);
+}
+"""
+)
+
+# What the water shader reads of wakes and shadows: slope, foam, shade.
+STIR_FRAGMENT = """
+#version 330
+in vec2 at; flat in vec4 what; in vec2 way;
+layout(location = 0) out vec4 stir;
+void main() {
+    float dark = what.y * (1.0 - smoothstep(0.35, 1.0, length(at)));
+    float behind = at.x, aside = abs(at.y), side = sign(at.y), beam = what.z;
+    float arm = 0.6 * beam + 0.354 * behind, width = 0.20 + 0.06 * behind;
+    float edge = exp(-pow((aside - arm) / width, 2.0)) * exp(-behind / 13.0) * smoothstep(0.0, 0.6, behind);
+    float phase = 1.5 * what.x * (0.58 * behind + 0.81 * aside);
+    float inside = (1.0 - smoothstep(arm - width, arm, aside)) * exp(-behind / 9.0);
+    float seen = 1.0 - smoothstep(1.2, 3.5, fwidth(phase));
+    float apart = edge * cos(phase) * seen, across = 0.45 * inside * cos(what.x * behind) * seen;
+    vec2 bent = what.y * (apart * vec2(0.58, 0.81 * side) + vec2(across, 0.0));
+    vec2 slope = -bent.x * way + bent.y * vec2(-way.y, way.x);
+    float churn = exp(-pow(aside / (0.9 * beam + 0.02 * behind), 2.0)) * exp(-behind / 7.0);
+    float foam = what.y * (3.2 * churn + 5.0 * edge * exp(-behind / 1.6) + 0.9 * edge);
+    stir = what.w > 0.5 ? vec4(slope, foam, 0.0) : vec4(0.0, 0.0, 0.0, dark);
+}
+"""
+
+SHADE_FRAGMENT = """
+#version 330
+in vec2 at; in float clear; flat in vec4 what;
+layout(location = 0) out vec4 colour;
+uniform float sunShare;
+void main() {
+    float dark = what.y * (1.0 - smoothstep(0.25, 1.0, length(at))) * (0.35 + 0.65 * sunShare) * clear;
+    colour = vec4(0.0, 0.0, 0.0, 0.55 * dark);
+}
+"""
+
 WATER_VERTEX = """
 #version 330
 layout(location = 0) in vec2 corner;
@@ -180,7 +228,8 @@ WATER_FRAGMENT = (
     _COMMON
     + """
 in vec3 world;
-uniform sampler2D slopes; uniform sampler2D mirrorView;
+uniform sampler2D slopes; uniform sampler2D mirrorView; uniform sampler2D stirred;
+uniform vec3 swellShare; uniform float sunShare;
 uniform mat4 clipFromMap; uniform vec2 screen; uniform vec2 windWay; uniform float slopeRms;
 uniform vec2 flow; uniform vec3 bodyRgb;
 layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label;
@@ -200,8 +249,10 @@ void main() {
     float gust = clamp(0.35 + 1.5 * (patchNoise.r - 0.30) + 0.5 * (patchNoise.g - 0.5), 0.15, 1.7);
     float rms = slopeRms * gust;
     vec4 a = swell(p, 11.3, 0.3, 0.9), b = swell(p, 4.1, -0.5, 0.55), c = swell(p, 1.37, 0.9, 0.35);
-    vec3 part = vec3(0.55, 0.62, 0.56) * rms;
-    vec2 slope = a.xy * part.x + b.xy * part.y + c.xy * part.z;
+    vec2 here = gl_FragCoord.xy / screen;
+    vec4 stir = texture(stirred, here);
+    vec3 part = swellShare * rms;
+    vec2 slope = a.xy * part.x + b.xy * part.y + c.xy * part.z + stir.xy;
     vec2 rough = a.zw * part.x * part.x + b.zw * part.y * part.y + c.zw * part.z * part.z;
     float variance = 0.5 * (rough.x + rough.y) + 1e-5;
     float sigma = sqrt(variance);
@@ -217,7 +268,6 @@ void main() {
     float fresnel = 0.02 + 0.98 * pow(1.0 - clamp(facing, 0.0, 1.0), 5.0)
         / (1.0 + 22.7 * pow(sigma, 1.5));
 
-    vec2 here = gl_FragCoord.xy / screen;
     float near = textureLod(mirrorView, here, 2.5).a;
     float reach = max(-60.0 * log(clamp((near - 0.25) / 0.75, 0.3, 1.0)) - range, 0.4);
     vec3 sky = skyLight(r, clamp(2.0 + 14.0 * sigma, 1.0, 5.0));
@@ -233,16 +283,19 @@ void main() {
         mirrored += mix(sky, hit.rgb * hit.rgb, solid) / 3.0;
     }
     float shore = 0.85 + 0.3 * texture(noiseTile, p * 0.05).g;
-    vec3 body = bodyRgb * shore * (0.35 * sunRgb * max(sun.z, 0.0) + 0.8 * skyRgb);
+    float lit = 1.0 - min(stir.w, 0.9) * (0.35 + 0.65 * sunShare);
+    vec3 body = bodyRgb * shore * lit * (0.35 * sunRgb * max(sun.z, 0.0) + 0.8 * skyRgb);
     vec3 light = mix(body, mirrored, fresnel);
 
     vec3 h = normalize(sun + v);
     vec2 tilt = h.xy / h.z + slope;
     float spread = variance + 0.0006;
     float glint = exp(-dot(tilt, tilt) / (2.0 * spread)) / (2.0 * PI * spread);
-    light += sunRgb * min(glint * 0.02 / max(4.0 * facing, 0.2), 3.0) * step(0.0, dot(v, h));
-    float crest = patchNoise.g + 0.35 * (c.x * 0.1 + texture(noiseTile, p * 0.9).b);
+    light += sunRgb * min(glint * 0.02 / max(4.0 * facing, 0.2), 3.0) * step(0.0, dot(v, h)) * lit;
+    float froth = texture(noiseTile, p * 0.9).b;
+    float crest = patchNoise.g + 0.35 * (c.x * 0.1 + froth);
     float foam = smoothstep(0.72, 0.9, crest) * smoothstep(0.15, 0.24, slopeRms);
+    foam = min(foam + 1.6 * stir.z * smoothstep(0.35, 0.75, froth + 0.5 * stir.z), 2.0);
     light = mix(light, vec3(0.6) * (skyRgb + 0.5 * sunRgb), 0.4 * foam);
     light = mix(light, hazeLight(-v), haze(range));
     colour = vec4(encode(light), 1.0);

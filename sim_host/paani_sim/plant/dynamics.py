@@ -107,8 +107,7 @@ def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = 
         forward_x * ahead_n + left_x * sideways_n,
         forward_y * ahead_n + left_y * sideways_n,
         forward_z * ahead_n + left_z * sideways_n + up_n,
-        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad)
-        - buoyancy.roll_damping * state.roll_rate_radps,
+        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad) - buoyancy.roll_damping * state.roll_rate_radps,
         -buoyancy.pitch_stiffness * (around.slope_ahead + angles.pitch_rad)
         - buoyancy.pitch_damping * state.pitch_rate_radps
         + vessel.fans.height_m * thrust_n,

@@ -2,13 +2,16 @@
 
 import hashlib
 import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from paani.config import PlantConfig
 from paani_sim.plant import passive
-from paani_sim.plant.dynamics import Attitude, Fans, HullState, attitude, body_velocity, wrench
+from paani_sim.plant.actors import Actors
+from paani_sim.plant.dynamics import Attitude, Fans, HullState, attitude, body_velocity, lagging, wrench
+from paani_sim.plant.instrument_faults import biased, cut_off, shifted, weakened
 from paani_sim.plant.sensors import (
     GpsReading,
     ImuReading,
@@ -17,7 +20,11 @@ from paani_sim.plant.sensors import (
     measure_gps,
     measure_imu,
 )
-from paani_sim.worlds import World, actor_pose
+from paani_sim.vessels import load_vessel
+from paani_sim.water.surroundings import CALM, Surroundings
+from paani_sim.water.wakes import Maker
+from paani_sim.water.water import Water
+from paani_sim.worlds import Fault, Kind, World
 from paani_sim.worlds.spec import build_spec
 
 COLLISION_GAP_S = 1.0  # touching again within it is still the same collision
@@ -28,39 +35,67 @@ class PlantDiverged(Exception):
     """The integration left the finite numbers: forces or settings are impossible."""
 
 
+class Hit(NamedTuple):
+    """The boat began to touch the geom of this name: an obstacle's or actor's id, or `bank_<n>`."""
+
+    time_s: float
+    name: str
+
+
 class Plant:
     """One boat in one world. Not thread-safe; `close` when done, the force hook is process-wide.
 
-    Equal `seed`, world and thrust give bit-equal states and measurements.
+    Equal `seed`, world, vessel, faults and thrust give bit-equal states and measurements.
     """
 
-    def __init__(self, world: World, config: PlantConfig, seed: int = 1) -> None:
-        """Compile the world and put the boat at its start."""
-        self._config = config
-        self._world = world
-        spec = build_spec(world)
+    def __init__(self, world: World, config: PlantConfig, seed: int = 1, faults: tuple[Fault, ...] = ()) -> None:
+        """Compile the world and put the boat at its start. Raises UserError for the vessel.
+
+        Of the faults it acts on those of GPS, compass, gyro and thrusters.
+        """
+        self._config, self._world, self._faults = config, world, faults
+        self._vessel = load_vessel(config.vessel)
+        spec = build_spec(world, self._vessel)
         spec.option.timestep = config.step_s
         with passive.compiling():
             self._model = spec.compile()
         self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        hull, added = self._vessel.hull, self._vessel.added_mass
+        self._model.dof_armature[2:6] = (
+            added.heave_ratio * hull.mass_kg,
+            added.roll_ratio * hull.roll_inertia_kgm2,
+            added.pitch_ratio * hull.pitch_inertia_kgm2,
+            added.yaw_ratio * hull.yaw_inertia_kgm2,
+        )
         self._data = mujoco.MjData(self._model)
+        self._qpos, self._qvel = self._data.qpos, self._data.qvel
+        self._accelerometer = self._data.sensor("accelerometer").data
+        self._gyro = self._data.sensor("gyro").data
         self._fans = Fans(0.0, 0.0)
+        self._around = CALM
         passive.install(self._model, self._apply_forces)
 
         boat = self._model.body("boat").id
         self._boat_geoms = frozenset(np.flatnonzero(self._model.geom_bodyid == boat).tolist())
-        self._mocap = [(actor, self._model.body(actor.id).mocapid[0]) for actor in world.actors]
+        self._actors = Actors(world.actors, ACTORS_EVERY_S, 0.5 * hull.length_m)
         self._actors_every = max(1, round(ACTORS_EVERY_S / config.step_s))
+        self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
+        self._vessels = [index for index, actor in enumerate(world.actors) if actor.kind is Kind.VESSEL]
 
-        biases, gps, imu = np.random.SeedSequence(seed).spawn(3)
+        biases, gps, imu, water = np.random.SeedSequence(seed).spawn(4)
         self._gps_rng, self._imu_rng = np.random.default_rng(gps), np.random.default_rng(imu)
         self._errors = initial_errors(config.sensors, np.random.default_rng(biases))
+        self._water = Water(world, self._vessel, len(self._vessels), water)
+        self._last_fix = GpsReading(world.origin_lat_deg, world.origin_lon_deg, 0.0, 0.0, 0.0, fix=False)
 
         self.steps = 0
         self.distance_m = 0.0
+        self.energy_j = 0.0
         self.collisions = 0
         self.in_contact = False
+        self.hits: list[Hit] = []
         self._last_contact_s = -math.inf
+        self._last_touch_s: dict[str, float] = {}
         mujoco.set_mju_user_warning(_keep_no_log_file)
         mujoco.mj_forward(self._model, self._data)
 
@@ -75,95 +110,133 @@ class Plant:
 
     @property
     def z_m(self) -> float:
-        """Height of the body's origin above the water."""
-        return float(self._data.qpos[2])
+        """Height of the body's origin above the water at rest."""
+        return float(self._qpos[2])
 
     @property
     def attitude(self) -> Attitude:
         """True roll, pitch, yaw."""
-        return attitude(*self._data.qpos[3:7].tolist())
+        return attitude(*self._qpos[3:7].tolist())
 
     @property
     def position_m(self) -> tuple[float, float]:
         """True position in the map frame."""
-        return float(self._data.qpos[0]), float(self._data.qpos[1])
+        return float(self._qpos[0]), float(self._qpos[1])
 
     @property
     def velocity(self) -> tuple[float, float, float]:
-        """True surge [m/s], sway [m/s] and yaw rate [rad/s]."""
+        """True surge [m/s], sway [m/s] over ground and yaw rate [rad/s]."""
         state = self._hull_state()
         return (*body_velocity(state), state.yaw_rate_radps)
 
+    @property
+    def actors_along_m(self) -> tuple[float, ...]:
+        """How far down its path each actor is, in the world's order."""
+        return self._actors.along_m
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Water and air about the hull in the last step."""
+        return self._around
+
     def step(self, left_n: float, right_n: float) -> None:
-        """Advance one step with these fan forces [N]. Raises PlantDiverged."""
-        self._fans = Fans(left_n, right_n)
+        """Advance one step with these fan forces [N] ordered. Raises PlantDiverged."""
+        step_s = self._config.step_s
+        x_m, y_m, _, qw, qx, qy, qz = self._qpos.tolist()
+        now_s = self.steps * step_s
         if self.steps % self._actors_every == 0:
-            self._move_actors()
-        x_m, y_m = self.position_m
+            self._move_actors(now_s, (x_m, y_m))
+        yaw_rad = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        self._around = self._water.about(x_m, y_m, yaw_rad, now_s)
+        order = weakened(Fans(left_n, right_n), self._faults, now_s) if self._faults else Fans(left_n, right_n)
+        self._fans = lagging(self._fans, order, self._vessel.fans.lag_s, step_s)
         mujoco.mj_step(self._model, self._data)
         self.steps += 1
-        state = [*self._data.qpos.tolist(), *self._data.qvel.tolist()]
-        if not all(map(math.isfinite, state)):
+        pose, velocity = self._qpos.tolist(), self._qvel.tolist()
+        if not math.isfinite(sum(pose) + sum(velocity)):
             raise PlantDiverged(f"plant: state is not finite after {self.steps} steps")
-        self.distance_m += math.hypot(state[0] - x_m, state[1] - y_m)
+        self.distance_m += math.hypot(pose[0] - x_m, pose[1] - y_m)
+        self.energy_j += self._power_w(math.cos(yaw_rad), math.sin(yaw_rad), velocity) * step_s
         self._count_contacts()
 
     def read_gps(self) -> GpsReading:
         """One fix; to be read at `gps_rate_hz`, the wandering error advances by one period."""
         origin_deg = (self._world.origin_lat_deg, self._world.origin_lon_deg)
-        self._errors, reading = measure_gps(
-            self._errors, self._truth(), origin_deg, self._config.sensors, self._gps_rng
-        )
+        now_s = self.sim_us * 1e-6
+        truth = shifted(self._truth(), self._faults, now_s)
+        self._errors, reading = measure_gps(self._errors, truth, origin_deg, self._config.sensors, self._gps_rng)
+        reading = cut_off(reading, self._last_fix, self._faults, now_s)
+        self._last_fix = reading
         return reading
 
     def read_imu(self) -> ImuReading:
         """One IMU sample."""
-        return measure_imu(self._errors, self._truth(), self._config.sensors, self._imu_rng)
+        reading = measure_imu(self._errors, self._truth(), self._config.sensors, self._imu_rng)
+        return biased(reading, self._faults, self.sim_us * 1e-6) if self._faults else reading
 
     def state_hash(self) -> str:
         """SHA-256 of position and velocity, to compare runs bit by bit."""
-        return hashlib.sha256(self._data.qpos.tobytes() + self._data.qvel.tobytes()).hexdigest()
+        return hashlib.sha256(self._qpos.tobytes() + self._qvel.tobytes()).hexdigest()
 
     def place(self, x_m: float, y_m: float, yaw_rad: float, z_m: float | None = None) -> None:
         """Put the boat somewhere else, at rest. `z_m` None: floating."""
-        height_m = self._config.dynamics.equilibrium_z_m if z_m is None else z_m
+        height_m = self._vessel.buoyancy.equilibrium_z_m if z_m is None else z_m
         half = 0.5 * yaw_rad
-        self._data.qpos[:7] = [x_m, y_m, height_m, math.cos(half), 0.0, 0.0, math.sin(half)]
-        self._data.qvel[:6] = 0.0
+        self._qpos[:7] = [x_m, y_m, height_m, math.cos(half), 0.0, 0.0, math.sin(half)]
+        self._qvel[:6] = 0.0
         mujoco.mj_forward(self._model, self._data)
 
     def _apply_forces(self, data: mujoco.MjData) -> None:
-        data.qfrc_passive[:6] = wrench(self._hull_state(), self._fans, self._config.dynamics)
+        data.qfrc_passive[:6] = wrench(self._hull_state(), self._fans, self._vessel, self._around)
 
     def _hull_state(self) -> HullState:
-        pose, velocity = self._data.qpos.tolist(), self._data.qvel.tolist()
-        return HullState(*pose[2:7], *velocity[:6])
+        return HullState(*self._qpos.tolist()[2:], *self._qvel.tolist())
 
     def _truth(self) -> Truth:
-        pose, velocity = self._data.qpos.tolist(), self._data.qvel.tolist()
-        angles = attitude(*pose[3:7])
-        force = self._data.sensor("accelerometer").data.tolist()
-        rates = self._data.sensor("gyro").data.tolist()
+        pose, velocity = self._qpos.tolist(), self._qvel.tolist()
+        angles = attitude(*pose[3:])
+        rates, force = self._gyro.tolist(), self._accelerometer.tolist()
         return Truth(pose[0], pose[1], velocity[0], velocity[1], *angles, tuple(rates), tuple(force))
 
-    def _move_actors(self) -> None:
-        time_s = self.sim_us * 1e-6
-        for actor, mocap in self._mocap:
-            pose = actor_pose(actor, time_s)
-            half = 0.5 * pose.yaw_rad
-            self._data.mocap_pos[mocap, :2] = (pose.x_m, pose.y_m)
-            self._data.mocap_quat[mocap] = (math.cos(half), 0.0, 0.0, math.sin(half))
+    def _power_w(self, cos: float, sin: float, velocity: list[float]) -> float:
+        """Work of the fans on the hull as it goes through the water: each one's force times its speed ahead."""
+        around, yaw_rate = self._around, velocity[5]
+        ahead_mps = cos * (velocity[0] - around.current_x_mps) + sin * (velocity[1] - around.current_y_mps)
+        turn_mps = 0.5 * self._vessel.fans.spacing_m * yaw_rate
+        left_w, right_w = self._fans.left_n * (ahead_mps - turn_mps), self._fans.right_n * (ahead_mps + turn_mps)
+        return abs(left_w) + abs(right_w)
+
+    def _move_actors(self, now_s: float, boat_xy_m: tuple[float, float]) -> None:
+        if not self._mocap:
+            return
+        self._actors.advance(now_s, boat_xy_m)
+        poses = self._actors.poses
+        self._data.mocap_pos[self._mocap, :2] = [pose[:2] for pose in poses]
+        halves = [0.5 * pose.yaw_rad for pose in poses]
+        self._data.mocap_quat[self._mocap] = [(math.cos(half), 0.0, 0.0, math.sin(half)) for half in halves]
+        actors, speeds = self._world.actors, self._actors.speeds_mps
+        self._water.pass_by([Maker(*poses[i], speeds[i], actors[i].width_m) for i in self._vessels], now_s)
 
     def _count_contacts(self) -> None:
-        contacts = (self._data.contact[index] for index in range(self._data.ncon))
-        self.in_contact = any(
-            contact.dist <= 0.0 and not self._boat_geoms.isdisjoint(contact.geom.tolist()) for contact in contacts
-        )
+        self.in_contact = False
+        count = self._data.ncon
+        if count == 0:
+            return
+        now_s = self.sim_us * 1e-6
+        for contact in self._data.contact[:count]:
+            others = [geom for geom in contact.geom.tolist() if geom not in self._boat_geoms]
+            if contact.dist <= 0.0 and len(others) == 1:
+                self.in_contact = True
+                self._touch(self._model.geom(others[0]).name, now_s)
         if self.in_contact:
-            now_s = self.sim_us * 1e-6
             if now_s - self._last_contact_s > COLLISION_GAP_S:
                 self.collisions += 1
             self._last_contact_s = now_s
+
+    def _touch(self, name: str, now_s: float) -> None:
+        if now_s - self._last_touch_s.get(name, -math.inf) > COLLISION_GAP_S:
+            self.hits.append(Hit(now_s, name))
+        self._last_touch_s[name] = now_s
 
 
 def _keep_no_log_file(_: str) -> None:

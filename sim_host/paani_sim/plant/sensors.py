@@ -46,6 +46,7 @@ class GpsReading(NamedTuple):
     sog_mps: float
     cog_rad: float
     position_std_m: float
+    fix: bool = True
 
 
 class ImuReading(NamedTuple):

@@ -47,6 +47,7 @@ def pose_message(plant: Plant, source_us: int) -> m.TruePose:
         distance_m=plant.distance_m,
         collisions=plant.collisions,
         in_contact=plant.in_contact,
+        actors_along_m=plant.actors_along_m,
     )
 
 

@@ -49,11 +49,9 @@ class Drive:
         world = scenario.world
         self.scenario, self.config = scenario, config
         self._eyes = eyes
-        self.plant = Plant(world, config.plant, scenario.seed)
+        self.plant = Plant(world, config.plant, scenario.seed, scenario.faults)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
-        self._estimator = estimator_of(
-            msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg)
-        )
+        self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self._out = Outbox(config.bus.domain, tap)
         waypoints = tuple(m.Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist())
         route = m.Route(source_us=0, name=world.name[:100], waypoints=waypoints, repeat=world.route_closed)
@@ -86,7 +84,7 @@ class Drive:
         self._fix: m.GpsFix | None = None
         self._odometry: m.Odometry | None = None
         self._coming: list[tuple[int, m.Evidence]] = []
-        self._frames = 0
+        self.frames = 0
         self._in_force: m.Thrust | None = None
         self._since_us = START_US
 
@@ -166,7 +164,7 @@ class Drive:
             return
         header = m.PictureHeader(
             source_us=now_us,
-            frame_seq=self._frames,
+            frame_seq=self.frames,
             frame_epoch=self._out.epoch,
             width_px=self.config.eye.width_px,
             height_px=self.config.eye.height_px,
@@ -175,7 +173,7 @@ class Drive:
         sight = self._eyes.look(pose_message(self.plant, now_us), header, roll_rad)
         if sight is None:
             return
-        self._frames += 1
+        self.frames += 1
         self._coming.append((now_us + self._late_us, sight.evidence))
         if self._out.tap is not None:
             self._show(sight, header, now_us)

@@ -96,9 +96,7 @@ class OracleEyes:
         boxes = []
         order = sorted(near, key=lambda i: away_m[i])
         outlines = self._outlines_m[order] if order else np.empty((0, 8, 2))
-        for number, points in zip(
-            order, silhouettes(outlines, self._heights_m[order], clip_from_map), strict=True
-        ):
+        for number, points in zip(order, silhouettes(outlines, self._heights_m[order], clip_from_map), strict=True):
             box = self._paint(points, covered)
             kind = self._things[number].kind
             if box is not None and kind in LABELS:

@@ -12,7 +12,7 @@ BACK_M, AHEAD_M = 10.0, 30.0  # where the boat is looked for, so that a route th
 
 
 class Along:
-    """Follows one boat. `now_m` is along the route since the start, laps added up; `best_m` the farthest it has been."""
+    """Follows one boat. `now_m`: along the route since the start, laps added up; `best_m`: the farthest so far."""
 
     def __init__(self, route_m: Points, *, closed: bool, start_m: tuple[float, float]) -> None:
         """route_m: `(n, 2)`. start_m: where the boat is at first; the nearest point of the route counts as 0."""

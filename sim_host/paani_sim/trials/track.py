@@ -52,7 +52,6 @@ class Track:
         self.advisories: list[m.Advisory] = []
         self.applied: list[Applying] = []
         self.unusable: list[tuple[int, m.UnusableCause]] = []  # picture's stamp and cause
-        self.work_j = 0.0
         self._in_force: m.Thrust | None = None
         self._was_zero = True
 
@@ -74,13 +73,12 @@ class Track:
         """Take one."""
         t_s = plant.sim_us * 1e-6
         x_m, y_m = plant.position_m
+        actors_along_m = plant.actors_along_m
         surge_mps = plant.velocity[0]
-        if self.samples:
-            self.work_j += (applied.left_n + applied.right_n) * max(0.0, surge_mps) * (t_s - self.samples[-1].t_s)
         self.samples.append(
             Sample(
                 t_s, x_m, y_m, plant.attitude.yaw_rad, surge_mps, along.off_m, applied.left_n, applied.right_n,
-                plant.collisions, plant.in_contact, (),
+                plant.collisions, plant.in_contact, actors_along_m,
             )
         )  # fmt: skip
         advisory, command = board.advisory, board.command
@@ -96,6 +94,8 @@ class Track:
                 self.halts[-1] = self.halts[-1]._replace(ended_s=t_s)
             return
         first = command.inhibits[0]
+        if first is m.Inhibit.NOT_ARMED:
+            return
         reason = advisory.reason.value if first is m.Inhibit.ADVISED_STOP and advisory else first.value
         if halted and self.halts[-1].reason == reason:
             return

@@ -7,31 +7,35 @@ Motion Control, 2nd ed. 2021, section 10.3.
 
 import math
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 
-from paani_sim.worlds.curves import Points, clearance_m
+from paani_sim.worlds.curves import Points
 from paani_sim.worlds.world import World
 
-CELL_M = 2.0
+CELL_M = 1.0
 EXPONENT = 1.0 / 7.0
+_SUBPIXEL_BITS = 8
+
+Grid = npt.NDArray[np.float32]
 
 
 class CurrentField:
     """Velocity of the water over ground, on a grid made once and interpolated linearly."""
 
     def __init__(self, world: World) -> None:
-        """Only a world with a current pays for the grid."""
+        """Only a world with a current has a grid."""
         self._still = world.current.speed_mps == 0.0
         if self._still:
             return
         low, high = world.shore_m.min(axis=0), world.shore_m.max(axis=0)
         columns, rows = (int(n) + 2 for n in np.ceil((high - low) / CELL_M))
-        x, y = np.meshgrid(low[0] + CELL_M * np.arange(columns), low[1] + CELL_M * np.arange(rows))
-        velocity = current_mps(world, np.column_stack([x.ravel(), y.ravel()]))
+        x_mps, y_mps = _velocity_mps(world, low, (rows, columns))
         self._low_m = float(low[0]), float(low[1])
         self._last = columns - 1.001, rows - 1.001
-        self._x = velocity[:, 0].reshape(rows, columns).tolist()
-        self._y = velocity[:, 1].reshape(rows, columns).tolist()
+        self._x_mps: list[list[float]] = x_mps.tolist()
+        self._y_mps: list[list[float]] = y_mps.tolist()
 
     def at(self, x_m: float, y_m: float) -> tuple[float, float]:
         """In the map frame [m/s]; beyond the grid as on its rim."""
@@ -41,35 +45,49 @@ class CurrentField:
         row = min(max((y_m - self._low_m[1]) / CELL_M, 0.0), self._last[1])
         i, j = int(column), int(row)
         right, up = column - i, row - j
-        weights = (1.0 - right) * (1.0 - up), right * (1.0 - up), (1.0 - right) * up, right * up
-        below, above = self._x[j], self._x[j + 1]
-        x = weights[0] * below[i] + weights[1] * below[i + 1] + weights[2] * above[i] + weights[3] * above[i + 1]
-        below, above = self._y[j], self._y[j + 1]
-        y = weights[0] * below[i] + weights[1] * below[i + 1] + weights[2] * above[i] + weights[3] * above[i + 1]
-        return x, y
+        return _between(self._x_mps, i, j, right, up), _between(self._y_mps, i, j, right, up)
 
 
-def current_mps(world: World, points_m: Points) -> Points:
-    """Velocity `(n, 2)` at points `(n, 2)`: full in mid-channel (or furthest from land), nothing ashore."""
-    bank_m = np.maximum(clearance_m(world.shore_m, points_m), 0.0)
+def _between(grid: list[list[float]], i: int, j: int, right: float, up: float) -> float:
+    below, above = grid[j], grid[j + 1]
+    low = below[i] + right * (below[i + 1] - below[i])
+    return low + up * (above[i] + right * (above[i + 1] - above[i]) - low)
+
+
+def _velocity_mps(world: World, low_m: Points, shape: tuple[int, int]) -> tuple[Grid, Grid]:
+    """Both parts on the grid: full in mid-channel (or where land is furthest), nothing ashore."""
+    scale = 2**_SUBPIXEL_BITS / CELL_M
+    water = np.zeros(shape, np.uint8)
+    cv2.fillPoly(water, [np.rint((world.shore_m - low_m) * scale).astype(np.int32)], 1, shift=_SUBPIXEL_BITS)
+    bank_m = CELL_M * cv2.distanceTransform(water, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     if world.channel_m is None:
         toward = world.current.toward_rad
         direction = np.array([[math.cos(toward), math.sin(toward)]])
-        part = bank_m / max(float(bank_m.max()), 1e-9)
+        ahead = np.zeros(shape, int)
+        part = bank_m / max(float(bank_m.max()), CELL_M)
     else:
-        middle_m, direction = _along_channel(world.channel_m, points_m)
-        part = bank_m / np.maximum(bank_m + middle_m, 1e-9)
+        middle_m, ahead, direction = _channel(world.channel_m, low_m, shape)
+        part = bank_m / np.maximum(bank_m + middle_m, CELL_M)
     speed_mps = world.current.speed_mps * part**EXPONENT
-    return np.asarray(speed_mps[:, None] * direction)
+    return speed_mps * direction[ahead, 0], speed_mps * direction[ahead, 1]
 
 
-def _along_channel(channel_m: Points, points_m: Points) -> tuple[Points, Points]:
-    """Distance `(n,)` to the nearest point of the centre line, and its direction downstream `(n, 2)`."""
-    tangent = np.gradient(channel_m, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    distance_m, nearest = np.empty(len(points_m)), np.empty(len(points_m), int)
-    for first in range(0, len(points_m), 1024):
-        away = np.linalg.norm(points_m[first : first + 1024, None] - channel_m[None], axis=-1)
-        nearest[first : first + 1024] = away.argmin(axis=1)
-        distance_m[first : first + 1024] = away.min(axis=1)
-    return distance_m, tangent[nearest]
+def _channel(channel_m: Points, low_m: Points, shape: tuple[int, int]) -> tuple[Grid, npt.NDArray[np.int_], Points]:
+    """Distance to the centre line, which of its points is nearest, and the directions of them all."""
+    arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(channel_m, axis=0), axis=1))])
+    along_m = np.arange(0.0, arc_m[-1] + CELL_M, CELL_M)
+    line_m = np.column_stack([np.interp(along_m, arc_m, channel_m[:, k]) for k in (0, 1)])
+    cells = np.rint((line_m - low_m) / CELL_M).astype(int)
+    within = ((cells >= 0) & (cells < [shape[1], shape[0]])).all(axis=1)
+    columns, rows = cells[within].T
+    away = np.ones(shape, np.uint8)
+    away[rows, columns] = 0
+    distance, label = cv2.distanceTransformWithLabels(
+        away, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest = np.zeros(label.max() + 1, int)
+    nearest[label[rows, columns]] = np.flatnonzero(within)
+    direction = np.gradient(line_m[:-1], axis=0)
+    direction = np.vstack([direction, direction[-1:]])
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return CELL_M * distance, nearest[label], direction

@@ -90,8 +90,7 @@ class Wakes:
         """`makers`: how many vessels `pass_by` will be told of, always in the same order."""
         self._last_m = [(math.inf, math.inf)] * makers
         self._packets: npt.NDArray[np.float64] = np.zeros((CAPACITY, len(Packet._fields)))
-        self._packets[:, 2] = -math.inf
-        self._next = 0
+        self._launched = 0
 
     def pass_by(self, makers: Sequence[Maker], at_s: float) -> None:
         """Where the vessels are now; those that make waves leave a pair of packets every wavelength they go."""
@@ -103,20 +102,19 @@ class Wakes:
             elif since_m >= wavelength_m(maker.speed_mps):
                 if math.isfinite(since_m):
                     for packet in launch(maker, at_s, since_m):
-                        self._packets[self._next] = packet
-                        self._next = (self._next + 1) % CAPACITY
+                        self._packets[self._launched % CAPACITY] = packet
+                        self._launched += 1
                 self._last_m[index] = maker.x_m, maker.y_m
 
     def near(self, x_m: float, y_m: float, at_s: float, within_m: float) -> list[Packet]:
         """The packets whose reach comes `within_m` of a place now, with the height they have there."""
-        if not self._next:
+        if not self._launched:
             return []
-        packets = self._packets
+        packets = self._packets[: self._launched]
         age_s = at_s - packets[:, 2]
-        with np.errstate(invalid="ignore"):
-            middle_x = packets[:, 0] + packets[:, 6] * age_s - x_m
-            middle_y = packets[:, 1] + packets[:, 7] * age_s - y_m
-            close = np.hypot(middle_x, middle_y) < REACH * packets[:, 8] + within_m
+        middle_x = packets[:, 0] + packets[:, 6] * age_s - x_m
+        middle_y = packets[:, 1] + packets[:, 7] * age_s - y_m
+        close = np.hypot(middle_x, middle_y) < REACH * packets[:, 8] + within_m
         found = []
         for index in np.flatnonzero(close).tolist():
             packet = Packet(*packets[index].tolist())

@@ -39,9 +39,7 @@ class Gusts:
         return speed_mps * self._toward[0], speed_mps * self._toward[1]
 
 
-def wind_force(
-    ahead_mps: float, left_mps: float, windage: Windage, length_m: float
-) -> tuple[float, float, float]:
+def wind_force(ahead_mps: float, left_mps: float, windage: Windage, length_m: float) -> tuple[float, float, float]:
     """Force ahead and to the left [N] and moment to port [N m] of air that moves so past the hull.
 
     0.5 rho V^2 A times c_x cos, c_y sin and c_n L sin 2 of its angle; the moment turns the hull broadside.

@@ -1,4 +1,4 @@
-"""Scenarios drawn at random: a stretch of a world's route, one to four things to meet on it, light, weather and water."""
+"""Scenarios drawn at random: a stretch of a world's route, one to four things to meet on it, light and weather."""
 
 import dataclasses
 import math
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from paani_sim.worlds import meetings
+from paani_sim.worlds import load_world, meetings
 from paani_sim.worlds.meetings import BOAT_MPS, Run
 from paani_sim.worlds.room import Lattice, fixed_gap_m
 from paani_sim.worlds.scenario import Scenario, Task
@@ -17,7 +17,6 @@ from paani_sim.worlds.world import (
     Actor,
     Behaviour,
     Current,
-    Kind,
     Light,
     Obstacle,
     Pose2,
@@ -54,20 +53,20 @@ class _Place:
     id: str
 
 
-def random_scenario(world: World, seed: int) -> Scenario:
-    """The scenario of this world and seed, always the same.
+def random_scenario(kind: str, seed: int) -> Scenario:
+    """The scenario of this kind of world and seed (0 or more), always the same. Raises UserError for an unknown world.
 
     The boat follows an open stretch of the world's route. Whatever is met, a gap of 3 m leads on at any time.
     """
-    rng = np.random.default_rng([zlib.crc32(world.name.encode()), seed])
-    world = dataclasses.replace(_weathered(world, rng), actors=())
+    rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
+    world = dataclasses.replace(_weathered(load_world(kind), rng), actors=())
     while True:
         found = _stretch_with_encounters(world, rng)
         if found is not None:
             break
     length_m = found.route_length_m
     return Scenario(
-        name=f"random:{world.name}:{seed}",
+        name=f"random:{kind}:{seed}",
         world=found,
         seed=seed,
         task=Task(distance_m=length_m, time_limit_s=3.0 * length_m / BOAT_MPS + 60.0),
@@ -93,7 +92,11 @@ def _stretch_with_encounters(world: World, rng: np.random.Generator) -> World | 
         if thing is None:
             continue
         fuller = _with(cut, thing)
-        if _is_clear_of_start(cut, thing) and lattice.is_passable(fuller.obstacles, fuller.actors, ROOM_M, BOAT_MPS):
+        if (
+            _is_clear_of_start(cut, thing)
+            and all(meetings.is_free_path(fuller, actor) for actor in cut.actors)
+            and lattice.is_passable(fuller.obstacles, fuller.actors, ROOM_M, BOAT_MPS)
+        ):
             cut = fuller
             met_m.append(at_m)
             if len(met_m) == wanted:

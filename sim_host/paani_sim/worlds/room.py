@@ -14,7 +14,8 @@ Flags = npt.NDArray[np.bool_]
 HEADROOM_M = 2.0  # a thing whose foot is higher can be passed underneath
 SIDE_M = 14.0
 NEAR_M = 5.0
-GRID_M = 0.5
+ALONG_M = 1.0
+LEFT_M = 0.5
 STEP_S = 4.0
 FINALLY_S = 1e5
 
@@ -42,12 +43,14 @@ class Lattice:
     """Points on and beside the first `length_m` of a way, with their distance to shore and obstacles."""
 
     def __init__(self, world: World, way: Way, length_m: float) -> None:
-        self._along_m = np.arange(0.0, length_m + 0.5 * GRID_M, GRID_M)
-        left_m = np.arange(-SIDE_M, SIDE_M + 0.5 * GRID_M, GRID_M)
+        self._along_m = np.arange(0.0, length_m + 0.5 * ALONG_M, ALONG_M)
+        left_m = np.arange(-SIDE_M, SIDE_M + 0.5 * LEFT_M, LEFT_M)
         self._shape = (len(self._along_m), len(left_m))
         self._lane = np.abs(left_m) < 0.25
         self._near = np.abs(left_m) <= NEAR_M
-        self.points_m = np.array([way.at(float(a), float(b))[:2] for a in self._along_m for b in left_m])
+        lane = np.array([way.at(float(along_m)) for along_m in self._along_m])
+        left = np.column_stack([-np.sin(lane[:, 2]), np.cos(lane[:, 2])])
+        self.points_m = (lane[:, None, :2] + left_m[None, :, None] * left[:, None]).reshape(-1, 2)
         self.shore_gap_m = clearance_m(world.shore_m, self.points_m)
 
     def is_passable(

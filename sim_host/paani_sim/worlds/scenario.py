@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from paani.messages import FenceArea
 from paani_sim.worlds.faults import Fault
 from paani_sim.worlds.world import World
 
@@ -16,7 +17,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """`vessel` names a vessel profile. `seed` drives sensors, waves and gusts."""
+    """`vessel` names a vessel profile. `seed` drives sensors, waves and gusts. The fence holds for the navigator."""
 
     name: str
     world: World
@@ -24,3 +25,4 @@ class Scenario:
     vessel: str = "paper"
     task: Task = Task()
     faults: tuple[Fault, ...] = ()
+    fence: tuple[FenceArea, ...] = ()

@@ -6,6 +6,7 @@ Gravity is -9.81 and there is no fluid: buoyancy, drag and thrust are the plant'
 import mujoco
 import numpy as np
 
+from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.worlds.curves import Points, corners
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
 

@@ -1,0 +1,187 @@
+"""What is known of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (checklist Q2). Pure.
+
+The grid lies in the map's axes and is laid anew around the boat from the sights of the last seconds.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani import portable
+from paani.config import CalibrationConfig, PlannerConfig
+from paani_services.navigator.projection import F64, Lens, Rays, Station, lens_at, ranges_m, rays, together
+from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Sight
+
+CELLS = 100  # Q2
+CELL_M = 0.2  # Q2
+FOOT_COLUMNS = 24
+FOOT_DEEP_M = 1.5  # a thing is as deep as it is wide, but no deeper
+CUT_FRAC = 0.99  # a box that reaches this low goes on below the picture
+CUT_NEARER_M = 0.8
+REST = Station(0.0, 0.0, 0.0, 0.0, 0.0)
+
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Polygon = tuple[tuple[float, float], ...]
+
+
+class Points(NamedTuple):
+    """Points of the map, and the number of the picture that shows each [n]."""
+
+    east_m: F64
+    north_m: F64
+    number: Indices
+
+
+class Grid(NamedTuple):
+    """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
+
+    west_m, south_m: the corner.
+    """
+
+    west_m: float
+    south_m: float
+    occupied: Mask
+    free: Mask
+    beside: Mask
+
+    @property
+    def unknown(self) -> Mask:
+        """Nothing is known."""
+        return ~(self.occupied | self.free | self.beside)
+
+
+def lay(
+    sights: tuple[Sight, ...],
+    position_m: tuple[float, float],
+    now_us: int,
+    calibration: CalibrationConfig,
+    hull: Polygon,
+    config: PlannerConfig,
+) -> Grid:
+    """The grid around the boat. sights: oldest first. hull: the own hull in the picture, as in `perception`.
+
+    Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
+    free since. Occupied wins. Beside: what the picture does not show because it is too near, given that there is a
+    picture: whoever arms the boat answers for it at the start, and what drifts in from astern no camera sees anyway.
+    """
+    west_m, south_m = ((math.floor(at_m / CELL_M) - CELLS // 2) * CELL_M for at_m in position_m)
+    longest_us, free_us, occupied_us = (
+        now_us - round(age_s * 1e6)
+        for age_s in (max(config.occupied_s, config.hidden_s), config.free_s, config.occupied_s)
+    )
+    known = [sight for sight in sights if longest_us <= sight.at_us <= now_us]
+    known = [sight for sight in known if len(sight.edge) == len(known[-1].edge)]
+    free_of, occupied_of = (np.full(CELLS * CELLS, -1, np.int64) for _ in range(2))  # number of the last sight
+    if known:
+        free, occupied = _seen(known, calibration, hull, config)
+        for last, points in ((free_of, free), (occupied_of, occupied)):
+            cells, inside = _cells(points, west_m, south_m)
+            last[cells] = points.number[inside]
+    first_free = sum(sight.at_us < free_us for sight in known)
+    first_occupied = sum(sight.at_us < occupied_us for sight in known)
+    not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
+    occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
+    free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
+    shape = (CELLS, CELLS)
+    grid = Grid(west_m, south_m, occupied_now.reshape(shape), free_now.reshape(shape), np.zeros(shape, np.bool_))
+    if first_free == len(known):
+        return grid
+    reach_m = blind_reach_m(known[-1], calibration, hull, config)
+    return grid._replace(beside=_within(grid, position_m, reach_m) & ~(grid.occupied | grid.free))
+
+
+def blind_reach_m(sight: Sight, calibration: CalibrationConfig, hull: Polygon, config: PlannerConfig) -> float:
+    """How far from the boat the water begins that a picture shows, boat at rest; at most `blind_m`."""
+    lens = lens_at(REST, calibration, sight.aspect)
+    u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    given = rays(lens, u, hull_top(hull, u))
+    near_m = ranges_m(lens, given, config.max_range_m)
+    east_m, north_m = lens.at_m[0] + near_m * given.east, lens.at_m[1] + near_m * given.north
+    reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
+    return reach_m if reach_m <= config.blind_m else 0.0
+
+
+def hull_top(hull: Polygon, u: F64) -> F64:
+    """The highest edge of the own hull at each of these columns, 1 where there is none [n] in [0, 1]."""
+    top = np.ones_like(u)
+    for (x1, y1), (x2, y2) in zip(hull, (*hull[1:], *hull[:1]), strict=True):
+        low, high = min(x1, x2), max(x1, x2)
+        wide = high - low
+        part = (u - x1) / (x2 - x1) if wide > 0.0 else np.zeros_like(u)
+        top = np.where((u >= low) & (u <= high), np.minimum(top, y1 + part * (y2 - y1)), top)
+    return top
+
+
+def _seen(
+    sights: list[Sight], calibration: CalibrationConfig, hull: Polygon, config: PlannerConfig
+) -> tuple[Points, Points]:
+    """Points of the map that the pictures show free, and occupied; those of later ones come later."""
+    lenses = [lens_at(sight.station, calibration, sight.aspect) for sight in sights]
+    lens = together(lenses)
+    edge = np.frombuffer(b"".join(sight.edge for sight in sights), np.uint8).astype(np.float64) / EDGE_STEPS
+    edge = edge.reshape(len(sights), -1)
+    u = (np.arange(edge.shape[1]) + 0.5) / edge.shape[1]
+    top = hull_top(hull, u)
+    near_m = ranges_m(lens, rays(lens, u, top), config.max_range_m)
+    ends = rays(lens, u, np.minimum(edge, top))
+    far_m = ranges_m(lens, ends, config.max_range_m)
+    water = ends.fall > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
+    numbers = np.broadcast_to(np.arange(len(sights))[:, None], edge.shape)
+    open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
+    free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M), numbers)
+    deep = math.ceil(config.thickness_m / CELL_M) + 1
+    points = [_points(lens, ends, far_m, np.where(np.isfinite(far_m), deep, 0.0), numbers)]
+    for number, (each, sight) in enumerate(zip(lenses, sights, strict=True)):
+        points += [_foot(each, foot, number, hull, config) for foot in sight.feet]
+    if len(points) == 1:
+        return free, points[0]
+    occupied = Points(*(np.concatenate(axis) for axis in zip(*points, strict=True)))
+    order = np.argsort(occupied.number, kind="stable")
+    return free, Points(*(axis[order] for axis in occupied))
+
+
+def _foot(lens: Lens, foot: tuple[int, int, int], number: int, hull: Polygon, config: PlannerConfig) -> Points:
+    """Points on the water under a box: along its lower end, and as far behind that as it is wide."""
+    left, right, low = (end / FOOT_STEPS for end in foot)
+    u = left + (right - left) * (np.arange(FOOT_COLUMNS) + 0.5) / FOOT_COLUMNS
+    top = hull_top(hull, u)
+    given = rays(lens, u, np.minimum(low, top))
+    range_m = ranges_m(lens, given, config.max_range_m)
+    if not np.isfinite(range_m).all():
+        return Points(np.empty(0), np.empty(0), np.empty(0, np.int64))
+    east_m, north_m = range_m * given.east, range_m * given.north
+    wide_m = math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
+    nearer_m = CUT_NEARER_M if low >= CUT_FRAC else 0.0
+    deep = math.ceil((nearer_m + max(config.thickness_m, min(wide_m, FOOT_DEEP_M))) / CELL_M) + 1
+    first_m = np.maximum(range_m - nearer_m, 0.0)
+    return _points(lens, given, first_m, np.full(u.shape, float(deep)), np.full(u.shape, number))
+
+
+def _points(lens: Lens, given: Rays, first_m: F64, counts: F64, numbers: Indices) -> Points:
+    """So many places on each ray, a cell apart, from that far on; all arrays of the rays' shape."""
+    times = np.maximum(counts, 0.0).astype(np.int64).ravel()
+    ray = np.repeat(np.arange(times.size), times)
+    place = np.arange(ray.size) - np.repeat(np.cumsum(times) - times, times)
+    range_m = first_m.ravel()[ray] + CELL_M * place
+    east_m, north_m = (np.broadcast_to(axis, first_m.shape).ravel()[ray] for axis in lens.at_m[:2])
+    return Points(
+        east_m + range_m * given.east.ravel()[ray], north_m + range_m * given.north.ravel()[ray], numbers.ravel()[ray]
+    )
+
+
+def _cells(points: Points, west_m: float, south_m: float) -> tuple[Indices, Mask]:
+    """Indices of the cells that points lie in, and which of the points do lie in the grid."""
+    column = np.floor((points.east_m - west_m) / CELL_M).astype(np.int64)
+    row = np.floor((points.north_m - south_m) / CELL_M).astype(np.int64)
+    inside = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
+    return (row * CELLS + column)[inside], inside
+
+
+def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Mask:
+    """Cells whose middle lies within reach."""
+    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    east_m, north_m = grid.west_m + middle - position_m[0], grid.south_m + middle - position_m[1]
+    return np.asarray((east_m * east_m)[None, :] + (north_m * north_m)[:, None] <= reach_m * reach_m)

@@ -1,0 +1,202 @@
+"""Heading and speed on water that is known to be free: swept footprints over the grid (checklist Q4-Q6). Pure."""
+
+import math
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani import portable
+from paani.config import PlannerConfig
+from paani.geometry import wrap_rad
+from paani_services.navigator.grid import CELL_M, CELLS, Grid, Mask
+from paani_services.navigator.projection import F64
+
+FIELD_CELLS = 10  # distances are known up to 2 m
+FULL_HELM_RAD = 0.5  # the controller's steering saturates there
+SLOWER = 0.5  # the other speed tried
+# Weights of a candidate's cost: a quarter turn off the wanted course is 1.
+SOON = 2.0  # something on the way just beyond the horizon; less the later
+CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
+UNKNOWN = 0.4  # all of the way is unknown
+SLOW = 0.3  # a stop
+CHANGE = 0.3  # a quarter turn off the plan before
+
+
+class Plan(msgspec.Struct, frozen=True):
+    """Where to steer and how fast; 0: nowhere is free. `verified`: every cell on the first `verified_m` is known."""
+
+    heading_rad: float
+    speed_mps: float
+    verified: bool = False
+
+
+class Start(NamedTuple):
+    """Where the boat is and how it moves."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    surge_mps: float = 0.0
+    yaw_rate_radps: float = 0.0
+
+
+class Ways(NamedTuple):
+    """Where candidates lead: positions and way made [times, candidates], times from now [times]."""
+
+    x_m: F64
+    y_m: F64
+    way_m: F64
+    at_s: F64
+
+
+class Wish(NamedTuple):
+    """The wanted course and the speed allowed. side: 1, never right of the heading now; -1, never left; 0, either."""
+
+    course_rad: float
+    speed_mps: float
+    side: float = 0.0
+
+
+def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: PlannerConfig) -> Plan:
+    """The best of headings around the wanted course at two speeds, none of which meets anything.
+
+    Refused is what sweeps an occupied cell within `horizon_s` (Q4, Q6), or an unknown one within the way to stop.
+    Costs: off the wanted course, near to things, into the unknown, slow, another than before.
+    """
+    nowhere = Plan(start.yaw_rad, 0.0)
+    if not grid.free.any():
+        return nowhere
+    offsets, speeds = candidates(start, wish, config)
+    if not offsets.size:
+        return nowhere
+    ways = roll_out(start, offsets, speeds, config)
+    gap_m = _looked_up(grid, distance_m(grid.occupied), ways)
+    blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
+    needed_m = footprint_m(ways.at_s, gap_m[0, 0], config)[:, None]
+    met, unseen = gap_m < needed_m, blank_m < config.hull_radius_m
+    soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
+    stopping = ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps)
+    refused = (met & soon).any(axis=0) | (unseen & stopping).any(axis=0)
+    if refused.all():
+        return nowhere
+    cost = _costs(offsets, speeds, start, wish, before)
+    cost = cost + _way_costs(ways, gap_m - needed_m, met, unseen, soon, config)
+    best = int(np.where(refused, np.inf, cost).argmin())
+    near = ways.way_m[:, best] <= config.verified_m
+    verified = bool(ways.way_m[-1, best] >= 0.5 * config.verified_m and not ((met | unseen)[:, best] & near).any())
+    return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]), verified)
+
+
+def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
+    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before."""
+    wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
+    spacing_rad = math.radians(config.spacing_deg)
+    found: list[float] = []
+    for number in range(math.floor(config.span_deg / config.spacing_deg) + 1):
+        for off_rad in (number * spacing_rad, -number * spacing_rad)[: 1 + (number > 0)]:
+            heading_rad = wanted_rad + off_rad
+            if abs(heading_rad) <= math.pi and heading_rad * wish.side >= -1e-9:
+                found.append(heading_rad)
+    speed_mps = min(wish.speed_mps, config.speed_mps)
+    offsets = np.array([heading for heading in found for _ in range(2)])
+    return offsets, np.array([speed_mps, SLOWER * speed_mps] * len(found))
+
+
+def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Ways:
+    """Where the boat gets in steps of `step_s` up to `horizon_s`, of twice that and at full speed up to `lookahead_s`.
+
+    Speed changes by `accel_mps2` at most; it turns towards the heading by `yaw_rate_radps` at most and on no tighter
+    circle than `turn_radius_m`, for fans that only push.
+    """
+    fine = round(config.horizon_s / config.step_s)
+    coarse = max(0, math.ceil((config.lookahead_s - config.horizon_s) / (2.0 * config.step_s) - 1e-9))
+    steps_s = [config.step_s] * fine + [2.0 * config.step_s] * coarse
+    count = offsets_rad.size
+    cos, sin = (np.full(count, of(start.yaw_rad)) for of in (portable.cos, portable.sin))
+    x_m, y_m, way_m = np.full(count, start.x_m), np.full(count, start.y_m), np.zeros(count)
+    turned, rate = np.zeros(count), np.full(count, start.yaw_rate_radps)
+    speed = np.full(count, max(start.surge_mps, 0.0))
+    rows = [(x_m, y_m, way_m)]
+    for number, step_s in enumerate(steps_s):
+        if number == fine:  # from here on the way counts, not when
+            speed, speeds_mps = np.maximum(speed, config.speed_mps), np.maximum(speeds_mps, config.speed_mps)
+        gain = config.accel_mps2 * step_s
+        speed = speed + np.clip(speeds_mps - speed, -gain, gain)
+        fastest = np.full(count, config.yaw_rate_radps)
+        if config.turn_radius_m > 0.0:
+            fastest = np.minimum(fastest, speed / config.turn_radius_m)
+        wanted = np.clip((offsets_rad - turned) / FULL_HELM_RAD, -1.0, 1.0) * fastest
+        swing = config.yaw_accel_radps2 * step_s
+        rate = rate + np.clip(wanted - rate, -swing, swing)
+        half = 0.5 * step_s * rate
+        turned = turned + 2.0 * half
+        # A rotation by 2 atan(half), which is right to 1e-4 rad a step and needs no sine.
+        scale = 1.0 + half * half
+        cos, sin = (
+            ((1.0 - half * half) * cos - 2.0 * half * sin) / scale,
+            ((1.0 - half * half) * sin + 2.0 * half * cos) / scale,
+        )
+        along = speed * step_s
+        x_m, y_m, way_m = x_m + along * cos, y_m + along * sin, way_m + along
+        rows.append((x_m, y_m, way_m))
+    xs, ys, ways = (np.stack(column) for column in zip(*rows, strict=True))
+    return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
+
+
+def footprint_m(at_s: F64, gap_now_m: float, config: PlannerConfig) -> F64:
+    """The radius that must be free at each time: hull, margin, and drift up to the horizon (Q6).
+
+    Where something is nearer than that already, a way that does not come nearer is allowed, up to the hull itself.
+    """
+    radius_m = config.hull_radius_m + config.margin_m + config.drift_mps * np.minimum(at_s, config.horizon_s)
+    return np.minimum(radius_m, max(config.hull_radius_m, float(gap_now_m) - CELL_M))
+
+
+def distance_m(cells: Mask) -> F64:
+    """From the middle of each cell to the middle of the nearest of these, at most 2 m [100, 100]."""
+    far = FIELD_CELLS * FIELD_CELLS
+    found: NDArray[np.int16] = np.where(cells, 0, far).astype(np.int16)
+    for axis in (0, 1):
+        given = found if axis == 0 else found.T
+        best = given.copy()
+        for off in range(1, FIELD_CELLS):
+            np.minimum(best[off:], given[:-off] + off * off, out=best[off:])
+            np.minimum(best[:-off], given[off:] + off * off, out=best[:-off])
+        found = best if axis == 0 else best.T
+    return CELL_M * np.sqrt(found.astype(np.float64))
+
+
+def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:
+    """The field at these places, between the middles of four cells; at the rim of the grid, the rim's."""
+    column = np.clip((ways.x_m - grid.west_m) / CELL_M - 0.5, 0.0, CELLS - 1.001)
+    row = np.clip((ways.y_m - grid.south_m) / CELL_M - 0.5, 0.0, CELLS - 1.001)
+    left, low = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
+    right_part, high_part = column - left, row - low
+    flat, at = field.ravel(), low * CELLS + left
+    lower = flat[at] * (1.0 - right_part) + flat[at + 1] * right_part
+    upper = flat[at + CELLS] * (1.0 - right_part) + flat[at + CELLS + 1] * right_part
+    return np.asarray(lower * (1.0 - high_part) + upper * high_part)
+
+
+def _costs(offsets: F64, speeds: F64, start: Start, wish: Wish, before: Plan | None) -> F64:
+    quarter = 0.5 * math.pi
+    cost = np.abs(offsets - wrap_rad(wish.course_rad - start.yaw_rad)) / quarter
+    cost = cost + SLOW * (1.0 - speeds / wish.speed_mps)
+    if before is not None and before.speed_mps > 0.0:
+        off = np.abs(offsets - wrap_rad(before.heading_rad - start.yaw_rad))
+        cost = cost + CHANGE * np.minimum(off, 2.0 * math.pi - off) / quarter
+    return np.asarray(cost)
+
+
+def _way_costs(ways: Ways, spare_m: F64, met: Mask, unseen: Mask, soon: Mask, config: PlannerConfig) -> F64:
+    """spare_m: between the footprint and the nearest thing. soon: times within the horizon [times, 1]."""
+    cost = UNKNOWN * unseen.sum(axis=0) / len(unseen)
+    nearest = np.where(soon, spare_m, np.inf).min(axis=0)
+    cost = cost + CLOSE * np.clip(1.0 - nearest / CLEAR_M, 0.0, 1.0)
+    later_s = config.lookahead_s - config.horizon_s
+    if later_s > 0.0:
+        first_s = np.where(met & ~soon, ways.at_s[:, None], np.inf).min(axis=0)
+        cost = cost + SOON * np.clip((config.lookahead_s - first_s) / later_s, 0.0, 1.0)
+    return np.asarray(cost)

@@ -1,0 +1,163 @@
+"""What the last pictures showed of the water, and where each was taken. Pure; small enough to be state."""
+
+import itertools
+import math
+
+import msgspec
+
+from paani.config import PlannerConfig
+from paani.geometry import wrap_rad
+from paani.messages import Evidence, Odometry, TimeBase
+from paani_services.navigator.projection import Station
+
+EDGE_STEPS = 128  # of the picture's height: two for each row of the mask
+FOOT_STEPS = 512
+POSE_SPACING_US = 90_000
+POSES_KEPT = 14  # 1.2 s: longer than a picture is under way
+SIGHT_SPACING_US = 100_000
+OLD_SPACING_US = 800_000  # between those kept for what is out of sight
+SIGHTS_KEPT = 40
+
+
+class Pose(msgspec.Struct, frozen=True):
+    """What one odometry said."""
+
+    at_us: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    roll_rad: float
+    pitch_rad: float
+
+
+class Sight(msgspec.Struct, frozen=True):
+    """One picture: where it was taken, its width over height, where the water ends, where things stand in it.
+
+    edge: for each column, left to right, in 1/128 of the height from the top, rounded towards the boat.
+    feet: left, right and lower end of each box, in 1/512 of the picture, rounded outwards.
+    """
+
+    at_us: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    roll_rad: float
+    pitch_rad: float
+    aspect: float
+    edge: bytes
+    feet: tuple[tuple[int, int, int], ...] = ()
+
+    @property
+    def station(self) -> Station:
+        """Where the boat was, and how it lay."""
+        return Station(self.x_m, self.y_m, self.yaw_rad, self.roll_rad, self.pitch_rad)
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Poses and sights, oldest first; the newest frame heard of (epoch, sequence); the odometry's epoch."""
+
+    poses: tuple[Pose, ...] = ()
+    sights: tuple[Sight, ...] = ()
+    frame: tuple[int, int] = (-1, -1)
+    epoch: int = -1
+
+
+def remember(memory: Memory, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig) -> Memory:
+    """The memory with what is new. Another odometry epoch, or a jump of the position, forgets everything seen."""
+    if odometry is not None and odometry.healthy:
+        memory = _with_pose(memory, odometry, config)
+    if evidence is None or (evidence.frame_epoch, evidence.frame_seq) == memory.frame:
+        return memory
+    memory = msgspec.structs.replace(memory, frame=(evidence.frame_epoch, evidence.frame_seq))
+    last_us = memory.sights[-1].at_us if memory.sights else -SIGHT_SPACING_US
+    if not shows_water(evidence) or evidence.source_us - last_us < SIGHT_SPACING_US:
+        return memory
+    pose = pose_at(memory.poses, evidence.source_us, config.max_pose_gap_s)
+    if pose is None:
+        return memory
+    return msgspec.structs.replace(memory, sights=_kept((*memory.sights, _sight(evidence, pose)), config))
+
+
+def shows_water(evidence: Evidence) -> bool:
+    """Is it free-space evidence: a live, usable picture, segmented by the learned net (F2)?"""
+    return (
+        evidence.usable
+        and evidence.navigation_eligible
+        and evidence.time_base is TimeBase.CAPTURE
+        and evidence.width_px > 0
+        and evidence.height_px > 0
+        and len(evidence.water_edge) > 0
+    )
+
+
+def pose_at(poses: tuple[Pose, ...], at_us: int, max_gap_s: float) -> Pose | None:
+    """The pose then, between the two around it, or the nearest; None if that one is further off than `max_gap_s`."""
+    if not poses:
+        return None
+    nearest = min(poses, key=lambda pose: abs(pose.at_us - at_us))
+    if abs(nearest.at_us - at_us) * 1e-6 > max_gap_s:
+        return None
+    for before, after in itertools.pairwise(poses):
+        if before.at_us <= at_us <= after.at_us and after.at_us > before.at_us:
+            part = (at_us - before.at_us) / (after.at_us - before.at_us)
+            return Pose(
+                at_us,
+                before.x_m + part * (after.x_m - before.x_m),
+                before.y_m + part * (after.y_m - before.y_m),
+                before.yaw_rad + part * wrap_rad(after.yaw_rad - before.yaw_rad),
+                before.roll_rad + part * (after.roll_rad - before.roll_rad),
+                before.pitch_rad + part * (after.pitch_rad - before.pitch_rad),
+            )
+    return nearest
+
+
+def _with_pose(memory: Memory, odometry: Odometry, config: PlannerConfig) -> Memory:
+    numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.roll_rad, odometry.pitch_rad)
+    if not all(map(math.isfinite, numbers)):
+        return memory
+    new = Pose(odometry.source_us, *numbers)
+    if odometry.epoch != memory.epoch:
+        return Memory(poses=(new,), frame=memory.frame, epoch=odometry.epoch)
+    if not memory.poses:
+        return msgspec.structs.replace(memory, poses=(new,))
+    last = memory.poses[-1]
+    if new.at_us <= last.at_us:
+        return memory
+    way_m = math.hypot(odometry.surge_mps, odometry.sway_mps) * (new.at_us - last.at_us) * 1e-6
+    if math.dist((new.x_m, new.y_m), (last.x_m, last.y_m)) > way_m + config.jump_m:
+        return Memory(poses=(new,), frame=memory.frame, epoch=odometry.epoch)
+    if new.at_us - last.at_us < POSE_SPACING_US:
+        return memory
+    return msgspec.structs.replace(memory, poses=(*memory.poses, new)[-POSES_KEPT:])
+
+
+def _sight(evidence: Evidence, pose: Pose) -> Sight:
+    return Sight(
+        evidence.source_us,
+        pose.x_m,
+        pose.y_m,
+        pose.yaw_rad,
+        pose.roll_rad,
+        pose.pitch_rad,
+        evidence.width_px / evidence.height_px,
+        bytes(math.ceil(edge * EDGE_STEPS) for edge in evidence.water_edge),
+        tuple(
+            (math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), math.ceil(y2 * FOOT_STEPS))
+            for x1, _, x2, y2 in (detection.box_xyxy for detection in evidence.detections)
+        ),
+    )
+
+
+def _kept(sights: tuple[Sight, ...], config: PlannerConfig) -> tuple[Sight, ...]:
+    """All those within the lifetimes of Q3, and a few older ones for what is out of sight."""
+    newest_us = sights[-1].at_us
+    kept: list[Sight] = []
+    old_us = -OLD_SPACING_US
+    for sight in sights:
+        age_s = (newest_us - sight.at_us) * 1e-6
+        if age_s <= config.occupied_s:
+            kept.append(sight)
+        elif age_s <= config.hidden_s and sight.at_us - old_us >= OLD_SPACING_US:
+            kept.append(sight)
+            old_us = sight.at_us
+    return tuple(kept[-SIGHTS_KEPT:])

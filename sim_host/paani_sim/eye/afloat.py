@@ -1,0 +1,82 @@
+"""How floating things ride the waves: heave, roll and pitch from the wind sea. Pure.
+
+Height and period of a fetch-limited sea: Hasselmann et al. (1973), JONSWAP.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2, Waves, Wind
+
+G_MPS2 = 9.81
+OWN_FETCH_M = 40.0  # of a world that names none: the eye's ripples need some water to grow on
+ROCK_RAD = 0.012  # how far a small boat is rocked by its own mooring and crew, standard deviation
+
+FLOATING_PIERS = ("pontoon", "finger")
+
+
+class Sea(NamedTuple):
+    """Significant height, peak period and the way the waves run."""
+
+    height_m: float
+    period_s: float
+    toward_rad: float
+
+    @property
+    def wave_m(self) -> float:
+        """Length of the wave at the peak, in deep water."""
+        return G_MPS2 * self.period_s**2 / (2.0 * np.pi)
+
+
+class Ride(NamedTuple):
+    """How far a thing is off its rest."""
+
+    up_m: float
+    roll_rad: float
+    pitch_rad: float
+
+
+def sea_of(wind: Wind, waves: Waves) -> Sea:
+    """The wind sea of a world."""
+    speed = max(wind.speed_mps, 0.3)
+    fetch = G_MPS2 * (waves.fetch_m or OWN_FETCH_M) / speed**2
+    height = 0.0016 * fetch**0.5 * speed**2 / G_MPS2
+    return Sea(float(height), float(speed / G_MPS2 / 3.5 * fetch**0.33), wind.toward_rad)
+
+
+def floats(thing: Obstacle | Actor) -> bool:
+    """Whether it moves with the water."""
+    return (
+        isinstance(thing, Actor)
+        or thing.kind in {Kind.VESSEL, Kind.BUOY}
+        or thing.look == "swimming"
+        or (thing.kind is Kind.PIER and thing.look in FLOATING_PIERS)
+    )
+
+
+def ride(sea: Sea, thing: Obstacle | Actor, pose: Pose2, t_s: float) -> Ride:
+    """A long wave through the thing's middle, taken less seriously the longer the thing is; and its own rocking."""
+    k_radpm = 2.0 * np.pi / sea.wave_m
+    omega = 2.0 * np.pi / sea.period_s
+    along = np.cos(sea.toward_rad) * pose.x_m + np.sin(sea.toward_rad) * pose.y_m
+    off = pose.yaw_rad - sea.toward_rad
+    phase = k_radpm * along - omega * t_s
+    fore = _filtered(k_radpm * thing.length_m * np.cos(off))
+    side = _filtered(k_radpm * thing.width_m * np.sin(off))
+    beat = 0.7 + 0.3 * np.sin(0.31 * omega * t_s + 0.7 * along)
+    amplitude = 0.5 * sea.height_m * beat
+    slope = k_radpm * amplitude
+    moored = thing.kind is Kind.PIER
+    rock = 0.0 if moored else ROCK_RAD * min(1.5, 2.0 / max(thing.width_m, 0.3))
+    own = np.sin(2.1 * t_s / np.sqrt(max(thing.width_m, 0.4)) + 1.7 * pose.x_m + 0.9 * pose.y_m)
+    return Ride(
+        float(amplitude * fore * side * np.sin(phase)),
+        float(np.clip(slope * fore * side * np.cos(phase) * np.sin(off), -0.15, 0.15) + rock * own),
+        float(np.clip(-slope * fore * side * np.cos(phase) * np.cos(off), -0.1, 0.1)),
+    )
+
+
+def _filtered(angle: float) -> float:
+    """Mean of a wave over a length that spans `angle` of it: |sinc|."""
+    return float(abs(np.sinc(0.5 * angle / np.pi)))

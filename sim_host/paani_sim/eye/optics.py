@@ -1,0 +1,76 @@
+"""From the pinhole that is drawn to the lens that is asked for: radial distortion, and which drawn pixel is which."""
+
+import dataclasses
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from paani.errors import UserError
+from paani_sim.eye.camera import Camera, distort
+
+F64 = npt.NDArray[np.float64]
+U8 = npt.NDArray[np.uint8]
+STEPS = 40
+ERROR_PX = 0.02
+
+
+class Optics:
+    """`pinhole` is the camera to draw, `scale` times larger each way than the picture of `camera`.
+
+    Raises `UserError` for a distortion that folds the picture over.
+    """
+
+    def __init__(self, camera: Camera, scale: float) -> None:
+        self._size = (camera.width_px, camera.height_px)
+        self._scale = scale
+        columns, rows = np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5
+        self._map: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]] | None = None
+        self.pinhole = camera
+        if camera.k1 == 0.0 and camera.k2 == 0.0:
+            self._rows = (rows * scale).astype(np.intp)[:, None]
+            self._columns = (columns * scale).astype(np.intp)[None, :]
+            return
+        seen = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        middle = 0.5 * np.array(self._size)
+        straight = _undistorted((seen - middle) / camera.focal_px, camera)
+        edge = np.vstack([np.abs(straight).max(axis=0), [0.5 * s / camera.focal_px for s in self._size]])
+        wider = max(1.0, float((edge[0] / edge[1]).max()))
+        half = wider * np.tan(0.5 * np.radians(camera.hfov_deg))
+        hfov_deg = float(2.0 * np.degrees(np.arctan(half)))
+        self.pinhole = dataclasses.replace(camera, hfov_deg=hfov_deg, k1=0.0, k2=0.0)
+        drawn = (straight * self.pinhole.focal_px + middle) * scale
+        limit = np.array(self._size) * scale - 1.0
+        nearest = np.clip(drawn, 0.0, limit).astype(np.intp).reshape(camera.height_px, camera.width_px, 2)
+        self._columns, self._rows = nearest[..., 0], nearest[..., 1]
+        wide = (drawn - 0.5).astype(np.float32).reshape(camera.height_px, camera.width_px, 2)
+        self._map = (np.ascontiguousarray(wide[..., 0]), np.ascontiguousarray(wide[..., 1]))
+
+    def picture(self, drawn: U8) -> U8:
+        """The picture of what was drawn, averaged down."""
+        if self._map is not None:
+            return np.asarray(cv2.remap(drawn, *self._map, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+        if self._scale == 1.0:
+            return drawn
+        return np.asarray(cv2.resize(drawn, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+
+    def nearest(self, drawn: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+        """Of what was drawn, the pixel in the middle of each of the picture's."""
+        return drawn[self._rows, self._columns]
+
+
+def _undistorted(seen: F64, camera: Camera) -> F64:
+    """Where a pinhole sees `(n, 2)` what the lens shows at `seen`; both from the middle, over focal length."""
+    radius = np.maximum(np.hypot(seen[:, 0], seen[:, 1]), 1e-12)
+    straight = radius.copy()
+    for _ in range(STEPS):
+        square = straight**2
+        value = straight * (1.0 + camera.k1 * square + camera.k2 * square**2)
+        slope = 1.0 + 3.0 * camera.k1 * square + 5.0 * camera.k2 * square**2
+        straight = straight - (value - radius) / np.maximum(slope, 0.1)
+    points = seen * (straight / radius)[:, None]
+    wrong = np.abs(distort(points, camera) - seen).max() * camera.focal_px
+    folded = (1.0 + 3.0 * camera.k1 * straight**2 + 5.0 * camera.k2 * straight**4).min() <= 0.0
+    if folded or not wrong < ERROR_PX:
+        raise UserError(f"eye: distortion k1={camera.k1:g} k2={camera.k2:g} folds the picture over")
+    return points

@@ -1,0 +1,87 @@
+"""Moving things: where they are on their paths, and how a skipper among them gives way to the boat."""
+
+import bisect
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from paani_sim.worlds.world import Actor, Behaviour, Pose2, along_at
+
+KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
+ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
+SLOWING_MPS2 = 0.15  # a small craft that throttles back
+
+
+class Track:
+    """An actor's path, measured once: `at` is `actor_at` to the last bits, much sooner."""
+
+    def __init__(self, actor: Actor) -> None:
+        path_m = np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m
+        steps = np.diff(path_m, axis=0)
+        lengths = np.linalg.norm(steps, axis=1)
+        self._closed = actor.closed
+        self._reach_m = 0.5 * actor.length_m
+        self._arc_m: list[float] = np.concatenate([[0.0], np.cumsum(lengths)]).tolist()
+        self._legs: list[list[float]] = np.column_stack([path_m[:-1], steps / lengths[:, None]]).tolist()
+
+    def at(self, along_m: float) -> Pose2:
+        """Where the actor is `along_m` down its path."""
+        x_m, y_m, east, north = self._point(along_m)
+        ahead, behind = self._point(along_m + self._reach_m), self._point(along_m - self._reach_m)
+        east_m, north_m = ahead[0] - behind[0], ahead[1] - behind[1]
+        if not (east_m or north_m):
+            east_m, north_m = east, north
+        return Pose2(x_m, y_m, math.atan2(north_m, east_m))
+
+    def _point(self, along_m: float) -> tuple[float, float, float, float]:
+        arc_m = self._arc_m
+        at_m = along_m % arc_m[-1] if self._closed else min(max(along_m, 0.0), arc_m[-1])
+        leg = min(bisect.bisect_right(arc_m, at_m) - 1, len(self._legs) - 1)
+        x_m, y_m, east, north = self._legs[leg]
+        part_m = at_m - arc_m[leg]
+        return x_m + part_m * east, y_m + part_m * north, east, north
+
+
+def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
+    """How fast the actor goes with the boat there; `boat_reach_m` is the boat's half length.
+
+    One that gives way slows so that it could stop `KEEP_CLEAR_M` short of a boat ahead, and goes on when that is clear.
+    """
+    if actor.behaviour is not Behaviour.GIVES_WAY:
+        return actor.speed_mps
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    east_m, north_m = boat_xy_m[0] - pose.x_m, boat_xy_m[1] - pose.y_m
+    ahead_m, aside_m = cos * east_m + sin * north_m, abs(cos * north_m - sin * east_m)
+    if ahead_m <= 0.0 or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
+        return actor.speed_mps
+    room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - KEEP_CLEAR_M
+    return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
+
+
+class Actors:
+    """All actors of a world, advanced together every `every_s`."""
+
+    def __init__(self, actors: Sequence[Actor], every_s: float, boat_reach_m: float) -> None:
+        """At their starts."""
+        self._actors = tuple(actors)
+        self._tracks = [Track(actor) for actor in actors]
+        self._every_s = every_s
+        self._boat_reach_m = boat_reach_m
+        self.along_m = tuple(along_at(actor, 0.0) for actor in actors)
+        self.speeds_mps = tuple(0.0 for _ in actors)
+        self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, self.along_m, strict=True)]
+
+    def advance(self, t_s: float, boat_xy_m: tuple[float, float]) -> None:
+        """To simulated time `t_s`, `every_s` after the last one; who holds on is where the time says, to the bit."""
+        along, speeds = [], []
+        for actor, pose, along_m in zip(self._actors, self.poses, self.along_m, strict=True):
+            if t_s <= actor.start_s:
+                speed = 0.0
+            else:
+                speed = speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
+            holds_on = actor.behaviour is Behaviour.HOLDS_ON
+            along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
+            speeds.append(speed)
+        self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
+        self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, along, strict=True)]

@@ -1,0 +1,129 @@
+"""Which drives there are: a scenario, what breaks in it, and who drives."""
+
+from __future__ import annotations
+
+import dataclasses
+import zlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from paani.errors import UserError
+from paani_sim.trials.policies import Policy
+from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
+from paani_sim.worlds.generate import random_scenario
+
+SPLIT, PLUS = ":", "+"
+STARTS_S = (12.0, 30.0)  # when a fault begins, drawn by seed
+# How long each fault of the suite lasts [s], and how bad it is in the unit of its kind.
+FAULTS = {
+    FaultKind.CAMERA_BLACK: (8.0, 0.0),
+    FaultKind.CAMERA_FROZEN: (8.0, 0.0),
+    FaultKind.CAMERA_BLURRED: (8.0, 8.0),
+    FaultKind.CAMERA_DROPPED: (8.0, 0.0),
+    FaultKind.GPS_OUTAGE: (15.0, 0.0),
+    FaultKind.GPS_JUMP: (20.0, 12.0),
+    FaultKind.COMPASS_BIAS: (20.0, 0.2),
+    FaultKind.GYRO_BIAS: (20.0, 0.05),
+    FaultKind.LINK_LOSS: (3.0, 0.0),
+    FaultKind.THRUSTER_LOSS: (20.0, 0.5),
+}
+CAMERA_FAULTS = tuple(kind for kind in FAULTS if kind.name.startswith("CAMERA"))
+
+
+class Case(msgspec.Struct, frozen=True, order=True):
+    """One drive. `world`: a kind of world, whose scenario is drawn by `seed`, or the path of a scenario file."""
+
+    world: str
+    seed: int
+    policy: Policy
+    fault: str = ""
+
+    @property
+    def name(self) -> str:
+        """As `--one` takes it."""
+        return f"{self.place}{SPLIT}{self.seed}{SPLIT}{self.policy.value}"
+
+    @property
+    def place(self) -> str:
+        """World and fault."""
+        return self.world + (PLUS + self.fault if self.fault else "")
+
+    @property
+    def stem(self) -> str:
+        """Of the files that belong to it."""
+        place = Path(self.world).stem if is_file(self.world) else self.world
+        return f"{place}{PLUS + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
+
+
+class Suite(msgspec.Struct, frozen=True, kw_only=True):
+    """`seeds` in every world for every policy; then, for `paani`, each fault in every world so many times."""
+
+    seeds: tuple[int, int]
+    camera_faults: int = 0
+    other_faults: int = 0
+
+
+SUITES = {
+    "quick": Suite(seeds=(1, 3)),
+    "standard": Suite(seeds=(1, 50), camera_faults=3, other_faults=1),
+}
+
+
+def is_file(world: str) -> bool:
+    """A scenario file, not a kind of world."""
+    return world.endswith(".toml")
+
+
+def cases_of(
+    suite: Suite, worlds: Sequence[str], policies: Iterable[Policy], seeds: tuple[int, int] | None = None
+) -> list[Case]:
+    """Every drive of a suite, in the order in which they are driven."""
+    first, last = seeds or suite.seeds
+    chosen = tuple(policies)
+    found = [Case(world, seed, policy) for seed in range(first, last + 1) for world in worlds for policy in chosen]
+    if Policy.PAANI in chosen:
+        for kind in FAULTS:
+            count = suite.camera_faults if kind in CAMERA_FAULTS else suite.other_faults
+            found += [
+                Case(world, seed, Policy.PAANI, kind.value)
+                for seed in range(first, first + count)
+                for world in worlds
+                if not is_file(world)
+            ]
+    return found
+
+
+def read_case(text: str) -> Case:
+    """From `WORLD[+FAULT]:SEED:POLICY`. Raises UserError."""
+    place, _, rest = text.partition(SPLIT)
+    seed, _, policy = rest.partition(SPLIT)
+    world, _, fault = place.partition(PLUS)
+    if not (is_file(world) or world in WORLDS):
+        raise UserError(f"--one {text}: no world '{world}' (have: {', '.join(WORLDS)}, or a scenario file)")
+    if fault and fault not in set(FaultKind):
+        raise UserError(f"--one {text}: no fault '{fault}' (have: {', '.join(FaultKind)})")
+    if policy not in set(Policy):
+        raise UserError(f"--one {text}: no policy '{policy}' (have: {', '.join(Policy)})")
+    if not seed.isdecimal():
+        raise UserError(f"--one {text}: '{seed}' is no seed")
+    return Case(world, int(seed), Policy(policy), fault)
+
+
+def scenario_of(case: Case) -> Scenario:
+    """The scenario, with its fault. Raises UserError for a scenario file that cannot be used."""
+    if is_file(case.world):
+        from paani_sim.worlds.scenario_file import load_scenario
+
+        scenario = dataclasses.replace(load_scenario(Path(case.world)), seed=case.seed)
+    else:
+        scenario = random_scenario(case.world, case.seed)
+    if not case.fault:
+        return scenario
+    kind = FaultKind(case.fault)
+    duration_s, amount = FAULTS[kind]
+    rng = np.random.default_rng([zlib.crc32(case.place.encode()), case.seed])
+    fault = Fault(kind, round(float(rng.uniform(*STARTS_S)), 2), duration_s, amount)
+    return dataclasses.replace(scenario, faults=(*scenario.faults, fault))

@@ -1,0 +1,151 @@
+"""`paani trial`: drives that are scored."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import msgspec
+from tqdm import tqdm
+
+from paani.errors import UserError
+from paani.whole_file import write_whole
+from paani_sim.trials.cases import SUITES, Case, cases_of, is_file, read_case, scenario_of
+from paani_sim.trials.one import run_case
+from paani_sim.trials.policies import Policy, config_of
+from paani_sim.trials.provenance import Maker
+from paani_sim.trials.result import TrialResult
+from paani_sim.trials.suite import Failure, drive_all, look
+from paani_sim.trials.summary import summarise, table
+from paani_sim.worlds import WORLDS
+
+
+def main(argv: list[str]) -> int:
+    """Drive, score, print. Exit codes: 0 it ran, 1 a drive gave no result, 2 user's mistake."""
+    options = _parser().parse_args(argv)
+    for name, file in (("--json", options.json), ("--report", options.report), ("--record", options.record)):
+        if file is not None and not file.absolute().parent.is_dir():
+            raise UserError(f"{name} {file}: no such folder")
+    if options.one:
+        return _one(options)
+    if options.record:
+        raise UserError("--record needs --one")
+    return _suite(options)
+
+
+def _suite(options: argparse.Namespace) -> int:
+    cases = _cases(options)
+    out: Path = options.out or Path("runs") / f"trial-{options.suite}"
+    maker = Maker(options.sets)
+    for policy in options.policy:
+        config_of(policy, options.sets)
+    kept = look(out, cases, maker)
+    if kept.results:
+        sys.stderr.write(f"{out}: {len(kept.results)} of {len(cases)} drives are there already\n")
+    for why, count in kept.outdated.items():
+        sys.stderr.write(f"{out}: {count} drives were made with {why}, and are driven again\n")
+    results, failures = dict(kept.results), list[Failure]()
+    try:
+        with tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar:
+            for case, result in drive_all(out, kept.wanted, maker, options.sets, options.jobs) if kept.wanted else ():
+                if isinstance(result, TrialResult):
+                    results[case] = result
+                else:
+                    failures.append(result)
+                touched = sum(r.collisions > 0 for c, r in results.items() if c.policy is Policy.PAANI)
+                bar.set_postfix_str(f"paani touched something in {touched}", refresh=False)
+                bar.update()
+    except KeyboardInterrupt:
+        sys.stderr.write(f"\n{out}: {len(results)} of {len(cases)} drives done; the same command goes on\n")
+        return 130
+    for failure in failures:
+        sys.stderr.write(f"{failure.case.name}: {failure.why}\n")
+    if not results:
+        return 1
+    summary = summarise(options.suite, results)
+    sys.stdout.write(table(summary))
+    if options.json:
+        write_whole(options.json, msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n", "--json")
+    if options.report:
+        from paani_sim.trials.report import write_report  # noqa: PLC0415
+
+        write_report(options.report, summary, results, options.sets)
+    return 1 if failures else 0
+
+
+def _one(options: argparse.Namespace) -> int:
+    """One drive in this process, its result printed."""
+    case = read_case(options.one)
+    if options.record:
+        from paani_sim.trials.recording import Recorder  # noqa: PLC0415
+
+        with Recorder(options.record, config_of(case.policy, options.sets), scenario_of(case)) as recorder:
+            result, effort = run_case(case, options.sets, threads=True, tap=recorder.tap)
+    else:
+        result, effort = run_case(case, options.sets, threads=True)
+    data = msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n"
+    if options.json:
+        write_whole(options.json, data, "--json")
+    else:
+        sys.stdout.write(data.decode())
+    sys.stderr.write(
+        f"{case.name}: {result.why.value}, {result.collisions} contacts, {result.near_misses} near misses, "
+        f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "
+        f"{effort.simulated_s / effort.wall_s:.1f} x real time\n"
+    )
+    return 0
+
+
+def _cases(options: argparse.Namespace) -> list[Case]:
+    worlds = [str(path) for path in options.scenario] or options.worlds or list(WORLDS)
+    for world in worlds:
+        if is_file(world):
+            scenario_of(Case(world, 1, Policy.BLIND))
+        elif world not in WORLDS:
+            raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
+    return cases_of(SUITES[options.suite], worlds, options.policy, options.seeds)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="paani trial",
+        description="Drive seeded scenarios in lockstep, faster than real time, and score them.",
+    )
+    parser.add_argument("--suite", choices=tuple(SUITES), default="quick", help="default: quick")
+    parser.add_argument("--seeds", type=_seeds, metavar="A..B", help="instead of the suite's")
+    parser.add_argument(
+        "--policy", nargs="+", type=Policy, choices=tuple(Policy), default=list(Policy), metavar="POLICY",
+        help=f"who drives: {', '.join(Policy)} (default: all)",
+    )  # fmt: skip
+    parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
+    parser.add_argument("--scenario", nargs="+", type=Path, default=[], metavar="FILE", help="instead of worlds")
+    parser.add_argument("--jobs", type=_count, default=os.cpu_count() or 1, metavar="N", help="drives side by side")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where results are kept (default: runs/trial-SUITE)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures there")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="also write a page with plots there")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="SECTION.FIELD=VALUE", dest="sets",
+        help="one setting, for every policy; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--one", metavar="WORLD[+FAULT]:SEED:POLICY", help="this drive alone, here")
+    parser.add_argument("--record", type=Path, metavar="FILE", help="write the one drive there as MCAP")
+    return parser
+
+
+def _seeds(text: str) -> tuple[int, int]:
+    first, dots, last = text.partition("..")
+    if not (first.isdecimal() and (last.isdecimal() if dots else True)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not A..B")
+    seeds = int(first), int(last or first)
+    if seeds[0] > seeds[1]:
+        raise argparse.ArgumentTypeError(f"'{text}' is empty")
+    return seeds
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return count

@@ -1,0 +1,73 @@
+"""What a camera fault led to. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from paani_sim.trials.outbox import START_US
+from paani_sim.trials.result import Reaction
+from paani_sim.trials.track import Applying, Sample, Track
+from paani_sim.worlds import Fault, FaultKind
+
+REST_MPS = 0.05
+IN_TIME_S = 0.5  # on top of one frame
+CAMERA_FAULTS = frozenset(
+    (FaultKind.CAMERA_BLACK, FaultKind.CAMERA_FROZEN, FaultKind.CAMERA_BLURRED, FaultKind.CAMERA_DROPPED)
+)
+
+
+def reactions_of(faults: Sequence[Fault], track: Track, frame_s: float) -> tuple[Reaction, ...]:
+    """Of every camera fault that began while the boat was armed. frame_s: between two pictures."""
+    if not track.samples:
+        return ()
+    first_s, last_s = track.samples[0].t_s, track.samples[-1].t_s
+    return tuple(
+        _reaction(fault, track, frame_s)
+        for fault in faults
+        if fault.kind in CAMERA_FAULTS and first_s <= fault.start_s <= last_s
+    )
+
+
+def _reaction(fault: Fault, track: Track, frame_s: float) -> Reaction:
+    start_us = START_US + round(fault.start_s * 1e6)
+    end_s = min(fault.start_s + fault.duration_s, track.samples[-1].t_s)
+    noticed = [stamp_us for stamp_us, _ in track.unusable if stamp_us >= start_us]
+    zero_s, held = _off(track.applied, fault.start_s, end_s)
+    return Reaction(
+        fault=fault.kind.value,
+        at_s=round(fault.start_s, 2),
+        noticed_s=round((noticed[0] - start_us) * 1e-6, 3) if noticed else None,
+        zero_thrust_s=round(zero_s, 3) if zero_s is not None else None,
+        rest_s=_rest_s(track.samples, fault.start_s, end_s),
+        in_time=zero_s is not None and held and zero_s <= frame_s + IN_TIME_S,
+    )
+
+
+def _off(applied: Sequence[Applying], start_s: float, end_s: float) -> tuple[float | None, bool]:
+    """How long after the start the fans were off, and whether they stayed so until the end of the fault."""
+    is_zero, off_s, held = True, None, True
+    for each in applied:
+        at_s = (each.at_us - START_US) * 1e-6
+        if at_s > start_s:
+            if is_zero and off_s is None:
+                off_s = 0.0
+            if at_s >= end_s:
+                break
+            if each.is_zero and off_s is None:
+                off_s = at_s - start_s
+            held &= each.is_zero or off_s is None
+        is_zero = each.is_zero
+    if off_s is None and is_zero:
+        off_s = 0.0
+    return off_s, held
+
+
+def _rest_s(samples: Sequence[Sample], start_s: float, end_s: float) -> float | None:
+    return next(
+        (
+            round(sample.t_s - start_s, 2)
+            for sample in samples
+            if start_s <= sample.t_s <= end_s and abs(sample.surge_mps) < REST_MPS
+        ),
+        None,
+    )

@@ -1,0 +1,122 @@
+"""What one drive came to. Closed values that encode to JSON; equal drives give equal bytes."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+from paani.dithering import Dithering
+from paani_sim.trials.policies import Policy
+from paani_sim.trials.states import Why
+
+
+class Closeness(StrEnum):
+    """Clearance between hull and footprint at the closest point of an encounter.
+
+    GRAZING: under 0.3 m, less than half the hull's width. TIGHT: under 0.6 m, one second at cruising speed.
+    CLOSE: under 1.5 m, twice the hull's width. CLEAR: the rest of what came within five metres.
+    """
+
+    CONTACT = "contact"
+    GRAZING = "grazing"
+    TIGHT = "tight"
+    CLOSE = "close"
+    CLEAR = "clear"
+
+
+NEAR_MISS_M = 0.5  # without touching: less than the hull's width
+UNDER_M = {Closeness.GRAZING: 0.3, Closeness.TIGHT: 0.6, Closeness.CLOSE: 1.5}
+
+
+class Encounter(msgspec.Struct, frozen=True, kw_only=True):
+    """Once within reach of one thing, or of the bank: the clearance and the moment of the closest point."""
+
+    what: str
+    kind: str
+    at_s: float
+    clearance_m: float
+    closeness: Closeness
+    x_m: float
+    y_m: float
+
+
+class Contact(msgspec.Struct, frozen=True, kw_only=True):
+    """One touch. `visible`: the camera could have seen it in the five seconds before."""
+
+    what: str
+    kind: str
+    at_s: float
+    x_m: float
+    y_m: float
+    speed_mps: float
+    visible: bool
+
+
+class Stops(msgspec.Struct, frozen=True, kw_only=True):
+    """How often and how long the boat was ordered to stand, for one reason."""
+
+    reason: str
+    count: int
+    seconds: float
+
+
+class Reaction(msgspec.Struct, frozen=True, kw_only=True):
+    """What a camera fault led to, counted from its beginning [s]; None: never.
+
+    `noticed_s`: the picture first called unusable, or None where none came. `zero_thrust_s`, `rest_s`: fans off, boat
+    slower than 0.05 m/s. `in_time`: fans off within one frame and 0.5 s.
+    """
+
+    fault: str
+    at_s: float
+    noticed_s: float | None
+    zero_thrust_s: float | None
+    rest_s: float | None
+    in_time: bool
+
+
+class Latency(msgspec.Struct, frozen=True, kw_only=True):
+    """From a picture to the first thrust decided from it, simulated time [s]; None where nobody looks."""
+
+    p50_s: float | None = None
+    p95_s: float | None = None
+    max_s: float | None = None
+    samples: int = 0
+
+
+class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
+    """One drive. `track`: time, x, y every two seconds. Cross-track error is that of the true position."""
+
+    scenario: str
+    seed: int
+    policy: Policy
+    world: str
+    why: Why
+    completed: bool
+    error: str
+    goal_m: float
+    progress_m: float
+    distance_m: float
+    seconds: float
+    limit_s: float
+    collisions: int
+    collisions_visible: int
+    collisions_bank: int
+    near_misses: int
+    near_misses_bank: int
+    min_clearance_m: float
+    min_bank_clearance_m: float
+    off_route_rms_m: float
+    off_route_max_m: float
+    energy_j: float
+    frames: int
+    unusable: int
+    encounters: tuple[Encounter, ...]
+    contacts: tuple[Contact, ...]
+    stops: tuple[Stops, ...]
+    reactions: tuple[Reaction, ...]
+    latency: Latency
+    dithering: Dithering
+    track: tuple[tuple[float, float, float], ...]
+    state_hash: str

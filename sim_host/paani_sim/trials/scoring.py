@@ -1,0 +1,198 @@
+"""From a finished drive to its result. Pure."""
+
+from __future__ import annotations
+
+import collections
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.config import EyeConfig
+from paani.dithering import dithering
+from paani.order_statistics import nearest_rank
+from paani_sim.plant.plant import Hit
+from paani_sim.trials.clearance import BANK, FAR_M, Course, afloat, clearances_m, could_see
+from paani_sim.trials.drive import SAMPLE_HZ, Drive
+from paani_sim.trials.policies import Policy, look_hz
+from paani_sim.trials.reactions import reactions_of
+from paani_sim.trials.result import (
+    NEAR_MISS_M,
+    UNDER_M,
+    Closeness,
+    Contact,
+    Encounter,
+    Latency,
+    Stops,
+    TrialResult,
+)
+from paani_sim.trials.states import Why
+from paani_sim.trials.track import Applying, Halt, Sample
+from paani_sim.vessels.vessel import Hull, load_vessel
+from paani_sim.worlds import Kind, World
+
+F64 = NDArray[np.float64]
+ENCOUNTER_M = {"thing": 5.0, BANK: UNDER_M[Closeness.CLOSE]}  # a bank is always somewhere
+APART_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
+SEEN_BEFORE_S, SEEN_WITHIN_M = 5.0, 15.0
+BANK_GEOM = "bank_"  # how the names of the plant's pieces of bank begin
+TRACK_S = 2.0
+
+
+def score(drive: Drive, policy: Policy) -> TrialResult:
+    """Everything that is known of a drive that has ended."""
+    scenario, track, eye = drive.scenario, drive.track, drive.config.eye
+    world, samples = scenario.world, track.samples
+    course = course_of(world, load_vessel(drive.config.plant.vessel).hull, samples)
+    gaps_m = clearances_m(world, course)
+    contacts = contacts_of(world, drive.plant.hits, samples, course, eye)
+    encounters = encounters_of(world, samples, gaps_m, contacts)
+    off_m = np.array([sample.off_m for sample in samples] or [0.0])
+    things = [encounter for encounter in encounters if encounter.what != BANK]
+    banks = [encounter for encounter in encounters if encounter.what == BANK]
+    every = round(TRACK_S * SAMPLE_HZ)
+    return TrialResult(
+        scenario=scenario.name,
+        seed=scenario.seed,
+        policy=policy,
+        world=world.name,
+        why=drive.why,
+        completed=drive.why is Why.COMPLETED,
+        error=drive.error,
+        goal_m=round(drive.goal_m, 3),
+        progress_m=round(drive.along.best_m, 3),
+        distance_m=round(drive.plant.distance_m, 3),
+        seconds=round(drive.elapsed_s, 3),
+        limit_s=round(drive.limit_s, 3),
+        collisions=len(contacts),
+        collisions_visible=sum(contact.visible for contact in contacts),
+        collisions_bank=sum(contact.what == BANK for contact in contacts),
+        near_misses=sum(map(_is_near_miss, things)),
+        near_misses_bank=sum(map(_is_near_miss, banks)),
+        min_clearance_m=_least_m(gaps for what, gaps in gaps_m.items() if what != BANK),
+        min_bank_clearance_m=_least_m([gaps_m[BANK]]),
+        off_route_rms_m=round(float(np.sqrt((off_m * off_m).mean())), 3),
+        off_route_max_m=round(float(np.abs(off_m).max()), 3),
+        energy_j=round(drive.plant.energy_j, 1),
+        frames=drive.frames,
+        unusable=len(track.unusable),
+        encounters=encounters,
+        contacts=contacts,
+        stops=stops_of(track.halts, samples[-1].t_s if samples else 0.0),
+        reactions=reactions_of(scenario.faults, track, 1.0 / look_hz(drive.config)),
+        latency=latency_of(track.applied) if policy is not Policy.BLIND else Latency(),
+        dithering=dithering(track.advisories),
+        track=tuple((round(s.t_s, 1), round(s.x_m, 2), round(s.y_m, 2)) for s in samples[::every]),
+        state_hash=drive.plant.state_hash(),
+    )
+
+
+def course_of(world: World, hull: Hull, samples: Sequence[Sample]) -> Course:
+    """The samples as arrays."""
+    along = [sample.actors_along_m for sample in samples]
+    return Course(
+        hull,
+        np.array([sample.x_m for sample in samples]),
+        np.array([sample.y_m for sample in samples]),
+        np.array([sample.yaw_rad for sample in samples]),
+        np.array(along, np.float64).reshape(len(samples), len(world.actors)),
+    )
+
+
+def contacts_of(
+    world: World, hits: Sequence[Hit], samples: Sequence[Sample], course: Course, eye: EyeConfig
+) -> tuple[Contact, ...]:
+    """Each thing that the hull began to touch, and what the camera could have seen of it."""
+    kinds, found = kinds_of(world), []
+    half_fov_rad = math.radians(0.5 * eye.hfov_deg)
+    for hit in hits:
+        k = next((k for k, sample in enumerate(samples) if sample.t_s >= hit.time_s), len(samples) - 1)
+        if k < 0:
+            continue
+        what = BANK if hit.name.startswith(BANK_GEOM) else hit.name
+        before = course.part(slice(max(0, k - round(SEEN_BEFORE_S * SAMPLE_HZ)), k + 1, 2))
+        found.append(
+            Contact(
+                what=what,
+                kind=kinds.get(what, Kind.OTHER.value),
+                at_s=round(hit.time_s, 2),
+                x_m=round(samples[k].x_m, 2),
+                y_m=round(samples[k].y_m, 2),
+                speed_mps=round(abs(samples[max(0, k - 2)].surge_mps), 3),
+                visible=could_see(world, what, before, half_fov_rad, SEEN_WITHIN_M, eye.camera_forward_m),
+            )
+        )
+    return tuple(found)
+
+
+def encounters_of(
+    world: World, samples: Sequence[Sample], gaps_m: dict[str, F64], contacts: Sequence[Contact]
+) -> tuple[Encounter, ...]:
+    """Every approach, in order of time."""
+    kinds, found = kinds_of(world), []
+    for what, gaps in gaps_m.items():
+        near = np.flatnonzero(gaps < ENCOUNTER_M[BANK if what == BANK else "thing"])
+        if not len(near):
+            continue
+        for part in np.split(near, np.flatnonzero(np.diff(near) > APART_S * SAMPLE_HZ) + 1):
+            k = int(part[np.argmin(gaps[part])])
+            begin_s, end_s = samples[int(part[0])].t_s, samples[int(part[-1])].t_s
+            touched = any(c.what == what and begin_s - 0.2 <= c.at_s <= end_s + 0.2 for c in contacts)
+            clearance_m = 0.0 if touched else float(gaps[k])
+            found.append(
+                Encounter(
+                    what=what,
+                    kind=kinds[what],
+                    at_s=round(samples[k].t_s, 2),
+                    clearance_m=round(clearance_m, 3),
+                    closeness=Closeness.CONTACT if touched else closeness_of(clearance_m),
+                    x_m=round(samples[k].x_m, 2),
+                    y_m=round(samples[k].y_m, 2),
+                )
+            )
+    return tuple(sorted(found, key=lambda encounter: (encounter.at_s, encounter.what)))
+
+
+def closeness_of(clearance_m: float) -> Closeness:
+    """The class of a closest point without contact."""
+    return next((kind for kind, under_m in UNDER_M.items() if clearance_m < under_m), Closeness.CLEAR)
+
+
+def kinds_of(world: World) -> dict[str, str]:
+    """What each thing afloat is."""
+    return {thing.id: thing.kind.value for thing in afloat(world)} | {BANK: BANK}
+
+
+def stops_of(halts: Sequence[Halt], end_s: float) -> tuple[Stops, ...]:
+    """By reason, the longest first."""
+    count: collections.Counter[str] = collections.Counter()
+    seconds: collections.Counter[str] = collections.Counter()
+    for halt in halts:
+        count[halt.reason] += 1
+        seconds[halt.reason] += (halt.ended_s if halt.ended_s is not None else end_s) - halt.t_s
+    order = sorted(count, key=lambda reason: (-seconds[reason], reason))
+    return tuple(Stops(reason=reason, count=count[reason], seconds=round(seconds[reason], 2)) for reason in order)
+
+
+def latency_of(applied: Sequence[Applying]) -> Latency:
+    """Each picture's first thrust."""
+    newest_us, found = 0, []
+    for each in applied:
+        if each.picture_us > newest_us and not each.is_zero:
+            newest_us = each.picture_us
+            found.append(round((each.at_us - each.picture_us) * 1e-6, 3))
+    if not found:
+        return Latency()
+    ordered = sorted(found)
+    return Latency(
+        p50_s=nearest_rank(ordered, 50), p95_s=nearest_rank(ordered, 95), max_s=ordered[-1], samples=len(ordered)
+    )
+
+
+def _is_near_miss(encounter: Encounter) -> bool:
+    return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_M
+
+
+def _least_m(gaps_m: Iterable[F64]) -> float:
+    return round(min((float(gaps.min()) for gaps in gaps_m if len(gaps)), default=FAR_M), 3)

@@ -1,0 +1,104 @@
+"""Whether a scenario can be: route, boat and what floats are in the water, clear of each other and inside the fence."""
+
+from collections import Counter
+
+import numpy as np
+
+from paani.errors import UserError
+from paani.messages import FenceArea, Keep
+from paani_sim.worlds.curves import Points, clearance_m, inside
+from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
+from paani_sim.worlds.scenario import Scenario
+from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose
+
+HULL_RADIUS_M = 0.75  # half the diagonal of a 1.3 x 0.75 m hull
+HALF_BEAM_M = 0.375
+SAMPLE_M = 0.5
+MIN_LEG_M = 0.05
+
+
+def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
+    """Raises UserError. `where` names the file, `names` the field that a thing's id stands for."""
+    world = scenario.world
+    things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
+    twice = [name for name, count in Counter(thing.id for thing in things).items() if count > 1]
+    if twice:
+        raise UserError(f"{where}: {names.get(twice[0], 'actors')}.id: {twice[0]!r} is there twice")
+    _check_route(world, scenario.fence, where)
+    _check_start(world, where)
+    for thing in things:
+        if thing.id in names:
+            _check_thing(world, thing, f"{where}: {names[thing.id]}")
+
+
+def _check_route(world: World, fence: tuple[FenceArea, ...], where: str) -> None:
+    _check_legs(world.route_m, closed=world.route_closed, where=f"{where}: route.waypoints_m")
+    for number, points_m in enumerate(_sampled(world.route_m, closed=world.route_closed)):
+        on_land = clearance_m(world.shore_m, points_m) < HALF_BEAM_M
+        if on_land.any():
+            raise UserError(f"{where}: route: leg {number} runs over land at {_at(points_m[int(np.argmax(on_land))])}")
+        outside = ~_allowed(fence, points_m)
+        if outside.any():
+            at = _at(points_m[int(np.argmax(outside))])
+            raise UserError(f"{where}: route: leg {number} is outside the fence at {at}")
+
+
+def _check_start(world: World, where: str) -> None:
+    here = np.array([world.start[:2]])
+    for thing in (*world.obstacles, *world.actors):
+        pose = thing.pose if isinstance(thing, Obstacle) else actor_pose(thing, 0.0)
+        over = isinstance(thing, Obstacle) and not np.isfinite(fixed_gap_m((thing,), here)[0])
+        if not over and footprint_gap_m(thing, pose, here)[0] < HULL_RADIUS_M:
+            raise UserError(f"{where}: route: the boat starts inside {thing.id!r}")
+
+
+def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
+    if isinstance(thing, Obstacle):
+        if _floats(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
+            raise UserError(f"{where}.at_m: {thing.look} on land")
+        return
+    _check_legs(thing.path_m, closed=thing.closed, where=f"{where}.path_m")
+    if not _floats(thing):
+        return
+    for number, points_m in enumerate(_sampled(thing.path_m, closed=thing.closed)):
+        on_land = clearance_m(world.shore_m, points_m) < 0.0
+        if on_land.any():
+            at = _at(points_m[int(np.argmax(on_land))])
+            raise UserError(f"{where}: its way runs over land at {at} (leg {number})")
+
+
+def _floats(thing: Obstacle | Actor) -> bool:
+    return thing.kind in {Kind.VESSEL, Kind.BUOY} or thing.look == "swimming"
+
+
+def _check_legs(line_m: Points, *, closed: bool, where: str) -> None:
+    after_m = np.roll(line_m, -1, axis=0) if closed else line_m[1:]
+    legs_m = np.linalg.norm(after_m - line_m[: len(after_m)], axis=1)
+    if legs_m.min() < MIN_LEG_M:
+        raise UserError(f"{where}[{int(np.argmin(legs_m))}] and the next are the same point")
+
+
+def _sampled(line_m: Points, *, closed: bool) -> list[Points]:
+    """Each leg as points half a metre apart, its ends included."""
+    ends_m = np.vstack([line_m, line_m[:1]]) if closed else line_m
+    legs = []
+    for start, end in zip(ends_m[:-1], ends_m[1:], strict=True):
+        count = min(4000, max(2, int(np.hypot(*(end - start)) / SAMPLE_M) + 2))
+        legs.append(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
+    return legs
+
+
+def _allowed(fence: tuple[FenceArea, ...], points_m: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    within = np.zeros(len(points_m), np.bool_)
+    allowed = np.ones(len(points_m), np.bool_)
+    for area in fence:
+        found = inside(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), points_m)
+        if area.keep is Keep.IN:
+            within |= found
+        else:
+            allowed &= ~found
+    return allowed & within if any(area.keep is Keep.IN for area in fence) else allowed
+
+
+def _at(point: Points) -> str:
+    return f"({point[0]:.1f}, {point[1]:.1f}) m"

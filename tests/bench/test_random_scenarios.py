@@ -1,0 +1,14 @@
+"""Two hundred scenarios drawn at random."""
+
+import pytest
+
+from paani_sim.worlds import WORLDS
+from paani_sim.worlds.generate import random_scenario
+from tests.unit.fair_scenarios import check_is_fair
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", sorted(WORLDS))
+def test_fifty_scenarios_of_each_world_are_fair(name: str) -> None:
+    for seed in range(50):
+        check_is_fair(random_scenario(name, seed))

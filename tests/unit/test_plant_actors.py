@@ -1,0 +1,73 @@
+"""Moving things on their paths, and skippers who give way."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani.geometry import wrap_rad
+from paani_sim.plant.actors import KEEP_CLEAR_M, Actors, Track, speed_mps
+from paani_sim.worlds import Actor, Behaviour, Kind, Pose2, actor_at, load_world
+
+BOAT_REACH_M = 0.65
+FAR_M = (1e3, 1e3)
+EVERY_S = 0.05
+
+
+def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: object) -> Actor:
+    path_m = np.array([[0.0, 0.0], [100.0, 0.0]])
+    actor = Actor("skipper", Kind.VESSEL, "cruiser", path_m, 1.5, 5.0, 2.0, 2.0, closed=False, behaviour=behaviour)
+    return dataclasses.replace(actor, **changes)
+
+
+@pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
+def test_track_is_the_path(name: str) -> None:
+    """The eye places actors with `actor_at`, the plant with its own measure of the path: one pose."""
+    for actor in load_world(name).actors:
+        track = Track(actor)
+        for along_m in np.linspace(-20.0, 400.0, 211):
+            exact, quick = actor_at(actor, float(along_m)), track.at(float(along_m))
+            assert math.hypot(exact.x_m - quick.x_m, exact.y_m - quick.y_m) < 1e-9
+            assert abs(wrap_rad(exact.yaw_rad - quick.yaw_rad)) < 1e-6
+
+
+def test_skipper_stops_short_and_goes_on_when_clear() -> None:
+    actors = Actors([straight()], EVERY_S, BOAT_REACH_M)
+    for step in range(1200):
+        actors.advance(EVERY_S * (step + 1), (30.0, 0.5))
+    gap_m = 30.0 - BOAT_REACH_M - (actors.along_m[0] + 2.5)
+    assert gap_m == pytest.approx(KEEP_CLEAR_M, abs=0.05)
+    assert actors.speeds_mps[0] < 0.02
+    stopped_m = actors.along_m[0]
+    for step in range(200):
+        actors.advance(60.0 + EVERY_S * (step + 1), (30.0, 8.0))
+    assert actors.along_m[0] == pytest.approx(stopped_m + 10.0 * 1.5, rel=0.01)
+
+
+def test_who_holds_on_keeps_time_to_the_bit() -> None:
+    """A path that no one bars is a function of time alone, whatever the boat does."""
+    actors = Actors([straight(Behaviour.HOLDS_ON, start_s=2.0)], EVERY_S, BOAT_REACH_M)
+    for step in range(400):
+        actors.advance(EVERY_S * (step + 1), (10.0, 0.0))
+    assert actors.along_m == (1.5 * (EVERY_S * 400 - 2.0),)
+
+
+def test_nobody_moves_before_the_start() -> None:
+    actors = Actors([straight(start_s=5.0)], EVERY_S, BOAT_REACH_M)
+    for step in range(100):
+        actors.advance(EVERY_S * (step + 1), FAR_M)
+    assert actors.along_m == (0.0,)
+
+
+@given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(-3.2, 3.2))
+def test_giving_way_only_ever_slows(x_m: float, y_m: float, yaw: float) -> None:
+    """Between stop and its own speed; a boat astern or well aside is none of its business."""
+    pose = Pose2(0.0, 0.0, yaw)
+    speed = speed_mps(straight(), pose, (x_m, y_m), BOAT_REACH_M)
+    assert 0.0 <= speed <= 1.5
+    if math.cos(yaw) * x_m + math.sin(yaw) * y_m <= 0.0 or math.hypot(x_m, y_m) > 20.0:
+        assert speed == 1.5
+    assert speed_mps(straight(Behaviour.HOLDS_ON), pose, (x_m, y_m), BOAT_REACH_M) == 1.5
