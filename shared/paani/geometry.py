@@ -33,7 +33,7 @@ def enu_from_geodetic(
     """
     east_m_per_deg, north_m_per_deg = _metres_per_degree(origin_latitude_deg)
     return (
-        (longitude_deg - origin_longitude_deg) * east_m_per_deg,
+        math.remainder(longitude_deg - origin_longitude_deg, 360.0) * east_m_per_deg,
         (latitude_deg - origin_latitude_deg) * north_m_per_deg,
     )
 

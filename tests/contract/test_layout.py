@@ -40,6 +40,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("from aiohttp", "services/paani_services/dashboard/"),
         ("import serial", "services/paani_services/bridge/"),
         ("from mcap", "shared/paani/logs/"),
+        ("import gpxpy", "services/paani_services/navigator/gpx.py"),
     ],
 )
 def test_each_library_has_one_importer(word: str, allowed: str) -> None:

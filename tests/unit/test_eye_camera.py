@@ -8,7 +8,7 @@ from paani_sim.eye.camera import look_from
 from paani_sim.eye.labels import read_labels
 from paani_sim.eye.mesh import box, ellipsoid, rotation
 from paani_sim.eye.scatter import random_pose, scatter
-from paani_sim.eye.scene import FIRST_THING, Thing, make_scene, obstacle_rows
+from paani_sim.eye.scene import FIRST_THING, Thing, make_scene, place
 from paani_sim.eye.sky import SKIES, paint_sky
 from paani_sim.eye.sprites import paint_sprites
 from paani_sim.eye.waves import SLOPE_RANGE, mean_square_slope, slope_tile
@@ -67,13 +67,15 @@ def test_solid_shapes_have_their_size() -> None:
     assert np.abs(ball).max(axis=0) == pytest.approx([1.0, 2.0, 3.0], rel=0.03)
 
 
-@pytest.mark.parametrize("name", ["lake", "river"])
+@pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
 def test_every_obstacle_has_a_body_of_its_stated_size(name: str) -> None:
     world = load_world(name)
     for obstacle in world.obstacles:
-        rows, things = obstacle_rows([obstacle], FIRST_THING)
-        assert things[0].id == obstacle.id
-        own = rows.rows[rows.rows[:, 10] == FIRST_THING, :2] - obstacle.pose[:2]
+        stands = place([obstacle], FIRST_THING)
+        assert stands.things[0].id == obstacle.id
+        afloat = [own.rows.rows for own in stands.afloat]
+        rows = afloat[0] if afloat else stands.still.rows - [*obstacle.pose[:2], *[0.0] * 9]
+        own = rows[rows[:, 10] == FIRST_THING, :2]
         reach_m = np.linalg.norm(own, axis=1).max()
         slack_m = 4.5 if obstacle.look == "bridge" else 0.3
         assert 0.35 * obstacle.length_m < reach_m < obstacle.radius_m + slack_m, obstacle.id
@@ -102,7 +104,7 @@ def test_labels_of_a_hand_made_picture() -> None:
     number[30:32, 50:52] = 300
     number[0:4, :] = 301
     picture = np.stack([number % 256, number // 256, number * 0, number * 0], -1).astype(np.uint8)
-    labelled = read_labels(np.zeros((40, 60, 3), np.uint8), picture, things)
+    labelled = read_labels(np.zeros((40, 60, 3), np.uint8), picture, np.ones((40, 60), np.float32), things)
     boxes = {b.id: b[2:6] for b in labelled.boxes}
     assert boxes == {"boat": (10, 10, 30, 25), "boat_crew_1": (18, 10, 22, 15)}
     assert labelled.mask[8, 5] == 2

@@ -15,7 +15,8 @@ from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.errors import UserError
 from paani_sim.eye.gl import Context
-from paani_sim.eye.service import open_eye, pose_of, run
+from paani_sim.eye.mounted import pose_of
+from paani_sim.eye.service import open_camera, run
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(60)]
 
@@ -43,7 +44,8 @@ def test_pose_keeps_every_axis() -> None:
 def test_settings_reach_the_eye() -> None:
     require_gl()
     config = load_config(sets=("world.name=lake", "world.wind_mps=5", "eye.camera_height_m=1.2", "eye.width_px=160"))
-    with open_eye(config) as eye:
+    eye, _ = open_camera(config)
+    with eye:
         assert eye.world.name == "lake"
         assert eye.world.wind.speed_mps == 5.0
         assert eye.camera.up_m + 0.177 == pytest.approx(1.2)
@@ -52,7 +54,7 @@ def test_settings_reach_the_eye() -> None:
 
 def test_unknown_world_is_one_line() -> None:
     with pytest.raises(UserError, match="unknown world"):
-        open_eye(load_config(sets=("world.name=sea",)))
+        open_camera(load_config(sets=("world.name=sea",)))
 
 
 async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], config: Config) -> None:

@@ -4,77 +4,12 @@ import math
 import statistics
 
 import msgspec
-import numpy as np
 import pytest
 
 from paani.config import LocalizationConfig
 from paani.geometry import geodetic_from_enu
-from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.calibration import UNCALIBRATED_STD_RADPS, gyro_bias
-from paani_services.localization.estimator import Estimator
-
-ORIGIN_DEG = (50.0, 8.0)
-CONFIG = LocalizationConfig(origin_lat_lon_deg=ORIGIN_DEG)
-START_US = 5_000_000
-BIAS_RADPS = 0.004
-
-
-class Ride:
-    """A boat at constant speed and yaw rate, its sensors, and the estimator at 20 Hz."""
-
-    def __init__(self, config: LocalizationConfig = CONFIG, seed: int = 1) -> None:
-        self.estimator = Estimator(config)
-        self.rng = np.random.default_rng(seed)
-        self.now_us = START_US
-        self.x_m, self.y_m, self.yaw_rad = 20.0, -10.0, 0.5
-        self.gps = self.imu = True
-        self.fix_offset_m = 0.0
-        self.epoch = 0
-        self.local = self.glob = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
-
-    def go(self, seconds: float, surge_mps: float = 0.0, yaw_rate_radps: float = 0.0) -> list[Odometry]:
-        found = []
-        for step in range(round(seconds * 20)):
-            samples = [self._sample(surge_mps, yaw_rate_radps) for _ in range(5)]
-            fix = self._fix(surge_mps) if step % 4 == 0 and self.gps else None
-            self.local, self.glob = self.estimator.step(samples if self.imu else [], fix, self.now_us)
-            found.append(self.glob)
-        return found
-
-    def _sample(self, surge_mps: float, yaw_rate_radps: float) -> ImuSample:
-        self.now_us += 10_000
-        self.yaw_rad += yaw_rate_radps * 0.01
-        self.x_m += surge_mps * math.cos(self.yaw_rad) * 0.01
-        self.y_m += surge_mps * math.sin(self.yaw_rad) * 0.01
-        noise = self.rng.standard_normal(4)
-        return ImuSample(
-            source_us=self.now_us,
-            epoch=self.epoch,
-            gyro_x_radps=0.0,
-            gyro_y_radps=0.0,
-            gyro_z_radps=yaw_rate_radps + BIAS_RADPS + 0.002 * noise[0],
-            accel_x_mps2=0.03 * noise[1],
-            accel_y_mps2=surge_mps * yaw_rate_radps + 0.03 * noise[2],
-            accel_z_mps2=9.81,
-            orientation_available=True,
-            yaw_rad=self.yaw_rad + 0.01 * noise[3],
-        )
-
-    def _fix(self, surge_mps: float) -> GpsFix:
-        noise = self.rng.standard_normal(4)
-        latitude_deg, longitude_deg = geodetic_from_enu(
-            self.x_m + self.fix_offset_m + 0.3 * noise[0], self.y_m + 0.3 * noise[1], *ORIGIN_DEG
-        )
-        vx = surge_mps * math.cos(self.yaw_rad) + 0.05 * noise[2]
-        vy = surge_mps * math.sin(self.yaw_rad) + 0.05 * noise[3]
-        return GpsFix(
-            source_us=self.now_us,
-            latitude_deg=latitude_deg,
-            longitude_deg=longitude_deg,
-            sog_mps=math.hypot(vx, vy),
-            cog_rad=math.atan2(vy, vx),
-            position_std_m=0.8,
-        )
+from tests.unit.boat_ride import BIAS_RADPS, ORIGIN_DEG, Ride
 
 
 @pytest.fixture
@@ -135,16 +70,6 @@ def test_stale_gps_and_stale_imu_are_unhealthy_and_recover(ride: Ride) -> None:
     assert not ride.local.healthy
 
 
-def test_a_receiver_that_jumps_is_doubted_then_followed(ride: Ride) -> None:
-    ride.fix_offset_m = 80.0
-    ride.go(1.0)
-    assert not ride.glob.healthy
-    assert ride.glob.x_m == pytest.approx(ride.x_m, abs=2.0)
-    ride.go(4.0)
-    assert ride.glob.healthy
-    assert ride.glob.x_m == pytest.approx(ride.x_m + 80.0, abs=1.0)
-
-
 def test_a_new_imu_epoch_starts_anew(ride: Ride) -> None:
     """A plant that restarts has its boat somewhere else: nothing of the old estimate survives."""
     ride.epoch, ride.x_m = 1, -200.0
@@ -180,7 +105,7 @@ def test_tilt_is_not_taken_for_acceleration(ride: Ride, roll_rad: float, pitch_r
     """A boat at rest that heels or trims feels gravity along its axes, and stays at rest."""
     for _ in range(40):
         tilted = msgspec.structs.replace(
-            ride._sample(0.0, 0.0),
+            ride.sample(0.0, 0.0),
             roll_rad=roll_rad,
             pitch_rad=pitch_rad,
             accel_x_mps2=-9.81 * math.sin(pitch_rad),
@@ -192,20 +117,17 @@ def test_tilt_is_not_taken_for_acceleration(ride: Ride, roll_rad: float, pitch_r
 
 def test_calibration_refuses_a_boat_that_turns() -> None:
     boat = Ride()
-    turning = [boat._sample(0.5, 0.1) for _ in range(200)]
+    turning = [boat.sample(0.5, 0.1) for _ in range(200)]
     assert gyro_bias(turning).radps == 0.0
     assert gyro_bias(turning).std_radps == UNCALIBRATED_STD_RADPS
-    resting = [boat._sample(0.0, 0.0) for _ in range(200)]
+    resting = [boat.sample(0.0, 0.0) for _ in range(200)]
     assert gyro_bias(resting).radps == pytest.approx(BIAS_RADPS, abs=5e-4)
 
 
 def test_a12_without_heading_there_is_no_health() -> None:
     """A12: an IMU that marks its orientation unavailable gives no yaw to steer by."""
     boat = Ride()
-    sample = boat._sample
-    boat._sample = lambda *motion: msgspec.structs.replace(  # type: ignore[method-assign]
-        sample(*motion), orientation_available=False
-    )
+    boat.change = lambda samples: [msgspec.structs.replace(each, orientation_available=False) for each in samples]
     assert not any(one.healthy for one in boat.go(6.0))
 
 

@@ -224,6 +224,15 @@ def test_waypoint_left_abeam_counts_in_paani_only() -> None:
     assert Drill(PAANI).order(Direction.STRAIGHT, far).waypoint_index == 1
 
 
+def test_beyond_its_end_no_line_leads_the_boat_away() -> None:
+    """Far past the last waypoint of an open route the boat turns back to it."""
+    route = msgspec.structs.replace(SQUARE, waypoints=SQUARE.waypoints[:2], repeat=False)
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
+    order = drill.order(Direction.STRAIGHT, pose(30.0, 0.0), route)
+    assert (order.enable, order.waypoints_reached) == (True, 0)
+    assert abs(order.heading_rad) == pytest.approx(math.pi)
+
+
 def test_joins_the_route_at_the_nearest_leg() -> None:
     """A navigator that restarts goes on where the boat is; nothing counts as reached."""
     drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))

@@ -98,7 +98,7 @@ def test_mistakes_are_named(tmp_path: Path, text: str, named: str) -> None:
 def test_k2_route_of_each_world_is_a_route_file(tmp_path: Path, name: str) -> None:
     """K2: the lake's repeating route has 59 waypoints and is 465.443 m long, as the navigator reads it."""
     world = load_world(name)
-    route = load_route(written(tmp_path, route_toml(world)))
+    route = load_route(written(tmp_path, route_toml(world, world.name)))
     points = [(waypoint.x_m, waypoint.y_m) for waypoint in route.waypoints]
     length_m = sum(math.dist(one, other) for one, other in itertools.pairwise([*points, points[0]]))
     assert (route.name, route.repeat) == (name, True)

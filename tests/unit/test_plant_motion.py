@@ -112,6 +112,15 @@ def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
     assert hit
 
 
+def test_boat_under_a_passing_hull_is_thrown_out_not_to_infinity(open_plant: OpenPlant) -> None:
+    """The worst of contacts, once inside every solid of the lake: the state stays finite and the speed comes down."""
+    plant = open_plant(load_world("lake"))
+    for obstacle in load_world("lake").obstacles:
+        plant.place(obstacle.pose.x_m + 0.1, obstacle.pose.y_m - 0.1, 0.3)
+        drive(plant, 300, FORCE_N * 0.12)
+        assert max(map(abs, plant.velocity)) < 5.0
+
+
 def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
     """1000 steps in one process, with a second plant alive: the force hook keeps them apart."""
 

@@ -67,9 +67,11 @@ async def test_a_busy_page_port_is_no_mistake_without_the_page(config: Config, p
 
 
 def test_options_stand_for_settings(private_sets: tuple[str, ...]) -> None:
-    sets = up_sets(world="lake", camera="/some where/x.mp4", headless=True)
+    files = {"mission": Path("/a/m.toml"), "fence": Path("/a/f.toml")}
+    sets = up_sets(world="lake", camera="/some where/x.mp4", headless=True, **files)
     config = load_config(sets=(*sets, *private_sets))
     assert (config.world.name, config.camera.source) == ("lake", "/some where/x.mp4")
+    assert (config.navigator.mission, config.navigator.fence) == ("/a/m.toml", "/a/f.toml")
     assert config.dashboard.arm_at_start
     assert not config.dashboard.serve
 

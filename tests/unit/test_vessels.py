@@ -94,5 +94,5 @@ def test_bad_file_is_refused_by_field(tmp_path: Path, old: str, new: str, said: 
 
 @pytest.mark.parametrize("name", ["submarine", "nowhere/mine.toml", ""])
 def test_unknown_vessel_is_refused(name: str) -> None:
-    with pytest.raises(UserError, match="vessel|No such file"):
+    with pytest.raises(UserError, match=r"vessel|No such file"):
         load_vessel(name)

@@ -50,7 +50,7 @@ def test_packets_keep_the_crests_of_those_before() -> None:
 
 
 def test_wake_lies_on_the_cusp() -> None:
-    """Across the wake 40 m astern the waves are highest where Kelvin's wedge is, as high as the formula says, on both sides."""
+    """40 m astern the waves are highest on the edges of Kelvin's wedge, and as high as the formula says."""
     wakes = passed(SPEED_MPS)
     offsets_m = np.linspace(0.0, 30.0, 121)
     heights_m = [2.0 * abs(surface_m(wakes, -40.0, float(y), 60.0)) for y in offsets_m]

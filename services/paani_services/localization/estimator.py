@@ -30,8 +30,8 @@ COMPASS_BIAS_STD_RAD = 0.05  # 3 degrees: a small compass on a small boat, adjus
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long: compass or gyro has changed by about so much
 COURSE_MPS = 0.3  # slower, the course over ground tells no heading
 # How much of a fix's spread changes from fix to fix is learnt; the rest wanders. At first, and at least:
-GPS_NOISE_FRAC, MIN_GPS_NOISE_FRAC = 1.0 / 4.0, 1.0 / 16.0
-NOISE_FIXES = 50
+GPS_NOISE_FRAC, MIN_GPS_NOISE_FRAC = 1.0 / 4.0, 1.0 / 32.0
+FIRST_NOISE_FIXES, MOST_NOISE_FIXES = 10, 300  # that it is averaged over
 GPS_SPEED_PER_S = 1.0 / 16.0  # spread of the speed for that of the position: 0.05 m/s for 0.8 m
 SWAY_STD_MPS = 1.4  # at 20 Hz as much as 0.1 m/s for 5 s on end
 LOCAL_SWAY_STD_MPS = 0.15
@@ -72,6 +72,8 @@ class Estimator:
         self._speeds_refused = 0
         self._compass_refused_s = 0.0
         self._noise_frac2 = GPS_NOISE_FRAC**2
+        self._noise_fixes = FIRST_NOISE_FIXES
+        self._doubt_m = 0.0  # how far the place lay from the receiver when it was taken over; fades
         self._nis = 0.0
         self._slow_since_us: int | None = None
 
@@ -169,11 +171,10 @@ class Estimator:
             self.drops["gps_out_of_step"] += 1
             return
         self._origin_deg = origin_deg
-        lost = self._last_fix is not None and (
-            (fix.source_us - self._last_fix.source_us) * 1e-6 > self._config.max_gps_age_s
-        )
-        if lost:
+        since_s = (fix.source_us - self._last_fix.source_us) * 1e-6 if self._last_fix else 0.0
+        if since_s > self._config.max_gps_age_s:
             self._accepted = min(self._accepted, CONVERGED_FIXES - RETURN_FIXES)
+        self._doubt_m *= math.exp(-max(since_s, 0.0) / self._config.gps_wander_s)
         self._last_fix = fix
         vx_mps, vy_mps = fix.sog_mps * math.cos(fix.cog_rad), fix.sog_mps * math.sin(fix.cog_rad)
         std_m, std_mps = fix.position_std_m, fix.position_std_m * GPS_SPEED_PER_S
@@ -195,9 +196,7 @@ class Estimator:
         self._nis = min(nis, 1e9)
         if taken:
             off2_m2 = 0.5 * ((x_m - expected_x_m) ** 2 + (y_m - expected_y_m) ** 2)
-            seen = (off2_m2 - expected_std_m**2) / fix.position_std_m**2
-            learnt = self._noise_frac2 + (seen - self._noise_frac2) / NOISE_FIXES
-            self._noise_frac2 = clip(learnt, MIN_GPS_NOISE_FRAC**2, 1.0)
+            self._learn_noise((off2_m2 - expected_std_m**2) / fix.position_std_m**2)
             self._accepted, self._refused = self._accepted + 1, 0
             self._of_one_mind.clear()
             return
@@ -207,7 +206,14 @@ class Estimator:
             self._of_one_mind.clear()
         self._of_one_mind.append((x_m, y_m))
         if len(self._of_one_mind) >= REFUSED_FIXES:
+            self._doubt_m = max(self._doubt_m, math.hypot(x_m - expected_x_m, y_m - expected_y_m))
             self._place(heard, x_m, y_m, fix)
+
+    def _learn_noise(self, frac2: float) -> None:
+        """One fix's share of noise in the receiver's variance."""
+        learnt = self._noise_frac2 + (frac2 - self._noise_frac2) / self._noise_fixes
+        self._noise_frac2 = clip(learnt, MIN_GPS_NOISE_FRAC**2, 1.0)
+        self._noise_fixes = min(self._noise_fixes + 1, MOST_NOISE_FIXES)
 
     def _correct_speed(self, heard: PlanarFilter, vx_mps: float, vy_mps: float, std_mps: float) -> None:
         turns = math.hypot(*heard.velocity) >= COURSE_MPS
@@ -255,7 +261,8 @@ class Estimator:
         if self._global is None or self._last_fix is None or self._origin_deg is None:
             return self._nothing(now_us)
         odometry = self._odometry(self._global, now_us, healthy=imu_fresh)
-        position_std_m = max(odometry.position_std_m, self._last_fix.position_std_m)
+        spread_m = max(odometry.position_std_m, self._last_fix.position_std_m)
+        position_std_m = math.hypot(spread_m, self._doubt_m / math.sqrt(2.0))
         healthy = (
             odometry.healthy
             and self._is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)

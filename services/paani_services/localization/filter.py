@@ -1,7 +1,7 @@
 """A planar extended Kalman filter. The only file that imports filterpy, which takes seconds.
 
-State x = [px, py, psi, u, v, b, gx, gy, c, wx, wy]: map position [m], yaw [rad], surge and sway through the water [m/s],
-gyro bias [rad/s], slow error of the GPS position [m], compass bias [rad], the water's own drift in the map [m/s].
+State x = [px, py, psi, u, v, b, gx, gy, c, wx, wy]: map position [m], yaw [rad], surge and sway through the water
+[m/s], gyro bias [rad/s], slow error of the GPS position [m], compass bias [rad], the water's drift in the map [m/s].
 """
 
 import math

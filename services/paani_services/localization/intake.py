@@ -1,28 +1,30 @@
 """What of the sensors' messages may be used. Pure; every refusal is counted under its cause."""
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
 import msgspec
 
-from paani.messages import GpsFix, ImuSample, Message
+from paani.messages import GpsFix, ImuSample
 
 MAX_FUTURE_S = 0.1  # as `NavigatorConfig.max_future_s`
-MIN_POSITION_STD_M = 0.1  # better than that no receiver of ours is
+MIN_POSITION_STD_M, MAX_POSITION_STD_M = 0.1, 1000.0  # no receiver is better; worse is no position
+MAX_SOG_MPS = 100.0
+MAX_ACCEL_MPS2, MAX_RATE_RADPS = 160.0, 35.0  # the widest ranges of small IMUs: 16 g, 2000 degrees a second
+MAX_ANGLE_RAD = 10.0
 
 
 def usable_samples(
     samples: Sequence[ImuSample], last: ImuSample | None, now_us: int, drops: Counter[str]
 ) -> list[ImuSample]:
-    """The samples that are finite, of the newest epoch, in order, later than `last`, and not from the future."""
+    """The samples within an IMU's ranges, of the newest epoch, in order, later than `last`, not from the future."""
     if not samples:
         return []
     epoch, kept = samples[-1].epoch, list[ImuSample]()
     after_us = last.source_us if last is not None and last.epoch == epoch else -1
     for sample in samples:
-        if not _is_finite(sample):
-            drops["imu_not_finite"] += 1
+        if not _is_possible_sample(sample):
+            drops["imu_impossible"] += 1
         elif sample.source_us > now_us + MAX_FUTURE_S * 1e6:
             drops["imu_future"] += 1
         elif sample.epoch != epoch or sample.source_us <= after_us:
@@ -37,8 +39,8 @@ def usable_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str
     """The fix, its spread not below what a receiver can do; None if it must not be used."""
     if not fix.fix:
         return None
-    if not _is_finite(fix) or abs(fix.latitude_deg) > 90.0 or abs(fix.longitude_deg) > 180.0:
-        drops["gps_not_finite"] += 1
+    if not _is_possible_fix(fix):
+        drops["gps_impossible"] += 1
     elif fix.source_us > now_us + MAX_FUTURE_S * 1e6:
         drops["gps_future"] += 1
     elif last is not None and fix.epoch == last.epoch and fix.source_us <= last.source_us:
@@ -48,5 +50,23 @@ def usable_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str
     return None
 
 
-def _is_finite(message: Message) -> bool:
-    return all(math.isfinite(value) for value in msgspec.structs.astuple(message) if isinstance(value, float))
+def _is_possible_sample(sample: ImuSample) -> bool:
+    """Comparisons with what is not a number are false."""
+    accel = (sample.accel_x_mps2, sample.accel_y_mps2, sample.accel_z_mps2)
+    rates = (sample.gyro_x_radps, sample.gyro_y_radps, sample.gyro_z_radps)
+    angles = (sample.roll_rad, sample.pitch_rad, sample.yaw_rad)
+    return (
+        all(abs(value) <= MAX_ACCEL_MPS2 for value in accel)
+        and all(abs(value) <= MAX_RATE_RADPS for value in rates)
+        and all(abs(value) <= MAX_ANGLE_RAD for value in angles)
+    )
+
+
+def _is_possible_fix(fix: GpsFix) -> bool:
+    return (
+        abs(fix.latitude_deg) <= 90.0
+        and abs(fix.longitude_deg) <= 180.0
+        and 0.0 <= fix.sog_mps <= MAX_SOG_MPS
+        and abs(fix.cog_rad) <= MAX_ANGLE_RAD
+        and 0.0 <= fix.position_std_m <= MAX_POSITION_STD_M
+    )

@@ -13,7 +13,7 @@ from statistics import fmean
 from typing import NamedTuple
 
 QUIET_S = 2.0  # L5: as long as `stopped_after_s`
-MAX_ACCEL_RANGE_MPS2 = 0.2  # between quiet steps; noise alone gives 0.06
+MAX_ACCEL_RANGE_MPS2 = 0.5  # between quiet steps: ripples rock a boat at rest; noise alone gives 0.06
 MAX_PUSH_MPS = 0.1  # gained in `QUIET_S` over what was felt before
 MAX_TILT_MPS2 = 0.15  # a constant that an IMU mounted askew by 0.9 degrees feels
 MAX_TURN_RADPS = 0.02

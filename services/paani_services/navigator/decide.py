@@ -1,9 +1,10 @@
-"""The navigator as a decider: advisory, odometry, clock, arming and its own mission in; one order out."""
+"""The navigator as a decider: advisory, evidence, odometry, clock, arming and its own mission in; one order out."""
 
 from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani.messages import Mission, Route
+from paani_services.navigator.grid import Camera
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
 
@@ -21,8 +22,10 @@ def decide(state: NavState, inputs: Inputs, now_us: int, config: Config) -> tupl
         clock_us=clock.received_us,
         arming=arming.message,
         arming_us=arming.received_us,
+        evidence=inputs[keys.EVIDENCE.name].message,
     )
-    state, order = navigate(state, heard, _mission(inputs), now_us, config.bus.domain, config.navigator)
+    camera = Camera(config.calibration, config.perception.ego_polygon)
+    state, order = navigate(state, heard, _mission(inputs), now_us, config.bus.domain, config.navigator, camera)
     return state, {keys.COMMAND.name: order}
 
 
@@ -40,7 +43,7 @@ def _mission(inputs: Inputs) -> Mission | None:
 DECIDER = Decider(
     service="navigator",
     state=NavState,
-    inputs=(keys.ADVISORY, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
+    inputs=(keys.ADVISORY, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,

@@ -120,6 +120,11 @@ def trouble(
 
 def segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     """Whether two pieces of line touch or cross."""
+    for axis in (0, 1):
+        if max(one[0][axis], one[1][axis]) < min(other[0][axis], other[1][axis]):
+            return False
+        if max(other[0][axis], other[1][axis]) < min(one[0][axis], one[1][axis]):
+            return False
     return _apart_m(one, other) == 0.0
 
 

@@ -27,6 +27,16 @@ Indices = NDArray[np.int64]
 Polygon = tuple[tuple[float, float], ...]
 
 
+class Camera(NamedTuple):
+    """The calibrated camera, and the own hull in its picture as in `perception.ego_polygon`."""
+
+    calibration: CalibrationConfig = CalibrationConfig()
+    hull: Polygon = ()
+
+
+UNCALIBRATED = Camera()
+
+
 class Points(NamedTuple):
     """Points of the map, and the number of the picture that shows each [n]."""
 
@@ -57,11 +67,10 @@ def lay(
     sights: tuple[Sight, ...],
     position_m: tuple[float, float],
     now_us: int,
-    calibration: CalibrationConfig,
-    hull: Polygon,
+    camera: Camera,
     config: PlannerConfig,
 ) -> Grid:
-    """The grid around the boat. sights: oldest first. hull: the own hull in the picture, as in `perception`.
+    """The grid around the boat. sights: oldest first.
 
     Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
     free since. Occupied wins. Beside: what the picture does not show because it is too near, given that there is a
@@ -76,7 +85,7 @@ def lay(
     known = [sight for sight in known if len(sight.edge) == len(known[-1].edge)]
     free_of, occupied_of = (np.full(CELLS * CELLS, -1, np.int64) for _ in range(2))  # number of the last sight
     if known:
-        free, occupied = _seen(known, calibration, hull, config)
+        free, occupied = _seen(known, camera, config)
         for last, points in ((free_of, free), (occupied_of, occupied)):
             cells, inside = _cells(points, west_m, south_m)
             last[cells] = points.number[inside]
@@ -89,16 +98,18 @@ def lay(
     grid = Grid(west_m, south_m, occupied_now.reshape(shape), free_now.reshape(shape), np.zeros(shape, np.bool_))
     if first_free == len(known):
         return grid
-    reach_m = blind_reach_m(known[-1], calibration, hull, config)
+    reach_m = blind_reach_m(known[-1].aspect, camera, config)
     return grid._replace(beside=_within(grid, position_m, reach_m) & ~(grid.occupied | grid.free))
 
 
-def blind_reach_m(sight: Sight, calibration: CalibrationConfig, hull: Polygon, config: PlannerConfig) -> float:
-    """How far from the boat the water begins that a picture shows, boat at rest; at most `blind_m`."""
-    lens = lens_at(REST, calibration, sight.aspect)
+def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
+    """How far from the boat the water begins that a picture shows, boat at rest; 0 if that is beyond `blind_m`."""
+    lens = lens_at(REST, camera.calibration, aspect)
     u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    given = rays(lens, u, hull_top(hull, u))
+    given = rays(lens, u, hull_top(camera.hull, u))
     near_m = ranges_m(lens, given, config.max_range_m)
+    if not np.isfinite(near_m).all():
+        return 0.0
     east_m, north_m = lens.at_m[0] + near_m * given.east, lens.at_m[1] + near_m * given.north
     reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
     return reach_m if reach_m <= config.blind_m else 0.0
@@ -115,16 +126,14 @@ def hull_top(hull: Polygon, u: F64) -> F64:
     return top
 
 
-def _seen(
-    sights: list[Sight], calibration: CalibrationConfig, hull: Polygon, config: PlannerConfig
-) -> tuple[Points, Points]:
+def _seen(sights: list[Sight], camera: Camera, config: PlannerConfig) -> tuple[Points, Points]:
     """Points of the map that the pictures show free, and occupied; those of later ones come later."""
-    lenses = [lens_at(sight.station, calibration, sight.aspect) for sight in sights]
+    lenses = [lens_at(sight.station, camera.calibration, sight.aspect) for sight in sights]
     lens = together(lenses)
     edge = np.frombuffer(b"".join(sight.edge for sight in sights), np.uint8).astype(np.float64) / EDGE_STEPS
     edge = edge.reshape(len(sights), -1)
     u = (np.arange(edge.shape[1]) + 0.5) / edge.shape[1]
-    top = hull_top(hull, u)
+    top = hull_top(camera.hull, u)
     near_m = ranges_m(lens, rays(lens, u, top), config.max_range_m)
     ends = rays(lens, u, np.minimum(edge, top))
     far_m = ranges_m(lens, ends, config.max_range_m)
@@ -135,7 +144,7 @@ def _seen(
     deep = math.ceil(config.thickness_m / CELL_M) + 1
     points = [_points(lens, ends, far_m, np.where(np.isfinite(far_m), deep, 0.0), numbers)]
     for number, (each, sight) in enumerate(zip(lenses, sights, strict=True)):
-        points += [_foot(each, foot, number, hull, config) for foot in sight.feet]
+        points += [_foot(each, foot, number, camera, config) for foot in sight.feet]
     if len(points) == 1:
         return free, points[0]
     occupied = Points(*(np.concatenate(axis) for axis in zip(*points, strict=True)))
@@ -143,11 +152,11 @@ def _seen(
     return free, Points(*(axis[order] for axis in occupied))
 
 
-def _foot(lens: Lens, foot: tuple[int, int, int], number: int, hull: Polygon, config: PlannerConfig) -> Points:
+def _foot(lens: Lens, foot: tuple[int, int, int], number: int, camera: Camera, config: PlannerConfig) -> Points:
     """Points on the water under a box: along its lower end, and as far behind that as it is wide."""
     left, right, low = (end / FOOT_STEPS for end in foot)
     u = left + (right - left) * (np.arange(FOOT_COLUMNS) + 0.5) / FOOT_COLUMNS
-    top = hull_top(hull, u)
+    top = hull_top(camera.hull, u)
     given = rays(lens, u, np.minimum(low, top))
     range_m = ranges_m(lens, given, config.max_range_m)
     if not np.isfinite(range_m).all():

@@ -13,6 +13,7 @@ from paani.messages import (
     Advisory,
     Arming,
     Direction,
+    Evidence,
     Inhibit,
     Mission,
     NavCommand,
@@ -21,9 +22,12 @@ from paani.messages import (
 )
 from paani_services.navigator.crab import Crab, learned, paused
 from paani_services.navigator.fence import bounded_speed, is_allowed
+from paani_services.navigator.grid import UNCALIBRATED, Camera
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
-from paani_services.navigator.turning import TURNS, Turn, continuous_heading, latched
+from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, acts, looked, steered
+from paani_services.navigator.planner import Plan, Wish
+from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
 
 
 class NavState(msgspec.Struct, frozen=True):
@@ -33,6 +37,7 @@ class NavState(msgspec.Struct, frozen=True):
     crab: Crab = Crab()
     turn: Turn | None = None
     guards: Guards = Guards()
+    pilot: Pilot = Pilot()
     sim_us: int = -1
     advanced_us: int | None = None
 
@@ -48,6 +53,7 @@ class Heard(msgspec.Struct, frozen=True):
     clock_us: int = 0
     arming: Arming | None = None
     arming_us: int = 0
+    evidence: Evidence | None = None
 
 
 def navigate(
@@ -57,13 +63,21 @@ def navigate(
     now_us: int,
     domain: int,
     config: NavigatorConfig,
+    camera: Camera = UNCALIBRATED,
 ) -> tuple[NavState, NavCommand]:
-    """One step. The order carries the advisory's `source_us` and the plant's newest stamp."""
+    """One step. The order carries the advisory's `source_us` and the plant's newest stamp.
+
+    With a valid calibration the metric planner has the last word on heading and speed; it never overrides a gate.
+    """
     state = _watch_clock(state, heard, now_us)
     inhibits = _gates(state, heard, now_us, domain, config)
     if mission is None:
         inhibits.append(Inhibit.NO_ROUTE)
     state = _forget_turn(state, heard)
+    plans = acts(camera, config.planner)
+    if plans:
+        pilot = looked(state.pilot, heard.odometry, heard.evidence, config.planner)
+        state = msgspec.structs.replace(state, pilot=pilot)
     odometry, advisory = heard.odometry, heard.advisory
     if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
         return state, _order(state, heard, now_us, inhibits)
@@ -88,7 +102,8 @@ def navigate(
         state = _paused(state, now_us)
         speed_mps *= config.turn_speed_frac
         if config.latch_turns:
-            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config)
+            max_deg = config.planner.max_turn_deg if plans else config.max_total_turn_deg
+            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config, max_deg)
             state = msgspec.structs.replace(state, turn=turn)
             heading_rad = turn.heading_rad
             if capped:
@@ -97,13 +112,31 @@ def navigate(
             heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
     else:
         heading_rad = guarded_course(wanted.course_rad, state.guards)
-        state = _learned(state, wanted, now_us, config, on_course=heading_rad == wrap_rad(wanted.course_rad))
+    if plans and not inhibits:
+        wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0))
+        pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner)
+        state = msgspec.structs.replace(state, pilot=pilot)
+        heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
+        if speed_mps <= 0.0:
+            inhibits.append(Inhibit.NO_FREE_PATH)
+        elif state.turn is not None and _is_too_far(state.turn, odometry.yaw_rad, plan, config):
+            inhibits.append(Inhibit.TURN_CAPPED)
+    if direction not in TURNS:
+        on_course = abs(wrap_rad(heading_rad - wanted.course_rad)) <= SAME_COURSE_RAD
+        state = _learned(state, wanted, now_us, config, on_course=on_course)
     bounded_mps = bounded_speed(mission.fence, odometry, heading_rad, speed_mps, config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, _order(
         state, heard, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=wanted.cross_track_m, leg=leg
     )
+
+
+def _is_too_far(turn: Turn, yaw_rad: float, plan: Plan, config: NavigatorConfig) -> bool:
+    """Does the plan go on with a run of turns beyond its cap, which only a way seen free may do?"""
+    turned_rad = abs(wrap_rad(yaw_rad - turn.start_rad) + wrap_rad(plan.heading_rad - yaw_rad))
+    cap_deg = config.planner.max_turn_deg if plan.verified else config.max_total_turn_deg
+    return turned_rad > math.radians(cap_deg) + 1e-9
 
 
 def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorConfig) -> NavState:
@@ -147,7 +180,7 @@ def _gates(state: NavState, heard: Heard, now_us: int, domain: int, config: Navi
 
     found: list[Inhibit] = []
     advisory, odometry, clock, arming = heard.advisory, heard.odometry, heard.clock, heard.arming
-    messages = (advisory, odometry, clock, arming)
+    messages = (advisory, odometry, clock, arming, heard.evidence)
     if any(message is not None and message.domain != domain for message in messages):
         found.append(Inhibit.WRONG_DOMAIN)
     if arming is None or not arming.armed or arming.stopped or is_old(heard.arming_us, config.arming_max_age_s):

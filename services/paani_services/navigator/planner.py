@@ -17,7 +17,7 @@ FIELD_CELLS = 10  # distances are known up to 2 m
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
 SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
-SOON = 2.0  # something on the way just beyond the horizon; less the later
+SOON = 1.0  # something on the way just beyond the horizon; less the later
 CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
 UNKNOWN = 0.4  # all of the way is unknown
 SLOW = 0.3  # a stop
@@ -69,19 +69,17 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     if not grid.free.any():
         return nowhere
     offsets, speeds = candidates(start, wish, config)
-    if not offsets.size:
-        return nowhere
     ways = roll_out(start, offsets, speeds, config)
     gap_m = _looked_up(grid, distance_m(grid.occupied), ways)
     blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
-    needed_m = footprint_m(ways.at_s, gap_m[0, 0], config)[:, None]
+    needed_m = footprint_m(ways.at_s, float(gap_m[0, 0]), config)[:, None]
     met, unseen = gap_m < needed_m, blank_m < config.hull_radius_m
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     stopping = ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps)
     refused = (met & soon).any(axis=0) | (unseen & stopping).any(axis=0)
     if refused.all():
         return nowhere
-    cost = _costs(offsets, speeds, start, wish, before)
+    cost = _costs(offsets, speeds, start, before)
     cost = cost + _way_costs(ways, gap_m - needed_m, met, unseen, soon, config)
     best = int(np.where(refused, np.inf, cost).argmin())
     near = ways.way_m[:, best] <= config.verified_m
@@ -90,14 +88,19 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
 
 
 def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
-    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before."""
+    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before.
+
+    A course wanted on a side not advised is that of the heading now.
+    """
     wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
+    if wanted_rad * wish.side < 0.0:
+        wanted_rad = 0.0
     spacing_rad = math.radians(config.spacing_deg)
     found: list[float] = []
     for number in range(math.floor(config.span_deg / config.spacing_deg) + 1):
         for off_rad in (number * spacing_rad, -number * spacing_rad)[: 1 + (number > 0)]:
             heading_rad = wanted_rad + off_rad
-            if abs(heading_rad) <= math.pi and heading_rad * wish.side >= -1e-9:
+            if abs(heading_rad) <= math.pi and heading_rad * wish.side >= 0.0:
                 found.append(heading_rad)
     speed_mps = min(wish.speed_mps, config.speed_mps)
     offsets = np.array([heading for heading in found for _ in range(2)])
@@ -146,12 +149,13 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
 
 
 def footprint_m(at_s: F64, gap_now_m: float, config: PlannerConfig) -> F64:
-    """The radius that must be free at each time: hull, margin, and drift up to the horizon (Q6).
+    """The radius that must be free at each time: hull, margin, and drift within the horizon (Q6).
 
     Where something is nearer than that already, a way that does not come nearer is allowed, up to the hull itself.
     """
-    radius_m = config.hull_radius_m + config.margin_m + config.drift_mps * np.minimum(at_s, config.horizon_s)
-    return np.minimum(radius_m, max(config.hull_radius_m, float(gap_now_m) - CELL_M))
+    drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
+    radius_m = config.hull_radius_m + config.margin_m + drift_m
+    return np.asarray(np.minimum(radius_m, max(config.hull_radius_m, gap_now_m - CELL_M)))
 
 
 def distance_m(cells: Mask) -> F64:
@@ -180,10 +184,9 @@ def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:
     return np.asarray(lower * (1.0 - high_part) + upper * high_part)
 
 
-def _costs(offsets: F64, speeds: F64, start: Start, wish: Wish, before: Plan | None) -> F64:
+def _costs(offsets: F64, speeds: F64, start: Start, before: Plan | None) -> F64:
     quarter = 0.5 * math.pi
-    cost = np.abs(offsets - wrap_rad(wish.course_rad - start.yaw_rad)) / quarter
-    cost = cost + SLOW * (1.0 - speeds / wish.speed_mps)
+    cost = np.abs(offsets - offsets[0]) / quarter + SLOW * (1.0 - speeds / speeds[0])
     if before is not None and before.speed_mps > 0.0:
         off = np.abs(offsets - wrap_rad(before.heading_rad - start.yaw_rad))
         cost = cost + CHANGE * np.minimum(off, 2.0 * math.pi - off) / quarter

@@ -31,10 +31,7 @@ def is_reached(track: Track, target: int, position_m: Point, config: NavigatorCo
     to_go_m = math.dist(position_m, (waypoint.x_m, waypoint.y_m))
     if to_go_m <= config.acceptance_m:
         return True
-    start = leg_start(track, target)
-    along_x, along_y = waypoint.x_m - start.x_m, waypoint.y_m - start.y_m
-    beyond = (position_m[0] - waypoint.x_m) * along_x + (position_m[1] - waypoint.y_m) * along_y
-    return to_go_m <= config.pass_abeam_m and beyond > 0.0
+    return to_go_m <= config.pass_abeam_m and _beyond_m2(leg_start(track, target), waypoint, position_m) > 0.0
 
 
 def leg_start(track: Track, target: int) -> Waypoint:
@@ -61,14 +58,21 @@ def bearing_rad(position_m: Point, to: Waypoint) -> float:
 def course_rad(track: Track, target: int, position_m: Point, lookahead_m: float, crab_m: float = 0.0) -> float:
     """Bearing of the waypoint (M4), or of the point on the leg's line `lookahead_m` ahead, held up by `crab_m`.
 
-    Line of sight: Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, section 12.3; `crab_m`
-    is what `crab.offset_m` has learned to add to the cross-track distance.
+    Beyond the leg's end it is the bearing again: no line leads a boat away from its route for ever. Line of sight:
+    Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, section 12.3; `crab_m` is what
+    `crab.offset_m` has learned to add to the cross-track distance.
     """
     start, end = leg_start(track, target), track.waypoints[target]
-    if lookahead_m <= 0.0:
+    if lookahead_m <= 0.0 or _beyond_m2(start, end, position_m) > 0.0:
         return bearing_rad(position_m, end)
     leg_rad = portable.atan2(end.y_m - start.y_m, end.x_m - start.x_m)
     return leg_rad - portable.atan2(cross_track_m(track, target, position_m) + crab_m, lookahead_m)
+
+
+def _beyond_m2(start: Waypoint, end: Waypoint, position_m: Point) -> float:
+    """How far past the leg's end, along it, times its length."""
+    along_x, along_y = end.x_m - start.x_m, end.y_m - start.y_m
+    return (position_m[0] - end.x_m) * along_x + (position_m[1] - end.y_m) * along_y
 
 
 def _distance_to_leg_m(track: Track, target: int, position_m: Point) -> float:

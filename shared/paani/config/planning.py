@@ -93,4 +93,4 @@ class PlannerConfig(Section, frozen=True):
     span_deg: Angle = 120.0  # headings to either side of the wanted course
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
     verified_m: Positive = 3.5
-    max_turn_deg: Angle = 180.0  # of a run of turns
+    max_turn_deg: Annotated[float, msgspec.Meta(gt=0.0, le=150.0)] = 150.0  # of a run of turns

@@ -11,9 +11,11 @@ from paani.keys import VITAL_SERVICES
 
 
 class WorldConfig(Section, frozen=True):
+    """`name`: a world, a scenario, `random:WORLD:SEED` or a TOML file. Seed and wind unset: as the scenario says."""
+
     name: str = "river"
-    seed: Annotated[int, msgspec.Meta(ge=0, le=2**31)] = 1
-    wind_mps: NonNegative = 2.0
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**31)] | None = None
+    wind_mps: NonNegative | None = None
 
 
 class SensorsConfig(Section, frozen=True):
@@ -44,12 +46,17 @@ class AdapterConfig(Section, frozen=True):
 class PlantConfig(Section, frozen=True):
     step_s: Positive = 0.01
     publish_rate_hz: Positive = 20.0
-    vessel: str = "paper"  # its name among the vessels, or a TOML file of the same form
+    vessel: str | None = None  # its name among the vessels, or a TOML file of the same form; None: the scenario's
     sensors: SensorsConfig = SensorsConfig()
     adapter: AdapterConfig = AdapterConfig()
 
 
 class EyeConfig(Section, frozen=True):
+    """The simulated camera. `lens_k1`, `lens_k2`: radial distortion after Brown, over focal length; zero: a pinhole.
+
+    `shutter_s` is how long a picture is exposed while the boat turns; `blue_gain` and `red_gain` are its white balance.
+    """
+
     rate_hz: Positive = 5.0
     width_px: Size = 320
     height_px: Size = 240
@@ -59,3 +66,8 @@ class EyeConfig(Section, frozen=True):
     pitch_down_deg: float = 6.0
     hfov_deg: Positive = 70.0
     exposure_frac: Fraction = 1.0
+    lens_k1: float = 0.0
+    lens_k2: float = 0.0
+    shutter_s: NonNegative = 0.0
+    blue_gain: Positive = 1.0
+    red_gain: Positive = 1.0

@@ -39,7 +39,15 @@ def write_report(path: Path, report: Report) -> None:
     write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--summary")
 
 
-def up_sets(*, world: str | None, camera: str | None, headless: bool, record: Path | None = None) -> tuple[str, ...]:
+def up_sets(
+    *,
+    world: str | None,
+    camera: str | None,
+    headless: bool,
+    record: Path | None = None,
+    mission: Path | None = None,
+    fence: Path | None = None,
+) -> tuple[str, ...]:
     """Settings that the options of `paani up` stand for. The boat is a simulated one: the operator arms at start."""
     sets = ["dashboard.arm_at_start=true"]
     if world is not None:
@@ -48,6 +56,9 @@ def up_sets(*, world: str | None, camera: str | None, headless: bool, record: Pa
         sets.append(f"camera.source={json.dumps(camera)}")
     if headless:
         sets.append("dashboard.serve=false")
+    for field, file in (("mission", mission), ("fence", fence)):
+        if file is not None:
+            sets.append(f"navigator.{field}={json.dumps(str(file.absolute()))}")
     if record is not None:
         sets.append(f"recorder.folder={json.dumps(str(record.absolute()))}")
     return tuple(sets)
@@ -70,18 +81,27 @@ def _result(report: Report) -> str:
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
-    sets = up_sets(world=options.world, camera=options.camera, headless=options.headless, record=options.record)
+    sets = up_sets(
+        world=options.world,
+        camera=options.camera,
+        headless=options.headless,
+        record=options.record,
+        mission=options.mission,
+        fence=options.fence,
+    )
     plan = await make_plan(config_from(options, sets))
     return await drive(plan, options.seconds, Display(sys.stdout))
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani up", description="Run the whole loop until Ctrl-C.")
-    parser.add_argument("--world", help="river or lake (default: river)")
+    parser.add_argument("--world", metavar="NAME|FILE", help="world or scenario (`paani world list`; default: river)")
     parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
     parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
     parser.add_argument("--summary", type=Path, metavar="FILE", help="write the run's figures as JSON")
     parser.add_argument("--record", type=Path, metavar="DIR", help="record everything into this folder")
+    parser.add_argument("--mission", type=Path, metavar="FILE", help="legs to run, TOML (default: the world's route)")
+    parser.add_argument("--fence", type=Path, metavar="FILE", help="areas to keep in and out of, TOML or GeoJSON")
     parser.add_argument("--headless", action="store_true", help="serve no page")
     add_config_arguments(parser)
     return parser

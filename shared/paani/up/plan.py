@@ -70,8 +70,8 @@ async def _require_free_page(config: Config) -> None:
 
 
 async def _world_route(config: Config) -> tuple[Path, tuple[float, float]]:
-    """The world's route as a file in the runtime folder, and its origin (latitude, longitude) [deg]."""
-    path = await asyncio.to_thread(lambda: runtime_dir(config.bus) / f"route-{config.world.name}.toml")
+    """The scenario's route as a file in the runtime folder, and its origin (latitude, longitude) [deg]."""
+    path = await asyncio.to_thread(lambda: runtime_dir(config.bus) / "route.toml")
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", EXPORT_ROUTE, config.world.name, str(path), stderr=asyncio.subprocess.PIPE
     )

@@ -6,7 +6,6 @@ Everything that touches OpenGL happens in one thread of its own: a context belon
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -16,38 +15,27 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.clock import Clock
 from paani.config import Config
-from paani_sim.eye.camera import REST_Z_M, BoatPose, Camera
+from paani_sim.eye.camera import BoatPose
+from paani_sim.eye.camera_faults import CameraFaults
+from paani_sim.eye.mounted import open_eye, pose_of
 from paani_sim.eye.renderer import Eye
-from paani_sim.worlds import load_world
+from paani_sim.worlds.load import configured_scenario
 
 
-def open_eye(config: Config) -> Eye:
-    """The eye of the configured world and camera."""
-    world = load_world(config.world.name)
-    world = dataclasses.replace(world, wind=dataclasses.replace(world.wind, speed_mps=config.world.wind_mps))
-    settings = config.eye
-    camera = Camera(
-        width_px=settings.width_px,
-        height_px=settings.height_px,
-        hfov_deg=settings.hfov_deg,
-        forward_m=settings.camera_forward_m,
-        up_m=settings.camera_height_m - REST_Z_M,
-        down_deg=settings.pitch_down_deg,
-    )
-    eye = Eye(world, camera)
-    eye.exposure *= settings.exposure_frac
-    return eye
+def open_camera(config: Config) -> tuple[Eye, CameraFaults]:
+    """The eye of the configured scenario, and what goes wrong with it."""
+    scenario = configured_scenario(config.world)
+    return open_eye(scenario.world, config.eye), CameraFaults(scenario.faults)
 
 
-def pose_of(truth: m.TruePose) -> BoatPose:
-    """Where the boat is and how it lies."""
-    return BoatPose(truth.x_m, truth.y_m, truth.yaw_rad, truth.z_m, truth.roll_rad, truth.pitch_rad)
-
-
-def jpeg(eye: Eye, pose: BoatPose, t_s: float, quality: int, actors_along_m: tuple[float, ...] = ()) -> bytes:
-    """One encoded picture."""
-    picture = eye.render(pose, t_s, actors_along_m)
-    _, data = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
+def jpeg(
+    eye: Eye, faults: CameraFaults, pose: BoatPose, t_s: float, quality: int, actors_along_m: tuple[float, ...] = ()
+) -> bytes | None:
+    """One encoded picture; None where the camera drops it."""
+    bgr = faults.apply(eye.render(pose, t_s, actors_along_m).bgr, t_s)
+    if bgr is None:
+        return None
+    _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
 
 
@@ -57,9 +45,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     pictures = bus.picture_publisher(keys.RENDERED)
     loop, gl_thread = asyncio.get_running_loop(), ThreadPoolExecutor(1, "gl")
     settings, period_us = config.eye, round(1e6 / config.eye.rate_hz)
-    eye = await loop.run_in_executor(gl_thread, open_eye, config)
+    eye, faults = await loop.run_in_executor(gl_thread, open_camera, config)
     try:
-        await loop.run_in_executor(gl_thread, jpeg, eye, BoatPose(*eye.world.start), 0.0, settings.jpeg_quality)
+        start = BoatPose(*eye.world.start)
+        await loop.run_in_executor(gl_thread, jpeg, eye, CameraFaults(()), start, 0.0, settings.jpeg_quality)
         with bus.alive():
             due_us, frame_seq, epoch = clock.now_us(), 0, None
             while True:
@@ -73,11 +62,15 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     gl_thread,
                     jpeg,
                     eye,
+                    faults,
                     pose_of(truth),
                     truth.sim_us * 1e-6,
                     settings.jpeg_quality,
                     truth.actors_along_m,
                 )
+                due_us = max(due_us + period_us, clock.now_us())
+                if data is None:
+                    continue
                 header = m.PictureHeader(
                     source_us=truth.source_us,
                     frame_seq=frame_seq,
@@ -87,7 +80,6 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 )
                 pictures.put_picture(header, data)
                 frame_seq += 1
-                due_us = max(due_us + period_us, clock.now_us())
     finally:
         await loop.run_in_executor(gl_thread, eye.close)
         gl_thread.shutdown(wait=False)

@@ -191,13 +191,13 @@ void main() {
     float arm = 0.6 * beam + 0.354 * behind, width = 0.20 + 0.06 * behind;
     float edge = exp(-pow((aside - arm) / width, 2.0)) * exp(-behind / 13.0) * smoothstep(0.0, 0.6, behind);
     float phase = 1.5 * what.x * (0.58 * behind + 0.81 * aside);
-    float inside = (1.0 - smoothstep(arm - width, arm, aside)) * exp(-behind / 9.0);
+    float inside = (1.0 - smoothstep(0.3 * arm, arm, aside)) * exp(-behind / 9.0);
     float seen = 1.0 - smoothstep(1.2, 3.5, fwidth(phase));
     float apart = edge * cos(phase) * seen, across = 0.45 * inside * cos(what.x * behind) * seen;
     vec2 bent = what.y * (apart * vec2(0.58, 0.81 * side) + vec2(across, 0.0));
     vec2 slope = -bent.x * way + bent.y * vec2(-way.y, way.x);
     float churn = exp(-pow(aside / (0.9 * beam + 0.02 * behind), 2.0)) * exp(-behind / 7.0);
-    float foam = what.y * (3.2 * churn + 5.0 * edge * exp(-behind / 1.6) + 0.9 * edge);
+    float foam = what.y * (3.0 * churn + 2.6 * edge * exp(-behind / 1.6) + 0.25 * edge);
     stir = what.w > 0.5 ? vec4(slope, foam, 0.0) : vec4(0.0, 0.0, 0.0, dark);
 }
 """

@@ -76,10 +76,7 @@ class Actors:
         """To simulated time `t_s`, `every_s` after the last one; who holds on is where the time says, to the bit."""
         along, speeds = [], []
         for actor, pose, along_m in zip(self._actors, self.poses, self.along_m, strict=True):
-            if t_s <= actor.start_s:
-                speed = 0.0
-            else:
-                speed = speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
+            speed = 0.0 if t_s <= actor.start_s else speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)

@@ -13,6 +13,9 @@ from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.water.wind import wind_force
 
 WATER_DENSITY_KGPM3 = 1000.0
+FASTEST = (
+    10.0  # m/s or rad/s: beyond it drag grows linearly, so that a step of 10 ms stays stable whatever hits the boat
+)
 
 
 class HullState(NamedTuple):
@@ -152,4 +155,4 @@ def _body_axes(state: HullState) -> tuple[float, float, float, float, float, flo
 
 
 def _drag(speed: float, linear: float, quadratic: float) -> float:
-    return linear * speed + quadratic * abs(speed) * speed
+    return linear * speed + quadratic * min(abs(speed), FASTEST) * speed

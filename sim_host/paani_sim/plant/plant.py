@@ -2,8 +2,9 @@
 
 import hashlib
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
+import msgspec
 import mujoco
 import numpy as np
 
@@ -20,11 +21,11 @@ from paani_sim.plant.sensors import (
     measure_gps,
     measure_imu,
 )
-from paani_sim.vessels import load_vessel
+from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.water.surroundings import CALM, Surroundings
 from paani_sim.water.wakes import Maker
 from paani_sim.water.water import Water
-from paani_sim.worlds import Fault, Kind, World
+from paani_sim.worlds import Fault, Kind, Scenario, World
 from paani_sim.worlds.spec import build_spec
 
 COLLISION_GAP_S = 1.0  # touching again within it is still the same collision
@@ -54,7 +55,7 @@ class Plant:
         Of the faults it acts on those of GPS, compass, gyro and thrusters.
         """
         self._config, self._world, self._faults = config, world, faults
-        self._vessel = load_vessel(config.vessel)
+        self._vessel = load_vessel(config.vessel or Scenario.vessel)
         spec = build_spec(world, self._vessel)
         spec.option.timestep = config.step_s
         with passive.compiling():
@@ -67,6 +68,7 @@ class Plant:
             added.pitch_ratio * hull.pitch_inertia_kgm2,
             added.yaw_ratio * hull.yaw_inertia_kgm2,
         )
+        mujoco.mj_setConst(self._model, mujoco.MjData(self._model))  # the inertia that MuJoCo keeps of a free body
         self._data = mujoco.MjData(self._model)
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._accelerometer = self._data.sensor("accelerometer").data
@@ -98,6 +100,17 @@ class Plant:
         self._last_touch_s: dict[str, float] = {}
         mujoco.set_mju_user_warning(_keep_no_log_file)
         mujoco.mj_forward(self._model, self._data)
+
+    @classmethod
+    def of(cls, scenario: Scenario, config: PlantConfig) -> Self:
+        """The boat of a scenario; a vessel in the settings goes before the scenario's."""
+        vessel = config.vessel or scenario.vessel
+        return cls(scenario.world, msgspec.structs.replace(config, vessel=vessel), scenario.seed, scenario.faults)
+
+    @property
+    def vessel(self) -> Vessel:
+        """What sails."""
+        return self._vessel
 
     def close(self) -> None:
         """Release the force hook; the plant steps no more."""

@@ -1,7 +1,6 @@
 """Plant process: thrust in; time, sensors and truth out, at real time."""
 
 import asyncio
-import dataclasses
 import functools
 
 from paani import keys
@@ -12,7 +11,7 @@ from paani.config import Config
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
-from paani_sim.worlds import Fault, World, load_world
+from paani_sim.worlds.load import configured_scenario
 
 MAX_BEHIND_S = 0.25  # further behind than this, simulated time slips instead of being caught up
 
@@ -20,8 +19,8 @@ MAX_BEHIND_S = 0.25  # further behind than this, simulated time slips instead of
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Step the plant in real time. Watchdogs run on the monotonic clock that `SimTime` hands out."""
     monotonic = MonotonicClock()
-    world, faults = scene(config)
-    plant = Plant(world, config.plant, config.world.seed, faults)
+    scenario = configured_scenario(config.world)
+    plant = Plant.of(scenario, config.plant)
     adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
     thrust, arming = bus.latest(keys.THRUST), bus.latest(keys.ARMING)
     for service in config.plant.adapter.require_pulses:
@@ -43,12 +42,6 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 instruments.publish(plant, adapter, applied, clock.now_us() - (now_us - due_us))
                 due_us += step_us
             await asyncio.sleep(max(0, due_us - monotonic.now_us()) * 1e-6)
-
-
-def scene(config: Config) -> tuple[World, tuple[Fault, ...]]:
-    """The configured world with the wind that the eye draws, and what goes wrong in it. Raises UserError."""
-    world = load_world(config.world.name)
-    return dataclasses.replace(world, wind=dataclasses.replace(world.wind, speed_mps=config.world.wind_mps)), ()
 
 
 def _hear(

@@ -73,10 +73,13 @@ class Process:
 
 
 class Board:
-    """Advisor, navigator and controller. `blind`: no advisor; the advice is always to go straight on."""
+    """Advisor, navigator and controller. `blind`: no advisor; the advice is always to go straight on.
 
-    def __init__(self, config: Config, route: m.Route, outbox: Outbox, *, blind: bool = False) -> None:
-        self._config, self._route, self._outbox = config, route, outbox
+    mission: whose first leg follows a route.
+    """
+
+    def __init__(self, config: Config, mission: m.Mission, outbox: Outbox, *, blind: bool = False) -> None:
+        self._config, self._mission, self._outbox = config, mission, outbox
         self._advisor = None if blind else Process("advisor", config, outbox)
         self._navigator = Process("navigator", config, outbox)
         self._controller = Process("controller", config, outbox)
@@ -102,7 +105,9 @@ class Board:
         if now_us >= self._advise_due_us or (self._stale_us is not None and now_us >= self._stale_us):
             self._advise(now_us)
         if now_us >= self._route_due_us:
-            route = msgspec.structs.replace(self._route, source_us=now_us)
+            self._navigator.publish_own(keys.MISSION, msgspec.structs.replace(self._mission, source_us=now_us), now_us)
+            leg = self._mission.legs[0]
+            route = m.Route(source_us=now_us, name=self._mission.name, waypoints=leg.waypoints, repeat=leg.repeat)
             self._navigator.publish_own(keys.ROUTE, route, now_us)
             self._route_due_us = now_us + round(1e6 / keys.ROUTE.rate_hz)
         ordered = (self._woken or now_us >= self._navigate_due_us) and self._navigate(now_us)

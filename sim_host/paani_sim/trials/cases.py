@@ -14,6 +14,7 @@ from paani.errors import UserError
 from paani_sim.trials.policies import Policy
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import random_scenario
+from paani_sim.worlds.load import load_scenario
 
 SPLIT, PLUS = ":", "+"
 STARTS_S = (12.0, 30.0)  # when a fault begins, drawn by seed
@@ -115,9 +116,7 @@ def read_case(text: str) -> Case:
 def scenario_of(case: Case) -> Scenario:
     """The scenario, with its fault. Raises UserError for a scenario file that cannot be used."""
     if is_file(case.world):
-        from paani_sim.worlds.scenario_file import load_scenario
-
-        scenario = dataclasses.replace(load_scenario(Path(case.world)), seed=case.seed)
+        scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
         scenario = random_scenario(case.world, case.seed)
     if not case.fault:

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_sim.trials.cases import SUITES, Case, cases_of, is_file, read_case, scenario_of
-from paani_sim.trials.one import run_case
+from paani_sim.trials.one import config_for, run_case
 from paani_sim.trials.policies import Policy, config_of
 from paani_sim.trials.provenance import Maker
 from paani_sim.trials.result import TrialResult
@@ -81,7 +81,7 @@ def _one(options: argparse.Namespace) -> int:
     if options.record:
         from paani_sim.trials.recording import Recorder  # noqa: PLC0415
 
-        with Recorder(options.record, config_of(case.policy, options.sets), scenario_of(case)) as recorder:
+        with Recorder(options.record, config_for(case, options.sets)) as recorder:
             result, effort = run_case(case, options.sets, threads=True, tap=recorder.tap)
     else:
         result, effort = run_case(case, options.sets, threads=True)

@@ -33,6 +33,18 @@ ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
 END_M = 1.5  # an open route is done this near its end: the navigator's acceptance radius
 
 
+def mission_of(scenario: Scenario) -> m.Mission:
+    """Follow the world's route, once or without end, within the scenario's fence."""
+    world = scenario.world
+    leg = m.MissionLeg(
+        kind=m.LegKind.FOLLOW_ROUTE,
+        waypoints=tuple(m.Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist()),
+        repeat=world.route_closed,
+        laps=0 if world.route_closed else 1,
+    )
+    return m.Mission(source_us=0, name=world.name, legs=(leg,), fence=scenario.fence)
+
+
 class Drive:
     """`step` until `phase` is FINISHED; `why` then says how it ended. `close` when done."""
 
@@ -49,13 +61,11 @@ class Drive:
         world = scenario.world
         self.scenario, self.config = scenario, config
         self._eyes = eyes
-        self.plant = Plant(world, config.plant, scenario.seed, scenario.faults)
+        self.plant = Plant.of(scenario, config.plant)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
         self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self._out = Outbox(config.bus.domain, tap)
-        waypoints = tuple(m.Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist())
-        route = m.Route(source_us=0, name=world.name[:100], waypoints=waypoints, repeat=world.route_closed)
-        self.board = Board(config, route, self._out, blind=eyes is None)
+        self.board = Board(config, mission_of(scenario), self._out, blind=eyes is None)
         self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
         self.applied: Applied = self.adapter.decide(START_US)
         self.along = Along(world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m))

@@ -34,9 +34,17 @@ def eyes_of(policy: Policy, scenario: Scenario, config: Config) -> Eyes | None:
     return OracleEyes(scenario.world, scenario.faults, config) if policy is Policy.ORACLE else None
 
 
+def config_for(case: Case, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
+    """The policy's settings with the scenario's vessel. Raises UserError for the scenario or a setting."""
+    config, vessel = config_of(case.policy, sets, threads=threads), scenario_of(case).vessel
+    if vessel == Scenario.vessel:
+        return config
+    return msgspec.structs.replace(config, plant=msgspec.structs.replace(config.plant, vessel=vessel))
+
+
 def drive_of(case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap: Tap | None = None) -> Drive:
     """Ready to begin; to be closed. Raises UserError for the scenario or a setting."""
-    config, scenario = config_of(case.policy, sets, threads=threads), scenario_of(case)
+    config, scenario = config_for(case, sets, threads=threads), scenario_of(case)
     eyes = eyes_of(case.policy, scenario, config)
     try:
         return Drive(scenario, config, eyes, tap=tap)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from paani import messages as m
 from paani.config import Config, CorridorConfig
 from paani_sim.eye.camera import look_from, view_projection
-from paani_sim.trials.eyes import Sight, camera_of, pose_of
+from paani_sim.eye.mounted import camera_of, pose_of
+from paani_sim.trials.eyes import Sight
 from paani_sim.trials.outlines import heights_of, placed, shape_of, silhouettes
 from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_at, along_at
 from paani_sim.worlds.faults import active
@@ -195,7 +196,7 @@ class OracleEyes:
             confidence_threshold=perception.detections.confidence,
             models=empty.models,
             roll_rad=roll_rad,
-            **_edge(seen.water),
+            water_edge=water_edge(seen.water),
         )
 
 
@@ -246,10 +247,6 @@ def water_edge(water: Flags) -> tuple[float, ...]:
     blocked = ~water
     last = rows - np.argmax(blocked[::-1], axis=0)
     return tuple(np.where(blocked.any(axis=0), last / rows, 0.0).tolist())
-
-
-def _edge(water: Flags) -> dict[str, tuple[float, ...]]:
-    return {"water_edge": water_edge(water)} if "water_edge" in m.Evidence.__struct_fields__ else {}
 
 
 def _shares(cells: int, start: float, end: float) -> F64:

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import msgspec
 
-from paani.config import Config, load_config
+from paani.config import Config, calibration_of, load_config
 
 NOMINAL_MPS = Config().navigator.cruise_mps
 
@@ -16,7 +16,7 @@ class Policy(StrEnum):
     """Who sees and who decides.
 
     PAANI: camera and deciders of the profile `paani`. PAPER: those of the profile `paper`, at its rates and speed.
-    BLIND: follows the route without looking. ORACLE: `paani` with evidence from truth instead of pictures.
+    BLIND: follows the route without looking, and without a planner. ORACLE: `paani` with evidence from truth.
     """
 
     PAANI = "paani"
@@ -30,9 +30,13 @@ CAMERA = frozenset({Policy.PAANI, Policy.PAPER})
 
 def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
     """Its settings. threads: the two nets side by side, for a drive that has two cores; what they say is the same."""
-    config = load_config(profile="paper" if policy is Policy.PAPER else "paani", sets=sets)
-    perception = msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1)
-    return msgspec.structs.replace(config, perception=perception)
+    given = tuple(sets) if policy is not Policy.BLIND else ("navigator.planner.use=false", *sets)
+    config = load_config(profile="paper" if policy is Policy.PAPER else "paani", sets=given)
+    return msgspec.structs.replace(
+        config,
+        perception=msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1),
+        calibration=config.calibration if config.calibration.valid else calibration_of(config.eye),
+    )
 
 
 def time_scale(config: Config) -> float:

@@ -29,7 +29,7 @@ from paani_sim.trials.result import (
 )
 from paani_sim.trials.states import Why
 from paani_sim.trials.track import Applying, Halt, Sample
-from paani_sim.vessels.vessel import Hull, load_vessel
+from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
 
 F64 = NDArray[np.float64]
@@ -44,7 +44,7 @@ def score(drive: Drive, policy: Policy) -> TrialResult:
     """Everything that is known of a drive that has ended."""
     scenario, track, eye = drive.scenario, drive.track, drive.config.eye
     world, samples = scenario.world, track.samples
-    course = course_of(world, load_vessel(drive.config.plant.vessel).hull, samples)
+    course = course_of(world, drive.plant.vessel.hull, samples)
     gaps_m = clearances_m(world, course)
     contacts = contacts_of(world, drive.plant.hits, samples, course, eye)
     encounters = encounters_of(world, samples, gaps_m, contacts)

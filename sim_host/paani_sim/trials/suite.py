@@ -120,7 +120,7 @@ def encoded(record: Record) -> bytes:
 
 def _drive(
     folder: Path, case: Case, made_with: MadeWith, sets: tuple[str, ...], threads: bool
-) -> TrialResult | Failure:  # noqa: FBT001
+) -> TrialResult | Failure:
     """In a process of its own."""
     try:
         result, effort = run_case(case, sets, threads=threads)

@@ -18,7 +18,7 @@ Coordinate = Annotated[float, msgspec.Meta(ge=-100.0, le=100.0)]
 
 
 class Hull(Section, frozen=True):
-    """Rigid body, and two capsules that collide: their axes `spacing_m` apart and `axis_z_m` above the body's origin."""
+    """Rigid body, and two capsules that collide: axes `spacing_m` apart, `axis_z_m` above the body's origin."""
 
     mass_kg: Positive
     roll_inertia_kgm2: Positive

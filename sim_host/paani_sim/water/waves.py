@@ -80,7 +80,7 @@ class Response(NamedTuple):
 
 
 def hull_response(kx_radpm: float, ky_radpm: float, yaw_rad: float, length_m: float, spacing_m: float) -> Response:
-    """Averages of the wave over the waterlines: |sinc(k L / 2)| and its like (Froude-Krylov, long wave over draught)."""
+    """Averages of the wave over two waterlines (Froude-Krylov): along the hull the elevation falls as sinc(k L / 2)."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     ahead, left = kx_radpm * cos + ky_radpm * sin, ky_radpm * cos - kx_radpm * sin
     along, across = 0.5 * ahead * length_m, 0.5 * left * spacing_m

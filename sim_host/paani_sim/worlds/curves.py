@@ -1,5 +1,7 @@
 """Plane curves and polygons: resampling, offsets, containment, distances. Pure numpy, metres."""
 
+import itertools
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,6 +24,16 @@ def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Point
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
     at_m = (start_m + np.arange(count) * arc_m[-1] / count) % arc_m[-1]
     return np.column_stack([np.interp(at_m, arc_m, ring[:, k]) for k in (0, 1)])
+
+
+def sampled_legs(line_m: Points, step_m: float, *, closed: bool) -> list[Points]:
+    """Each leg of the line as points at most `step_m` apart, both its ends included; 4000 points a leg at most."""
+    ends_m = np.vstack([line_m, line_m[:1]]) if closed else line_m
+    legs = []
+    for start, end in itertools.pairwise(ends_m):
+        count = min(4000, int(np.ceil(np.hypot(*(end - start)) / step_m)) + 1)
+        legs.append(start + np.linspace(0.0, 1.0, max(2, count))[:, None] * (end - start))
+    return legs
 
 
 def point_along_closed(points_m: Points, distance_m: float) -> tuple[float, float, float]:

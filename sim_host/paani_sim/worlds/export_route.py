@@ -1,17 +1,19 @@
-"""Writes a world's route as a route file: `python -m paani_sim.worlds.export_route WORLD FILE`."""
+"""Writes a scenario's route as a route file: `python -m paani_sim.worlds.export_route SCENARIO FILE`."""
 
-import os
+import json
 import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_sim.worlds import World, load_world
+from paani.whole_file import write_whole
+from paani_sim.worlds.load import load_scenario
+from paani_sim.worlds.world import World
 
 
-def route_toml(world: World) -> str:
+def route_toml(world: World, name: str) -> str:
     """The route file of the world (format: `paani_services.navigator.route`), in map metres."""
     head = (
-        f'name = "{world.name}"\nrepeat = true\n\n[origin]\n'
+        f"name = {json.dumps(name[-100:])}\nrepeat = {json.dumps(world.route_closed)}\n\n[origin]\n"
         f"latitude_deg = {world.origin_lat_deg}\nlongitude_deg = {world.origin_lon_deg}\n"
     )
     points = (f"\n[[waypoints]]\nx_m = {x_m:.4f}\ny_m = {y_m:.4f}\n" for x_m, y_m in world.route_m.tolist())
@@ -19,17 +21,12 @@ def route_toml(world: World) -> str:
 
 
 def main(name: str, file: str) -> int:
-    """Write the file: beside it first, then renamed. Exit code 2, with one line, for a user's mistake."""
-    path = Path(file)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    """Write the file whole or not at all. Exit code 2, with one line, for a user's mistake."""
     try:
-        beside.write_text(route_toml(load_world(name)), encoding="utf-8")
-        beside.replace(path)
+        scenario = load_scenario(name)
+        write_whole(Path(file), route_toml(scenario.world, scenario.name).encode())
     except UserError as error:
         sys.stderr.write(f"{error}\n")
-        return 2
-    except OSError as error:
-        sys.stderr.write(f"{file}: {error.strerror}\n")
         return 2
     return 0
 

@@ -12,7 +12,6 @@ MOLE_M = 9.0  # thickness of the mole
 ENTRANCE_M = (9.0, 29.0)
 BERTHS_M = (-58.0, -44.0, -30.0, -16.0, -2.0, 12.0)  # where the finger pontoons leave the north quay
 FINGER_M = 11.0
-FACE_STEP_M = 4.0
 
 CORNERS_M = (
     (ENTRANCE_M[0], 0.0),
@@ -74,7 +73,7 @@ def harbour() -> World:
         seed=23,
         origin_lat_deg=43.2951,
         origin_lon_deg=5.3652,
-        shore_m=_shore(),
+        shore_m=np.array(CORNERS_M),
         route_m=route_m,
         start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
         obstacles=(*_berths(), *_obstacles()),
@@ -86,16 +85,6 @@ def harbour() -> World:
         bank=Bank.QUAY,
         waves=Waves(fetch_m=120.0),
     )
-
-
-def _shore() -> Points:
-    """The corners, with a point about every `FACE_STEP_M` between them; counter-clockwise."""
-    corners = np.array(CORNERS_M)
-    faces = []
-    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        steps = max(1, round(float(np.hypot(*(end - start))) / FACE_STEP_M))
-        faces.append(start + np.arange(steps)[:, None] / steps * (end - start))
-    return np.vstack(faces)
 
 
 def _route() -> Points:
@@ -120,7 +109,7 @@ def _berths() -> tuple[Obstacle, ...]:
     )
     middle_m = NORTH_M - 0.5 * FINGER_M
     fingers = tuple(
-        Obstacle(f"finger_{k}", Kind.PIER, "pontoon", Pose2(x_m, middle_m, south), FINGER_M, 1.6, 0.45, 0.0, k % 2)
+        Obstacle(f"finger_{k}", Kind.PIER, "finger", Pose2(x_m, middle_m, south), FINGER_M, 1.6, 0.45, 0.0, k % 2)
         for k, x_m in enumerate(BERTHS_M)
     )
     moored = tuple(
@@ -144,11 +133,11 @@ def _obstacles() -> tuple[Obstacle, ...]:
     vessel, person, buoy, pier = Kind.VESSEL, Kind.PERSON, Kind.BUOY, Kind.PIER
     north = 0.5 * np.pi
     return (
-        Obstacle("steps_east", pier, "quay", Pose2(EAST_M - 0.4, 14.0, north), 4.0, 1.2, 0.5),
+        Obstacle("steps_east", pier, "quay_steps", Pose2(EAST_M - 0.55, 14.0, north), 4.0, 1.2, QUAY_M),
         Obstacle("pontoon_west", pier, "pontoon", Pose2(WEST_M + 1.4, 30.0, north), 12.0, 2.2, 0.45),
         Obstacle("jetty_outer", pier, "jetty", Pose2(-58.0, -14.4, -1.4), 8.0, 1.8, 0.8),
         Obstacle("barge_quay", vessel, "barge", Pose2(EAST_M - 2.0, 30.0, north), 16.0, 3.2, 2.6, 0.0, 1),
-        Obstacle("tug_quay", vessel, "workboat", Pose2(EAST_M - 1.9, 47.0, -north), 9.0, 3.0, 3.0),
+        Obstacle("tug_quay", vessel, "tug", Pose2(EAST_M - 2.1, 48.0, -north), 11.0, 3.5, 5.5),
         Obstacle("fisher_mole", vessel, "workboat", Pose2(48.0, 1.8, 0.0), 7.4, 2.6, 2.7, 0.0, 3),
         Obstacle("barge_mole", vessel, "barge", Pose2(-30.0, 2.0, 0.0), 14.0, 3.0, 2.2, 0.0, 2),
         Obstacle("cruiser_west", vessel, "cruiser", Pose2(WEST_M + 3.8, 30.0, north), 6.4, 2.2, 2.0, 0.0, 2),
@@ -165,6 +154,9 @@ def _obstacles() -> tuple[Obstacle, ...]:
         Obstacle("port_hand", buoy, "can", Pose2(19.4, -20.0, 0.0), 0.8, 0.8, 1.4),
         Obstacle("starboard_hand", buoy, "cone", Pose2(33.0, -16.0, 0.0), 0.8, 0.8, 1.4, 0.0, 1),
         Obstacle("road_mark", buoy, "pillar", Pose2(60.0, -61.6, 0.0), 0.9, 0.9, 2.4, 0.0, 2),
+        Obstacle("crane_east", Kind.OTHER, "crane", Pose2(EAST_M + 4.5, 34.0, np.pi), 6.0, 5.0, 15.0, QUAY_M),
+        Obstacle("store_east", Kind.OTHER, "warehouse", Pose2(EAST_M + 20.0, 30.0, north), 30.0, 11.0, 9.0, QUAY_M),
+        Obstacle("store_north", Kind.OTHER, "warehouse", Pose2(30.0, NORTH_M + 15.0, 0.0), 26.0, 10.0, 8.0, QUAY_M, 1),
         Obstacle("angler_mole", person, "standing", Pose2(2.0, -2.0, 1.5), 0.5, 0.5, 1.75, QUAY_M),
         Obstacle("angler_head", person, "sitting", Pose2(31.0, -3.0, 2.6), 0.6, 0.6, 1.2, QUAY_M, 2),
         Obstacle("walker_mole", person, "walking", Pose2(-56.0, -4.0, 0.1), 0.5, 0.5, 1.7, QUAY_M, 1),

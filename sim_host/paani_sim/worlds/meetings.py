@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, clearance_m, open_length_m
+from paani_sim.worlds.curves import Points, clearance_m, sampled_legs
 from paani_sim.worlds.room import fixed_gap_m
 from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Actor, Pose2, World
@@ -86,12 +86,7 @@ def drifting(
 
 def is_free_path(world: World, actor: Actor) -> bool:
     """Whether the actor keeps off the banks and the obstacles all along its path."""
-    count = max(2, round(open_length_m(actor.path_m)) + 1)
-    first, last = actor.path_m[:-1], actor.path_m[1:]
-    per_leg = max(2, math.ceil(count / len(first)))
-    points_m = np.concatenate([first + part * (last - first) for part in np.linspace(0.0, 1.0, per_leg)])
-    if actor.closed:
-        points_m = np.vstack([points_m, np.linspace(actor.path_m[-1], actor.path_m[0], per_leg)])
+    points_m = np.concatenate(sampled_legs(actor.path_m, 1.0, closed=actor.closed))
     half_m = 0.5 * actor.width_m + SPARE_M
     return bool(
         (clearance_m(world.shore_m, points_m) > half_m).all()

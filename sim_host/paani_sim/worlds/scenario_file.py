@@ -1,7 +1,7 @@
 """What a scenario file may say, and reading it strictly. README.md beside this folder shows one.
 
-Frames of points: `map` (metres east and north of the origin), `route` (metres along the route from the boat's start, and
-to its left) and `channel` (the same of the world's centre line, from its first point).
+Frames of points: `map` (metres east and north of the origin), `route` (metres along the route from the boat's start,
+and to its left) and `channel` (the same of the world's centre line, from its first point).
 """
 
 import tomllib
@@ -78,9 +78,9 @@ class VesselPart(Section, frozen=True):
 class ActorPart(Section, frozen=True):
     """A thing that stays (`at_m`), runs along a path (`path_m`) or meets the boat (`encounter` and `meets_at_m`).
 
-    `heading_deg` is counter-clockwise from east in the map, else to the left of route or channel; of a crossing it is the
-    way across, of something adrift the way it drifts. `left_m` is where beside the route it is met. Sizes are the look's
-    usual ones where they are left out.
+    `heading_deg` is counter-clockwise from east in the map, else to the left of route or channel; of an encounter it is
+    the way a crossing goes or something drifts, to the left of the route. `left_m` is where beside the route it is met.
+    Sizes are the look's usual ones where they are left out.
     """
 
     look: str
@@ -114,7 +114,7 @@ class RoutePart(Section, frozen=True):
 
 
 class TaskPart(Section, frozen=True):
-    """How far along the route (left out: all of it) in which time (left out: three times what 0.6 m/s takes, and 60 s)."""
+    """How far along the route (left out: all of it), and in which time (left out: thrice that of 0.6 m/s, and 60 s)."""
 
     distance_m: Annotated[float, msgspec.Meta(gt=0.0, le=1e5)] | None = None
     time_limit_s: Annotated[float, msgspec.Meta(gt=0.0, le=1e6)] | None = None

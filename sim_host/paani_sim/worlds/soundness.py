@@ -6,7 +6,7 @@ import numpy as np
 
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
-from paani_sim.worlds.curves import Points, clearance_m, inside
+from paani_sim.worlds.curves import Points, clearance_m, inside, sampled_legs
 from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose
@@ -33,7 +33,7 @@ def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
 
 def _check_route(world: World, fence: tuple[FenceArea, ...], where: str) -> None:
     _check_legs(world.route_m, closed=world.route_closed, where=f"{where}: route.waypoints_m")
-    for number, points_m in enumerate(_sampled(world.route_m, closed=world.route_closed)):
+    for number, points_m in enumerate(sampled_legs(world.route_m, SAMPLE_M, closed=world.route_closed)):
         on_land = clearance_m(world.shore_m, points_m) < HALF_BEAM_M
         if on_land.any():
             raise UserError(f"{where}: route: leg {number} runs over land at {_at(points_m[int(np.argmax(on_land))])}")
@@ -60,7 +60,7 @@ def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
     _check_legs(thing.path_m, closed=thing.closed, where=f"{where}.path_m")
     if not _floats(thing):
         return
-    for number, points_m in enumerate(_sampled(thing.path_m, closed=thing.closed)):
+    for number, points_m in enumerate(sampled_legs(thing.path_m, SAMPLE_M, closed=thing.closed)):
         on_land = clearance_m(world.shore_m, points_m) < 0.0
         if on_land.any():
             at = _at(points_m[int(np.argmax(on_land))])
@@ -76,16 +76,6 @@ def _check_legs(line_m: Points, *, closed: bool, where: str) -> None:
     legs_m = np.linalg.norm(after_m - line_m[: len(after_m)], axis=1)
     if legs_m.min() < MIN_LEG_M:
         raise UserError(f"{where}[{int(np.argmin(legs_m))}] and the next are the same point")
-
-
-def _sampled(line_m: Points, *, closed: bool) -> list[Points]:
-    """Each leg as points half a metre apart, its ends included."""
-    ends_m = np.vstack([line_m, line_m[:1]]) if closed else line_m
-    legs = []
-    for start, end in zip(ends_m[:-1], ends_m[1:], strict=True):
-        count = min(4000, max(2, int(np.hypot(*(end - start)) / SAMPLE_M) + 2))
-        legs.append(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
-    return legs
 
 
 def _allowed(fence: tuple[FenceArea, ...], points_m: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -35,6 +35,7 @@ export const WHY_STILL = {
   ADVISED_STOP: "the advisor says stop",
   ADVISED_NO_DATA: "the advisor has nothing to judge",
   TURN_CAPPED: "turned as far as allowed without a clear way",
+  NO_FREE_PATH: "no way is known to be free",
   NO_ROUTE: "no route",
   ROUTE_FINISHED: "route finished",
   HOLDING: "holding station",

@@ -1,0 +1,53 @@
+"""The metric planner at work: what the pictures show is remembered, and every new one gives a new plan. Pure."""
+
+import math
+
+import msgspec
+
+from paani.config import PlannerConfig
+from paani.geometry import wrap_rad
+from paani.messages import Evidence, Odometry
+from paani_services.navigator.grid import Camera, lay
+from paani_services.navigator.planner import Plan, Start, Wish, plan
+from paani_services.navigator.sighting import Memory, remember
+
+SAME_COURSE_RAD = math.radians(3.0)
+
+
+class Pilot(msgspec.Struct, frozen=True):
+    """What was seen, the plan in force, the course and side it was made for, when, and on which picture."""
+
+    memory: Memory = Memory()
+    plan: Plan | None = None
+    course_rad: float = 0.0
+    side: float = 0.0
+    planned_us: int = 0
+    frame: tuple[int, int] = (-1, -1)
+
+
+def acts(camera: Camera, config: PlannerConfig) -> bool:
+    """Whether the planner steers: it refuses without a valid calibration."""
+    return config.use and camera.calibration.valid
+
+
+def looked(pilot: Pilot, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig) -> Pilot:
+    """The pilot with what is new to remember."""
+    return msgspec.structs.replace(pilot, memory=remember(pilot.memory, odometry, evidence, config))
+
+
+def steered(
+    pilot: Pilot, odometry: Odometry, wish: Wish, now_us: int, camera: Camera, config: PlannerConfig
+) -> tuple[Pilot, Plan]:
+    """The plan for this wish: made anew for a new picture, another course or side, or after `replan_s`.
+
+    No plan is faster than wished for, nor made for a side that is no longer advised.
+    """
+    held = pilot.plan
+    is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
+    is_new = is_other or pilot.memory.frame != pilot.frame
+    if held is None or is_new or not 0.0 <= (now_us - pilot.planned_us) * 1e-6 < config.replan_s:
+        grid = lay(pilot.memory.sights, (odometry.x_m, odometry.y_m), now_us, camera, config)
+        start = Start(odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)
+        held = plan(grid, start, wish, held, config)
+        pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
+    return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

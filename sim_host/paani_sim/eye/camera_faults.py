@@ -1,0 +1,40 @@
+"""A camera that fails as a scenario says: black, frozen, blurred or dropped pictures. The same times give the same."""
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from paani.picture_faults import black
+from paani_sim.worlds.faults import Fault, FaultKind, active
+
+U8 = npt.NDArray[np.uint8]
+BLUR_PX = 8.0  # of a blur whose amount is not named: severity 3 of `paani.picture_faults.blur`
+DARK_SEVERITY = 3
+
+
+class CameraFaults:
+    """Remembers the last good picture, which a frozen camera shows again."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self._faults = tuple(faults)
+        self._kept: U8 | None = None
+
+    def apply(self, bgr: U8, t_s: float) -> U8 | None:
+        """What comes out of the camera at simulated time `t_s`; None: no picture comes.
+
+        A camera that is frozen from its first picture on shows that one.
+        """
+        if active(self._faults, FaultKind.CAMERA_DROPPED, t_s):
+            return None
+        if self._kept is None or not active(self._faults, FaultKind.CAMERA_FROZEN, t_s):
+            self._kept = bgr.copy()
+        shown = self._kept
+        blurred = active(self._faults, FaultKind.CAMERA_BLURRED, t_s)
+        if blurred:
+            sigma_px = (blurred.amount or BLUR_PX) * bgr.shape[1] / 320.0
+            shown = np.asarray(cv2.GaussianBlur(shown, (0, 0), sigma_px), np.uint8)
+        if active(self._faults, FaultKind.CAMERA_BLACK, t_s):
+            shown = black(shown, DARK_SEVERITY, np.random.default_rng(round(t_s * 1e6)))
+        return shown

@@ -1,0 +1,136 @@
+"""`paani world`: what scenarios there are, pictures of one, its MuJoCo model, and whether files are sound."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import cv2
+from tqdm import tqdm
+
+from paani.errors import UserError
+from paani.whole_file import write_whole
+from paani_sim.worlds import WORLDS
+from paani_sim.worlds.load import SCENARIOS, load_scenario
+from paani_sim.worlds.scenario import Scenario
+
+VIEW_PX = (480, 360)
+MAX_VIEW_PX = 2048
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 done, 2 user's mistake."""
+    options = _parser().parse_args(argv)
+    return int(options.run(options))
+
+
+def _list(_: argparse.Namespace) -> int:
+    rows = [("scenario", "world", "route", "fixed", "moving", "faults")]
+    rows += [_row(load_scenario(name)) for name in (*WORLDS, *SCENARIOS)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        sys.stdout.write("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() + "\n")
+    sys.stdout.write("random:WORLD:SEED  drawn at random\n")
+    return 0
+
+
+def _row(scenario: Scenario) -> tuple[str, ...]:
+    world = scenario.world
+    lap = " lap" if world.route_closed else ""
+    faults = ", ".join(dict.fromkeys(str(fault.kind) for fault in scenario.faults))
+    counts = (str(len(world.obstacles)), str(len(world.actors)))
+    return (scenario.name, world.name, f"{world.route_length_m:.0f} m{lap}", *counts, faults)
+
+
+def _check(options: argparse.Namespace) -> int:
+    wrong = 0
+    for file in options.files:
+        try:
+            scenario = load_scenario(file)
+        except UserError as error:
+            wrong += 1
+            sys.stderr.write(f"paani: {error}\n")
+        else:
+            sys.stdout.write(f"{file}: sound ({', '.join(text for text in _row(scenario)[1:3])})\n")
+    return 2 if wrong else 0
+
+
+def _render(options: argparse.Namespace) -> int:
+    from paani_sim.worlds.sheet import VIEWS, sheet  # noqa: PLC0415  the rest needs no OpenGL
+
+    out: Path = options.out
+    if out.suffix.lower() != ".png":
+        raise UserError(f"--out {out}: must end in .png")
+    _require_folder(out)
+    picture = None
+    with tqdm(total=VIEWS, unit="view", desc=str(options.scenario), disable=None) as progress:
+        for picture in sheet(load_scenario(options.scenario), *options.size):
+            progress.update(picture is None)
+    _, data = cv2.imencode(".png", picture)
+    write_whole(out, data.tobytes(), "--out")
+    return 0
+
+
+def _mjcf(options: argparse.Namespace) -> int:
+    from paani_sim.vessels import load_vessel  # noqa: PLC0415
+    from paani_sim.worlds.spec import build_spec  # noqa: PLC0415  the rest needs no MuJoCo
+
+    _require_folder(options.out)
+    scenario = load_scenario(options.scenario)
+    spec = build_spec(scenario.world, load_vessel(scenario.vessel), visual=True)
+    spec.compile()
+    write_whole(options.out, spec.to_xml().encode(), "--out")
+    return 0
+
+
+def _dataset(options: argparse.Namespace) -> int:
+    from paani_sim.dataset import write_dataset  # noqa: PLC0415  the rest needs no OpenGL
+
+    _require_folder(options.out)
+    manifest = write_dataset(options.out, options.n, options.seed, options.worlds)
+    boxes = ", ".join(f"{count} {name}" for name, count in manifest.boxes.items())
+    sys.stdout.write(f"{options.out}: {manifest.images} pictures, boxes: {boxes}\n")
+    return 0
+
+
+def _require_folder(out: Path) -> None:
+    if not out.absolute().parent.is_dir():
+        raise UserError(f"--out {out}: no such folder")
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    size = int(width), int(height)
+    if not all(16 <= side <= MAX_VIEW_PX for side in size):
+        raise ValueError(text)
+    return size
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if not 1 <= count <= 1_000_000:
+        raise ValueError(text)
+    return count
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani world", description=__doc__)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    listed = commands.add_parser("list", help="the worlds and scenarios that can be named")
+    listed.set_defaults(run=_list)
+    render = commands.add_parser("render", help="a sheet: the plan, and what the camera sees along the route")
+    render.add_argument("--size", type=_size, default=VIEW_PX, metavar="WIDTHxHEIGHT", help="of a view (480x360)")
+    check = commands.add_parser("check", help="whether scenario files are sound")
+    check.add_argument("files", nargs="+", metavar="FILE")
+    check.set_defaults(run=_check)
+    mjcf = commands.add_parser("mjcf", help="the MuJoCo model of boat and solids, as XML")
+    for command, run in ((render, _render), (mjcf, _mjcf)):
+        command.add_argument("scenario", help="name or TOML file")
+        command.add_argument("--out", type=Path, required=True, metavar="FILE")
+        command.set_defaults(run=run)
+    dataset = commands.add_parser("dataset", help="labelled pictures for training")
+    dataset.add_argument("--n", type=_count, required=True, help="how many pictures")
+    dataset.add_argument("--seed", type=int, default=0)
+    dataset.add_argument("--out", type=Path, required=True, metavar="DIR")
+    dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
+    dataset.set_defaults(run=_dataset)
+    return parser

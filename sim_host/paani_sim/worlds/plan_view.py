@@ -1,0 +1,137 @@
+"""A scenario seen from above: shore, route, what stands and what moves, with a legend and a scale. Colours are BGR."""
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from paani_sim.worlds.curves import Points
+from paani_sim.worlds.scenario import Scenario
+from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose
+
+U8 = npt.NDArray[np.uint8]
+Rgb = tuple[int, int, int]
+
+WATER: Rgb = (222, 196, 160)
+LAND: dict[Bank, Rgb] = {Bank.GRASS: (150, 196, 160), Bank.QUAY: (188, 192, 196)}
+INK: Rgb = (40, 40, 40)
+ROUTE: Rgb = (40, 40, 220)
+PATH: Rgb = (190, 60, 160)
+FENCE: Rgb = (0, 110, 255)
+KINDS: dict[Kind, Rgb] = {
+    Kind.VESSEL: (120, 60, 30),
+    Kind.PERSON: (30, 30, 200),
+    Kind.PIER: (60, 100, 130),
+    Kind.BUOY: (0, 150, 255),
+    Kind.OTHER: (110, 110, 110),
+}
+SUB_BITS = 4  # of a pixel, in drawing
+MARGIN_M = 8.0
+LEAST_PX = 3.0
+SCALES_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def plan_view(scenario: Scenario, width_px: int, height_px: int, views: Sequence[Pose2] = ()) -> U8:
+    """The part of the world around the route (all of the water, where the route is closed), `(height, width, 3)`.
+
+    `views` are drawn as numbered camera positions.
+    """
+    world = scenario.world
+    sheet = _Sheet(world.shore_m if world.route_closed else _surroundings(scenario), width_px, height_px)
+    sheet.picture[:] = LAND[world.bank]
+    sheet.fill(world.shore_m, WATER)
+    sheet.line(world.shore_m, INK, closed=True)
+    for area in scenario.fence:
+        sheet.line(np.array([(p.x_m, p.y_m) for p in area.corners]), FENCE, closed=True, width_px=2)
+    for obstacle in world.obstacles:
+        sheet.fill(_outline(obstacle, obstacle.pose), KINDS[obstacle.kind])
+    for actor in world.actors:
+        sheet.line(actor.path_m, PATH, closed=actor.closed)
+        sheet.fill(_outline(actor, actor_pose(actor, 0.0)), PATH)
+    sheet.line(world.route_m, ROUTE, closed=world.route_closed, width_px=2)
+    sheet.dot(world.start[:2], ROUTE, 6)
+    for number, view in enumerate(views, start=1):
+        sheet.view(view, str(number))
+    sheet.scale()
+    sheet.legend()
+    return sheet.picture
+
+
+def _surroundings(scenario: Scenario) -> Points:
+    route_m = scenario.world.route_m
+    return np.vstack([route_m - 2.0 * MARGIN_M, route_m + 2.0 * MARGIN_M])
+
+
+def _outline(thing: Obstacle | Actor, pose: Pose2) -> Points:
+    """The footprint's corners, of what is long with a bow."""
+    half = np.array([0.5 * thing.length_m, 0.5 * thing.width_m])
+    corners = np.array([[-1.0, -1.0], [0.55, -1.0], [1.0, 0.0], [0.55, 1.0], [-1.0, 1.0]])
+    if thing.kind is not Kind.VESSEL:
+        corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return np.asarray(corners * half @ np.array([[cos, sin], [-sin, cos]]) + np.array(pose[:2]))
+
+
+class _Sheet:
+    """A picture with map coordinates."""
+
+    def __init__(self, around_m: Points, width_px: int, height_px: int) -> None:
+        low, high = around_m.min(axis=0) - MARGIN_M, around_m.max(axis=0) + MARGIN_M
+        self._per_m = float(min(width_px / (high - low)[0], height_px / (high - low)[1]))
+        self._middle_m = 0.5 * (low + high)
+        self._middle_px = np.array([0.5 * width_px, 0.5 * height_px])
+        self.picture: U8 = np.zeros((height_px, width_px, 3), np.uint8)
+
+    def _px(self, points_m: Points) -> npt.NDArray[np.int32]:
+        """In fractions of a pixel, as OpenCV takes them."""
+        px = (np.asarray(points_m) - self._middle_m) * [self._per_m, -self._per_m] + self._middle_px
+        return np.asarray(np.round(np.clip(px, -3e4, 3e4) * (1 << SUB_BITS)), np.int32)
+
+    def fill(self, polygon_m: Points, rgb: Rgb) -> None:
+        """What would be smaller than a dot becomes one."""
+        if np.ptp(polygon_m, axis=0).max() * self._per_m < 2.0 * LEAST_PX:
+            self.dot(polygon_m.mean(axis=0), rgb, LEAST_PX)
+        else:
+            cv2.fillPoly(self.picture, [self._px(polygon_m)], rgb, cv2.LINE_AA, SUB_BITS)
+
+    def line(self, line_m: Points, rgb: Rgb, *, closed: bool, width_px: int = 1) -> None:
+        cv2.polylines(self.picture, [self._px(line_m)], closed, rgb, width_px, cv2.LINE_AA, SUB_BITS)
+
+    def dot(self, at_m: Points | tuple[float, float], rgb: Rgb, radius_px: float) -> None:
+        x, y = (int(v) for v in self._px(np.asarray(at_m)))
+        cv2.circle(self.picture, (x, y), round(radius_px * (1 << SUB_BITS)), rgb, -1, cv2.LINE_AA, SUB_BITS)
+
+    def view(self, pose: Pose2, label: str) -> None:
+        """A wedge where the camera looks, and its number."""
+        reach_m = 26.0 / self._per_m
+        rays = [pose.yaw_rad + turn for turn in (-0.6, 0.6)]
+        ends = [(pose.x_m + reach_m * math.cos(ray), pose.y_m + reach_m * math.sin(ray)) for ray in rays]
+        self.line(np.array([ends[0], pose[:2], ends[1]]), INK, closed=False, width_px=2)
+        x, y = (int(v) >> SUB_BITS for v in self._px(np.asarray(pose[:2])))
+        _text(self.picture, label, (x - 22, y + 6), 0.6, 2)
+
+    def scale(self) -> None:
+        """A bar of a round length, about a sixth of the width, above north."""
+        room_px = self.picture.shape[1] / 6.0
+        length_m = max((m for m in SCALES_M if m * self._per_m <= room_px), default=SCALES_M[0])
+        length_px, base = round(length_m * self._per_m), self.picture.shape[0] - 18
+        cv2.line(self.picture, (18, base), (18 + length_px, base), INK, 3)
+        _text(self.picture, f"{length_m:.0f} m", (18, base - 8), 0.5, 1)
+        cv2.arrowedLine(self.picture, (32, base - 34), (32, base - 74), INK, 2, cv2.LINE_AA, 0, 0.3)
+        _text(self.picture, "N", (40, base - 58), 0.5, 1)
+
+    def legend(self) -> None:
+        """What the colours mean, in the upper left corner."""
+        rows = [*((str(kind), rgb) for kind, rgb in KINDS.items()), ("path", PATH), ("route", ROUTE)]
+        cv2.rectangle(self.picture, (8, 8), (108, 16 + 18 * len(rows)), (245, 245, 245), -1)
+        for number, (name, rgb) in enumerate(rows):
+            y = 20 + 18 * number
+            cv2.rectangle(self.picture, (14, y - 4), (30, y + 6), rgb, -1)
+            _text(self.picture, name, (38, y + 6), 0.45, 1)
+
+
+def _text(picture: U8, text: str, at_px: tuple[int, int], size: float, width_px: int) -> None:
+    cv2.putText(picture, text, at_px, FONT, size, INK, width_px, cv2.LINE_AA)

@@ -1,0 +1,78 @@
+"""A scenario on one sheet: what it is, its plan, and what the boat's camera sees along the route."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from paani_sim.eye.camera import BoatPose, Camera
+from paani_sim.eye.renderer import Eye
+from paani_sim.worlds.casting import route_way
+from paani_sim.worlds.meetings import BOAT_MPS
+from paani_sim.worlds.plan_view import FONT, INK, plan_view
+from paani_sim.worlds.scenario import Scenario
+from paani_sim.worlds.world import Pose2
+
+U8 = npt.NDArray[np.uint8]
+COLUMNS = 4
+VIEWS = 8
+TITLE_PX, CAPTION_PX = 56, 22
+
+
+def sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[U8 | None]:
+    """Yields None as each of the `VIEWS` views of this size is drawn, then the sheet. Raises UserError without OpenGL.
+
+    A view is what a boat sees that moves along the route at 0.6 m/s and gets there in time.
+    """
+    length_m, way = scenario.world.route_length_m, route_way(scenario.world)
+    span_m = length_m if scenario.world.route_closed else 0.94 * length_m
+    along_m = np.linspace(0.0, span_m, VIEWS, endpoint=not scenario.world.route_closed)
+    poses = [way.at(float(distance_m)) for distance_m in along_m]
+    pictures = []
+    with Eye(scenario.world, Camera(width_px=width_px, height_px=height_px)) as eye:
+        for number, (distance_m, pose) in enumerate(zip(along_m, poses, strict=True), start=1):
+            t_s = float(distance_m) / BOAT_MPS
+            picture = eye.render(BoatPose(*pose), t_s).bgr
+            pictures.append(_captioned(picture, f"{number}   {distance_m:.0f} m   {t_s:.0f} s"))
+            yield None
+    yield _laid_out(scenario, poses, pictures)
+
+
+def _laid_out(scenario: Scenario, poses: list[Pose2], pictures: list[U8]) -> U8:
+    rows = [np.hstack(pictures[first : first + COLUMNS]) for first in range(0, len(pictures), COLUMNS)]
+    width_px = rows[0].shape[1]
+    plan = plan_view(scenario, width_px, _plan_height_px(scenario, width_px), poses)
+    return np.vstack([_title(scenario, width_px), plan, *rows])
+
+
+def _plan_height_px(scenario: Scenario, width_px: int) -> int:
+    """As high as the water is for its width, within a quarter and six tenths of it."""
+    world = scenario.world
+    x_m, y_m = np.ptp(world.shore_m if world.route_closed else world.route_m, axis=0) + 32.0
+    return round(width_px * min(0.6, max(0.25, float(y_m / x_m))))
+
+
+def _title(scenario: Scenario, width_px: int) -> U8:
+    world = scenario.world
+    wind, light = world.wind, world.light
+    first = (
+        f"{scenario.name}   {world.name}, {world.route_length_m:.0f} m, {len(world.obstacles)} things, "
+        f"{len(world.actors)} moving"
+    )
+    sun_deg, toward_deg = np.degrees(light.sun_elevation_rad), np.degrees(wind.toward_rad) % 360.0
+    parts = [
+        f"{light.sky}, sun {sun_deg:.0f} deg, visibility {light.visibility_m:.0f} m, rain {light.rain_mmph:.1f} mm/h",
+        f"wind {wind.speed_mps:.1f} m/s towards {toward_deg:.0f} deg, current {world.current.speed_mps:.2f} m/s",
+        *(f"{fault.kind} at {fault.start_s:.0f} s" for fault in scenario.faults),
+    ]
+    band = np.full((TITLE_PX, width_px, 3), 250, np.uint8)
+    cv2.putText(band, first, (12, 24), FONT, 0.7, INK, 1, cv2.LINE_AA)
+    cv2.putText(band, ", ".join(parts), (12, 46), FONT, 0.5, INK, 1, cv2.LINE_AA)
+    return band
+
+
+def _captioned(picture: U8, caption: str) -> U8:
+    band = np.full((CAPTION_PX, picture.shape[1], 3), 250, np.uint8)
+    cv2.putText(band, caption, (8, 16), FONT, 0.5, INK, 1, cv2.LINE_AA)
+    return np.vstack([picture, band])

@@ -1,0 +1,120 @@
+"""A boat on a plane, its sensors, and the estimator at 20 Hz."""
+
+import math
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+
+from paani.config import LocalizationConfig
+from paani.geometry import geodetic_from_enu
+from paani.messages import GpsFix, ImuSample, Odometry
+from paani_services.localization.estimator import Estimator
+
+ORIGIN_DEG = (50.0, 8.0)
+CONFIG = LocalizationConfig(origin_lat_lon_deg=ORIGIN_DEG)
+START_US = 5_000_000
+BIAS_RADPS = 0.004
+PICK_UP_MPS2 = 0.5
+
+
+def unchanged(samples: list[ImuSample]) -> list[ImuSample]:
+    return samples
+
+
+class Ride:
+    """`wander_m`: spread of a GPS error that forgets itself in a minute; `fix_noise_m`: of one drawn anew each time."""
+
+    def __init__(
+        self,
+        config: LocalizationConfig = CONFIG,
+        seed: int = 1,
+        *,
+        wander_m: float = 0.0,
+        fix_noise_m: float = 0.3,
+        fix_speed_noise_mps: float = 0.05,
+        fix_std_m: float = 0.8,
+        steps_per_fix: int = 4,
+    ) -> None:
+        self.estimator = Estimator(config)
+        self.rng = np.random.default_rng(seed)
+        self.now_us = START_US
+        self.x_m, self.y_m, self.yaw_rad, self.surge_mps = 20.0, -10.0, 0.5, 0.0
+        self.gps = self.imu = True
+        self.fix_offset_m = self.compass_bias_rad = self.gyro_fault_radps = 0.0
+        self.epoch = 0
+        self.local = self.glob = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
+        self.change: Callable[[list[ImuSample]], list[ImuSample]] = unchanged  # what befalls the samples on their way
+        self.change_fix: Callable[[GpsFix], GpsFix] = lambda fix: fix
+        self._wander_std_m, self._wander_m = wander_m, wander_m * self.rng.standard_normal(2)
+        self._fix_noise_m, self._fix_speed_noise_mps, self._fix_std_m = fix_noise_m, fix_speed_noise_mps, fix_std_m
+        self._steps_per_fix = steps_per_fix
+
+    def go(self, seconds: float, surge_mps: float = 0.0, yaw_rate_radps: float = 0.0) -> list[Odometry]:
+        """The global estimates of `seconds` that end at this speed."""
+        found = []
+        for step in range(round(seconds * 20)):
+            samples = self.change([self.sample(surge_mps, yaw_rate_radps) for _ in range(5)])
+            fix = self.change_fix(self.fix()) if step % self._steps_per_fix == 0 and self.gps else None
+            self.local, self.glob = self.estimator.step(samples if self.imu else [], fix, self.now_us)
+            found.append(self.glob)
+        return found
+
+    def off_m(self) -> float:
+        """How far the global estimate is from the boat."""
+        return math.hypot(self.glob.x_m - self.x_m, self.glob.y_m - self.y_m)
+
+    def sample(self, surge_mps: float, yaw_rate_radps: float) -> ImuSample:
+        """The next 10 ms of the boat, picking up to that speed."""
+        self.now_us += 10_000
+        change = PICK_UP_MPS2 * 0.01
+        gained_mps = min(max(surge_mps - self.surge_mps, -change), change)
+        self.surge_mps += gained_mps
+        self.yaw_rad += yaw_rate_radps * 0.01
+        self.x_m += self.surge_mps * math.cos(self.yaw_rad) * 0.01
+        self.y_m += self.surge_mps * math.sin(self.yaw_rad) * 0.01
+        noise = self.rng.standard_normal(4)
+        return ImuSample(
+            source_us=self.now_us,
+            epoch=self.epoch,
+            gyro_x_radps=0.0,
+            gyro_y_radps=0.0,
+            gyro_z_radps=yaw_rate_radps + BIAS_RADPS + self.gyro_fault_radps + 0.002 * noise[0],
+            accel_x_mps2=gained_mps / 0.01 + 0.03 * noise[1],
+            accel_y_mps2=self.surge_mps * yaw_rate_radps + 0.03 * noise[2],
+            accel_z_mps2=9.81,
+            orientation_available=True,
+            yaw_rad=self.yaw_rad + self.compass_bias_rad + 0.01 * noise[3],
+        )
+
+    def fix(self) -> GpsFix:
+        """What the receiver says of here and now."""
+        keep = math.exp(-self._steps_per_fix / 20.0 / 60.0)
+        renew_m = self._wander_std_m * math.sqrt(1.0 - keep * keep)
+        self._wander_m = keep * self._wander_m + renew_m * self.rng.standard_normal(2)
+        noise = self.rng.standard_normal(4)
+        latitude_deg, longitude_deg = geodetic_from_enu(
+            self.x_m + self.fix_offset_m + float(self._wander_m[0]) + self._fix_noise_m * noise[0],
+            self.y_m + float(self._wander_m[1]) + self._fix_noise_m * noise[1],
+            *ORIGIN_DEG,
+        )
+        vx = self.surge_mps * math.cos(self.yaw_rad) + self._fix_speed_noise_mps * noise[2]
+        vy = self.surge_mps * math.sin(self.yaw_rad) + self._fix_speed_noise_mps * noise[3]
+        return GpsFix(
+            source_us=self.now_us,
+            latitude_deg=latitude_deg,
+            longitude_deg=longitude_deg,
+            sog_mps=math.hypot(vx, vy),
+            cog_rad=math.atan2(vy, vx),
+            position_std_m=self._fix_std_m,
+        )
+
+
+def wandering(seed: int = 1, config: LocalizationConfig = CONFIG) -> Ride:
+    """The receiver of the simulator: 0.8 m of wander, 0.05 m of noise."""
+    return Ride(config, seed, wander_m=0.8, fix_noise_m=0.05)
+
+
+def shifted(sample: ImuSample, by_us: int) -> ImuSample:
+    """The same sample with another stamp."""
+    return msgspec.structs.replace(sample, source_us=sample.source_us + by_us)

@@ -1,0 +1,88 @@
+"""Flat water with bars across it, as the calibrated camera of the simulator would report it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from paani import messages as m
+from paani.config import calibration_of, load_config
+from paani_services.navigator.grid import Camera
+from paani_services.navigator.sighting import Memory, remember
+from paani_sim.eye.camera import BoatPose, look_from
+from paani_sim.eye.camera import Camera as Eye
+
+CONFIG = load_config()
+CAMERA = Camera(calibration_of(CONFIG.eye))
+PLANNER = CONFIG.navigator.planner
+EYE = Eye()
+ROWS, COLUMNS = 64, 80
+START_US = 5_000_000
+Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
+FAR_M = 500.0
+AT_REST, NOTHING = BoatPose(0.0, 0.0, 0.0), Memory()
+
+
+def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
+    """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
+    position, turn = look_from(boat, EYE)
+    found = []
+    for column in range(COLUMNS):
+        edge = 0.0
+        for row in range(ROWS - 1, -1, -1):
+            right = ((column + 0.5) / COLUMNS - 0.5) * EYE.width_px
+            up = (0.5 - (row + 0.5) / ROWS) * EYE.height_px
+            ray = turn @ np.array([right, up, -EYE.focal_px])
+            far_m = position[2] / -ray[2] * math.hypot(ray[0], ray[1]) if ray[2] < 0.0 else math.inf
+            x, y = position[:2] + far_m / math.hypot(ray[0], ray[1]) * ray[:2] if far_m < math.inf else (0.0, 0.0)
+            if far_m > bank_m or any(w <= x <= e and s <= y <= n for w, s, e, n in bars):
+                edge = (row + 1) / ROWS
+                break
+        found.append(edge)
+    return tuple(found)
+
+
+def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Evidence:
+    """Usable evidence of a frame taken then."""
+    given: dict[str, object] = {
+        "source_us": at_us,
+        "frame_seq": at_us // 1000,
+        "frame_epoch": 1,
+        "width_px": 320,
+        "height_px": 240,
+        "usable": True,
+        "navigation_eligible": True,
+        "segmentation": m.SegmentationSource.LEARNED,
+        "water_edge": edge,
+    }
+    return m.Evidence(**(given | changes))  # type: ignore[arg-type]
+
+
+def odometry(at_us: int, boat: BoatPose, surge_mps: float = 0.0, **changes: object) -> m.Odometry:
+    """Healthy odometry of a boat that lies so."""
+    given: dict[str, object] = {
+        "source_us": at_us,
+        "epoch": 1,
+        "x_m": boat.x_m,
+        "y_m": boat.y_m,
+        "yaw_rad": boat.yaw_rad,
+        "roll_rad": boat.roll_rad,
+        "pitch_rad": boat.pitch_rad,
+        "surge_mps": surge_mps,
+        "healthy": True,
+    }
+    return m.Odometry(**(given | changes))  # type: ignore[arg-type]
+
+
+def seen(
+    boat: BoatPose = AT_REST,
+    edge: tuple[float, ...] | None = None,
+    at_us: int = START_US,
+    memory: Memory = NOTHING,
+    **changes: object,
+) -> Memory:
+    """The memory after one more picture from there; open water by default."""
+    shown = edge if edge is not None else edge_of(boat)
+    memory = remember(memory, odometry(at_us, boat), None, PLANNER)
+    return remember(memory, None, evidence(at_us, shown, **changes), PLANNER)
