@@ -50,7 +50,7 @@ CONDITIONS = (
 
 
 class Instant(NamedTuple):
-    """One step of the estimator: what is true, what it says, and the fix it was given."""
+    """One step of the estimator: what is true, what it says, and the compass and fix it was given."""
 
     at_s: float
     x_m: float
@@ -58,13 +58,14 @@ class Instant(NamedTuple):
     yaw_rad: float
     speed_mps: float
     said: m.Odometry
+    compass_rad: float
     fix: m.GpsFix | None
 
 
 class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
     """One course. Distances are in the plane; healthy: while the estimate said so.
 
-    gps_m: RMS error of the fixes themselves. nis: mean over the fixes that were used, 2 if the stated spread is right;
+    gps_m, compass_deg: RMS errors of the fixes and of the compass themselves. nis: mean over the fixes that were used, 2 if the stated spread is right;
     nis_low, nis_high: its 95 % band. nees: mean squared position error over the published variance, at most 2 if the
     published spread covers the error. false_motion_frac: of the steps truly at rest, those with an estimated speed
     above 0.05 m/s; None: never at rest. false_motion_s: the longest stretch of them.
@@ -76,6 +77,7 @@ class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
     healthy_position_m: float
     gps_m: float
     heading_deg: float
+    compass_deg: float
     speed_mps: float
     nis: float
     nis_low: float
@@ -114,7 +116,8 @@ def course(condition: Condition, seed: int, config: Config) -> Iterator[Instant]
                 _, said = estimator.step(samples, fix, now_us)
                 surge_mps, sway_mps, _ = plant.velocity
                 speed_mps = math.hypot(surge_mps, sway_mps)
-                yield Instant(plant.sim_us * 1e-6, *plant.position_m, plant.attitude.yaw_rad, speed_mps, said, fix)
+                truth = (*plant.position_m, plant.attitude.yaw_rad, speed_mps)
+                yield Instant(plant.sim_us * 1e-6, *truth, said, samples[-1].yaw_rad, fix)
                 samples, fix = [], None
     finally:
         plant.close()
@@ -144,6 +147,7 @@ def row_of(condition: str, seed: int, instants: list[Instant], world: World) -> 
         healthy_position_m=_rms(healthy),
         gps_m=_rms([_fix_off2_m2(each, world) for each in instants if each.fix is not None and each.fix.fix]),
         heading_deg=math.degrees(_rms([wrap_rad(each.said.yaw_rad - each.yaw_rad) ** 2 for each in instants])),
+        compass_deg=math.degrees(_rms([wrap_rad(each.compass_rad - each.yaw_rad) ** 2 for each in instants])),
         speed_mps=_rms(
             [(math.hypot(each.said.surge_mps, each.said.sway_mps) - each.speed_mps) ** 2 for each in instants]
         ),
@@ -179,13 +183,13 @@ def part_of(rows: list[EstimationRow]) -> Part:
     return Part(
         name="estimation",
         columns=(
-            "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "speed m/s", "NIS", "95 % band",
+            "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg", "speed m/s", "NIS", "95 % band",
             "NEES", "false motion %", "longest s", "unhealthy s", "refused",
         ),
         rows=tuple(
             (
                 row.condition, row.seed, round(row.position_m, 2), round(row.healthy_position_m, 2),
-                round(row.gps_m, 2), round(row.heading_deg, 2), round(row.speed_mps, 3), round(row.nis, 2),
+                round(row.gps_m, 2), round(row.heading_deg, 2), round(row.compass_deg, 2), round(row.speed_mps, 3), round(row.nis, 2),
                 f"{row.nis_low:.2f}..{row.nis_high:.2f}", round(row.nees, 2),
                 None if row.false_motion_frac is None else round(100.0 * row.false_motion_frac, 2),
                 round(row.false_motion_s, 2), round(row.unhealthy_s, 1), row.refused,

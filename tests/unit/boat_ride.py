@@ -73,7 +73,7 @@ class Ride:
         self.yaw_rad += yaw_rate_radps * 0.01
         self.x_m += self.surge_mps * math.cos(self.yaw_rad) * 0.01
         self.y_m += self.surge_mps * math.sin(self.yaw_rad) * 0.01
-        noise = self.rng.standard_normal(4)
+        noise = self.rng.standard_normal(4).tolist()
         return ImuSample(
             source_us=self.now_us,
             epoch=self.epoch,
@@ -92,7 +92,7 @@ class Ride:
         keep = math.exp(-self._steps_per_fix / 20.0 / 60.0)
         renew_m = self._wander_std_m * math.sqrt(1.0 - keep * keep)
         self._wander_m = keep * self._wander_m + renew_m * self.rng.standard_normal(2)
-        noise = self.rng.standard_normal(4)
+        noise = self.rng.standard_normal(4).tolist()
         latitude_deg, longitude_deg = geodetic_from_enu(
             self.x_m + self.fix_offset_m + float(self._wander_m[0]) + self._fix_noise_m * noise[0],
             self.y_m + float(self._wander_m[1]) + self._fix_noise_m * noise[1],

@@ -14,9 +14,10 @@ import pytest
 
 from paani.errors import UserError
 from paani_sim.dataset import Manifest, write_dataset
-from paani_sim.eye import BoatPose, Eye, Labelled, project
+from paani_sim.eye import BoatPose, Camera, Eye, Labelled, project
+from paani_sim.eye.camera import look_from
 from paani_sim.eye.gl import Context
-from paani_sim.worlds import Kind, Light, Obstacle, Pose2, Wind, World, load_world
+from paani_sim.worlds import Kind, Light, Obstacle, Pose2, Wind, World, actor_at, along_at, load_world
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(120)]
 
@@ -69,7 +70,7 @@ def test_water_moves_with_time(eye: Eye, river: World) -> None:
     assert step.max(axis=2)[water].mean() > 2.0
 
 
-@pytest.mark.parametrize("name", ["lake", "river"])
+@pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
 def test_picture_is_well_exposed_all_round_the_route(name: str) -> None:
     _require_gl()
     world = load_world(name)
@@ -154,6 +155,101 @@ def test_actor_moves_through_the_picture(eye: Eye, river: World) -> None:
             if box.id == "boat_under_way":
                 seen.add((box.x0_px, box.x1_px))
     assert len(seen) > 3
+
+
+def test_actors_are_drawn_where_the_plant_says(eye: Eye, river: World) -> None:
+    """`actors_along_m` overrides time; what time says gives the same picture."""
+    pose = BoatPose(60.0, float(river.route_m[6, 1]), 0.3)
+    by_time = [along_at(actor, 40.0) for actor in river.actors]
+    assert np.array_equal(eye.render(pose, 40.0).bgr, eye.render(pose, 40.0, by_time).bgr)
+    boat = next(k for k, actor in enumerate(river.actors) if actor.id == "boat_under_way")
+    seen = set()
+    for along_m in range(0, 300, 15):
+        by_time[boat] = float(along_m)
+        boxes = eye.render_labelled(pose, 40.0, by_time).boxes
+        seen |= {b[2:4] for b in boxes if b.id == "boat_under_way"}
+    assert len(seen) > 2
+    with pytest.raises(ValueError, match="argument"):
+        eye.render(pose, 40.0, by_time[:1])
+
+
+@pytest.mark.parametrize(("supersample", "first_row"), [(1.0, 115), (1.5, 130)])
+@pytest.mark.parametrize(("roll_rad", "pitch_rad"), [(0.0, 0.0), (0.06, -0.03)])
+def test_depth_of_water_is_that_of_the_plane(
+    river: World, supersample: float, first_row: int, roll_rad: float, pitch_rad: float
+) -> None:
+    """Within 1 % of the ray through each pixel's middle cut with z = 0; the sky is infinitely far."""
+    _require_gl()
+    pose = dataclasses.replace(at_start(river), roll_rad=roll_rad, pitch_rad=pitch_rad)
+    with Eye(river, supersample=supersample) as looking:
+        seen = view(looking, pose)
+        camera = looking.camera
+    position, turn = look_from(pose, camera)
+    columns, rows = np.meshgrid(np.arange(320) + 0.5, np.arange(240) + 0.5)
+    ray = np.stack([(columns - 160.0) / camera.focal_px, (120.0 - rows) / camera.focal_px, -np.ones_like(rows)], -1)
+    down = ray @ turn.T[:, 2]
+    water = (seen.mask == 1) & (rows > first_row) & (down < 0.0)
+    expected = -position[2] / down[water]
+    assert water.sum() > 20_000
+    assert seen.depth_m[water] == pytest.approx(expected, rel=0.01)
+    assert np.isinf(seen.depth_m[seen.mask == 2]).all()
+    assert np.isfinite(seen.depth_m[seen.mask != 2]).all()
+    assert seen.depth_m.dtype == np.float32
+
+
+def test_a_lens_bends_picture_mask_and_boxes_alike(river: World) -> None:
+    """A buoy at the edge of a barrel lens: its box lies where `project` says, well away from the pinhole's."""
+    _require_gl()
+    x_m, y_m, yaw_rad = river.start
+    way = yaw_rad + 0.5
+    spot = np.array([x_m + 6.0 * np.cos(way), y_m + 6.0 * np.sin(way)])
+    can = Obstacle("known", Kind.BUOY, "can", Pose2(float(spot[0]), float(spot[1]), 0.0), 0.8, 0.8, 1.2)
+    middles = {}
+    for camera in (Camera(), Camera(k1=-0.12)):
+        with Eye(river, camera) as looking:
+            looking.place([can])
+            box = next(b for b in view(looking, at_start(river)).boxes if b.id == "known")
+            middles[camera.k1] = 0.5 * (box.x0_px + box.x1_px)
+            middle = project(np.array([[*spot, 0.6]]), at_start(river), camera)[0]
+            assert middles[camera.k1] == pytest.approx(middle[0], abs=3.0)
+    assert middles[-0.12] > middles[0.0] + 3.0
+
+
+def test_a_moving_boat_leaves_a_wake(river: World) -> None:
+    """Behind it the water differs from that of the same boat at rest; elsewhere it does not."""
+    _require_gl()
+    boat = river.actors[0]
+    moving = dataclasses.replace(river, actors=(dataclasses.replace(boat, speed_mps=2.0),))
+    at_rest = dataclasses.replace(river, actors=(dataclasses.replace(boat, speed_mps=0.0),))
+    here = actor_at(boat, 200.0)
+    pose = BoatPose(here.x_m - 9.0 * np.cos(here.yaw_rad), here.y_m - 9.0 * np.sin(here.yaw_rad), here.yaw_rad)
+    pictures = []
+    for world in (moving, at_rest):
+        with Eye(world) as looking:
+            pictures.append(looking.render_labelled(pose, 5.0, (200.0,)))
+    water = (pictures[0].mask == 1) & (pictures[1].mask == 1)
+    change = np.abs(pictures[0].bgr.astype(int) - pictures[1].bgr).max(axis=2)
+    assert np.array_equal(pictures[0].mask, pictures[1].mask)
+    middle = np.zeros_like(water)
+    middle[150:, 100:220] = True
+    assert change[water & middle].mean() > 3.0
+    assert change[:90].max() <= 2
+
+
+def test_rain_and_fog_hide_what_is_far(river: World) -> None:
+    _require_gl()
+    with Eye(river) as looking:
+        pose = at_start(river)
+        clear = looking.render(pose, 5.0).bgr[80:105].astype(float)
+        contrast = {}
+        for name, light in {
+            "fog": dataclasses.replace(river.light, visibility_m=40.0),
+            "rain": dataclasses.replace(river.light, rain_mmph=40.0),
+        }.items():
+            looking.set_weather(light, river.wind)
+            contrast[name] = float(looking.render(pose, 5.0).bgr[80:105].astype(float).std())
+        assert contrast["fog"] < 0.6 * clear.std()
+        assert contrast["rain"] < clear.std()
 
 
 def test_weather_changes_the_picture(river: World) -> None:

@@ -11,7 +11,8 @@ import pytest
 import paani_sim.vessels
 from paani.config import PlantConfig
 from paani_sim.plant.plant import Plant, PlantDiverged
-from paani_sim.worlds import World, load_world
+from paani_sim.vessels import load_vessel
+from paani_sim.worlds import Fault, FaultKind, Scenario, World, load_world
 
 STEP_S = 0.01
 FORCE_N = 75.0
@@ -112,13 +113,14 @@ def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
     assert hit
 
 
-def test_boat_under_a_passing_hull_is_thrown_out_not_to_infinity(open_plant: OpenPlant) -> None:
-    """The worst of contacts, once inside every solid of the lake: the state stays finite and the speed comes down."""
-    plant = open_plant(load_world("lake"))
+@pytest.mark.parametrize("vessel", ["paper", "otter"])
+def test_boat_inside_a_solid_is_thrown_out_not_to_infinity(open_plant: OpenPlant, vessel: str) -> None:
+    """The worst of contacts, athwart the middle of every thing on the lake: thrown out, then slowed by the water."""
+    plant = open_plant(load_world("lake"), PlantConfig(vessel=vessel))
     for obstacle in load_world("lake").obstacles:
-        plant.place(obstacle.pose.x_m + 0.1, obstacle.pose.y_m - 0.1, 0.3)
-        drive(plant, 300, FORCE_N * 0.12)
-        assert max(map(abs, plant.velocity)) < 5.0
+        plant.place(obstacle.pose.x_m, obstacle.pose.y_m, 0.7)
+        drive(plant, 250, 9.0)
+        assert max(map(abs, plant.velocity)) < 5.0, obstacle.id
 
 
 def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
@@ -147,3 +149,15 @@ def test_divergence_names_itself(open_plant: OpenPlant, tmp_path: Path, monkeypa
     with pytest.raises(PlantDiverged, match="not finite"):
         drive(plant, 2000, 1e8)
     assert not list(tmp_path.iterdir())
+
+
+def test_vessel_of_the_settings_goes_before_the_scenario_s(open_plant: OpenPlant) -> None:
+    """A scenario's vessel, seed and faults make its boat; `--set plant.vessel=...` tries another vessel in it."""
+    scenario = Scenario("still", open_water(), seed=4, vessel="otter", faults=(Fault(FaultKind.GPS_OUTAGE, 0.0),))
+    for config, vessel in ((PlantConfig(), "otter"), (PlantConfig(vessel="paper"), "paper")):
+        plant = Plant.of(scenario, config)
+        try:
+            assert plant.vessel == load_vessel(vessel)
+            assert not plant.read_gps().fix
+        finally:
+            plant.close()

@@ -1,6 +1,7 @@
 """The plant in wind, waves and current, with its faults, hits and energy."""
 
 import dataclasses
+import itertools
 import math
 import statistics
 from collections.abc import Callable, Iterator
@@ -240,3 +241,41 @@ def test_truth_tells_where_the_actors_are(launch: Launch) -> None:
     assert truth.actors_along_m[0] < actor.start_m + 0.8 * actor.speed_mps * 60.0
     assert truth.actors_along_m[1] == pytest.approx(world.actors[1].start_m + world.actors[1].speed_mps * 60.0, abs=0.1)
     assert plant.collisions == 0
+
+
+def test_otter_heaves_and_rolls_with_its_added_mass(launch: Launch) -> None:
+    """Heave: sqrt(650 / 24.8) = 5.12 rad/s, zeta 0.3: 1.29 s. Roll: sqrt(90 / 1.032) = 9.34 rad/s, 0.2: 0.69 s."""
+    plant = launch(lake())
+    plant.place(0.0, 0.0, 0.0, z_m=0.227)
+    plant._data.qvel[3] = 0.2
+    heights, rolls = [], []
+    for _ in range(300):
+        plant.step(0.0, 0.0)
+        heights.append(plant.z_m - 0.177)
+        rolls.append(plant.attitude.roll_rad)
+    assert period_s(heights) == pytest.approx(1.286, abs=0.03)
+    assert period_s(rolls) == pytest.approx(0.687, abs=0.02)
+
+
+def period_s(swing: list[float]) -> float:
+    """Twice the time between the first two changes of sign."""
+    changes = [index for index, (a, b) in enumerate(itertools.pairwise(swing)) if a * b < 0.0]
+    return 2.0 * (changes[1] - changes[0]) * 0.01
+
+
+@pytest.mark.parametrize("vessel", ["paper", "otter"])
+def test_boat_rides_waves_much_longer_than_itself(launch: Launch, vessel: str) -> None:
+    """Swell of 20 m: the hull goes up and down with the surface and leans with its slope."""
+    plant = launch(lake(wind=Wind(10.0, 0.0), waves=Waves(20_000.0)), PlantConfig(vessel=vessel))
+    plant.place(0.0, 0.0, 0.0)
+    lifts, surface, pitches, slopes = [], [], [], []
+    for step in range(4000):
+        plant.step(0.0, 0.0)
+        if step > 1000:
+            lifts.append(plant.z_m - 0.177)
+            surface.append(plant.surroundings.elevation_m)
+            pitches.append(-plant.attitude.pitch_rad)
+            slopes.append(plant.surroundings.slope_ahead)
+    assert statistics.correlation(lifts, surface) > 0.98
+    assert statistics.pstdev(lifts) == pytest.approx(statistics.pstdev(surface), rel=0.15)
+    assert statistics.correlation(pitches, slopes) > 0.9

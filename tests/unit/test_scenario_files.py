@@ -65,7 +65,7 @@ frame = "route"
 at_m = [20.0, 3.0]
 [[actors]]
 look = "dinghy"
-path_m = [[-60.0, 60.0], [-40.0, 60.0], [-50.0, 50.0]]
+path_m = [[-20.0, 44.0], [-4.0, 44.0], [-12.0, 38.0]]
 closed = true
 speed_mps = 1.0
 length_m = 3.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from paani import messages as m
@@ -27,20 +25,17 @@ AT_REST, NOTHING = BoatPose(0.0, 0.0, 0.0), Memory()
 def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
     """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
     position, turn = look_from(boat, EYE)
-    found = []
-    for column in range(COLUMNS):
-        edge = 0.0
-        for row in range(ROWS - 1, -1, -1):
-            right = ((column + 0.5) / COLUMNS - 0.5) * EYE.width_px
-            up = (0.5 - (row + 0.5) / ROWS) * EYE.height_px
-            ray = turn @ np.array([right, up, -EYE.focal_px])
-            far_m = position[2] / -ray[2] * math.hypot(ray[0], ray[1]) if ray[2] < 0.0 else math.inf
-            x, y = position[:2] + far_m / math.hypot(ray[0], ray[1]) * ray[:2] if far_m < math.inf else (0.0, 0.0)
-            if far_m > bank_m or any(w <= x <= e and s <= y <= n for w, s, e, n in bars):
-                edge = (row + 1) / ROWS
-                break
-        found.append(edge)
-    return tuple(found)
+    right = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * EYE.width_px
+    up = (0.5 - (np.arange(ROWS) + 0.5) / ROWS) * EYE.height_px
+    pixels = np.stack(np.broadcast_arrays(right[None, :], up[:, None], -EYE.focal_px))
+    east, north, fall = np.einsum("ij,jrc->irc", turn * np.array([1.0, 1.0, -1.0])[:, None], pixels)
+    below = np.maximum(fall, 1e-9)
+    x_m, y_m = position[0] + position[2] / below * east, position[1] + position[2] / below * north
+    ends = (fall <= 0.0) | (np.hypot(x_m - position[0], y_m - position[1]) > bank_m)
+    for west, south, east_m, north_m in bars:
+        ends |= (x_m >= west) & (x_m <= east_m) & (y_m >= south) & (y_m <= north_m)
+    lowest = ROWS - ends[::-1].argmax(axis=0)
+    return tuple(np.where(ends.any(axis=0), lowest / ROWS, 0.0).tolist())
 
 
 def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Evidence:

@@ -11,7 +11,7 @@ MAX_FUTURE_S = 0.1  # as `NavigatorConfig.max_future_s`
 MIN_POSITION_STD_M, MAX_POSITION_STD_M = 0.1, 1000.0  # no receiver is better; worse is no position
 MAX_SOG_MPS = 100.0
 MAX_ACCEL_MPS2, MAX_RATE_RADPS = 160.0, 35.0  # the widest ranges of small IMUs: 16 g, 2000 degrees a second
-MAX_ANGLE_RAD = 10.0
+MAX_ANGLE_RAD = 1e4  # some count their turns
 
 
 def usable_samples(

@@ -18,6 +18,7 @@ RANGE_ERROR_M = (
     5.0  # of one range of a single-frequency receiver, times HDOP (GPS SPS performance standard: 8 m at 95 %)
 )
 UNKNOWN_STD_M = 10.0  # without HDOP; more than `LocalizationConfig.max_position_std_m`, so no boat sails by it
+WORST_HDOP = 99.99  # how receivers write that they have none
 DAY_S = 86_400.0
 _PLAIN = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?", re.ASCII)
 MAX_LENGTH = 120  # the standard allows 82; receivers write more
@@ -42,7 +43,7 @@ def parse(line: str) -> Fields | None:
     if len(line) < 7 or line[0] != "$" or line[3:6] not in _READERS:
         return None
     body, star, checksum = line[1:].partition("*")
-    if len(line) > MAX_LENGTH or not star or int(checksum, 16) != _checksum(body):
+    if len(line) > MAX_LENGTH or not star or checksum.upper() != f"{_checksum(body):02X}":
         raise ValueError("length or checksum")
     words = body.split(",")
     if len(words) < _WORDS[line[3:6]]:
@@ -66,7 +67,7 @@ def fixes(lines: Iterable[str], drops: Counter[str]) -> Iterator[GpsFix]:
         if found is None:
             continue
         if found.kind == "GGA":
-            std_m = UNKNOWN_STD_M if found.hdop is None else RANGE_ERROR_M * found.hdop
+            std_m = UNKNOWN_STD_M if found.hdop is None else RANGE_ERROR_M * min(found.hdop, WORST_HDOP)
         elif found.kind == "VTG":
             course = found
         elif found.kind == "RMC" or (not has_rmc and course.sog_mps is not None):

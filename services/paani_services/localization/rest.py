@@ -19,7 +19,8 @@ MAX_TILT_MPS2 = 0.15  # a constant that an IMU mounted askew by 0.9 degrees feel
 MAX_TURN_RADPS = 0.02
 FOUND_S = 5.0  # of fixes whose mean speed is about zero
 FOUND_MPS = 0.1  # slower than any speed that the navigator orders
-FOUND_SIGMAS, LOST_SIGMAS, STRAYED_SIGMAS = 2.5, 4.0, 4.0
+FOUND_SIGMAS, LOST_SIGMAS = 2.5, 4.0  # of the mean speed
+AWAY_SIGMAS, STRAYED_SIGMAS = 2.0, 4.0  # of the place: with such a speed, and with any
 SETTLE_S = 60.0  # over which the place of rest follows the receiver: a drift above 0.05 m/s leaves it behind
 
 
@@ -77,7 +78,7 @@ class RestWatch:
     def _keep_rest(self, fix: Shown, recent: list[Shown]) -> None:
         x_m, y_m = self._place_m
         strayed = math.hypot(fix.x_m - x_m, fix.y_m - y_m) / fix.std_m
-        if strayed > STRAYED_SIGMAS or (strayed > 1.0 and _sigmas(recent) > LOST_SIGMAS):
+        if strayed > STRAYED_SIGMAS or (strayed > AWAY_SIGMAS and _sigmas(recent) > LOST_SIGMAS):
             self._leave(felt_it=False)
             return
         since_s = (fix.at_us - self._shown[-2].at_us) * 1e-6 if len(self._shown) > 1 else 0.0
@@ -92,10 +93,15 @@ class RestWatch:
         if self._is_disturbed():
             self._has_moved = True
             return
-        fresh = not self._has_moved and _sigmas(recent) <= LOST_SIGMAS
-        mean_mps = math.hypot(fmean(each.vx_mps for each in shown), fmean(each.vy_mps for each in shown))
-        settled = shown[-1].at_us - shown[0].at_us >= 0.7 * FOUND_S * 1e6
-        if fresh or (settled and mean_mps < FOUND_MPS and _sigmas(shown) < FOUND_SIGMAS):
+        if shown[-1].at_us - shown[0].at_us < 0.7 * FOUND_S * 1e6:
+            return
+        if self._has_moved:
+            mean_mps = math.hypot(fmean(each.vx_mps for each in shown), fmean(each.vy_mps for each in shown))
+            spread_mps = fmean(each.std_mps for each in shown) / math.sqrt(len(shown))
+            found = mean_mps <= min(FOUND_SIGMAS * spread_mps, FOUND_MPS - FOUND_SIGMAS * spread_mps)
+        else:
+            found = _sigmas(shown) <= LOST_SIGMAS and _sigmas(recent) <= LOST_SIGMAS
+        if found:
             self.at_rest = True
             _, ahead, left, _ = zip(*self._felt, strict=True)
             self._usual = fmean(ahead), fmean(left)

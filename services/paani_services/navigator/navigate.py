@@ -111,7 +111,8 @@ def navigate(
         else:
             heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
     else:
-        heading_rad = guarded_course(wanted.course_rad, state.guards)
+        # The planner remembers where things are; guards are for who has no map.
+        heading_rad = wanted.course_rad if plans else guarded_course(wanted.course_rad, state.guards)
     if plans and not inhibits:
         wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0))
         pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner)

@@ -17,7 +17,7 @@ FIELD_CELLS = 10  # distances are known up to 2 m
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
 SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
-SOON = 1.0  # something on the way just beyond the horizon; less the later
+SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
 UNKNOWN = 0.4  # all of the way is unknown
 SLOW = 0.3  # a stop
@@ -70,6 +70,7 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
         return nowhere
     offsets, speeds = candidates(start, wish, config)
     ways = roll_out(start, offsets, speeds, config)
+    looked = ways.way_m <= config.look_m
     gap_m = _looked_up(grid, distance_m(grid.occupied), ways)
     blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
     needed_m = footprint_m(ways.at_s, float(gap_m[0, 0]), config)[:, None]
@@ -80,10 +81,10 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     if refused.all():
         return nowhere
     cost = _costs(offsets, speeds, start, before)
-    cost = cost + _way_costs(ways, gap_m - needed_m, met, unseen, soon, config)
+    cost = cost + _way_costs(ways, gap_m - needed_m, met & looked, unseen & looked, soon, config)
     best = int(np.where(refused, np.inf, cost).argmin())
     near = ways.way_m[:, best] <= config.verified_m
-    verified = bool(ways.way_m[-1, best] >= 0.5 * config.verified_m and not ((met | unseen)[:, best] & near).any())
+    verified = not bool(((met | unseen)[:, best] & near).any())
     return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]), verified)
 
 
@@ -108,13 +109,13 @@ def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F6
 
 
 def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Ways:
-    """Where the boat gets in steps of `step_s` up to `horizon_s`, of twice that and at full speed up to `lookahead_s`.
+    """Where the boat gets in steps of `step_s` up to `horizon_s`, then at full speed and twice as long up to `look_m`.
 
     Speed changes by `accel_mps2` at most; it turns towards the heading by `yaw_rate_radps` at most and on no tighter
     circle than `turn_radius_m`, for fans that only push.
     """
     fine = round(config.horizon_s / config.step_s)
-    coarse = max(0, math.ceil((config.lookahead_s - config.horizon_s) / (2.0 * config.step_s) - 1e-9))
+    coarse = math.ceil(config.look_m / (2.0 * config.step_s * config.speed_mps))
     steps_s = [config.step_s] * fine + [2.0 * config.step_s] * coarse
     count = offsets_rad.size
     cos, sin = (np.full(count, of(start.yaw_rad)) for of in (portable.cos, portable.sin))
@@ -125,14 +126,15 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     for number, step_s in enumerate(steps_s):
         if number == fine:  # from here on the way counts, not when
             speed, speeds_mps = np.maximum(speed, config.speed_mps), np.maximum(speeds_mps, config.speed_mps)
+        helm = np.clip((offsets_rad - turned) / FULL_HELM_RAD, -1.0, 1.0)
         gain = config.accel_mps2 * step_s
-        speed = speed + np.clip(speeds_mps - speed, -gain, gain)
+        driven = np.maximum(speeds_mps, config.helm_speed_mps * np.abs(helm))
+        speed = speed + np.clip(driven - speed, -gain, gain)
         fastest = np.full(count, config.yaw_rate_radps)
         if config.turn_radius_m > 0.0:
             fastest = np.minimum(fastest, speed / config.turn_radius_m)
-        wanted = np.clip((offsets_rad - turned) / FULL_HELM_RAD, -1.0, 1.0) * fastest
         swing = config.yaw_accel_radps2 * step_s
-        rate = rate + np.clip(wanted - rate, -swing, swing)
+        rate = rate + np.clip(helm * fastest - rate, -swing, swing)
         half = 0.5 * step_s * rate
         turned = turned + 2.0 * half
         # A rotation by 2 atan(half), which is right to 1e-4 rad a step and needs no sine.
@@ -198,8 +200,7 @@ def _way_costs(ways: Ways, spare_m: F64, met: Mask, unseen: Mask, soon: Mask, co
     cost = UNKNOWN * unseen.sum(axis=0) / len(unseen)
     nearest = np.where(soon, spare_m, np.inf).min(axis=0)
     cost = cost + CLOSE * np.clip(1.0 - nearest / CLEAR_M, 0.0, 1.0)
-    later_s = config.lookahead_s - config.horizon_s
-    if later_s > 0.0:
-        first_s = np.where(met & ~soon, ways.at_s[:, None], np.inf).min(axis=0)
-        cost = cost + SOON * np.clip((config.lookahead_s - first_s) / later_s, 0.0, 1.0)
+    if config.look_m > 0.0:
+        first_m = np.where(met, ways.way_m, np.inf).min(axis=0)
+        cost = cost + SOON * np.clip(1.0 - first_m / config.look_m, 0.0, 1.0)
     return np.asarray(cost)

@@ -62,7 +62,7 @@ class PlannerConfig(Section, frozen=True):
     camera that is blind beyond it leaves the rest unknown.
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
-    `lookahead_s`: what lies on the course beyond `horizon_s` is avoided early but forbids nothing.
+    `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     `verified_m`: a way known this far may turn the boat beyond `navigator.max_total_turn_deg`, up to `max_turn_deg`.
     """
@@ -79,12 +79,13 @@ class PlannerConfig(Section, frozen=True):
     jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten
     horizon_s: Positive = 3.0  # Q4
     step_s: Positive = 0.2  # Q4
-    lookahead_s: Positive = 8.0
+    look_m: NonNegative = 5.0  # a quarter turn at `turn_radius_m`, the boat, and as much again
     speed_mps: Positive = 0.6  # cap while the planner steers; the paper has 0.4 (Q5)
     yaw_rate_radps: Positive = 0.35  # Q5
     yaw_accel_radps2: Positive = 0.35
-    accel_mps2: Positive = 0.2  # Q5
+    accel_mps2: Positive = 0.4  # measured on K4, K5; the paper has 0.2 (Q5)
     turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
+    helm_speed_mps: NonNegative = 0.5  # measured: what one fan alone drives a boat at that turns as hard as it can
     hull_radius_m: Positive = 0.55  # Q6
     margin_m: NonNegative = 0.25  # Q6
     drift_mps: NonNegative = 0.15  # Q6

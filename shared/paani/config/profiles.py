@@ -38,7 +38,10 @@ PAPER: dict[str, object] = {
             "use": False,
             "hidden_s": 0.0,  # Q3
             "speed_mps": 0.4,  # Q5
-            "lookahead_s": 3.0,  # Q4
+            "accel_mps2": 0.2,  # Q5
+            "turn_radius_m": 0.0,  # Q5
+            "helm_speed_mps": 0.0,  # Q5
+            "look_m": 0.0,  # Q4
         },
     },
     "controller": {

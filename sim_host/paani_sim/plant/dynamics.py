@@ -13,9 +13,7 @@ from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.water.wind import wind_force
 
 WATER_DENSITY_KGPM3 = 1000.0
-FASTEST = (
-    10.0  # m/s or rad/s: beyond it drag grows linearly, so that a step of 10 ms stays stable whatever hits the boat
-)
+FASTEST = 10.0  # m/s or rad/s: beyond it drag grows linearly, or explicit steps would diverge after a hard hit
 
 
 class HullState(NamedTuple):
@@ -110,9 +108,10 @@ def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = 
         forward_x * ahead_n + left_x * sideways_n,
         forward_y * ahead_n + left_y * sideways_n,
         forward_z * ahead_n + left_z * sideways_n + up_n,
-        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad) - buoyancy.roll_damping * state.roll_rate_radps,
+        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad)
+        - buoyancy.roll_damping * (state.roll_rate_radps - around.slope_left_rate_ps),
         -buoyancy.pitch_stiffness * (around.slope_ahead + angles.pitch_rad)
-        - buoyancy.pitch_damping * state.pitch_rate_radps
+        - buoyancy.pitch_damping * (state.pitch_rate_radps + around.slope_ahead_rate_ps)
         + vessel.fans.height_m * thrust_n,
         port_nm,
     )

@@ -14,7 +14,7 @@ from paani.errors import UserError
 from paani_sim.trials.policies import Policy
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import random_scenario
-from paani_sim.worlds.load import load_scenario
+from paani_sim.worlds.load import SCENARIOS, load_scenario
 
 SPLIT, PLUS = ":", "+"
 STARTS_S = (12.0, 30.0)  # when a fault begins, drawn by seed
@@ -35,7 +35,7 @@ CAMERA_FAULTS = tuple(kind for kind in FAULTS if kind.name.startswith("CAMERA"))
 
 
 class Case(msgspec.Struct, frozen=True, order=True):
-    """One drive. `world`: a kind of world, whose scenario is drawn by `seed`, or the path of a scenario file."""
+    """One drive. `world`: a kind of world, where `seed` draws the scenario, or the name or file of one."""
 
     world: str
     seed: int
@@ -55,7 +55,7 @@ class Case(msgspec.Struct, frozen=True, order=True):
     @property
     def stem(self) -> str:
         """Of the files that belong to it."""
-        place = Path(self.world).stem if is_file(self.world) else self.world
+        place = Path(self.world).stem if is_written(self.world) else self.world
         return f"{place}{PLUS + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
 
 
@@ -73,9 +73,9 @@ SUITES = {
 }
 
 
-def is_file(world: str) -> bool:
-    """A scenario file, not a kind of world."""
-    return world.endswith(".toml")
+def is_written(world: str) -> bool:
+    """A scenario that somebody wrote, by name or as a file; not a kind of world to draw one in."""
+    return world.endswith(".toml") or world in SCENARIOS
 
 
 def cases_of(
@@ -92,7 +92,7 @@ def cases_of(
                 Case(world, seed, Policy.PAANI, kind.value)
                 for seed in range(first, first + count)
                 for world in worlds
-                if not is_file(world)
+                if not is_written(world)
             ]
     return found
 
@@ -102,8 +102,8 @@ def read_case(text: str) -> Case:
     place, _, rest = text.partition(SPLIT)
     seed, _, policy = rest.partition(SPLIT)
     world, _, fault = place.partition(PLUS)
-    if not (is_file(world) or world in WORLDS):
-        raise UserError(f"--one {text}: no world '{world}' (have: {', '.join(WORLDS)}, or a scenario file)")
+    if not (is_written(world) or world in WORLDS):
+        raise UserError(f"--one {text}: no world '{world}' (have: {', '.join((*WORLDS, *SCENARIOS))}; or a file)")
     if fault and fault not in set(FaultKind):
         raise UserError(f"--one {text}: no fault '{fault}' (have: {', '.join(FaultKind)})")
     if policy not in set(Policy):
@@ -115,7 +115,7 @@ def read_case(text: str) -> Case:
 
 def scenario_of(case: Case) -> Scenario:
     """The scenario, with its fault. Raises UserError for a scenario file that cannot be used."""
-    if is_file(case.world):
+    if is_written(case.world):
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
         scenario = random_scenario(case.world, case.seed)

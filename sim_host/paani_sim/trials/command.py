@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from paani.errors import UserError
 from paani.whole_file import write_whole
-from paani_sim.trials.cases import SUITES, Case, cases_of, is_file, read_case, scenario_of
+from paani_sim.trials.cases import SUITES, Case, cases_of, read_case
 from paani_sim.trials.one import config_for, run_case
 from paani_sim.trials.policies import Policy, config_of
 from paani_sim.trials.provenance import Maker
@@ -20,6 +20,7 @@ from paani_sim.trials.result import TrialResult
 from paani_sim.trials.suite import Failure, drive_all, look
 from paani_sim.trials.summary import summarise, table
 from paani_sim.worlds import WORLDS
+from paani_sim.worlds.load import load_scenario
 
 
 def main(argv: list[str]) -> int:
@@ -99,10 +100,10 @@ def _one(options: argparse.Namespace) -> int:
 
 
 def _cases(options: argparse.Namespace) -> list[Case]:
-    worlds = [str(path) for path in options.scenario] or options.worlds or list(WORLDS)
+    worlds = options.scenario or options.worlds or list(WORLDS)
     for world in worlds:
-        if is_file(world):
-            scenario_of(Case(world, 1, Policy.BLIND))
+        if options.scenario:
+            load_scenario(world)
         elif world not in WORLDS:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
     return cases_of(SUITES[options.suite], worlds, options.policy, options.seeds)
@@ -120,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f"who drives: {', '.join(Policy)} (default: all)",
     )  # fmt: skip
     parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
-    parser.add_argument("--scenario", nargs="+", type=Path, default=[], metavar="FILE", help="instead of worlds")
+    parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
     parser.add_argument("--jobs", type=_count, default=os.cpu_count() or 1, metavar="N", help="drives side by side")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where results are kept (default: runs/trial-SUITE)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures there")

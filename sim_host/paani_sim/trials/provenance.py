@@ -10,11 +10,12 @@ from pathlib import Path
 import msgspec
 
 from paani.config import encode_config
-from paani_sim.trials.cases import Case, is_file
+from paani_sim.trials.cases import Case
 from paani_sim.trials.policies import config_of
 
+TOML = ".toml"
 PACKAGES = ("paani", "paani_services", "paani_sim")
-DRIVING = (".py", ".toml")
+DRIVING = (".py", TOML)
 MODELS = "paani_models"
 
 
@@ -49,7 +50,7 @@ class Maker:
             code=self._code,
             models=self._models,
             settings=self._settings[case.policy],
-            scenario=_sum([Path(case.world)]) if is_file(case.world) else case.place,
+            scenario=_sum([Path(case.world)]) if case.world.endswith(TOML) else case.place,
         )
 
 

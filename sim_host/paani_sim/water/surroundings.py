@@ -6,8 +6,8 @@ from typing import NamedTuple
 class Surroundings(NamedTuple):
     """Current and wind over ground in the map frame, and the water's surface as the hull feels it.
 
-    `elevation_m` above z = 0 and its rate; slopes along the body's forward and left axes; the squared
-    envelope of the waves times the unit vector that they run along, in the map frame.
+    `elevation_m` above z = 0, slopes along the body's forward and left axes, and the rates of all three; the
+    squared envelope of the waves times the unit vector that they run along, in the map frame.
     """
 
     current_x_mps: float = 0.0
@@ -18,6 +18,8 @@ class Surroundings(NamedTuple):
     elevation_rate_mps: float = 0.0
     slope_ahead: float = 0.0
     slope_left: float = 0.0
+    slope_ahead_rate_ps: float = 0.0
+    slope_left_rate_ps: float = 0.0
     envelope_x_m2: float = 0.0
     envelope_y_m2: float = 0.0
 

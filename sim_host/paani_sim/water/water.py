@@ -96,7 +96,7 @@ def _surface(
     """`now` with the surface as it is here."""
     x_m, y_m, at_s = here
     cos, sin = math.cos, math.sin
-    elevation = rate = ahead = left = crest = quarter = 0.0
+    elevation = rate = ahead = left = ahead_rate = left_rate = crest = quarter = 0.0
     for kx, ky, omega, phase, lift, slope_ahead, slope_left, amplitude in trains:
         angle = kx * x_m + ky * y_m - omega * at_s + phase
         c, s = cos(angle), sin(angle)
@@ -104,6 +104,8 @@ def _surface(
         rate += lift * omega * s
         ahead -= slope_ahead * s
         left -= slope_left * s
+        ahead_rate += slope_ahead * omega * c
+        left_rate += slope_left * omega * c
         crest += amplitude * c
         quarter += amplitude * s
     for packet, felt in packets:
@@ -117,5 +119,8 @@ def _surface(
             rate += felt.elevation * packet.omega_radps * s
             ahead -= felt.slope_ahead_pm * s
             left -= felt.slope_left_pm * s
+            ahead_rate += felt.slope_ahead_pm * packet.omega_radps * c
+            left_rate += felt.slope_left_pm * packet.omega_radps * c
     envelope_m2 = crest * crest + quarter * quarter
-    return Surroundings(*now[:4], elevation, rate, ahead, left, envelope_m2 * toward[0], envelope_m2 * toward[1])
+    envelope = envelope_m2 * toward[0], envelope_m2 * toward[1]
+    return Surroundings(*now[:4], elevation, rate, ahead, left, ahead_rate, left_rate, *envelope)

@@ -1,4 +1,4 @@
-"""A scenario seen from above: shore, route, what stands and what moves, with a legend and a scale. Colours are BGR."""
+"""A scenario seen from above: shore, route, what stands and what moves, with a legend and a scale.."""
 
 import math
 from collections.abc import Sequence
@@ -12,15 +12,15 @@ from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose
 
 U8 = npt.NDArray[np.uint8]
-Rgb = tuple[int, int, int]
+Bgr = tuple[int, int, int]
 
-WATER: Rgb = (222, 196, 160)
-LAND: dict[Bank, Rgb] = {Bank.GRASS: (150, 196, 160), Bank.QUAY: (188, 192, 196)}
-INK: Rgb = (40, 40, 40)
-ROUTE: Rgb = (40, 40, 220)
-PATH: Rgb = (190, 60, 160)
-FENCE: Rgb = (0, 110, 255)
-KINDS: dict[Kind, Rgb] = {
+WATER: Bgr = (222, 196, 160)
+LAND: dict[Bank, Bgr] = {Bank.GRASS: (150, 196, 160), Bank.QUAY: (188, 192, 196)}
+INK: Bgr = (40, 40, 40)
+ROUTE: Bgr = (40, 40, 220)
+PATH: Bgr = (190, 60, 160)
+FENCE: Bgr = (0, 110, 255)
+KINDS: dict[Kind, Bgr] = {
     Kind.VESSEL: (120, 60, 30),
     Kind.PERSON: (30, 30, 200),
     Kind.PIER: (60, 100, 130),
@@ -90,19 +90,19 @@ class _Sheet:
         px = (np.asarray(points_m) - self._middle_m) * [self._per_m, -self._per_m] + self._middle_px
         return np.asarray(np.round(np.clip(px, -3e4, 3e4) * (1 << SUB_BITS)), np.int32)
 
-    def fill(self, polygon_m: Points, rgb: Rgb) -> None:
+    def fill(self, polygon_m: Points, bgr: Bgr) -> None:
         """What would be smaller than a dot becomes one."""
         if np.ptp(polygon_m, axis=0).max() * self._per_m < 2.0 * LEAST_PX:
-            self.dot(polygon_m.mean(axis=0), rgb, LEAST_PX)
+            self.dot(polygon_m.mean(axis=0), bgr, LEAST_PX)
         else:
-            cv2.fillPoly(self.picture, [self._px(polygon_m)], rgb, cv2.LINE_AA, SUB_BITS)
+            cv2.fillPoly(self.picture, [self._px(polygon_m)], bgr, cv2.LINE_AA, SUB_BITS)
 
-    def line(self, line_m: Points, rgb: Rgb, *, closed: bool, width_px: int = 1) -> None:
-        cv2.polylines(self.picture, [self._px(line_m)], closed, rgb, width_px, cv2.LINE_AA, SUB_BITS)
+    def line(self, line_m: Points, bgr: Bgr, *, closed: bool, width_px: int = 1) -> None:
+        cv2.polylines(self.picture, [self._px(line_m)], closed, bgr, width_px, cv2.LINE_AA, SUB_BITS)
 
-    def dot(self, at_m: Points | tuple[float, float], rgb: Rgb, radius_px: float) -> None:
+    def dot(self, at_m: Points | tuple[float, float], bgr: Bgr, radius_px: float) -> None:
         x, y = (int(v) for v in self._px(np.asarray(at_m)))
-        cv2.circle(self.picture, (x, y), round(radius_px * (1 << SUB_BITS)), rgb, -1, cv2.LINE_AA, SUB_BITS)
+        cv2.circle(self.picture, (x, y), round(radius_px * (1 << SUB_BITS)), bgr, -1, cv2.LINE_AA, SUB_BITS)
 
     def view(self, pose: Pose2, label: str) -> None:
         """A wedge where the camera looks, and its number."""
@@ -125,11 +125,11 @@ class _Sheet:
 
     def legend(self) -> None:
         """What the colours mean, in the upper left corner."""
-        rows = [*((str(kind), rgb) for kind, rgb in KINDS.items()), ("path", PATH), ("route", ROUTE)]
+        rows = [*((str(kind), bgr) for kind, bgr in KINDS.items()), ("path", PATH), ("route", ROUTE)]
         cv2.rectangle(self.picture, (8, 8), (108, 16 + 18 * len(rows)), (245, 245, 245), -1)
-        for number, (name, rgb) in enumerate(rows):
+        for number, (name, bgr) in enumerate(rows):
             y = 20 + 18 * number
-            cv2.rectangle(self.picture, (14, y - 4), (30, y + 6), rgb, -1)
+            cv2.rectangle(self.picture, (14, y - 4), (30, y + 6), bgr, -1)
             _text(self.picture, name, (38, y + 6), 0.45, 1)
 
 

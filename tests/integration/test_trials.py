@@ -1,0 +1,69 @@
+"""`paani trial` with processes of its own."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from paani_sim.trials.cases import Case
+from paani_sim.trials.one import run_case
+from paani_sim.trials.policies import Policy
+from paani_sim.trials.provenance import Maker
+from paani_sim.trials.suite import Record, encoded, look, result_path
+
+pytestmark = pytest.mark.integration
+SHORT = """
+[world]
+kind = "lake"
+obstacles = false
+actors = false
+[route]
+from_m = 20.0
+length_m = 9.0
+[task]
+time_limit_s = 60.0
+"""
+
+
+def words(folder: Path, *more: str) -> list[str]:
+    file = folder / "short.toml"
+    file.write_text(SHORT)
+    start = [sys.executable, "-m", "paani", "trial", "--scenario", str(file), "--out", str(folder / "run")]
+    return [*start, "--policy", "blind", "oracle", "--seeds", "1..2", *more]
+
+
+def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
+    """W14: two processes side by side give the bytes that one gives; a second run drives nothing."""
+    figures = tmp_path / "figures.json"
+    first = subprocess.run(
+        words(tmp_path, "--jobs", "2", "--json", str(figures)), capture_output=True, text=True, check=False
+    )
+    assert first.returncode == 0, first.stderr
+    assert json.loads(figures.read_bytes())["policies"]["oracle"]["completed"] == 2
+    case, maker = Case(str(tmp_path / "short.toml"), 2, Policy.ORACLE), Maker(())
+    result, _ = run_case(case)
+    file = result_path(tmp_path / "run", case)
+    assert file.read_bytes() == encoded(Record(made_with=maker.of(case), result=result))
+    assert look(tmp_path / "run", [case], maker).wanted == ()
+    second = subprocess.run(words(tmp_path), capture_output=True, text=True, check=False)
+    assert "4 of 4 drives are there already" in second.stderr
+    assert second.stdout == first.stdout
+
+
+def test_an_interrupted_run_is_gone_on_with(tmp_path: Path) -> None:
+    """Ctrl-C: what is done stays, the processes end, and the line says how to go on."""
+    run = subprocess.Popen(
+        words(tmp_path, "--seeds", "1..40", "--jobs", "1"), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    done = tmp_path / "run" / "trials"
+    while run.poll() is None and len(list(done.glob("*.json"))) < 1:
+        pass
+    run.send_signal(signal.SIGINT)
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 130, said
+    assert "the same command goes on" in said
+    assert 1 <= len(list(done.glob("*.json"))) < 80
+    assert not list(done.glob(".*"))

@@ -1,0 +1,155 @@
+"""L5: a receiver at a quay shows speed where there is none; a boat that leaves is not held."""
+
+import itertools
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from paani.config import LocalizationConfig
+from paani.geometry import enu_from_geodetic
+from paani.messages import GpsFix, ImuSample, Odometry
+from paani_services.localization.estimator import Estimator
+from paani_services.localization.nmea import fixes
+from tests.unit.boat_ride import Ride, wandering
+
+LOGS = Path(os.environ.get("PAANI_DATA", Path(__file__).parents[3] / "shared" / "data")) / "logs"
+
+
+def speed_mps(said: Odometry) -> float:
+    return math.hypot(said.surge_mps, said.sway_mps)
+
+
+def longest(flags: list[bool]) -> int:
+    return max((len(list(run)) for flag, run in itertools.groupby(flags) if flag), default=0)
+
+
+def at_quay(shown: list[GpsFix], *, tilt_mps2: float = 0.0, seed: int = 1) -> Iterator[tuple[Odometry, GpsFix | None]]:
+    """The estimates of a boat whose IMU lies quiet, from the first fix on; and each fix when it comes."""
+    estimator, rng, waiting = Estimator(LocalizationConfig()), np.random.default_rng(seed), list(reversed(shown))
+    now_us = shown[0].source_us - 3_000_000
+    while waiting:
+        samples = []
+        for noise in rng.standard_normal((5, 5)).tolist():
+            now_us += 10_000
+            samples.append(
+                ImuSample(
+                    source_us=now_us,
+                    gyro_x_radps=0.002 * noise[0],
+                    gyro_y_radps=0.0,
+                    gyro_z_radps=0.004 + 0.002 * noise[1],
+                    accel_x_mps2=tilt_mps2 + 0.03 * noise[2],
+                    accel_y_mps2=0.03 * noise[3],
+                    accel_z_mps2=9.81,
+                    orientation_available=True,
+                    yaw_rad=1.0 + 0.01 * noise[4],
+                )
+            )
+        fix = waiting.pop() if waiting[-1].source_us <= now_us else None
+        _, said = estimator.step(samples, fix, now_us)
+        if fix is not None or len(waiting) < len(shown):
+            yield said, fix
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
+@pytest.mark.parametrize("tilt_mps2", [0.0, 0.05])
+def test_l5_a_recorded_moored_boat_is_not_read_as_motion(tilt_mps2: float) -> None:
+    """L5: of ten minutes at a dock, with 0.05 m/s and more in 93 % of the fixes, at most 4 % are read as motion."""
+    shown = list(fixes((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
+    assert sum(fix.sog_mps > 0.05 for fix in shown) > 0.9 * len(shown)
+    said = list(at_quay(shown, tilt_mps2=tilt_mps2))
+    moving = [speed_mps(each) > 0.05 for each, _ in said]
+    assert sum(moving) < 0.04 * len(moving)
+    assert longest(moving) < 10 * 20
+    assert sum(each.stopped for each, _ in said) > 0.93 * len(said)
+    offs = []
+    for each, fix in said:
+        if fix is not None:
+            x_m, y_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, each.latitude_deg, each.longitude_deg)
+            offs.append(max(abs(x_m), abs(y_m)) / each.position_std_m)
+    assert np.quantile(offs, 0.95) < 2.5  # the stated spread covers the wander
+    assert max(offs) < 3.5
+
+
+def noisy(std_m: float, speed_mps: float, seed: int = 1) -> Ride:
+    """A receiver of 1 Hz, as poor as it says."""
+    return Ride(
+        seed=seed,
+        wander_m=std_m,
+        fix_noise_m=0.1 * std_m,
+        fix_speed_noise_mps=speed_mps,
+        fix_std_m=std_m,
+        steps_per_fix=20,
+    )
+
+
+def test_l5_noise_of_gps_speed_is_no_motion_at_rest() -> None:
+    """L5: with 0.3 m/s of it the filter alone would never stop."""
+    boat = noisy(5.0, 0.3)
+    said = boat.go(120.0)[200:]
+    assert all(each.stopped for each in said)
+    assert max(map(speed_mps, said)) < 0.05
+
+
+def test_the_simulators_receiver_shows_no_motion_at_rest() -> None:
+    said = wandering().go(300.0)[200:]
+    moving = [speed_mps(each) > 0.05 for each in said]
+    assert sum(moving) < 0.02 * len(moving)
+    assert longest(moving) < 2 * 20
+
+
+@pytest.mark.parametrize("poor", [False, True])
+@pytest.mark.parametrize("surge_mps", [0.15, 0.6])
+def test_a_boat_that_casts_off_is_not_held(poor: bool, surge_mps: float) -> None:
+    """Its IMU feels it go: within 2 s it is under way, as slow as the paper's cruise."""
+    boat = noisy(5.0, 0.3) if poor else wandering()
+    boat.go(30.0)
+    boat.go(2.0, surge_mps=surge_mps)
+    said = boat.go(20.0, surge_mps=surge_mps)
+    assert not any(each.stopped for each in said)
+    assert speed_mps(said[-1]) > 0.5 * surge_mps
+
+
+def test_a_boat_that_drifts_off_unfelt_is_not_held_by_a_good_receiver() -> None:
+    boat = wandering()
+    boat.go(30.0)
+    for step in range(1, 21):
+        boat.go(2.0, surge_mps=0.01 * step)  # 0.005 m/s^2
+    assert boat.glob.surge_mps > 0.1
+    assert not boat.glob.stopped
+    assert boat.off_m() < 3.0
+
+
+def test_steady_slow_motion_is_never_taken_for_rest() -> None:
+    """Half the paper's cruise, in a calm, begun while the gyro was calibrated: nothing is felt for minutes."""
+    boat = wandering()
+    boat.go(15.0, surge_mps=0.075)
+    said = boat.go(240.0, surge_mps=0.075)
+    assert sum(each.stopped for each in said) == 0
+    assert boat.off_m() < 2.5
+
+
+def test_rest_is_found_again_after_a_voyage() -> None:
+    boat = wandering()
+    boat.go(20.0)
+    boat.go(60.0, surge_mps=0.6)
+    said = boat.go(30.0)
+    assert said[-1].stopped
+    assert sum(each.stopped for each in said) > 15 * 20
+
+
+def test_an_imu_without_noise_is_no_proof_of_rest() -> None:
+    """One that repeats itself is broken: the receiver is believed."""
+    boat = wandering()
+    boat.go(30.0)
+    frozen = boat.sample(0.0, 0.0)
+    boat.change = lambda samples: [msgspec.structs.replace(frozen, source_us=each.source_us) for each in samples]
+    boat.go(5.0, surge_mps=0.5)
+    said = boat.go(10.0, surge_mps=0.5)
+    assert not said[-1].stopped or not said[-1].healthy

@@ -1,0 +1,212 @@
+"""Heading and speed on free water alone (Q4-Q6)."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani.config import load_config
+from paani_services.navigator.grid import CELL_M, CELLS, Grid, lay
+from paani_services.navigator.planner import (
+    Plan,
+    Start,
+    Wish,
+    candidates,
+    distance_m,
+    footprint_m,
+    plan,
+    roll_out,
+)
+from paani_services.navigator.sighting import Memory
+from paani_sim.eye.camera import BoatPose
+from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, seen
+
+PAPER = load_config(profile="paper").navigator.planner
+AHEAD = Wish(0.0, 0.6)
+RESTING, CRUISING = Start(0.0, 0.0, 0.0), Start(0.0, 0.0, 0.0, 0.6)
+
+
+def pool(*bars: Bar, bank_m: float = 500.0) -> Grid:
+    """The grid of a boat at the origin that has just looked along x."""
+    memory = seen(edge=edge_of(AT_REST, bars, bank_m))
+    return lay(memory.sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+
+
+def swept_gap_m(grid: Grid, start: Start, found: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Times and distances from the middle of the nearest occupied cell, all the way that the plan leads."""
+    off = (found.heading_rad - start.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
+    ways = roll_out(start, np.array([off]), np.array([found.speed_mps]), PLANNER)
+    rows, columns = np.nonzero(grid.occupied)
+    x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
+    gaps = np.hypot(ways.x_m - x_m[None, :], ways.y_m - y_m[None, :])
+    return ways.at_s, gaps.min(axis=1, initial=math.inf)
+
+
+def test_q4_three_seconds_in_steps_of_0_2() -> None:
+    """Q4: the swept footprint's horizon and step, in both profiles."""
+    for config in (PAPER, PLANNER):
+        ways = roll_out(RESTING, np.zeros(1), np.array([0.4]), config)
+        near = ways.at_s[ways.at_s <= 3.0 + 1e-9]
+        assert near == pytest.approx(np.arange(16) * 0.2)
+    assert roll_out(RESTING, np.zeros(1), np.array([0.4]), PAPER).at_s[-1] == pytest.approx(3.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    surge=st.floats(0.0, 0.4),
+    rate=st.floats(-0.35, 0.35),
+    offset=st.floats(-3.0, 3.0),
+    speed=st.floats(0.0, 0.4),
+)
+def test_q5_speed_yaw_rate_and_acceleration(surge: float, rate: float, offset: float, speed: float) -> None:
+    """Q5: no way is faster than 0.4 m/s, turns faster than 0.35 rad/s or speeds up by more than 0.2 m/s2."""
+    assert (PAPER.speed_mps, PAPER.yaw_rate_radps, PAPER.accel_mps2) == (0.4, 0.35, 0.2)
+    start = Start(0.0, 0.0, 0.0, surge, rate)
+    ways = roll_out(start, np.array([offset]), np.array([speed]), PAPER)
+    step_s = np.diff(ways.at_s)
+    speeds = np.concatenate([[surge], np.diff(ways.way_m[:, 0]) / step_s])
+    assert speeds.max() <= 0.4 + 1e-9
+    assert np.abs(np.diff(speeds)).max() <= 0.2 * 0.2 + 1e-9
+    headings = np.unwrap(np.arctan2(np.diff(ways.y_m[:, 0]), np.diff(ways.x_m[:, 0])))
+    moving = np.diff(ways.way_m[:, 0]) > 1e-6
+    turns = np.abs(np.diff(headings)) / step_s[1:]
+    assert turns[moving[1:] & moving[:-1]].max(initial=0.0) <= 0.35 + 1e-6
+    assert candidates(start, Wish(0.3, 5.0), PAPER)[1].max() == 0.4
+
+
+def test_q6_hull_margin_and_drift() -> None:
+    """Q6: 0.55 m hull, 0.25 m margin, 0.15 m/s of drift; where it is tighter already, no nearer, and never the hull."""
+    at_s = np.array([0.0, 1.0, 2.0, 3.0])
+    for config in (PAPER, PLANNER):
+        assert footprint_m(at_s, 2.0, config) == pytest.approx(0.8 + 0.15 * at_s)
+        assert footprint_m(at_s, 1.0, config) == pytest.approx([0.8, 0.8, 0.8, 0.8])
+        assert footprint_m(at_s, 0.3, config) == pytest.approx([0.55, 0.55, 0.55, 0.55])
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    bars=st.lists(
+        st.tuples(st.floats(1.5, 7.0), st.floats(-3.0, 3.0), st.floats(0.3, 2.0), st.floats(0.3, 2.0)), max_size=4
+    ),
+    bank_m=st.floats(1.5, 9.0),
+    course=st.floats(-3.1, 3.1),
+    surge=st.floats(0.0, 0.6),
+    side=st.sampled_from([-1.0, 0.0, 1.0]),
+)
+def test_no_way_leads_into_what_is_occupied(
+    bars: list[tuple[float, float, float, float]], bank_m: float, course: float, surge: float, side: float
+) -> None:
+    """Q4, Q6: along the plan the footprint is clear of every occupied cell for 3 s; half a cell for looking it up."""
+    grid = pool(*((x, y, x + deep, y + wide) for x, y, deep, wide in bars), bank_m=bank_m)
+    start = Start(0.0, 0.0, 0.0, surge)
+    found = plan(grid, start, Wish(course, 0.6, side), None, PLANNER)
+    if found.speed_mps == 0.0:
+        return
+    at_s, gap_m = swept_gap_m(grid, start, found)
+    near = at_s <= PLANNER.horizon_s
+    needed = footprint_m(at_s, float(gap_m[0]), PLANNER)
+    assert (gap_m[near] >= needed[near] - 0.5 * CELL_M).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(course=st.floats(-3.1, 3.1), yaw=st.floats(-3.1, 3.1), side=st.sampled_from([-1.0, 1.0]))
+def test_a_side_that_is_not_advised_is_never_steered_to(course: float, yaw: float, side: float) -> None:
+    """LEFT never steers right of the heading now, RIGHT never left of it, whatever is wanted."""
+    offsets, _ = candidates(Start(0.0, 0.0, yaw), Wish(course, 0.6, side), PLANNER)
+    assert (side * offsets >= 0.0).all()
+    assert offsets.size > 0
+
+
+def test_open_water_is_crossed_on_the_wanted_course_at_full_speed() -> None:
+    """At the start too: what no picture shows beside the boat is the operator's word."""
+    for start in (RESTING, CRUISING):
+        assert plan(pool(), start, AHEAD, None, PLANNER) == Plan(0.0, 0.6, verified=True)
+        found = plan(pool(), start, Wish(0.4, 0.6), None, PLANNER)
+        assert found.heading_rad == pytest.approx(0.4)
+
+
+def test_nothing_seen_or_nothing_lately_is_nowhere_to_go() -> None:
+    """Q2: unknown by default, and unknown is not free."""
+    memory = seen()
+    for sights, age_us in ((Memory().sights, 0), (memory.sights, 810_000)):
+        grid = lay(sights, (0.0, 0.0), START_US + age_us, CAMERA, PLANNER)
+        assert plan(grid, RESTING, AHEAD, None, PLANNER).speed_mps == 0.0
+
+
+def test_a_wall_ahead_stops_the_boat() -> None:
+    for start in (RESTING, CRUISING):
+        assert plan(pool(bank_m=1.6), start, AHEAD, None, PLANNER).speed_mps == 0.0
+
+
+def test_what_stands_in_the_way_is_passed_on_the_side_with_more_room() -> None:
+    for side in (-1.0, 1.0):
+        bar = (4.0, min(-0.3, side * 0.9), 4.6, max(0.3, side * 0.9))
+        found = plan(pool(bar), CRUISING, AHEAD, None, PLANNER)
+        assert found.speed_mps > 0.0
+        assert found.heading_rad * side < -0.1
+
+
+def test_a_side_once_chosen_is_kept() -> None:
+    """As much room on either side: the plan before decides."""
+    bar = (4.0, -0.4, 4.6, 0.4)
+    for before in (0.35, -0.35):
+        found = plan(pool(bar), CRUISING, AHEAD, Plan(before, 0.6), PLANNER)
+        assert found.heading_rad * before > 0.0
+
+
+def test_nothing_within_the_way_to_stop_may_be_unknown() -> None:
+    """A boat that needs longer to stop goes slower, or not at all: it never outruns what was seen free."""
+    near = msgspec.structs.replace(PLANNER, max_range_m=2.6)
+    memory = seen()
+    grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, near)
+    speeds = [
+        plan(grid, RESTING, AHEAD, None, msgspec.structs.replace(near, stop_s=stop_s)).speed_mps
+        for stop_s in (2.5, 6.0, 20.0)
+    ]
+    assert speeds == [0.6, 0.3, 0.0]
+    blind = msgspec.structs.replace(PLANNER, blind_m=0.0)
+    grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, blind)
+    assert plan(grid, RESTING, AHEAD, None, blind).speed_mps == 0.0
+
+
+def test_what_went_out_of_sight_below_the_picture_is_still_there() -> None:
+    """Seen 3 m ahead, then too near to be seen: the boat that drifted up to it does not run over it."""
+    buoy = (3.0, -0.3, 3.5, 0.3)
+    memory, at_us = Memory(), START_US
+    for x_m in np.arange(0.0, 1.9, 0.1).tolist():
+        boat = BoatPose(x_m, 0.0, 0.0)
+        memory, at_us = seen(boat, edge_of(boat, (buoy,)), at_us + 300_000, memory), at_us + 300_000
+    assert max(edge_of(boat, (buoy,))) < 0.7  # it is not in the picture any more
+    for _ in range(5):
+        at_us += 300_000
+        memory = seen(boat, at_us=at_us, memory=memory)
+    grid = lay(memory.sights, (x_m, 0.0), at_us, CAMERA, PLANNER)
+    found = plan(grid, Start(x_m, 0.0, 0.0), AHEAD, None, PLANNER)
+    at_s, gap_m = swept_gap_m(grid, Start(x_m, 0.0, 0.0), found)
+    assert found.speed_mps == 0.0 or gap_m[at_s <= 3.0].min() > 0.5
+    forgetful = lay(memory.sights, (x_m, 0.0), at_us, CAMERA, PAPER)
+    assert not forgetful.occupied[49:51, 50:58].any()
+
+
+@settings(max_examples=30, deadline=None)
+@given(cells=st.lists(st.tuples(st.integers(0, 99), st.integers(0, 99)), min_size=1, max_size=12))
+def test_distances_are_those_to_the_nearest_cell(cells: list[tuple[int, int]]) -> None:
+    mask = np.zeros((CELLS, CELLS), np.bool_)
+    for row, column in cells:
+        mask[row, column] = True
+    rows, columns = np.indices(mask.shape)
+    exact = np.min([np.hypot(rows - row, columns - column) for row, column in cells], axis=0) * CELL_M
+    assert distance_m(mask) == pytest.approx(np.minimum(exact, 2.0))
+
+
+def test_plans_repeat_bit_by_bit() -> None:
+    """The same sights give the same plan to the last bit, whatever was computed in between."""
+    bar = (4.0, -0.4, 4.6, 0.4)
+    first = msgspec.json.encode(plan(pool(bar), CRUISING, Wish(0.123, 0.6), None, PLANNER))
+    plan(pool(), RESTING, Wish(-1.0, 0.3, 1.0), None, PLANNER)
+    assert msgspec.json.encode(plan(pool(bar), CRUISING, Wish(0.123, 0.6), None, PLANNER)) == first

@@ -1,0 +1,258 @@
+"""The metric planner in the navigator: advice stays the veto, and without a calibration nothing changes (Q1-Q6)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani.config import load_config
+from paani.messages import Advisory, Arming, Direction, Inhibit, LaneRisk, NavCommand, Reason, Route, SimTime, Waypoint
+from paani_services.navigator.grid import UNCALIBRATED, Camera
+from paani_services.navigator.mission import route_alone
+from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_sim.eye.camera import BoatPose
+from tests.unit.watery_sights import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
+
+CONFIG = load_config().navigator
+PAPER = load_config(profile="paper").navigator
+EAST = Route(source_us=0, name="east", waypoints=(Waypoint(x_m=-5, y_m=0), Waypoint(x_m=60, y_m=0)), repeat=False)
+STEP_US = 100_000
+TURN_RADIUS_M = 2.2
+
+
+class Pool:
+    """A boat on flat water that goes where it is told, 10 orders and 5 pictures a second."""
+
+    def __init__(self, *bars: Bar, bank_m: float = 500.0, boat: BoatPose = AT_REST, camera: Camera = CAMERA) -> None:
+        self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
+        self.state, self.now_us, self.speed_mps = NavState(), START_US, 0.0
+        self.direction, self.looks = Direction.STRAIGHT, True
+        self.order: NavCommand | None = None
+        self.shown = None
+
+    def run(self, seconds: float) -> Iterator[NavCommand]:
+        for _ in range(round(seconds * 10)):
+            self.now_us += STEP_US
+            self._drift()
+            if self.looks and self.now_us % 200_000 == 0:
+                self.shown = evidence(self.now_us, edge_of(self.boat, self.bars, self.bank_m))
+            at = odometry(self.now_us, self.boat, self.speed_mps)
+            heard = Heard(
+                advisory=Advisory(source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR),
+                advisory_us=self.now_us,
+                odometry=at,
+                odometry_us=self.now_us,
+                clock=SimTime(source_us=self.now_us, sim_us=self.now_us, stamp_us=1),
+                clock_us=self.now_us,
+                arming=Arming(source_us=self.now_us, armed=True),
+                arming_us=self.now_us,
+                evidence=self.shown,
+            )
+            self.state, self.order = navigate(
+                self.state, heard, route_alone(EAST), self.now_us, 43, CONFIG, self.camera
+            )
+            yield self.order
+
+    def settle(self, seconds: float) -> NavCommand:
+        *_, last = self.run(seconds)
+        return last
+
+    def _drift(self) -> None:
+        """Speed follows the order within 0.3 m/s2, heading on a circle of 2.2 m at the tightest."""
+        dt = STEP_US * 1e-6
+        wanted = self.order.speed_mps if self.order is not None else 0.0
+        self.speed_mps += max(-0.3 * dt, min(0.3 * dt, wanted - self.speed_mps))
+        turn = 0.0
+        if self.order is not None and self.order.enable:
+            off = (self.order.heading_rad - self.boat.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
+            limit = self.speed_mps / TURN_RADIUS_M
+            turn = max(-limit, min(limit, off))
+        yaw = self.boat.yaw_rad + turn * dt
+        way = self.speed_mps * dt
+        self.boat = BoatPose(self.boat.x_m + way * math.cos(yaw), self.boat.y_m + way * math.sin(yaw), yaw)
+
+    def gap_m(self) -> float:
+        """From the boat's middle to the nearest bar."""
+        return min(
+            (
+                math.hypot(
+                    max(w - self.boat.x_m, 0.0, self.boat.x_m - e), max(s - self.boat.y_m, 0.0, self.boat.y_m - n)
+                )
+                for w, s, e, n in self.bars
+            ),
+            default=math.inf,
+        )
+
+
+def test_open_water_is_sailed_as_without_a_planner() -> None:
+    """Same course and speed where nothing is in the way."""
+    with_planner, without = Pool(), Pool(camera=UNCALIBRATED)
+    for one, other in zip(with_planner.run(20.0), without.run(20.0), strict=True):
+        if other.enable and with_planner.now_us > START_US + 300_000:
+            assert one.enable
+            assert one.speed_mps == other.speed_mps
+            assert one.heading_rad == pytest.approx(other.heading_rad, abs=math.radians(3.0))
+    assert with_planner.boat.x_m > 9.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    direction=st.sampled_from([Direction.STOP, Direction.NO_DATA]),
+    bars=st.lists(st.tuples(st.floats(2.0, 6.0), st.floats(-2.0, 1.0)), max_size=2),
+    bank_m=st.floats(1.5, 500.0),
+    yaw=st.floats(-3.1, 3.1),
+    warm=st.booleans(),
+)
+def test_the_planner_never_moves_the_boat_where_the_advice_says_stop(
+    direction: Direction, bars: list[tuple[float, float]], bank_m: float, yaw: float, warm: bool
+) -> None:
+    """Advice is the veto: STOP and NO_DATA stay as they are, with a plan in force or without."""
+    pool = Pool(*((x, y, x + 0.5, y + 1.0) for x, y in bars), bank_m=bank_m, boat=BoatPose(0.0, 0.0, yaw))
+    if warm:
+        pool.settle(0.6)
+    pool.direction = direction
+    for order in pool.run(0.6):
+        assert (order.enable, order.speed_mps) == (False, 0.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    turn=st.sampled_from([Direction.LEFT, Direction.SLIGHT_LEFT, Direction.RIGHT, Direction.SLIGHT_RIGHT]),
+    bars=st.lists(st.tuples(st.floats(2.0, 6.0), st.floats(-2.0, 1.0)), max_size=3),
+    yaw=st.floats(-1.5, 1.5),
+)
+def test_the_planner_never_steers_to_the_side_not_advised(
+    turn: Direction, bars: list[tuple[float, float]], yaw: float
+) -> None:
+    """LEFT never steers right of the present heading, whatever is free there; speeds are never above the turn's."""
+    side = 1.0 if turn in {Direction.LEFT, Direction.SLIGHT_LEFT} else -1.0
+    pool = Pool(*((x, y, x + 0.5, y + 1.0) for x, y in bars), boat=BoatPose(0.0, 0.0, yaw))
+    pool.direction = turn
+    for order in pool.run(1.5):
+        if order.enable:
+            off = (order.heading_rad - pool.boat.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
+            assert side * off >= -math.radians(3.0)  # a plan is kept while the boat turns towards it
+            assert order.speed_mps <= 0.5 * CONFIG.cruise_mps
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+def test_without_a_valid_calibration_the_planner_refuses_to_act(direction: Direction) -> None:
+    """The heading heuristic decides as before, to the byte, whatever the pictures show."""
+    blocked, unseen = Pool(bank_m=1.5, camera=UNCALIBRATED), Pool(camera=UNCALIBRATED)
+    unseen.looks = False
+    blocked.direction = unseen.direction = direction
+    for one, other in zip(blocked.run(2.0), unseen.run(2.0), strict=True):
+        assert msgspec.json.encode(one) == msgspec.json.encode(other)
+
+
+def test_the_paper_has_no_planner() -> None:
+    """A prototype beside the evaluated configuration: a calibration alone does not bring it in."""
+    assert not PAPER.planner.use
+
+
+def test_what_is_not_seen_free_is_not_entered() -> None:
+    """No picture, a wall, then pictures that end: NO_FREE_PATH each time, and never motion."""
+    pool = Pool()
+    pool.looks = False
+    assert pool.settle(1.0).inhibits == (Inhibit.NO_FREE_PATH,)
+    walled = Pool(bank_m=1.6)
+    assert walled.settle(1.0).inhibits == (Inhibit.NO_FREE_PATH,)
+    pool.looks = True
+    assert pool.settle(2.0).enable
+    pool.looks = False
+    assert pool.settle(1.2).inhibits == (Inhibit.NO_FREE_PATH,)
+
+
+def test_a_bar_on_the_route_is_passed_and_the_route_rejoined() -> None:
+    """The advice says STRAIGHT all along: the planner alone goes round, and comes back to the same leg."""
+    pool = Pool((10.0, -0.6, 10.8, 0.4))
+    nearest = math.inf
+    aside = 0.0
+    for order in pool.run(55.0):
+        nearest = min(nearest, pool.gap_m())
+        aside = max(aside, abs(pool.boat.y_m))
+        assert not order.enable or order.waypoint_index == 1
+    assert nearest > 0.6
+    assert 0.8 < aside < 4.0
+    assert pool.boat.x_m > 20.0
+    assert abs(pool.boat.y_m) < 0.4
+
+
+def test_a_boat_before_a_wall_turns_along_it() -> None:
+    """A quay across the route with a way round its left end: no advice but STRAIGHT, and no touch."""
+    pool = Pool((9.0, -30.0, 10.0, 2.5))
+    nearest = math.inf
+    for _ in pool.run(70.0):
+        nearest = min(nearest, pool.gap_m())
+    assert nearest > 0.6
+    assert pool.boat.x_m > 10.0
+
+
+def test_a_dead_end_is_waited_in_until_it_opens() -> None:
+    pool = Pool((6.0, -30.0, 7.0, 30.0))
+    last = pool.settle(40.0)
+    assert last.inhibits == (Inhibit.NO_FREE_PATH,)
+    assert pool.gap_m() > 0.6
+    pool.bars = ()
+    assert pool.settle(9.5).enable
+
+
+def test_a_run_of_turns_goes_beyond_its_cap_on_water_seen_free_alone() -> None:
+    """90 degrees without the planner; with it on while the way is known to be free, and never round in a circle."""
+    for camera, low_deg, high_deg in ((UNCALIBRATED, 80.0, 97.0), (CAMERA, 120.0, 157.0)):
+        pool = Pool(camera=camera)
+        pool.settle(3.0)
+        pool.direction = Direction.LEFT
+        turned = [(math.degrees(pool.boat.yaw_rad), order.inhibits) for order in pool.run(60.0)]
+        assert low_deg < max(degrees for degrees, _ in turned) < high_deg
+        assert turned[-1][1] == (Inhibit.TURN_CAPPED,)
+
+
+def test_beyond_the_cap_a_way_that_is_not_known_stops_the_run_of_turns() -> None:
+    """Something all round at 3 m: nothing is verified, so 90 degrees is all."""
+    pool = Pool(bank_m=3.2)
+    pool.direction = Direction.LEFT
+    for _ in pool.run(60.0):
+        assert math.degrees(pool.boat.yaw_rad) < 97.0
+
+
+def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
+    """What was passed is remembered where it is, so the way back need not wait for `clear_m`."""
+    advisory = Advisory(
+        source_us=START_US, direction=Direction.STRAIGHT, reason=Reason.CENTER_CLEAR, right=LaneRisk(occupied=True)
+    )
+    for camera, steers in ((CAMERA, True), (UNCALIBRATED, False)):
+        pool = Pool(boat=BoatPose(0.0, 2.0, 0.0), camera=camera)
+        pool.settle(1.0)
+        heard = Heard(
+            advisory=msgspec.structs.replace(advisory, source_us=pool.now_us),
+            advisory_us=pool.now_us,
+            odometry=odometry(pool.now_us, BoatPose(0.0, 2.0, 0.0)),
+            odometry_us=pool.now_us,
+            clock=SimTime(source_us=pool.now_us, sim_us=pool.now_us, stamp_us=1),
+            clock_us=pool.now_us,
+            arming=Arming(source_us=pool.now_us, armed=True),
+            arming_us=pool.now_us,
+            evidence=pool.shown,
+        )
+        _, order = navigate(pool.state, heard, route_alone(EAST), pool.now_us, 43, CONFIG, camera)
+        assert (order.heading_rad < -0.1) is steers
+
+
+def test_the_state_is_small_and_loses_nothing_as_json() -> None:
+    """A recorded state decides on as the live one did; every 2 s it costs the ledger less than 12 kB."""
+    pool = Pool((10.0, -0.6, 10.8, 0.4))
+    pool.settle(12.0)
+    data = msgspec.json.encode(pool.state)
+    assert len(data) < 12_000
+    again = Pool((10.0, -0.6, 10.8, 0.4), boat=pool.boat)
+    again.state, again.now_us, again.speed_mps = msgspec.json.decode(data, type=NavState), pool.now_us, pool.speed_mps
+    again.order, again.shown = pool.order, pool.shown
+    assert again.state == pool.state
+    for one, other in zip(pool.run(3.0), again.run(3.0), strict=True):
+        assert msgspec.json.encode(one) == msgspec.json.encode(other)
