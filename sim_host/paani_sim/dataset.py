@@ -1,4 +1,4 @@
-"""Labelled pictures rendered from the worlds, for training the models.
+"""Labelled pictures rendered from the worlds, for training the models. What weather hides has no label.
 
 The folder has the form of the real sources: `images/*.jpg`, `masks/*.png` (0 obstacle, 1 water,
 2 sky), `labels/*.txt` (class, then box centre and size, normalised; classes in the detector's
@@ -18,17 +18,19 @@ from tqdm import tqdm
 
 from paani.errors import UserError
 from paani_sim.eye.camera import Camera
-from paani_sim.eye.labels import CLASSES, Labelled
+from paani_sim.eye.labels import CLASSES, Labelled, seen_boxes
 from paani_sim.eye.renderer import Eye
 from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.sky import SKIES
-from paani_sim.worlds import load_world
+from paani_sim.worlds import WORLDS, load_world
 from paani_sim.worlds.world import Light, Wind, World
 
 U8 = npt.NDArray[np.uint8]
 
 PICTURES_PER_SESSION = 24
 PICTURES_PER_SKY = 4
+FOG_FRAC, RAIN_FRAC = 0.12, 0.15  # of the skies
+LENS_FRAC = 0.35  # of the pictures come through a lens that bends
 WATERS: tuple[tuple[float, float, float], ...] = (
     (0.30, 0.34, 0.22),
     (0.40, 0.36, 0.24),
@@ -64,7 +66,7 @@ def write_dataset(
     out: Path,
     n: int,
     seed: int = 0,
-    worlds: Sequence[str] = ("river", "lake"),
+    worlds: Sequence[str] = tuple(WORLDS),
     *,
     width_px: int = 320,
     height_px: int = 240,
@@ -125,12 +127,17 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
     """One picture with its own pose, camera and things, and now and then another sky."""
     if k % PICTURES_PER_SKY == 0:
         light = Light(
-            sky=str(rng.choice(SKIES, p=[0.2, 0.3, 0.25, 0.1, 0.15])),
+            sky=str(rng.choice(SKIES, p=[0.2, 0.3, 0.22, 0.14, 0.14])),
             sun_azimuth_rad=float(rng.uniform(-np.pi, np.pi)),
             sun_elevation_rad=float(rng.uniform(0.15, 1.2)),
             visibility_m=float(120.0 * 15.0 ** rng.random()),
             seed=int(rng.integers(1 << 30)),
         )
+        if rng.random() < FOG_FRAC:
+            light = dataclasses.replace(light, visibility_m=float(rng.uniform(18.0, 90.0)))
+        if rng.random() < RAIN_FRAC:
+            sky = str(rng.choice(["overcast", "overcast", "cloudy", "dusk"]))
+            light = dataclasses.replace(light, sky=sky, rain_mmph=float(rng.gamma(1.5, 6.0)))
         wind = Wind(float(rng.gamma(1.6, 1.6)), float(rng.uniform(-np.pi, np.pi)))
         eye.set_weather(light, wind)
     eye.exposure = float(1.15 * np.exp(rng.normal(0.0, 0.28)))
@@ -139,10 +146,13 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
         hfov_deg=float(rng.uniform(52.0, 88.0)),
         up_m=float(rng.uniform(0.35, 1.6)),
         down_deg=float(rng.normal(3.5, 3.0)),
+        k1=float(rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
+        shutter_s=float(rng.uniform(0.0, 0.03)),
     )
-    pose = random_pose(eye.world, rng)
+    pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))
     eye.place(scatter(eye.world, pose, rng))
-    return eye.render_labelled(pose, float(rng.uniform(0.0, 600.0)))
+    view = eye.render_labelled(pose, float(rng.uniform(0.0, 600.0)))
+    return dataclasses.replace(view, boxes=seen_boxes(view))
 
 
 def _write(folder: Path, seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:

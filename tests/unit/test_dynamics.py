@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paani_sim.plant.dynamics import GRAVITY_MPS2, Fans, HullState, attitude, body_velocity, wrench
+from paani_sim.plant.dynamics import Fans, HullState, attitude, body_velocity, wrench
 from paani_sim.vessels import load_vessel
+from paani_sim.water.waves import GRAVITY_MPS2
 
 PAPER = load_vessel("paper")
 AFLOAT = HullState(PAPER.buoyancy.equilibrium_z_m, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

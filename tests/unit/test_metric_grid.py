@@ -174,6 +174,16 @@ def test_a_thing_stands_where_its_box_ends_below() -> None:
     assert cell(grid, 4.05, 0.8) == cell(grid, 3.5, 0.0) == "free"
 
 
+def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
+    """The lower end of its box is that of its near end; where the mask looks through it, the box counts."""
+    aslant = tuple(0.45 + 0.005 * column for column in range(80))
+    box = (0.0, 0.42, 1.0, aslant[-1])
+    vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
+    assert (grid_of(seen(edge=aslant, detections=(vessel,))).occupied == grid_of(seen(edge=aslant)).occupied).all()
+    holed = (*aslant[:30], *([0.4] * 20), *aslant[50:])
+    assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == ((192, 320, math.ceil(aslant[-1] * 512)),)
+
+
 def test_a_box_cut_below_stands_nearer_than_the_picture_shows() -> None:
     box = Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(0.45, 0.6, 0.55, 1.0))
     grid = grid_of(seen(detections=(box,)))

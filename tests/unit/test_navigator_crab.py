@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from paani.config import NavigatorConfig, load_config
-from paani.messages import Route, Waypoint
+from paani.messages import Odometry, Route, Waypoint
 from paani_services.navigator.crab import Crab, learned, offset_m
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.progress import Track
@@ -24,6 +24,10 @@ def route(*points: tuple[float, float], repeat: bool = False) -> Route:
 
 
 STRAIGHT = route((0, 0), (400, 0))
+
+
+def heading(yaw_rad: float) -> Odometry:
+    return Odometry(source_us=0, x_m=0.0, y_m=0.0, yaw_rad=yaw_rad, surge_mps=0.6, healthy=True)
 
 
 def off_line_m(config: NavigatorConfig, drift_mps: tuple[float, float], settle_s: float = 90.0) -> float:
@@ -75,13 +79,20 @@ def test_the_crab_angle_is_bounded() -> None:
 
 
 def test_borhaug_s_integral_by_hand() -> None:
-    """y = 2 m left, s = 1 m, L = 4 m, sigma = 0.15 m/s: s grows by 0.15 * 4 * 2 / (9 + 16) m each second."""
+    """y = 2 m left, s = 1 m, L = 4 m, sigma = 0.25 m/s: s grows by 0.25 * 4 * 2 / (9 + 16) m each second."""
     track = Track((Waypoint(x_m=0, y_m=0), Waypoint(x_m=0, y_m=50)))
-    crab = learned(Crab(east_m=-1.0, at_us=1_000_000), track, 1, 2.0, 1_100_000, PAANI)
-    assert offset_m(crab, track, 1) == pytest.approx(1.0 + 0.1 * 0.15 * 4.0 * 2.0 / 25.0)
+    crab = learned(Crab(east_m=-1.0, at_us=1_000_000), track, 1, 2.0, heading(0.5 * math.pi), 1_100_000, PAANI)
+    assert offset_m(crab, track, 1) == pytest.approx(1.0 + 0.1 * 0.25 * 4.0 * 2.0 / 25.0)
 
 
 def test_a_gap_in_time_teaches_little() -> None:
     track = Track((Waypoint(x_m=0, y_m=0), Waypoint(x_m=50, y_m=0)))
-    after_gap = learned(Crab(at_us=1), track, 1, 1.0, 60_000_000, PAANI)
-    assert after_gap.north_m < 0.3 * 0.15
+    after_gap = learned(Crab(at_us=1), track, 1, 1.0, heading(0.0), 60_000_000, PAANI)
+    assert 0.0 < after_gap.north_m < 0.3 * 0.25
+
+
+@pytest.mark.parametrize("off_m", [2.0, 5.0, 10.0])
+def test_joining_the_line_teaches_nothing(off_m: float) -> None:
+    """A distance that is on its way out is no drift: the boat joins from afar and crosses by no more than 0.2 m."""
+    boat = DriftingBoat(route_alone(STRAIGHT), PAANI, (0.0, off_m))
+    assert min(boat.y_m for _ in boat.run(120.0)) > -0.2

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ FAR_M = (1e3, 1e3)
 EVERY_S = 0.05
 
 
-def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: object) -> Actor:
+def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: Any) -> Actor:
     path_m = np.array([[0.0, 0.0], [100.0, 0.0]])
     actor = Actor("skipper", Kind.VESSEL, "cruiser", path_m, 1.5, 5.0, 2.0, 2.0, closed=False, behaviour=behaviour)
     return dataclasses.replace(actor, **changes)

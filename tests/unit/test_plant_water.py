@@ -5,6 +5,7 @@ import itertools
 import math
 import statistics
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def launch() -> Iterator[Launch]:
         plant.close()
 
 
-def lake(**changes: object) -> World:
+def lake(**changes: Any) -> World:
     """Open water."""
     world = dataclasses.replace(load_world("lake"), obstacles=(), actors=(), wind=STILL)
     return dataclasses.replace(world, **changes)

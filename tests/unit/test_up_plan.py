@@ -17,8 +17,10 @@ from paani.errors import UserError
 from paani.up.command import up_sets
 from paani.up.display import Display
 from paani.up.plan import make_plan
+from paani_services.navigator.fence_file import load_fence
 from paani_services.navigator.route import load_route
 from paani_sim.worlds import WORLDS, load_world
+from paani_sim.worlds.load import load_scenario
 
 
 @pytest.mark.parametrize("name", sorted(WORLDS))
@@ -30,6 +32,18 @@ async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_s
     np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], world.route_m, atol=1e-4)
     assert plan.services == tuple(name for name in keys.SERVICES if name != "recorder")
     assert decode_config(encode_config(plan.config)) == plan.config
+
+
+async def test_a_scenario_s_open_route_and_fence_are_handed_over(private_sets: tuple[str, ...]) -> None:
+    plan = await make_plan(load_config(sets=(*private_sets, "world.name=harbour_crossing")))
+    scenario = await asyncio.to_thread(load_scenario, "harbour_crossing")
+    route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
+    fence = await asyncio.to_thread(load_fence, Path(plan.config.navigator.fence), None)
+    assert not route.repeat
+    np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], scenario.world.route_m, atol=1e-4)
+    assert fence == scenario.fence
+    plain = await make_plan(load_config(sets=(*private_sets, "world.name=harbour")))
+    assert not plain.config.navigator.fence
 
 
 async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> None:

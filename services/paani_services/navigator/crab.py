@@ -5,6 +5,7 @@ marine surface vessels in the presence of constant ocean currents", CDC 2008: th
 `lookahead_m` ahead and `y + s` abeam, and s grows with sigma L y / ((y + s)^2 + L^2), which slows down far from the
 line by itself. Here s is the part across the leg of a vector in the map frame: what pushes the boat comes from
 one side of the map, so what was learned on one leg holds on the next as far as it points the same way.
+Nothing is learned while the boat is closing in on its line anyway: a distance that is on its way out is no drift.
 """
 
 import math
@@ -14,8 +15,10 @@ import msgspec
 from paani import portable
 from paani.config import NavigatorConfig
 from paani.geometry import clip
-from paani_services.navigator.progress import Track, leg_start
+from paani.messages import Odometry
+from paani_services.navigator.progress import Track, leg_start, over_ground_mps
 
+CLOSING_MPS = 0.1  # the integral alone brings the boat back slower
 MAX_STEP_S = 0.3  # a longer gap since the last lesson counts as this long
 
 
@@ -33,13 +36,18 @@ def offset_m(crab: Crab, track: Track, target: int) -> float:
     return crab.east_m * left_x + crab.north_m * left_y
 
 
-def learned(crab: Crab, track: Track, target: int, cross_m: float, now_us: int, config: NavigatorConfig) -> Crab:
-    """One step of the integral at `cross_m` left of the leg. Bounded by `max_crab_deg`; paused by not calling it."""
+def learned(
+    crab: Crab, track: Track, target: int, cross_m: float, odometry: Odometry, now_us: int, config: NavigatorConfig
+) -> Crab:
+    """One step of the integral at `cross_m` left of the leg, bounded by `max_crab_deg`."""
+    left_x, left_y = _left(track, target)
+    east_mps, north_mps = over_ground_mps(odometry)
+    if -math.copysign(1.0, cross_m) * (east_mps * left_x + north_mps * left_y) > CLOSING_MPS:
+        return paused(crab, now_us)
     lookahead_m = config.lookahead_m
     step_s = clip((now_us - crab.at_us) * 1e-6, 0.0, MAX_STEP_S) if crab.at_us else 0.0
     aside_m = cross_m + offset_m(crab, track, target)
     grown_m = step_s * config.crab_gain_mps * lookahead_m * cross_m / (aside_m * aside_m + lookahead_m * lookahead_m)
-    left_x, left_y = _left(track, target)
     east_m, north_m = crab.east_m + grown_m * left_x, crab.north_m + grown_m * left_y
     most_m, length_m = lookahead_m * portable.tan(math.radians(config.max_crab_deg)), math.hypot(east_m, north_m)
     if length_m > most_m:

@@ -12,7 +12,7 @@ from paani import portable
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
 from paani.messages import FenceArea, Keep, Odometry, Waypoint
-from paani_services.navigator.progress import Point
+from paani_services.navigator.progress import Point, over_ground_mps
 
 DRIFTING_MPS = 0.1  # below it the course over ground is noise
 CREEP_MPS = 0.05  # a slower order would not move the boat
@@ -87,9 +87,7 @@ def bounded_speed(
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _speed_outside(fence, here, heading_rad, speed_mps, config)
-    cosine, sine = portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad)
-    east_mps = odometry.surge_mps * cosine - odometry.sway_mps * sine
-    north_mps = odometry.surge_mps * sine + odometry.sway_mps * cosine
+    east_mps, north_mps = over_ground_mps(odometry)
     if math.hypot(east_mps, north_mps) > DRIFTING_MPS:
         stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
         if room_m(fence, here, stops_at) < math.inf:

@@ -124,7 +124,7 @@ def navigate(
             inhibits.append(Inhibit.TURN_CAPPED)
     if direction not in TURNS:
         on_course = abs(wrap_rad(heading_rad - wanted.course_rad)) <= SAME_COURSE_RAD
-        state = _learned(state, wanted, now_us, config, on_course=on_course)
+        state = _learned(state, wanted, odometry, now_us, config, on_course=on_course)
     bounded_mps = bounded_speed(mission.fence, odometry, heading_rad, speed_mps, config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
@@ -147,10 +147,12 @@ def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorCo
     return msgspec.structs.replace(state, progress=progress, crab=crab)
 
 
-def _learned(state: NavState, wanted: Aim, now_us: int, config: NavigatorConfig, *, on_course: bool) -> NavState:
+def _learned(
+    state: NavState, wanted: Aim, odometry: Odometry, now_us: int, config: NavigatorConfig, *, on_course: bool
+) -> NavState:
     if wanted.track is None or config.lookahead_m <= 0.0 or not on_course:
         return _paused(state, now_us)
-    crab = learned(state.crab, wanted.track, wanted.target, wanted.cross_track_m, now_us, config)
+    crab = learned(state.crab, wanted.track, wanted.target, wanted.cross_track_m, odometry, now_us, config)
     return msgspec.structs.replace(state, crab=crab)
 
 

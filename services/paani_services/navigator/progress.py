@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from paani import portable
 from paani.config import NavigatorConfig
-from paani.messages import Waypoint
+from paani.messages import Odometry, Waypoint
 
 Point = tuple[float, float]
 MIN_LEG_M = 0.01  # two waypoints nearer than this are the same
@@ -48,6 +48,15 @@ def cross_track_m(track: Track, target: int, position_m: Point) -> float:
     along_x, along_y = end.x_m - start.x_m, end.y_m - start.y_m
     from_x, from_y = position_m[0] - start.x_m, position_m[1] - start.y_m
     return (along_x * from_y - along_y * from_x) / math.hypot(along_x, along_y)
+
+
+def over_ground_mps(odometry: Odometry) -> tuple[float, float]:
+    """Velocity towards east and north."""
+    cosine, sine = portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad)
+    return (
+        odometry.surge_mps * cosine - odometry.sway_mps * sine,
+        odometry.surge_mps * sine + odometry.sway_mps * cosine,
+    )
 
 
 def bearing_rad(position_m: Point, to: Waypoint) -> float:

@@ -2,12 +2,13 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 
 import msgspec
 
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani.messages import Evidence, Odometry, TimeBase
+from paani.messages import Detection, Evidence, Label, Odometry, TimeBase
 from paani_services.navigator.projection import Station
 
 EDGE_STEPS = 128  # of the picture's height: two for each row of the mask
@@ -17,6 +18,7 @@ POSES_KEPT = 14  # 1.2 s: longer than a picture is under way
 SIGHT_SPACING_US = 100_000
 OLD_SPACING_US = 800_000  # between those kept for what is out of sight
 SIGHTS_KEPT = 40
+SMALL = frozenset({Label.PERSON, Label.BUOY})
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -34,7 +36,7 @@ class Sight(msgspec.Struct, frozen=True):
     """One picture: where it was taken, its width over height, where the water ends, where things stand in it.
 
     edge: for each column, left to right, in 1/128 of the height from the top, rounded towards the boat.
-    feet: left, right and lower end of each box, in 1/512 of the picture, rounded outwards.
+    feet: left, right and lower end of each thing, in 1/512 of the picture, rounded outwards.
     """
 
     at_us: int
@@ -141,11 +143,27 @@ def _sight(evidence: Evidence, pose: Pose) -> Sight:
         pose.pitch_rad,
         evidence.width_px / evidence.height_px,
         bytes(math.ceil(edge * EDGE_STEPS) for edge in evidence.water_edge),
-        tuple(
-            (math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), math.ceil(y2 * FOOT_STEPS))
-            for x1, _, x2, y2 in (detection.box_xyxy for detection in evidence.detections)
-        ),
+        tuple(foot for detection in evidence.detections for foot in _feet(detection, evidence.water_edge)),
     )
+
+
+def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[tuple[int, int, int]]:
+    """Where a box stands on the water.
+
+    A small thing's lower end is its foot. A long hull or pier that lies aslant reaches that low at one end only: it
+    stands where the mask ends the water, and on the box's lower end in columns where the mask looks through it.
+    """
+    x1, y1, x2, y2 = detection.box_xyxy
+    low = math.ceil(y2 * FOOT_STEPS)
+    if detection.label in SMALL:
+        yield math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), low
+        return
+    count = len(edge)
+    columns = range(math.floor(x1 * count), min(math.ceil(x2 * count), count))
+    for is_missed, run in itertools.groupby(columns, key=lambda column: edge[column] < y1):
+        if is_missed:
+            missed = tuple(run)
+            yield missed[0] * FOOT_STEPS // count, -(-(missed[-1] + 1) * FOOT_STEPS // count), low
 
 
 def _kept(sights: tuple[Sight, ...], config: PlannerConfig) -> tuple[Sight, ...]:

@@ -43,8 +43,8 @@ class NavigatorConfig(Section, frozen=True):
     pass_abeam_m: NonNegative = 6.0  # a waypoint left behind within this distance counts; 0: never
     lookahead_m: NonNegative = 4.0  # line of sight along the leg; 0: plain waypoint bearing (M4)
     # Gain of the integral against wind and current, sigma of Borhaug, Pavlov and Pettersen, CDC 2008; 0: none.
-    # A quarter of the cruise speed damps the line critically.
-    crab_gain_mps: NonNegative = 0.15
+    # The line is damped with half the root of cruise over gain: 0.77.
+    crab_gain_mps: NonNegative = 0.25
     max_crab_deg: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] = 40.0  # holds against a drift of 0.64 of the speed
     station_speed_frac: Fraction = 0.5  # of cruise, back to a station the boat drifted off
     station_inner_frac: Fraction = 0.5  # of the station's radius: once adrift, driven back this far in

@@ -27,10 +27,18 @@ class Plan(NamedTuple):
     config: Config
 
 
+class _Course(NamedTuple):
+    """Files of route and fence ("": none), and where the map's (0, 0) lies [deg]."""
+
+    route: str
+    fence: str
+    origin_lat_lon_deg: tuple[float, float]
+
+
 async def make_plan(config: Config) -> Plan:
     """Complete the settings. Raises UserError for what can be known before anything starts.
 
-    The world's route and origin are handed to navigator and localization unless they have their own.
+    The scenario's route, fence and origin are handed to navigator and localization unless they have their own.
     With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse; with `sim` the
     calibration is the eye's, unless another is given as valid.
     """
@@ -38,12 +46,14 @@ async def make_plan(config: Config) -> Plan:
     await _require_source(config.camera.source)
     if config.dashboard.serve:
         await _require_free_page(config)
-    route, origin_deg = await _world_route(config)
+    course = await _course(config)
     navigator, localization = config.navigator, config.localization
     if not navigator.route:
-        navigator = replace(navigator, route=str(route))
+        navigator = replace(navigator, route=course.route)
+    if not navigator.fence:
+        navigator = replace(navigator, fence=course.fence)
     if localization.origin_lat_lon_deg is None:
-        localization = replace(localization, origin_lat_lon_deg=origin_deg)
+        localization = replace(localization, origin_lat_lon_deg=course.origin_lat_lon_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
         calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
@@ -69,11 +79,13 @@ async def _require_free_page(config: Config) -> None:
     await server.wait_closed()
 
 
-async def _world_route(config: Config) -> tuple[Path, tuple[float, float]]:
-    """The scenario's route as a file in the runtime folder, and its origin (latitude, longitude) [deg]."""
-    path = await asyncio.to_thread(lambda: runtime_dir(config.bus) / "route.toml")
+async def _course(config: Config) -> _Course:
+    """What the scenario hands over, as files in the runtime folder."""
+    folder = await asyncio.to_thread(runtime_dir, config.bus)
+    route, fence = folder / "route.toml", folder / "fence.toml"
+    await asyncio.to_thread(fence.unlink, missing_ok=True)
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", EXPORT_ROUTE, config.world.name, str(path), stderr=asyncio.subprocess.PIPE
+        sys.executable, "-m", EXPORT_ROUTE, config.world.name, str(route), str(fence), stderr=asyncio.subprocess.PIPE
     )
     try:
         _, errors = await process.communicate()
@@ -83,5 +95,6 @@ async def _world_route(config: Config) -> tuple[Path, tuple[float, float]]:
     if process.returncode:
         lines = errors.decode(errors="replace").strip().splitlines() or [f"world.name {config.world.name}: no route"]
         raise UserError(lines[-1])
-    origin = tomllib.loads(await asyncio.to_thread(path.read_text, encoding="utf-8"))["origin"]
-    return path, (origin["latitude_deg"], origin["longitude_deg"])
+    origin = tomllib.loads(await asyncio.to_thread(route.read_text, encoding="utf-8"))["origin"]
+    fenced = await asyncio.to_thread(fence.exists)
+    return _Course(str(route), str(fence) if fenced else "", (origin["latitude_deg"], origin["longitude_deg"]))

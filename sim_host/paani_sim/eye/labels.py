@@ -14,6 +14,8 @@ OBSTACLE_CODE, WATER_CODE, SKY_CODE = 0, 1, 2
 CLASSES = (Kind.PERSON, Kind.VESSEL, Kind.PIER, Kind.BUOY)
 MIN_SIDE_PX = 3
 MIN_PIXELS = 10
+MIN_CONTRAST = 9.0  # of 255: below it neither colour nor brightness tells a thing from what is around it
+AROUND_PX = 3
 
 U8 = npt.NDArray[np.uint8]
 F32 = npt.NDArray[np.float32]
@@ -65,6 +67,32 @@ def read_labels(bgr: U8, labels: U8, depth_m: F32, things: Sequence[Thing]) -> L
         if box is not None:
             boxes.append(VisibleBox(thing.id, thing.kind, *box))
     return Labelled(bgr, mask, tuple(boxes), depth_m)
+
+
+def seen_boxes(view: Labelled, min_contrast: float = MIN_CONTRAST) -> tuple[VisibleBox, ...]:
+    """The boxes whose thing stands out from its surroundings: fog, dusk and rain hide the others."""
+    return tuple(box for box in view.boxes if contrast(view.bgr, box) >= min_contrast)
+
+
+def contrast(bgr: U8, box: VisibleBox) -> float:
+    """How far a box's pixels are from a frame `AROUND_PX` wide around it, 0..255.
+
+    The larger of the distance of medians in any channel, and half the distance from the frame's brightness to what is
+    brightest or darkest inside: a thing with a pattern of its own is seen too.
+    """
+    height, width = bgr.shape[:2]
+    x0, y0 = max(0, box.x0_px - AROUND_PX), max(0, box.y0_px - AROUND_PX)
+    x1, y1 = min(width, box.x1_px + AROUND_PX), min(height, box.y1_px + AROUND_PX)
+    whole = bgr[y0:y1, x0:x1].astype(np.float32)
+    own = np.zeros(whole.shape[:2], bool)
+    own[box.y0_px - y0 : box.y1_px - y0, box.x0_px - x0 : box.x1_px - x0] = True
+    inside, around = whole[own], whole[~own]
+    if len(around) == 0:
+        return 255.0
+    apart = np.abs(np.median(inside, axis=0) - np.median(around, axis=0)).max()
+    low, high = np.percentile(inside.mean(axis=1), [5, 95])
+    from_around = np.median(around.mean(axis=1))
+    return float(max(apart, 0.5 * max(high - from_around, from_around - low)))
 
 
 def _box(visible: npt.NDArray[np.bool_]) -> tuple[int, int, int, int, int] | None:

@@ -7,9 +7,10 @@ import numpy.typing as npt
 
 from paani_sim.eye.boats import BOAT_LOOKS
 from paani_sim.eye.camera import BoatPose
+from paani_sim.eye.quay import QUAY_TOP_M
 from paani_sim.eye.structures import BUOY_LOOKS
 from paani_sim.worlds.curves import clearance_m, normals_left, resample_closed
-from paani_sim.worlds.world import Kind, Obstacle, Pose2, World
+from paani_sim.worlds.world import Bank, Kind, Obstacle, Pose2, World
 
 F64 = npt.NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def _nose_to_bank(world: World, rng: np.random.Generator) -> BoatPose:
 def scatter(world: World, pose: BoatPose, rng: np.random.Generator) -> list[Obstacle]:
     """Boats, buoys, piers and people in front of the boat, none inside another or on the boat."""
     scene = _Scatter(world, pose, rng)
-    for _ in range(int(rng.choice([0, 1, 2], p=[0.25, 0.45, 0.30]))):
+    for _ in range(int(rng.choice([0, 1, 2, 3], p=[0.15, 0.40, 0.30, 0.15]))):
         scene.pier()
     for _ in range(int(rng.integers(0, 4))):
         scene.boat(str(rng.choice(BOAT_LOOKS)))
@@ -93,7 +94,7 @@ def scatter(world: World, pose: BoatPose, rng: np.random.Generator) -> list[Obst
         scene.buoy()
     for _ in range(int(rng.integers(0, 3))):
         scene.swimmer()
-    for _ in range(int(rng.integers(0, 6))):
+    for _ in range(int(rng.integers(0, 7))):
         scene.walker()
     return scene.found
 
@@ -210,6 +211,8 @@ class _Scatter:
             off_m = float(self._rng.uniform(0.7, 3.0))
             x_m, y_m = self._shore[index] - off_m * self._inward[index]
             base_m = 0.75 * (1.0 - float(np.exp(-off_m / 1.6))) + 0.035 * off_m
+            if self._world.bank is Bank.QUAY:
+                base_m = QUAY_TOP_M
             if self._person(float(x_m), float(y_m), base_m, None):
                 return
 
@@ -236,17 +239,26 @@ class _Scatter:
         if len(self._shore) == 0:
             return
         rng = self._rng
-        look = str(rng.choice(["jetty", "jetty", "pontoon", "quay"]))
+        quayed = self._world.bank is Bank.QUAY
+        looks = (
+            ("finger", "pontoon", "quay_steps", "jetty") if quayed else ("jetty", "jetty", "pontoon", "finger", "quay")
+        )
+        look = str(rng.choice(looks))
         for _ in range(8):
             index = int(rng.integers(len(self._shore)))
             inward = self._inward[index]
             across = float(np.arctan2(inward[1], inward[0]))
             length, width = float(rng.uniform(5.0, 12.0)), float(rng.uniform(1.3, 2.8))
-            if look == "jetty" or (look == "pontoon" and rng.random() < 0.5):
-                off_m, yaw = 0.5 * length - 1.2, across
+            if look == "quay_steps":
+                length = float(rng.uniform(2.2, 3.2))
+            if look in {"jetty", "finger", "quay_steps"} or (look == "pontoon" and rng.random() < 0.5):
+                off_m, yaw = 0.5 * length - (0.1 if quayed else 1.2), across
             else:
-                off_m, yaw = 0.5 * width - 0.2, across + 0.5 * np.pi
-            tall = {"jetty": 0.8, "pontoon": 0.45, "quay": 1.1}[look] * float(rng.uniform(0.8, 1.3))
+                off_m, yaw = 0.5 * width + (0.1 if quayed else -0.2), across + 0.5 * np.pi
+            if look == "finger":
+                width = float(rng.uniform(0.8, 1.4))
+            tall = {"jetty": 0.8, "pontoon": 0.45, "finger": 0.4, "quay": 1.1, "quay_steps": QUAY_TOP_M}[look]
+            tall *= 1.0 if look == "quay_steps" else float(rng.uniform(0.8, 1.3))
             x_m, y_m = self._shore[index] + off_m * inward
             pose = Pose2(float(x_m), float(y_m), yaw + float(rng.normal(0.0, 0.08)))
             thing = Obstacle(
@@ -261,7 +273,7 @@ class _Scatter:
             )
             if not self._try(thing, clear_m=None):
                 continue
-            for _ in range(int(rng.integers(0, 4))):
+            for _ in range(0 if look == "quay_steps" else int(rng.integers(0, 4))):
                 part = float(rng.uniform(-0.3, 0.45)) * length
                 side = float(rng.uniform(-0.3, 0.3)) * width
                 cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)

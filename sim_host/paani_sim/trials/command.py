@@ -72,7 +72,7 @@ def _suite(options: argparse.Namespace) -> int:
     if options.report:
         from paani_sim.trials.report import write_report  # noqa: PLC0415
 
-        write_report(options.report, summary, results, options.sets)
+        write_report(options.report, summary, results, options.sets, options.jobs)
     return 1 if failures else 0
 
 

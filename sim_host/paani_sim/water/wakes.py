@@ -58,7 +58,7 @@ def wavelength_m(speed_mps: float) -> float:
 def height_m(speed_mps: float, distance_m: float) -> float:
     """H = 1.2 h (d / h)^(-1/3) U^4 / (g h)^2 at `distance_m` from the sailing line."""
     froude2 = speed_mps**2 / (GRAVITY_MPS2 * DEPTH_M)
-    return 1.2 * DEPTH_M * (distance_m / DEPTH_M) ** (-1.0 / 3.0) * froude2**2
+    return 1.2 * DEPTH_M / math.cbrt(distance_m / DEPTH_M) * froude2**2
 
 
 def launch(maker: Maker, at_s: float, since_m: float) -> tuple[Packet, Packet]:
@@ -119,7 +119,7 @@ class Wakes:
         for index in np.flatnonzero(close).tolist():
             packet = Packet(*packets[index].tolist())
             gone_m = math.hypot(packet.vx_mps, packet.vy_mps) * (at_s - packet.at_s) * math.sin(CUSP_RAD)
-            amplitude_m = packet.amplitude_m * (max(gone_m, packet.spread_m) / DEPTH_M) ** (-1.0 / 3.0)
+            amplitude_m = packet.amplitude_m / math.cbrt(max(gone_m, packet.spread_m) / DEPTH_M)
             if gone_m < FURTHEST_M:
                 found.append(packet._replace(amplitude_m=amplitude_m))
         return found

@@ -67,14 +67,10 @@ class Water:
     def _drift(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> None:
         self._trains = []
         for wave in self._sea:
-            felt = self._felt(wave.kx_radpm, wave.ky_radpm, yaw_rad)
-            self._trains.append(
-                Train(
-                    *wave[1:],
-                    *(wave.amplitude_m * part for part in felt),
-                    wave.amplitude_m,
-                )
-            )
+            a, kx, ky, omega, phase = wave
+            felt = self._felt(kx, ky, yaw_rad)
+            lift, ahead, left = a * felt.elevation, a * felt.slope_ahead_pm, a * felt.slope_left_pm
+            self._trains.append(Train(kx, ky, omega, phase, lift, ahead, left, a))
         packets = self._wakes.near(x_m, y_m, at_s, WITHIN_M)
         self._packets = [(packet, self._felt(packet.kx_radpm, packet.ky_radpm, yaw_rad)) for packet in packets]
         self._now = Surroundings(

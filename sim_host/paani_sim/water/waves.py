@@ -33,7 +33,7 @@ def significant_height_m(wind_mps: float, fetch_m: float) -> float:
 
 def peak_omega_radps(wind_mps: float, fetch_m: float) -> float:
     """omega_p = 22 (g^2 / (U F))^(1/3)."""
-    return 22.0 * (GRAVITY_MPS2**2 / (wind_mps * fetch_m)) ** (1.0 / 3.0)
+    return 22.0 * math.cbrt(GRAVITY_MPS2**2 / (wind_mps * fetch_m))
 
 
 def spectrum_m2s(omega_radps: npt.NDArray[np.float64], wind_mps: float, fetch_m: float) -> npt.NDArray[np.float64]:

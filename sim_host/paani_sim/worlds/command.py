@@ -24,7 +24,7 @@ def main(argv: list[str]) -> int:
 
 
 def _list(_: argparse.Namespace) -> int:
-    rows = [("scenario", "world", "route", "fixed", "moving", "faults")]
+    rows: list[tuple[str, ...]] = [("scenario", "world", "route", "fixed", "moving", "faults")]
     rows += [_row(load_scenario(name)) for name in (*WORLDS, *SCENARIOS)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:

@@ -1,4 +1,4 @@
-"""Writes a scenario's route as a route file: `python -m paani_sim.worlds.export_route SCENARIO FILE`."""
+"""Writes a scenario's route, and its fence where it has one; run as a module: SCENARIO ROUTE_FILE FENCE_FILE."""
 
 import json
 import sys
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from paani.errors import UserError
 from paani.whole_file import write_whole
+from paani_sim.worlds.export_fence import fence_toml
 from paani_sim.worlds.load import load_scenario
 from paani_sim.worlds.world import World
 
@@ -20,11 +21,13 @@ def route_toml(world: World, name: str) -> str:
     return head + "".join(points)
 
 
-def main(name: str, file: str) -> int:
-    """Write the file whole or not at all. Exit code 2, with one line, for a user's mistake."""
+def main(name: str, route: str, fence: str) -> int:
+    """Write each file whole or not at all. Exit code 2, with one line, for a user's mistake."""
     try:
         scenario = load_scenario(name)
-        write_whole(Path(file), route_toml(scenario.world, scenario.name).encode())
+        write_whole(Path(route), route_toml(scenario.world, scenario.name).encode())
+        if scenario.fence:
+            write_whole(Path(fence), fence_toml(scenario.world, scenario.fence).encode())
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         return 2
@@ -32,4 +35,4 @@ def main(name: str, file: str) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(*sys.argv[1:3]))
+    raise SystemExit(main(*sys.argv[1:4]))

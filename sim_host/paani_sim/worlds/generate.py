@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from paani_sim.worlds import load_world, meetings
+from paani_sim.worlds.curves import Points
 from paani_sim.worlds.meetings import BOAT_MPS, Run
 from paani_sim.worlds.room import Lattice, fixed_gap_m
 from paani_sim.worlds.scenario import Scenario, Task
@@ -139,15 +140,12 @@ def _fixed(place: _Place, look: str, pose: Pose2, rng: np.random.Generator) -> O
     return thing if lies_free else None
 
 
-def _outline_m(length_m: float, width_m: float, pose: Pose2) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    part = np.linspace(-0.5, 0.5, 9)
-    edge = np.full(9, 0.5)
-    own = np.vstack(
-        [np.column_stack([part, s * edge]) for s in (-1, 1)] + [np.column_stack([s * edge, part]) for s in (-1, 1)]
-    )
-    own = own * [length_m, width_m]
+def _outline_m(length_m: float, width_m: float, pose: Pose2) -> Points:
+    part, half = np.linspace(-0.5, 0.5, 9), np.full(9, 0.5)
+    sides = [np.column_stack(edge) for edge in ((part, -half), (part, half), (-half, part), (half, part))]
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    return own @ np.array([[cos, sin], [-sin, cos]]) + np.array(pose[:2])
+    own = np.vstack(sides) * [length_m, width_m]
+    return np.asarray(own @ np.array([[cos, sin], [-sin, cos]]) + np.array(pose[:2]))
 
 
 def _swimmer(place: _Place, rng: np.random.Generator) -> Actor | None:

@@ -62,7 +62,7 @@ class Lattice:
         """
         still_m = np.minimum(self.shore_gap_m, fixed_gap_m(obstacles, self.points_m))
         half_m = 0.5 * room_m
-        nominal_s = float(self._along_m[-1]) / boat_mps
+        nominal_s = float(self._along_m[-1]) / boat_mps if actors else 0.0
         for t_s in np.arange(0.0, nominal_s + STEP_S, STEP_S):
             first = int(np.searchsorted(self._along_m, boat_mps * t_s - 5.0))
             if not _leads_on(self._free(still_m, actors, float(t_s), half_m)[first:], self._near):
@@ -81,8 +81,21 @@ def _leads_on(free: Flags, from_columns: Flags) -> bool:
     """Whether free cells connect these columns of the first row with the last row, never going back."""
     if not len(free):
         return True
-    reached = free[0] & from_columns
-    for row in free[1:]:
-        number = np.cumsum(np.diff(row.astype(np.int8), prepend=0) == 1) * row  # runs of free cells, from 1
-        reached = row & np.isin(number, np.unique(number[reached & row]))
-    return bool(reached.any())
+    bits = np.left_shift(np.uint64(1), np.arange(free.shape[1], dtype=np.uint64))
+    rows: list[int] = (free * bits).sum(axis=1).tolist()
+    reached = rows[0] & int((from_columns * bits).sum())
+    for row in rows[1:]:
+        reached = _spread(reached & row, row)
+    return reached != 0
+
+
+def _spread(seeds: int, row: int) -> int:
+    """The bits of the row that are connected with a seed by bits of the row; 64 bits."""
+    up = down = seeds
+    up_row = down_row = row
+    for shift in (1, 2, 4, 8, 16, 32):
+        up |= up_row & (up << shift)
+        up_row &= up_row << shift
+        down |= down_row & (down >> shift)
+        down_row &= down_row >> shift
+    return up | down

@@ -11,12 +11,15 @@ from paani_sim.eye.renderer import Eye
 from paani_sim.worlds.casting import route_way
 from paani_sim.worlds.meetings import BOAT_MPS
 from paani_sim.worlds.plan_view import FONT, INK, plan_view
+from paani_sim.worlds.room import fixed_gap_m
 from paani_sim.worlds.scenario import Scenario
+from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Pose2
 
 U8 = npt.NDArray[np.uint8]
 COLUMNS = 4
 VIEWS = 8
+CLEAR_M = 1.5
 TITLE_PX, CAPTION_PX = 56, 22
 
 
@@ -28,6 +31,7 @@ def sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[U8 | No
     length_m, way = scenario.world.route_length_m, route_way(scenario.world)
     span_m = length_m if scenario.world.route_closed else 0.94 * length_m
     along_m = np.linspace(0.0, span_m, VIEWS, endpoint=not scenario.world.route_closed)
+    along_m = np.array([_in_the_clear(scenario, way, float(distance_m)) for distance_m in along_m])
     poses = [way.at(float(distance_m)) for distance_m in along_m]
     pictures = []
     with Eye(scenario.world, Camera(width_px=width_px, height_px=height_px)) as eye:
@@ -39,6 +43,15 @@ def sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[U8 | No
     yield _laid_out(scenario, poses, pictures)
 
 
+def _in_the_clear(scenario: Scenario, way: Way, along_m: float) -> float:
+    """There, or as much further on as it takes for the camera not to be in something that stands in the way."""
+    for further_m in np.arange(0.0, 12.0, 1.0):
+        here = np.array([way.at(along_m + float(further_m))[:2]])
+        if fixed_gap_m(scenario.world.obstacles, here)[0] > CLEAR_M:
+            return along_m + float(further_m)
+    return along_m
+
+
 def _laid_out(scenario: Scenario, poses: list[Pose2], pictures: list[U8]) -> U8:
     rows = [np.hstack(pictures[first : first + COLUMNS]) for first in range(0, len(pictures), COLUMNS)]
     width_px = rows[0].shape[1]
@@ -47,10 +60,10 @@ def _laid_out(scenario: Scenario, poses: list[Pose2], pictures: list[U8]) -> U8:
 
 
 def _plan_height_px(scenario: Scenario, width_px: int) -> int:
-    """As high as the water is for its width, within a quarter and six tenths of it."""
+    """As high as the water is for its width, from a quarter to 0.45 of it."""
     world = scenario.world
     x_m, y_m = np.ptp(world.shore_m if world.route_closed else world.route_m, axis=0) + 32.0
-    return round(width_px * min(0.6, max(0.25, float(y_m / x_m))))
+    return round(width_px * min(0.45, max(0.25, float(y_m / x_m))))
 
 
 def _title(scenario: Scenario, width_px: int) -> U8:

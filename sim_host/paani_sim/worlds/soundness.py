@@ -45,7 +45,8 @@ def _check_route(world: World, fence: tuple[FenceArea, ...], where: str) -> None
 
 def _check_start(world: World, where: str) -> None:
     here = np.array([world.start[:2]])
-    for thing in (*world.obstacles, *world.actors):
+    things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
+    for thing in things:
         pose = thing.pose if isinstance(thing, Obstacle) else actor_pose(thing, 0.0)
         over = isinstance(thing, Obstacle) and not np.isfinite(fixed_gap_m((thing,), here)[0])
         if not over and footprint_gap_m(thing, pose, here)[0] < HULL_RADIUS_M:

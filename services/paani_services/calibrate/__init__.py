@@ -1,0 +1,1 @@
+"""`paani calibrate`: how the camera is mounted, from the far waterline and the IMU."""

@@ -1,0 +1,109 @@
+"""Evidence and attitude, paired, from a recording or from the bus."""
+
+import asyncio
+import contextlib
+import math
+from bisect import bisect_left
+from collections.abc import Iterable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from tqdm import tqdm
+
+from paani import keys
+from paani.bus import Queue
+from paani.config import BusConfig
+from paani.errors import UserError
+from paani.inspect.listen import observer
+from paani.logs.reader import open_log
+from paani.messages import Evidence, Odometry, TimeBase
+from paani_services.calibrate.horizon import waterline
+from paani_services.calibrate.mount import Look
+
+MAX_GAP_US = 100_000
+MAX_SPEED_MPS = 0.5  # faster, and the bow lifts by itself
+MAX_PICTURES = 2000
+SEED = 1
+DEPTH = 1024
+SHOW_S = 0.5
+Heard = tuple[list[Evidence], list[Odometry]]
+
+
+def recorded(path: Path) -> Heard:
+    """What a recording holds of both. Raises UserError naming the file and what it lacks."""
+    log = open_log(path)
+    evidence: list[Evidence] = []
+    odometry: list[Odometry] = []
+    wanted = {keys.EVIDENCE.name, keys.ODOMETRY.name}
+    total = sum(count for topic, count in log.topics.items() if topic in wanted)
+    with tqdm(total=total, desc="reading", unit="message", leave=False) as bar:
+        for record in log.records(wanted):
+            bar.update()
+            with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+                if record.topic == keys.EVIDENCE.name:
+                    evidence.append(msgspec.json.decode(record.data, type=Evidence))
+                else:
+                    odometry.append(msgspec.json.decode(record.data, type=Odometry))
+    for name, found in ((keys.EVIDENCE.name, evidence), (keys.ODOMETRY.name, odometry)):
+        if not found:
+            raise UserError(f"{path}: no {name} in it")
+    return evidence, odometry
+
+
+async def heard_live(bus_config: BusConfig, seconds: float) -> Heard:
+    """What comes over the bus in that time. Raises UserError where nothing listens or something does not come."""
+    async with observer(bus_config) as bus:
+        queues: tuple[Queue[Evidence], Queue[Odometry]] = (
+            bus.queue(keys.EVIDENCE, DEPTH),
+            bus.queue(keys.ODOMETRY, DEPTH),
+        )
+        heard: Heard = ([], [])
+        tasks = [asyncio.create_task(_collect(queue, kept)) for queue, kept in zip(queues, heard, strict=True)]
+        with tqdm(total=round(seconds / SHOW_S), desc="listening", leave=False) as bar:
+            for _ in range(round(seconds / SHOW_S)):
+                await asyncio.sleep(SHOW_S)
+                bar.update()
+        for task in tasks:
+            task.cancel()
+    for name, found in ((keys.EVIDENCE.name, heard[0]), (keys.ODOMETRY.name, heard[1])):
+        if not found:
+            raise UserError(f"bus: no {name} came in {seconds:g} s")
+    return heard
+
+
+def looks(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[Look]:
+    """Waterlines of live pictures with the attitude heard within 0.1 s of each, boat slow; at most MAX_PICTURES.
+
+    Raises UserError when the attitude is missing throughout.
+    """
+    frames = {(e.frame_epoch, e.frame_seq): e for e in evidence if e.time_base is TimeBase.CAPTURE and e.water_edge}
+    attitudes = sorted((o for o in odometry if o.healthy and _is_known(o)), key=lambda o: o.source_us)
+    if not frames:
+        raise UserError("no evidence says where the water ends (live pictures, segmented)")
+    if not attitudes:
+        raise UserError("no healthy odometry: roll and pitch of the boat are not known")
+    chosen = list(frames.values())[:: max(1, len(frames) // MAX_PICTURES)]
+    rng = np.random.default_rng(SEED)
+    stamps = [o.source_us for o in attitudes]
+    found: list[Look] = []
+    for frame in tqdm(chosen, desc="waterlines", unit="picture", leave=False):
+        at = bisect_left(stamps, frame.source_us)
+        nearest = min(attitudes[max(0, at - 1) : at + 1], key=lambda o: abs(o.source_us - frame.source_us))
+        if abs(nearest.source_us - frame.source_us) > MAX_GAP_US or abs(nearest.surge_mps) > MAX_SPEED_MPS:
+            continue
+        line = waterline(frame, rng)
+        if line is not None:
+            found.append(Look(line, nearest.roll_rad, nearest.pitch_rad))
+    return found
+
+
+async def _collect(queue: "Queue[Evidence] | Queue[Odometry]", kept: list[Evidence] | list[Odometry]) -> None:
+    while True:
+        kept.append(await queue.get())  # type: ignore[arg-type]  # each queue has its own list
+
+
+def _is_known(odometry: Odometry) -> bool:
+    """A filter without an IMU says exactly level."""
+    numbers = (odometry.roll_rad, odometry.pitch_rad)
+    return all(map(math.isfinite, numbers)) and any(numbers)

@@ -1,0 +1,154 @@
+"""The page about many drives: figures with intervals, and the worst drives with plan, pictures and recording."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from paani.whole_file import write_whole
+from paani_models.report.charts import bar
+from paani_sim.trials.cases import Case, scenario_of
+from paani_sim.trials.plan_view import plan_view
+from paani_sim.trials.result import Closeness, TrialResult
+from paani_sim.trials.summary import PolicyFigures, Share, Summary
+from paani_sim.trials.worst import Again, drive_again, worst_of
+
+WORST = 6
+KEY = (
+    '<p class="key"><span style="background:#0072b2"></span>track<span style="background:#c8321e"></span>contact'
+    '<span style="background:#d98200"></span>buoy; ring: closer than 0.6 m'
+    '<span style="background:#8a6d4b"></span>vessel'
+    '<span style="background:#77685a"></span>pier<span style="background:#b0317a"></span>swimmer. '
+    "Dashed: the route, and the ways of what moves, drawn where it would be at the worst moment.</p>"
+)
+
+
+def write_report(
+    path: Path, summary: Summary, results: Mapping[Case, TrialResult], sets: Sequence[str], jobs: int
+) -> None:
+    """The page, and beside it a folder with recordings and pictures. Raises UserError for what cannot be written."""
+    folder = path.with_name(f"{path.stem}-drives")
+    again = drive_again(worst_of(results, WORST), results, sets, folder, jobs)
+    write_whole(path, page(summary, results, again, folder.name).encode(), "--report")
+
+
+def page(summary: Summary, results: Mapping[Case, TrialResult], again: Sequence[Again], folder: str) -> str:
+    """The HTML text. folder: where recordings lie, from the page."""
+    drives = sum(figures.trials for figures in summary.policies.values())
+    km = sum(figures.distance_m for figures in summary.policies.values()) * 1e-3
+    body = [
+        "<h2>Policies</h2>",
+        "<p>Every policy drives the same scenarios. Bars: the share and its 95 % Wilson interval. A contact is visible "
+        "if the camera could have seen the thing within 15 m in the five seconds before. A near miss is a clearance "
+        "below 0.5 m without contact; those of banks are not counted here.</p>",
+        _policies(summary.policies),
+        "<h2>How close</h2><p>Encounters within five metres, by the clearance at the closest point.</p>",
+        _closeness(summary.policies),
+        "<h2>Worlds</h2>",
+        *(f"<h3>{escape(policy)}</h3>{_policies(worlds)}" for policy, worlds in summary.worlds.items()),
+        "<h2>Why the boat stood</h2>",
+        _stops(summary.policies),
+    ]
+    if summary.faults:
+        body += ["<h2>Faults</h2>", _faults(summary)]
+    body += ["<h2>Worst drives</h2>", KEY, *(_drive(each, results[each.case], folder) for each in again)]
+    template = Template((files("paani_sim.trials") / "page.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        title=escape(summary.suite), subtitle=f"{drives} drives, {km:.2f} km", body="\n".join(body)
+    )
+
+
+def _policies(rows: Mapping[str, PolicyFigures]) -> str:
+    head = (
+        "", "drives", "completed", "without contact", "contacts", "visible", "banks", "per km", "near misses",
+        "least clearance [m]", "off route rms [m]", "speed [m/s]", "changes a minute", "latency [s]",
+    )  # fmt: skip
+    return _table(
+        head,
+        [
+            (
+                escape(name), str(p.trials), _share(p.completed_share), _share(p.untouched_share), _bad(p.collisions),
+                _bad(p.collisions_visible), str(p.collisions_bank), f"{p.contacts_per_km:.2f}", str(p.near_misses),
+                f"{p.min_clearance_m:.2f}", f"{p.off_route_rms_m:.2f}", f"{p.mean_speed_mps:.2f}",
+                f"{p.changes_per_min:.1f}", "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
+            )
+            for name, p in rows.items()
+        ],
+    )  # fmt: skip
+
+
+def _closeness(rows: Mapping[str, PolicyFigures]) -> str:
+    body = [(escape(name), *(str(p.encounters.get(kind.value, 0)) for kind in Closeness)) for name, p in rows.items()]
+    return _table(("", "contact", "under 0.3 m", "under 0.6 m", "under 1.5 m", "farther"), body)
+
+
+def _stops(rows: Mapping[str, PolicyFigures]) -> str:
+    body = [
+        (escape(name), reason.replace("_", " ").lower(), str(stop.count), f"{stop.seconds:.0f}")
+        for name, p in rows.items()
+        for reason, stop in p.stops.items()
+    ]
+    return _table(("", "reason", "times", "seconds"), body) if body else '<p class="faint">It never stood.</p>'
+
+
+def _faults(summary: Summary) -> str:
+    head = ("", "drives", "completed", "contacts", "fans off in time", "latest fans off [s]", "latest at rest [s]")
+    return _table(
+        head,
+        [
+            (
+                escape(kind.replace("_", " ")), str(f.trials), str(f.completed), _bad(f.collisions),
+                f"{f.in_time} of {f.judged}" if f.judged else "-",
+                "-" if f.worst_zero_thrust_s is None else f"{f.worst_zero_thrust_s:.2f}",
+                "-" if f.worst_rest_s is None else f"{f.worst_rest_s:.2f}",
+            )
+            for kind, f in summary.faults.items()
+        ],
+    )  # fmt: skip
+
+
+def _drive(each: Again, result: TrialResult, folder: str) -> str:
+    facts = [f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s: {result.why.value}"]
+    facts += [
+        f'<span class="bad">touched {escape(c.what)} ({c.kind})</span> at {c.at_s:.1f} s, {c.speed_mps:.2f} m/s, '
+        + ("in view" if c.visible else "out of view")
+        for c in result.contacts
+    ]
+    facts += [
+        f"{e.clearance_m:.2f} m from {escape(e.what)} ({e.kind}) at {e.at_s:.1f} s"
+        for e in result.encounters
+        if e.closeness in {Closeness.GRAZING, Closeness.TIGHT}
+    ]
+    facts += [f"stood {s.seconds:.1f} s: {s.reason.replace('_', ' ').lower()} ({s.count})" for s in result.stops[:4]]
+    if not each.same:
+        facts.append('<span class="bad">driven again it went otherwise: other code or settings</span>')
+    strip = ""
+    if each.strip:
+        data = base64.b64encode(each.strip).decode()
+        strip = (
+            f'<div class="strip"><img alt="pictures before the worst moment" src="data:image/png;base64,{data}"></div>'
+        )
+    items = "".join(f"<li>{fact}</li>" for fact in facts)
+    link = f"{escape(folder)}/{escape(each.log)}"
+    return (
+        f'<div class="drive"><div>{plan_view(scenario_of(each.case).world, result)}</div>'
+        f'<div><h3>{escape(each.case.name)}</h3><ul>{items}</ul><a href="{link}">recording</a></div>{strip}</div>'
+    )
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    top = "".join(f"<th>{cell}</th>" for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def _share(s: Share) -> str:
+    return f"{100 * s.share:.1f} %{bar(s.share, s.low, s.high)}"
+
+
+def _bad(count: int) -> str:
+    return f'<span class="bad">{count}</span>' if count else "0"

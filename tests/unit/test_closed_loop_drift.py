@@ -1,0 +1,40 @@
+"""Wind and current on the whole guidance chain: plant, sensors, estimator, navigator, controller, adapter."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import pytest
+
+from paani.config import load_config
+from paani_sim.worlds import Current, Wind, World
+from tests.unit.test_closed_loop_guidance import Lockstep, off_route_m, open_water
+
+PERFECT = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0", "plant.vessel=otter")
+
+
+@pytest.fixture
+def windy_lake() -> World:
+    """6 m/s of wind and 0.15 m/s of current, across each other."""
+    return dataclasses.replace(
+        open_water("lake"), wind=Wind(speed_mps=6.0, toward_rad=0.6), current=Current(speed_mps=0.15, toward_rad=2.2)
+    )
+
+
+def off_m(boat: Lockstep) -> Iterator[float]:
+    boat.settle(30.0)
+    for _ in boat.run(60.0):
+        yield off_route_m(boat.world, boat.plant.position_m)
+
+
+def test_wind_and_current_no_longer_push_the_boat_off_its_line(windy_lake: World) -> None:
+    """Without the integral the same boat is further off; the positions that remain are the estimate's."""
+    worst_m = {}
+    for gain_mps in (0.0, 0.25):
+        config = load_config(sets=(*PERFECT, f"navigator.crab_gain_mps={gain_mps}"))
+        boat = Lockstep(windy_lake, config)
+        worst_m[gain_mps] = max(off_m(boat))
+        boat.plant.close()
+    assert worst_m[0.25] < 0.5
+    assert worst_m[0.25] < 0.7 * worst_m[0.0]
