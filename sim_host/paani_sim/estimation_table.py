@@ -65,8 +65,8 @@ class Instant(NamedTuple):
 class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
     """One course. Distances are in the plane; healthy: while the estimate said so.
 
-    gps_m, compass_deg: RMS errors of the fixes and of the compass themselves. nis: mean over the fixes that were used, 2 if the stated spread is right;
-    nis_low, nis_high: its 95 % band. nees: mean squared position error over the published variance, at most 2 if the
+    gps_m, compass_deg: RMS errors of the fixes and of the compass themselves. nis: mean over the fixes that were used,
+    2 if the stated spread is right; nis_low, nis_high: its 95 % band. nees: mean squared position error over the published variance, at most 2 if the
     published spread covers the error. false_motion_frac: of the steps truly at rest, those with an estimated speed
     above 0.05 m/s; None: never at rest. false_motion_s: the longest stretch of them.
     """
@@ -183,14 +183,14 @@ def part_of(rows: list[EstimationRow]) -> Part:
     return Part(
         name="estimation",
         columns=(
-            "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg", "speed m/s", "NIS", "95 % band",
-            "NEES", "false motion %", "longest s", "unhealthy s", "refused",
+            "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg", "speed m/s", "NIS",
+            "95 % band", "NEES", "false motion %", "longest s", "unhealthy s", "refused",
         ),
         rows=tuple(
             (
                 row.condition, row.seed, round(row.position_m, 2), round(row.healthy_position_m, 2),
-                round(row.gps_m, 2), round(row.heading_deg, 2), round(row.compass_deg, 2), round(row.speed_mps, 3), round(row.nis, 2),
-                f"{row.nis_low:.2f}..{row.nis_high:.2f}", round(row.nees, 2),
+                round(row.gps_m, 2), round(row.heading_deg, 2), round(row.compass_deg, 2), round(row.speed_mps, 3),
+                round(row.nis, 2), f"{row.nis_low:.2f}..{row.nis_high:.2f}", round(row.nees, 2),
                 None if row.false_motion_frac is None else round(100.0 * row.false_motion_frac, 2),
                 round(row.false_motion_s, 2), round(row.unhealthy_s, 1), row.refused,
             )

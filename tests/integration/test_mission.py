@@ -11,6 +11,7 @@ import pytest
 
 from paani import keys
 from paani import messages as m
+from paani.bus import Bus
 from paani.clock import WallClock
 from tests.conftest import OpenAs, Spawn
 
@@ -32,30 +33,67 @@ def settings(folder: Path, east_m: float) -> tuple[str, ...]:
     return tuple(f"navigator.{name}={folder / f'{name}.toml'}" for name in files)
 
 
+class Around:
+    """Everything the navigator hears, and what it says."""
+
+    def __init__(self, buses: dict[str, Bus]) -> None:
+        self.clock = buses["plant"].publisher(keys.SIM_TIME)
+        self.advisory = buses["advisor"].publisher(keys.ADVISORY)
+        self.odometry = buses["localization"].publisher(keys.ODOMETRY)
+        self.arming = buses["dashboard"].publisher(keys.ARMING)
+        self.orders = buses["observer"].latest(keys.COMMAND)
+        self.mission = buses["observer"].latest(keys.MISSION)
+        self.sim_us = 0
+
+    async def until_under_way(self) -> list[int]:
+        """The leg of each order up to the first that moves."""
+        legs: list[int] = []
+        while True:
+            now_us, self.sim_us = CLOCK.now_us(), self.sim_us + 50_000
+            self.clock.put(m.SimTime(source_us=now_us, sim_us=self.sim_us, stamp_us=now_us))
+            said = m.Advisory(source_us=now_us, direction=m.Direction.STRAIGHT, reason=m.Reason.CENTER_CLEAR)
+            self.advisory.put(said)
+            here = m.Odometry(source_us=now_us, x_m=1.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.0, healthy=True)
+            self.odometry.put(here)
+            self.arming.put(m.Arming(source_us=now_us, armed=True))
+            await asyncio.sleep(0.05)
+            order = self.orders.value
+            if order is not None and order.source_us > now_us - 500_000:
+                legs.append(order.leg_index)
+                if order.enable:
+                    return legs
+
+
+BUSES = ("plant", "advisor", "localization", "dashboard", "observer")
+
+
 async def test_legs_follow_each_other_on_the_real_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
     """Held for half a second of simulated time, then under way; the mission is on the bus for late joiners."""
-    plant, advisor, localization, operator, observer = [
-        await open_as(name) for name in ("plant", "advisor", "localization", "dashboard", "observer")
-    ]
-    clock, advisory = plant.publisher(keys.SIM_TIME), advisor.publisher(keys.ADVISORY)
-    odometry, arming = localization.publisher(keys.ODOMETRY), operator.publisher(keys.ARMING)
-    orders, mission = observer.latest(keys.COMMAND), observer.latest(keys.MISSION)
-    seen: list[tuple[int, tuple[m.Inhibit, ...]]] = []
+    around = Around({name: await open_as(name) for name in BUSES})
     async with spawn("navigator", *settings(tmp_path, 100.0)), asyncio.timeout(30):
-        sim_us = 0
-        while not (seen and seen[-1] == (1, ())):
-            now_us, sim_us = CLOCK.now_us(), sim_us + 50_000
-            clock.put(m.SimTime(source_us=now_us, sim_us=sim_us, stamp_us=now_us))
-            advisory.put(m.Advisory(source_us=now_us, direction=m.Direction.STRAIGHT, reason=m.Reason.CENTER_CLEAR))
-            odometry.put(m.Odometry(source_us=now_us, x_m=1.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.0, healthy=True))
-            arming.put(m.Arming(source_us=now_us, armed=True))
-            await asyncio.sleep(0.05)
-            if orders.value is not None:
-                seen.append((orders.value.leg_index, orders.value.inhibits))
-        assert (0, (m.Inhibit.HOLDING,)) in seen
-        assert mission.value is not None
-        assert [leg.kind for leg in mission.value.legs] == [m.LegKind.HOLD_STATION, m.LegKind.FOLLOW_ROUTE]
-        assert len(mission.value.fence) == 1
+        legs = await around.until_under_way()
+    assert (legs[0], legs[-1]) == (0, 1)
+    mission = around.mission.value
+    assert mission is not None
+    assert [leg.kind for leg in mission.legs] == [m.LegKind.HOLD_STATION, m.LegKind.FOLLOW_ROUTE]
+    assert len(mission.fence) == 1
+
+
+async def test_restarted_under_way_it_goes_on_with_its_leg(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
+    """The station is not held again; an operator whose own process is new has the mission from its beginning."""
+    buses = {name: await open_as(name) for name in BUSES}
+    around, sets = Around(buses), settings(tmp_path, 100.0)
+    async with spawn("navigator", *sets), asyncio.timeout(30):
+        await around.until_under_way()
+    await asyncio.sleep(0.6)
+    async with spawn("navigator", *sets), asyncio.timeout(30):
+        assert set(await around.until_under_way()) == {1}
+    await buses["dashboard"].close()
+    await asyncio.sleep(0.6)
+    anew = Around({**buses, "dashboard": await open_as("dashboard")})
+    anew.sim_us = around.sim_us
+    async with spawn("navigator", *sets), asyncio.timeout(30):
+        assert (await anew.until_under_way())[0] == 0
 
 
 async def test_a_route_that_leaves_the_fence_stops_the_process_before_it_starts(

@@ -1,5 +1,6 @@
 """`paani trial` with processes of its own."""
 
+import dataclasses
 import json
 import signal
 import subprocess
@@ -8,11 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from paani_sim.trials.cases import Case
-from paani_sim.trials.one import run_case
+from paani.replay import command as replay
+from paani_sim.trials.cases import Case, scenario_of
+from paani_sim.trials.drive import Drive
+from paani_sim.trials.one import config_for, run_case
+from paani_sim.trials.oracle import OracleEyes
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.provenance import Maker
+from paani_sim.trials.recording import Recorder
 from paani_sim.trials.suite import Record, encoded, look, result_path
+from paani_sim.worlds import Task
 
 pytestmark = pytest.mark.integration
 SHORT = """
@@ -67,3 +73,17 @@ def test_an_interrupted_run_is_gone_on_with(tmp_path: Path) -> None:
     assert "the same command goes on" in said
     assert 1 <= len(list(done.glob("*.json"))) < 80
     assert not list(done.glob(".*"))
+
+
+def test_a_recorded_drive_is_decided_again_to_the_byte(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The recording is one of the live topics: every decision in it comes out the same."""
+    case = Case("lake", 1, Policy.ORACLE)
+    scenario = dataclasses.replace(scenario_of(case), task=Task(distance_m=2.0, time_limit_s=30.0))
+    config, file = config_for(case), tmp_path / "drive.mcap"
+    with Recorder(file, config) as recorder:
+        drive = Drive(scenario, config, OracleEyes(scenario.world, (), config), tap=recorder.tap)
+        drive.run()
+        drive.close()
+    assert drive.along.best_m > 2.0
+    assert replay.main([str(file), "--check"]) == 0
+    assert "0 differ" in capsys.readouterr().out

@@ -9,6 +9,7 @@ from paani_sim.worlds.curves import Points, clearance_m, open_length_m
 from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
 
 BOAT_MPS = 0.6
+GRID_M = 0.7
 
 
 def met(scenario: Scenario) -> tuple[Obstacle | Actor, ...]:
@@ -35,6 +36,7 @@ def check_is_fair(scenario: Scenario) -> None:
     assert 1 <= len(met(scenario)) <= 4
     start_m = np.array([world.start[:2]])
     assert fixed_gap_m(world.obstacles, start_m)[0] > 2.0
+    assert fixed_gap_m(world.obstacles, world.route_m[-1:])[0] > 2.0
     for actor in world.actors:
         assert footprint_gap_m(actor, actor_pose(actor, 0.0), start_m)[0] > 2.0, actor.id
         track_m = fine(actor.path_m)
@@ -52,7 +54,7 @@ def has_room(scenario: Scenario) -> bool:
     """Whether a disc 2.6 m wide gets from start to goal around the route; actors where they end up."""
     world = scenario.world
     low, high = world.route_m.min(axis=0) - 16.0, world.route_m.max(axis=0) + 16.0
-    x_m, y_m = np.arange(low[0], high[0], 0.5), np.arange(low[1], high[1], 0.5)
+    x_m, y_m = np.arange(low[0], high[0], GRID_M), np.arange(low[1], high[1], GRID_M)
     points_m = np.stack(np.meshgrid(x_m, y_m, indexing="ij"), axis=-1).reshape(-1, 2)
     gap_m = np.minimum(clearance_m(world.shore_m, points_m), fixed_gap_m(world.obstacles, points_m))
     for actor in world.actors:

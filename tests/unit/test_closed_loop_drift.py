@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 
 from paani.config import load_config
+from paani.messages import FenceArea, Inhibit, Keep, Waypoint
+from paani_services.navigator.fence import distance_m, is_allowed
 from paani_sim.worlds import Current, Wind, World
 from tests.unit.test_closed_loop_guidance import Lockstep, off_route_m, open_water
 
@@ -26,6 +29,25 @@ def off_m(boat: Lockstep) -> Iterator[float]:
     boat.settle(30.0)
     for _ in boat.run(60.0):
         yield off_route_m(boat.world, boat.plant.position_m)
+
+
+def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None:
+    """The fence cuts the route: the plant's own position stays inside, whatever pushes, while the boat brakes."""
+    boat = Lockstep(windy_lake, load_config(sets=PERFECT))
+    start = boat.plant.position_m
+    corners = [(start[0] + x, start[1] + y) for x, y in ((-18.0, -60.0), (40.0, -60.0), (40.0, 60.0), (-18.0, 60.0))]
+    area = FenceArea(keep=Keep.IN, corners=tuple(Waypoint(x_m=x, y_m=y) for x, y in corners))
+    boat.mission = msgspec.structs.replace(boat.mission, fence=(area,))
+    fastest_mps = 0.0
+    for _ in boat.run(90.0):
+        fastest_mps = max(fastest_mps, boat.plant.velocity[0])
+        assert boat.command is not None
+        if Inhibit.OUTSIDE_FENCE in boat.command.inhibits and boat.plant.velocity[0] < 0.1:
+            break
+    assert fastest_mps > 0.5
+    assert is_allowed(boat.mission.fence, boat.plant.position_m)
+    assert distance_m(boat.mission.fence, boat.plant.position_m) < 6.0
+    boat.plant.close()
 
 
 def test_wind_and_current_no_longer_push_the_boat_off_its_line(windy_lake: World) -> None:

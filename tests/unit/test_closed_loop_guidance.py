@@ -56,6 +56,7 @@ class Lockstep:
             name=world.name,
             waypoints=tuple(Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist()),
         )
+        self.mission = route_alone(self.route)
         self.nav, self.ctl = NavState(), ControlState()
         self.adapter = ThrustAdapter(config.plant.adapter, DOMAIN)
         self.direction = Direction.STRAIGHT
@@ -106,9 +107,7 @@ class Lockstep:
             arming=arming,
             arming_us=now_us,
         )
-        self.nav, self.command = navigate(
-            self.nav, heard, route_alone(self.route), now_us, DOMAIN, self.config.navigator
-        )
+        self.nav, self.command = navigate(self.nav, heard, self.mission, now_us, DOMAIN, self.config.navigator)
         self.ctl, thrust = control(
             self.ctl,
             ControllerHeard(self.command, now_us, self.odometry, now_us),

@@ -5,7 +5,7 @@ import pytest
 
 from paani_sim.eye import BoatPose, Camera, project
 from paani_sim.eye.camera import look_from
-from paani_sim.eye.labels import read_labels
+from paani_sim.eye.labels import read_labels, seen_boxes
 from paani_sim.eye.mesh import box, ellipsoid, rotation
 from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.scene import FIRST_THING, Thing, make_scene, place
@@ -155,3 +155,26 @@ def test_scatter_is_seeded_and_keeps_the_boat_free() -> None:
         for thing in found:
             gap_m = np.hypot(thing.pose.x_m - pose.x_m, thing.pose.y_m - pose.y_m)
             assert gap_m > 1.4, thing
+
+
+@pytest.mark.parametrize(("shade", "seen"), [(120, False), (124, False), (150, True), (60, True)])
+def test_what_does_not_stand_out_is_not_labelled(shade: int, seen: bool) -> None:
+    """A boat in the fog's own grey keeps its box in the truth and loses its label."""
+    number = np.zeros((40, 60), np.uint8)
+    number[15:25, 10:30] = FIRST_THING
+    picture = np.stack([number, number * 0, number * 0, number * 0], -1)
+    bgr = np.full((40, 60, 3), 120, np.uint8)
+    bgr[15:25, 10:30] = shade
+    view = read_labels(bgr, picture, np.ones((40, 60), np.float32), [Thing(FIRST_THING, "boat", Kind.VESSEL, "")])
+    assert len(view.boxes) == 1
+    assert (len(seen_boxes(view)) == 1) is seen
+
+
+def test_specks_of_a_hidden_person_are_not_labelled() -> None:
+    number = np.zeros((60, 60), np.uint8)
+    number[5:55:5, 5:55:5] = FIRST_THING
+    picture = np.stack([number, number * 0, number * 0, number * 0], -1)
+    bgr = np.where(number[..., None] == FIRST_THING, 250, 60).astype(np.uint8).repeat(3, axis=2)
+    view = read_labels(bgr, picture, np.ones((60, 60), np.float32), [Thing(FIRST_THING, "p", Kind.PERSON, "")])
+    assert view.boxes[0].contrast > 100.0
+    assert seen_boxes(view) == ()

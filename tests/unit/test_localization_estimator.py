@@ -129,6 +129,16 @@ def test_a12_without_heading_there_is_no_health() -> None:
     boat = Ride()
     boat.change = lambda samples: [msgspec.structs.replace(each, orientation_available=False) for each in samples]
     assert not any(one.healthy for one in boat.go(6.0))
+    assert not any(one.healthy for one in boat.go(60.0, surge_mps=0.6))
+
+
+def test_a12_a_compass_that_falls_silent_ends_health(ride: Ride) -> None:
+    """A12: the gyro keeps the heading for 3 s, no longer."""
+    ride.go(10.0, surge_mps=0.6)
+    ride.change = lambda samples: [msgspec.structs.replace(each, orientation_available=False) for each in samples]
+    said = ride.go(5.0, surge_mps=0.6)
+    assert said[50].healthy
+    assert not any(one.healthy for one in said[62:])
 
 
 def test_first_fix_is_the_origin_when_none_is_set() -> None:

@@ -4,8 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from paani.messages import ImuSample
 from paani_services.localization.filter import OWN, PSI, PX, PY, SIZE, PlanarFilter, U, V
+from paani_services.localization.levelling import level
 
 STD = np.array([1.0, 1.0, 0.1, 0.2, 0.1, 0.005, 0.8, 0.8, 0.05, 0.3, 0.3])
 
@@ -70,3 +74,79 @@ def test_velocity_correction_in_map_axes() -> None:
     for _ in range(50):
         one.correct_velocity(0.0, 0.4, 0.05, gate2=1e9)
     assert one.x[[U, V]] == pytest.approx([0.4, 0.0], abs=0.02)
+
+
+def test_the_receivers_slow_error_is_not_taken_for_motion() -> None:
+    """A fix that wanders by its stated spread moves the boat at rest by far less."""
+    rng, one = np.random.default_rng(3), PlanarFilter(state(), STD)
+    one.move_to(0.0, 0.0, 0.8, 0.05)
+    keep, error = math.exp(-0.2 / 60.0), 0.8 * rng.standard_normal(2)
+    places = []
+    for _ in range(1500):
+        error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
+        one.predict(0.0, 0.0, 0.0, 0.2, 0.8)
+        one.correct_velocity(0.0, 0.0, 0.03, math.inf, turns=False)
+        one.correct_position(*(error + 0.05 * rng.standard_normal(2)).tolist(), 0.05, 25.0)
+        places.append(one.x[[PX, PY]])
+    assert np.std(np.array(places[300:]), axis=0).max() < 0.3
+
+
+def test_position_errors_are_as_large_as_the_covariance_says() -> None:
+    """NEES: over forty receivers, the mean of e' P^-1 e is 2 by its 95 % band."""
+    rng, found = np.random.default_rng(5), []
+    keep, std = math.exp(-0.2 / 60.0), np.array([1.0, 1.0, 0.02, 0.05, 0.05, 0.001, 0.8, 0.8, 0.02, 0.0, 0.0])
+    for _ in range(40):
+        error = 0.8 * rng.standard_normal(2)
+        one = PlanarFilter(state(0.0, 0.0, 0.4, 0.6), std)
+        truth = np.zeros(2)
+        first = truth + error + 0.05 * rng.standard_normal(2)
+        one.move_to(*first.tolist(), 0.8, 0.05)
+        for _ in range(300):
+            truth = truth + 0.2 * 0.6 * np.array([math.cos(0.4), math.sin(0.4)])
+            error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
+            one.predict(0.0, 0.0, 0.0, 0.2, 0.8)
+            velocity = 0.6 * np.array([math.cos(0.4), math.sin(0.4)]) + 0.05 * rng.standard_normal(2)
+            one.correct_velocity(*velocity.tolist(), 0.05, math.inf)
+            one.correct_position(*(truth + error + 0.05 * rng.standard_normal(2)).tolist(), 0.05, math.inf)
+        off = one.x[[PX, PY]] - truth
+        found.append(float(off @ np.linalg.solve(one.covariance[:2, :2], off)))
+    assert np.mean(found) == pytest.approx(2.0, abs=1.96 * math.sqrt(4.0 / len(found)))
+
+
+def test_a_long_run_keeps_the_covariance_a_covariance() -> None:
+    rng, one = np.random.default_rng(7), PlanarFilter(state(), STD)
+    for step in range(3_000):
+        one.predict(0.3 * math.sin(0.01 * step), 0.1, 0.05, 0.05, 0.8)
+        one.correct_yaw(float(one.x[PSI]) + 0.02 * rng.standard_normal(), 0.02, 9.0)
+        one.correct_way(1.4)
+        if step % 4 == 0:
+            x_m, y_m, _ = one.expected_fix
+            one.correct_position(x_m + 0.05 * rng.standard_normal(), y_m, 0.05, 25.0)
+            one.correct_velocity(*one.velocity, 0.05, 25.0)
+    assert (one.covariance == one.covariance.T).all()
+    assert np.linalg.eigvalsh(one.covariance).min() > 0.0
+    assert np.isfinite(one.x).all()
+    assert one.std.max() < 2.0
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
+def test_gravity_leaves_no_trace_on_level_axes(roll_rad: float, pitch_rad: float, turn_radps: float) -> None:
+    """A boat that lies still, or turns, however it heels and trims."""
+    sin_roll, cos_roll, sin_pitch, cos_pitch = (
+        math.sin(roll_rad), math.cos(roll_rad), math.sin(pitch_rad), math.cos(pitch_rad)
+    )  # fmt: skip
+    felt = level(
+        ImuSample(
+            source_us=0,
+            gyro_x_radps=-turn_radps * sin_pitch,
+            gyro_y_radps=turn_radps * cos_pitch * sin_roll,
+            gyro_z_radps=turn_radps * cos_pitch * cos_roll,
+            accel_x_mps2=-9.81 * sin_pitch,
+            accel_y_mps2=9.81 * cos_pitch * sin_roll,
+            accel_z_mps2=9.81 * cos_pitch * cos_roll,
+            roll_rad=roll_rad,
+            pitch_rad=pitch_rad,
+        )
+    )
+    assert (felt.ahead_mps2, felt.left_mps2) == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert felt.yaw_rate_radps == pytest.approx(turn_radps)

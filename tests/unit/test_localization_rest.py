@@ -29,7 +29,7 @@ def longest(flags: list[bool]) -> int:
     return max((len(list(run)) for flag, run in itertools.groupby(flags) if flag), default=0)
 
 
-def at_quay(shown: list[GpsFix], *, tilt_mps2: float = 0.0, seed: int = 1) -> Iterator[tuple[Odometry, GpsFix | None]]:
+def at_quay(shown: list[GpsFix], *, tilt_mps2: float, seed: int = 1) -> Iterator[tuple[Odometry, GpsFix | None]]:
     """The estimates of a boat whose IMU lies quiet, from the first fix on; and each fix when it comes."""
     estimator, rng, waiting = Estimator(LocalizationConfig()), np.random.default_rng(seed), list(reversed(shown))
     now_us = shown[0].source_us - 3_000_000
@@ -58,16 +58,18 @@ def at_quay(shown: list[GpsFix], *, tilt_mps2: float = 0.0, seed: int = 1) -> It
 
 @pytest.mark.data
 @pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
-@pytest.mark.parametrize("tilt_mps2", [0.0, 0.05])
-def test_l5_a_recorded_moored_boat_is_not_read_as_motion(tilt_mps2: float) -> None:
-    """L5: of ten minutes at a dock, with 0.05 m/s and more in 93 % of the fixes, at most 4 % are read as motion."""
+def test_l5_a_recorded_moored_boat_is_not_read_as_motion() -> None:
+    """L5: of ten minutes at a dock, with over 0.05 m/s in 93 % of the fixes, 2 % at most are read as motion.
+
+    The IMU is mounted askew by 0.3 degrees.
+    """
     shown = list(fixes((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
     assert sum(fix.sog_mps > 0.05 for fix in shown) > 0.9 * len(shown)
-    said = list(at_quay(shown, tilt_mps2=tilt_mps2))
+    said = list(at_quay(shown, tilt_mps2=0.05))
     moving = [speed_mps(each) > 0.05 for each, _ in said]
-    assert sum(moving) < 0.04 * len(moving)
-    assert longest(moving) < 10 * 20
-    assert sum(each.stopped for each, _ in said) > 0.93 * len(said)
+    assert sum(moving) < 0.02 * len(moving)
+    assert longest(moving) < 6 * 20
+    assert sum(each.stopped for each, _ in said) > 0.97 * len(said)
     offs = []
     for each, fix in said:
         if fix is not None:
@@ -98,7 +100,7 @@ def test_l5_noise_of_gps_speed_is_no_motion_at_rest() -> None:
 
 
 def test_the_simulators_receiver_shows_no_motion_at_rest() -> None:
-    said = wandering().go(300.0)[200:]
+    said = wandering().go(150.0)[200:]
     moving = [speed_mps(each) > 0.05 for each in said]
     assert sum(moving) < 0.02 * len(moving)
     assert longest(moving) < 2 * 20
@@ -130,7 +132,7 @@ def test_steady_slow_motion_is_never_taken_for_rest() -> None:
     """Half the paper's cruise, in a calm, begun while the gyro was calibrated: nothing is felt for minutes."""
     boat = wandering()
     boat.go(15.0, surge_mps=0.075)
-    said = boat.go(240.0, surge_mps=0.075)
+    said = boat.go(120.0, surge_mps=0.075)
     assert sum(each.stopped for each in said) == 0
     assert boat.off_m() < 2.5
 

@@ -56,7 +56,7 @@ def test_q4_three_seconds_in_steps_of_0_2() -> None:
     assert roll_out(RESTING, np.zeros(1), np.array([0.4]), PAPER).at_s[-1] == pytest.approx(3.0)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     surge=st.floats(0.0, 0.4),
     rate=st.floats(-0.35, 0.35),
@@ -88,7 +88,7 @@ def test_q6_hull_margin_and_drift() -> None:
         assert footprint_m(at_s, 0.3, config) == pytest.approx([0.55, 0.55, 0.55, 0.55])
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     bars=st.lists(
         st.tuples(st.floats(1.5, 7.0), st.floats(-3.0, 3.0), st.floats(0.3, 2.0), st.floats(0.3, 2.0)), max_size=4
@@ -113,7 +113,7 @@ def test_no_way_leads_into_what_is_occupied(
     assert (gap_m[near] >= needed[near] - 0.5 * CELL_M).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(course=st.floats(-3.1, 3.1), yaw=st.floats(-3.1, 3.1), side=st.sampled_from([-1.0, 1.0]))
 def test_a_side_that_is_not_advised_is_never_steered_to(course: float, yaw: float, side: float) -> None:
     """LEFT never steers right of the heading now, RIGHT never left of it, whatever is wanted."""
@@ -193,7 +193,7 @@ def test_what_went_out_of_sight_below_the_picture_is_still_there() -> None:
     assert not forgetful.occupied[49:51, 50:58].any()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(cells=st.lists(st.tuples(st.integers(0, 99), st.integers(0, 99)), min_size=1, max_size=12))
 def test_distances_are_those_to_the_nearest_cell(cells: list[tuple[int, int]]) -> None:
     mask = np.zeros((CELLS, CELLS), np.bool_)

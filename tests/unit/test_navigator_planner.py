@@ -92,15 +92,15 @@ class Pool:
 def test_open_water_is_sailed_as_without_a_planner() -> None:
     """Same course and speed where nothing is in the way."""
     with_planner, without = Pool(), Pool(camera=UNCALIBRATED)
-    for one, other in zip(with_planner.run(20.0), without.run(20.0), strict=True):
+    for one, other in zip(with_planner.run(12.0), without.run(12.0), strict=True):
         if other.enable and with_planner.now_us > START_US + 300_000:
             assert one.enable
             assert one.speed_mps == other.speed_mps
             assert one.heading_rad == pytest.approx(other.heading_rad, abs=math.radians(3.0))
-    assert with_planner.boat.x_m > 9.0
+    assert with_planner.boat.x_m > 5.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     direction=st.sampled_from([Direction.STOP, Direction.NO_DATA]),
     bars=st.lists(st.tuples(st.floats(2.0, 6.0), st.floats(-2.0, 1.0)), max_size=2),
@@ -120,7 +120,7 @@ def test_the_planner_never_moves_the_boat_where_the_advice_says_stop(
         assert (order.enable, order.speed_mps) == (False, 0.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     turn=st.sampled_from([Direction.LEFT, Direction.SLIGHT_LEFT, Direction.RIGHT, Direction.SLIGHT_RIGHT]),
     bars=st.lists(st.tuples(st.floats(2.0, 6.0), st.floats(-2.0, 1.0)), max_size=3),
@@ -170,32 +170,32 @@ def test_what_is_not_seen_free_is_not_entered() -> None:
 
 def test_a_bar_on_the_route_is_passed_and_the_route_rejoined() -> None:
     """The advice says STRAIGHT all along: the planner alone goes round, and comes back to the same leg."""
-    pool = Pool((10.0, -0.6, 10.8, 0.4))
+    pool = Pool((6.0, -0.6, 6.8, 0.4))
     nearest = math.inf
     aside = 0.0
-    for order in pool.run(55.0):
+    for order in pool.run(34.0):
         nearest = min(nearest, pool.gap_m())
         aside = max(aside, abs(pool.boat.y_m))
         assert not order.enable or order.waypoint_index == 1
     assert nearest > 0.6
     assert 0.8 < aside < 4.0
-    assert pool.boat.x_m > 20.0
+    assert pool.boat.x_m > 14.0
     assert abs(pool.boat.y_m) < 0.4
 
 
 def test_a_boat_before_a_wall_turns_along_it() -> None:
     """A quay across the route with a way round its left end: no advice but STRAIGHT, and no touch."""
-    pool = Pool((9.0, -30.0, 10.0, 2.5))
+    pool = Pool((6.0, -30.0, 7.0, 2.5))
     nearest = math.inf
-    for _ in pool.run(70.0):
+    for _ in pool.run(40.0):
         nearest = min(nearest, pool.gap_m())
     assert nearest > 0.6
-    assert pool.boat.x_m > 10.0
+    assert pool.boat.x_m > 7.0
 
 
 def test_a_dead_end_is_waited_in_until_it_opens() -> None:
-    pool = Pool((6.0, -30.0, 7.0, 30.0))
-    last = pool.settle(40.0)
+    pool = Pool((4.0, -30.0, 5.0, 30.0))
+    last = pool.settle(15.0)
     assert last.inhibits == (Inhibit.NO_FREE_PATH,)
     assert pool.gap_m() > 0.6
     pool.bars = ()
@@ -208,7 +208,7 @@ def test_a_run_of_turns_goes_beyond_its_cap_on_water_seen_free_alone() -> None:
         pool = Pool(camera=camera)
         pool.settle(3.0)
         pool.direction = Direction.LEFT
-        turned = [(math.degrees(pool.boat.yaw_rad), order.inhibits) for order in pool.run(60.0)]
+        turned = [(math.degrees(pool.boat.yaw_rad), order.inhibits) for order in pool.run(42.0)]
         assert low_deg < max(degrees for degrees, _ in turned) < high_deg
         assert turned[-1][1] == (Inhibit.TURN_CAPPED,)
 
@@ -217,7 +217,7 @@ def test_beyond_the_cap_a_way_that_is_not_known_stops_the_run_of_turns() -> None
     """Something all round at 3 m: nothing is verified, so 90 degrees is all."""
     pool = Pool(bank_m=3.2)
     pool.direction = Direction.LEFT
-    for _ in pool.run(60.0):
+    for _ in pool.run(20.0):
         assert math.degrees(pool.boat.yaw_rad) < 97.0
 
 
@@ -247,7 +247,7 @@ def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
 def test_the_state_is_small_and_loses_nothing_as_json() -> None:
     """A recorded state decides on as the live one did; every 2 s it costs the ledger less than 12 kB."""
     pool = Pool((10.0, -0.6, 10.8, 0.4))
-    pool.settle(12.0)
+    pool.settle(9.0)
     data = msgspec.json.encode(pool.state)
     assert len(data) < 12_000
     again = Pool((10.0, -0.6, 10.8, 0.4), boat=pool.boat)

@@ -12,7 +12,7 @@ import paani_sim.vessels
 from paani.config import PlantConfig
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.vessels import load_vessel
-from paani_sim.worlds import Fault, FaultKind, Scenario, World, load_world
+from paani_sim.worlds import Behaviour, Fault, FaultKind, Scenario, World, load_world
 
 STEP_S = 0.01
 FORCE_N = 75.0
@@ -100,8 +100,10 @@ def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
 
 
 def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
-    plant = open_plant(load_world("river"))
-    path_m = load_world("river").actors[0].path_m
+    world = load_world("river")
+    holding_on = dataclasses.replace(world.actors[0], behaviour=Behaviour.HOLDS_ON)
+    plant = open_plant(dataclasses.replace(world, actors=(holding_on,)))
+    path_m = holding_on.path_m
     ahead_m = path_m[(len(path_m) * 2) // 3]
     plant.place(float(ahead_m[0]), float(ahead_m[1]), 0.0)
     hit = False

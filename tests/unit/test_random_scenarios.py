@@ -12,7 +12,7 @@ from paani_sim.worlds.room import HEADROOM_M, footprint_gap_m
 from paani_sim.worlds.spec import build_spec
 from tests.unit.fair_scenarios import check_is_fair, fine
 
-SEEDS = 5
+SEEDS = 4
 
 
 @pytest.fixture(scope="module", params=sorted(WORLDS))
@@ -27,10 +27,10 @@ def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
 
 
 def test_the_same_seed_gives_the_same_scenario(scenarios: tuple[Scenario, ...]) -> None:
-    first = scenarios[3]
-    again = random_scenario(first.world.name, 3)
+    first = scenarios[2]
+    again = random_scenario(first.world.name, 2)
     assert _plain(again) == _plain(first)
-    assert _plain(scenarios[4]) != _plain(first)
+    assert _plain(scenarios[3]) != _plain(first)
 
 
 def _plain(value: object) -> object:

@@ -1,10 +1,14 @@
 """Scenarios in TOML: what ships, what a file can say, and how what cannot be is refused."""
 
+import json
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from paani.config import WorldConfig
 from paani.errors import UserError
@@ -221,6 +225,10 @@ BAD = {
         "[fence]\nkeep_out = [[[8.0, -9.0], [9.0, -9.0], [9.0, 9.0], [8.0, 9.0]]]\n",
         r"outside the fence",
     ),
+    "a fence that crosses itself": (
+        LAKE + "[fence]\nkeep_in = [[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]]]\n",
+        r"fence\.keep_in: the edges from corners 0 and 2 meet",
+    ),
     "starts in a boat": (
         LAKE + "[route]\nwaypoints_m = [[-66.0, 8.0], [-40.0, 8.0]]\n",
         r"starts inside 'sail_middle'",
@@ -236,6 +244,10 @@ BAD = {
     "path over land": (
         LAKE + '[[actors]]\nlook = "kayak"\npath_m = [[0.0, 0.0], [0.0, 90.0]]\nspeed_mps = 1.0\n',
         r"actors\[0\]: its way runs over land",
+    ),
+    "still path": (
+        LAKE + '[[actors]]\nlook = "kayak"\npath_m = [[0.0, 0.0], [0.0, 0.0]]\nspeed_mps = 1.0\n',
+        r"actors\[0\]\.path_m\[0\] and the next are the same point",
     ),
     "no speed": (
         MINIMAL + '[[actors]]\nlook = "kayak"\npath_m = [[0.0, 0.0], [0.0, 1.0]]\n',
@@ -285,3 +297,53 @@ def test_missing_binary_and_nested_files_are_refused(tmp_path: Path) -> None:
         load_scenario("sea")
     with pytest.raises(UserError, match="'sea'"):
         load_scenario("random:sea:1")
+
+
+_NUMBERS = st.one_of(st.floats(), st.integers(-(10**6), 10**6))
+_JUNK = st.one_of(_NUMBERS, st.booleans(), st.text("ab[]{}.:=", max_size=6), st.lists(_NUMBERS, max_size=3))
+_POINTS = st.lists(st.lists(st.floats(-120.0, 120.0), min_size=2, max_size=2), min_size=1, max_size=5)
+
+
+@given(
+    st.fixed_dictionaries(
+        {"look": st.sampled_from(["kayak", "barge", "swimming", "can", "ufo"])},
+        optional={
+            "frame": st.sampled_from(["map", "route", "channel"]),
+            "at_m": st.lists(st.floats(-100.0, 100.0), min_size=2, max_size=2),
+            "path_m": _POINTS,
+            "encounter": st.sampled_from(["crossing", "head_on", "overtaking", "drifting"]),
+            "meets_at_m": st.floats(0.0, 500.0),
+            "left_m": st.floats(-20.0, 20.0),
+            "heading_deg": st.floats(-360.0, 360.0),
+            "speed_mps": st.floats(0.01, 15.0),
+            "length_m": _JUNK,
+            "closed": st.booleans(),
+        },
+    ),
+    st.one_of(st.just({}), st.dictionaries(st.sampled_from(["from_m", "length_m", "waypoints_m"]), _JUNK | _POINTS)),
+)
+@settings(max_examples=60, deadline=None)
+def test_whatever_the_file_says_it_is_sound_or_refused(actor: dict[str, object], route: dict[str, object]) -> None:
+    """Never anything but a scenario that compiles, or one line."""
+    tables = [
+        '[world]\nkind = "river"',
+        "[route]",
+        *map(_pair, route.items()),
+        "[[actors]]",
+        *map(_pair, actor.items()),
+    ]
+    refusal = ""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.toml"
+        path.write_text("\n".join(tables))
+        try:
+            build_spec(load_scenario(path).world).compile()
+        except UserError as error:
+            refusal = str(error)
+    assert "\n" not in refusal
+    assert not refusal or "any.toml" in refusal
+
+
+def _pair(item: tuple[str, object]) -> str:
+    """`key = value` in TOML; JSON is, but for what is not finite."""
+    return f"{item[0]} = {json.dumps(item[1]).replace('NaN', 'nan').replace('Infinity', 'inf')}"

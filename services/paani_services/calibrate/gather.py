@@ -9,7 +9,6 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from tqdm import tqdm
 
 from paani import keys
 from paani.bus import Queue
@@ -18,6 +17,7 @@ from paani.errors import UserError
 from paani.inspect.listen import observer
 from paani.logs.reader import open_log
 from paani.messages import Evidence, Odometry, TimeBase
+from paani.replay.progress import Progress
 from paani_services.calibrate.horizon import waterline
 from paani_services.calibrate.mount import Look
 
@@ -26,7 +26,7 @@ MAX_SPEED_MPS = 0.5  # faster, and the bow lifts by itself
 MAX_PICTURES = 2000
 SEED = 1
 DEPTH = 1024
-SHOW_S = 0.5
+SHOW_S = 0.25
 Heard = tuple[list[Evidence], list[Odometry]]
 
 
@@ -36,10 +36,10 @@ def recorded(path: Path) -> Heard:
     evidence: list[Evidence] = []
     odometry: list[Odometry] = []
     wanted = {keys.EVIDENCE.name, keys.ODOMETRY.name}
-    total = sum(count for topic, count in log.topics.items() if topic in wanted)
-    with tqdm(total=total, desc="reading", unit="message", leave=False) as bar:
+    span_us = max(1, log.end_us - log.start_us)
+    with Progress("reading") as bar:
         for record in log.records(wanted):
-            bar.update()
+            bar.at((record.log_us - log.start_us) / span_us)
             with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
                 if record.topic == keys.EVIDENCE.name:
                     evidence.append(msgspec.json.decode(record.data, type=Evidence))
@@ -60,10 +60,11 @@ async def heard_live(bus_config: BusConfig, seconds: float) -> Heard:
         )
         heard: Heard = ([], [])
         tasks = [asyncio.create_task(_collect(queue, kept)) for queue, kept in zip(queues, heard, strict=True)]
-        with tqdm(total=round(seconds / SHOW_S), desc="listening", leave=False) as bar:
-            for _ in range(round(seconds / SHOW_S)):
-                await asyncio.sleep(SHOW_S)
-                bar.update()
+        steps = math.ceil(seconds / SHOW_S)
+        with Progress("listening") as bar:
+            for step in range(steps):
+                bar.at(step / steps, f"{len(heard[0])} pictures")
+                await asyncio.sleep(seconds / steps)
         for task in tasks:
             task.cancel()
     for name, found in ((keys.EVIDENCE.name, heard[0]), (keys.ODOMETRY.name, heard[1])):
@@ -87,7 +88,7 @@ def looks(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[Lo
     rng = np.random.default_rng(SEED)
     stamps = [o.source_us for o in attitudes]
     found: list[Look] = []
-    for frame in tqdm(chosen, desc="waterlines", unit="picture", leave=False):
+    for frame in chosen:
         at = bisect_left(stamps, frame.source_us)
         nearest = min(attitudes[max(0, at - 1) : at + 1], key=lambda o: abs(o.source_us - frame.source_us))
         if abs(nearest.source_us - frame.source_us) > MAX_GAP_US or abs(nearest.surge_mps) > MAX_SPEED_MPS:

@@ -10,7 +10,7 @@ from paani.messages import Evidence
 F64 = NDArray[np.float64]
 NEAR_ROWS = 0.75  # of one mask row: how far an end may lie off the line
 MIN_SHARE = 0.5  # of the columns must lie on it
-TRIES = 60
+TRIES = 80
 MIN_SPREAD = 0.4  # of the picture's width, between the outermost of them
 
 
@@ -47,6 +47,10 @@ def waterline(evidence: Evidence, rng: np.random.Generator) -> Waterline | None:
         near = ended & (np.abs(v - v[first] - slope * (u - u[first])) <= NEAR_ROWS / rows)
         if near.sum() > best.sum():
             best = near
+    if best.sum() >= 2:  # two ends of whole rows lean: the line through all of its ends is the better one
+        slope, level = np.polyfit(u[best], v[best], 1)
+        near = ended & (np.abs(v - slope * u - level) <= NEAR_ROWS / rows)
+        best = near if near.sum() > best.sum() else best
     if best.sum() < MIN_SHARE * v.size or np.ptp(u[best]) < MIN_SPREAD:
         return None
     return Waterline(u[best], v[best], evidence.width_px / evidence.height_px, rows)

@@ -1,4 +1,4 @@
-"""Pitch and roll of the camera's mount from waterlines and the boat's attitude: least squares over all columns. Pure."""
+"""Pitch and roll of the camera's mount from waterlines and the boat's attitude, by least squares. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -80,9 +80,7 @@ def mount_of(looks: Sequence[Look], calibration: CalibrationConfig, shore_m: flo
     return mount
 
 
-def _with_slopes(
-    looks: Sequence[Look], calibration: CalibrationConfig, tilt: F64, dip_rad: float
-) -> tuple[F64, F64]:
+def _with_slopes(looks: Sequence[Look], calibration: CalibrationConfig, tilt: F64, dip_rad: float) -> tuple[F64, F64]:
     """Residuals [n] and their slopes over pitch and roll [n, 2]."""
     off = _off(looks, calibration, tilt, dip_rad)
     steps = np.eye(2) * STEP_RAD

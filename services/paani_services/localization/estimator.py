@@ -28,11 +28,13 @@ YAW_GATE2 = 9.0  # the compass is heard twenty times a second: a refusal costs l
 YAW_FLOOR_RAD = 0.02  # no compass is mounted better
 COMPASS_BIAS_STD_RAD = 0.05  # 3 degrees: a small compass on a small boat, adjusted
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long: compass or gyro has changed by about so much
+COMPASS_AGE_S = 3.0  # without it for longer, the heading is a guess, however sure the course makes it look (A12)
 COURSE_MPS = 0.3  # slower, the course over ground tells no heading
 # How much of a fix's spread changes from fix to fix is learnt; the rest wanders. At first, and at least:
 GPS_NOISE_FRAC, MIN_GPS_NOISE_FRAC = 1.0 / 4.0, 1.0 / 32.0
 FIRST_NOISE_FIXES, MOST_NOISE_FIXES = 10, 300  # that it is averaged over
-GPS_SPEED_PER_S = 1.0 / 16.0  # spread of the speed for that of the position: 0.05 m/s for 0.8 m
+GPS_SPEED_PER_S = 1.0 / 16.0  # spread of the speed for that of the position: 0.05 m/s for 0.8 m,
+MIN_GPS_SPEED_STD_MPS = 0.05  # and no less for a better place: speed is measured by other means
 SWAY_STD_MPS = 1.4  # at 20 Hz as much as 0.1 m/s for 5 s on end
 LOCAL_SWAY_STD_MPS = 0.15
 LOCAL_SPEED_STD_MPS = 2.0  # the local filter's surge fades towards zero instead of running away
@@ -62,6 +64,7 @@ class Estimator:
         self._local: PlanarFilter | None = None
         self._global: PlanarFilter | None = None
         self._last_imu: ImuSample | None = None
+        self._last_heading: ImuSample | None = None
         self._last_fix: GpsFix | None = None
         self._bias = gyro_bias(())
         self._rest = RestWatch()
@@ -111,19 +114,20 @@ class Estimator:
             self._bridge(step_s)
             step_s = NOMINAL_GAP_S * len(samples)
         self._last_imu = newest
+        if newest.orientation_available:
+            self._last_heading = newest
         ahead, left, yaw_rate = mean_level(samples)
         self._rest.feel(Felt(newest.source_us, ahead, left, yaw_rate - float(self._local.x[B])))
         self._local.predict(yaw_rate, ahead, left, step_s)
         if newest.orientation_available:
             self._local.correct_yaw(newest.yaw_rad, YAW_STD_RAD, math.inf)
-        self._local.correct_sway(0.0, LOCAL_SWAY_STD_MPS)
-        self._local.correct_surge(0.0, LOCAL_SPEED_STD_MPS)
+        self._local.correct_way(LOCAL_SWAY_STD_MPS, LOCAL_SPEED_STD_MPS)
         if self._global is None or self._last_fix is None:
             return
         self._global.predict(yaw_rate, ahead, left, step_s, self._last_fix.position_std_m)
         if newest.orientation_available:
             self._hear_compass(self._global, newest.yaw_rad, step_s)
-        self._global.correct_sway(0.0, SWAY_STD_MPS)
+        self._global.correct_way(SWAY_STD_MPS)
         if self._rest.at_rest:
             self._global.correct_velocity(0.0, 0.0, REST_STD_MPS, math.inf, turns=False)
 
@@ -177,7 +181,7 @@ class Estimator:
         self._doubt_m *= math.exp(-max(since_s, 0.0) / self._config.gps_wander_s)
         self._last_fix = fix
         vx_mps, vy_mps = fix.sog_mps * math.cos(fix.cog_rad), fix.sog_mps * math.sin(fix.cog_rad)
-        std_m, std_mps = fix.position_std_m, fix.position_std_m * GPS_SPEED_PER_S
+        std_m, std_mps = fix.position_std_m, max(fix.position_std_m * GPS_SPEED_PER_S, MIN_GPS_SPEED_STD_MPS)
         self._rest.show(Shown(fix.source_us, x_m, y_m, vx_mps, vy_mps, std_m, std_mps))
         if self._global is None:
             self._global = self._start_global(vx_mps, vy_mps, std_mps)
@@ -265,6 +269,7 @@ class Estimator:
         position_std_m = math.hypot(spread_m, self._doubt_m / math.sqrt(2.0))
         healthy = (
             odometry.healthy
+            and self._is_fresh(self._last_heading, COMPASS_AGE_S, now_us)
             and self._is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
             and self._accepted >= CONVERGED_FIXES
             and self._refused < DOUBTFUL_FIXES

@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 
 PX, PY, PSI, U, V, B, GX, GY, C, WX, WY = range(11)
 SIZE = 11
+_PICK = np.eye(SIZE)
 OWN = 6  # the local filter knows these; the rest describe GPS, compass and water
 
 # Per square root second.
@@ -149,13 +150,11 @@ class PlanarFilter:
         jacobian[0, PSI] = jacobian[0, C] = 1.0
         return self._correct(np.array([wrap_rad(yaw_rad - float(x[PSI] + x[C]))]), jacobian, std_rad, gate2)
 
-    def correct_surge(self, surge_mps: float, std_mps: float) -> None:
-        """A belief about the speed ahead, for want of a measurement."""
-        self._believe(U, surge_mps, std_mps)
-
-    def correct_sway(self, sway_mps: float, std_mps: float) -> None:
-        """A hull goes through the water where it points: sway is about zero."""
-        self._believe(V, sway_mps, std_mps)
+    def correct_way(self, sway_std_mps: float, surge_std_mps: float | None = None) -> None:
+        """A hull goes through the water where it points: sway is about zero. And surge, for want of a measurement."""
+        known = [V] if surge_std_mps is None else [V, U]
+        std = np.array([sway_std_mps, surge_std_mps or 0.0][: len(known)])
+        self._correct(-self._ekf.x[known], _PICK[known], std, math.inf)
 
     def move_to(self, x_m: float, y_m: float, std_m: float, noise_m: float) -> None:
         """Begin at a fix with slow error `std_m` and noise `noise_m`; keep what is not position."""
@@ -188,14 +187,9 @@ class PlanarFilter:
         np.fill_diagonal(self._noise, diagonal + [0.0] * (SIZE - len(diagonal)))
         return self._noise
 
-    def _believe(self, index: int, value: float, std: float) -> None:
-        jacobian = np.zeros((1, SIZE))
-        jacobian[0, index] = 1.0
-        self._correct(np.array([value - float(self._ekf.x[index])]), jacobian, std, math.inf)
-
-    def _correct(self, residual: Array, jacobian: Array, std: float, gate2: float) -> Verdict:
+    def _correct(self, residual: Array, jacobian: Array, std: float | Array, gate2: float) -> Verdict:
         """One update unless the squared Mahalanobis distance of the innovation exceeds `gate2`."""
-        noise = np.eye(len(residual)) * std**2
+        noise = _PICK[: len(residual), : len(residual)] * std**2
         if math.isfinite(gate2):
             nis = float(residual @ np.linalg.solve(jacobian @ self._ekf.P @ jacobian.T + noise, residual))
             if not nis <= gate2:

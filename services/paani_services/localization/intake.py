@@ -52,13 +52,16 @@ def usable_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str
 
 def _is_possible_sample(sample: ImuSample) -> bool:
     """Comparisons with what is not a number are false."""
-    accel = (sample.accel_x_mps2, sample.accel_y_mps2, sample.accel_z_mps2)
-    rates = (sample.gyro_x_radps, sample.gyro_y_radps, sample.gyro_z_radps)
-    angles = (sample.roll_rad, sample.pitch_rad, sample.yaw_rad)
     return (
-        all(abs(value) <= MAX_ACCEL_MPS2 for value in accel)
-        and all(abs(value) <= MAX_RATE_RADPS for value in rates)
-        and all(abs(value) <= MAX_ANGLE_RAD for value in angles)
+        abs(sample.accel_x_mps2) <= MAX_ACCEL_MPS2
+        and abs(sample.accel_y_mps2) <= MAX_ACCEL_MPS2
+        and abs(sample.accel_z_mps2) <= MAX_ACCEL_MPS2
+        and abs(sample.gyro_x_radps) <= MAX_RATE_RADPS
+        and abs(sample.gyro_y_radps) <= MAX_RATE_RADPS
+        and abs(sample.gyro_z_radps) <= MAX_RATE_RADPS
+        and abs(sample.roll_rad) <= MAX_ANGLE_RAD
+        and abs(sample.pitch_rad) <= MAX_ANGLE_RAD
+        and abs(sample.yaw_rad) <= MAX_ANGLE_RAD
     )
 
 

@@ -84,13 +84,13 @@ def lay(
     known = [sight for sight in sights if longest_us <= sight.at_us <= now_us]
     known = [sight for sight in known if len(sight.edge) == len(known[-1].edge)]
     free_of, occupied_of = (np.full(CELLS * CELLS, -1, np.int64) for _ in range(2))  # number of the last sight
+    first_free = sum(sight.at_us < free_us for sight in known)
+    first_occupied = sum(sight.at_us < occupied_us for sight in known)
     if known:
-        free, occupied = _seen(known, camera, config)
+        free, occupied = _seen(known, first_free, camera, config)
         for last, points in ((free_of, free), (occupied_of, occupied)):
             cells, inside = _cells(points, west_m, south_m)
             last[cells] = points.number[inside]
-    first_free = sum(sight.at_us < free_us for sight in known)
-    first_occupied = sum(sight.at_us < occupied_us for sight in known)
     not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
     occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
@@ -126,8 +126,12 @@ def hull_top(hull: Polygon, u: F64) -> F64:
     return top
 
 
-def _seen(sights: list[Sight], camera: Camera, config: PlannerConfig) -> tuple[Points, Points]:
-    """Points of the map that the pictures show free, and occupied; those of later ones come later."""
+def _seen(sights: list[Sight], first_free: int, camera: Camera, config: PlannerConfig) -> tuple[Points, Points]:
+    """Points of the map that the pictures show free, and occupied; those of later ones come later.
+
+    first_free: the first that is young enough to free a cell; of those before, which only say what is gone, every
+    second column is enough.
+    """
     lenses = [lens_at(sight.station, camera.calibration, sight.aspect) for sight in sights]
     lens = together(lenses)
     edge = np.frombuffer(b"".join(sight.edge for sight in sights), np.uint8).astype(np.float64) / EDGE_STEPS
@@ -140,6 +144,7 @@ def _seen(sights: list[Sight], camera: Camera, config: PlannerConfig) -> tuple[P
     water = ends.fall > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
     numbers = np.broadcast_to(np.arange(len(sights))[:, None], edge.shape)
     open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
+    open_m[:first_free, 1::2] = 0.0
     free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M), numbers)
     deep = math.ceil(config.thickness_m / CELL_M) + 1
     points = [_points(lens, ends, far_m, np.where(np.isfinite(far_m), deep, 0.0), numbers)]

@@ -62,7 +62,8 @@ class Wish(NamedTuple):
 def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: PlannerConfig) -> Plan:
     """The best of headings around the wanted course at two speeds, none of which meets anything.
 
-    Refused is what sweeps an occupied cell within `horizon_s` (Q4, Q6), or an unknown one within the way to stop.
+    Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), or an unknown one within the way to
+    stop.
     Costs: off the wanted course, near to things, into the unknown, slow, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
@@ -77,7 +78,7 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     met, unseen = gap_m < needed_m, blank_m < config.hull_radius_m
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     stopping = ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps)
-    refused = (met & soon).any(axis=0) | (unseen & stopping).any(axis=0)
+    refused = (met & (soon | (ways.way_m <= config.room_m))).any(axis=0) | (unseen & stopping).any(axis=0)
     if refused.all():
         return nowhere
     cost = _costs(offsets, speeds, start, before)

@@ -11,7 +11,9 @@ from paani import messages as m
 from paani.bus import Bus, Latest, Stepper
 from paani.clock import Clock
 from paani.config import Config
+from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
+from paani_services.navigator.logbook import Logbook
 from paani_services.navigator.mission_file import first_route, load_task
 
 EARLY_US = 5_000  # a wake-up this much before the period is over is on time
@@ -27,6 +29,12 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     sent_us = route_us = 0
     with bus.alive():
         async with asyncio.TaskGroup() as group:
+            logbook = None
+            if mission is not None:
+                logbook = Logbook(await asyncio.to_thread(runtime_dir, config.bus), mission)
+                progress = await logbook.restore(stepper.inboxes[keys.ARMING.name])
+                stepper.state = msgspec.structs.replace(stepper.state, progress=progress)
+                group.create_task(logbook.keep())
             for topic in (keys.ADVISORY, keys.ODOMETRY, keys.ARMING):
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
@@ -39,6 +47,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                         stepper.publish_own(keys.ROUTE, msgspec.structs.replace(route, source_us=now_us))
                     route_us = now_us
                 now_us, outputs = stepper.decide()
+                if logbook is not None:
+                    logbook.note(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
                 order = outputs[keys.COMMAND.name]
                 assert isinstance(order, m.NavCommand)
                 if now_us - sent_us >= period_s * 1e6 - EARLY_US or _differs(order, sent):

@@ -63,6 +63,7 @@ class PlannerConfig(Section, frozen=True):
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
+    `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     `verified_m`: a way known this far may turn the boat beyond `navigator.max_total_turn_deg`, up to `max_turn_deg`.
     """
@@ -85,6 +86,7 @@ class PlannerConfig(Section, frozen=True):
     yaw_accel_radps2: Positive = 0.35
     accel_mps2: Positive = 0.4  # measured on K4, K5; the paper has 0.2 (Q5)
     turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
+    room_m: NonNegative = 3.0  # turn_radius_m, hull_radius_m and margin_m
     helm_speed_mps: NonNegative = 0.5  # measured: what one fan alone drives a boat at that turns as hard as it can
     hull_radius_m: Positive = 0.55  # Q6
     margin_m: NonNegative = 0.25  # Q6

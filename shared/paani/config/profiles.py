@@ -41,6 +41,7 @@ PAPER: dict[str, object] = {
             "accel_mps2": 0.2,  # Q5
             "turn_radius_m": 0.0,  # Q5
             "helm_speed_mps": 0.0,  # Q5
+            "room_m": 0.0,  # Q4
             "look_m": 0.0,  # Q4
         },
     },

@@ -15,6 +15,7 @@ CLASSES = (Kind.PERSON, Kind.VESSEL, Kind.PIER, Kind.BUOY)
 MIN_SIDE_PX = 3
 MIN_PIXELS = 10
 MIN_CONTRAST = 9.0  # of 255: below it neither colour nor brightness tells a thing from what is around it
+MIN_FILLED = 0.06  # of a box: less are specks behind leaves and railings
 AROUND_PX = 3
 
 U8 = npt.NDArray[np.uint8]
@@ -22,7 +23,11 @@ F32 = npt.NDArray[np.float32]
 
 
 class VisibleBox(NamedTuple):
-    """Where a thing is visible: pixel edges, right and bottom exclusive."""
+    """Where a thing is visible: pixel edges, right and bottom exclusive; how many pixels, and how far they stand out.
+
+    `contrast` (0..255) is the larger of two: how far the median colour of its pixels is from that of the others in and
+    around the box, in any channel; half of how far its brightest or darkest are from their brightness.
+    """
 
     id: str
     kind: Kind
@@ -31,6 +36,7 @@ class VisibleBox(NamedTuple):
     x1_px: int
     y1_px: int
     visible_px: int
+    contrast: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,36 +69,34 @@ def read_labels(bgr: U8, labels: U8, depth_m: F32, things: Sequence[Thing]) -> L
             numbers += [t.number for t in things if t.part_of == thing.id]
         if not seen.intersection(numbers):
             continue
-        box = _box(np.isin(number, numbers))
+        own = np.isin(number, numbers)
+        box = _box(own)
         if box is not None:
-            boxes.append(VisibleBox(thing.id, thing.kind, *box))
+            boxes.append(VisibleBox(thing.id, thing.kind, *box, _contrast(bgr, own, box[:4])))
     return Labelled(bgr, mask, tuple(boxes), depth_m)
 
 
-def seen_boxes(view: Labelled, min_contrast: float = MIN_CONTRAST) -> tuple[VisibleBox, ...]:
-    """The boxes whose thing stands out from its surroundings: fog, dusk and rain hide the others."""
-    return tuple(box for box in view.boxes if contrast(view.bgr, box) >= min_contrast)
+def seen_boxes(view: Labelled) -> tuple[VisibleBox, ...]:
+    """The boxes of things that stand out from what is around them: fog, dusk, rain and reeds hide the others."""
+    return tuple(box for box in view.boxes if box.contrast >= MIN_CONTRAST and _filled(box) >= MIN_FILLED)
 
 
-def contrast(bgr: U8, box: VisibleBox) -> float:
-    """How far a box's pixels are from a frame `AROUND_PX` wide around it, 0..255.
+def _filled(box: VisibleBox) -> float:
+    return box.visible_px / ((box.x1_px - box.x0_px) * (box.y1_px - box.y0_px))
 
-    The larger of the distance of medians in any channel, and half the distance from the frame's brightness to what is
-    brightest or darkest inside: a thing with a pattern of its own is seen too.
-    """
-    height, width = bgr.shape[:2]
-    x0, y0 = max(0, box.x0_px - AROUND_PX), max(0, box.y0_px - AROUND_PX)
-    x1, y1 = min(width, box.x1_px + AROUND_PX), min(height, box.y1_px + AROUND_PX)
-    whole = bgr[y0:y1, x0:x1].astype(np.float32)
-    own = np.zeros(whole.shape[:2], bool)
-    own[box.y0_px - y0 : box.y1_px - y0, box.x0_px - x0 : box.x1_px - x0] = True
-    inside, around = whole[own], whole[~own]
+
+def _contrast(bgr: U8, own: npt.NDArray[np.bool_], edges: tuple[int, int, int, int]) -> float:
+    height, width = own.shape
+    x0, y0 = max(0, edges[0] - AROUND_PX), max(0, edges[1] - AROUND_PX)
+    x1, y1 = min(width, edges[2] + AROUND_PX), min(height, edges[3] + AROUND_PX)
+    there, pixels = own[y0:y1, x0:x1], bgr[y0:y1, x0:x1].astype(np.float32)
+    inside, around = pixels[there], pixels[~there]
     if len(around) == 0:
         return 255.0
     apart = np.abs(np.median(inside, axis=0) - np.median(around, axis=0)).max()
-    low, high = np.percentile(inside.mean(axis=1), [5, 95])
-    from_around = np.median(around.mean(axis=1))
-    return float(max(apart, 0.5 * max(high - from_around, from_around - low)))
+    low, high = np.percentile(inside.mean(axis=1), [10, 90])
+    level = np.median(around.mean(axis=1))
+    return float(max(apart, 0.5 * (high - level), 0.5 * (level - low)))
 
 
 def _box(visible: npt.NDArray[np.bool_]) -> tuple[int, int, int, int, int] | None:

@@ -34,7 +34,8 @@ from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, a
 F32 = npt.NDArray[np.float32]
 _NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
 DETAILS_WITHIN_M = 80.0
-MIRRORED_WITHIN_M = 160.0
+SHADES_WITHIN_M = 40.0
+MIRRORED_WITHIN_M = 120.0
 _FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
 _QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
 _IDENTITY = np.eye(4, dtype=np.float32)
@@ -288,7 +289,7 @@ class Eye:
         gl.glBlendFunc(gl.GL_ZERO, gl.GL_ONE_MINUS_SRC_ALPHA)
         gl.glDepthMask(False)
         self._programs["shade"].use(**shared)
-        self._draw_ahead(shades, shared, DETAILS_WITHIN_M)
+        self._draw_ahead(shades, shared, SHADES_WITHIN_M)
         gl.glDepthMask(True)
         gl.glDisable(gl.GL_BLEND)
         g.aim_target(gl, 2)

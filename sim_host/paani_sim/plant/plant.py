@@ -79,6 +79,7 @@ class Plant:
 
         boat = self._model.body("boat").id
         self._boat_geoms = frozenset(np.flatnonzero(self._model.geom_bodyid == boat).tolist())
+        self._geom_names = [self._model.geom(geom).name for geom in range(self._model.ngeom)]
         self._actors = Actors(world.actors, ACTORS_EVERY_S, 0.5 * hull.length_m)
         self._actors_every = max(1, round(ACTORS_EVERY_S / config.step_s))
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
@@ -232,15 +233,14 @@ class Plant:
 
     def _count_contacts(self) -> None:
         self.in_contact = False
-        count = self._data.ncon
-        if count == 0:
+        if self._data.ncon == 0:
             return
         now_s = self.sim_us * 1e-6
-        for contact in self._data.contact[:count]:
-            others = [geom for geom in contact.geom.tolist() if geom not in self._boat_geoms]
-            if contact.dist <= 0.0 and len(others) == 1:
+        contacts = self._data.contact
+        for pair, gap_m in zip(contacts.geom.tolist(), contacts.dist.tolist(), strict=True):
+            if gap_m <= 0.0:
                 self.in_contact = True
-                self._touch(self._model.geom(others[0]).name, now_s)
+                self._touch(next(self._geom_names[geom] for geom in pair if geom not in self._boat_geoms), now_s)
         if self.in_contact:
             if now_s - self._last_contact_s > COLLISION_GAP_S:
                 self.collisions += 1

@@ -21,6 +21,7 @@ from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_models.report.charts import lines
 from paani_sim.estimation_table import estimation
+from paani_sim.eye.bench import eye
 from paani_sim.plant.bench import physics
 from paani_sim.plant.oracle import oracle
 from paani_sim.trials.drive import Drive
@@ -61,7 +62,7 @@ def main(argv: list[str]) -> int:
         return cost_part(costs)
 
     parts: dict[str, Callable[[], Part]] = {
-        "physics": physics, "oracle": oracle, "lockstep": lockstep, "cost": cost, "estimation": estimation
+        "physics": physics, "oracle": oracle, "eye": eye, "lockstep": lockstep, "cost": cost, "estimation": estimation
     }  # fmt: skip
     parser = argparse.ArgumentParser(prog="paani bench water", description="How fast the simulator is, and how true.")
     parser.add_argument("--only", nargs="+", choices=tuple(parts), metavar="PART", help=f"of {', '.join(parts)}")

@@ -147,7 +147,8 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _share(s: Share) -> str:
-    return f"{100 * s.share:.1f} %{bar(s.share, s.low, s.high)}"
+    interval = f"<small>{100 * s.low:.1f} to {100 * s.high:.1f}</small>"
+    return f"{100 * s.share:.1f} % {interval}{bar(s.share, s.low, s.high)}"
 
 
 def _bad(count: int) -> str:

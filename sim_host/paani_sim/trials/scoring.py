@@ -36,6 +36,7 @@ F64 = NDArray[np.float64]
 ENCOUNTER_M = {"thing": 5.0, BANK: UNDER_M[Closeness.CLOSE]}  # a bank is always somewhere
 APART_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
 SEEN_BEFORE_S, SEEN_WITHIN_M = 5.0, 15.0
+SCRAPE_S = 5.0
 BANK_GEOM = "bank_"  # how the names of the plant's pieces of bank begin
 TRACK_S = 2.0
 
@@ -103,14 +104,20 @@ def course_of(world: World, hull: Hull, samples: Sequence[Sample]) -> Course:
 def contacts_of(
     world: World, hits: Sequence[Hit], samples: Sequence[Sample], course: Course, eye: EyeConfig
 ) -> tuple[Contact, ...]:
-    """Each thing that the hull began to touch, and what the camera could have seen of it."""
-    kinds, found = kinds_of(world), []
+    """Each time the hull began to touch something, and what the camera could have seen of it.
+
+    Scraping along a thing is one contact: it ends when there is none for `SCRAPE_S`.
+    """
+    kinds, found, last_s = kinds_of(world), list[Contact](), dict[str, float]()
     half_fov_rad = math.radians(0.5 * eye.hfov_deg)
     for hit in hits:
         k = next((k for k, sample in enumerate(samples) if sample.t_s >= hit.time_s), len(samples) - 1)
         if k < 0:
             continue
         what = BANK if hit.name.startswith(BANK_GEOM) else hit.name
+        before_s, last_s[what] = last_s.get(what, -math.inf), hit.time_s
+        if hit.time_s - before_s <= SCRAPE_S:
+            continue
         before = course.part(slice(max(0, k - round(SEEN_BEFORE_S * SAMPLE_HZ)), k + 1, 2))
         found.append(
             Contact(

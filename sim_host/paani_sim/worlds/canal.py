@@ -153,6 +153,7 @@ def _actors(channel: Channel) -> tuple[Actor, ...]:
         [channel.bank(along_m, 1, -1.5 - 0.05 * (along_m - 150.0))[:2] for along_m in (166.0, 158.0, 150.0)]
     )
     kayak_m = resample_closed(channel.loop_m(62.0, 108.0, 0.04)[::-1], 70)
+    gives_way = Behaviour.GIVES_WAY
     return (
         Actor(
             "boat_under_way",
@@ -166,7 +167,7 @@ def _actors(channel: Channel) -> tuple[Actor, ...]:
             0.0,
             2,
             closed=False,
-            behaviour=Behaviour.GIVES_WAY,
+            behaviour=gives_way,
         ),
-        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 30.0, 1),
+        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 30.0, 1, behaviour=gives_way),
     )

@@ -10,6 +10,7 @@ from paani_sim.worlds.curves import Points
 from paani_sim.worlds.meetings import BOAT_MPS, Encounter, Run
 from paani_sim.worlds.scenario_file import ActorPart
 from paani_sim.worlds.sizes import SIZES, Size
+from paani_sim.worlds.soundness import check_legs
 from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Actor, Obstacle, Pose2, World
 
@@ -67,7 +68,9 @@ def _standing(part: ActorPart, size: Size, world: World, where: str, fallback_id
 
 def _path_m(part: ActorPart, world: World, where: str) -> Points:
     points = part.path_m or ()
-    return np.array([_placed(part, world, where, point, 0.0)[:2] for point in points])
+    path_m = np.array([_placed(part, world, where, point, 0.0)[:2] for point in points])
+    check_legs(path_m, closed=part.closed, where=f"{where}.path_m")
+    return path_m
 
 
 def _placed(part: ActorPart, world: World, where: str, point: tuple[float, float], turn_rad: float) -> Pose2:

@@ -30,7 +30,8 @@ from paani_sim.worlds.world import (
 DISTANCE_M = (35.0, 60.0)
 ROOM_M = 3.0  # the least width of a gap that leads on
 APART_M = 8.0  # between the places of two encounters
-FREE_AT_START_M = 4.5
+FREE_AT_ENDS_M = 4.0
+FREE_BEYOND_M = 8.0  # nothing is met so near the goal, or stands so far behind it
 MOST = 4
 TRIES = 60
 FETCH_M = {"lake": 200.0, "river": 80.0, "canal": 40.0, "harbour": 120.0}
@@ -81,11 +82,12 @@ def _stretch_with_encounters(world: World, rng: np.random.Generator) -> World | 
     cut = stretch(world, from_m, length_m)
     lattice = Lattice(cut, way, length_m)
     start_gap_m = fixed_gap_m(cut.obstacles, np.array([cut.start[:2]]))[0]
-    if start_gap_m < FREE_AT_START_M or not lattice.is_passable(cut.obstacles, (), ROOM_M, BOAT_MPS):
+    goal_gap_m = fixed_gap_m(cut.obstacles, way.line_m(length_m, length_m + FREE_BEYOND_M)).min()
+    if min(start_gap_m, goal_gap_m) < FREE_AT_ENDS_M or not lattice.is_passable(cut.obstacles, (), ROOM_M, BOAT_MPS):
         return None
     wanted, met_m = int(rng.integers(1, MOST + 1)), list[float]()
     for number in range(TRIES):
-        at_m = float(rng.uniform(10.0, length_m - 3.0))
+        at_m = float(rng.uniform(10.0, length_m - FREE_BEYOND_M))
         if any(abs(at_m - other_m) < APART_M for other_m in met_m):
             continue
         draw = _DRAWS[int(rng.choice(len(_DRAWS), p=_CHANCES))]
@@ -114,7 +116,7 @@ def _with(world: World, thing: Obstacle | Actor) -> World:
 def _is_clear_of_start(world: World, thing: Obstacle | Actor) -> bool:
     pose = thing.pose if isinstance(thing, Obstacle) else actor_pose(thing, 0.0)
     gap_m = math.hypot(pose.x_m - world.start.x_m, pose.y_m - world.start.y_m)
-    return gap_m - 0.5 * thing.length_m > FREE_AT_START_M
+    return gap_m - 0.5 * thing.length_m > FREE_AT_ENDS_M
 
 
 def _buoy(place: _Place, rng: np.random.Generator) -> Obstacle | None:

@@ -9,7 +9,7 @@ from paani_sim.worlds.curves import (
     point_along_closed,
     resample_closed,
 )
-from paani_sim.worlds.world import Actor, Kind, Light, Obstacle, Pose2, Wind, World
+from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 EXTENT_X_M = 208.699  # checklist K1
 EXTENT_Y_M = 126.000  # checklist K1
@@ -113,7 +113,8 @@ def _actors() -> tuple[Actor, ...]:
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     sail_m = ring * [52.0, 24.0] + [6.0, -4.0]
     kayak_m = (ring * [30.0, 14.0] + [20.0, 22.0])[::-1].copy()
+    gives_way = Behaviour.GIVES_WAY
     return (
-        Actor("sail_under_way", Kind.VESSEL, "sailboat", sail_m, 0.9, 6.2, 2.0, 8.0, 40.0, 2),
-        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 10.0, 0),
+        Actor("sail_under_way", Kind.VESSEL, "sailboat", sail_m, 0.9, 6.2, 2.0, 8.0, 40.0, 2, behaviour=gives_way),
+        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 10.0, 0, behaviour=gives_way),
     )

@@ -19,7 +19,7 @@ from paani_sim.worlds.generate import random_scenario
 from paani_sim.worlds.meetings import BOAT_MPS
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.scenario_file import FencePart, RoutePart, ScenarioFile, read_scenario_file
-from paani_sim.worlds.soundness import check
+from paani_sim.worlds.soundness import check, check_legs
 from paani_sim.worlds.way import start_of, stretch
 from paani_sim.worlds.world import Light, Obstacle, World
 
@@ -142,6 +142,7 @@ def _routed(world: World, part: RoutePart, where: str) -> World:
         if part.from_m is not None or part.length_m is not None:
             raise UserError(f"{where}: route: either waypoints_m or from_m and length_m")
         route_m = np.array(part.waypoints_m)
+        check_legs(route_m, closed=part.closed, where=f"{where}: route.waypoints_m")
         return dataclasses.replace(world, route_m=route_m, route_closed=part.closed, start=start_of(route_m))
     if part.from_m is None and part.length_m is None:
         return world

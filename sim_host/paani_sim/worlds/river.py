@@ -7,7 +7,7 @@ import numpy as np
 
 from paani_sim.worlds.channel import Channel
 from paani_sim.worlds.curves import Points, resample_closed
-from paani_sim.worlds.world import Actor, Kind, Light, Obstacle, Pose2, Wind, World
+from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 CHANNEL_START_M = -150.0
 CHANNEL_END_M = 430.0
@@ -116,7 +116,8 @@ def _actors(channel: Channel) -> tuple[Actor, ...]:
     """Both go round against the route's sense, near the middle: the boat meets them, in view."""
     boat_m = resample_closed(channel.loop_m(40.0, 178.0, 0.045)[::-1], 140)
     kayak_m = resample_closed(channel.loop_m(218.0, 276.0, 0.05)[::-1], 60)
+    gives_way = Behaviour.GIVES_WAY
     return (
-        Actor("boat_under_way", Kind.VESSEL, "cruiser", boat_m, 1.2, 5.6, 2.1, 1.9, 150.0, 2),
-        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 30.0, 2),
+        Actor("boat_under_way", Kind.VESSEL, "cruiser", boat_m, 1.2, 5.6, 2.1, 1.9, 150.0, 2, behaviour=gives_way),
+        Actor("kayak_under_way", Kind.VESSEL, "kayak", kayak_m, 0.8, 4.2, 0.7, 1.1, 30.0, 2, behaviour=gives_way),
     )

@@ -18,7 +18,7 @@ from paani_sim.worlds.world import Behaviour
 
 MAX_BYTES = 256 * 1024
 MAX_ACTORS = 32
-MAX_POINTS = 1000
+MAX_POINTS = 200  # of a path, a route or an area
 
 Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}$")]
 Coordinate = Annotated[float, msgspec.Meta(ge=-1e5, le=1e5)]

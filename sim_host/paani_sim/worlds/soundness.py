@@ -24,6 +24,8 @@ def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
     twice = [name for name, count in Counter(thing.id for thing in things).items() if count > 1]
     if twice:
         raise UserError(f"{where}: {names.get(twice[0], 'actors')}.id: {twice[0]!r} is there twice")
+    for area in scenario.fence:
+        _check_area(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), f"{where}: fence.keep_{area.keep}")
     _check_route(world, scenario.fence, where)
     _check_start(world, where)
     for thing in things:
@@ -31,8 +33,15 @@ def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
             _check_thing(world, thing, f"{where}: {names[thing.id]}")
 
 
+def check_legs(line_m: Points, *, closed: bool, where: str) -> None:
+    """Raises UserError for a leg without length, to be called before anything runs along the line."""
+    after_m = np.roll(line_m, -1, axis=0) if closed else line_m[1:]
+    legs_m = np.linalg.norm(after_m - line_m[: len(after_m)], axis=1)
+    if legs_m.min() < MIN_LEG_M:
+        raise UserError(f"{where}[{int(np.argmin(legs_m))}] and the next are the same point")
+
+
 def _check_route(world: World, fence: tuple[FenceArea, ...], where: str) -> None:
-    _check_legs(world.route_m, closed=world.route_closed, where=f"{where}: route.waypoints_m")
     for number, points_m in enumerate(sampled_legs(world.route_m, SAMPLE_M, closed=world.route_closed)):
         on_land = clearance_m(world.shore_m, points_m) < HALF_BEAM_M
         if on_land.any():
@@ -58,7 +67,6 @@ def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
         if _floats(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
             raise UserError(f"{where}.at_m: {thing.look} on land")
         return
-    _check_legs(thing.path_m, closed=thing.closed, where=f"{where}.path_m")
     if not _floats(thing):
         return
     for number, points_m in enumerate(sampled_legs(thing.path_m, SAMPLE_M, closed=thing.closed)):
@@ -68,15 +76,29 @@ def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
             raise UserError(f"{where}: its way runs over land at {at} (leg {number})")
 
 
+def _check_area(corners_m: Points, where: str) -> None:
+    """A simple polygon: no edge meets another but its neighbours'."""
+    check_legs(corners_m, closed=True, where=where)
+    start, end = corners_m, np.roll(corners_m, -1, axis=0)
+
+    def side(of: Points) -> Points:
+        """Left (1) or right (-1) of edge i lies point j, `(edges, points)`."""
+        way, rel = (end - start)[:, None], of[None] - start[:, None]
+        return np.asarray(np.sign(way[..., 0] * rel[..., 1] - way[..., 1] * rel[..., 0]))
+
+    starts, ends = side(start), side(end)
+    apart = starts * ends <= 0.0
+    crossing = apart & apart.T
+    count = len(corners_m)
+    for step in (-1, 0, 1):
+        crossing[np.arange(count), (np.arange(count) + step) % count] = False
+    if crossing.any():
+        one, other = (int(index) for index in np.argwhere(crossing)[0])
+        raise UserError(f"{where}: the edges from corners {one} and {other} meet")
+
+
 def _floats(thing: Obstacle | Actor) -> bool:
     return thing.kind in {Kind.VESSEL, Kind.BUOY} or thing.look == "swimming"
-
-
-def _check_legs(line_m: Points, *, closed: bool, where: str) -> None:
-    after_m = np.roll(line_m, -1, axis=0) if closed else line_m[1:]
-    legs_m = np.linalg.norm(after_m - line_m[: len(after_m)], axis=1)
-    if legs_m.min() < MIN_LEG_M:
-        raise UserError(f"{where}[{int(np.argmin(legs_m))}] and the next are the same point")
 
 
 def _allowed(fence: tuple[FenceArea, ...], points_m: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
