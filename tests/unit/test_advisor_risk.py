@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani.config import Config, RiskConfig
-from paani_services.advisor.risk import either, overlap, severity, total
+from paani.config import CalibrationConfig, Config, EyeConfig, RiskConfig, calibration_of, load_config
+from paani.messages import BoxXyxy
+from paani_services.advisor.risk import either, overlap, relevance, severity, total
 from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, box, play, seeing
 
 UNIT = st.floats(0.0, 1.0)
@@ -107,3 +110,31 @@ def test_f3_an_ineligible_mask_never_counts(
     _, advice, _ = play([msgspec.structs.replace(CLEAR, **mask)], config)
     assert advice[0].center.risk == pytest.approx(risk)
     assert advice[0].direction is direction
+
+
+def box_at(range_m: float) -> BoxXyxy:
+    """A vessel whose foot is so far ahead of the simulator's camera, at rest on level water."""
+    eye = EyeConfig()
+    focal = 0.5 * eye.width_px / math.tan(0.5 * math.radians(eye.hfov_deg)) / eye.height_px
+    down = math.atan2(eye.camera_height_m, range_m) - math.radians(eye.pitch_down_deg)
+    foot = 0.5 + focal * math.tan(down)
+    return (0.4, foot - 0.1, 0.6, foot)
+
+
+def test_what_is_far_counts_less_and_only_where_the_camera_is_calibrated() -> None:
+    """A harbour's worth of moored boats on the horizon is no reason to stop; without a calibration it still is."""
+    weights, known = RiskConfig(), calibration_of(EyeConfig())
+    aspect = EyeConfig().width_px / EyeConfig().height_px
+    weigh = [relevance(box_at(range_m), aspect, known, weights) for range_m in (2.0, 5.0, 9.0, 12.0, 15.0, 19.0, 25.0)]
+    assert weigh == sorted(weigh, reverse=True)
+    assert weigh[:3] == [1.0, 1.0, 1.0]
+    assert 0.0 < weigh[4] < 1.0
+    assert weigh[-1] == 0.0
+    assert relevance(box_at(25.0), aspect, CalibrationConfig(), weights) == 1.0
+    assert relevance(box_at(25.0), aspect, known, RiskConfig(far_m=0.0)) == 1.0
+
+
+def test_what_is_left_out_cannot_be_reached_before_the_next_advice() -> None:
+    """Safety: at full speed, within the lifetime of an advisory, the boat does not get half way to what counts less."""
+    config = load_config()
+    assert config.advisor.lifetime_s * config.controller.max_speed_mps < 0.5 * config.advisor.risk.near_m

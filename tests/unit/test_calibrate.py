@@ -165,7 +165,7 @@ def test_a_near_shore_and_a_recording_without_evidence_are_refused(
 @pytest.mark.gl
 @pytest.mark.parametrize(("down_deg", "roll_deg"), [(6.0, 0.0), (9.0, 3.0)])
 def test_rendered_pictures_give_the_mount_to_0_3_degrees(down_deg: float, roll_deg: float) -> None:
-    """Drawn on the lake while the boat turns once round, segmented by the shipped net: pitch and roll of the mount within 0.3 degrees."""
+    """Drawn on the lake while the boat turns once round, segmented by the shipped net: both within 0.3 degrees."""
     try:
         Context().close()
     except UserError as error:

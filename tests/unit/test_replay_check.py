@@ -115,7 +115,8 @@ def test_a_changed_input_shows_in_the_decisions_after_it() -> None:
 def test_a_tampered_state_is_a_difference() -> None:
     def other(tree: dict[str, Any]) -> dict[str, Any]:
         state = msgspec.json.decode(tree["state"])
-        return tree | {"state": msgspec.json.encode(state | {"reached": 41}).decode()}
+        progress = state["progress"] | {"reached": 41}
+        return tree | {"state": msgspec.json.encode(state | {"progress": progress}).decode()}
 
     records = changed(DRIVE, lambda r: r.topic == "navigator/step" and b'"state":"{' in r.data and at_s(r) > 5, other)
     result = check("navigator", records)

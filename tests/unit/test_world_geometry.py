@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_sim.worlds import WORLDS, Kind, Obstacle, World, actor_pose, load_world
+from paani_sim.worlds import WORLDS, Kind, World, actor_pose, load_world
 from paani_sim.worlds.curves import (
     Points,
     clearance_m,
     closed_length_m,
     inside,
-    open_length_m,
     point_along_closed,
     resample_closed,
 )
+from paani_sim.worlds.room import footprint_gap_m
 
 SQUARE_M = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 
@@ -84,7 +84,7 @@ def test_route_keeps_off_what_is_not_meant_to_be_in_the_way(name: str) -> None:
     world = load_world(name)
     fine_m = resample_closed(world.route_m, 2000)
     for obstacle in world.obstacles:
-        gap_m = _footprint_gap_m(obstacle, fine_m).min()
+        gap_m = footprint_gap_m(obstacle, obstacle.pose, fine_m).min()
         assert obstacle.look == "bridge" or gap_m < 1.0 or gap_m > 2.5, (obstacle.id, gap_m)
 
 
@@ -112,17 +112,8 @@ def test_actors_stay_in_the_water_and_off_fixed_things(world: World) -> None:
         assert clearance_m(world.shore_m, track_m).min() > 0.5 * actor.width_m + 0.3, actor.id
         for obstacle in world.obstacles:
             if obstacle.look != "bridge":
-                gap_m = _footprint_gap_m(obstacle, track_m).min()
+                gap_m = footprint_gap_m(obstacle, obstacle.pose, track_m).min()
                 assert gap_m > 0.5 * actor.width_m, (actor.id, obstacle.id)
-
-
-def _footprint_gap_m(obstacle: Obstacle, points_m: Points) -> Points:
-    pose = obstacle.pose
-    turn = np.array([[np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)], [-np.sin(pose.yaw_rad), np.cos(pose.yaw_rad)]])
-    own = np.abs((points_m - pose[:2]) @ turn.T)
-    size = np.array([obstacle.length_m, obstacle.width_m])
-    gap_m: Points = np.linalg.norm(np.maximum(own - 0.5 * size, 0.0), axis=1)
-    return gap_m
 
 
 def test_actor_runs_at_its_speed_along_its_heading(world: World) -> None:
@@ -140,7 +131,7 @@ def test_something_stands_in_the_way_and_leaves_room(world: World) -> None:
     near = [
         o
         for o in world.obstacles
-        if o.look != "bridge" and _footprint_gap_m(o, resample_closed(world.route_m, 2000)).min() < 1.0
+        if o.look != "bridge" and footprint_gap_m(o, o.pose, resample_closed(world.route_m, 2000)).min() < 1.0
     ]
     assert near
     afloat = [o for o in world.obstacles if o.look != "bridge"]
@@ -149,7 +140,7 @@ def test_something_stands_in_the_way_and_leaves_room(world: World) -> None:
         for side in np.arange(-24.0, 24.0, 0.5):
             nearest = _across_route(world, obstacle.pose[:2], side)
             clear = clearance_m(world.shore_m, nearest[None])[0] > 1.0 and all(
-                _footprint_gap_m(o, nearest[None])[0] > 0.8 for o in afloat
+                footprint_gap_m(o, o.pose, nearest[None])[0] > 0.8 for o in afloat
             )
             free_m.append(clear)
         assert _longest_run(free_m) * 0.5 >= 4.0, obstacle.id

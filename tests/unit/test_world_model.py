@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from paani_sim.worlds import WORLDS, Kind, World, load_world
+from paani_sim.worlds import WORLDS, World, load_world
 from paani_sim.worlds.spec import BOAT_BIT, SOLID_BIT, build_spec
 
 
@@ -79,7 +79,7 @@ def test_bank_is_solid_all_round(world: World, model: mujoco.MjModel) -> None:
         assert any(name.startswith("bank_") for name in touched)
 
 
-def test_things_are_solid_but_a_bridge_can_be_passed(world: World, model: mujoco.MjModel) -> None:
+def test_things_are_solid_but_the_bridge_can_be_passed(world: World, model: mujoco.MjModel) -> None:
     for obstacle in world.obstacles:
         data = _move_boat(model, *obstacle.pose[:2])
         touched = {model.geom(g).name for c in data.contact for g in c.geom}

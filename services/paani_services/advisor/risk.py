@@ -1,10 +1,12 @@
 """How bad each corridor is: the water's part, the obstacles' part, their sum R_j (checklist J1-J4). Pure."""
 
+import math
 from collections.abc import Iterable
 
 import msgspec
 
-from paani.config import Config, CorridorConfig, RiskConfig
+from paani import portable
+from paani.config import CalibrationConfig, Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
 from paani_services.advisor.tracker import TrackerState, is_accepted, is_immediate_danger, presence, urgency_now
@@ -45,6 +47,24 @@ def severity(confidence: float, box: BoxXyxy) -> float:
     return clip(confidence * (NEAR_SHARE * near + TALL_SHARE * tall), 0.0, 1.0)
 
 
+def relevance(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weights: RiskConfig) -> float:
+    """How much a thing counts by how far its foot is off: 1 up to `near_m`, 0 from `far_m` on.
+
+    aspect: width of the picture over its height. 1 without a valid calibration, or where `far_m` is 0. The range is
+    that of level water seen from a boat at rest: a boat that pitches by a degree misjudges 10 m by a fifth.
+    """
+    if not calibration.valid or weights.far_m == 0.0:
+        return 1.0
+    focal = 0.5 * aspect / portable.tan(0.5 * math.radians(calibration.hfov_deg))  # heights of the picture
+    horizon = calibration.centre_frac[1] - focal * portable.tan(math.radians(calibration.pitch_down_deg))
+    # Of rays near the optical axis: range = height times focal length over how far below the horizon.
+    below = box[3] - horizon
+    if below <= 0.0:
+        return 0.0
+    range_m = calibration.height_m * focal / below
+    return clip((weights.far_m - range_m) / (weights.far_m - weights.near_m), 0.0, 1.0)
+
+
 def shared_width(box: BoxXyxy, span: tuple[float, float]) -> float:
     """Width that a box and an x range have in common, normalised to the picture."""
     return max(0.0, min(box[2], span[1]) - max(box[0], span[0]))
@@ -75,16 +95,23 @@ def total(non_water: float, obstacle: float, urgency: float, uncertainty: float,
     )
 
 
-def obstacles_of(state: TrackerState, config: Config) -> tuple[Obstacle, ...]:
-    """Accepted tracks, confirmed or an immediate danger, that reach below the corridors' top."""
+def obstacles_of(state: TrackerState, config: Config, aspect: float) -> tuple[Obstacle, ...]:
+    """Accepted tracks, confirmed or an immediate danger, that reach below the corridors' top.
+
+    aspect: width of the picture over its height.
+    """
     settings = config.advisor.tracker
+
+    def weight(box: BoxXyxy) -> float:
+        return relevance(box, aspect, config.calibration, config.advisor.risk)
+
     return tuple(
         Obstacle(
             id=track.id,
             craft=track.label == "vessel",
             box=track.box,
-            severity=severity(track.display_confidence, track.box),
-            urgency=urgency_now(track, state.at_us, settings),
+            severity=severity(track.display_confidence, track.box) * weight(track.box),
+            urgency=urgency_now(track, state.at_us, settings) * weight(track.box),
             presence=presence(track, state.at_us, settings),
             danger=is_immediate_danger(track.box, settings),
         )

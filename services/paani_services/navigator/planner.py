@@ -127,15 +127,15 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     for number, step_s in enumerate(steps_s):
         if number == fine:  # from here on the way counts, not when
             speed, speeds_mps = np.maximum(speed, config.speed_mps), np.maximum(speeds_mps, config.speed_mps)
-        helm = np.clip((offsets_rad - turned) / FULL_HELM_RAD, -1.0, 1.0)
+        helm = _between((offsets_rad - turned) / FULL_HELM_RAD, 1.0)
         gain = config.accel_mps2 * step_s
         driven = np.maximum(speeds_mps, config.helm_speed_mps * np.abs(helm))
-        speed = speed + np.clip(driven - speed, -gain, gain)
+        speed = speed + _between(driven - speed, gain)
         fastest = np.full(count, config.yaw_rate_radps)
         if config.turn_radius_m > 0.0:
             fastest = np.minimum(fastest, speed / config.turn_radius_m)
         swing = config.yaw_accel_radps2 * step_s
-        rate = rate + np.clip(helm * fastest - rate, -swing, swing)
+        rate = rate + _between(helm * fastest - rate, swing)
         half = 0.5 * step_s * rate
         turned = turned + 2.0 * half
         # A rotation by 2 atan(half), which is right to 1e-4 rad a step and needs no sine.
@@ -149,6 +149,11 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
         rows.append((x_m, y_m, way_m))
     xs, ys, ways = (np.stack(column) for column in zip(*rows, strict=True))
     return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
+
+
+def _between(values: F64, limit: float) -> F64:
+    """Each, but no further from zero than the limit."""
+    return np.asarray(np.minimum(np.maximum(values, -limit), limit))
 
 
 def footprint_m(at_s: F64, gap_now_m: float, config: PlannerConfig) -> F64:

@@ -58,10 +58,23 @@ class MotionConfig(Section, frozen=True):
 
 
 class RiskConfig(Section, frozen=True):
+    """`near_m`, `far_m`: with a valid calibration a thing counts fully up to one and not at all from the other on.
+
+    20 m are half a minute at cruise and more than the advisory's lifetime by a factor of nine; `far_m` 0: everything
+    counts, as in the paper.
+    """
+
     non_water: NonNegative = 0.55  # J4
     obstacle: NonNegative = 0.65  # J4
     urgency: NonNegative = 0.20  # J4
     uncertainty: NonNegative = 0.15  # J4
+    near_m: NonNegative = 10.0
+    far_m: NonNegative = 20.0
+
+    def __post_init__(self) -> None:
+        """What is far is farther than what is near."""
+        if self.far_m and self.far_m <= self.near_m:
+            raise ValueError("far_m: must be larger than near_m, or 0")
 
 
 class PolicyConfig(Section, frozen=True):

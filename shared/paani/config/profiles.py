@@ -23,6 +23,7 @@ PAPER: dict[str, object] = {
             "shape_change_hits": 1,  # I13
             "compensate_rotation": False,  # I19
         },
+        "risk": {"far_m": 0.0},  # J1: by the picture alone
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
         "policy": {"side_change_margin": 0.0, "release_margin": 0.0},  # J5, resolution 13: thresholds without memory
     },

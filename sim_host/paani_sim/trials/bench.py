@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 import msgspec
 
-from paani.bench.part import Part, part_text
+from paani.bench.part import Cell, Part, part_text
 from paani.bench.table import Machine
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
@@ -93,7 +93,7 @@ def main(argv: list[str]) -> int:
 
 def lockstep() -> Part:
     """Whole drives: one with both cores to itself, and two side by side with one each."""
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for policy in (Policy.PAANI, Policy.ORACLE, Policy.BLIND, Policy.PAPER):
         simulated_s, wall_s, cpu_s = timed(policy, 2, PLAIN[1], RUN_S, threads=True)
         rows.append((policy.value, 1, simulated_s / wall_s, cpu_s / simulated_s))

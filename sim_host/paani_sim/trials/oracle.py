@@ -113,7 +113,8 @@ class OracleEyes:
             )
         ]
         self._outlines_m = np.array([*self._still_m, *moving]).reshape(-1, 8, 2)
-        return self._outlines_m.mean(axis=1)
+        middles_m: F64 = self._outlines_m.mean(axis=1)
+        return middles_m
 
     def _near(self, position: F64, turn: F64, ranges_m: F64, middles_m: F64) -> tuple[list[int], F64]:
         """Things ahead, near enough, and not behind the shore; and how far each one's nearest corner is."""
@@ -238,7 +239,8 @@ def levelled(water: Flags, roll_rad: float, aspect: float) -> Flags:
     column = np.floor((from_x + 0.5) * columns).astype(int)
     row = np.floor((from_y + 0.5) * rows).astype(int)
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    return inside & water[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+    turned: Flags = inside & water[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+    return turned
 
 
 def water_edge(water: Flags) -> tuple[float, ...]:
@@ -252,4 +254,5 @@ def water_edge(water: Flags) -> tuple[float, ...]:
 def _shares(cells: int, start: float, end: float) -> F64:
     """How much of each of `cells` equal cells of [0, 1] lies in [start, end]."""
     edges = np.arange(cells + 1) / cells
-    return np.clip(np.minimum(edges[1:], end) - np.maximum(edges[:-1], start), 0.0, None) * cells
+    inside: F64 = np.minimum(edges[1:], end) - np.maximum(edges[:-1], start)
+    return np.maximum(inside, 0.0) * cells

@@ -174,7 +174,7 @@ def kinds_of(world: World) -> dict[str, str]:
 def stops_of(halts: Sequence[Halt], end_s: float) -> tuple[Stops, ...]:
     """By reason, the longest first."""
     count: collections.Counter[str] = collections.Counter()
-    seconds: collections.Counter[str] = collections.Counter()
+    seconds: collections.defaultdict[str, float] = collections.defaultdict(float)
     for halt in halts:
         count[halt.reason] += 1
         seconds[halt.reason] += (halt.ended_s if halt.ended_s is not None else end_s) - halt.t_s
