@@ -26,8 +26,8 @@ def windy_lake() -> World:
 
 
 def off_m(boat: Lockstep) -> Iterator[float]:
-    boat.settle(30.0)
-    for _ in boat.run(60.0):
+    boat.settle(60.0)
+    for _ in boat.run(30.0):
         yield off_route_m(boat.world, boat.plant.position_m)
 
 
@@ -51,12 +51,12 @@ def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None
 
 
 def test_wind_and_current_no_longer_push_the_boat_off_its_line(windy_lake: World) -> None:
-    """Without the integral the same boat is further off; the positions that remain are the estimate's."""
+    """A minute after the start: without the integral the same boat is more than a metre off."""
     worst_m = {}
     for gain_mps in (0.0, 0.25):
         config = load_config(sets=(*PERFECT, f"navigator.crab_gain_mps={gain_mps}"))
         boat = Lockstep(windy_lake, config)
         worst_m[gain_mps] = max(off_m(boat))
         boat.plant.close()
-    assert worst_m[0.25] < 0.5
-    assert worst_m[0.25] < 0.7 * worst_m[0.0]
+    assert worst_m[0.25] < 0.25
+    assert worst_m[0.0] > 1.0

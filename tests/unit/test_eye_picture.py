@@ -17,7 +17,6 @@ from paani_sim.dataset import Manifest, write_dataset
 from paani_sim.eye import BoatPose, Camera, Eye, Labelled, project
 from paani_sim.eye.camera import look_from
 from paani_sim.eye.gl import Context
-from paani_sim.eye.scatter import gap_m
 from paani_sim.worlds import Kind, Light, Obstacle, Pose2, Wind, World, actor_at, along_at, load_world
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(120)]
@@ -79,10 +78,9 @@ def test_picture_is_well_exposed_all_round_the_route(name: str) -> None:
         for k in range(0, len(world.route_m), 9):
             step = world.route_m[(k + 1) % len(world.route_m)] - world.route_m[k]
             pose = BoatPose(float(world.route_m[k, 0]), float(world.route_m[k, 1]), float(np.arctan2(step[1], step[0])))
-            ahead = (pose.x_m + 2.0 * np.cos(pose.yaw_rad), pose.y_m + 2.0 * np.sin(pose.yaw_rad))
-            if min(gap_m(o, *ahead) for o in world.obstacles if o.look != "bridge") < 1.0:
-                continue
             seen = view(looking, pose)
+            if any(b.visible_px > 15_000 for b in seen.boxes):
+                continue  # something lies right ahead
             assert seen.bgr.shape == (240, 320, 3)
             assert seen.bgr.dtype == np.uint8
             assert 60.0 < seen.bgr.mean() < 200.0
@@ -177,7 +175,7 @@ def test_actors_are_drawn_where_the_plant_says(eye: Eye, river: World) -> None:
         eye.render(pose, 40.0, by_time[:1])
 
 
-@pytest.mark.parametrize(("supersample", "first_row"), [(1.0, 115), (1.5, 142)])
+@pytest.mark.parametrize(("supersample", "first_row"), [(1.0, 115), (1.25, 125), (1.5, 125)])
 @pytest.mark.parametrize(("roll_rad", "pitch_rad"), [(0.0, 0.0), (0.06, -0.03)])
 def test_depth_of_water_is_that_of_the_plane(
     river: World, supersample: float, first_row: int, roll_rad: float, pitch_rad: float

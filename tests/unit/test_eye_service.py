@@ -14,9 +14,13 @@ from paani.bus import Bus, Picture
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.errors import UserError
+from paani_sim.eye.camera import BoatPose
+from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.eye.gl import Context
 from paani_sim.eye.mounted import pose_of
-from paani_sim.eye.service import open_camera, run
+from paani_sim.eye.service import jpeg, open_camera, run
+from paani_sim.worlds import Fault, FaultKind
+from paani_sim.worlds.load import configured_scenario
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(60)]
 
@@ -55,6 +59,25 @@ def test_settings_reach_the_eye() -> None:
 def test_unknown_world_is_one_line() -> None:
     with pytest.raises(UserError, match="unknown world"):
         open_camera(load_config(sets=("world.name=sea",)))
+
+
+def test_a_scenarios_camera_faults_reach_its_pictures() -> None:
+    """Black while the scenario says so; nothing at all of a camera that drops its pictures."""
+    require_gl()
+    config = load_config(sets=("world.name=river_camera_black",))
+    fault = configured_scenario(config.world).faults[0]
+    assert fault.kind is FaultKind.CAMERA_BLACK
+    eye, faults = open_camera(config)
+    with eye:
+        pose = BoatPose(*eye.world.start)
+        means = []
+        for t_s in (fault.start_s - 0.1, fault.start_s + 0.1):
+            data = jpeg(eye, faults, pose, t_s, 85)
+            assert data is not None
+            means.append(np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)).mean())
+        assert means[0] > 50.0
+        assert means[1] < 15.0
+        assert jpeg(eye, CameraFaults([Fault(FaultKind.CAMERA_DROPPED, 0.0)]), pose, 1.0, 85) is None
 
 
 async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], config: Config) -> None:

@@ -177,7 +177,7 @@ def test_nothing_within_the_way_to_stop_may_be_unknown() -> None:
 def test_what_went_out_of_sight_below_the_picture_is_still_there() -> None:
     """Seen 3 m ahead, then too near to be seen: the boat that drifted up to it does not run over it."""
     buoy = (3.0, -0.3, 3.5, 0.3)
-    memory, at_us = Memory(), START_US
+    memory, at_us, boat = Memory(), START_US, AT_REST
     for x_m in np.arange(0.0, 1.9, 0.1).tolist():
         boat = BoatPose(x_m, 0.0, 0.0)
         memory, at_us = seen(boat, edge_of(boat, (buoy,)), at_us + 300_000, memory), at_us + 300_000
@@ -185,11 +185,11 @@ def test_what_went_out_of_sight_below_the_picture_is_still_there() -> None:
     for _ in range(5):
         at_us += 300_000
         memory = seen(boat, at_us=at_us, memory=memory)
-    grid = lay(memory.sights, (x_m, 0.0), at_us, CAMERA, PLANNER)
-    found = plan(grid, Start(x_m, 0.0, 0.0), AHEAD, None, PLANNER)
-    at_s, gap_m = swept_gap_m(grid, Start(x_m, 0.0, 0.0), found)
+    grid = lay(memory.sights, (boat.x_m, 0.0), at_us, CAMERA, PLANNER)
+    found = plan(grid, Start(boat.x_m, 0.0, 0.0), AHEAD, None, PLANNER)
+    at_s, gap_m = swept_gap_m(grid, Start(boat.x_m, 0.0, 0.0), found)
     assert found.speed_mps == 0.0 or gap_m[at_s <= 3.0].min() > 0.5
-    forgetful = lay(memory.sights, (x_m, 0.0), at_us, CAMERA, PAPER)
+    forgetful = lay(memory.sights, (boat.x_m, 0.0), at_us, CAMERA, PAPER)
     assert not forgetful.occupied[49:51, 50:58].any()
 
 

@@ -11,7 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.config import load_config
-from paani.messages import Advisory, Arming, Direction, Inhibit, LaneRisk, NavCommand, Reason, Route, SimTime, Waypoint
+from paani.messages import (
+    Advisory,
+    Arming,
+    Direction,
+    Evidence,
+    Inhibit,
+    LaneRisk,
+    NavCommand,
+    Reason,
+    Route,
+    SimTime,
+    Waypoint,
+)
 from paani_services.navigator.grid import UNCALIBRATED, Camera
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
@@ -21,25 +33,25 @@ from tests.unit.watery_sights import AT_REST, CAMERA, START_US, Bar, edge_of, ev
 CONFIG = load_config().navigator
 PAPER = load_config(profile="paper").navigator
 EAST = Route(source_us=0, name="east", waypoints=(Waypoint(x_m=-5, y_m=0), Waypoint(x_m=60, y_m=0)), repeat=False)
-STEP_US = 100_000
+STEP_US = 200_000
 TURN_RADIUS_M = 2.2
 
 
 class Pool:
-    """A boat on flat water that goes where it is told, 10 orders and 5 pictures a second."""
+    """A boat on flat water that goes where it is told, 5 pictures and orders a second."""
 
     def __init__(self, *bars: Bar, bank_m: float = 500.0, boat: BoatPose = AT_REST, camera: Camera = CAMERA) -> None:
         self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
         self.state, self.now_us, self.speed_mps = NavState(), START_US, 0.0
         self.direction, self.looks = Direction.STRAIGHT, True
         self.order: NavCommand | None = None
-        self.shown = None
+        self.shown: Evidence | None = None
 
     def run(self, seconds: float) -> Iterator[NavCommand]:
-        for _ in range(round(seconds * 10)):
+        for _ in range(round(seconds * 5)):
             self.now_us += STEP_US
             self._drift()
-            if self.looks and self.now_us % 200_000 == 0:
+            if self.looks:
                 self.shown = evidence(self.now_us, edge_of(self.boat, self.bars, self.bank_m))
             at = odometry(self.now_us, self.boat, self.speed_mps)
             heard = Heard(
@@ -136,7 +148,7 @@ def test_the_planner_never_steers_to_the_side_not_advised(
     for order in pool.run(1.5):
         if order.enable:
             off = (order.heading_rad - pool.boat.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
-            assert side * off >= -math.radians(3.0)  # a plan is kept while the boat turns towards it
+            assert side * off >= -1e-9
             assert order.speed_mps <= 0.5 * CONFIG.cruise_mps
 
 

@@ -220,6 +220,15 @@ def test_metres_without_an_origin_need_one_to_become_latitudes(
     assert geodetic(read_route(out, "test"), "test")[0] == (47.65, 9.48)
 
 
+def test_a_route_across_the_antimeridian_is_short(tmp_path: Path) -> None:
+    line = Line(
+        "fiji", (Spot(latitude_deg=-17.0, longitude_deg=179.9999), Spot(latitude_deg=-17.0, longitude_deg=-179.9999))
+    )
+    path = written(tmp_path, "a.geojson", route_bytes(line, ".geojson", "test"))
+    first, last = load_route(path, (-17.0, -179.9995)).waypoints
+    assert last.x_m - first.x_m == pytest.approx(21.3, abs=0.1)
+
+
 def test_info(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert paani(["route", "info", str(written(tmp_path, "a.geojson", GEOJSON))]) == 0
     said = capsys.readouterr().out

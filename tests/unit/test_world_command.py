@@ -69,6 +69,14 @@ def test_impossible_sizes_are_refused(size: str, capsys: pytest.CaptureFixture[s
     assert "--size" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--n=0", "--n=many", "--seed=-1"])
+def test_impossible_numbers_are_refused(option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["dataset", "--n=1", "--out", str(tmp_path / "set"), option])
+    assert caught.value.code == 2
+    assert option.split("=", maxsplit=1)[0] in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["lake", "harbour_crossing"])
 def test_the_plan_shows_water_land_route_and_things(name: str) -> None:
     scenario = load_scenario(name)

@@ -6,6 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 import numpy as np
@@ -16,7 +17,7 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.inspect.listen import observer
 from paani.logs.reader import open_log
-from paani.messages import Evidence, Odometry, TimeBase
+from paani.messages import Evidence, Message, Odometry, TimeBase
 from paani.replay.progress import Progress
 from paani_services.calibrate.horizon import waterline
 from paani_services.calibrate.mount import Look
@@ -28,6 +29,7 @@ SEED = 1
 DEPTH = 1024
 SHOW_S = 0.25
 Heard = tuple[list[Evidence], list[Odometry]]
+T = TypeVar("T", bound=Message)
 
 
 def recorded(path: Path) -> Heard:
@@ -54,12 +56,11 @@ def recorded(path: Path) -> Heard:
 async def heard_live(bus_config: BusConfig, seconds: float) -> Heard:
     """What comes over the bus in that time. Raises UserError where nothing listens or something does not come."""
     async with observer(bus_config) as bus:
-        queues: tuple[Queue[Evidence], Queue[Odometry]] = (
-            bus.queue(keys.EVIDENCE, DEPTH),
-            bus.queue(keys.ODOMETRY, DEPTH),
-        )
         heard: Heard = ([], [])
-        tasks = [asyncio.create_task(_collect(queue, kept)) for queue, kept in zip(queues, heard, strict=True)]
+        tasks = [
+            asyncio.create_task(_collect(bus.queue(keys.EVIDENCE, DEPTH), heard[0])),
+            asyncio.create_task(_collect(bus.queue(keys.ODOMETRY, DEPTH), heard[1])),
+        ]
         steps = math.ceil(seconds / SHOW_S)
         with Progress("listening") as bar:
             for step in range(steps):
@@ -99,9 +100,9 @@ def looks(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[Lo
     return found
 
 
-async def _collect(queue: "Queue[Evidence] | Queue[Odometry]", kept: list[Evidence] | list[Odometry]) -> None:
+async def _collect(queue: Queue[T], kept: list[T]) -> None:
     while True:
-        kept.append(await queue.get())  # type: ignore[arg-type]  # each queue has its own list
+        kept.append(await queue.get())
 
 
 def _is_known(odometry: Odometry) -> bool:

@@ -36,6 +36,7 @@ FIRST_NOISE_FIXES, MOST_NOISE_FIXES = 10, 300  # that it is averaged over
 GPS_SPEED_PER_S = 1.0 / 16.0  # spread of the speed for that of the position: 0.05 m/s for 0.8 m,
 MIN_GPS_SPEED_STD_MPS = 0.05  # and no less for a better place: speed is measured by other means
 SWAY_STD_MPS = 1.4  # at 20 Hz as much as 0.1 m/s for 5 s on end
+STRAIGHT_RADPS = 0.03  # a hull that turns slides outwards: its sway is not about zero
 LOCAL_SWAY_STD_MPS = 0.15
 LOCAL_SPEED_STD_MPS = 2.0  # the local filter's surge fades towards zero instead of running away
 REST_STD_MPS = 0.03
@@ -127,7 +128,8 @@ class Estimator:
         self._global.predict(yaw_rate, ahead, left, step_s, self._last_fix.position_std_m)
         if newest.orientation_available:
             self._hear_compass(self._global, newest.yaw_rad, step_s)
-        self._global.correct_way(SWAY_STD_MPS)
+        if abs(yaw_rate - float(self._global.x[B])) < STRAIGHT_RADPS:
+            self._global.correct_way(SWAY_STD_MPS)
         if self._rest.at_rest:
             self._global.correct_velocity(0.0, 0.0, REST_STD_MPS, math.inf, turns=False)
 

@@ -118,12 +118,7 @@ def trouble(
 
 def segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     """Whether two pieces of line touch or cross."""
-    for axis in (0, 1):
-        if max(one[0][axis], one[1][axis]) < min(other[0][axis], other[1][axis]):
-            return False
-        if max(other[0][axis], other[1][axis]) < min(one[0][axis], one[1][axis]):
-            return False
-    return _apart_m(one, other) == 0.0
+    return _may_be_near(one, other, 0.0) and _apart_m(one, other) == 0.0
 
 
 def _speed_outside(
@@ -154,8 +149,11 @@ def _nearest(at_m: Point, start: Point, end: Point) -> Point:
 
 def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
     """Nothing within the margin of the allowed way is an edge, but for edges between two areas that keep in."""
+    way = (start, end)
     return not any(
-        _apart_m((start, end), edge) < margin_m and _is_border(fence, edge) for area in fence for edge in _edges(area)
+        _may_be_near(way, edge, margin_m) and _apart_m(way, edge) < margin_m and _is_border(fence, edge)
+        for area in fence
+        for edge in _edges(area)
     )
 
 
@@ -167,6 +165,17 @@ def _is_border(fence: Fence, edge: tuple[Point, Point]) -> bool:
     middles = (_between(*edge, part) for part in (0.01, 0.25, 0.5, 0.75, 0.99))
     return not all(
         is_allowed(fence, (x_m + side * left[0], y_m + side * left[1])) for x_m, y_m in middles for side in (-1.0, 1.0)
+    )
+
+
+def _may_be_near(one: tuple[Point, Point], other: tuple[Point, Point], within_m: float) -> bool:
+    """False where the boxes around them are further apart than that: most pairs are settled here."""
+    ((x1, y1), (x2, y2)), ((x3, y3), (x4, y4)) = one, other
+    return (
+        min(x1, x2) - within_m <= max(x3, x4)
+        and min(x3, x4) - within_m <= max(x1, x2)
+        and min(y1, y2) - within_m <= max(y3, y4)
+        and min(y3, y4) - within_m <= max(y1, y2)
     )
 
 
@@ -187,12 +196,12 @@ def _between(start: Point, end: Point, part: float) -> Point:
 
 
 def _crossings(from_m: Point, to_m: Point, start: Point, end: Point) -> Iterator[float]:
-    """Where on the way, from 0 to 1, it meets the edge; a way along the edge meets it at the edge's ends."""
+    """Where on the way, from 0 to 1, it meets the edge; nowhere where they run side by side."""
     way_x, way_y = to_m[0] - from_m[0], to_m[1] - from_m[1]
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     to_x, to_y = start[0] - from_m[0], start[1] - from_m[1]
     cross = way_x * edge_y - way_y * edge_x
-    if cross == 0.0:  # side by side, or no way at all: what lies between other cuts is asked in its middle
+    if cross == 0.0:
         return
     part, along = (to_x * edge_y - to_y * edge_x) / cross, (to_x * way_y - to_y * way_x) / cross
     if 0.0 <= part <= 1.0 and -1e-9 <= along <= 1.0 + 1e-9:

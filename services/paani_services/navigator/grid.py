@@ -152,9 +152,10 @@ def _seen(sights: list[Sight], first_free: int, camera: Camera, config: PlannerC
         points += [_foot(each, foot, number, camera, config) for foot in sight.feet]
     if len(points) == 1:
         return free, points[0]
-    occupied = Points(*(np.concatenate(axis) for axis in zip(*points, strict=True)))
-    order = np.argsort(occupied.number, kind="stable")
-    return free, Points(*(axis[order] for axis in occupied))
+    numbers = np.concatenate([each.number for each in points])
+    order = np.argsort(numbers, kind="stable")
+    east_m, north_m = (np.concatenate(axis) for axis in ([p.east_m for p in points], [p.north_m for p in points]))
+    return free, Points(east_m[order], north_m[order], numbers[order])
 
 
 def _foot(lens: Lens, foot: tuple[int, int, int], number: int, camera: Camera, config: PlannerConfig) -> Points:

@@ -1,15 +1,13 @@
-"""How floating things ride the waves: heave, roll and pitch from the wind sea. Pure.
-
-Height and period of a fetch-limited sea: Hasselmann et al. (1973), JONSWAP.
-"""
+"""How floating things ride the waves: heave, roll and pitch from the wind sea. Pure."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from paani_sim.water.waves import GRAVITY_MPS2, peak_omega_radps, significant_height_m
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2, Waves, Wind
 
-G_MPS2 = 9.81
+SLOWEST_MPS = 0.3  # of a wind that moves the water at all
 OWN_FETCH_M = 40.0  # of a world that names none: the eye's ripples need some water to grow on
 ROCK_RAD = 0.012  # how far a small boat is rocked by its own mooring and crew, standard deviation
 
@@ -26,7 +24,7 @@ class Sea(NamedTuple):
     @property
     def wave_m(self) -> float:
         """Length of the wave at the peak, in deep water."""
-        return G_MPS2 * self.period_s**2 / (2.0 * np.pi)
+        return GRAVITY_MPS2 * self.period_s**2 / (2.0 * np.pi)
 
 
 class Ride(NamedTuple):
@@ -39,10 +37,9 @@ class Ride(NamedTuple):
 
 def sea_of(wind: Wind, waves: Waves) -> Sea:
     """The wind sea of a world."""
-    speed = max(wind.speed_mps, 0.3)
-    fetch = G_MPS2 * (waves.fetch_m or OWN_FETCH_M) / speed**2
-    height = 0.0016 * fetch**0.5 * speed**2 / G_MPS2
-    return Sea(float(height), float(speed / G_MPS2 / 3.5 * fetch**0.33), wind.toward_rad)
+    speed_mps, fetch_m = max(wind.speed_mps, SLOWEST_MPS), max(waves.fetch_m or OWN_FETCH_M, 1.0)
+    period_s = 2.0 * np.pi / peak_omega_radps(speed_mps, fetch_m)
+    return Sea(significant_height_m(speed_mps, fetch_m), period_s, wind.toward_rad)
 
 
 def floats(thing: Obstacle | Actor) -> bool:

@@ -82,7 +82,7 @@ def view_projection(pose: BoatPose, camera: Camera) -> F64:
 def distort(points: F64, camera: Camera) -> F64:
     """Where the lens puts what a pinhole sees at `points` `(n, 2)`; both from the middle, over focal length."""
     square = (points**2).sum(axis=1, keepdims=True)
-    return points * (1.0 + camera.k1 * square + camera.k2 * square**2)
+    return np.asarray(points * (1.0 + camera.k1 * square + camera.k2 * square**2))
 
 
 def project(points_m: F64, pose: BoatPose, camera: Camera) -> F64:

@@ -54,6 +54,12 @@ class Optics:
             return drawn
         return np.asarray(cv2.resize(drawn, self._size, interpolation=cv2.INTER_AREA), np.uint8)
 
+    def middle(self, drawn: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """Of what was drawn, the value at the middle of each of the picture's pixels, between the nearest four."""
+        if self._map is not None:
+            return np.asarray(cv2.remap(drawn, *self._map, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+        return np.asarray(cv2.resize(drawn, self._size, interpolation=cv2.INTER_LINEAR), np.float32)
+
     def nearest(self, drawn: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
         """Of what was drawn, the pixel in the middle of each of the picture's."""
         return drawn[self._rows, self._columns]

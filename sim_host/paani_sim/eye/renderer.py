@@ -35,6 +35,7 @@ F32 = npt.NDArray[np.float32]
 _NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
 DETAILS_WITHIN_M = 80.0
 SHADES_WITHIN_M = 40.0
+SAME_SURFACE_FRAC = 0.05
 MIRRORED_WITHIN_M = 120.0
 _FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
 _QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
@@ -74,7 +75,7 @@ class Eye:
         world: World,
         camera: Camera | None = None,
         *,
-        supersample: float = 1.5,
+        supersample: float = 1.25,
         exposure: float = 1.1,
         balance: tuple[float, float, float] = NEUTRAL,
         context: g.Context | None = None,
@@ -186,8 +187,16 @@ class Eye:
         """The picture with its class mask, the boxes of what is visible, and depth."""
         self._draw(pose, t_s, actors_along_m)
         labels = np.asarray(self._optics.nearest(g.read_target(self._gl, self._main, 1)), np.uint8)
-        depth = np.asarray(self._optics.nearest(g.read_depth(self._gl, self._main)), np.float32)
-        return read_labels(self._develop(pose, t_s), labels, metres(depth), self.things)
+        return read_labels(self._develop(pose, t_s), labels, self._depth_m(), self.things)
+
+    def _depth_m(self) -> F32:
+        """Depth at the middle of each pixel: the buffer is linear across a plane; at edges what is there counts."""
+        depth = np.ascontiguousarray(g.read_depth(self._gl, self._main))
+        there = metres(np.asarray(self._optics.nearest(depth), np.float32))
+        between = metres(self._optics.middle(depth))
+        with np.errstate(invalid="ignore"):
+            same = np.abs(between - there) < SAME_SURFACE_FRAC * there
+        return np.where(same, between, there)
 
     def _develop(self, pose: BoatPose, t_s: float) -> npt.NDArray[np.uint8]:
         raw = g.read_target(self._gl, self._main, 0)

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from paani_sim.eye.afloat import G_MPS2, floats
+from paani_sim.eye.afloat import floats
+from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.worlds.curves import Points
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2
 
@@ -98,7 +99,7 @@ def wake(actor: Actor, along_m: float) -> F64:
     way = -way  # the line runs backwards
     left = np.column_stack([-way[:, 1], way[:, 0]])
     reach = 0.5 * actor.width_m + 0.8 + KELVIN * 1.35 * behind
-    wave_radpm = min(G_MPS2 / actor.speed_mps**2, 14.0)
+    wave_radpm = min(GRAVITY_MPS2 / actor.speed_mps**2, 14.0)
     steep = 0.14 * min(1.5, actor.speed_mps) * min(1.0, actor.width_m / 1.5)
     edge = {side: line + side * reach[:, None] * left for side in (1.0, -1.0)}
     rows = np.zeros((TRAIL_STEPS, 4, COLUMNS))

@@ -62,7 +62,7 @@ def main(argv: list[str]) -> int:
         return cost_part(costs)
 
     parts: dict[str, Callable[[], Part]] = {
-        "physics": physics, "oracle": oracle, "eye": eye, "lockstep": lockstep, "cost": cost, "estimation": estimation
+        "physics": physics, "eye": eye, "lockstep": lockstep, "cost": cost, "oracle": oracle, "estimation": estimation
     }  # fmt: skip
     parser = argparse.ArgumentParser(prog="paani bench water", description="How fast the simulator is, and how true.")
     parser.add_argument("--only", nargs="+", choices=tuple(parts), metavar="PART", help=f"of {', '.join(parts)}")

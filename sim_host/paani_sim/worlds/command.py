@@ -87,7 +87,7 @@ def _dataset(options: argparse.Namespace) -> int:
 
     _require_folder(options.out)
     manifest = write_dataset(options.out, options.n, options.seed, options.worlds)
-    boxes = ", ".join(f"{count} {name}" for name, count in manifest.boxes.items())
+    boxes = ", ".join(f"{number} {name}" for name, number in manifest.boxes.items())
     sys.stdout.write(f"{options.out}: {manifest.images} pictures, boxes: {boxes}\n")
     return 0
 
@@ -97,19 +97,29 @@ def _require_folder(out: Path) -> None:
         raise UserError(f"--out {out}: no such folder")
 
 
-def _size(text: str) -> tuple[int, int]:
+def size(text: str) -> tuple[int, int]:
+    """Width and height [px]."""
     width, _, height = text.partition("x")
-    size = int(width), int(height)
-    if not all(16 <= side <= MAX_VIEW_PX for side in size):
+    sides = int(width), int(height)
+    if not all(16 <= side <= MAX_VIEW_PX for side in sides):
         raise ValueError(text)
-    return size
+    return sides
 
 
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= 1_000_000:
+def count(text: str) -> int:
+    """How many, from 1 to a million."""
+    number = int(text)
+    if not 1 <= number <= 1_000_000:
         raise ValueError(text)
-    return count
+    return number
+
+
+def seed(text: str) -> int:
+    """A whole number that is not negative."""
+    number = int(text)
+    if number < 0:
+        raise ValueError(text)
+    return number
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -118,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     listed = commands.add_parser("list", help="the worlds and scenarios that can be named")
     listed.set_defaults(run=_list)
     render = commands.add_parser("render", help="a sheet: the plan, and what the camera sees along the route")
-    render.add_argument("--size", type=_size, default=VIEW_PX, metavar="WIDTHxHEIGHT", help="of a view (480x360)")
+    render.add_argument("--size", type=size, default=VIEW_PX, metavar="WIDTHxHEIGHT", help="of a view (480x360)")
     check = commands.add_parser("check", help="whether scenario files are sound")
     check.add_argument("files", nargs="+", metavar="FILE")
     check.set_defaults(run=_check)
@@ -128,8 +138,8 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--out", type=Path, required=True, metavar="FILE")
         command.set_defaults(run=run)
     dataset = commands.add_parser("dataset", help="labelled pictures for training")
-    dataset.add_argument("--n", type=_count, required=True, help="how many pictures")
-    dataset.add_argument("--seed", type=int, default=0)
+    dataset.add_argument("--n", type=count, required=True, help="how many pictures")
+    dataset.add_argument("--seed", type=seed, default=0)
     dataset.add_argument("--out", type=Path, required=True, metavar="DIR")
     dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
     dataset.set_defaults(run=_dataset)
