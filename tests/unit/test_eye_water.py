@@ -61,6 +61,14 @@ def test_wake_lies_behind_the_boat_in_a_wedge() -> None:
     assert np.sign(rows[:, 1]).tolist() == np.sign(aside).tolist()
 
 
+def test_a_wake_ends_where_the_boat_came_round_a_bend() -> None:
+    hairpin = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 3.0], [0.0, 3.0]])
+    rows = ripples.wake(dataclasses.replace(STRAIGHT, path_m=hairpin), 63.0 + 8.0)
+    assert 0 < len(rows) < 4 * ripples.TRAIL_STEPS
+    assert (rows[:, 9] < 0.0).all() or rows[rows[:, 9] >= 0.0, 6].max() == 0.0
+    assert rows[:4, 6].min() > 0.1
+
+
 def test_no_wake_without_way() -> None:
     assert len(ripples.wake(dataclasses.replace(STRAIGHT, speed_mps=0.1), 60.0)) == 0
     assert len(ripples.wake(STRAIGHT, 500.0)) == 0

@@ -86,7 +86,8 @@ def test_the_receivers_slow_error_is_not_taken_for_motion() -> None:
         error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
         one.predict(0.0, 0.0, 0.0, 0.2, 0.8)
         one.correct_velocity(0.0, 0.0, 0.03, math.inf, turns=False)
-        one.correct_position(*(error + 0.05 * rng.standard_normal(2)).tolist(), 0.05, 25.0)
+        fix = error + 0.05 * rng.standard_normal(2)
+        one.correct_position(float(fix[0]), float(fix[1]), 0.05, 25.0)
         places.append(one.x[[PX, PY]])
     assert np.std(np.array(places[300:]), axis=0).max() < 0.3
 
@@ -100,14 +101,15 @@ def test_position_errors_are_as_large_as_the_covariance_says() -> None:
         one = PlanarFilter(state(0.0, 0.0, 0.4, 0.6), std)
         truth = np.zeros(2)
         first = truth + error + 0.05 * rng.standard_normal(2)
-        one.move_to(*first.tolist(), 0.8, 0.05)
+        one.move_to(float(first[0]), float(first[1]), 0.8, 0.05)
         for _ in range(300):
             truth = truth + 0.2 * 0.6 * np.array([math.cos(0.4), math.sin(0.4)])
             error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
             one.predict(0.0, 0.0, 0.0, 0.2, 0.8)
             velocity = 0.6 * np.array([math.cos(0.4), math.sin(0.4)]) + 0.05 * rng.standard_normal(2)
-            one.correct_velocity(*velocity.tolist(), 0.05, math.inf)
-            one.correct_position(*(truth + error + 0.05 * rng.standard_normal(2)).tolist(), 0.05, math.inf)
+            fix = truth + error + 0.05 * rng.standard_normal(2)
+            one.correct_velocity(float(velocity[0]), float(velocity[1]), 0.05, math.inf)
+            one.correct_position(float(fix[0]), float(fix[1]), 0.05, math.inf)
         off = one.x[[PX, PY]] - truth
         found.append(float(off @ np.linalg.solve(one.covariance[:2, :2], off)))
     assert np.mean(found) == pytest.approx(2.0, abs=1.96 * math.sqrt(4.0 / len(found)))

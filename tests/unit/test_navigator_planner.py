@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani import keys
 from paani.config import load_config
+from paani.decider import Input
 from paani.messages import (
     Advisory,
     Arming,
@@ -24,6 +26,7 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
+from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.grid import UNCALIBRATED, Camera
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
@@ -160,6 +163,17 @@ def test_without_a_valid_calibration_the_planner_refuses_to_act(direction: Direc
     blocked.direction = unseen.direction = direction
     for one, other in zip(blocked.run(2.0), unseen.run(2.0), strict=True):
         assert msgspec.json.encode(one) == msgspec.json.encode(other)
+
+
+def test_the_decider_gives_it_the_pictures_and_the_calibration() -> None:
+    """Evidence is an input of the recorded step, so a planned order can be decided again."""
+    config = load_config()
+    seeing = msgspec.structs.replace(config, calibration=CAMERA.calibration)
+    inputs = {topic.name: Input() for topic in DECIDER.inputs}
+    shown = evidence(START_US, edge_of(AT_REST))
+    inputs |= {keys.EVIDENCE.name: Input(shown), keys.ODOMETRY.name: Input(odometry(START_US, AT_REST), START_US)}
+    sights = [DECIDER.decide(NavState(), inputs, START_US, c)[0].pilot.memory.sights for c in (seeing, config)]
+    assert [len(each) for each in sights] == [1, 0]
 
 
 def test_the_paper_has_no_planner() -> None:

@@ -46,6 +46,17 @@ async def test_a_scenario_s_open_route_and_fence_are_handed_over(private_sets: t
     assert not plain.config.navigator.fence
 
 
+async def test_the_simulator_s_camera_is_calibrated_and_no_other(private_sets: tuple[str, ...], tmp_path: Path) -> None:
+    """B16: a real camera's calibration is not established until somebody gives one."""
+    plan = await make_plan(load_config(sets=(*private_sets, "eye.pitch_down_deg=9.0")))
+    assert plan.config.calibration.valid
+    assert plan.config.calibration.pitch_down_deg == 9.0
+    own = ("calibration.hfov_deg=62", "calibration.height_m=0.8", "calibration.valid=true")
+    assert (await make_plan(load_config(sets=(*private_sets, *own)))).config.calibration.hfov_deg == 62.0
+    real = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
+    assert not real.config.calibration.valid
+
+
 async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> None:
     own = ("navigator.route=mine.toml", "localization.origin_lat_lon_deg=[10.0, 20.0]")
     plan = await make_plan(load_config(sets=(*private_sets, *own)))

@@ -44,7 +44,7 @@ SPEED_DOUBT_MPS = 0.3
 CONVERGED_FIXES = 5
 RETURN_FIXES = 3  # after an outage, before the position may be believed again
 DOUBTFUL_FIXES = 3  # refused in a row: one of the two is wrong
-REFUSED_FIXES = 10  # refused in a row, and of one mind: the filter is wrong, not the receiver
+REFUSED_FIXES = 10  # refused in a row, and of one mind with the next: the filter is wrong, not the receiver
 MAX_LAG_S = 1.0  # of a fix behind the IMU
 MAX_RANGE_M = 50_000.0  # from the origin: beyond, a plane is no map
 
@@ -211,7 +211,7 @@ class Estimator:
         if self._of_one_mind and math.dist(self._of_one_mind[-1], (x_m, y_m)) > 2.0 * fix.position_std_m + fix.sog_mps:
             self._of_one_mind.clear()
         self._of_one_mind.append((x_m, y_m))
-        if len(self._of_one_mind) >= REFUSED_FIXES:
+        if len(self._of_one_mind) > REFUSED_FIXES:
             self._doubt_m = max(self._doubt_m, math.hypot(x_m - expected_x_m, y_m - expected_y_m))
             self._place(heard, x_m, y_m, fix)
 

@@ -113,7 +113,7 @@ def navigate(
     else:
         # The planner remembers where things are; guards are for who has no map.
         heading_rad = wanted.course_rad if plans else guarded_course(wanted.course_rad, state.guards)
-    if plans and not inhibits:
+    if plans and not inhibits and speed_mps > 0.0:
         wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0))
         pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner)
         state = msgspec.structs.replace(state, pilot=pilot)

@@ -19,7 +19,7 @@ SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
-UNKNOWN = 0.4  # all of the way is unknown
+UNKNOWN = 1.0  # all of the way is unknown: turn to what is seen, and see further from there
 SLOW = 0.3  # a stop
 CHANGE = 0.3  # a quarter turn off the plan before
 
@@ -67,7 +67,7 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     Costs: off the wanted course, near to things, into the unknown, slow, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
-    if not grid.free.any():
+    if wish.speed_mps <= 0.0 or not grid.free.any():
         return nowhere
     offsets, speeds = candidates(start, wish, config)
     ways = roll_out(start, offsets, speeds, config)

@@ -110,7 +110,9 @@ def wake(actor: Actor, along_m: float) -> F64:
         rows[:, corner, 4] = side * reach[pick]
         rows[:, corner, 9:] = way[pick]
     rows[..., 5:9] = (wave_radpm, steep, 0.5 * actor.width_m, WAKE)
-    return rows.reshape(-1, COLUMNS)
+    straight = np.minimum.accumulate(np.clip(2.0 * way @ way[0] - 1.0, 0.0, 1.0))  # round a bend the strip would fold
+    rows[..., 6] *= np.column_stack([straight[:-1], straight[:-1], straight[1:], straight[1:]])
+    return rows[straight[:-1] > 0.0].reshape(-1, COLUMNS)
 
 
 def _length_m(actor: Actor) -> float:

@@ -171,7 +171,7 @@ PATCH_VERTEX = (
 layout(location = 0) in vec3 place; layout(location = 1) in vec2 corner;
 layout(location = 2) in vec4 numbers; layout(location = 3) in vec2 toward;
 uniform mat4 clipFromMap;
-out vec2 at; out float clear; flat out vec4 what; out vec2 way;
+out vec2 at; out float clear; out vec4 what; out vec2 way;
 void main() {
     at = corner; what = numbers; way = toward;
     clear = 1.0 - haze(distance(place, eye));
@@ -183,7 +183,7 @@ void main() {
 # What the water shader reads of wakes and shadows: slope, foam, shade.
 STIR_FRAGMENT = """
 #version 330
-in vec2 at; flat in vec4 what; in vec2 way;
+in vec2 at; in vec4 what; in vec2 way;
 layout(location = 0) out vec4 stir;
 void main() {
     float dark = what.y * (1.0 - smoothstep(0.35, 1.0, length(at)));
@@ -204,7 +204,7 @@ void main() {
 
 SHADE_FRAGMENT = """
 #version 330
-in vec2 at; in float clear; flat in vec4 what;
+in vec2 at; in float clear; in vec4 what;
 layout(location = 0) out vec4 colour;
 uniform float sunShare;
 void main() {
