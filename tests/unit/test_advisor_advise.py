@@ -35,8 +35,8 @@ def test_nothing_yet_is_no_data() -> None:
     ("age_s", "direction", "reason"),
     [
         (0.0, D.STRAIGHT, R.CENTER_CLEAR),
-        (0.8, D.STRAIGHT, R.CENTER_CLEAR),
-        (0.800001, D.STOP, R.STALE_EVIDENCE),
+        (0.6, D.STRAIGHT, R.CENTER_CLEAR),
+        (0.600001, D.STOP, R.STALE_EVIDENCE),
         (9.3, D.STOP, R.STALE_EVIDENCE),  # V16
         (-0.1, D.STRAIGHT, R.CENTER_CLEAR),
         (-0.100001, D.STOP, R.FUTURE_EVIDENCE),
@@ -69,13 +69,13 @@ def test_an_unusable_picture_stops_within_one_frame(cause: m.UnusableCause) -> N
 def test_republishing_keeps_the_date_and_the_decision_then_stops() -> None:
     """J17, I17: same source_us and frame; only the age moves, until it is too much."""
     state, first, tracks = advise(AdvisorState(), water(0.3, 0.5, 0.4), T0_US, PAANI)
-    for age_us in (200_000, 400_000, 800_000):
+    for age_us in (200_000, 400_000, 600_000):
         state, again, tracks_again = advise(state, state.evidence, T0_US + age_us, PAANI)
         assert (again.source_us, again.frame_seq, again.direction) == (first.source_us, first.frame_seq, D.LEFT)
         assert again.center == first.center
         assert tracks_again == tracks
     stale_us = stale_at_us(state, PAANI)
-    assert stale_us == T0_US + 800_001
+    assert stale_us == T0_US + 600_001
     _, late, _ = advise(state, state.evidence, stale_us, PAANI)
     assert (late.direction, late.reason, late.source_us) == (D.STOP, R.STALE_EVIDENCE, T0_US)
 
@@ -224,7 +224,7 @@ def test_any_evidence_gives_an_advisory_that_survives_the_wire(frames: list[tupl
         judged = state.evidence
         assert all(0.0 <= lane.risk <= 1.0 for lane in (advisory.left, advisory.center, advisory.right))
         age_s = advisory.evidence_age_s
-        if judged is None or not judged.usable or age_s > 0.8 or age_s < -0.1:
+        if judged is None or not judged.usable or age_s > 0.6 or age_s < -0.1:
             assert advisory.direction is D.STOP
 
 

@@ -98,7 +98,7 @@ def test_a_frozen_camera() -> None:
     eyes = perceiver()
     data = jpeg(river())
     causes = [eyes.perceive(data, msgspec.structs.replace(HEADER, frame_seq=i), 0.0)[0].cause for i in range(6)]
-    assert causes == [m.UnusableCause.NONE] * 4 + [m.UnusableCause.FROZEN] * 2
+    assert causes == [m.UnusableCause.NONE] * 2 + [m.UnusableCause.FROZEN] * 4
     assert eyes.perceive(jpeg(noisy(river(), 3.0)), HEADER, 0.0)[0].usable
 
 

@@ -30,7 +30,7 @@ PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`p
 READY_LIMIT_S = 20.0
 MIN_READY_S = 2.0
 ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
-END_M = 1.5  # an open route is done this near its end: the navigator's acceptance radius
+END_M = 4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
 BELIEVED_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS
 
 
