@@ -26,7 +26,7 @@ from paani_services.navigator.grid import UNCALIBRATED, Camera
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
 from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, acts, looked, steered
-from paani_services.navigator.planner import Plan, Wish
+from paani_services.navigator.planner import Wish
 from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
 
 
@@ -101,9 +101,12 @@ def navigate(
     if direction in TURNS:
         state = _paused(state, now_us)
         speed_mps *= config.turn_speed_frac
+    if plans:
+        # The planner weighs the advised side against what the map shows, and remembers where things are.
+        heading_rad = wanted.course_rad
+    elif direction in TURNS:
         if config.latch_turns:
-            max_deg = config.planner.max_turn_deg if plans else config.max_total_turn_deg
-            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config, max_deg)
+            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config)
             state = msgspec.structs.replace(state, turn=turn)
             heading_rad = turn.heading_rad
             if capped:
@@ -111,8 +114,7 @@ def navigate(
         else:
             heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
     else:
-        # The planner remembers where things are; guards are for who has no map.
-        heading_rad = wanted.course_rad if plans else guarded_course(wanted.course_rad, state.guards)
+        heading_rad = guarded_course(wanted.course_rad, state.guards)
     if plans and not inhibits and speed_mps > 0.0:
         wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0))
         pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner)
@@ -120,8 +122,6 @@ def navigate(
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
         if speed_mps <= 0.0:
             inhibits.append(Inhibit.NO_FREE_PATH)
-        elif state.turn is not None and _is_too_far(state.turn, odometry.yaw_rad, plan, config):
-            inhibits.append(Inhibit.TURN_CAPPED)
     if direction not in TURNS:
         on_course = abs(wrap_rad(heading_rad - wanted.course_rad)) <= SAME_COURSE_RAD
         state = _learned(state, wanted, odometry, now_us, config, on_course=on_course)
@@ -131,13 +131,6 @@ def navigate(
     return state, _order(
         state, heard, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=wanted.cross_track_m, leg=leg
     )
-
-
-def _is_too_far(turn: Turn, yaw_rad: float, plan: Plan, config: NavigatorConfig) -> bool:
-    """Does the plan go on with a run of turns beyond its cap, which only a way seen free may do?"""
-    turned_rad = abs(wrap_rad(yaw_rad - turn.start_rad) + wrap_rad(plan.heading_rad - yaw_rad))
-    cap_deg = config.planner.max_turn_deg if plan.verified else config.max_total_turn_deg
-    return turned_rad > math.radians(cap_deg) + 1e-9
 
 
 def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorConfig) -> NavState:

@@ -40,7 +40,7 @@ def steered(
 ) -> tuple[Pilot, Plan]:
     """The plan for this wish: made anew for a new picture, another course or side, or after `replan_s`.
 
-    No plan is faster than wished for, nor steers to a side that is not advised, also while the boat turns past it.
+    No plan is faster than wished for.
     """
     held = pilot.plan
     is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
@@ -50,8 +50,4 @@ def steered(
         start = Start(odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)
         held = plan(grid, start, wish, held, config)
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
-    heading_rad = held.heading_rad
-    if wish.side * wrap_rad(heading_rad - odometry.yaw_rad) < 0.0:
-        heading_rad = odometry.yaw_rad
-    speed_mps = min(held.speed_mps, wish.speed_mps)
-    return pilot, msgspec.structs.replace(held, heading_rad=heading_rad, speed_mps=speed_mps)
+    return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

@@ -19,17 +19,17 @@ SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
-UNKNOWN = 1.0  # all of the way is unknown: turn to what is seen, and see further from there
+UNKNOWN = 0.3  # all of the way is unknown: turn to what is seen, and see further from there
 SLOW = 0.3  # a stop
-CHANGE = 0.3  # a quarter turn off the plan before
+CHANGE = 0.15  # a quarter turn off the plan before
+ADVICE, ADVISED_RAD = 0.15, math.radians(25.0)  # not the advised side; nothing from a full turn to it on (M5)
 
 
 class Plan(msgspec.Struct, frozen=True):
-    """Where to steer and how fast; 0: nowhere is free. `verified`: every cell on the first `verified_m` is known."""
+    """Where to steer and how fast; 0: nowhere is free."""
 
     heading_rad: float
     speed_mps: float
-    verified: bool = False
 
 
 class Start(NamedTuple):
@@ -52,7 +52,7 @@ class Ways(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """The wanted course and the speed allowed. side: 1, never right of the heading now; -1, never left; 0, either."""
+    """The wanted course and the speed allowed. side: the one advised, 1 port, -1 starboard, 0 neither."""
 
     course_rad: float
     speed_mps: float
@@ -64,7 +64,7 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
 
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), or an unknown one within the way to
     stop.
-    Costs: off the wanted course, near to things, into the unknown, slow, another than before.
+    Costs: off the wanted course, not to the advised side, near to things, into the unknown, slow, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
     if wish.speed_mps <= 0.0 or not grid.free.any():
@@ -81,28 +81,21 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     refused = (met & (soon | (ways.way_m <= config.room_m))).any(axis=0) | (unseen & stopping).any(axis=0)
     if refused.all():
         return nowhere
-    cost = _costs(offsets, speeds, start, before)
+    cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
     cost = cost + _way_costs(ways, gap_m - needed_m, met & looked, unseen & looked, soon, config)
     best = int(np.where(refused, np.inf, cost).argmin())
-    near = ways.way_m[:, best] <= config.verified_m
-    verified = not bool(((met | unseen)[:, best] & near).any())
-    return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]), verified)
+    return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
 
 
 def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
-    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before.
-
-    A course wanted on a side not advised is that of the heading now.
-    """
+    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before."""
     wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
-    if wanted_rad * wish.side < 0.0:
-        wanted_rad = 0.0
     spacing_rad = math.radians(config.spacing_deg)
     found: list[float] = []
     for number in range(math.floor(config.span_deg / config.spacing_deg) + 1):
         for off_rad in (number * spacing_rad, -number * spacing_rad)[: 1 + (number > 0)]:
             heading_rad = wanted_rad + off_rad
-            if abs(heading_rad) <= math.pi and heading_rad * wish.side >= 0.0:
+            if abs(heading_rad) <= math.pi:
                 found.append(heading_rad)
     speed_mps = min(wish.speed_mps, config.speed_mps)
     offsets = np.array([heading for heading in found for _ in range(2)])
@@ -159,11 +152,11 @@ def _between(values: F64, limit: float) -> F64:
 def footprint_m(at_s: F64, gap_now_m: float, config: PlannerConfig) -> F64:
     """The radius that must be free at each time: hull, margin, and drift within the horizon (Q6).
 
-    Where something is nearer than that already, a way that does not come nearer is allowed, up to the hull itself.
+    Where something is nearer than that already, a way that comes no nearer is allowed: it leads out.
     """
     drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
-    return np.asarray(np.minimum(radius_m, max(config.hull_radius_m, gap_now_m - CELL_M)))
+    return np.asarray(np.minimum(radius_m, max(0.0, gap_now_m - 0.5 * CELL_M)))
 
 
 def distance_m(cells: Mask) -> F64:
@@ -199,6 +192,10 @@ def _costs(offsets: F64, speeds: F64, start: Start, before: Plan | None) -> F64:
         off = np.abs(offsets - wrap_rad(before.heading_rad - start.yaw_rad))
         cost = cost + CHANGE * np.minimum(off, 2.0 * math.pi - off) / quarter
     return np.asarray(cost)
+
+
+def _unadvised(offsets: F64, side: float) -> F64:
+    return np.asarray(ADVICE * abs(side) * np.minimum(np.maximum(1.0 - side * offsets / ADVISED_RAD, 0.0), 1.0))
 
 
 def _way_costs(ways: Ways, spare_m: F64, met: Mask, unseen: Mask, soon: Mask, config: PlannerConfig) -> F64:

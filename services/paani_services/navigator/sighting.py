@@ -17,7 +17,7 @@ POSE_SPACING_US = 90_000
 POSES_KEPT = 14  # 1.2 s: longer than a picture is under way
 SIGHT_SPACING_US = 100_000
 OLD_SPACING_US = 800_000  # between those kept for what is out of sight
-SIGHTS_KEPT = 40
+SIGHTS_KEPT = 48
 SMALL = frozenset({Label.PERSON, Label.BUOY})
 
 

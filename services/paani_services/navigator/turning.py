@@ -43,31 +43,29 @@ def continuous_heading(direction: Direction, yaw_rad: float, config: NavigatorCo
 
 
 def latched(
-    turn: Turn | None, direction: Direction, yaw_rad: float, now_us: int, config: NavigatorConfig, max_total_deg: float
+    turn: Turn | None, direction: Direction, yaw_rad: float, now_us: int, config: NavigatorConfig
 ) -> tuple[Turn, bool]:
     """The turn with its latched heading, and whether its cap forbids what is advised.
 
     A heading is latched when the direction changes, and again when the same turn is still advised
     after the boat has held it for `turn_hold_s`. No heading lies more than
-    `max_total_deg` from the yaw at which the run began: a stuck detection cannot spin the boat.
+    `max_total_turn_deg` from the yaw at which the run began: a stuck detection cannot spin the boat.
     """
     if turn is None:
-        return _extended(Turn(direction, yaw_rad, 0.0), direction, yaw_rad, config, max_total_deg)
+        return _extended(Turn(direction, yaw_rad, 0.0), direction, yaw_rad, config)
     if direction is not turn.direction:
-        return _extended(turn, direction, yaw_rad, config, max_total_deg)
+        return _extended(turn, direction, yaw_rad, config)
     if abs(wrap_rad(turn.heading_rad - yaw_rad)) > ON_HEADING_RAD:
         return msgspec.structs.replace(turn, on_heading_us=0), False
     if turn.on_heading_us == 0:
         return msgspec.structs.replace(turn, on_heading_us=now_us), False
     if (now_us - turn.on_heading_us) * 1e-6 < config.turn_hold_s:
         return turn, False
-    return _extended(turn, direction, yaw_rad, config, max_total_deg)
+    return _extended(turn, direction, yaw_rad, config)
 
 
-def _extended(
-    turn: Turn, direction: Direction, yaw_rad: float, config: NavigatorConfig, max_total_deg: float
-) -> tuple[Turn, bool]:
-    limit_rad = math.radians(max_total_deg)
+def _extended(turn: Turn, direction: Direction, yaw_rad: float, config: NavigatorConfig) -> tuple[Turn, bool]:
+    limit_rad = math.radians(config.max_total_turn_deg)
     side = SIDE[direction]
     sofar_rad = wrap_rad(yaw_rad - turn.start_rad)
     if side * sofar_rad >= limit_rad - ON_HEADING_RAD:

@@ -11,6 +11,9 @@ from paani_sim.worlds.world import Actor, Behaviour, Pose2, along_at
 KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
 SLOWING_MPS2 = 0.15  # a small craft that throttles back
+# One who has stood still for the boat this long backs off for a while, and so lets it pass.
+PATIENCE_S, BACKING_MPS, BACKING_S = 8.0, 0.4, 30.0
+STANDING_MPS = 0.05
 
 
 class Track:
@@ -69,16 +72,29 @@ class Actors:
         self._every_s = every_s
         self._boat_reach_m = boat_reach_m
         self.along_m = tuple(along_at(actor, 0.0) for actor in actors)
+        self._waited_s = [0.0] * len(self._actors)
         self.speeds_mps = tuple(0.0 for _ in actors)
         self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, self.along_m, strict=True)]
 
     def advance(self, t_s: float, boat_xy_m: tuple[float, float]) -> None:
         """To simulated time `t_s`, `every_s` after the last one; who holds on is where the time says, to the bit."""
         along, speeds = [], []
-        for actor, pose, along_m in zip(self._actors, self.poses, self.along_m, strict=True):
-            speed = 0.0 if t_s <= actor.start_s else speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
+        for number, (actor, pose, along_m) in enumerate(zip(self._actors, self.poses, self.along_m, strict=True)):
+            speed = 0.0
+            if t_s > actor.start_s:
+                speed = self._patient(number, speed_mps(actor, pose, boat_xy_m, self._boat_reach_m))
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
         self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, along, strict=True)]
+
+    def _patient(self, number: int, speed: float) -> float:
+        """The speed, or astern for `BACKING_S` after `PATIENCE_S` of standing still for the boat."""
+        waited_s = self._waited_s[number]
+        if waited_s >= PATIENCE_S:
+            self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + BACKING_S else 0.0
+            return -BACKING_MPS
+        stands = speed < STANDING_MPS < self._actors[number].speed_mps
+        self._waited_s[number] = waited_s + self._every_s if stands else 0.0
+        return speed
