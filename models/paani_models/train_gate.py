@@ -31,7 +31,7 @@ MEASURED_SCENES = 84  # enough for a cell's mIoU to one or two points
 class Recipe:
     """Everything that decides a gate training besides the pictures and the segmenter whose errors it learns."""
 
-    epochs: int = 24
+    epochs: int = 14
     batch: int = 64
     peak_rate: float = 2e-3
     weight_decay: float = 1e-3

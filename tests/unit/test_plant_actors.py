@@ -37,14 +37,15 @@ def test_track_is_the_path(name: str) -> None:
 
 def test_skipper_stops_short_and_goes_on_when_clear() -> None:
     actors = Actors([straight()], EVERY_S, BOAT_REACH_M)
-    for step in range(1200):
+    steps = round(24.0 / EVERY_S)
+    for step in range(steps):
         actors.advance(EVERY_S * (step + 1), (30.0, 0.5))
     gap_m = 30.0 - BOAT_REACH_M - (actors.along_m[0] + 2.5)
     assert gap_m == pytest.approx(KEEP_CLEAR_M, abs=0.05)
     assert actors.speeds_mps[0] < 0.02
     stopped_m = actors.along_m[0]
     for step in range(200):
-        actors.advance(60.0 + EVERY_S * (step + 1), (30.0, 8.0))
+        actors.advance(24.0 + EVERY_S * (step + 1), (30.0, 8.0))
     assert actors.along_m[0] == pytest.approx(stopped_m + 10.0 * 1.5, rel=0.01)
 
 
@@ -65,10 +66,26 @@ def test_nobody_moves_before_the_start() -> None:
 
 @given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(-3.2, 3.2))
 def test_giving_way_only_ever_slows(x_m: float, y_m: float, yaw: float) -> None:
-    """Between stop and its own speed; a boat astern or well aside is none of its business."""
+    """Between stop and its own speed; a boat well astern or aside is none of its business."""
     pose = Pose2(0.0, 0.0, yaw)
     speed = speed_mps(straight(), pose, (x_m, y_m), BOAT_REACH_M)
     assert 0.0 <= speed <= 1.5
-    if math.cos(yaw) * x_m + math.sin(yaw) * y_m <= 0.0 or math.hypot(x_m, y_m) > 20.0:
+    if math.cos(yaw) * x_m + math.sin(yaw) * y_m <= -2.5 - BOAT_REACH_M or math.hypot(x_m, y_m) > 20.0:
         assert speed == 1.5
     assert speed_mps(straight(Behaviour.HOLDS_ON), pose, (x_m, y_m), BOAT_REACH_M) == 1.5
+
+
+def test_who_has_waited_long_backs_off_and_tries_again() -> None:
+    """Two that wait for each other would wait for ever."""
+    actors = Actors([straight()], EVERY_S, BOAT_REACH_M)
+    stopped_m, furthest_m, back_m = 0.0, 0.0, 1e9
+    for step in range(round(70.0 / EVERY_S)):
+        actors.advance(EVERY_S * (step + 1), (30.0, 0.5))
+        furthest_m = max(furthest_m, actors.along_m[0])
+        if actors.speeds_mps[0] < 0.0 and not stopped_m:
+            stopped_m = actors.along_m[0]
+        if stopped_m:
+            back_m = min(back_m, actors.along_m[0])
+    assert stopped_m == pytest.approx(furthest_m, abs=0.1)
+    assert furthest_m + 2.5 < 30.0 - BOAT_REACH_M - KEEP_CLEAR_M + 0.1
+    assert back_m == pytest.approx(stopped_m - 12.0, abs=0.1)

@@ -48,12 +48,13 @@ class Points(NamedTuple):
 class Grid(NamedTuple):
     """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
 
-    west_m, south_m: the corner.
+    west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago.
     """
 
     west_m: float
     south_m: float
     occupied: Mask
+    hidden: Mask
     free: Mask
     beside: Mask
 
@@ -95,7 +96,14 @@ def lay(
     occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
     shape = (CELLS, CELLS)
-    grid = Grid(west_m, south_m, occupied_now.reshape(shape), free_now.reshape(shape), np.zeros(shape, np.bool_))
+    grid = Grid(
+        west_m,
+        south_m,
+        occupied=occupied_now.reshape(shape),
+        hidden=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
+        free=free_now.reshape(shape),
+        beside=np.zeros(shape, np.bool_),
+    )
     if first_free == len(known):
         return grid
     reach_m = blind_reach_m(known[-1].aspect, camera, config)

@@ -72,7 +72,9 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     offsets, speeds = candidates(start, wish, config)
     ways = roll_out(start, offsets, speeds, config)
     looked = ways.way_m <= config.look_m
-    gap_m = _looked_up(grid, distance_m(grid.occupied), ways)
+    # What is out of sight may have drifted nearer.
+    clear_m = np.minimum(distance_m(grid.occupied), np.maximum(distance_m(grid.hidden) - config.hidden_drift_m, 0.0))
+    gap_m = _looked_up(grid, clear_m, ways)
     blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
     needed_m = footprint_m(ways.at_s, float(gap_m[0, 0]), config)[:, None]
     met, unseen = gap_m < needed_m, blank_m < config.hull_radius_m

@@ -60,7 +60,8 @@ class PlannerConfig(Section, frozen=True):
 
     `blind_m`: what no picture shows beside the boat counts as water that far, unless something was last seen in it; a
     camera that is blind beyond it leaves the rest unknown.
-    `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone.
+    `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. It may
+    have come `hidden_drift_m` nearer meanwhile.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
     `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
@@ -74,6 +75,7 @@ class PlannerConfig(Section, frozen=True):
     free_s: Positive = 0.8  # Q3
     occupied_s: Positive = 2.0  # Q3
     hidden_s: NonNegative = 20.0
+    hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
     jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten

@@ -49,14 +49,15 @@ class Track:
 def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
     """How fast the actor goes with the boat there; `boat_reach_m` is the boat's half length.
 
-    One that gives way slows so that it could stop `KEEP_CLEAR_M` short of a boat ahead, and goes on when that is clear.
+    One that gives way slows so that it could stop `KEEP_CLEAR_M` short of a boat ahead, and goes on when that is clear;
+    with the boat close alongside it stands still and lets it draw ahead.
     """
     if actor.behaviour is not Behaviour.GIVES_WAY:
         return actor.speed_mps
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     east_m, north_m = boat_xy_m[0] - pose.x_m, boat_xy_m[1] - pose.y_m
     ahead_m, aside_m = cos * east_m + sin * north_m, abs(cos * north_m - sin * east_m)
-    if ahead_m <= 0.0 or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
+    if ahead_m <= -0.5 * actor.length_m - boat_reach_m or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
         return actor.speed_mps
     room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - KEEP_CLEAR_M
     return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
