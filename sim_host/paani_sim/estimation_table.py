@@ -67,8 +67,9 @@ class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
 
     gps_m, compass_deg: RMS errors of the fixes and of the compass themselves. nis: mean over the fixes that were used,
     2 if the stated spread is right; nis_low, nis_high: its 95 % band. nees: mean squared position error over the
-    published variance, at most 2 if the published spread covers the error. false_motion_frac: of the steps truly at rest, those with an estimated speed
-    above 0.05 m/s; None: never at rest. false_motion_s: the longest stretch of them.
+    published variance, at most 2 if the published spread covers the error. false_motion_frac: of the steps truly at
+    rest, those with an estimated speed above 0.05 m/s; None: never at rest. false_motion_s: the longest stretch of
+    them.
     """
 
     condition: str

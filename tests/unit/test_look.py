@@ -88,7 +88,7 @@ def test_stills_do_not_know_of_each_other(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_a_video_is_one_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A film of one and the same picture is a frozen camera from its fifth frame on."""
+    """A film of one and the same picture is a frozen camera from its third frame on."""
     path = tmp_path / "still.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 5.0, (320, 240))
     for _ in range(8):
@@ -96,7 +96,7 @@ def test_a_video_is_one_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[s
     writer.release()
     assert main([str(path), "--json"]) == 0
     causes = [json.loads(line)["cause"] for line in capsys.readouterr().out.splitlines()]
-    assert causes == ["none"] * 4 + ["frozen"] * 4
+    assert causes == ["none"] * 2 + ["frozen"] * 6
 
 
 def test_a_mistake_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,7 @@ from paani.errors import UserError
 from paani.geometry import enu_from_geodetic, geodetic_from_enu
 from paani.messages import Waypoint
 
-MAX_BYTES = 32 * 2**20  # a route of 100,000 points with names and times is smaller
+MAX_BYTES = 32 << 20  # a route of 100,000 points with names and times is smaller
 
 Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]

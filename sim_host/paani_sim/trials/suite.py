@@ -21,7 +21,9 @@ from paani_sim.trials.provenance import MadeWith, Maker
 from paani_sim.trials.result import TrialResult
 
 TRIALS, EFFORTS = "trials", "efforts"
-DRIVES_PER_PROCESS = 16  # bounds what a driver of OpenGL may leave behind
+# Bounds what a driver of OpenGL may leave behind. Not the executor's own `max_tasks_per_child`: in Python 3.11 it can
+# wait for ever for the process that should take over.
+DRIVES_PER_PROCESS = 32
 NICE = 5
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -76,11 +78,16 @@ def drive_all(
         _make_folder(folder / name)
     for name in ONE_THREAD:
         os.environ[name] = "1"
+    batch = DRIVES_PER_PROCESS * jobs
+    for first in range(0, len(cases), batch):
+        yield from _drive_batch(folder, cases[first : first + batch], maker, sets, jobs)
+
+
+def _drive_batch(
+    folder: Path, cases: Sequence[Case], maker: Maker, sets: Sequence[str], jobs: int
+) -> Iterator[tuple[Case, TrialResult | Failure]]:
     executor = concurrent.futures.ProcessPoolExecutor(
-        min(jobs, max(1, len(cases))),
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_begin_process,
-        max_tasks_per_child=DRIVES_PER_PROCESS,
+        min(jobs, len(cases)), mp_context=multiprocessing.get_context("spawn"), initializer=_begin_process
     )
     try:
         running = {
