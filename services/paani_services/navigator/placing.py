@@ -76,7 +76,7 @@ def read_bytes(path: Path, where: str) -> bytes:
     """The whole file. Raises UserError where it cannot be read or is larger than any plan could be."""
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise UserError(f"{where}: larger than {MAX_BYTES // 2**20} MiB")
+            raise UserError(f"{where}: larger than {MAX_BYTES >> 20} MiB")
         return path.read_bytes()
     except OSError as error:
         raise UserError(f"{where}: {error.strerror}") from error
