@@ -175,6 +175,20 @@ def test_a_thing_stands_where_its_box_ends_below() -> None:
     assert cell(grid, 4.05, 0.8) == cell(grid, 3.5, 0.0) == "free"
 
 
+def test_people_are_given_more_room() -> None:
+    """Round a swimmer 0.8 m are occupied too; round a buoy of the same box they are not."""
+    corners = np.array([[4.0, -0.3, 0.0], [4.0, 0.3, 0.0]])
+    (left, low), (right, _) = project(corners, AT_REST, EYE) / (320, 240)
+    box = (min(left, right), low - 0.1, max(left, right), low)
+    found = {}
+    for label in (Label.PERSON, Label.BUOY):
+        thing = Detection(label=label, confidence=0.9, box_xyxy=tuple(map(float, box)))  # type: ignore[arg-type]
+        grid = grid_of(seen(detections=(thing,)))
+        found[label] = [cell(grid, 4.05, 0.0), cell(grid, 4.05, 0.9), cell(grid, 3.5, 0.0), cell(grid, 4.05, 1.5)]
+    assert found[Label.PERSON] == ["occupied", "occupied", "occupied", "free"]
+    assert found[Label.BUOY] == ["occupied", "free", "free", "free"]
+
+
 def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     """The lower end of its box is that of its near end; where the mask looks through it, the box counts."""
     aslant = tuple(0.45 + 0.005 * column for column in range(80))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from paani import portable
 from paani.config import CalibrationConfig, PlannerConfig
 from paani_services.navigator.projection import F64, Lens, Rays, Station, lens_at, ranges_m, rays, together
-from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Sight
+from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Foot, Sight
 
 CELLS = 100  # Q2
 CELL_M = 0.2  # Q2
@@ -43,6 +43,9 @@ class Points(NamedTuple):
     east_m: F64
     north_m: F64
     number: Indices
+
+
+NO_POINTS = Points(np.empty(0), np.empty(0), np.empty(0, np.int64))
 
 
 class Grid(NamedTuple):
@@ -166,21 +169,37 @@ def _seen(sights: list[Sight], first_free: int, camera: Camera, config: PlannerC
     return free, Points(east_m[order], north_m[order], numbers[order])
 
 
-def _foot(lens: Lens, foot: tuple[int, int, int], number: int, camera: Camera, config: PlannerConfig) -> Points:
-    """Points on the water under a box: along its lower end, and as far behind that as it is wide."""
-    left, right, low = (end / FOOT_STEPS for end in foot)
-    u = left + (right - left) * (np.arange(FOOT_COLUMNS) + 0.5) / FOOT_COLUMNS
-    top = hull_top(camera.hull, u)
-    given = rays(lens, u, np.minimum(low, top))
-    range_m = ranges_m(lens, given, config.max_range_m)
+def _foot(lens: Lens, foot: Foot, number: int, camera: Camera, config: PlannerConfig) -> Points:
+    """Points on the water under a box: along its lower end, as far behind as it is wide; more round people."""
+    left, right, low = (end / FOOT_STEPS for end in (foot.left, foot.right, foot.low))
+    given, range_m = _along(lens, left, right, low, camera, config)
     if not np.isfinite(range_m).all():
-        return Points(np.empty(0), np.empty(0), np.empty(0, np.int64))
-    east_m, north_m = range_m * given.east, range_m * given.north
-    wide_m = math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
-    nearer_m = CUT_NEARER_M if low >= CUT_FRAC else 0.0
-    deep = math.ceil((nearer_m + max(config.thickness_m, min(wide_m, FOOT_DEEP_M))) / CELL_M) + 1
+        return NO_POINTS
+    wide_m = _width_m(given, range_m)
+    room_m = config.person_room_m if foot.person else 0.0
+    if room_m > 0.0:
+        more = (right - left) * room_m / max(wide_m, CELL_M)
+        given, range_m = _along(lens, left - more, right + more, low, camera, config)
+        if not np.isfinite(range_m).all():
+            return NO_POINTS
+    nearer_m = room_m + (CUT_NEARER_M if low >= CUT_FRAC else 0.0)
+    deep = math.ceil((nearer_m + room_m + max(config.thickness_m, min(wide_m, FOOT_DEEP_M))) / CELL_M) + 1
     first_m = np.maximum(range_m - nearer_m, 0.0)
-    return _points(lens, given, first_m, np.full(u.shape, float(deep)), np.full(u.shape, number))
+    return _points(lens, given, first_m, np.full(range_m.shape, float(deep)), np.full(range_m.shape, number))
+
+
+def _along(
+    lens: Lens, left: float, right: float, low: float, camera: Camera, config: PlannerConfig
+) -> tuple[Rays, F64]:
+    """Rays through the lower end of a box, and how far along each the water lies."""
+    u = left + (right - left) * (np.arange(FOOT_COLUMNS) + 0.5) / FOOT_COLUMNS
+    given = rays(lens, u, np.minimum(low, hull_top(camera.hull, u)))
+    return given, ranges_m(lens, given, config.max_range_m)
+
+
+def _width_m(given: Rays, range_m: F64) -> float:
+    east_m, north_m = range_m * given.east, range_m * given.north
+    return math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
 
 
 def _points(lens: Lens, given: Rays, first_m: F64, counts: F64, numbers: Indices) -> Points:

@@ -86,7 +86,8 @@ def navigate(
     direction = advisory.direction if advisory is not None else Direction.NO_DATA
     if advisory is not None and config.clear_m > 0.0:
         state = msgspec.structs.replace(state, guards=watch(state.guards, advisory, odometry, config.clear_m))
-    straight = not inhibits and direction is Direction.STRAIGHT
+    # M1, M3: a turn by the picture keeps its waypoint. The planner steers for the route whatever is advised.
+    straight = not inhibits and (plans or direction is Direction.STRAIGHT)
     scene = Scene(odometry, heard.arming, state.sim_us, free=not inhibits, straight=straight)
     state = _pursue(state, mission, scene, config)
     wanted = aim(state.progress, mission, state.crab, position_m, config)

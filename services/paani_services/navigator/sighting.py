@@ -32,11 +32,20 @@ class Pose(msgspec.Struct, frozen=True):
     pitch_rad: float
 
 
+class Foot(msgspec.Struct, frozen=True, array_like=True):
+    """Left, right and lower end of a thing, in 1/512 of the picture, rounded outwards."""
+
+    left: int
+    right: int
+    low: int
+    person: bool = False
+
+
 class Sight(msgspec.Struct, frozen=True):
     """One picture: where it was taken, its width over height, where the water ends, where things stand in it.
 
     edge: for each column, left to right, in 1/128 of the height from the top, rounded towards the boat.
-    feet: left, right and lower end of each thing, in 1/512 of the picture, rounded outwards.
+    feet: where things stand.
     """
 
     at_us: int
@@ -47,7 +56,7 @@ class Sight(msgspec.Struct, frozen=True):
     pitch_rad: float
     aspect: float
     edge: bytes
-    feet: tuple[tuple[int, int, int], ...] = ()
+    feet: tuple[Foot, ...] = ()
 
     @property
     def station(self) -> Station:
@@ -147,7 +156,7 @@ def _sight(evidence: Evidence, pose: Pose) -> Sight:
     )
 
 
-def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[tuple[int, int, int]]:
+def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
     """Where a box stands on the water.
 
     A small thing's lower end is its foot. A long hull or pier that lies aslant reaches that low at one end only: it
@@ -156,14 +165,15 @@ def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[tuple[int, 
     x1, y1, x2, y2 = detection.box_xyxy
     low = math.ceil(y2 * FOOT_STEPS)
     if detection.label in SMALL:
-        yield math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), low
+        person = detection.label is Label.PERSON
+        yield Foot(math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), low, person)
         return
     count = len(edge)
     columns = range(math.floor(x1 * count), min(math.ceil(x2 * count), count))
     for is_missed, run in itertools.groupby(columns, key=lambda column: edge[column] < y1):
         if is_missed:
             missed = tuple(run)
-            yield missed[0] * FOOT_STEPS // count, -(-(missed[-1] + 1) * FOOT_STEPS // count), low
+            yield Foot(missed[0] * FOOT_STEPS // count, -(-(missed[-1] + 1) * FOOT_STEPS // count), low)
 
 
 def _kept(sights: tuple[Sight, ...], config: PlannerConfig) -> tuple[Sight, ...]:

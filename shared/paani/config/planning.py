@@ -77,6 +77,7 @@ class PlannerConfig(Section, frozen=True):
     hidden_s: NonNegative = 20.0
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
+    person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
     max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
     jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten
     horizon_s: Positive = 3.0  # Q4

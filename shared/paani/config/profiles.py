@@ -39,6 +39,7 @@ PAPER: dict[str, object] = {
             "use": False,
             "hidden_s": 0.0,  # Q3
             "margin_m": 0.25,  # Q6
+            "person_room_m": 0.0,  # Q6
             "speed_mps": 0.4,  # Q5
             "accel_mps2": 0.2,  # Q5
             "turn_radius_m": 0.0,  # Q5
