@@ -15,7 +15,7 @@ from paani.errors import UserError
 from paani.messages import Detection, Label, SegmentationSource, TimeBase
 from paani_services.navigator.grid import CELL_M, CELLS, Camera, Grid, blind_reach_m, hull_top, lay
 from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
-from paani_services.navigator.sighting import Memory, pose_at, remember, shows_water
+from paani_services.navigator.sighting import Foot, Memory, pose_at, remember, shows_water
 from paani_sim.eye.camera import BoatPose, project
 from paani_sim.eye.camera import Camera as Eye
 from tests.unit.watery_sights import AT_REST, CAMERA, CONFIG, EYE, PLANNER, START_US, edge_of, evidence, odometry, seen
@@ -196,7 +196,7 @@ def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
     assert (grid_of(seen(edge=aslant, detections=(vessel,))).occupied == grid_of(seen(edge=aslant)).occupied).all()
     holed = (*aslant[:30], *([0.4] * 20), *aslant[50:])
-    assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == ((192, 320, math.ceil(aslant[-1] * 512)),)
+    assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == (Foot(192, 320, math.ceil(aslant[-1] * 512)),)
 
 
 def test_a_box_cut_below_stands_nearer_than_the_picture_shows() -> None:
