@@ -74,7 +74,7 @@ def test_what_is_no_picture(data: bytes) -> None:
     assert decoded(data) is None
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(st.binary(max_size=300), st.integers(0, 10_000), st.sampled_from(sorted(FORMS)))
 def test_damage_never_raises(noise: bytes, at: int, form: str) -> None:
     data = bytearray(FORMS[form])

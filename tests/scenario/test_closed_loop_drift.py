@@ -12,7 +12,7 @@ from paani.config import load_config
 from paani.messages import FenceArea, Inhibit, Keep, Waypoint
 from paani_services.navigator.fence import distance_m, is_allowed
 from paani_sim.worlds import Current, Wind, World
-from tests.unit.test_closed_loop_guidance import Lockstep, off_route_m, open_water
+from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
 
 PERFECT = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0", "plant.vessel=otter")
 
