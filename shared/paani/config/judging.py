@@ -102,7 +102,7 @@ class TuningConfig(Section, frozen=True):
 
 class AdvisorConfig(Section, frozen=True):
     rate_hz: Positive = 5.0  # J17
-    evidence_max_age_s: Positive = 0.6  # a camera that falls silent stops the boat within a frame and 0.5 s; J16: 0.8
+    evidence_max_age_s: Positive = 0.6  # J16 has 0.8: a silent camera stops the boat within a frame and 0.5 s
     lifetime_s: Positive = 3.5  # J16
     max_future_s: NonNegative = 0.1
     counterfactual_size: RemovalSize = 3  # sets of up to so many pieces of evidence are sought; 0: none
