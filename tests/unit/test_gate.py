@@ -60,7 +60,7 @@ def test_what_cameras_see(name: str) -> None:
 def test_what_only_the_net_knows(seed: int) -> None:
     """These have sound statistics: only the net knows that no camera on a boat sees this."""
     mask = np.zeros((240, 320), np.uint8)
-    for name in ("shuffled", "drop_out", "drops", "false_colour", "rain"):
+    for name in ("shuffled", "drop_out", "drops", "false_colour"):
         picture, _ = spoilt(name, river(), mask, 5, np.random.default_rng(seed))
         assert judge(GateState(), picture, 1, ON)[1] is C.NONE
         assert judge(GateState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
