@@ -14,11 +14,14 @@ from pathlib import Path
 
 import pytest
 from blockbuster import blockbuster_ctx
+from hypothesis import settings
 
 from paani.bus import Bus, open_bus
 from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
+
+settings.register_profile("quick", max_examples=15)  # for `make check`; everything else tries more
 
 START_TIMEOUT_S = 40.0
 STOP_TIMEOUT_S = 10.0
