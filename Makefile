@@ -20,7 +20,7 @@ test: setup-test lint ## everything that CI runs
 	$(BIN)/python -m pytest -q tests
 
 check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests
-	$(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data"
+	$(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data and not slow"
 
 lint:
 	$(BIN)/ruff check -q .

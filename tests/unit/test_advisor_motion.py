@@ -19,6 +19,8 @@ from paani_services.advisor.rotation import ATTITUDES_KEPT
 from paani_services.advisor.tracker import PERIODS_KEPT
 from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing
 
+pytestmark = pytest.mark.slow
+
 BUOY = m.Label.BUOY
 S, C = m.MotionState, m.MotionCause
 

@@ -17,6 +17,8 @@ from paani_services.advisor.risk import LANES, components, severity
 from tests.unit.advisor_evidence import PAANI, PAPER, play, water
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
+pytestmark = pytest.mark.slow
+
 D, R = m.Direction, m.Reason
 CONFIGS = st.sampled_from((PAANI, PAPER))
 ABRUPT = load_config(sets=("advisor.policy.side_change_margin=0", "advisor.policy.release_margin=0"))

@@ -14,6 +14,8 @@ from paani_sim.eye.sprites import paint_sprites
 from paani_sim.eye.waves import SLOPE_RANGE, mean_square_slope, slope_tile
 from paani_sim.worlds import Kind, Light, load_world
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Camera()
 
 

@@ -17,6 +17,8 @@ from paani_services.faults.corpus import Scene
 from paani_services.faults.measure import CellFigures, CleanFigures, cell_figures, joint, mean_iou, totals
 from tests.unit.pictures import noisy, river
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def corpus(tmp_path: Path) -> Path:

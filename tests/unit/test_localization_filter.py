@@ -11,6 +11,8 @@ from paani.messages import ImuSample
 from paani_services.localization.filter import OWN, PSI, PX, PY, SIZE, PlanarFilter, U, V
 from paani_services.localization.levelling import level
 
+pytestmark = pytest.mark.slow
+
 STD = np.array([1.0, 1.0, 0.1, 0.2, 0.1, 0.005, 0.8, 0.8, 0.05, 0.3, 0.3])
 
 OWN_STD = np.array([*STD[:OWN], *[0.0] * (SIZE - OWN)])

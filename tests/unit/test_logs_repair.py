@@ -21,6 +21,8 @@ from paani.logs.repair import Interrupted, is_finished, repair, repair_all
 from paani.logs.scan import Damage, Found, scan
 from tests.unit.small_logs import NAME, begin, finished, unfinished
 
+pytestmark = pytest.mark.slow
+
 N, EVERY = 60, 10
 MANY = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

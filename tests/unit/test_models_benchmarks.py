@@ -19,6 +19,8 @@ from paani_models.mods_tracks import Results
 from tests.unit.pictures import river
 from tests.unit.public_sets import write_picture
 
+pytestmark = pytest.mark.slow
+
 CALIBRATION = """%YAML:1.0
 ---
 imageSize: [ 320, 240 ]

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from paani_models.detection_metrics import Found, class_figures
 
+pytestmark = pytest.mark.slow
+
 SIDE = 200.0
 
 

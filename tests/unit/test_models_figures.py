@@ -7,6 +7,8 @@ from paani_models.cli import data_folder
 from paani_models.evaluate import detector_figures, false_alarm_figures, null_figure, segmenter_figures
 from paani_models.sources import Sample, choose, read_samples
 
+pytestmark = pytest.mark.slow
+
 needs_data = pytest.mark.skipif(
     not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA"
 )

@@ -17,6 +17,8 @@ from paani_models.segmenter_scores import read_truth as read_water
 from paani_models.sources import Sample, Source, choose, read_boxes, read_mask, read_samples
 from tests.unit.public_sets import own_data, scene, write_picture
 
+pytestmark = pytest.mark.slow
+
 NAMES = ["tbiseg_dasha", "mcoe_boats"]
 
 

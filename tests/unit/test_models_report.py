@@ -32,6 +32,8 @@ from paani_models.segmenter_scores import ScoredMask
 from paani_models.sources import Sample, Source, choose
 from tests.unit.public_sets import own_data
 
+pytestmark = pytest.mark.slow
+
 RIVER = Source("river", "river", masks="masks", labels="labels", annotated=frozenset({"person", "vessel"}))
 (DASHA,) = choose(["tbiseg_dasha"])
 

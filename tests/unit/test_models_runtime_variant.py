@@ -24,6 +24,8 @@ from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
 from tests.unit.pictures import PICTURES, river  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 HEADER = m.PictureHeader(source_us=1_000_000, frame_seq=7, frame_epoch=3, width_px=320, height_px=240)
 NETS = ("segmenter", "detector")
 # Of shares in 0..1 and scores; a cell of 5,120 whose two best scores agree to rounding may change sides.

@@ -31,6 +31,8 @@ from paani_models.data.waterscenes import (
 from paani_models.sources import DETECTOR_CLASSES, choose, read_boxes, read_samples
 from tests.unit.public_sets import scene, waterscenes, write_picture
 
+pytestmark = pytest.mark.slow
+
 
 def of(kind: int) -> Box:
     return Box(kind, 0.5, 0.5, 0.1, 0.1)

@@ -16,6 +16,8 @@ from PIL import Image
 from paani_services.perception.decoding import MAX_PIXELS, decoded, stated_pixels
 from tests.unit.pictures import river
 
+pytestmark = pytest.mark.slow
+
 RIVER = river()
 
 

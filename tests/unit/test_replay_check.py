@@ -19,6 +19,8 @@ from paani.replay.recompute import Losses
 from paani.replay.whatif import changes_of
 from tests.unit.recorded_drive import CONFIG, T0_US, drive
 
+pytestmark = pytest.mark.slow
+
 DRIVE = drive(32.0)
 SERVICES = keys.DECIDING_SERVICES
 

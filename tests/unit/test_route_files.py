@@ -18,6 +18,8 @@ from paani_services.navigator.line import MAX_POINTS, Line, kept
 from paani_services.navigator.placing import Spot
 from paani_services.navigator.route import geodetic, load_route, read_route, route_bytes
 
+pytestmark = pytest.mark.slow
+
 SUFFIXES = (".gpx", ".geojson", ".toml")
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" creator="a plotter" xmlns="http://www.topografix.com/GPX/1/1">

@@ -22,6 +22,8 @@ from paani_services.scenario.trajectories import families
 from tests.unit.advisor_evidence import CLEAR, PAPER, box, lane, play, seeing, water
 from tests.unit.pictures import PICTURES, river
 
+pytestmark = pytest.mark.slow
+
 D, R = m.Direction, m.Reason
 VESSEL = box(m.Label.VESSEL, (0.0, 0.38, 0.30, 0.56), 0.85723)  # reaches beyond the frame's left edge
 MOORED = box(m.Label.BUOY, (0.70, 0.56, 0.95, 0.66), 0.45)

@@ -23,6 +23,8 @@ from paani_sim.worlds.room import footprint_gap_m
 from paani_sim.worlds.scenario_file import MAX_ACTORS, MAX_BYTES
 from paani_sim.worlds.spec import build_spec
 
+pytestmark = pytest.mark.slow
+
 WHOLE = """
 seed = 7
 [world]

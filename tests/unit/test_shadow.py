@@ -17,6 +17,8 @@ from paani.decider import Input, Inputs, Outputs
 from paani_services.advisor.decide import DECIDER, DeciderState, decide
 from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, T0_US, box, seeing, water
 
+pytestmark = pytest.mark.slow
+
 ACT, NO = m.TuningAct, m.TuningRefusal
 LOWER = (m.Change(path="advisor.policy.center_block_risk", value="0.46"),)
 PERIOD_US = 200_000

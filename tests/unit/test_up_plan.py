@@ -22,6 +22,8 @@ from paani_services.navigator.route import load_route
 from paani_sim.worlds import WORLDS, load_world
 from paani_sim.worlds.load import load_scenario
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", sorted(WORLDS))
 async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_sets: tuple[str, ...]) -> None:

@@ -17,6 +17,8 @@ from paani_sim.worlds.curves import (
 )
 from paani_sim.worlds.room import footprint_gap_m
 
+pytestmark = pytest.mark.slow
+
 SQUARE_M = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 
 

@@ -7,6 +7,8 @@ import pytest
 from paani_sim.worlds import WORLDS, World, load_world
 from paani_sim.worlds.spec import BOAT_BIT, SOLID_BIT, build_spec
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module", params=sorted(WORLDS))
 def world(request: pytest.FixtureRequest) -> World:
