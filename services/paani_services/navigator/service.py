@@ -25,7 +25,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     stepper = Stepper(bus, clock, config, DECIDER)
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
-    sent: m.Message | None = None
+    sent: m.NavCommand | None = None
     sent_us = route_us = 0
     with bus.alive():
         async with asyncio.TaskGroup() as group:
@@ -51,8 +51,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     logbook.note(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
                 order = outputs[keys.COMMAND.name]
                 assert isinstance(order, m.NavCommand)
-                if now_us - sent_us >= period_s * 1e6 - EARLY_US or _differs(order, sent):
-                    sent, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
+                if now_us - sent_us >= period_s * 1e6 - EARLY_US or order.is_news_after(sent):
+                    said, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
+                    assert isinstance(said, m.NavCommand)
+                    sent = said
                     bus.note(", ".join(order.inhibits))
                 else:
                     stepper.conclude({})
@@ -66,10 +68,3 @@ async def _wake_on(inbox: Latest[Any], wake: asyncio.Event) -> None:
     while True:
         await inbox.next()
         wake.set()
-
-
-def _differs(order: m.NavCommand, sent: m.Message | None) -> bool:
-    """New evidence, other advice or another gate goes out at once; the rest waits for the period."""
-    if not isinstance(sent, m.NavCommand):
-        return True
-    return (order.source_us, order.direction, order.inhibits) != (sent.source_us, sent.direction, sent.inhibits)

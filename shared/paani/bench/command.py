@@ -14,6 +14,7 @@ import msgspec
 from paani.bench.judgement import contract, step
 from paani.bench.part import Part, installed_commands, installed_parts, part_text
 from paani.bench.recorder import recorder
+from paani.bench.report import Report, measured
 from paani.bench.steadiness import steadiness
 from paani.bench.table import Machine, bench_of, text_of
 from paani.cli import add_config_arguments, config_from
@@ -24,13 +25,6 @@ from paani.up.display import Display
 from paani.up.drive import Outcome, drive
 from paani.up.plan import make_plan
 from paani.whole_file import write_whole
-
-
-class Judgement(msgspec.Struct, frozen=True, kw_only=True):
-    """What `paani bench judgement --json` writes."""
-
-    machine: Machine
-    parts: tuple[Part, ...]
 
 
 def main(argv: list[str]) -> int:
@@ -103,17 +97,9 @@ def _judgement(options: argparse.Namespace) -> int:
     for name in options.only:
         if name not in parts:
             raise UserError(f"--only {name}: no such part (have: {', '.join(parts)})")
-    cores, load_before, done = os.cpu_count() or 1, os.getloadavg()[0], []
-    for name in options.only or parts:
-        done.append(parts[name]())
-        sys.stdout.write("\n" + part_text(done[-1]))
-        sys.stdout.flush()
-    machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
-    sys.stdout.write(
-        f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
-    )
+    report = measured(parts[name] for name in options.only or parts)
     if options.json:
-        write_whole(options.json, msgspec.json.encode(Judgement(machine=machine, parts=tuple(done))) + b"\n", "--json")
+        write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
     return 0
 
 
@@ -132,7 +118,7 @@ def _recorder(options: argparse.Namespace) -> int:
         f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
     )
     if options.json:
-        write_whole(options.json, msgspec.json.encode(Judgement(machine=machine, parts=(part,))) + b"\n", "--json")
+        write_whole(options.json, msgspec.json.encode(Report(machine=machine, parts=(part,))) + b"\n", "--json")
     return 0
 
 

@@ -56,6 +56,12 @@ class NavCommand(Message, frozen=True, kw_only=True):
     leg_index: Count = 0
     leg: Text = ""
 
+    def is_news_after(self, sent: NavCommand | None) -> bool:
+        """New evidence, other advice or another gate goes out at once; the rest waits for the period."""
+        if sent is None:
+            return True
+        return (self.source_us, self.direction, self.inhibits) != (sent.source_us, sent.direction, sent.inhibits)
+
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True):
     x_m: Finite

@@ -7,15 +7,14 @@ import concurrent.futures
 import dataclasses
 import multiprocessing
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import msgspec
 
-from paani.bench.part import Cell, Part, part_text
-from paani.bench.table import Machine
+from paani.bench.part import Cell, Part
+from paani.bench.report import measured
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
 from paani.whole_file import write_whole
@@ -46,13 +45,6 @@ class Cost(msgspec.Struct, frozen=True, kw_only=True):
     cpu_s: float
 
 
-class Water(msgspec.Struct, frozen=True, kw_only=True):
-    """What `--json` writes."""
-
-    machine: Machine
-    parts: tuple[Part, ...]
-
-
 def main(argv: list[str]) -> int:
     """Measure and print. Raises UserError for a file that cannot be written."""
     costs: list[Cost] = []
@@ -75,17 +67,9 @@ def main(argv: list[str]) -> int:
     names = options.only or list(parts)
     if options.svg and "cost" not in names:
         raise UserError("--svg needs the part cost")
-    cores, load_before, done = os.cpu_count() or 1, os.getloadavg()[0], []
-    for name in names:
-        done.append(parts[name]())
-        sys.stdout.write("\n" + part_text(done[-1]))
-        sys.stdout.flush()
-    machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
-    sys.stdout.write(
-        f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
-    )
+    report = measured(parts[name] for name in names)
     if options.json:
-        write_whole(options.json, msgspec.json.encode(Water(machine=machine, parts=tuple(done))) + b"\n", "--json")
+        write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
     if options.svg:
         write_whole(options.svg, plot(costs).encode(), "--svg")
     return 0

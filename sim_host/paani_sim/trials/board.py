@@ -137,7 +137,7 @@ class Board:
         outputs = self._navigator.decide(now_us)
         order = outputs[keys.COMMAND.name]
         assert isinstance(order, m.NavCommand)
-        if now_us - self._command_us < period_us and not _differs(order, self.command):
+        if now_us - self._command_us < period_us and not order.is_news_after(self.command):
             self._navigator.conclude({}, now_us)
             return False
         sent = self._navigator.conclude(outputs, now_us)[keys.COMMAND.name]
@@ -151,9 +151,3 @@ class Board:
         sent = self._controller.conclude(self._controller.decide(now_us), now_us)[keys.THRUST.name]
         assert isinstance(sent, m.Thrust)
         return sent
-
-
-def _differs(order: m.NavCommand, sent: m.NavCommand | None) -> bool:
-    if sent is None:
-        return True
-    return (order.source_us, order.direction, order.inhibits) != (sent.source_us, sent.direction, sent.inhibits)
