@@ -9,6 +9,7 @@ import numpy as np
 
 from paani_sim.worlds.channel import Channel
 from paani_sim.worlds.curves import closed_length_m, resample_closed
+from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
 
 ROUTE_START_M = 24.0
@@ -60,8 +61,6 @@ def canal() -> World:
     channel = _channel()
     loop_m = channel.loop_m(ROUTE_START_M, ROUTE_END_M, LANE_M)
     route_m = resample_closed(loop_m, round(closed_length_m(loop_m) / LEG_M))
-    x_m, y_m = route_m[0]
-    east_m, north_m = route_m[1] - route_m[0]
     return World(
         name="canal",
         seed=17,
@@ -69,7 +68,7 @@ def canal() -> World:
         origin_lon_deg=5.1202,
         shore_m=channel.shore_m(),
         route_m=route_m,
-        start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
+        start=start_of(route_m),
         obstacles=_obstacles(channel),
         actors=_actors(channel),
         wind=Wind(speed_mps=1.5, toward_rad=0.2),

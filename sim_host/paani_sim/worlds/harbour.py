@@ -3,6 +3,7 @@
 import numpy as np
 
 from paani_sim.worlds.curves import Points, closed_length_m, resample_closed
+from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
 
 LEG_M = 7.5
@@ -67,8 +68,6 @@ ROUTE_M = (
 def harbour() -> World:
     """Build the harbour."""
     route_m = _route()
-    x_m, y_m = route_m[0]
-    east_m, north_m = route_m[1] - route_m[0]
     return World(
         name="harbour",
         seed=23,
@@ -76,7 +75,7 @@ def harbour() -> World:
         origin_lon_deg=5.3652,
         shore_m=np.array(CORNERS_M),
         route_m=route_m,
-        start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
+        start=start_of(route_m),
         obstacles=(*_berths(), *_obstacles()),
         actors=_actors(),
         wind=Wind(speed_mps=2.5, toward_rad=1.2),

@@ -9,6 +9,7 @@ from paani_sim.worlds.curves import (
     point_along_closed,
     resample_closed,
 )
+from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 EXTENT_X_M = 208.699  # checklist K1
@@ -22,8 +23,6 @@ def lake() -> World:
     """Build the lake."""
     shore_m = _shore()
     route_m = _route(shore_m)
-    x_m, y_m = route_m[0]
-    east_m, north_m = route_m[1] - route_m[0]
     return World(
         name="lake",
         seed=7,
@@ -31,7 +30,7 @@ def lake() -> World:
         origin_lon_deg=9.4794,
         shore_m=shore_m,
         route_m=route_m,
-        start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
+        start=start_of(route_m),
         obstacles=_obstacles(shore_m),
         actors=_actors(),
         wind=Wind(speed_mps=3.0, toward_rad=0.9),

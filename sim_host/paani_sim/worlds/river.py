@@ -7,6 +7,7 @@ import numpy as np
 
 from paani_sim.worlds.channel import Channel
 from paani_sim.worlds.curves import Points, resample_closed
+from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 CHANNEL_START_M = -150.0
@@ -22,8 +23,6 @@ def river() -> World:
     """Build the river."""
     channel = _channel()
     route_m = _route(channel)
-    x_m, y_m = route_m[0]
-    east_m, north_m = route_m[1] - route_m[0]
     return World(
         name="river",
         seed=11,
@@ -31,7 +30,7 @@ def river() -> World:
         origin_lon_deg=8.6928,
         shore_m=channel.shore_m(),
         route_m=route_m,
-        start=Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m))),
+        start=start_of(route_m),
         obstacles=_obstacles(channel),
         actors=_actors(channel),
         wind=Wind(speed_mps=1.8, toward_rad=0.5),
