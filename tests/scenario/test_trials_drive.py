@@ -87,6 +87,13 @@ def test_time_is_up(launch: Launch) -> None:
     assert result.latency.samples == 0
 
 
+def test_a_minute_without_progress_is_the_end(launch: Launch) -> None:
+    given = scenario(50.0, 200.0, Fault(FaultKind.LINK_LOSS, 4.0, 200.0), alone=True)
+    result = result_of(launch(given, Policy.BLIND), Policy.BLIND)
+    assert (result.why, result.completed) == (Why.STALLED, False)
+    assert 60.0 <= result.seconds < 70.0
+
+
 def test_slower_policies_have_longer() -> None:
     """The paper cruises at 0.15 m/s (M7), a quarter of the default."""
     assert time_scale(config_of(Policy.PAPER)) == pytest.approx(4.0)

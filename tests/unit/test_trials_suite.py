@@ -27,13 +27,13 @@ def maker() -> Maker:
 
 
 def test_suites() -> None:
-    """`standard` drives at least 200 times in every camera policy, 50 times and more in each world."""
+    """`standard` drives 50 times in each world with every policy but the slow one, which drives 5 times in each."""
     quick, standard = (cases_of(SUITES[name], tuple(WORLDS), Policy) for name in ("quick", "standard"))
-    assert len(quick) == 12 * len(Policy)
+    assert len(quick) == len(WORLDS) * (2 * 3 + 1)
     for policy in Policy:
         plain = [case for case in standard if case.policy is policy and not case.fault]
-        assert len(plain) >= 200
-        assert all(sum(case.world == world for case in plain) >= 50 for world in WORLDS)
+        wanted = 5 if policy is Policy.PAPER else 50
+        assert all(sum(case.world == world for case in plain) == wanted for world in WORLDS)
     assert {case.fault for case in standard if case.fault} == {kind.value for kind in FAULTS} == set(FaultKind)
     assert len({case.stem for case in standard}) == len(standard) == len({case.name for case in standard})
 

@@ -23,12 +23,13 @@ from paani_sim.trials.policies import look_hz, time_scale
 from paani_sim.trials.route_progress import Along
 from paani_sim.trials.states import Phase, Why
 from paani_sim.trials.track import Track
-from paani_sim.worlds import FaultKind, Scenario
-from paani_sim.worlds.faults import active
+from paani_sim.worlds import Scenario
+from paani_sim.worlds.faults import is_linked
 
 PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`paani bench chain`), about 100 ms
 READY_LIMIT_S = 20.0
 MIN_READY_S = 2.0
+STALL_S, STALL_M = 60.0, 0.5  # who gets no further than this in that time is not waiting for anything that passes
 ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
 END_M = 4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
 BELIEVED_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS
@@ -75,6 +76,7 @@ class Drive:
         self.track = Track()
         self.phase, self.why, self.error = Phase.READY, Why.NONE, ""
         self.running_us = 0  # when the boat was armed
+        self._gained_s, self._gained_m = 0.0, 0.0  # when and where progress was last made
         rate = 1.0 / config.plant.step_s
         sensors = config.plant.sensors
         self._every = {
@@ -124,7 +126,7 @@ class Drive:
             self._finish(Why.DIVERGED)
             return
         now_us = self.now_us
-        linked = not active(self.scenario.faults, FaultKind.LINK_LOSS, self.plant.sim_us * 1e-6)
+        linked = is_linked(self.scenario.faults, self.plant.sim_us * 1e-6)
         self._measure(now_us)
         self._estimate(now_us, linked=linked)
         self._look(now_us, linked=linked)
@@ -244,6 +246,10 @@ class Drive:
             self._finish(Why.COMPLETED)
         elif self.elapsed_s >= self.limit_s:
             self._finish(Why.TIME_LIMIT)
+        elif self.along.best_m >= self._gained_m + STALL_M:
+            self._gained_s, self._gained_m = self.elapsed_s, self.along.best_m
+        elif self.elapsed_s >= self._gained_s + STALL_S:
+            self._finish(Why.STALLED)
 
     def _is_ready(self) -> bool:
         """Nothing but the operator's word is missing, or what the eyes advise."""

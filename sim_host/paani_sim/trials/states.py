@@ -12,10 +12,14 @@ class Phase(StrEnum):
 
 
 class Why(StrEnum):
-    """How a drive ended. Only COMPLETED is a success; touching something does not end a drive."""
+    """How a drive ended. Only COMPLETED is a success; touching something does not end a drive.
+
+    STALLED: a minute without progress along the route.
+    """
 
     NONE = "none"
     COMPLETED = "completed"
     TIME_LIMIT = "time_limit"
+    STALLED = "stalled"
     DIVERGED = "diverged"
     NOT_READY = "not_ready"
