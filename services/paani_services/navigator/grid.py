@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from paani import portable
 from paani.config import CalibrationConfig, PlannerConfig
 from paani_services.navigator.projection import F64, Lens, Rays, Station, lens_at, ranges_m, rays, together
-from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Foot, Sight
+from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Box, Foot, Sight
 
 CELLS = 100  # Q2
 CELL_M = 0.2  # Q2
@@ -20,11 +20,14 @@ FOOT_COLUMNS = 24
 FOOT_DEEP_M = 1.5  # a thing is as deep as it is wide, but no deeper
 CUT_FRAC = 0.99  # a box that reaches this low goes on below the picture
 CUT_NEARER_M = 0.8
+ROWS = 2.0 / 64.0  # two of the mask: how far its edge is off a box's
 REST = Station(0.0, 0.0, 0.0, 0.0, 0.0)
 
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Polygon = tuple[tuple[float, float], ...]
+Moving = frozenset[tuple[int, int]]  # boxes of what moves: the sight's stamp and the box's number in it
+NOTHING_MOVES: Moving = frozenset()
 
 
 class Camera(NamedTuple):
@@ -73,8 +76,9 @@ def lay(
     now_us: int,
     camera: Camera,
     config: PlannerConfig,
+    moving: Moving = NOTHING_MOVES,
 ) -> Grid:
-    """The grid around the boat. sights: oldest first.
+    """The grid around the boat. sights: oldest first. moving: what moves occupies no cell.
 
     Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
     free since. Occupied wins. Beside: what the picture does not show because it is too near, given that there is a
@@ -91,7 +95,7 @@ def lay(
     first_free = sum(sight.at_us < free_us for sight in known)
     first_occupied = sum(sight.at_us < occupied_us for sight in known)
     if known:
-        free, occupied = _seen(known, first_free, camera, config)
+        free, occupied = _seen(known, first_free, camera, config, moving)
         for last, points in ((free_of, free), (occupied_of, occupied)):
             cells, inside = _cells(points, west_m, south_m)
             last[cells] = points.number[inside]
@@ -137,7 +141,9 @@ def hull_top(hull: Polygon, u: F64) -> F64:
     return top
 
 
-def _seen(sights: list[Sight], first_free: int, camera: Camera, config: PlannerConfig) -> tuple[Points, Points]:
+def _seen(
+    sights: list[Sight], first_free: int, camera: Camera, config: PlannerConfig, moving: Moving
+) -> tuple[Points, Points]:
     """Points of the map that the pictures show free, and occupied; those of later ones come later.
 
     first_free: the first that is young enough to free a cell; of those before, which only say what is gone, every
@@ -158,15 +164,34 @@ def _seen(sights: list[Sight], first_free: int, camera: Camera, config: PlannerC
     open_m[:first_free, 1::2] = 0.0
     free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M), numbers)
     deep = math.ceil(config.thickness_m / CELL_M) + 1
-    points = [_points(lens, ends, far_m, np.where(np.isfinite(far_m), deep, 0.0), numbers)]
+    boxes = [[box for k, box in enumerate(sight.boxes) if (sight.at_us, k) in moving] for sight in sights]
+    stays = np.ones(edge.shape, np.bool_)
+    for number, own in enumerate(boxes):
+        for box in own:
+            stays[number] &= ~_ends_at(box, u, edge[number])
+    points = [_points(lens, ends, far_m, np.where(np.isfinite(far_m) & stays, deep, 0.0), numbers)]
     for number, (each, sight) in enumerate(zip(lenses, sights, strict=True)):
-        points += [_foot(each, foot, number, camera, config) for foot in sight.feet]
+        points += [_foot(each, foot, number, camera, config) for foot in sight.feet if _stays(foot, boxes[number])]
     if len(points) == 1:
         return free, points[0]
     numbers = np.concatenate([each.number for each in points])
     order = np.argsort(numbers, kind="stable")
     east_m, north_m = (np.concatenate(axis) for axis in ([p.east_m for p in points], [p.north_m for p in points]))
     return free, Points(east_m[order], north_m[order], numbers[order])
+
+
+def _ends_at(box: Box, u: F64, edge: F64) -> Mask:
+    """Columns where it is this thing that ends the water: near its foot; a hull's lies as high as half its box."""
+    left, top, right, low = (side / FOOT_STEPS for side in (box.left, box.top, box.right, box.low))
+    wide = 1.0 / len(u)
+    high = low - ROWS if box.is_small else 0.5 * (top + low)
+    return np.asarray((u > left - wide) & (u < right + wide) & (edge >= high) & (edge <= low + ROWS))
+
+
+def _stays(foot: Foot, moving: list[Box]) -> bool:
+    """It belongs to none of these."""
+    wide = FOOT_STEPS // 64  # a column of the mask
+    return all(foot.low != box.low or foot.left < box.left - wide or foot.right > box.right + wide for box in moving)
 
 
 def _foot(lens: Lens, foot: Foot, number: int, camera: Camera, config: PlannerConfig) -> Points:

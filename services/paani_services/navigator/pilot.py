@@ -7,7 +7,8 @@ import msgspec
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry
-from paani_services.navigator.grid import Camera, lay
+from paani_services.navigator.grid import Camera, Moving, lay
+from paani_services.navigator.movers import movers
 from paani_services.navigator.planner import Plan, Start, Wish, plan
 from paani_services.navigator.sighting import Memory, remember
 
@@ -46,8 +47,11 @@ def steered(
     is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
     is_new = is_other or pilot.memory.frame != pilot.frame
     if held is None or is_new or not 0.0 <= (now_us - pilot.planned_us) * 1e-6 < config.replan_s:
-        grid = lay(pilot.memory.sights, (odometry.x_m, odometry.y_m), now_us, camera, config)
+        sights = pilot.memory.sights
+        moving = movers(sights, now_us, camera, config) if config.predict else ()
+        boxes: Moving = frozenset().union(*(mover.boxes for mover in moving))
+        grid = lay(sights, (odometry.x_m, odometry.y_m), now_us, camera, config, boxes)
         start = Start(odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)
-        held = plan(grid, start, wish, held, config)
+        held = plan(grid, start, wish, held, config, moving)
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

@@ -1,6 +1,7 @@
 """Heading and speed on water that is known to be free: swept footprints over the grid (checklist Q4-Q6). Pure."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -11,6 +12,7 @@ from paani import portable
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani_services.navigator.grid import CELL_M, CELLS, Grid, Mask
+from paani_services.navigator.movers import Mover
 from paani_services.navigator.projection import F64
 
 FIELD_CELLS = 10  # distances are known up to 2 m
@@ -59,12 +61,20 @@ class Wish(NamedTuple):
     side: float = 0.0
 
 
-def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: PlannerConfig) -> Plan:
+def plan(
+    grid: Grid,
+    start: Start,
+    wish: Wish,
+    before: Plan | None,
+    config: PlannerConfig,
+    moving: Sequence[Mover] = (),
+) -> Plan:
     """The best of headings around the wanted course at two speeds, none of which meets anything.
 
-    Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), or an unknown one within the way to
-    stop.
-    Costs: off the wanted course, not to the advised side, near to things, into the unknown, slow, another than before.
+    Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
+    moving thing is by then, or sweeps an unknown cell within the way to stop.
+    Costs: off the wanted course, not to the advised side, near to things, ahead of those that move, into the unknown,
+    slow, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
     if wish.speed_mps <= 0.0 or not grid.free.any():
@@ -76,15 +86,20 @@ def plan(grid: Grid, start: Start, wish: Wish, before: Plan | None, config: Plan
     clear_m = np.minimum(distance_m(grid.occupied), np.maximum(distance_m(grid.hidden) - config.hidden_drift_m, 0.0))
     gap_m = _looked_up(grid, clear_m, ways)
     blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
-    needed_m = footprint_m(ways.at_s, float(gap_m[0, 0]), config)[:, None]
-    met, unseen = gap_m < needed_m, blank_m < config.hull_radius_m
+    spare_m = gap_m - footprint_m(ways.at_s, gap_m[0, 0], config)[:, None]
+    roomy_m = spare_m
+    for mover in (each for each in moving if each.age_s <= config.unseen_s):
+        own_m = _spare_m(mover, ways, start, config)
+        spare_m = np.minimum(spare_m, own_m)
+        roomy_m = np.minimum(roomy_m, np.minimum(own_m, _spare_m(_led(mover, config.lead_s), ways, start, config)))
+    met, unseen = spare_m < 0.0, blank_m < config.hull_radius_m
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     stopping = ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps)
     refused = (met & (soon | (ways.way_m <= config.room_m))).any(axis=0) | (unseen & stopping).any(axis=0)
     if refused.all():
         return nowhere
     cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
-    cost = cost + _way_costs(ways, gap_m - needed_m, met & looked, unseen & looked, soon, config)
+    cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
     best = int(np.where(refused, np.inf, cost).argmin())
     return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
 
@@ -151,14 +166,44 @@ def _between(values: F64, limit: float) -> F64:
     return np.asarray(np.minimum(np.maximum(values, -limit), limit))
 
 
-def footprint_m(at_s: F64, gap_now_m: float, config: PlannerConfig) -> F64:
+def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
     """The radius that must be free at each time: hull, margin, and drift within the horizon (Q6).
 
-    Where something is nearer than that already, a way that comes no nearer is allowed: it leads out.
+    gap_m: to the nearest thing, boat at rest. Where that is less, a way that comes no nearer is allowed: it leads out.
     """
     drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
-    return np.asarray(np.minimum(radius_m, max(0.0, gap_now_m - 0.5 * CELL_M)))
+    return np.asarray(np.minimum(radius_m, np.maximum(0.0, gap_m - 0.5 * CELL_M)))
+
+
+def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
+    """From places to the outline of a thing that moves on, at these times from now; less what is kept beside it.
+
+    Uncertainty is one standard deviation of its velocity, from when it was last seen.
+    """
+    motion = mover.motion
+    east_m, north_m = x_m - at_s * motion.east_mps, y_m - at_s * motion.north_mps
+    square = np.full(east_m.shape, np.inf)
+    for x, y in zip(mover.east_m.tolist(), mover.north_m.tolist(), strict=True):
+        east, north = east_m - x, north_m - y
+        square = np.minimum(square, east * east + north * north)
+    return np.asarray(np.sqrt(square) - mover.room_m - motion.deviation_mps * (at_s + mover.age_s))
+
+
+def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
+    """Between the footprint and a thing that moves. What comes near a boat at rest may come no nearer on the way."""
+    at_s = ways.at_s[:, None]
+    rest_m = gap_to_m(mover, np.full_like(at_s, start.x_m), np.full_like(at_s, start.y_m), at_s)[:, 0]
+    rest_m = np.minimum.accumulate(np.where(ways.at_s <= config.horizon_s + 1e-9, rest_m, np.inf))
+    return np.asarray(gap_to_m(mover, ways.x_m, ways.y_m, at_s) - footprint_m(ways.at_s, rest_m, config)[:, None])
+
+
+def _led(mover: Mover, lead_s: float) -> Mover:
+    """The same so much later: what comes near this one passes ahead of it."""
+    motion = mover.motion
+    return mover._replace(
+        east_m=mover.east_m + lead_s * motion.east_mps, north_m=mover.north_m + lead_s * motion.north_mps
+    )
 
 
 def distance_m(cells: Mask) -> F64:

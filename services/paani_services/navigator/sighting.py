@@ -17,8 +17,11 @@ POSE_SPACING_US = 90_000
 POSES_KEPT = 14  # 1.2 s: longer than a picture is under way
 SIGHT_SPACING_US = 100_000
 OLD_SPACING_US = 800_000  # between those kept for what is out of sight
-SIGHTS_KEPT = 48
+SIGHTS_KEPT = 100
+BOXES_SPACING_US = 190_000  # between those kept for their boxes alone
+BOX_COLUMNS = 9
 SMALL = frozenset({Label.PERSON, Label.BUOY})
+MOVABLE = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -41,11 +44,30 @@ class Foot(msgspec.Struct, frozen=True, array_like=True):
     person: bool = False
 
 
+class Box(msgspec.Struct, frozen=True, array_like=True):
+    """A detection of something that may move: its sides in 1/512 of the picture, rounded outwards.
+
+    ends: where it meets the water, at `BOX_COLUMNS` places from left to right.
+    """
+
+    left: int
+    top: int
+    right: int
+    low: int
+    label: Label
+    ends: tuple[int, ...]
+
+    @property
+    def is_small(self) -> bool:
+        """Its lower end is its foot."""
+        return self.label in SMALL
+
+
 class Sight(msgspec.Struct, frozen=True):
     """One picture: where it was taken, its width over height, where the water ends, where things stand in it.
 
     edge: for each column, left to right, in 1/128 of the height from the top, rounded towards the boat.
-    feet: where things stand.
+    feet: where things stand. boxes: what may move. Of older sights the boxes alone are kept.
     """
 
     at_us: int
@@ -57,6 +79,7 @@ class Sight(msgspec.Struct, frozen=True):
     aspect: float
     edge: bytes
     feet: tuple[Foot, ...] = ()
+    boxes: tuple[Box, ...] = ()
 
     @property
     def station(self) -> Station:
@@ -153,7 +176,22 @@ def _sight(evidence: Evidence, pose: Pose) -> Sight:
         evidence.width_px / evidence.height_px,
         bytes(math.ceil(edge * EDGE_STEPS) for edge in evidence.water_edge),
         tuple(foot for detection in evidence.detections for foot in _feet(detection, evidence.water_edge)),
+        tuple(_box(detection, evidence.water_edge) for detection in evidence.detections if detection.label in MOVABLE),
     )
+
+
+def _box(detection: Detection, edge: tuple[float, ...]) -> Box:
+    """It meets the water at its lower end; a hull where the mask ends the water, if in the box's lower half."""
+    x1, y1, x2, y2 = detection.box_xyxy
+    left, top, right, low = (FOOT_STEPS * side for side in detection.box_xyxy)
+    ends = [math.ceil(low)] * BOX_COLUMNS
+    if detection.label not in SMALL:
+        for number in range(BOX_COLUMNS):
+            u = x1 + (x2 - x1) * (number + 0.5) / BOX_COLUMNS
+            seen = edge[min(max(int(u * len(edge)), 0), len(edge) - 1)]
+            if 0.5 * (y1 + y2) <= seen <= y2:
+                ends[number] = math.ceil(seen * FOOT_STEPS)
+    return Box(math.floor(left), math.floor(top), math.ceil(right), math.ceil(low), detection.label, tuple(ends))
 
 
 def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
@@ -177,15 +215,19 @@ def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
 
 
 def _kept(sights: tuple[Sight, ...], config: PlannerConfig) -> tuple[Sight, ...]:
-    """All those within the lifetimes of Q3, and a few older ones for what is out of sight."""
+    """All those within the lifetimes of Q3, a few older ones for what is out of sight, and the boxes of more."""
     newest_us = sights[-1].at_us
     kept: list[Sight] = []
-    old_us = -OLD_SPACING_US
+    old_us = last_us = -OLD_SPACING_US
     for sight in sights:
         age_s = (newest_us - sight.at_us) * 1e-6
+        is_apart = sight.at_us - last_us >= BOXES_SPACING_US
         if age_s <= config.occupied_s:
             kept.append(sight)
-        elif age_s <= config.hidden_s and sight.at_us - old_us >= OLD_SPACING_US:
+        elif age_s <= config.hidden_s and sight.edge and sight.at_us - old_us >= OLD_SPACING_US:
             kept.append(sight)
-            old_us = sight.at_us
+            old_us = last_us = sight.at_us
+        elif age_s <= config.fit_s + config.unseen_s and sight.boxes and is_apart:
+            kept.append(msgspec.structs.replace(sight, edge=b"", feet=()))
+            last_us = sight.at_us
     return tuple(kept[-SIGHTS_KEPT:])

@@ -64,6 +64,10 @@ class PlannerConfig(Section, frozen=True):
     have come `hidden_drift_m` nearer meanwhile.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
+    `predict`: what moves counts where it will be, not where it was: velocities over `fit_s`, as far as `mover_range_m`;
+    expected to go on for `unseen_s` out of sight; where it was last seen stays occupied as anything else.
+    `person_near_m`, `vessel_near_m`: kept free around what moves. `lead_s`: ways that come near where it will be so
+    much later cost more, those astern do not.
     `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     """
@@ -78,6 +82,13 @@ class PlannerConfig(Section, frozen=True):
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
+    predict: bool = True
+    mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
+    fit_s: Positive = 2.5
+    unseen_s: NonNegative = 8.0
+    lead_s: NonNegative = 2.0
+    person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes
+    vessel_near_m: NonNegative = 0.2
     max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
     jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten
     horizon_s: Positive = 3.0  # Q4

@@ -1,0 +1,272 @@
+"""What moves: its velocity from where boxes stood, and ways that keep clear of where it will be."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani.messages import Detection, Label
+from paani_services.navigator.grid import Grid, lay
+from paani_services.navigator.movers import Motion, Mover, movers
+from paani_services.navigator.planner import Plan, Start, Wish, gap_to_m, plan, roll_out
+from paani_services.navigator.sighting import Memory
+from paani_sim.eye.camera import BoatPose, project
+from tests.unit.watery_sights import CAMERA, EYE, PLANNER, START_US, edge_of, seen
+
+PERIOD_S = 0.2
+CRUISING, RESTING = Start(0.0, 0.0, 0.0, 0.6), Start(0.0, 0.0, 0.0)
+AHEAD = Wish(0.0, 0.6)
+
+
+def box_of(boat: BoatPose, x_m: float, y_m: float, rng: np.random.Generator, jitter_px: float) -> Detection | None:
+    """A swimmer's box, 1.1 m wide; its sides jitter. None where it is not all in the picture."""
+    across = np.array([-math.sin(boat.yaw_rad), math.cos(boat.yaw_rad)])
+    ends = np.array([[x_m, y_m] - 0.5 * across, [x_m, y_m] + 0.5 * across])
+    corners = np.vstack([np.column_stack([ends, [0.0, 0.0]]), np.column_stack([ends, [0.4, 0.4]])])
+    pixels = project(corners, boat, EYE) + rng.normal(0.0, jitter_px, (4, 2))
+    (x1, y1), (x2, y2) = pixels.min(axis=0) / (320, 240), pixels.max(axis=0) / (320, 240)
+    if x1 < 0.0 or y1 < 0.0 or x2 > 1.0 or y2 > 1.0:
+        return None
+    return Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(float(x1), float(y1), float(x2), float(y2)))
+
+
+def watched(
+    place_m: tuple[float, float],
+    velocity_mps: tuple[float, float],
+    *,
+    seconds: float = 3.0,
+    surge_mps: float = 0.5,
+    yaw_radps: float = 0.0,
+    jitter_px: float = 0.7,
+    mistaken: float = 0.0,
+    seed: int = 0,
+) -> tuple[Memory, int, BoatPose]:
+    """What a moving, turning boat remembers of a swimmer who is at `place_m` when the boat comes to (0, 0)."""
+    rng = np.random.default_rng(seed)
+    memory, at_us, boat = Memory(), START_US, BoatPose(0.0, 0.0, 0.0)
+    for k in range(round(seconds / PERIOD_S), -1, -1):
+        t_s = -k * PERIOD_S
+        boat = BoatPose(surge_mps * t_s, 0.0, yaw_radps * t_s)
+        at_us = START_US + round((seconds + t_s) * 1e6)
+        found = box_of(boat, place_m[0] + velocity_mps[0] * t_s, place_m[1] + velocity_mps[1] * t_s, rng, jitter_px)
+        if found and rng.random() < mistaken:  # a reflection taken in
+            x1, y1, x2, y2 = found.box_xyxy
+            found = msgspec.structs.replace(found, box_xyxy=(x1, y1, x2, min(1.0, y2 + 0.25 * (y2 - y1))))
+        memory = seen(boat, at_us=at_us, memory=memory, detections=(found,) if found else ())
+    return memory, at_us, boat
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None)
+@given(
+    x_m=st.floats(3.5, 6.5),
+    side=st.floats(-0.3, 0.3),
+    speed=st.floats(0.25, 0.4),
+    toward=st.floats(-3.1, 3.1),
+    surge=st.floats(0.0, 0.6),
+    yaw=st.floats(-0.1, 0.1),
+    seed=st.integers(0, 1000),
+)
+def test_a_swimmer_s_velocity_is_known_within_its_deviation(
+    x_m: float, side: float, speed: float, toward: float, surge: float, yaw: float, seed: int
+) -> None:
+    """From a boat that moves and turns, boxes that jitter: right to three deviations, or not said to move."""
+    velocity = (speed * math.cos(toward), speed * math.sin(toward))
+    memory, at_us, _ = watched((x_m, side * x_m), velocity, surge_mps=surge, yaw_radps=yaw, seed=seed)
+    for mover in movers(memory.sights, at_us, CAMERA, PLANNER):
+        off = math.hypot(mover.motion.east_mps - velocity[0], mover.motion.north_mps - velocity[1])
+        assert off <= 3.5 * mover.motion.deviation_mps + 0.05
+        assert mover.motion.deviation_mps < 0.3
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.35), (0.0, -0.35), (-0.35, 0.0), (-0.25, 0.25)])
+@pytest.mark.parametrize("yaw", [-0.1, 0.0, 0.1])
+def test_a_swimmer_5_m_ahead_is_seen_to_move(velocity: tuple[float, float], yaw: float) -> None:
+    memory, at_us, _ = watched((5.0, 0.0), velocity, yaw_radps=yaw)
+    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    assert mover.motion[:2] == pytest.approx(velocity, abs=0.13)
+    assert math.hypot(mover.east_m.mean() - 5.0, mover.north_m.mean()) < 0.4
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None)
+@given(
+    x_m=st.floats(3.0, 12.0),
+    side=st.floats(-0.3, 0.3),
+    surge=st.floats(0.0, 0.6),
+    yaw=st.floats(-0.2, 0.2),
+    seed=st.integers(0, 10_000),
+)
+def test_what_stands_is_not_seen_to_move(x_m: float, side: float, surge: float, yaw: float, seed: int) -> None:
+    """From a boat that moves and turns, and boxes whose every side jitters by a pixel."""
+    memory, at_us, _ = watched((x_m, side * x_m), (0.0, 0.0), surge_mps=surge, yaw_radps=yaw, seed=seed, jitter_px=1.0)
+    assert movers(memory.sights, at_us, CAMERA, PLANNER) == ()
+
+
+@pytest.mark.slow
+def test_reflections_taken_in_move_nothing() -> None:
+    """One box in seven reaches a quarter lower: at most one standing swimmer in a hundred is taken for a moving one."""
+    said = 0
+    for seed in range(100):
+        memory, at_us, _ = watched((3.5 + 0.05 * seed, 0.0), (0.0, 0.0), mistaken=0.15, seed=seed)
+        said += len(movers(memory.sights, at_us, CAMERA, PLANNER))
+    assert said <= 1
+
+
+def test_what_left_the_picture_goes_on_and_is_where_it_was_last_seen() -> None:
+    """Turned away from it, the boat expects it where it is by now, less surely, and keeps off where it was last."""
+    memory, at_us, _ = watched((5.0, 1.0), (0.0, 0.35), surge_mps=0.0)
+    away = BoatPose(0.0, 0.0, -1.5)
+    for _ in range(20):
+        at_us += 200_000
+        memory = seen(away, at_us=at_us, memory=memory)
+    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    assert mover.age_s == pytest.approx(4.0, abs=0.3)
+    assert (mover.east_m.mean(), mover.north_m.mean()) == pytest.approx((5.0, 2.4), abs=0.6)
+    now, later = (gap_to_m(each, np.zeros(1), np.zeros(1), np.zeros(1)) for each in (mover._replace(age_s=0.0), mover))
+    assert later[0] < now[0]
+    before, after = (
+        lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, of).occupied for of in (frozenset(), mover.boxes)
+    )
+    assert 0 < after.sum() < before.sum()
+    assert not (after & ~before).any()
+
+
+def test_what_is_cut_by_the_picture_s_side_stays_occupied() -> None:
+    """It moved when it was last seen whole; what a picture shows of it since is there, however long that lasts."""
+    memory, at_us, boat = watched((4.5, 1.6), (0.0, 0.35), surge_mps=0.0)
+    whole = memory.sights[-1].boxes[-1]
+    wide, top, low = ((each / 512) for each in (whole.right - whole.left, whole.top, whole.low))
+    cut = Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(0.0, top, wide, low))
+    for k in range(1, 51):
+        at_us += 200_000
+        memory = seen(boat, at_us=at_us, memory=memory, detections=(cut,))
+        found = movers(memory.sights, at_us, CAMERA, PLANNER)
+        grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, frozenset().union(*(m.boxes for m in found)))
+        assert grid.occupied.any(), k
+
+
+def test_only_the_trail_of_what_moves_is_freed() -> None:
+    """A bar beside the swimmer and a bank behind stay as occupied as they were, cell by cell."""
+    memory, at_us = Memory(), START_US
+    rng, boat = np.random.default_rng(1), BoatPose(0.0, 0.0, 0.0)
+    edge = edge_of(boat, ((4.0, -2.2, 5.0, -1.2),), 7.0)
+    for k in range(16):
+        at_us = START_US + 200_000 * k
+        found = box_of(boat, 5.0, 0.2 + 0.07 * k, rng, 0.5)
+        memory = seen(boat, edge, at_us, memory, detections=(found,) if found else ())
+    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    before = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER)
+    after = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, mover.boxes)
+    assert not (after.occupied & ~before.occupied).any()
+    rows, columns = np.nonzero(before.occupied & ~after.occupied)
+    x_m, y_m = before.west_m + 0.2 * (columns + 0.5), before.south_m + 0.2 * (rows + 0.5)
+    assert len(rows)
+    assert (abs(x_m - 5.0) < 2.0).all()  # `person_room_m` before and behind
+    assert (y_m > -1.8).all()
+    assert (y_m < 3.5).all()
+
+
+def open_water() -> Grid:
+    return lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+
+
+def swimmer(x_m: float, y_m: float, east_mps: float, north_mps: float, age_s: float = 0.1) -> Mover:
+    return Mover(np.array([x_m]), np.array([y_m]), 0.5, Motion(east_mps, north_mps, 0.05), age_s, frozenset())
+
+
+def least_gap_m(found: Plan, start: Start, mover: Mover) -> float:
+    """Between the boat's middle and a thing that moves on, over six seconds of the plan, or at rest."""
+    at_s = np.arange(0.0, 6.0, 0.1)
+    if found.speed_mps > 0.0:
+        ways = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
+        x_m, y_m = (np.interp(at_s, ways.at_s, axis[:, 0]) for axis in (ways.x_m, ways.y_m))
+    else:
+        x_m, y_m = np.full_like(at_s, start.x_m), np.full_like(at_s, start.y_m)
+    easts, norths = mover.east_m[0] + at_s * mover.motion.east_mps, mover.north_m[0] + at_s * mover.motion.north_mps
+    return float(np.hypot(x_m - easts, y_m - norths).min())
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_crosser_is_passed_astern(side: float) -> None:
+    """From `side` across the bow: standing it would be passed on the other side, moving it is passed behind."""
+    crossing = swimmer(4.5, side * 1.5, 0.0, -side * 0.35)
+    found = plan(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,))
+    assert found.speed_mps > 0.0
+    assert found.heading_rad * side > 0.05
+    standing = swimmer(4.5, side * 0.3, 0.0, 0.0)
+    assert plan(open_water(), CRUISING, AHEAD, None, PLANNER, (standing,)).heading_rad * side < 0.0
+
+
+def test_what_is_gone_by_then_turns_nobody() -> None:
+    """It crosses the course, but is past before the boat comes."""
+    gone = swimmer(5.5, 0.6, 0.0, 0.6)
+    assert plan(open_water(), CRUISING, AHEAD, None, PLANNER, (gone,)) == Plan(0.0, 0.6)
+
+
+def test_head_on_the_boat_turns_or_stops() -> None:
+    for ahead_m in (3.0, 4.0, 5.0):
+        oncoming = swimmer(ahead_m, 0.0, -0.4, 0.0)
+        found = plan(open_water(), CRUISING, AHEAD, None, PLANNER, (oncoming,))
+        assert found.speed_mps == 0.0 or abs(found.heading_rad) > 0.1
+        straight = least_gap_m(Plan(0.0, 0.6), CRUISING, oncoming)
+        assert least_gap_m(found, CRUISING, oncoming) > straight + 0.3
+
+
+def test_a_boat_at_rest_gets_out_of_the_way() -> None:
+    """Somebody comes from the side: a way that comes no nearer than waiting is taken."""
+    coming = swimmer(0.3, 2.2, 0.0, -0.4)
+    found = plan(open_water(), RESTING, AHEAD, None, PLANNER, (coming,))
+    assert found.speed_mps > 0.0
+    assert least_gap_m(found, RESTING, coming) > least_gap_m(Plan(0.0, 0.0), RESTING, coming) + 0.3
+
+
+def test_what_was_not_seen_for_long_counts_no_more() -> None:
+    crossing = swimmer(3.0, 0.3, 0.0, -0.1, PLANNER.unseen_s + 0.1)
+    assert plan(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,)) == Plan(0.0, 0.6)
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None)
+@given(
+    bar=st.tuples(st.floats(1.5, 7.0), st.floats(-3.0, 3.0), st.floats(0.3, 2.0), st.floats(0.3, 2.0)),
+    bank_m=st.floats(1.5, 9.0),
+    place=st.tuples(st.floats(1.0, 6.0), st.floats(-3.0, 3.0)),
+    velocity=st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)),
+    surge=st.floats(0.0, 0.6),
+)
+def test_who_moves_never_opens_a_way(
+    bar: tuple[float, float, float, float],
+    bank_m: float,
+    place: tuple[float, float],
+    velocity: tuple[float, float],
+    surge: float,
+) -> None:
+    """On one grid the boat moves with movers only where it moves without, and comes near none more than at rest."""
+    x, y, deep, wide = bar
+    memory = seen(edge=edge_of(BoatPose(0.0, 0.0, 0.0), ((x, y, x + deep, y + wide),), bank_m))
+    grid, start = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, PLANNER), Start(0.0, 0.0, 0.0, surge)
+    mover = swimmer(*place, *velocity)
+    found = plan(grid, start, AHEAD, None, PLANNER, (mover,))
+    if found.speed_mps == 0.0:
+        return
+    assert plan(grid, start, AHEAD, None, PLANNER).speed_mps > 0.0
+    ways = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
+    soon = ways.at_s <= PLANNER.horizon_s
+    at_s = ways.at_s[soon, None]
+    gap_m = gap_to_m(mover, ways.x_m[soon], ways.y_m[soon], at_s)[:, 0]
+    rest_m = np.minimum.accumulate(gap_to_m(mover, np.zeros_like(at_s), np.zeros_like(at_s), at_s)[:, 0])
+    assert (gap_m >= np.minimum(1.0, np.maximum(rest_m - 0.1, 0.0)) - 1e-9).all()
+
+
+def test_movers_repeat_bit_by_bit() -> None:
+    memory, at_us, _ = watched((5.0, 0.5), (0.1, -0.3))
+    again = msgspec.json.decode(msgspec.json.encode(memory), type=Memory)
+    first, second = (movers(each.sights, at_us, CAMERA, PLANNER) for each in (memory, again))
+    assert first[0].motion == second[0].motion
+    assert (first[0].east_m == second[0].east_m).all()
