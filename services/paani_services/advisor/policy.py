@@ -129,21 +129,32 @@ def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfi
     return other if gain > 0.0 and gain >= needed else held
 
 
+def is_planned(config: Config) -> bool:
+    """Whether the metric planner acts: it knows in metres what is wide enough to pass, and goes nowhere else."""
+    return config.calibration.valid and config.navigator.planner.use
+
+
 def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
     """Low in the picture and wide enough to occupy the lane (J6)."""
     policy = config.advisor.policy
     if obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
-    return 0.0 < shared_width(obstacle.box, span) >= policy.occupancy_coverage * (span[1] - span[0])
+    coverage = policy.planned_coverage if is_planned(config) else policy.occupancy_coverage
+    return 0.0 < shared_width(obstacle.box, span) >= coverage * (span[1] - span[0])
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
-    """A vessel whose part inside the centre corridor is large (J7)."""
+    """A vessel whose part inside the centre corridor is large (J7).
+
+    Inside its core where the metric planner acts: what reaches into the corridor's edges alone leaves a way beside it.
+    """
     if not obstacle.craft or obstacle.presence < SEEN_ENOUGH:
         return False
-    share = overlap(obstacle.box, lane_span("center", config.perception.corridors))
-    return 0.0 < area(obstacle.box) * share >= config.advisor.policy.center_vessel_area
+    policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
+    if is_planned(config):
+        span = (policy.core_left, policy.core_right)
+    return 0.0 < area(obstacle.box) * overlap(obstacle.box, span) >= policy.center_vessel_area
 
 
 def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:

@@ -82,6 +82,7 @@ class PolicyConfig(Section, frozen=True):
     side_block_risk: Fraction = 0.58  # J5
     occupancy_bottom: Fraction = 0.65  # J6
     occupancy_coverage: Fraction = 0.25  # J6
+    planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
     occupancy_frames: Size = 2  # J6
     center_vessel_area: Fraction = 0.04  # J7
     core_left: Fraction = 0.405  # J9
