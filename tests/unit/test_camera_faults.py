@@ -1,6 +1,7 @@
 """A failing camera: what it shows, when, and that it comes back."""
 
 import numpy as np
+import pytest
 
 from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.worlds import Fault, FaultKind
@@ -19,8 +20,9 @@ def test_without_faults_pictures_pass_unchanged() -> None:
         assert np.array_equal(picture, np.asarray(seen))
 
 
-def test_dropped_pictures_do_not_come() -> None:
-    seen = shown(Fault(FaultKind.CAMERA_DROPPED, 2.0, 2.0))
+@pytest.mark.parametrize("kind", [FaultKind.CAMERA_DROPPED, FaultKind.LINK_LOSS])
+def test_dropped_pictures_do_not_come(kind: FaultKind) -> None:
+    seen = shown(Fault(kind, 2.0, 2.0))
     assert [s is None for s in seen] == [False, False, True, True, False, False]
 
 

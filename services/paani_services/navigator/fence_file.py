@@ -35,7 +35,7 @@ class _File(Section, frozen=True):
 
 def load_fence(path: Path, map_deg: LatLon | None, where: str = "navigator.fence") -> tuple[FenceArea, ...]:
     """Read a fence onto the map. Raises UserError that names file, area and corner."""
-    where = f"{where} {path}"
+    where = f"{where} {path}".lstrip()
     match path.suffix.lower():
         case ".toml":
             file = read_toml(path, where, _File)

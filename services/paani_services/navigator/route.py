@@ -37,7 +37,7 @@ def load_route(path: Path, map_deg: LatLon | None = None, where: str = "navigato
     Where it is None, metres are taken as they are and latitudes are refused.
     Raises UserError that names file and field.
     """
-    where = f"{where} {path}"
+    where = f"{where} {path}".lstrip()
     line = read_route(path, where)
     require_sailable(line, where)
     frame = Frame(where, line.origin_deg, map_deg)

@@ -1,4 +1,4 @@
-"""A camera that fails as a scenario says: black, frozen, blurred or dropped pictures. The same times give the same."""
+"""A camera that fails as a scenario says: black, frozen, blurred or no pictures. The same times give the same."""
 
 from collections.abc import Iterable
 
@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from paani.picture_faults import black
-from paani_sim.worlds.faults import Fault, FaultKind, active
+from paani_sim.worlds.faults import Fault, FaultKind, active, is_linked
 
 U8 = npt.NDArray[np.uint8]
 BLUR_PX = 8.0  # of a blur whose amount is not named: severity 3 of `paani.picture_faults.blur`
@@ -22,11 +22,11 @@ class CameraFaults:
         self._kept: U8 | None = None
 
     def apply(self, bgr: U8, t_s: float) -> U8 | None:
-        """What comes out of the camera at simulated time `t_s`; None: no picture comes.
+        """What comes out of the camera at simulated time `t_s`; None: no picture comes, or none crosses the link.
 
         A camera that is frozen from its first picture on shows that one.
         """
-        if active(self._faults, FaultKind.CAMERA_DROPPED, t_s):
+        if active(self._faults, FaultKind.CAMERA_DROPPED, t_s) or not is_linked(self._faults, t_s):
             return None
         if self._kept is None or not active(self._faults, FaultKind.CAMERA_FROZEN, t_s):
             self._kept = bgr.copy()

@@ -10,6 +10,7 @@ from paani_sim.eye import sprites
 from paani_sim.eye.buildings import house
 from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
 from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, furniture, quay
+from paani_sim.eye.structures import bridge_reach_m
 from paani_sim.worlds.curves import Points, clearance_m, normals_left, resample_closed
 from paani_sim.worlds.world import Bank, Kind, World
 
@@ -18,6 +19,7 @@ REACH_M = 460.0
 ROWS_M = (-4.0, -1.6, -0.5, 0.0, 0.35, 0.9, 1.8, 3.2, 5.5, 9.0, 14.0, 21.0)
 COARSE_M, FAR_CELLS = 14.0, 3  # cells of the ground behind the banks; how many make one beyond `FAR_M`
 FAR_M = 84.0
+ROADSIDE_M = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,4 +234,16 @@ def _plants(world: World, field: _Field, rng: np.random.Generator) -> npt.NDArra
         layer = rng.choice(np.asarray(sown.layers), len(xy))
         shade = rng.uniform(0.8, 1.15, len(xy))
         rows.append(np.column_stack([xy, z, width, height, layer, shade]))
-    return np.concatenate(rows).astype(np.float32)
+    found = np.concatenate(rows).astype(np.float32)
+    return found[~_on_a_bridge(world, found[:, :2])]
+
+
+def _on_a_bridge(world: World, xy_m: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """Where the road of a bridge, or a ramp up to it, lies over the ground."""
+    under = np.zeros(len(xy_m), np.bool_)
+    for thing in (o for o in world.obstacles if o.look == "bridge"):
+        cos, sin = np.cos(thing.pose.yaw_rad), np.sin(thing.pose.yaw_rad)
+        own_m = (xy_m - np.array(thing.pose[:2])) @ np.array([[cos, -sin], [sin, cos]])
+        reach_m = bridge_reach_m(thing.length_m, thing.base_z_m)
+        under |= (np.abs(own_m[:, 0]) < reach_m) & (np.abs(own_m[:, 1]) < 0.5 * thing.width_m + ROADSIDE_M)
+    return under

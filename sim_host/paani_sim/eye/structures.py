@@ -29,6 +29,10 @@ PIER_LOOKS = ("jetty", "pontoon", "quay", "quay_steps", "finger")
 TIMBER: Rgb = (0.47, 0.39, 0.30)
 CONCRETE: Rgb = (0.62, 0.61, 0.58)
 STEEL: Rgb = (0.30, 0.32, 0.34)
+PARAPET: Rgb = (0.62, 0.58, 0.52)
+ABUTMENT_M = 0.9  # an abutment reaches this far beyond the arch
+DECK_M, HALF_DECK_M = 0.5, 0.25  # of a bridge: middle of the deck above the soffit, and half its thickness
+RAMP_SLOPE, RAMP_FOOT_M = 0.2, 0.5  # a ramp ends below every bank
 
 
 def buoy(look: str, width_m: float, height_m: float, variant: int) -> Mesh:
@@ -228,23 +232,49 @@ def _finger(length: float, width: float, height: float, variant: int) -> Mesh:
 
 
 def bridge(length_m: float, width_m: float, base_z_m: float, height_m: float) -> Mesh:
-    """A road bridge along x with a flat arch below and abutments on both banks."""
-    deck_z = base_z_m + 0.5
+    """A road bridge along x with a flat arch below, abutments on both banks and ramps down from them."""
+    deck_z = base_z_m + DECK_M
     stone: Rgb = (0.56, 0.52, 0.46)
     x = np.linspace(-0.5 * length_m, 0.5 * length_m, 21)
     crown = deck_z - 0.35
     arch = crown - (crown - 0.9) * (np.abs(x) / (0.5 * length_m)) ** 2.4
-    parts = [placed(box((length_m + 8.0, width_m, 0.5), stone, ROCK), (0.0, 0.0, deck_z))]
+    road_m = length_m + 2.0 * ABUTMENT_M
+    parts = [placed(box((road_m, width_m, 2.0 * HALF_DECK_M), stone, ROCK), (0.0, 0.0, deck_z))]
     for side in (1.0, -1.0):
         y = np.full(21, side * 0.5 * width_m)
         top, low = np.column_stack([x, y, np.full(21, deck_z)]), np.column_stack([x, y, arch])
         parts.append(loft(np.stack([top, low] if side > 0 else [low, top]), stone, ROCK))
-        wall = box((length_m + 8.0, 0.30, 0.95), (0.62, 0.58, 0.52), ROCK)
+        wall = box((road_m, 0.30, 0.95), PARAPET, ROCK)
         parts.append(placed(wall, (0.0, side * (0.5 * width_m - 0.15), deck_z + 0.6)))
     under = [np.column_stack([x, np.full(21, s * 0.5 * width_m), arch]) for s in (-1.0, 1.0)]
     parts.append(loft(np.stack(under), (0.30, 0.28, 0.25), ROCK))
     for side in (1.0, -1.0):
         block = box((3.0, width_m + 0.6, deck_z + 1.5), stone, ROCK)
-        parts.append(placed(block, (side * (0.5 * length_m - 0.6), 0.0, 0.5 * deck_z - 0.75)))
+        parts.append(placed(block, (side * (0.5 * road_m - 1.5), 0.0, 0.5 * deck_z - 0.75)))
     parts.append(placed(box((length_m, 0.05, 0.05), STEEL), (0, 0, base_z_m + height_m)))
+    ramp = placed(_ramp(width_m, deck_z + HALF_DECK_M, stone), (0.5 * road_m, 0.0, 0.0))
+    return merge(*parts, ramp, placed(ramp, yaw_rad=np.pi))
+
+
+def _ramp(width_m: float, top_m: float, stone: Rgb) -> Mesh:
+    """A road between walls, from `top_m` at the origin down along +x until it is in the ground."""
+    run_m, deep_m = _ramp_m(top_m), 2.5
+    pitch = float(np.arctan(RAMP_SLOPE))
+    slope_m, up = run_m / np.cos(pitch), np.array([np.sin(pitch), 0.0, np.cos(pitch)])
+    middle = np.array([0.5 * run_m, 0.0, top_m - 0.5 * run_m * RAMP_SLOPE])
+    road = middle - 0.5 * deep_m * up
+    parts = [placed(box((slope_m, width_m, deep_m), stone, ROCK), (road[0], 0.0, road[2]), pitch_rad=pitch)]
+    wall = middle + 0.35 * up
+    for side in (1.0, -1.0):
+        at = (wall[0], side * (0.5 * width_m - 0.15), wall[2])
+        parts.append(placed(box((slope_m, 0.30, 0.95), PARAPET, ROCK), at, pitch_rad=pitch))
     return merge(*parts)
+
+
+def bridge_reach_m(length_m: float, base_z_m: float) -> float:
+    """From the middle of a bridge to where its road is in the ground."""
+    return 0.5 * length_m + ABUTMENT_M + _ramp_m(base_z_m + DECK_M + HALF_DECK_M)
+
+
+def _ramp_m(top_m: float) -> float:
+    return (top_m - RAMP_FOOT_M) / RAMP_SLOPE

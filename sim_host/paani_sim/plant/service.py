@@ -1,4 +1,7 @@
-"""Plant process: thrust in; time, sensors and truth out, at real time."""
+"""Plant process: thrust in; time, sensors and truth out, at real time.
+
+While a scenario's link is lost, nothing of the board reaches the last gate, and the board gets no time.
+"""
 
 import asyncio
 import functools
@@ -11,6 +14,8 @@ from paani.config import Config
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
+from paani_sim.worlds import Fault
+from paani_sim.worlds.faults import is_linked
 from paani_sim.worlds.load import configured_scenario
 
 MAX_BEHIND_S = 0.25  # further behind than this, simulated time slips instead of being caught up
@@ -22,17 +27,18 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     scenario = configured_scenario(config.world)
     plant = Plant.of(scenario, config.plant)
     adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
+    link = _Link(plant, scenario.faults)
     thrust, arming = bus.latest(keys.THRUST), bus.latest(keys.ARMING)
     for service in config.plant.adapter.require_pulses:
-        bus.on(keys.pulse(service), functools.partial(_pulse, adapter, service, monotonic))
-    instruments = _Instruments(bus, monotonic, config)
+        bus.on(keys.pulse(service), functools.partial(_pulse, adapter, service, monotonic, link))
+    instruments = _Instruments(bus, monotonic, config, link)
     step_us = round(config.plant.step_s * 1e6)
     seen: tuple[m.Thrust | None, m.Arming | None] = (None, None)
     with bus.alive():
         due_us = monotonic.now_us()
         while True:
             now_us = monotonic.now_us()
-            seen = _hear(bus, adapter, seen, (thrust.value, arming.value), now_us)
+            seen = _hear(bus, adapter, link, seen, (thrust.value, arming.value), now_us)
             if now_us - due_us > MAX_BEHIND_S * 1e6:
                 bus.count_drop("sim_time_slipped_ms", (now_us - due_us) // 1000)
                 due_us = now_us
@@ -44,33 +50,46 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             await asyncio.sleep(max(0, due_us - monotonic.now_us()) * 1e-6)
 
 
+class _Link:
+    """Between board and host, as the scenario has it."""
+
+    def __init__(self, plant: Plant, faults: tuple[Fault, ...]) -> None:
+        self._plant, self._faults = plant, faults
+
+    def is_up(self) -> bool:
+        """At the simulated time of now."""
+        return is_linked(self._faults, self._plant.sim_us * 1e-6)
+
+
 def _hear(
     bus: Bus,
     adapter: ThrustAdapter,
+    link: _Link,
     seen: tuple[m.Thrust | None, m.Arming | None],
     newest: tuple[m.Thrust | None, m.Arming | None],
     now_us: int,
 ) -> tuple[m.Thrust | None, m.Arming | None]:
-    """Give the adapter what is new since the last time."""
+    """Give the adapter what is new since the last time; what came over a lost link is gone."""
     thrust, arming = newest
     if arming is not None and arming is not seen[1]:
         adapter.hear_arming(arming, now_us)
-    if thrust is not None and thrust is not seen[0]:
+    if thrust is not None and thrust is not seen[0] and link.is_up():
         cause = adapter.offer(thrust, now_us)
         if cause is not m.ZeroCause.NONE:
             bus.count_drop(f"thrust_{cause.value}")
     return newest
 
 
-def _pulse(adapter: ThrustAdapter, service: str, monotonic: Clock, _: m.Pulse) -> None:
-    adapter.hear_pulse(service, monotonic.now_us())
+def _pulse(adapter: ThrustAdapter, service: str, monotonic: Clock, link: _Link, _: m.Pulse) -> None:
+    if service not in keys.BOARD_SERVICES or link.is_up():
+        adapter.hear_pulse(service, monotonic.now_us())
 
 
 class _Instruments:
     """Publishes each measurement when its step comes."""
 
-    def __init__(self, bus: Bus, monotonic: Clock, config: Config) -> None:
-        self._monotonic = monotonic
+    def __init__(self, bus: Bus, monotonic: Clock, config: Config, link: _Link) -> None:
+        self._monotonic, self._link = monotonic, link
         self._time = bus.publisher(keys.SIM_TIME)
         self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
         self._applied, self._pose = bus.publisher(keys.THRUST_APPLIED), bus.publisher(keys.TRUE_POSE)
@@ -83,14 +102,15 @@ class _Instruments:
         self._since_us = 0
 
     def publish(self, plant: Plant, adapter: ThrustAdapter, applied: Applied, source_us: int) -> None:
-        """`source_us` dates the step that was just made."""
+        """`source_us` dates the step that was just made. The time is for the board alone."""
         if plant.steps % self._imu_every == 0:
             self._imu.put(imu_message(plant, source_us))
         if plant.steps % self._gps_every == 0:
             self._gps.put(gps_message(plant, source_us))
         if plant.steps % self._every == 0:
-            stamp_us = self._monotonic.now_us()
-            self._time.put(m.SimTime(source_us=source_us, sim_us=plant.sim_us, stamp_us=stamp_us))
+            if self._link.is_up():
+                stamp_us = self._monotonic.now_us()
+                self._time.put(m.SimTime(source_us=source_us, sim_us=plant.sim_us, stamp_us=stamp_us))
             self._pose.put(pose_message(plant, source_us))
         in_force = adapter.command if applied.zero_cause is m.ZeroCause.NONE else None
         if in_force is not self._in_force or self._since_us == 0:

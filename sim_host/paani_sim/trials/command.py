@@ -17,6 +17,7 @@ from paani_sim.trials.one import config_for, run_case
 from paani_sim.trials.policies import Policy, config_of
 from paani_sim.trials.provenance import Maker
 from paani_sim.trials.result import TrialResult
+from paani_sim.trials.states import Why
 from paani_sim.trials.suite import Failure, drive_all, look
 from paani_sim.trials.summary import summarise, table
 from paani_sim.worlds import WORLDS
@@ -24,7 +25,7 @@ from paani_sim.worlds.load import load_scenario
 
 
 def main(argv: list[str]) -> int:
-    """Drive, score, print. Exit codes: 0 it ran, 1 a drive gave no result, 2 user's mistake."""
+    """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake."""
     options = _parser().parse_args(argv)
     for name, file in (("--json", options.json), ("--report", options.report), ("--record", options.record)):
         if file is not None and not file.absolute().parent.is_dir():
@@ -63,6 +64,9 @@ def _suite(options: argparse.Namespace) -> int:
         return 130
     for failure in failures:
         sys.stderr.write(f"{failure.case.name}: {failure.why}\n")
+    diverged = [case for case in sorted(results) if results[case].why is Why.DIVERGED]
+    for case in diverged:
+        sys.stderr.write(f"{case.name}: {results[case].error}\n")
     if not results:
         return 1
     summary = summarise(options.suite, results)
@@ -73,7 +77,7 @@ def _suite(options: argparse.Namespace) -> int:
         from paani_sim.trials.report import write_report  # noqa: PLC0415
 
         write_report(options.report, summary, results, options.sets, options.jobs)
-    return 1 if failures else 0
+    return 1 if failures or diverged else 0
 
 
 def _one(options: argparse.Namespace) -> int:
@@ -96,7 +100,7 @@ def _one(options: argparse.Namespace) -> int:
         f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "
         f"{effort.simulated_s / effort.wall_s:.1f} x real time\n"
     )
-    return 0
+    return 1 if result.why is Why.DIVERGED else 0
 
 
 def _cases(options: argparse.Namespace) -> list[Case]:

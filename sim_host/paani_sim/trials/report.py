@@ -13,7 +13,7 @@ from paani.whole_file import write_whole
 from paani_models.report.charts import bar
 from paani_sim.trials.cases import Case, scenario_of
 from paani_sim.trials.plan_view import plan_view
-from paani_sim.trials.result import Closeness, TrialResult
+from paani_sim.trials.result import UNDER_M, Closeness, TrialResult
 from paani_sim.trials.summary import PolicyFigures, Share, Summary
 from paani_sim.trials.worst import Again, drive_again, worst_of
 
@@ -83,7 +83,7 @@ def _policies(rows: Mapping[str, PolicyFigures]) -> str:
 
 def _closeness(rows: Mapping[str, PolicyFigures]) -> str:
     body = [(escape(name), *(str(p.encounters.get(kind.value, 0)) for kind in Closeness)) for name, p in rows.items()]
-    return _table(("", "contact", "under 0.3 m", "under 0.6 m", "under 1.5 m", "farther"), body)
+    return _table(("", "contact", *(f"under {under_m}&nbsp;m" for under_m in UNDER_M.values()), "farther"), body)
 
 
 def _stops(rows: Mapping[str, PolicyFigures]) -> str:
@@ -92,7 +92,7 @@ def _stops(rows: Mapping[str, PolicyFigures]) -> str:
         for name, p in rows.items()
         for reason, stop in p.stops.items()
     ]
-    return _table(("", "reason", "times", "seconds"), body) if body else '<p class="faint">It never stood.</p>'
+    return _table(("", "reason", "times", "seconds"), body, "words") if body else '<p class="faint">It never stood.</p>'
 
 
 def _faults(summary: Summary) -> str:
@@ -140,10 +140,11 @@ def _drive(each: Again, result: TrialResult, folder: str) -> str:
     )
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
+    """`kind` "words": with a second column of text."""
     top = "".join(f"<th>{cell}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+    return f'<div class="wide"><table class="{kind}"><tr>{top}</tr>{body}</table></div>'
 
 
 def _share(s: Share) -> str:

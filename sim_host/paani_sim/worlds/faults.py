@@ -36,3 +36,8 @@ class Fault(NamedTuple):
 def active(faults: Iterable[Fault], kind: FaultKind, t_s: float) -> Fault | None:
     """The first fault of this kind that acts at `t_s`."""
     return next((fault for fault in faults if fault.kind is kind and fault.is_on(t_s)), None)
+
+
+def is_linked(faults: Iterable[Fault], t_s: float) -> bool:
+    """Whether board and host hear each other at `t_s`."""
+    return active(faults, FaultKind.LINK_LOSS, t_s) is None

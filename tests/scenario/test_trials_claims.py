@@ -1,0 +1,133 @@
+"""What the paper leaves open, on small drives of what `paani trial` measures on hundreds."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+
+from paani_sim import vessels
+from paani_sim.trials import command
+from paani_sim.trials.cases import Case, scenario_of
+from paani_sim.trials.one import config_for, run_case
+from paani_sim.trials.policies import Policy
+from paani_sim.trials.result import TrialResult
+from paani_sim.trials.states import Why
+from paani_sim.worlds import WORLDS
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
+PAPER = Path(vessels.__file__).with_name("paper.toml")
+OPEN_WATER = 'seed = 5\n[world]\nkind = "lake"\nobstacles = false\nactors = false\n'
+LAP = OPEN_WATER + (
+    "[weather]\nwind_mps = 1.0\n"
+    "[route]\nclosed = true\n"
+    "waypoints_m = [[0.0, 0.0], [4.2, -2.8], [9.8, -3.5], [14.7, -2.1], [16.8, 2.1], [14.7, 6.3], [9.8, 7.7],"
+    " [4.2, 7.0], [0.0, 4.2]]\n"
+    "[task]\ntime_limit_s = 150.0\n"
+    '[[actors]]\nlook = "can"\nat_m = [9.8, -3.2]\n'
+    '[[actors]]\nlook = "rowboat"\nat_m = [9.8, 8.3]\nheading_deg = 10.0\n'
+)
+AHEAD = OPEN_WATER + (
+    "[route]\nwaypoints_m = [[0.0, 0.0], [16.0, 0.0]]\n[task]\ntime_limit_s = 90.0\n"
+    '[[actors]]\nlook = "can"\nat_m = [8.0, 0.2]\n'
+)
+LOW_LIGHT = '[light]\nsky = "dusk"\nsun_elevation_deg = 4.0\n'
+REFLECTIONS = '[light]\nsky = "clear"\nsun_elevation_deg = 9.0\nsun_azimuth_deg = 0.0\n'  # sun ahead
+RAIN = '[light]\nsky = "overcast"\n[weather]\nrain_mmph = 10.0\nwind_mps = 3.0\nvisibility_m = 150.0\n'
+OCCLUSION = '[[actors]]\nlook = "can"\nat_m = [11.0, 0.3]\n'  # hidden by the one before it
+
+
+def driven(folder: Path, text: str, policy: Policy, *sets: str) -> TrialResult:
+    file = folder / "given.toml"
+    file.write_text(text)
+    return run_case(Case(str(file), 5, policy), sets)[0]
+
+
+@pytest.mark.gl
+def test_w14_a_whole_lap_by_camera_round_what_lies_on_it(tmp_path: Path) -> None:
+    """W14, W6: rendered pictures and the nets alone lead a boat once round; who does not look runs into the buoy."""
+    seeing, blind = driven(tmp_path, LAP, Policy.PAANI), driven(tmp_path, LAP, Policy.BLIND)
+    assert blind.collisions > 0
+    assert (seeing.why, seeing.collisions) == (Why.COMPLETED, 0)
+    assert seeing.progress_m >= seeing.goal_m > 45.0
+    assert seeing.frames > 250
+    assert {encounter.what for encounter in seeing.encounters} == {"actor_0", "actor_1"}
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(
+    "condition", [LOW_LIGHT, REFLECTIONS, RAIN, OCCLUSION], ids=["low light", "reflections", "rain", "occlusion"]
+)
+def test_w4_what_lies_ahead_is_not_touched_in_any_condition(tmp_path: Path, condition: str) -> None:
+    """W4: it is passed, or stopped before where the picture is not fit to be evidence."""
+    result = driven(tmp_path, AHEAD + condition, Policy.PAANI)
+    assert result.collisions == 0
+    assert result.completed or result.stops
+
+
+def test_w4_the_suite_has_these_conditions() -> None:
+    """Low light, low sun, rain and fog, among the first six seeds of one world."""
+    lights = [scenario_of(Case("lake", seed, Policy.PAANI)).world.light for seed in range(1, 7)]
+    assert any(light.sky == "dusk" for light in lights)
+    assert any(light.sun_elevation_rad < 0.3 for light in lights)
+    assert any(light.rain_mmph > 1.0 for light in lights)
+    assert any(light.visibility_m < 300.0 for light in lights)
+
+
+@pytest.mark.parametrize("fault", ["camera_black", "camera_dropped", "gps_outage", "link_loss"])
+def test_w6_a_failure_that_passes_does_not_end_the_task(tmp_path: Path, fault: str) -> None:
+    """W6: the boat stops or not, touches nothing, and arrives all the same."""
+    failing = f'[[faults]]\nkind = "{fault}"\nstart_s = 8.0\nduration_s = 5.0\n'
+    result = driven(tmp_path, AHEAD + failing, Policy.ORACLE)
+    assert (result.why, result.collisions) == (Why.COMPLETED, 0)
+    if fault != "gps_outage":
+        assert sum(stop.seconds for stop in result.stops) > 3.0
+
+
+def test_w7_policies_differ_in_nothing_but_themselves(tmp_path: Path) -> None:
+    """W7: the same water, things, weather, faults and seed for every policy; one setting is one ablation."""
+    for world in WORLDS:
+        assert len({pickle.dumps(scenario_of(Case(world, 7, policy, "gps_jump"))) for policy in Policy}) == 1
+    case = Case("lake", 7, Policy.ORACLE)
+    assert config_for(case, ["navigator.planner.use=true"]) == config_for(case)
+    whole = driven(tmp_path, AHEAD, Policy.ORACLE)
+    without = driven(tmp_path, AHEAD, Policy.ORACLE, "navigator.planner.use=false")
+    assert whole != without
+    assert (whole.goal_m, whole.limit_s, whole.seed) == (without.goal_m, without.limit_s, without.seed)
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_w12_other_waters_ask_for_other_files_alone(world: str, tmp_path: Path) -> None:
+    """W12: canal, harbour and lake are driven by the same processes; what differs is a scenario in a file."""
+    text = f'seed = 2\n[world]\nkind = "{world}"\nactors = false\n[task]\ndistance_m = 12.0\ntime_limit_s = 60.0\n'
+    result = driven(tmp_path, text, Policy.ORACLE)
+    assert (result.why, result.collisions) == (Why.COMPLETED, 0)
+
+
+def test_w12_other_rules_are_settings(tmp_path: Path) -> None:
+    """W12: a task that asks for slow driving on one side of a line; the thing in the way is passed on the other."""
+    fence = "[fence]\nkeep_in = [[[-5.0, -10.0], [30.0, -10.0], [30.0, 1.8], [-5.0, 1.8]]]\n"
+    plain = driven(tmp_path, AHEAD, Policy.ORACLE)
+    bound = driven(tmp_path, AHEAD + fence, Policy.ORACLE, "navigator.cruise_mps=0.3")
+    assert plain.completed
+    assert bound.completed
+    assert bound.seconds > 1.5 * plain.seconds
+    assert max(y_m for _, _, y_m in bound.track) < 1.8
+
+
+def test_a_drive_that_diverges_is_no_success_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Alone or in a suite: exit 1, one line, and not among the completed."""
+    vessel = tmp_path / "stiff.toml"
+    vessel.write_text(PAPER.read_text().replace("surge_linear = 4.0", "surge_linear = 9e8"))
+    words = ["--set", f'plant.vessel="{vessel}"']
+    assert command.main(["--one", "lake:1:blind", *words]) == 1
+    assert '"why": "diverged"' in capsys.readouterr().out
+    figures, out = tmp_path / "figures.json", str(tmp_path / "out")
+    suite = ["--policy", "blind", "--worlds", "lake", "--seeds", "1", "--jobs", "1", "--out", out]
+    assert command.main([*suite, "--json", str(figures), *words]) == 1
+    assert "lake:1:blind: plant: state is not finite" in capsys.readouterr().err
+    told = json.loads(figures.read_bytes())["policies"]["blind"]
+    assert (told["trials"], told["completed"]) == (1, 0)
