@@ -11,6 +11,7 @@ import pytest
 
 from paani.cli import main as paani
 from paani.errors import UserError
+from paani_services.look.annotate import FONT, wrapped
 from paani_services.look.command import file_name, main
 from tests.unit.pictures import PICTURES, river
 
@@ -116,3 +117,13 @@ def test_names_never_clash() -> None:
     taken: set[str] = set()
     names = [file_name(name, taken) for name in ("a/x.png", "b/x.png", "c/x.jpg", "c/x.mp4#7")]
     assert names == ["x.jpg", "x_2.jpg", "x_3.jpg", "x_000007.jpg"]
+
+
+def test_an_explanation_is_wrapped_by_its_drawn_width() -> None:
+    """Wide letters take more room than narrow ones; a word that fits nowhere has a line of its own."""
+    for letters in ("wwww", "iiii"):
+        lines = wrapped(" ".join([letters] * 60), 0.6, 400)
+        assert sum(len(line.split()) for line in lines) == 60
+        assert all(cv2.getTextSize(line, FONT, 0.6, 1)[0][0] <= 400 for line in lines)
+    assert wrapped("a " + "w" * 90 + " b", 0.6, 400) == ["a", "w" * 90, "b"]
+    assert wrapped("", 0.6, 400) == []

@@ -28,6 +28,7 @@ from paani_models.evidence import Evidence, Finding, Findings
 from paani_models.report.charts import bar, lines
 from paani_models.report.page import Content, page
 from paani_models.report.records import FaultCell, FaultReport, read_faults, read_record, training_charts
+from paani_models.report.tried import read_tried
 from paani_models.segmenter_scores import ScoredMask
 from paani_models.sources import Sample, Source, choose
 from tests.unit.public_sets import own_data
@@ -212,6 +213,9 @@ def test_a_whole_report_of_a_miniature(data: Path, tmp_path: Path) -> None:
     written = msgspec.json.decode((out / "evaluation.json").read_bytes(), type=Evaluation)
     assert {e.source for e in written.estimates} == {"tbiseg_dasha", "mcoe_boats", "all"}
     assert [m.name for m in written.models] == ["segmenter", "detector"]
+    assert all(text.count(title) for title in ("what was tried", "where its mistakes lie", "what limits it"))
+    measured = [row for row in read_tried(out) if not row.asked and row.sha256 == written.models[0].sha256]
+    assert [figure.n for row in measured for figure in row.figures] == [4]
 
 
 def test_pictures_never_get_into_the_repository(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,11 @@ from string import Template
 from paani_models.detection_metrics import RECALL_STEPS
 from paani_models.estimates import ALARMS, Estimate, Evaluation
 from paani_models.evidence import TITLES, Evidence, Finding, sections
+from paani_models.report.bars import Reached
+from paani_models.report.box_limits import BoxLimits
 from paani_models.report.charts import Points, lines
+from paani_models.report.limits_tables import bars_section, box_limits_section, mask_limits_section
+from paani_models.report.mask_limits import MaskLimits
 from paani_models.report.overlays import Drawn, gallery
 from paani_models.report.records import FaultReport, fault_charts, training_charts
 from paani_models.report.tables import (
@@ -22,6 +26,7 @@ from paani_models.report.tables import (
     rate_table,
     sequence_table,
 )
+from paani_models.report.tried import Tried
 from paani_models.sources import DETECTOR_CLASSES
 
 MASK_KEY = (
@@ -43,6 +48,10 @@ class Content:
     findings: Sequence[Finding] = ()
     runs: Mapping[str, Sequence[dict[str, float]]] = field(default_factory=dict)
     faults: FaultReport | None = None
+    reached: Sequence[Reached] = ()
+    tried: Sequence[Tried] = ()
+    mask_limits: Sequence[MaskLimits] = ()
+    box_limits: Sequence[BoxLimits] = ()
     worst_masks: Sequence[Drawn] = ()
     best_masks: Sequence[Drawn] = ()
     worst_boxes: Sequence[Drawn] = ()
@@ -74,6 +83,8 @@ def _labelled(content: Content) -> str:
         "<p>Held-out sequences only. Intervals hold 95 % and come from drawing whole sequences again, with a fixed "
         "seed; frames of one sequence count as one piece of evidence. Without at least two sequences there is none.</p>"
     ]
+    if content.reached:
+        parts.append(bars_section(content.reached, content.tried))
     if masks:
         parts += _segmenter(content, masks)
     if boxes:
@@ -105,6 +116,7 @@ def _segmenter(content: Content, estimates: list[Estimate]) -> list[str]:
         ),
         "<h3>Segmenter: what is taken for what</h3>",
         f'<div class="side">{"".join(confusion_table(table) for table in tables)}</div>',
+        mask_limits_section(content.mask_limits) if content.mask_limits else "",
         "<h3>Segmenter: worst pictures</h3>" + MASK_KEY + gallery(content.worst_masks) if content.worst_masks else "",
         "<h3>Segmenter: best pictures</h3>" + gallery(content.best_masks) if content.best_masks else "",
     ]
@@ -132,6 +144,7 @@ def _detector(content: Content, estimates: list[Estimate]) -> list[str]:
         + lines(curves, "recall at IoU 0.5 (true boxes in brackets)", "precision", (0.0, 1.0))
         + (confusion_table(table) if table else "")
         + "</div>",
+        box_limits_section(content.box_limits) if content.box_limits else "",
         "<h3>Detector: worst pictures</h3>" + BOX_KEY + gallery(content.worst_boxes) if content.worst_boxes else "",
         "<h3>Detector: best pictures</h3>" + gallery(content.best_boxes) if content.best_boxes else "",
     ]

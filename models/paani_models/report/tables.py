@@ -34,7 +34,7 @@ def mask_table(estimates: Sequence[Estimate]) -> str:
         first = next(iter(mine.values()))
         cells = "".join(f"<td>{_cell(mine.get(metric))}</td>" for metric in MASK_METRICS)
         rows.append(f"<tr><th>{escape(name)}</th><td>{first.n}</td><td>{first.sequences}</td>{cells}</tr>")
-    return _table(f"<th>source</th><th>pictures</th><th>sequences</th>{head}", rows)
+    return as_table(f"<th>source</th><th>pictures</th><th>sequences</th>{head}", rows)
 
 
 def box_table(estimates: Sequence[Estimate], kind: str) -> str:
@@ -48,7 +48,7 @@ def box_table(estimates: Sequence[Estimate], kind: str) -> str:
         cells = "".join(f"<td>{_cell(found.get(metric))}</td>" for metric in BOX_METRICS)
         total = ' class="total"' if name == "all" else ""
         rows.append(f"<tr{total}><th>{escape(name)}</th><td>{first.n}</td><td>{first.sequences}</td>{cells}</tr>")
-    return _table(f"<th>source</th><th>boxes</th><th>sequences</th>{head}", rows)
+    return as_table(f"<th>source</th><th>boxes</th><th>sequences</th>{head}", rows)
 
 
 def sequence_table(estimates: Sequence[Estimate], metric: str) -> str:
@@ -58,7 +58,7 @@ def sequence_table(estimates: Sequence[Estimate], metric: str) -> str:
         f"<tr><th>{escape(e.source)}</th><td>{escape(e.sequence)}</td><td>{e.n}</td><td>{_cell(e)}</td></tr>"
         for e in mine
     ]
-    return _table("<th>source</th><th>sequence</th><th>n</th><th>value</th>", rows)
+    return as_table("<th>source</th><th>sequence</th><th>n</th><th>value</th>", rows)
 
 
 def rate_table(estimates: Sequence[Estimate]) -> str:
@@ -68,7 +68,7 @@ def rate_table(estimates: Sequence[Estimate]) -> str:
         for e in estimates
         if not e.sequence
     ]
-    return _table("<th>source</th><th>pictures</th><th>sequences</th><th>per picture</th>", rows)
+    return as_table("<th>source</th><th>pictures</th><th>sequences</th><th>per picture</th>", rows)
 
 
 def confusion_table(confusion: Confusion) -> str:
@@ -84,7 +84,7 @@ def confusion_table(confusion: Confusion) -> str:
             for count in counts
         )
         rows.append(f"<tr><th>{escape(name)}</th>{cells}<td>{total:,}</td></tr>")
-    return _table(f"<th>{escape(confusion.source)}: truth \\ found</th>{head}<th>n</th>", rows)
+    return as_table(f"<th>{escape(confusion.source)}: truth \\ found</th>{head}<th>n</th>", rows)
 
 
 def findings_table(findings: Sequence[Finding]) -> str:
@@ -94,7 +94,7 @@ def findings_table(findings: Sequence[Finding]) -> str:
         f"<td>{f.n} {escape(f.of)}</td></tr>"
         for f in findings
     ]
-    return _table("<th>metric</th><th>source</th><th>value</th><th>n</th>", rows)
+    return as_table("<th>metric</th><th>source</th><th>value</th><th>n</th>", rows)
 
 
 def _cell(estimate: Estimate | None) -> str:
@@ -113,5 +113,6 @@ def _sources(estimates: Sequence[Estimate]) -> list[str]:
     return [name for name in names if name != "all"] + (["all"] if "all" in names else [])
 
 
-def _table(head: str, rows: Sequence[str]) -> str:
+def as_table(head: str, rows: Sequence[str]) -> str:
+    """Head cells and rows, each HTML text; scrolls sideways where it is too wide."""
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'

@@ -1,7 +1,5 @@
 """Draws what was seen and advised onto the picture. Pure: arrays in, array out."""
 
-import textwrap
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +10,8 @@ from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk
 Bytes = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
-WIDTH_PX, BANNER_PX, LINE_PX = 800, 142, 24
+WIDTH_PX, BANNER_PX, LINE_PX, MARGIN_PX = 800, 142, 24, 14
+TEXT_SCALE = 0.6
 TINTS = np.array([(230, 200, 40), (40, 140, 255), (120, 50, 20)], np.float32)  # BGR: water, obstacle, sky
 TINT_SHARE = 0.32
 INK, PAPER = (245, 245, 245), (28, 24, 22)
@@ -82,12 +81,25 @@ def _label(
 def _banner(evidence: Evidence, advisory: Advisory) -> Bytes:
     banner = np.full((BANNER_PX, WIDTH_PX, 3), PAPER, np.uint8)
     colour = ADVICE_COLOURS.get(advisory.direction, BOX)
-    cv2.putText(banner, advisory.direction.replace("_", " "), (14, 46), FONT, 1.35, colour, 3, cv2.LINE_AA)
+    cv2.putText(banner, advisory.direction.replace("_", " "), (MARGIN_PX, 46), FONT, 1.35, colour, 3, cv2.LINE_AA)
     reason = advisory.reason.replace("_", " ")
     if not evidence.usable:
         reason += f" ({evidence.cause.replace('_', ' ')})"
     (width, _), _ = cv2.getTextSize(reason, FONT, 0.7, 1)
-    cv2.putText(banner, reason, (WIDTH_PX - width - 14, 40), FONT, 0.7, INK, 1, cv2.LINE_AA)
-    for i, line in enumerate(textwrap.wrap(advisory.explanation, 105)[:3]):
-        cv2.putText(banner, line, (14, 80 + i * LINE_PX), FONT, 0.6, INK, 1, cv2.LINE_AA)
+    cv2.putText(banner, reason, (WIDTH_PX - width - MARGIN_PX, 40), FONT, 0.7, INK, 1, cv2.LINE_AA)
+    for i, line in enumerate(wrapped(advisory.explanation, TEXT_SCALE, WIDTH_PX - 2 * MARGIN_PX)[:3]):
+        cv2.putText(banner, line, (MARGIN_PX, 80 + i * LINE_PX), FONT, TEXT_SCALE, INK, 1, cv2.LINE_AA)
     return banner
+
+
+def wrapped(text: str, scale: float, width_px: int) -> list[str]:
+    """Lines of whole words, none drawn wider than `width_px` unless a single word is."""
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        (drawn_px, _), _ = cv2.getTextSize(longer, FONT, scale, 1)
+        if lines and drawn_px <= width_px:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines

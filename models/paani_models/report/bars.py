@@ -1,0 +1,101 @@
+"""Figures that the models are to reach, what they reach, and the measured reason where they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from paani_models.report.box_limits import FATES, BoxLimits
+from paani_models.report.mask_limits import REACHES_PX, MaskLimits, edge_f1, mean_iou, water_iou
+
+PHOTOGRAPHS = "photographs"  # every real source that boxes the class, pooled
+FAR_PX = REACHES_PX[-1]
+SMALL_PX, NEAR_PX = 8.0, 16.0
+
+_MASK_FIGURES = {"iou_water": water_iou, "miou": mean_iou}
+
+
+@dataclass(frozen=True)
+class Bar:
+    """The least that a figure should be, on held-out sequences of real pictures."""
+
+    net: str
+    metric: str
+    source: str
+    least: float
+
+
+BARS = (
+    Bar("segmenter", "iou_water", "tbiseg_usvinland", 0.97),
+    Bar("segmenter", "iou_water", "tbiseg_dasha", 0.97),
+    Bar("segmenter", "miou", "mastr1325", 0.95),
+    Bar("segmenter", "edge_f1", "mastr1325", 0.88),
+    Bar("detector", "vessel_ap50", PHOTOGRAPHS, 0.75),
+    Bar("detector", "buoy_ap50", PHOTOGRAPHS, 0.60),
+    Bar("detector", "person_ap50", PHOTOGRAPHS, 0.50),
+)
+
+
+@dataclass(frozen=True)
+class Reached:
+    """One bar and what was measured; n counts pictures, or true boxes. limit: the reason, empty where it is met."""
+
+    bar: Bar
+    value: float
+    n: int
+    limit: str
+
+    @property
+    def met(self) -> bool:
+        """Whether the figure is at or above its bar."""
+        return self.value >= self.bar.least
+
+
+def reached(masks: Sequence[MaskLimits], boxes: Sequence[BoxLimits]) -> list[Reached]:
+    """Every bar whose pictures are at hand."""
+    by_source = {limits.source.name: limits for limits in masks}
+    by_kind = {f"{limits.kind}_ap50": limits for limits in boxes}
+    found = []
+    for bar in BARS:
+        if bar.net == "segmenter" and bar.source in by_source:
+            found.append(_of_masks(bar, by_source[bar.source]))
+        elif bar.net == "detector" and bar.metric in by_kind:
+            found.append(_of_boxes(bar, by_kind[bar.metric]))
+    return found
+
+
+def _of_masks(bar: Bar, limits: MaskLimits) -> Reached:
+    if bar.metric == "edge_f1":
+        value, best = edge_f1(limits.edges), edge_f1(limits.best_edges)
+    else:
+        value, best = (_MASK_FIGURES[bar.metric](counts) for counts in (limits.counts, limits.best_counts))
+    if value >= bar.least:
+        return Reached(bar, value, limits.n, "")
+    return Reached(bar, value, limits.n, f"{_mistakes(limits)} The best answer of the net's cells reaches {best:.3f}.")
+
+
+def _mistakes(limits: MaskLimits) -> str:
+    if limits.wrong == 0:
+        return "No pixel is wrong."
+    wrong = limits.wrong
+    far, taken = 1 - limits.near[-1] / wrong, limits.false_water.sum() / wrong
+    missed = limits.missed_water.sum() / wrong
+    return (
+        f"Of the {wrong / limits.counts.sum():.1%} of pixels that are wrong, {taken:.0%} are something else taken for "
+        f"water and {missed:.0%} are water missed; {far:.0%} lie more than {FAR_PX} px from a true edge."
+    )
+
+
+def _of_boxes(bar: Bar, limits: BoxLimits) -> Reached:
+    if limits.ap50 >= bar.least:
+        return Reached(bar, limits.ap50, limits.n, "")
+    small, smalls = limits.found_between(0.0, SMALL_PX)
+    near, nears = limits.found_between(NEAR_PX, float("inf"))
+    fates = ", ".join(f"{count} {fate}" for fate, count in zip(FATES[1:], limits.fates[1:], strict=True))
+    return Reached(
+        bar,
+        limits.ap50,
+        limits.n,
+        f"Of {smalls} objects under {SMALL_PX:g} px high {small} are found, of {nears} of {NEAR_PX:g} px and more "
+        f"{near}. What is not found: {fates}.",
+    )

@@ -1,0 +1,158 @@
+"""Bars, what was tried for them, and what limits each net, as HTML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paani_models.report.bars import PHOTOGRAPHS, Bar, Reached
+from paani_models.report.box_limits import FATES, SCORE_STEPS, BoxLimits
+from paani_models.report.charts import Points, lines
+from paani_models.report.mask_limits import REACHES_PX, TENTHS, MaskLimits, edge_f1, water_iou
+from paani_models.report.tables import TITLES, as_table
+from paani_models.report.tried import Tried
+
+_TICKS = 4  # a chart's axis has this many steps, so that each trial stands on a whole number
+
+
+def bars_section(found: Sequence[Reached], tried: Sequence[Tried]) -> str:
+    """What is to be reached, what is, why not; then how each figure moved from recipe to recipe."""
+    rows = [
+        f'<tr class="{"met" if each.met else "missed"}"><th>{escape(_name(each.bar))}</th><td>{each.n}</td>'
+        f"<td>{each.bar.least:.2f}</td><td>{each.value:.3f}</td><td>{'met' if each.met else 'missed'}</td>"
+        f'<td class="text">{escape(each.limit)}</td></tr>'
+        for each in found
+    ]
+    head = '<th>figure</th><th>n</th><th>bar</th><th>reached</th><th></th><th class="text">what limits it</th>'
+    parts = [
+        "<h3>Figures and their bars</h3>",
+        "<p>Real pictures of held-out sequences only. What was tried before stands as it was recorded, where it was "
+        "measured on as many pictures or boxes as now.</p>",
+        as_table(head, rows),
+    ]
+    for net in dict.fromkeys(each.bar.net for each in found):
+        now = [each for each in found if each.bar.net == net]
+        mine = [row for row in tried if row.net == net]
+        charts = "".join(f"<figure>{_tried_chart(each, mine)}</figure>" for each in now)
+        parts.append(f'<h3>{net.capitalize()}: what was tried</h3><div class="side">{charts}</div>')
+        parts.append(_tried_table(now, mine))
+    return "".join(parts)
+
+
+def mask_limits_section(limits: Sequence[MaskLimits]) -> str:
+    """Where mistakes lie, and the best that the net's cells allow."""
+    near = "".join(f"<th>within {reach} px</th>" for reach in REACHES_PX)
+    head = (
+        "<th>source</th><th>pictures</th><th>wrong</th><th>taken for water</th><th>water missed</th>"
+        f"{near}<th>water IoU</th><th>best of cells</th><th>edge F1</th><th>best of cells</th>"
+    )
+    rows = []
+    for each in limits:
+        wrong = max(1, each.wrong)
+        shares = (each.false_water.sum() / wrong, each.missed_water.sum() / wrong, *(each.near / wrong))
+        figures = (
+            water_iou(each.counts),
+            water_iou(each.best_counts),
+            edge_f1(each.edges),
+            edge_f1(each.best_edges),
+        )
+        cells = "".join(f"<td>{share:.0%}</td>" for share in shares)
+        cells += "".join(f"<td>{figure:.3f}</td>" for figure in figures)
+        rows.append(
+            f"<tr><th>{escape(each.source.name)}</th><td>{each.n}</td>"
+            f"<td>{each.wrong / max(1, each.counts.sum()):.2%}</td>{cells}</tr>"
+        )
+    taken = {each.source.name: each.false_water / each.judged.clip(1) for each in limits}
+    missed = {each.source.name: each.missed_water / each.judged.clip(1) for each in limits}
+    charts = _height_chart(taken, "something else taken for water") + _height_chart(missed, "water missed")
+    return (
+        "<h3>Segmenter: where its mistakes lie</h3><p>Shares of the wrong pixels: by kind, and by distance from a "
+        "true edge, in pixels of the mask. Best of cells: the truth itself, rounded to one answer per 4x4 pixels of "
+        "the input. Undecided bands count as edges, and are split along their middle for edge F1.</p>"
+        f'{as_table(head, rows)}<div class="side">{charts}</div>'
+    )
+
+
+def box_limits_section(limits: Sequence[BoxLimits]) -> str:
+    """Heights, fates and scores of each class."""
+    parts = ["<h3>Detector: what limits it</h3><p>Photographs only; heights in pixels of the input, 320x256.</p>"]
+    for each in limits:
+        rows = [
+            f"<tr><th>{_range(row.low, row.high)}</th><td>{row.n}</td><td>{row.found / row.n:.3f}</td>"
+            f"<td>{row.ap50:.3f}</td></tr>"
+            for row in each.rows
+            if row.n
+        ]
+        fates = [
+            f"<tr><th>{fate}</th><td>{count}</td><td>{count / each.n:.0%}</td></tr>"
+            for fate, count in zip(FATES, each.fates, strict=True)
+        ]
+        parts.append(
+            f'<h4>{each.kind}: AP50 {each.ap50:.3f} of {each.n}</h4><div class="side">'
+            + as_table("<th>height, px</th><th>n</th><th>recall at 0.40</th><th>AP50</th>", rows)
+            + as_table("<th>true objects</th><th>n</th><th>share</th>", fates)
+            + _score_chart(each)
+            + "</div>"
+        )
+    return "".join(parts)
+
+
+def _tried_chart(now: Reached, tried: Sequence[Tried]) -> str:
+    bar = now.bar
+    values = [row.value(bar.metric, bar.source, now.n) for row in tried]
+    points: Points = [(number, value) for number, value in enumerate(values, 1) if value is not None]
+    asked = {number for number, row in enumerate(tried, 1) if row.asked}
+    last = 1.0 + _TICKS * math.ceil(max(1, len(tried) - 1) / _TICKS)
+    least = min([bar.least, *(value for _, value in points)])
+    series: dict[str, Points] = {
+        "bar": [(1.0, bar.least), (last, bar.least)],
+        "weights": [point for point in points if point[0] not in asked],
+        "asked otherwise": [point for point in points if point[0] in asked],
+    }
+    return lines(series, "recipe", _name(bar), (1.0, last), (math.floor(least * 5) / 5, 1.0))
+
+
+def _tried_table(now: Sequence[Reached], tried: Sequence[Tried]) -> str:
+    head = "".join(f"<th>{escape(_name(each.bar))}</th>" for each in now)
+    rows = []
+    for number, row in enumerate(tried, 1):
+        values = [row.value(each.bar.metric, each.bar.source, each.n) for each in now]
+        cells = "".join("<td></td>" if value is None else f"<td>{value:.3f}</td>" for value in values)
+        recipe = escape(f"{row.recipe}; {row.asked}" if row.asked else row.recipe)
+        rows.append(f'<tr><th>{number}</th><td class="text">{recipe} <code>{row.sha256[:8]}</code></td>{cells}</tr>')
+    return as_table(f'<th></th><th class="text">recipe</th>{head}', rows)
+
+
+def _height_chart(shares: Mapping[str, NDArray[np.float64]], title: str) -> str:
+    largest = max((float(share.max()) for share in shares.values()), default=0.0)
+    top = float(_TICKS * max(1, math.ceil(100 * largest / _TICKS)))
+    series: dict[str, Points] = {
+        name: [((tenth + 0.5) / TENTHS, 100 * float(value)) for tenth, value in enumerate(share)]
+        for name, share in shares.items()
+    }
+    y_label = f"{title}, % of the pixels there"
+    return lines(series, "height in the picture, 0 at the top", y_label, (0.0, 1.0), (0.0, top))
+
+
+def _score_chart(limits: BoxLimits) -> str:
+    first = int(1 + 0.1 // SCORE_STEPS[1])  # below 0.1 the wrong ones are legion
+    middles = (SCORE_STEPS[:-1] + SCORE_STEPS[1:])[first:] / 2
+    counts = {"right": limits.right[first:], "wrong": limits.wrong[first:]}
+    series: dict[str, Points] = {
+        name: [(float(x), float(y)) for x, y in zip(middles, ys, strict=True)] for name, ys in counts.items()
+    }
+    top = float(max(1, *(ys.max() for ys in counts.values())))
+    return lines(series, "score", f"{limits.kind} boxes", (0.0, 1.0), (0.0, top))
+
+
+def _name(bar: Bar) -> str:
+    metric = TITLES.get(bar.metric) or bar.metric.replace("_ap50", " AP50")
+    return metric if bar.source == PHOTOGRAPHS else f"{metric}, {bar.source}"
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more"

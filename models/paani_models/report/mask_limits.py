@@ -1,0 +1,130 @@
+"""What keeps a segmenter from the truth: where its mistakes lie, and what answers of its size could reach at best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from paani_models.segmenter_metrics import boundary, class_iou, confusion, edge_counts, f1
+from paani_models.segmenter_scores import WATER, Mask, as_label, read_truth, restrict
+from paani_models.sources import IGNORE, SEGMENTER_CLASSES, Sample, Source, read_picture
+
+Counts = NDArray[np.int64]
+
+REACHES_PX = (2, 4, 8)
+TENTHS = 10
+CELLS_HW = (64, 80)  # the shipped segmenter answers once per 4x4 pixels of its 256x320 input
+_UNDECIDED = len(SEGMENTER_CLASSES)
+
+
+@dataclass(frozen=True)
+class MaskLimits:
+    """Added over pictures of one source, in pixels of its masks.
+
+    counts, edges: as `confusion` and `edge_counts` give them, an undecided band between two classes split along its
+    middle for the edges; best_counts, best_edges: those of the best answer on CELLS_HW. near: wrong pixels within
+    REACHES_PX of a true edge or undecided band. false_water, missed_water, judged: by tenth of the height, top first.
+    """
+
+    source: Source
+    n: int
+    counts: Counts
+    edges: Counts
+    best_counts: Counts
+    best_edges: Counts
+    near: Counts
+    false_water: Counts
+    missed_water: Counts
+    judged: Counts
+
+    @property
+    def wrong(self) -> int:
+        """Judged pixels of another class than the truth."""
+        return int(self.counts.sum() - np.trace(self.counts))
+
+
+def mask_limits(
+    samples: Sequence[Sample], segment: Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]
+) -> list[MaskLimits]:
+    """One per source. Raises UserError naming a file that cannot be read."""
+    found: dict[Source, list[Counts]] = {}
+    for sample in tqdm(samples, "mistakes", unit="picture", mininterval=2.0):
+        truth = read_truth(sample)
+        label = restrict(segment(read_picture(sample.picture), truth.shape), sample.source)
+        row = np.concatenate([part.ravel() for part in mistakes(label, truth)])
+        found.setdefault(sample.source, []).append(row)
+    parts = np.cumsum([9, 4, 9, 4, len(REACHES_PX), TENTHS, TENTHS])
+    limits = []
+    for source, rows in found.items():
+        counts, edges, best_counts, best_edges, *rest = np.split(np.sum(rows, axis=0), parts)
+        square = counts.reshape(3, 3), edges, best_counts.reshape(3, 3), best_edges
+        limits.append(MaskLimits(source, len(rows), *square, *rest))
+    return limits
+
+
+def mistakes(label: Mask, truth: Mask) -> tuple[Counts, ...]:
+    """The counts of one picture, in the order of MaskLimits."""
+    decided = filled(truth)
+    best = gridded(decided)
+    wrong = (label != truth) & (truth != IGNORE)
+    edge = boundary(np.where(truth == IGNORE, np.uint8(_UNDECIDED), truth))
+    distance_px = cv2.distanceTransform((~edge).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    classes = len(SEGMENTER_CLASSES)
+    return (
+        confusion(label, truth, classes),
+        np.array(edge_counts(label, decided), np.int64),
+        confusion(best, truth, classes),
+        np.array(edge_counts(best, decided), np.int64),
+        np.array([(wrong & (distance_px <= reach)).sum() for reach in REACHES_PX], np.int64),
+        by_tenth(wrong & (label == WATER)),
+        by_tenth(wrong & (truth == WATER)),
+        by_tenth(truth != IGNORE),
+    )
+
+
+def filled(truth: Mask) -> Mask:
+    """Undecided pixels take the class of the nearest decided one; a mask without any stays as it is."""
+    undecided = truth == IGNORE
+    if undecided.all() or not undecided.any():
+        return truth
+    _, nearest = cv2.distanceTransformWithLabels(
+        undecided.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    kinds = np.zeros(int(nearest.max()) + 1, np.uint8)
+    kinds[nearest[~undecided]] = truth[~undecided]
+    return np.asarray(kinds[nearest], np.uint8)
+
+
+def gridded(truth: Mask) -> Mask:
+    """Each of CELLS_HW takes the class that fills most of it: what a net with so many answers could say at best."""
+    size_wh = CELLS_HW[::-1]
+    shares = [
+        cv2.resize((truth == kind).astype(np.float32), size_wh, interpolation=cv2.INTER_AREA)
+        for kind in range(len(SEGMENTER_CLASSES))
+    ]
+    return as_label(np.stack(shares)[None], truth.shape)
+
+
+def by_tenth(flags: NDArray[np.bool_]) -> Counts:
+    """Set pixels per tenth of the height, int64 [10], top first."""
+    return np.array([part.sum() for part in np.array_split(flags, TENTHS)], np.int64)
+
+
+def water_iou(counts: Counts) -> float:
+    """IoU of water from a confusion matrix [3,3]."""
+    return float(class_iou(counts)[WATER])
+
+
+def mean_iou(counts: Counts) -> float:
+    """Mean over the classes that occur."""
+    return float(np.nanmean(class_iou(counts)))
+
+
+def edge_f1(edges: Counts) -> float:
+    """F1 of counts as `edge_counts` gives them."""
+    return f1(*(int(count) for count in edges))

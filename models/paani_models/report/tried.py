@@ -1,0 +1,73 @@
+"""What was tried for the figures that have a bar: weights of before and how they were made, beside the present ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from paani.errors import UserError
+from paani_models.catalogue import Figure, Model, Record
+from paani_models.report.bars import Reached
+
+TRIED = "tried.json"
+PRESENT = "these weights"
+
+
+class Tried(Record, frozen=True):
+    """One recipe in words, and what it reached on held-out sequences of real pictures.
+
+    sha256: of the file that was measured. asked: in what way, where otherwise than the board does it.
+    """
+
+    net: str
+    sha256: str
+    recipe: str
+    figures: tuple[Figure, ...]
+    asked: str = ""
+
+    def value(self, metric: str, source: str, n: int) -> float | None:
+        """One of its figures; None where it has none of that name, or one of other pictures than n of them."""
+        return next((f.value for f in self.figures if (f.metric, f.source, f.n) == (metric, source, n)), None)
+
+
+class _Record(Record, frozen=True):
+    tried: tuple[Tried, ...]
+
+
+def read_tried(weights: Path) -> tuple[Tried, ...]:
+    """The record of a weights folder, oldest first, empty where there is none.
+
+    Raises UserError naming a malformed one.
+    """
+    path = weights / TRIED
+    if not path.is_file():
+        return ()
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=_Record).tried
+    except (OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{path}: {error}") from error
+
+
+def with_present(tried: Sequence[Tried], catalogue: dict[str, Model], reached: Sequence[Reached]) -> tuple[Tried, ...]:
+    """The record with the present weights as measured now, in their place, or as the last where it lacks them."""
+    rows = list(tried)
+    for net in dict.fromkeys(each.bar.net for each in reached):
+        figures = tuple(
+            Figure(each.bar.metric, each.bar.source, round(each.value, 4), each.n)
+            for each in reached
+            if each.bar.net == net
+        )
+        sha256 = catalogue[net].sha256
+        place = next((i for i, row in enumerate(rows) if row.sha256 == sha256 and not row.asked), None)
+        if place is None:
+            rows.append(Tried(net, sha256, PRESENT, figures))
+        else:
+            rows[place] = msgspec.structs.replace(rows[place], figures=figures)
+    return tuple(rows)
+
+
+def encoded(tried: Sequence[Tried]) -> bytes:
+    """The record as it stands beside a manifest."""
+    return msgspec.json.format(msgspec.json.encode(_Record(tuple(tried))), indent=1) + b"\n"
