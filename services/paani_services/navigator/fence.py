@@ -34,16 +34,24 @@ def contains(area: FenceArea, at_m: Point) -> bool:
     """Whether a ray to the east crosses the polygon's edge an odd number of times."""
     x_m, y_m = at_m
     inside = False
-    for (x1, y1), (x2, y2) in _edges(area):
+    for (x1, y1), (x2, y2) in edges(area):
         if (y1 > y_m) != (y2 > y_m) and x_m < (x2 - x1) * (y_m - y1) / (y2 - y1) + x1:
             inside = not inside
     return inside
 
 
+def edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
+    """From each corner to the next, the one that closes it first."""
+    last = area.corners[-1]
+    for corner in area.corners:
+        yield (last.x_m, last.y_m), (corner.x_m, corner.y_m)
+        last = corner
+
+
 def distance_m(fence: Fence, at_m: Point) -> float:
     """To the nearest edge of any area, infinite without a fence."""
     return min(
-        (math.dist(at_m, _nearest(at_m, *edge)) for area in fence for edge in _edges(area)),
+        (math.dist(at_m, _nearest(at_m, *edge)) for area in fence for edge in edges(area)),
         default=math.inf,
     )
 
@@ -53,7 +61,7 @@ def room_m(fence: Fence, from_m: Point, to_m: Point) -> float:
     length_m = math.dist(from_m, to_m)
     if not is_allowed(fence, from_m):
         return 0.0
-    cuts = sorted(cut for area in fence for edge in _edges(area) for cut in _crossings(from_m, to_m, *edge))
+    cuts = sorted(cut for area in fence for edge in edges(area) for cut in _crossings(from_m, to_m, *edge))
     for cut, beyond in pairwise((*cuts, 1.0)):
         middle = 0.5 * (cut + beyond)
         if not is_allowed(fence, _between(from_m, to_m, middle)):
@@ -64,7 +72,7 @@ def room_m(fence: Fence, from_m: Point, to_m: Point) -> float:
 def way_back_rad(fence: Fence, at_m: Point) -> float | None:
     """Direction of the nearest allowed point from one that is not; None where there is none."""
     found = sorted(
-        (_nearest(at_m, *edge) for area in fence for edge in _edges(area)), key=lambda point: math.dist(at_m, point)
+        (_nearest(at_m, *edge) for area in fence for edge in edges(area)), key=lambda point: math.dist(at_m, point)
     )
     for x_m, y_m in found:
         rad = portable.atan2(y_m - at_m[1], x_m - at_m[0])
@@ -130,13 +138,6 @@ def _speed_outside(
     return speed_mps
 
 
-def _edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
-    last = area.corners[-1]
-    for corner in area.corners:
-        yield (last.x_m, last.y_m), (corner.x_m, corner.y_m)
-        last = corner
-
-
 def _nearest(at_m: Point, start: Point, end: Point) -> Point:
     """Point of the edge nearest to `at_m`."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
@@ -153,7 +154,7 @@ def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
     return not any(
         _may_be_near(way, edge, margin_m) and _apart_m(way, edge) < margin_m and _is_border(fence, edge)
         for area in fence
-        for edge in _edges(area)
+        for edge in edges(area)
     )
 
 
@@ -188,7 +189,7 @@ def _apart_m(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
 
 
 def _on_edge(area: FenceArea, at_m: Point) -> bool:
-    return any(_nearest(at_m, *edge) == at_m for edge in _edges(area))
+    return any(_nearest(at_m, *edge) == at_m for edge in edges(area))
 
 
 def _between(start: Point, end: Point, part: float) -> Point:

@@ -118,7 +118,7 @@ def navigate(
         heading_rad = guarded_course(wanted.course_rad, state.guards)
     if plans and not inhibits and speed_mps > 0.0:
         wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0))
-        pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner)
+        pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner, mission.fence)
         state = msgspec.structs.replace(state, pilot=pilot)
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
         if speed_mps <= 0.0:

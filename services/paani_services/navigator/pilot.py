@@ -7,6 +7,8 @@ import msgspec
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry
+from paani_services.navigator.fence import Fence
+from paani_services.navigator.fence_cells import fenced
 from paani_services.navigator.grid import Camera, Moving, lay
 from paani_services.navigator.movers import movers
 from paani_services.navigator.planner import Plan, Start, Wish, plan
@@ -37,11 +39,17 @@ def looked(pilot: Pilot, odometry: Odometry | None, evidence: Evidence | None, c
 
 
 def steered(
-    pilot: Pilot, odometry: Odometry, wish: Wish, now_us: int, camera: Camera, config: PlannerConfig
+    pilot: Pilot,
+    odometry: Odometry,
+    wish: Wish,
+    now_us: int,
+    camera: Camera,
+    config: PlannerConfig,
+    fence: Fence = (),
 ) -> tuple[Pilot, Plan]:
-    """The plan for this wish: made anew for a new picture, another course or side, or after `replan_s`.
+    """The plan for this wish, within the fence and no faster than wished for.
 
-    No plan is faster than wished for.
+    It is made anew for a new picture, another course or side, or after `replan_s`.
     """
     held = pilot.plan
     is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
@@ -52,6 +60,6 @@ def steered(
         boxes: Moving = frozenset().union(*(mover.boxes for mover in moving))
         grid = lay(sights, (odometry.x_m, odometry.y_m), now_us, camera, config, boxes)
         start = Start(odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)
-        held = plan(grid, start, wish, held, config, moving)
+        held = plan(fenced(grid, fence), start, wish, held, config, moving)
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

@@ -25,7 +25,7 @@ from paani_sim.worlds.load import load_scenario
 
 
 def main(argv: list[str]) -> int:
-    """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake."""
+    """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake, 130 Ctrl-C."""
     options = _parser().parse_args(argv)
     for name, file in (("--json", options.json), ("--report", options.report), ("--record", options.record)):
         if file is not None and not file.absolute().parent.is_dir():
@@ -48,7 +48,7 @@ def _suite(options: argparse.Namespace) -> int:
         sys.stderr.write(f"{out}: {len(kept.results)} of {len(cases)} drives are there already\n")
     for why, count in kept.outdated.items():
         sys.stderr.write(f"{out}: {count} drives were made with {why}, and are driven again\n")
-    results, failures = dict(kept.results), list[Failure]()
+    results, failures, code = dict(kept.results), list[Failure](), 0
     try:
         with tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar:
             for case, result in drive_all(out, kept.wanted, maker, options.sets, options.jobs) if kept.wanted else ():
@@ -61,23 +61,23 @@ def _suite(options: argparse.Namespace) -> int:
                 bar.update()
     except KeyboardInterrupt:
         sys.stderr.write(f"\n{out}: {len(results)} of {len(cases)} drives done; the same command goes on\n")
-        return 130
+        code = 130
     for failure in failures:
         sys.stderr.write(f"{failure.case.name}: {failure.why}\n")
     diverged = [case for case in sorted(results) if results[case].why is Why.DIVERGED]
     for case in diverged:
         sys.stderr.write(f"{case.name}: {results[case].error}\n")
     if not results:
-        return 1
+        return code or 1
     summary = summarise(options.suite, results)
     sys.stdout.write(table(summary))
     if options.json:
         write_whole(options.json, msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n", "--json")
-    if options.report:
+    if options.report and not code:
         from paani_sim.trials.report import write_report  # noqa: PLC0415
 
         write_report(options.report, summary, results, options.sets, options.jobs)
-    return 1 if failures or diverged else 0
+    return code or int(bool(failures or diverged))
 
 
 def _one(options: argparse.Namespace) -> int:

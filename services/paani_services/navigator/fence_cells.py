@@ -1,0 +1,38 @@
+"""The fence on the planner's grid: what lies beyond it is no water to plan on. Pure."""
+
+import numpy as np
+
+from paani.messages import FenceArea, Keep
+from paani_services.navigator.fence import Fence, edges
+from paani_services.navigator.grid import CELL_M, CELLS, Grid, Mask
+
+
+def fenced(grid: Grid, fence: Fence) -> Grid:
+    """The grid with every cell occupied whose middle the fence does not allow; as `fence.is_allowed` but for edges."""
+    if not fence:
+        return grid
+    inner = [_inside(grid, area) for area in fence if area.keep is Keep.IN]
+    allowed = np.logical_or.reduce(inner) if inner else np.ones((CELLS, CELLS), np.bool_)
+    for area in fence:
+        if area.keep is Keep.OUT:
+            allowed &= ~_inside(grid, area)
+    return grid._replace(
+        occupied=grid.occupied | ~allowed,
+        hidden=grid.hidden & allowed,
+        free=grid.free & allowed,
+        beside=grid.beside & allowed,
+    )
+
+
+def _inside(grid: Grid, area: FenceArea) -> Mask:
+    """Cells from whose middle a ray to the east crosses the polygon's edge an odd number of times."""
+    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    x_m, y_m = grid.west_m + middle, grid.south_m + middle
+    inside = np.zeros((CELLS, CELLS), np.bool_)
+    for (x1, y1), (x2, y2) in edges(area):
+        first, last = np.searchsorted(y_m, sorted((y1, y2)))
+        if first == last:
+            continue
+        rows = slice(first, last)
+        inside[rows] ^= x_m < ((x2 - x1) * (y_m[rows] - y1) / (y2 - y1) + x1)[:, None]
+    return inside
