@@ -15,17 +15,13 @@ RECORDS = ("epochs.jsonl", "log.jsonl")
 
 
 class FaultCell(msgspec.Struct, frozen=True):
-    """One fault at one severity: of n pictures, how many the gate refused; what the segmenter still reaches.
-
-    implausible: of the refused ones, those that only the check after segmentation refused.
-    """
+    """One fault at one severity: of n pictures, how many the gate refused; what the segmenter still reaches."""
 
     fault: str
     severity: int
     n: int
     rejected: int
     miou: float
-    implausible: int = 0
 
 
 class FaultTotals(msgspec.Struct, frozen=True):
@@ -42,7 +38,6 @@ class CleanSource(msgspec.Struct, frozen=True):
     source: str
     n: int
     rejected: int
-    implausible: int = 0
 
 
 class FaultReport(msgspec.Struct, frozen=True):
@@ -75,20 +70,6 @@ def gate_figures(report: FaultReport) -> list[Figure]:
             Figure("fit_refused_frac", "spoilt", round(report.totals.false_reject_frac, 4), spoilt),
             Figure("clean_refused_frac", "all", round(report.totals.clean_reject_frac, 4), clean),
         ]
-    return figures
-
-
-def quality_figures(report: FaultReport) -> list[Figure]:
-    """The manifest's figures of the check after segmentation: what it refuses that nothing before it did."""
-    figures = [
-        Figure("clean_implausible_frac", source.source, round(source.implausible / source.n, 4), source.n)
-        for source in report.clean
-        if source.n
-    ]
-    spoilt = sum(cell.n for cell in report.cells)
-    if spoilt:
-        found = sum(cell.implausible for cell in report.cells) / spoilt
-        figures.append(Figure("implausible_frac", "spoilt", round(found, 4), spoilt))
     return figures
 
 
