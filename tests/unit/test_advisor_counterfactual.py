@@ -133,7 +133,8 @@ def test_the_nearest_limit_by_hand() -> None:
     found = advice[0].counterfactual
     assert found.limit is m.Limit.SIDE_GAIN
     assert found.margin == pytest.approx(0.011)
-    _, advice, _ = play([water(0.57, 0.70, 0.60)])
+    wet = m.LaneEvidence(non_water=0.9, uncertainty=0.5, clear_width=0.1)  # a risk of 0.57, but not dry
+    _, advice, _ = play([msgspec.structs.replace(water(0.57, 0.70, 0.60), left=wet)])
     found = advice[0].counterfactual
     assert found.limit is m.Limit.LEFT_RISK
     assert found.margin == pytest.approx(-0.01)

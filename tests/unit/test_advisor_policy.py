@@ -186,3 +186,16 @@ def test_a_hidden_obstacle_fades_in_paani_and_stays_in_paper() -> None:
     assert [len(t.tracks) for t in tracks] == [1] * 12
     assert fading[11].center.obstacle < 0.2 * fading[1].center.obstacle
     assert lasting[11].center.obstacle == pytest.approx(lasting[1].center.obstacle)
+
+
+@pytest.mark.parametrize("shown", [0.96, 1.0])
+def test_no_turn_into_a_lane_without_water(shown: float) -> None:
+    """A beach from side to side, seen for certain, is a risk of 0.55 in each lane, and no side's limit is that low."""
+    dry = m.LaneEvidence(non_water=shown, uncertainty=0.0, clear_width=1.0 - shown)
+    beach = msgspec.structs.replace(CLEAR, left=dry, center=dry, right=dry)
+    _, advice, _ = play([beach])
+    assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SAFE_SIDE)
+    _, advice, _ = play([msgspec.structs.replace(beach, left=lane(0.4))])
+    assert advice[0].direction is D.LEFT
+    _, advice, _ = play([beach], PAPER)
+    assert advice[0].direction is D.RIGHT

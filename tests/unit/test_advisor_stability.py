@@ -41,7 +41,9 @@ def test_a_new_side_must_be_clearly_better() -> None:
 
 def test_a_side_that_becomes_barred_is_left_at_once() -> None:
     """J8: no margin holds a turn into a barred side."""
-    _, advice, _ = play([water(0.30, 0.50, 0.40), water(0.58, 0.50, 0.57)])
+    wet = m.LaneEvidence(non_water=0.9, uncertainty=0.5, clear_width=0.1)  # a risk of 0.57, but not dry
+    barred = msgspec.structs.replace(water(0.58, 0.50, 0.57), right=wet)
+    _, advice, _ = play([water(0.30, 0.50, 0.40), barred])
     assert [a.direction for a in advice] == [D.LEFT, D.RIGHT]
 
 

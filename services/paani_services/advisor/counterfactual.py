@@ -28,6 +28,7 @@ from paani_services.advisor.policy import (
     decide,
     direct,
     fills,
+    is_dry,
     is_vessel_ahead,
     limit_of,
     place_in_center,
@@ -148,7 +149,7 @@ def nearest_limit(
     for lane in LANES:
         limit = lanes[lane].limit
         margin = risks[lane] - limit
-        if lanes[lane].occupied or (lane == "center" and vessel):
+        if lanes[lane].occupied or is_dry(lanes[lane].non_water, policy) or (lane == "center" and vessel):
             continue
         across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
         moved = msgspec.structs.replace(standing, better=better_side(state, across, policy), **{lane: margin < 0.0})
@@ -215,13 +216,14 @@ def _scene(
         inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
         filling = [o for o in obstacles if fills(o, lane, config)]
         lasting = before + 1 >= policy.occupancy_frames
+        dry = (wet.get(lane),) if is_dry(water[lane].non_water, policy) else ()
         lanes[lane] = _Lane(
             non_water=water[lane].non_water,
             uncertainty=water[lane].uncertainty,
             water=wet.get(lane),
             obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
             urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
-            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
+            occupying=(*dry, *(bit.get(o.id) for o in filling if lasting or o.danger)),
             limit=limit_of(lane, state, policy),
         )
     middle = lane_span("center", config.perception.corridors)

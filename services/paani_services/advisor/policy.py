@@ -67,8 +67,9 @@ def decide(
     frames, occupied = _occupancy(state, obstacles, config)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     limits = {lane: limit_of(lane, state, policy) for lane in LANES}
+    barred = {lane: occupied[lane] or is_dry(lanes[lane].non_water, policy) for lane in LANES}
     blocked = {
-        lane: occupied[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
+        lane: barred[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
     }
     judged = {lane: _lane_risk(lanes[lane], limits[lane], occupied[lane], blocked[lane]) for lane in LANES}
     clear_frames = 0 if blocked["center"] else state.clear_frames + 1
@@ -142,6 +143,11 @@ def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
     span = lane_span(lane, config.perception.corridors)
     coverage = policy.planned_coverage if is_planned(config) else policy.occupancy_coverage
     return 0.0 < shared_width(obstacle.box, span) >= coverage * (span[1] - span[0])
+
+
+def is_dry(non_water: float, policy: PolicyConfig) -> bool:
+    """A lane that shows no water, whatever its risk: land, a wall, or a hull from side to side."""
+    return non_water > policy.dry
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:

@@ -84,6 +84,7 @@ class PolicyConfig(Section, frozen=True):
     occupancy_coverage: Fraction = 0.25  # J6
     planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
     occupancy_frames: Size = 2  # J6
+    dry: Fraction = 0.95  # a lane of which more is no water is barred, as water alone is a risk of 0.7 at most
     center_vessel_area: Fraction = 0.04  # J7
     core_left: Fraction = 0.405  # J9
     core_right: Fraction = 0.595  # J9

@@ -25,7 +25,11 @@ PAPER: dict[str, object] = {
         },
         "risk": {"far_m": 0.0},  # J1: by the picture alone
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
-        "policy": {"side_change_margin": 0.0, "release_margin": 0.0},  # J5, resolution 13: thresholds without memory
+        "policy": {
+            "side_change_margin": 0.0,  # J5, resolution 13: thresholds without memory
+            "release_margin": 0.0,
+            "dry": 1.0,  # J5: risk alone
+        },
     },
     "navigator": {
         "acceptance_m": 1.0,  # M2
