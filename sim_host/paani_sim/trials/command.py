@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -49,6 +50,7 @@ def _suite(options: argparse.Namespace) -> int:
     for why, count in kept.outdated.items():
         sys.stderr.write(f"{out}: {count} drives were made with {why}, and are driven again\n")
     results, failures, code = dict(kept.results), list[Failure](), 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # or the processes that drive would go on without it
     try:
         with tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar:
             for case, result in drive_all(out, kept.wanted, maker, options.sets, options.jobs) if kept.wanted else ():
@@ -60,8 +62,8 @@ def _suite(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(f"paani touched something in {touched}", refresh=False)
                 bar.update()
     except KeyboardInterrupt:
+        results, code = dict(look(out, cases, maker).results), 130
         sys.stderr.write(f"\n{out}: {len(results)} of {len(cases)} drives done; the same command goes on\n")
-        code = 130
     for failure in failures:
         sys.stderr.write(f"{failure.case.name}: {failure.why}\n")
     diverged = [case for case in sorted(results) if results[case].why is Why.DIVERGED]

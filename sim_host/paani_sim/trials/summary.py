@@ -28,7 +28,10 @@ class StopFigures(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PolicyFigures(msgspec.Struct, frozen=True, kw_only=True):
-    """Sums over all drives without a fault. `near_misses` are of things; those of banks are counted apart."""
+    """Sums over all drives without a fault. `near_misses` are of things; those of banks are counted apart.
+
+    `close_per_km`: near misses and contacts, as a boat held by what it hit comes near to nothing after it.
+    """
 
     trials: int
     completed: int
@@ -42,6 +45,7 @@ class PolicyFigures(msgspec.Struct, frozen=True, kw_only=True):
     near_misses: int
     near_misses_bank: int
     near_misses_per_km: float
+    close_per_km: float
     distance_m: float
     progress_m: float
     seconds: float
@@ -130,6 +134,7 @@ def figures(results: Sequence[TrialResult]) -> PolicyFigures:
         near_misses=near,
         near_misses_bank=sum(r.near_misses_bank for r in results),
         near_misses_per_km=round(near / km, 3),
+        close_per_km=round((near + collisions) / km, 3),
         distance_m=round(distance_m, 1),
         progress_m=round(sum(r.progress_m for r in results), 1),
         seconds=round(seconds, 1),
@@ -177,13 +182,14 @@ def table(summary: Summary) -> str:
     """One line per policy, then one per fault."""
     lines = [
         f"{'policy':8} {'drives':>6}  {'completed [95 %]':22} {'no contact [95 %]':22} {'contacts':>8} {'visible':>7}"
-        f" {'bank':>5} {'per km':>7} {'near':>5} {'least':>6} {'off rms':>8} {'turns/min':>9} {'km':>7}"
+        f" {'bank':>5} {'per km':>7} {'near':>5} {'close/km':>8} {'least':>6} {'off rms':>8} {'turns/min':>9} {'km':>7}"
     ]
     for name, p in summary.policies.items():
         lines.append(
             f"{name:8} {p.trials:6}  {_share(p.completed_share):22} {_share(p.untouched_share):22} {p.collisions:8}"
             f" {p.collisions_visible:7} {p.collisions_bank:5} {p.contacts_per_km:7.2f} {p.near_misses:5}"
-            f" {p.min_clearance_m:6.2f} {p.off_route_rms_m:8.2f} {p.changes_per_min:9.2f} {p.distance_m * 1e-3:7.3f}"
+            f" {p.close_per_km:8.2f} {p.min_clearance_m:6.2f} {p.off_route_rms_m:8.2f}"
+            f" {p.changes_per_min:9.2f} {p.distance_m * 1e-3:7.3f}"
         )
     if summary.faults:
         lines += [
