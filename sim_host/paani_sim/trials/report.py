@@ -75,7 +75,8 @@ def _policies(rows: Mapping[str, PolicyFigures]) -> str:
                 escape(name), str(p.trials), _share(p.completed_share), _share(p.untouched_share), _bad(p.collisions),
                 _bad(p.collisions_visible), str(p.collisions_bank), f"{p.contacts_per_km:.2f}", str(p.near_misses),
                 f"{p.close_per_km:.1f}", f"{p.min_clearance_m:.2f}", f"{p.off_route_rms_m:.2f}",
-                f"{p.mean_speed_mps:.2f}", f"{p.changes_per_min:.1f}", "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
+                f"{p.mean_speed_mps:.2f}", f"{p.changes_per_min:.1f}",
+                "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
             )
             for name, p in rows.items()
         ],
