@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from paani.messages import FenceArea, Keep, Waypoint
 from paani_services.navigator.fence import is_allowed
 from paani_services.navigator.fence_cells import fenced
-from paani_services.navigator.grid import CELL_M, CELLS, Grid, lay
+from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.pilot import Pilot, steered
 from paani_services.navigator.planner import Plan, Start, Wish, plan
+from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, odometry, seen
 

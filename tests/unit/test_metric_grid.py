@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from paani.config import CalibrationConfig, calibration_of, load_config
 from paani.errors import UserError
 from paani.messages import Detection, Label, SegmentationSource, TimeBase
-from paani_services.navigator.grid import CELL_M, CELLS, Camera, Grid, blind_reach_m, hull_top, lay
+from paani_services.navigator.grid import CELLS, Grid, blind_reach_m, lay
 from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
+from paani_services.navigator.shown import CELL_M, Camera, hull_top
 from paani_services.navigator.sighting import Foot, Memory, pose_at, remember, shows_water
 from paani_sim.eye.camera import BoatPose, project
 from paani_sim.eye.camera import Camera as Eye

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.config import load_config
-from paani_services.navigator.grid import CELL_M, CELLS, Grid, lay
+from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.planner import (
     Plan,
     Start,
@@ -22,6 +22,7 @@ from paani_services.navigator.planner import (
     plan,
     roll_out,
 )
+from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose
 from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, seen

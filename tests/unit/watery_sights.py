@@ -6,7 +6,7 @@ import numpy as np
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.navigator.grid import Camera
+from paani_services.navigator.shown import Camera
 from paani_services.navigator.sighting import Memory, remember
 from paani_sim.eye.camera import BoatPose, look_from
 from paani_sim.eye.camera import Camera as Eye

@@ -4,7 +4,8 @@ import numpy as np
 
 from paani.messages import FenceArea, Keep
 from paani_services.navigator.fence import Fence, edges
-from paani_services.navigator.grid import CELL_M, CELLS, Grid, Mask
+from paani_services.navigator.grid import CELLS, Grid
+from paani_services.navigator.shown import CELL_M, Mask
 
 
 def fenced(grid: Grid, fence: Fence) -> Grid:

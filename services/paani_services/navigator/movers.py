@@ -11,8 +11,9 @@ import numpy as np
 
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.grid import Camera, Moving, hull_top
+from paani_services.navigator.grid import Moving
 from paani_services.navigator.projection import F64, lens_at, ranges_m, rays, together
+from paani_services.navigator.shown import Camera, hull_top
 from paani_services.navigator.sighting import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 
 ROW_RAD = 0.0044  # one row of 240: how exactly a box's lower end is known

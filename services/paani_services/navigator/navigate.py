@@ -22,11 +22,12 @@ from paani.messages import (
 )
 from paani_services.navigator.crab import Crab, learned, paused
 from paani_services.navigator.fence import bounded_speed, is_allowed
-from paani_services.navigator.grid import UNCALIBRATED, Camera
+from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
 from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, acts, looked, steered
 from paani_services.navigator.planner import Wish
+from paani_services.navigator.shown import Camera
 from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
 
 

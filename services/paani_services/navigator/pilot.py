@@ -9,9 +9,10 @@ from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry
 from paani_services.navigator.fence import Fence
 from paani_services.navigator.fence_cells import fenced
-from paani_services.navigator.grid import Camera, Moving, lay
+from paani_services.navigator.grid import Moving, lay
 from paani_services.navigator.movers import movers
 from paani_services.navigator.planner import Plan, Start, Wish, plan
+from paani_services.navigator.shown import Camera
 from paani_services.navigator.sighting import Memory, remember
 
 SAME_COURSE_RAD = math.radians(3.0)

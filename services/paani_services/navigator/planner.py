@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from paani import portable
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani_services.navigator.grid import CELL_M, CELLS, Grid, Mask
+from paani_services.navigator.grid import CELLS, Grid
 from paani_services.navigator.movers import Mover
 from paani_services.navigator.projection import F64
+from paani_services.navigator.shown import CELL_M, Mask
 
 FIELD_CELLS = 10  # distances are known up to 2 m
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
