@@ -56,6 +56,16 @@ def test_what_cameras_see(name: str) -> None:
     assert judge(GateState(), PICTURES[name], 1, ON, FITNESS)[1] is C.NONE
 
 
+@pytest.mark.parametrize("name", ["river", "river_at_dusk"])
+@pytest.mark.parametrize("size_wh", [(320, 240), (480, 270), (640, 480)])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_lines_of_a_wrong_length(name: str, size_wh: tuple[int, int], sense: int) -> None:
+    """Each line begins 3/320 of the width further along than the one above, to either side."""
+    picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_AREA)[:, ::sense]
+    skewed, _ = spoilt("sheared", picture, np.zeros(size_wh[::-1], np.uint8), 5, np.random.default_rng(0))
+    assert judge(GateState(), np.ascontiguousarray(skewed[:, ::sense]), 1, ON)[1] is C.SKEWED
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_what_only_the_net_knows(seed: int) -> None:
     """These have sound statistics: only the net knows that no camera on a boat sees this."""

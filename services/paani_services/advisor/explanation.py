@@ -24,6 +24,7 @@ UNUSABLE = {
     UnusableCause.NOISE: "is noise",
     UnusableCause.BLURRED: "is blurred",
     UnusableCause.COVERED: "is covered",
+    UnusableCause.SKEWED: "has lines of a wrong length",
     UnusableCause.FROZEN: "is frozen",
     UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",

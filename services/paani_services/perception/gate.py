@@ -24,6 +24,7 @@ PLAIN_STD, DARK_TILE_STD, DARK_TILE_MEAN = 2.0, 3.0, 40.0
 # J. Immerkaer, Fast Noise Variance Estimation, 1996: a mask that image structure does not answer to.
 NOISE_MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 NOISE_SCALE = float(np.sqrt(np.pi / 2.0)) / 6.0
+SKEW_ROWS, SKEW_PX = 2, (4, 10)  # lines this far apart, moved by so much against each other
 
 
 class GateState(NamedTuple):
@@ -38,6 +39,7 @@ class Statistics(NamedTuple):
     """What the gate looks at. Levels are of 255, shares of 1; `correlation` is of neighbouring small pixels.
 
     `upright_residual` is the part of the variation that vertical stripes do not explain: test cards have none.
+    `skew` is how unlike lines are at best that are moved against each other, to how unlike they are as they stand.
     """
 
     mean: float
@@ -51,6 +53,7 @@ class Statistics(NamedTuple):
     fineness: float
     covered_frac: float
     rest_mean: float
+    skew: float
 
 
 def judge(
@@ -109,6 +112,7 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
         fineness=_edges(fine) / (_edges(small) + 1e-3),
         covered_frac=float(covered.mean()),
         rest_mean=float(tile_mean[~covered].mean()) if not covered.all() else 0.0,
+        skew=_skew(middle),
     )
 
 
@@ -136,6 +140,8 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
         return UnusableCause.COVERED
     if seen.fineness < config.blur_fineness:
         return UnusableCause.BLURRED
+    if seen.skew < config.skew:
+        return UnusableCause.SKEWED
     return UnusableCause.NONE
 
 
@@ -144,6 +150,22 @@ def _edges(luma: Floats) -> float:
     across = cv2.norm(luma[:, 2:], luma[:, :-2], cv2.NORM_L1) / luma[:, 2:].size
     down = cv2.norm(luma[2:], luma[:-2], cv2.NORM_L1) / luma[2:].size
     return float(across + down) / 4.0
+
+
+def _skew(middle: Bytes) -> float:
+    """Lines of a wrong length each begin further along: moved back, every line is like the one above it."""
+    lines = np.ascontiguousarray(middle[::SKEW_ROWS])
+    above, below = lines[:-1], lines[1:]
+
+    def unlike(first: Bytes, second: Bytes) -> float:
+        return cv2.norm(first, second, cv2.NORM_L1) / first.size
+
+    moved = min(
+        unlike(one[:, by:], other[:, :-by])
+        for by in range(SKEW_PX[0], SKEW_PX[1] + 1)
+        for one, other in ((above, below), (below, above))
+    )
+    return moved / (unlike(above, below) + 1e-3)
 
 
 def _tiles(middle: Bytes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -31,6 +31,7 @@ class UnusableCause(StrEnum):
     NOISE = "noise"
     BLURRED = "blurred"
     COVERED = "covered"
+    SKEWED = "skewed"
     FROZEN = "frozen"
     UNFIT = "unfit"
     STALE = "stale"
