@@ -20,6 +20,11 @@ def lane(risk: float) -> m.LaneEvidence:
     return m.LaneEvidence(non_water=non_water, uncertainty=uncertainty, clear_width=1.0 - non_water)
 
 
+def murky(risk: float) -> m.LaneEvidence:
+    """As `lane`, for 0.495 to 0.645, but with some water left in it: no dry lane."""
+    return m.LaneEvidence(non_water=0.9, uncertainty=(risk - 0.495) / 0.15, clear_width=0.1)
+
+
 CLEAR = m.Evidence(
     source_us=T0_US, frame_seq=0, frame_epoch=1, width_px=320, height_px=240, usable=True,
     left=lane(0.05), center=lane(0.05), right=lane(0.05),

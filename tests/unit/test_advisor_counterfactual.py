@@ -16,7 +16,7 @@ from paani_services.advisor.counterfactual import CLEAR_WATER, counterfactual, n
 from paani_services.advisor.explanation import explain
 from paani_services.advisor.policy import PolicyState, decide
 from paani_services.advisor.risk import LANES, components
-from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, lane, play, seeing, water
+from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, lane, murky, play, seeing, water
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
 D, R, By = m.Direction, m.Reason, m.ChangedBy
@@ -133,8 +133,7 @@ def test_the_nearest_limit_by_hand() -> None:
     found = advice[0].counterfactual
     assert found.limit is m.Limit.SIDE_GAIN
     assert found.margin == pytest.approx(0.011)
-    wet = m.LaneEvidence(non_water=0.9, uncertainty=0.5, clear_width=0.1)  # a risk of 0.57, but not dry
-    _, advice, _ = play([msgspec.structs.replace(water(0.57, 0.70, 0.60), left=wet)])
+    _, advice, _ = play([msgspec.structs.replace(water(0.57, 0.70, 0.60), left=murky(0.57))])
     found = advice[0].counterfactual
     assert found.limit is m.Limit.LEFT_RISK
     assert found.margin == pytest.approx(-0.01)

@@ -14,7 +14,7 @@ from paani.config import Config, load_config
 from paani.dithering import Dithering, dithering
 from paani_services.advisor.policy import OTHER, PolicyState, better_side, limit_of, side_held
 from paani_services.advisor.risk import LANES, components, severity
-from tests.unit.advisor_evidence import PAANI, PAPER, play, water
+from tests.unit.advisor_evidence import PAANI, PAPER, murky, play, water
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
 pytestmark = pytest.mark.slow
@@ -41,8 +41,7 @@ def test_a_new_side_must_be_clearly_better() -> None:
 
 def test_a_side_that_becomes_barred_is_left_at_once() -> None:
     """J8: no margin holds a turn into a barred side."""
-    wet = m.LaneEvidence(non_water=0.9, uncertainty=0.5, clear_width=0.1)  # a risk of 0.57, but not dry
-    barred = msgspec.structs.replace(water(0.58, 0.50, 0.57), right=wet)
+    barred = msgspec.structs.replace(water(0.58, 0.50, 0.57), right=murky(0.57))
     _, advice, _ = play([water(0.30, 0.50, 0.40), barred])
     assert [a.direction for a in advice] == [D.LEFT, D.RIGHT]
 

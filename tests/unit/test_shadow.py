@@ -15,7 +15,7 @@ from paani.config import Config
 from paani.config.tuning import FIXED, TUNABLE, setting_text
 from paani.decider import Input, Inputs, Outputs
 from paani_services.advisor.decide import DECIDER, DeciderState, decide
-from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, T0_US, box, seeing, water
+from tests.unit.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, T0_US, box, murky, seeing, water
 
 pytestmark = pytest.mark.slow
 
@@ -125,7 +125,7 @@ def test_disagreements_are_counted_and_named() -> None:
 
     boat = Boat()
     boat.ask(ACT.PROPOSE, "b", (m.Change(path="advisor.policy.side_block_risk", value="0.7"),))
-    boat.see([water(0.6, 0.6, 0.6)] * 20)
+    boat.see([msgspec.structs.replace(CLEAR, left=murky(0.6), center=murky(0.6), right=murky(0.6))] * 20)
     assert (boat.shadow.moves_more, boat.shadow.stops_more, len(boat.shadow.recent)) == (20, 0, 8)
 
 
