@@ -21,6 +21,7 @@ from paani.messages import (
     Inhibit,
     LaneRisk,
     NavCommand,
+    Odometry,
     Reason,
     Route,
     SimTime,
@@ -57,22 +58,26 @@ class Pool:
             self._drift()
             if self.looks:
                 self.shown = evidence(self.now_us, edge_of(self.boat, self.bars, self.bank_m))
-            at = odometry(self.now_us, self.boat, self.speed_mps)
-            heard = Heard(
-                advisory=Advisory(source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR),
-                advisory_us=self.now_us,
-                odometry=at,
-                odometry_us=self.now_us,
-                clock=SimTime(source_us=self.now_us, sim_us=self.now_us, stamp_us=1),
-                clock_us=self.now_us,
-                arming=Arming(source_us=self.now_us, armed=True),
-                arming_us=self.now_us,
-                evidence=self.shown,
-            )
+            advisory = Advisory(source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
+            heard = self.heard(advisory, odometry(self.now_us, self.boat, self.speed_mps))
             self.state, self.order = navigate(
                 self.state, heard, route_alone(EAST), self.now_us, 43, CONFIG, self.camera
             )
             yield self.order
+
+    def heard(self, advisory: Advisory, at: Odometry) -> Heard:
+        """All of it fresh, the boat armed."""
+        return Heard(
+            advisory=advisory,
+            advisory_us=self.now_us,
+            odometry=at,
+            odometry_us=self.now_us,
+            clock=SimTime(source_us=self.now_us, sim_us=self.now_us, stamp_us=1),
+            clock_us=self.now_us,
+            arming=Arming(source_us=self.now_us, armed=True),
+            arming_us=self.now_us,
+            evidence=self.shown,
+        )
 
     def settle(self, seconds: float) -> NavCommand:
         *_, last = self.run(seconds)
@@ -238,16 +243,8 @@ def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
     for camera, steers in ((CAMERA, True), (UNCALIBRATED, False)):
         pool = Pool(boat=BoatPose(0.0, 2.0, 0.0), camera=camera)
         pool.settle(1.0)
-        heard = Heard(
-            advisory=msgspec.structs.replace(advisory, source_us=pool.now_us),
-            advisory_us=pool.now_us,
-            odometry=odometry(pool.now_us, BoatPose(0.0, 2.0, 0.0)),
-            odometry_us=pool.now_us,
-            clock=SimTime(source_us=pool.now_us, sim_us=pool.now_us, stamp_us=1),
-            clock_us=pool.now_us,
-            arming=Arming(source_us=pool.now_us, armed=True),
-            arming_us=pool.now_us,
-            evidence=pool.shown,
+        heard = pool.heard(
+            msgspec.structs.replace(advisory, source_us=pool.now_us), odometry(pool.now_us, BoatPose(0.0, 2.0, 0.0))
         )
         _, order = navigate(pool.state, heard, route_alone(EAST), pool.now_us, 43, CONFIG, camera)
         assert (order.heading_rad < -0.1) is steers

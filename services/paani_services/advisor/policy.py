@@ -130,18 +130,15 @@ def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfi
     return other if gain > 0.0 and gain >= needed else held
 
 
-def is_planned(config: Config) -> bool:
-    """Whether the metric planner acts: it knows in metres what is wide enough to pass, and goes nowhere else."""
-    return config.calibration.valid and config.navigator.planner.use
-
-
 def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
     """Low in the picture and wide enough to occupy the lane (J6)."""
     policy = config.advisor.policy
     if obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
-    coverage = policy.planned_coverage if is_planned(config) else policy.occupancy_coverage
+    coverage = (
+        policy.planned_coverage if config.navigator.planner.acts_on(config.calibration) else policy.occupancy_coverage
+    )
     return 0.0 < shared_width(obstacle.box, span) >= coverage * (span[1] - span[0])
 
 
@@ -158,7 +155,7 @@ def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
     if not obstacle.craft or obstacle.presence < SEEN_ENOUGH:
         return False
     policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
-    if is_planned(config):
+    if config.navigator.planner.acts_on(config.calibration):
         span = (policy.core_left, policy.core_right)
     return 0.0 < area(obstacle.box) * overlap(obstacle.box, span) >= policy.center_vessel_area
 

@@ -25,7 +25,7 @@ from paani_services.navigator.fence import bounded_speed, is_allowed
 from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
-from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, acts, looked, steered
+from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, looked, steered
 from paani_services.navigator.planner import Wish
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
@@ -75,7 +75,7 @@ def navigate(
     if mission is None:
         inhibits.append(Inhibit.NO_ROUTE)
     state = _forget_turn(state, heard)
-    plans = acts(camera, config.planner)
+    plans = config.planner.acts_on(camera.calibration)
     if plans:
         pilot = looked(state.pilot, heard.odometry, heard.evidence, config.planner)
         state = msgspec.structs.replace(state, pilot=pilot)

@@ -29,11 +29,6 @@ class Pilot(msgspec.Struct, frozen=True):
     frame: tuple[int, int] = (-1, -1)
 
 
-def acts(camera: Camera, config: PlannerConfig) -> bool:
-    """Whether the planner steers: it refuses without a valid calibration."""
-    return config.use and camera.calibration.valid
-
-
 def looked(pilot: Pilot, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig) -> Pilot:
     """The pilot with what is new to remember."""
     return msgspec.structs.replace(pilot, memory=remember(pilot.memory, odometry, evidence, config))

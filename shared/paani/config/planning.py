@@ -108,3 +108,7 @@ class PlannerConfig(Section, frozen=True):
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
     span_deg: Angle = 120.0  # headings to either side of the wanted course
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
+
+    def acts_on(self, calibration: CalibrationConfig) -> bool:
+        """Whether the planner steers: it refuses without a valid calibration."""
+        return self.use and calibration.valid
