@@ -104,7 +104,8 @@ def _refine(channels: int) -> nn.Sequential:
 class ImageNetSegmenter(nn.Module):
     """RGB normalised as in `paani_models.catalogue`, float32 [N,3,H,W] (H, W multiples of 32) -> logits [N,3,H,W].
 
-    The encoder sees a smaller picture; a thin branch at full size keeps the edges. Logits are constant over 4x4 pixels.
+    The encoder sees a smaller picture; a thin branch at full size keeps the edges. Logits are interpolated between the
+    middles of 4x4 pixels.
     """
 
     def __init__(self) -> None:
@@ -154,7 +155,7 @@ class ImageNetSegmenter(nn.Module):
             y = refine(F.interpolate(y, size=_size(tap), mode="nearest") + lateral(tap))
         detail = self.detail(x)
         y = self.finish(F.interpolate(y, size=_size(detail), mode="bilinear", align_corners=False) + detail)
-        return F.interpolate(self.head(y), scale_factor=4.0, mode="nearest")
+        return F.interpolate(self.head(y), scale_factor=4.0, mode="bilinear", align_corners=False)
 
     def forward(self, x: Tensor) -> Tensor:
         return self.decode(self.taps(x), x)

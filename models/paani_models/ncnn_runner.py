@@ -19,6 +19,7 @@ from paani_models.catalogue import Record, file_sha256
 Floats = NDArray[np.float32]
 Run = Callable[[Floats], Floats]
 INPUT, OUTPUT = "in0", "out0"
+_CUBIC, _CORNERS_STAY = "0=3", "6=1"  # settings of ncnn's Interp
 NOT_INSTALLED = "ncnn is not installed; install the extra paani[ncnn]"
 _SMALL = ("use_fp16_packed", "use_fp16_storage", "use_fp16_arithmetic", "use_bf16_packed", "use_bf16_storage")
 
@@ -80,8 +81,16 @@ def release() -> str | None:
     return str(ncnn.__version__)
 
 
-def open_ncnn(files: NcnnFiles, threads: int) -> Run:
-    """A function from input [1,C,H,W] to the output with a leading 1, computed in float32. The calls release the GIL.
+def resized(files: NcnnFiles) -> str | None:
+    """Name of what the last step resizes, as `last_resize` has it, into the output; None where it is no such step."""
+    for words in map(str.split, files.param.read_text(encoding="utf-8", errors="replace").splitlines()):
+        if words[:1] == ["Interp"] and words[2:4] == ["1", "1"] and words[5] == OUTPUT:
+            return None if {_CUBIC, _CORNERS_STAY} & set(words) else words[4]
+    return None
+
+
+def open_ncnn(files: NcnnFiles, threads: int, output: str = OUTPUT) -> Run:
+    """A function from input [1,C,H,W] to an output with a leading 1, computed in float32. The calls release the GIL.
 
     Raises UserError where ncnn is not installed, or naming a file that it does not read.
     """
@@ -102,9 +111,9 @@ def open_ncnn(files: NcnnFiles, threads: int) -> Run:
     def run(x: Floats) -> Floats:
         extractor = net.create_extractor()
         taken = extractor.input(INPUT, ncnn.Mat(np.ascontiguousarray(x[0], np.float32)))
-        failed, output = extractor.extract(OUTPUT) if taken == 0 else (taken, None)
+        failed, answer = extractor.extract(output) if taken == 0 else (taken, None)
         if failed != 0:
-            raise UserError(f"{files.param}: does not run from {INPUT} to {OUTPUT}")
-        return np.array(output, np.float32)[None]
+            raise UserError(f"{files.param}: does not run from {INPUT} to {output}")
+        return np.array(answer, np.float32)[None]
 
     return run

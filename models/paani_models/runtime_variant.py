@@ -1,8 +1,8 @@
 """The same net with less around it: picture in as bytes, scores out once per cell.
 
-The float32 contract costs a look-up per pixel before each run, and the segmenter's last step writes every score
-sixteen times. A variant takes RGB bytes [1,H,W,3], scales them itself, and leaves that last step out. Its answers are
-the shipped net's to rounding; a manifest beside it states what it takes and gives.
+The float32 contract costs a look-up per pixel before each run, and the segmenter's last step makes sixteen scores of
+each. A variant takes RGB bytes [1,H,W,3], scales them itself, and leaves that last step out, as perception does. Its
+answers are the shipped net's to rounding; a manifest beside it states what it takes and gives.
 """
 
 from __future__ import annotations
@@ -17,16 +17,19 @@ from onnx import TensorProto, helper, numpy_helper
 
 from paani.errors import UserError
 from paani_models.catalogue import Model, Tensor, file_sha256, load_catalogue, save_catalogue
+from paani_models.last_resize import before_resize
 
 
 def write_variant(name: str, contract: Model, net: Path, folder: Path) -> Model:
     """Write `folder`/<file> and its manifest entry, both by renaming. Raises UserError naming a file that is no net."""
     try:
-        model = onnx.load(str(net))
+        whole = net.read_bytes()
+        cells = before_resize(whole)
+        model = onnx.load_from_string(cells or whole)
     except Exception as error:
         raise UserError(f"{net}: not a readable ONNX file ({type(error).__name__})") from error
     _take_bytes(model, contract)
-    output = _once_per_cell(model) if len(contract.output.shape) == 4 else contract.output
+    output = _stated(model, contract.output.shape[:2]) if cells else contract.output
     onnx.checker.check_model(model, full_check=True)
     folder.mkdir(parents=True, exist_ok=True)
     beside = folder / f"{contract.file}.partial"
@@ -74,21 +77,11 @@ def _per_channel(name: str, values: NDArray[np.float32]) -> onnx.TensorProto:
     return numpy_helper.from_array(np.ascontiguousarray(values.reshape(1, -1, 1, 1), np.float32), name)
 
 
-def _once_per_cell(model: onnx.ModelProto) -> Tensor:
-    """Leave out a last step that only repeats; the output as it is then."""
+def _stated(model: onnx.ModelProto, batch_and_classes: tuple[int, ...]) -> Tensor:
+    """The answer once per cell, its shape written into the file."""
     graph = model.graph
-    last = next(node for node in graph.node if graph.output[0].name in node.output)
-    modes = {a.name: a.s for a in last.attribute}
-    if last.op_type != "Resize" or modes.get("mode") != b"nearest":
-        return Tensor(graph.output[0].name, _shape(graph.output[0]))
-    inferred = onnx.shape_inference.infer_shapes(model).graph
-    cells = next(value for value in inferred.value_info if value.name == last.input[0])
-    shape = (*_shape(graph.output[0])[:2], *_shape(cells)[2:])
-    graph.node.remove(last)
-    del graph.output[:]
-    graph.output.append(helper.make_tensor_value_info(cells.name, TensorProto.FLOAT, shape))
-    return Tensor(cells.name, shape)
-
-
-def _shape(value: onnx.ValueInfoProto) -> tuple[int, ...]:
-    return tuple(int(side.dim_value) for side in value.type.tensor_type.shape.dim)
+    cells = onnx.shape_inference.infer_shapes(model).graph.output[0]
+    height_and_width = (int(side.dim_value) for side in cells.type.tensor_type.shape.dim[2:])
+    answer = Tensor(cells.name, (*batch_and_classes, *height_and_width))
+    graph.output[0].CopyFrom(helper.make_tensor_value_info(answer.name, TensorProto.FLOAT, answer.shape))
+    return answer

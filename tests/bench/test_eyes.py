@@ -64,11 +64,9 @@ def test_ratios_of_what_was_measured() -> None:
 
 def test_the_papers_shape_sees_what_perception_sees() -> None:
     """It is a fair comparison: the same networks, the same corridors, to the width of a cell."""
-    segmenter = OnnxEngine.load("segmenter", "", 1)
-    logits = segmenter.run(paper_shaped.stretched(river()))
-    config = CorridorConfig()
-    ours = summarise(*classify(logits, 1.0), config)
-    theirs = paper_shaped.lanes(logits, config)
+    config, picture = CorridorConfig(), paper_shaped.stretched(river())
+    ours = summarise(*classify(OnnxEngine.load("segmenter", "", 1).run(picture), 1.0), config)
+    theirs = paper_shaped.lanes(OnnxEngine.load("segmenter", "", 1, whole=True).run(picture), config)
     for mine, (non_water, uncertainty, clear_width) in zip(ours, theirs, strict=True):
         assert mine.non_water == pytest.approx(non_water, abs=0.02)
         assert mine.uncertainty == pytest.approx(uncertainty, abs=0.02)

@@ -23,6 +23,12 @@ CONVOLUTION = """7767517
 Input in0 0 1 in0
 Convolution scores 1 1 in0 out0 0=3 1=1 11=1 2=1 12=1 3=1 13=1 4=0 14=0 5=1 6=9
 """
+RESIZED = """7767517
+3 3
+Input in0 0 1 in0
+Convolution scores 1 1 in0 cells 0=3 1=1 11=1 2=1 12=1 3=4 13=4 4=0 14=0 5=1 6=9
+Interp last 1 1 cells out0 0=2 1=4.0 2=4.0 6=0
+"""
 NO_BOXES = """7767517
 2 2
 Input in0 0 1 in0

@@ -32,6 +32,7 @@ from paani_models.ncnn_convert import convert, join_corners  # noqa: E402
 from tests.unit.ncnn_nets import (  # noqa: E402
     CONVOLUTION,
     NO_BOXES,
+    RESIZED,
     SHAPE,
     WATER_BIAS,
     packed,
@@ -40,6 +41,7 @@ from tests.unit.ncnn_nets import (  # noqa: E402
     small_segmenter,
 )
 
+needs_pnnx = pytest.mark.skipif(shutil.which("pnnx") is None, reason="pnnx is not on the PATH")
 HEADER = m.PictureHeader(source_us=1_000_000, frame_seq=7, frame_epoch=3, width_px=320, height_px=240)
 
 
@@ -77,6 +79,28 @@ def test_a_picture_is_perceived_by_ncnn(segmenter: Path, detector: Path) -> None
         assert lane.uncertainty == pytest.approx(same.uncertainty, abs=1e-3)
     assert found[0].detections == ()
     np.testing.assert_array_equal(found[1], expected[1])
+
+
+def test_of_a_net_that_ends_with_a_resize_the_cells_are_read(tmp_path: Path) -> None:
+    model = place(small_segmenter(tmp_path / "own.onnx"), RESIZED, packed())
+    x = np.random.default_rng(2).standard_normal(SHAPE).astype(np.float32)
+    cells, whole = NcnnEngine.load("segmenter", str(model), 1).run(x), open_ncnn(files_of(model), 1)(x)
+    np.testing.assert_allclose(cells, open_net(model, 1)(x)[:, :, ::4, ::4], atol=MAX_DIFFERENCE)
+    assert (cells.shape, whole.shape) == ((1, 3, 64, 80), tuple(SHAPE))
+    corners_stay = place(model, RESIZED.replace("6=0", "6=1"), packed())
+    assert NcnnEngine.load("segmenter", str(corners_stay), 1).run(x).shape == tuple(SHAPE)
+
+
+@needs_pnnx
+def test_both_engines_read_the_same_cells_of_the_shipped_net(tmp_path: Path) -> None:
+    contract = load_catalogue()["segmenter"]
+    convert(verified_path("segmenter"), "segmenter", tmp_path, None, inputs_for(contract, []))
+    own = NcnnEngine.load("segmenter", str(tmp_path / contract.file), 1)
+    shipped = OnnxEngine.load("segmenter", "", 1)
+    for x in drawn_inputs(contract).values():
+        cells = shipped.run(x)
+        assert cells.shape == (1, 3, 64, 80)
+        np.testing.assert_allclose(own.run(x), cells, atol=MAX_DIFFERENCE)
 
 
 def test_missing_files_name_file_and_command(tmp_path: Path) -> None:
@@ -203,9 +227,6 @@ def test_the_joined_corners_are_the_same_net(tmp_path: Path, name: str) -> None:
     for x in inputs_for(contract, []).values():
         np.testing.assert_array_equal(joined(x), plain(x))
     assert not [node.name for node in model.graph.node if node.op_type == "Slice" and "input" in node.input]
-
-
-needs_pnnx = pytest.mark.skipif(shutil.which("pnnx") is None, reason="pnnx is not on the PATH")
 
 
 @needs_pnnx

@@ -128,10 +128,23 @@ def test_the_shipped_segmenter_costs_less_than_the_papers() -> None:
     assert multiply_adds(ImageNetSegmenter()) < 0.75 * multiply_adds(segmenter.Segmenter())
 
 
-def test_the_shipped_segmenter_is_piecewise_constant_over_four_pixels() -> None:
-    """The runtime reads one logit in sixteen (stride 4)."""
+def test_the_shipped_segmenter_is_bilinear_between_the_middles_of_its_cells() -> None:
+    """Pixel p of a row lies (p - 1.5) / 4 cells from the first middle; outside the middles nothing changes."""
+    torch.manual_seed(0)
+    net, heads = ImageNetSegmenter().eval(), []
+    net.head.register_forward_hook(lambda _head, _inputs, output: heads.append(output))
     with torch.no_grad():
-        logits = ImageNetSegmenter().eval()(torch.rand(1, 3, 256, 320))
+        logits = net(torch.rand(1, 3, 256, 320))
+    (head,) = heads
     assert tuple(logits.shape) == (1, 3, 256, 320)
-    cells = logits[:, :, ::4, ::4]
-    assert torch.equal(logits, cells.repeat_interleave(4, 2).repeat_interleave(4, 3))
+    assert tuple(head.shape) == (1, 3, 64, 80)
+    down, across = (_between(cells) for cells in (64, 80))
+    expected = torch.einsum("pi,ncij,qj->ncpq", down, head, across)
+    assert float((logits - expected).abs().max()) < 1e-5
+    assert not torch.equal(logits[:, :, ::4, ::4], logits[:, :, 1::4, 1::4])
+
+
+def _between(cells: int) -> Tensor:
+    """How much each of `cells` counts at each of four times as many pixels [4 cells, cells]."""
+    place = ((torch.arange(4 * cells) - 1.5) / 4).clamp(0, cells - 1)
+    return (1 - (place[:, None] - torch.arange(cells)[None]).abs()).clamp(0)

@@ -124,7 +124,7 @@ def test_e1_softmax() -> None:
 
 
 def test_every_fourth_score_says_everything() -> None:
-    """D4: the last step is a nearest resize by four, so argmax and confidence repeat exactly."""
+    """D4: the paper's last step is a nearest resize by four, so argmax and confidence repeat exactly."""
     small = np.random.default_rng(0).normal(size=(1, 3, 64, 80)).astype(np.float32)
     large = small.repeat(4, axis=2).repeat(4, axis=3)
     mask, confidence = classify(large, 1.0)

@@ -198,5 +198,5 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
 
 def _paper_shaped(config: PerceptionConfig) -> Step:
     detector = OnnxEngine.load("detector", config.detector, 2, spinning=True)
-    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True)
+    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True, whole=True)
     return lambda bgr: paper_shaped.perceive(bgr, detector.run, segmenter.run, config.detections, config.corridors)

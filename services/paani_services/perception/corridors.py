@@ -1,10 +1,12 @@
 """Class scores of the mask to three corridors of water (checklist E1-E7). Pure.
 
-The net's last step repeats each score four times in both directions, so every fourth score says everything.
+A cell is 4x4 pixels of the answer. Its score is what a net that ends with a fourfold resize gave before it; of any
+other answer, the pixel to the right of and below the cell's middle.
 """
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,10 +15,12 @@ from paani.messages import LaneEvidence
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
-STRIDE = 4
+STRIDE, MIDDLE = 4, 2
 MIN_ROWS = 32
 MIN_COUNTED = 0.5  # a corridor of which less can be seen is unknown, which is blocked
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
+# Glints of the sun near the boat: 2 or 3 cells there are 0.15 m seen from 1 m, and no swimmer's head seen from 5 m.
+SPECK_CELLS, SPECKS_BELOW = 3, 2.0 / 3.0
 
 
 class Lanes(NamedTuple):
@@ -25,14 +29,22 @@ class Lanes(NamedTuple):
     right: LaneEvidence
 
 
+def cells_only(shape: tuple[int, ...]) -> tuple[int, ...] | None:
+    """Shape [1, C, h, w] of the cells of an answer [1, C, H, W]; None where `classify` does not take them for cells."""
+    if len(shape) != 4:
+        return None
+    cells = (*shape[:2], shape[2] // STRIDE, shape[3] // STRIDE)
+    return cells if cells[2] < STRIDE * MIN_ROWS <= shape[2] else None
+
+
 def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
     """Class mask and confidence of each cell (E1).
 
     logits: float32 [1, 3, H, W] of water, obstacle, sky. Returns uint8 and float32 [h, w]: argmax and largest softmax
-    probability of every fourth score, or of every one where there are few.
+    probability of each cell's score. Where there are few rows, each is a cell.
     """
-    stride = STRIDE if logits.shape[2] >= STRIDE * MIN_ROWS else 1
-    scores = logits[0, :, ::stride, ::stride] / np.float32(temperature)
+    cells = logits[0, :, MIDDLE::STRIDE, MIDDLE::STRIDE] if logits.shape[2] >= STRIDE * MIN_ROWS else logits[0]
+    scores = cells / np.float32(temperature)
     largest = scores.max(axis=0)
     confidence = 1.0 / np.exp(scores - largest).sum(axis=0)
     return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)
@@ -60,14 +72,20 @@ def water_edge(mask: Bytes, counts: Floats) -> tuple[float, ...]:
     """Where the water that begins at the picture's bottom ends, for each column: see `Evidence.water_edge`.
 
     mask: uint8 [h, w], as the picture is, not levelled. counts: how much of each cell is not own hull, [h, w].
-    A column of nothing but own hull has no water.
+    A column of nothing but own hull has no water. Specks with water all round end nothing: see `SPECK_CELLS`.
     """
     height = mask.shape[0]
     hull = counts < MIN_COUNTED
-    ends = (mask != WATER) & ~hull
+    ends = _without_specks((mask != WATER) & ~hull)
     lowest = height - ends[::-1].argmax(axis=0)  # its lower edge, in cells from the top
     edge = np.where(ends.any(axis=0), lowest, np.where(hull.all(axis=0), height, 0))
     return tuple((edge / height).tolist())
+
+
+def _without_specks(ends: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    count, part_of, box, _ = cv2.connectedComponentsWithStats(ends.astype(np.uint8), connectivity=8)
+    is_speck = (box[:, cv2.CC_STAT_AREA] <= SPECK_CELLS) & (box[:, cv2.CC_STAT_TOP] >= SPECKS_BELOW * ends.shape[0])
+    return ends & ~is_speck[part_of] if count > 1 else ends
 
 
 def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from paani.config import EngineName
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
+from paani_models.last_resize import before_resize
+from paani_services.perception.corridors import cells_only
 from paani_services.perception.ncnn_engine import NcnnEngine
 
 Floats = NDArray[np.float32]
@@ -31,7 +33,10 @@ class Engine(Protocol):
         ...
 
     def run(self, tensor: Floats | Bytes) -> Floats:
-        """One inference: the contract's input to its output. Other threads go on meanwhile."""
+        """One inference: the contract's input to its output. Other threads go on meanwhile.
+
+        Of a segmenter that ends by resizing its scores fourfold: those scores, one per cell.
+        """
         ...
 
     def info(self) -> str:
@@ -59,8 +64,11 @@ class OnnxEngine:
         self.contract = contract
 
     @classmethod
-    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False) -> Self:
-        """As any engine. spinning: idle threads wait busily; two models that do so get in each other's way."""
+    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False, whole: bool = False) -> Self:
+        """As any engine. spinning: idle threads wait busily; two models that do so get in each other's way.
+
+        whole: a segmenter answers at full size.
+        """
         check_onnxruntime(_installed())
         import onnxruntime as ort  # noqa: PLC0415 - a release that is refused would end the process here
 
@@ -69,25 +77,40 @@ class OnnxEngine:
         options = ort.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
+        options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(file.parent))
         options.log_severity_level = 3
-        try:
-            session = ort.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-        except Exception as error:  # onnxruntime raises classes of its own that it does not export
-            raise UserError(f"{file}: not an ONNX model that can run here") from error
-        ends = ((session.get_inputs(), contract.input), (session.get_outputs(), contract.output))
-        for found, wanted in ends:
-            shapes = [(tuple(end.shape), end.type) for end in found]
-            if shapes != [(wanted.shape, ORT_TYPES[wanted.dtype])]:
-                raise UserError(f"{file}: {role} must have {wanted.dtype} {list(wanted.shape)}, found {shapes}")
+
+        def opened(model: str | bytes) -> Any:
+            try:
+                return ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+            except Exception as error:  # onnxruntime raises classes of its own that it does not export
+                raise UserError(f"{file}: not an ONNX model that can run here") from error
+
+        session = opened(str(file))
+        for found, wanted in zip(_ends(session), (contract.input, contract.output), strict=True):
+            if found != [(wanted.shape, ORT_TYPES[wanted.dtype])]:
+                raise UserError(f"{file}: {role} must have {wanted.dtype} {list(wanted.shape)}, found {found}")
+        cells = None if whole or role != "segmenter" else cells_only(contract.output.shape)
+        if cells and (model := before_resize(file.read_bytes())):
+            del session  # its memory serves the other
+            session = opened(model)
+            if _ends(session)[1][0][0] != cells:
+                return cls.load(role, path, threads, spinning=spinning, whole=True)
         return cls(session, contract, f"{role} {checksum[:12]}")
 
     def run(self, tensor: Floats | Bytes) -> Floats:
-        """One inference: the contract's input to its output."""
+        """One inference: the contract's input to its output, or its cells."""
         return np.asarray(self._session.run(None, {self._input: tensor})[0], np.float32)
 
     def info(self) -> str:
         """Role and the beginning of the file's checksum."""
         return self._name
+
+
+def _ends(session: Any) -> tuple[list[tuple[tuple[int, ...], str]], ...]:
+    """Shapes and kinds of the inputs and of the outputs."""
+    ends = (session.get_inputs(), session.get_outputs())
+    return tuple([(tuple(end.shape), end.type) for end in found] for found in ends)
 
 
 def _installed() -> str:

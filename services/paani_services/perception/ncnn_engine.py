@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
-from paani_models.ncnn_runner import Run, converted, open_ncnn
+from paani_models.ncnn_runner import Run, converted, open_ncnn, resized
+from paani_services.perception.corridors import cells_only
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -31,10 +32,14 @@ class NcnnEngine:
         shape = run(np.zeros(contract.input.shape, np.float32)).shape
         if shape != contract.output.shape:
             raise UserError(f"{files.param}: {role} must give {list(contract.output.shape)}, found {list(shape)}")
+        cells = cells_only(shape) if role == "segmenter" else None
+        if cells and (name := resized(files)):
+            short = open_ncnn(files, threads, name)
+            run = short if short(np.zeros(contract.input.shape, np.float32)).shape == cells else run
         return cls(run, contract, f"{role} {file_sha256(file)[:12]} ncnn")
 
     def run(self, tensor: Floats | Bytes) -> Floats:
-        """One inference: the contract's input to its output."""
+        """One inference: the contract's input to its output, or its cells."""
         return self._run(np.asarray(tensor, np.float32))
 
     def info(self) -> str:

@@ -1,0 +1,107 @@
+"""A net without a last step that only resizes its answer. Works on the file's bytes, as the board has no onnx.
+
+A protocol buffer is a row of fields, each with its number before it; the numbers here are those of onnx.proto.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+_GRAPH = 7  # of a model
+_NODE, _OUTPUT = 1, 12  # of a graph
+_TAKES, _GIVES, _KIND, _ATTRIBUTE = 1, 2, 4, 5  # of a node
+_NAME, _TEXT = 1, 4  # of an attribute; a value begins with its name as well
+_FLOAT32 = b"\x12\x04\x0a\x02\x08\x01"  # a value's type: a tensor of float32, its shape for the reader to infer
+_VARINT, _EIGHT_BYTES, _LENGTH_FIRST, _FOUR_BYTES = 0, 1, 2, 5
+
+
+class _Field(NamedTuple):
+    number: int
+    whole: memoryview
+    content: memoryview
+
+
+def before_resize(model: bytes) -> bytes | None:
+    """The net that answers what its last step would have resized; None where the last step is no such resize.
+
+    That is one to the nearest or linear, which leaves the middles of the cells where they are; one that keeps the
+    corners in place does not. Bytes that are no ONNX model have no such step.
+    """
+    try:
+        return _without_resize(model)
+    except ValueError:
+        return None
+
+
+def _without_resize(model: bytes) -> bytes | None:
+    outer = list(_fields(memoryview(model)))
+    graph = [field for part in outer if part.number == _GRAPH for field in _fields(part.content)]
+    answers = [_first(field.content, _NAME) for field in graph if field.number == _OUTPUT]
+    last = next((f for f in graph if f.number == _NODE and _first(f.content, _GIVES) in answers), None)
+    if len(answers) != 1 or last is None or not _only_resizes(last.content):
+        return None
+    answer = _coded(_NAME, _first(last.content, _TAKES)) + _FLOAT32
+    kept = [field.whole for field in graph if field is not last and field.number != _OUTPUT]
+    rest = [part.whole for part in outer if part.number != _GRAPH]
+    return b"".join((*rest, _coded(_GRAPH, b"".join((*kept, _coded(_OUTPUT, answer))))))
+
+
+def _only_resizes(node: memoryview) -> bool:
+    if _first(node, _KIND) != b"Resize":
+        return False
+    settings = {
+        _first(field.content, _NAME): _first(field.content, _TEXT)
+        for field in _fields(node)
+        if field.number == _ATTRIBUTE
+    }
+    moved = settings.get(b"coordinate_transformation_mode") in {b"align_corners", b"tf_crop_and_resize"}
+    return settings.get(b"mode", b"nearest") in {b"nearest", b"linear"} and not moved
+
+
+def _first(message: memoryview, number: int) -> bytes:
+    """The content of the first field of that number; empty where there is none."""
+    return next((bytes(field.content) for field in _fields(message) if field.number == number), b"")
+
+
+def _fields(message: memoryview) -> Iterator[_Field]:
+    end = 0
+    while end < len(message):
+        start = end
+        key, begin = _varint(message, start)
+        kind = key & 7
+        if kind == _VARINT:
+            _, end = _varint(message, begin)
+        elif kind == _LENGTH_FIRST:
+            size, begin = _varint(message, begin)
+            end = begin + size
+        elif kind in {_EIGHT_BYTES, _FOUR_BYTES}:
+            end = begin + (8 if kind == _EIGHT_BYTES else 4)
+        else:
+            raise ValueError(f"a field of kind {kind}")
+        if end > len(message):
+            raise ValueError("ends within a field")
+        yield _Field(key >> 3, message[start:end], message[begin:end])
+
+
+def _varint(message: memoryview, at: int) -> tuple[int, int]:
+    """A number in groups of seven bits, lowest first, and where it ends."""
+    value = shift = 0
+    while at < len(message):
+        value |= (message[at] & 0x7F) << shift
+        shift, at = shift + 7, at + 1
+        if message[at - 1] < 0x80:
+            return value, at
+    raise ValueError("ends within a number")
+
+
+def _coded(number: int, content: bytes) -> bytes:
+    return _number(number << 3 | _LENGTH_FIRST) + _number(len(content)) + content
+
+
+def _number(value: int) -> bytes:
+    groups = []
+    while value > 0x7F:
+        groups.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*groups, value])
