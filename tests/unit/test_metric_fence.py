@@ -68,6 +68,15 @@ def test_a_fence_takes_and_gives_nothing() -> None:
     assert fenced(before, ()) is before
 
 
+def test_a_fence_lies_in_the_map_and_the_grid_where_it_was_reckoned() -> None:
+    """What is 2 m east on the grid is 5 m east in the map."""
+    fence = (box(Keep.IN, -50.0, -50.0, 5.0, 50.0),)
+    east_m = np.arange(CELLS) * CELL_M + pool().west_m
+    barred = fenced(pool(), fence, (3.0, 0.0)).occupied
+    assert barred[:, east_m > 2.0].all()
+    assert not barred[:, east_m < 1.8].any()
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) -> None:
     fence = (box(Keep.OUT, -2.0, side * 0.9, 12.0, side * 9.0),)

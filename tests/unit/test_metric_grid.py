@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paani.config import CalibrationConfig, calibration_of, load_config
+from paani.config import CalibrationConfig, PlannerConfig, calibration_of, load_config
 from paani.errors import UserError
-from paani.messages import Detection, Label, SegmentationSource, TimeBase
+from paani.messages import Detection, Label, Odometry, SegmentationSource, TimeBase
 from paani_services.navigator.grid import CELLS, Grid, blind_reach_m, lay
 from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
 from paani_services.navigator.shown import CELL_M, Camera, hull_top
@@ -26,9 +26,14 @@ PAPER = load_config(profile="paper").navigator.planner
 AHEAD_5_M = ((5.0, -1.0, 5.6, 1.0),)
 
 
-def grid_of(memory: Memory, age_s: float = 0.1, position_m: tuple[float, float] = (0.0, 0.0)) -> Grid:
+def grid_of(
+    memory: Memory,
+    age_s: float = 0.1,
+    position_m: tuple[float, float] = (0.0, 0.0),
+    config: PlannerConfig = PLANNER,
+) -> Grid:
     now_us = memory.sights[-1].at_us + round(age_s * 1e6) if memory.sights else START_US
-    return lay(memory.sights, position_m, now_us, CAMERA, PLANNER)
+    return lay(memory.sights, position_m, now_us, CAMERA, config)
 
 
 def cell(grid: Grid, x_m: float, y_m: float) -> str:
@@ -144,13 +149,35 @@ def test_q3_lifetimes() -> None:
     assert (PAPER.free_s, PAPER.occupied_s) == (PLANNER.free_s, PLANNER.occupied_s) == (0.8, 2.0)
 
 
-def test_q3_occupied_wins_for_its_lifetime() -> None:
-    """A picture that shows open water there does not free a cell seen occupied less than 2 s ago."""
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
+@pytest.mark.parametrize("config", [PAPER, PLANNER])
+def test_q3_occupied_wins_for_its_lifetime(config: PlannerConfig) -> None:
+    """Pictures that show open water there do not free a cell that one saw occupied (Q3), or two, less than 2 s ago."""
+    vouched_us = 0 if config is PAPER else 200_000
+    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), at_us=START_US - 200_000)
+    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), memory=memory)
     for later_us in range(200_000, 2_400_000, 200_000):
         memory = seen(at_us=START_US + later_us, memory=memory)
-        expected = "occupied" if later_us + 100_000 <= 2_000_000 else "free"
+        expected = "occupied" if later_us + vouched_us + 100_000 <= 2_000_000 else "free"
+        assert cell(grid_of(memory, config=config), 5.0, 0.0) == expected
+
+
+def test_what_one_picture_alone_shows_two_later_ones_deny() -> None:
+    """A glint of the sun is gone within two pictures; the paper's lifetimes keep it for 2 s."""
+    memory = seen(at_us=START_US - 200_000)
+    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), memory=memory)
+    for pictures, expected in enumerate(("occupied", "occupied", "free", "free")):
         assert cell(grid_of(memory), 5.0, 0.0) == expected
+        assert cell(grid_of(memory, config=PAPER), 5.0, 0.0) == "occupied"
+        memory = seen(at_us=START_US + 200_000 * (pictures + 1), memory=memory)
+
+
+def test_a_thing_whose_edge_wavers_by_a_cell_is_not_denied() -> None:
+    """Two pictures show it, each a cell off the other: they vouch for each other."""
+    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
+    memory = seen(edge=edge_of(AT_REST, ((5.2, -1.0, 5.8, 1.0),)), at_us=START_US + 200_000, memory=memory)
+    for later_us in (400_000, 600_000, 800_000):
+        memory = seen(at_us=START_US + later_us, memory=memory)
+        assert cell(grid_of(memory), 5.0, 0.0) == cell(grid_of(memory), 5.4, 0.0) == "occupied"
 
 
 def test_what_is_out_of_sight_stays_occupied_longer() -> None:
@@ -263,20 +290,58 @@ def test_a_picture_without_odometry_near_it_is_not_remembered() -> None:
 
 def test_the_pose_between_two_odometries_lies_between_them() -> None:
     memory = remember(Memory(), odometry(START_US, BoatPose(0.0, 0.0, 3.1)), None, PLANNER)
-    memory = remember(memory, odometry(START_US + 100_000, BoatPose(0.1, 0.0, -3.1, pitch_rad=0.02)), None, PLANNER)
+    later = odometry(START_US + 100_000, BoatPose(0.0, 0.0, -3.1, pitch_rad=0.02), surge_mps=1.0)
+    memory = remember(memory, later, None, PLANNER)
     pose = pose_at(memory.poses, START_US + 25_000, 0.15)
     assert pose is not None
-    assert pose.x_m == pytest.approx(0.025)
+    assert pose.x_m == pytest.approx(-0.025, abs=1e-4)
     assert pose.pitch_rad == pytest.approx(0.005)
     assert pose.yaw_rad == pytest.approx(3.1 + 0.25 * (2.0 * math.pi - 6.2))
 
 
+def test_what_was_seen_stays_where_it_is_while_gps_wanders() -> None:
+    """The position strays by 3 m under a boat at rest, and jumps by 8: nothing seen is nearer or further for it."""
+    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
+    for k in range(1, 16):
+        stray = BoatPose(0.2 * k + (8.0 if k > 7 else 0.0), -0.1 * k, 0.0)
+        memory = remember(memory, odometry(START_US + 100_000 * k, stray), None, PLANNER)
+    assert memory.here is not None
+    assert (memory.here.x_m, memory.here.y_m) == (0.0, 0.0)
+    assert cell(grid_of(memory, age_s=1.5), 5.0, 0.0) == "occupied"
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-0.8, 0.8), st.floats(-0.3, 0.3), st.floats(-3.1, 3.1), st.floats(-0.3, 0.3))
+def test_the_way_over_ground_is_reckoned(surge: float, sway: float, yaw: float, rate: float) -> None:
+    """Against the sum of what each twentieth of a second adds, over 5 s."""
+    memory = remember(Memory(), odometry(START_US, BoatPose(3.0, 4.0, yaw)), None, PLANNER)
+    x_m, y_m = 3.0, 4.0
+    for k in range(1, 101):
+        heading = yaw + rate * 0.05 * k
+        boat = BoatPose(0.0, 0.0, heading)
+        memory = remember(memory, odometry(START_US + 50_000 * k, boat, surge, sway_mps=sway), None, PLANNER)
+        x_m += 0.05 * (surge * math.cos(heading) - sway * math.sin(heading))
+        y_m += 0.05 * (surge * math.sin(heading) + sway * math.cos(heading))
+    assert memory.here is not None
+    assert (memory.here.x_m, memory.here.y_m) == pytest.approx((x_m, y_m), abs=1e-6)
+
+
 @pytest.mark.parametrize(
-    "after", [odometry(START_US + 100_000, AT_REST, epoch=2), odometry(START_US + 100_000, BoatPose(3.0, 0.0, 0.0))]
+    "after",
+    [
+        odometry(START_US + 100_000, AT_REST, epoch=2),
+        odometry(START_US + round(PLANNER.max_reckon_s * 1e6) + 1, AT_REST),
+    ],
 )
-def test_another_epoch_or_a_jump_forgets_what_was_seen(after: object) -> None:
-    """The map has moved under the cells: unknown is the safe direction."""
-    assert remember(seen(), after, None, PLANNER).sights == ()  # type: ignore[arg-type]
+def test_another_epoch_or_a_gap_forgets_what_was_seen(after: Odometry) -> None:
+    """The boat may be anywhere under the cells: unknown is the safe direction."""
+    assert remember(seen(), after, None, PLANNER).sights == ()
+
+
+@pytest.mark.parametrize("changes", [{"surge_mps": math.nan}, {"sway_mps": math.inf}, {"healthy": False}])
+def test_odometry_that_is_unusable_is_no_way(changes: dict[str, float]) -> None:
+    memory = seen()
+    assert remember(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
 
 
 def test_nothing_of_a_boat_that_sees_too_little_is_beside_it() -> None:

@@ -91,11 +91,25 @@ def test_where_the_water_ends_in_each_column() -> None:
     mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
     mask[:16] = SKY
     mask[32:40, 10] = OBSTACLE  # water again above it
-    mask[63, 11] = OBSTACLE
+    mask[60:, 11] = OBSTACLE
     mask[:, 12] = WATER
     edge = water_edge(mask, ALL)
     assert edge[:10] == (0.25,) * 10
     assert edge[10:14] == (40 / 64, 1.0, 0.0, 0.25)
+
+
+def test_a_glint_near_the_boat_ends_nothing() -> None:
+    """Up to three cells with water all round, in the lowest third; what is larger, higher up or reaches up ends it."""
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[:16] = SKY
+    mask[62, 5:8] = OBSTACLE
+    mask[50, 20] = mask[51, 21] = OBSTACLE
+    mask[60:, 30] = OBSTACLE  # four cells
+    mask[30, 40] = OBSTACLE  # far away, a swimmer's head
+    mask[16:64, 50] = OBSTACLE  # a pole
+    edge = water_edge(mask, ALL)
+    assert set(edge[5:8] + edge[20:22]) == {0.25}
+    assert (edge[30], edge[40], edge[50]) == (1.0, 31 / 64, 1.0)
 
 
 def test_the_own_hull_does_not_end_the_water() -> None:
@@ -110,13 +124,14 @@ def test_the_own_hull_does_not_end_the_water() -> None:
     assert (edge[29], edge[40]) == (48 / 64, 1.0)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.floats(0.0, 1.0))
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.floats(0.0, 1.0))
 def test_no_water_below_the_edge_is_anything_else(seed: int, bare: int, watery: float) -> None:
-    """Below its edge each column is water or own hull, and just above it is not."""
+    """Below its edge each column is water or own hull, and just above it is not. Cells in fours: none is a speck."""
     random = np.random.default_rng(seed)
-    mask = np.where(random.random((HEIGHT, WIDTH)) < watery, WATER, OBSTACLE).astype(np.uint8)
+    coarse = np.where(random.random((HEIGHT // 2, WIDTH // 2)) < watery, WATER, OBSTACLE).astype(np.uint8)
+    mask = coarse.repeat(2, axis=0).repeat(2, axis=1)
     counts = np.ones((HEIGHT, WIDTH), np.float32)
-    counts[HEIGHT - bare :, ::3] = 0.0
+    counts[HEIGHT - 2 * bare :, ::4] = counts[HEIGHT - 2 * bare :, 1::4] = 0.0
     for column, edge in enumerate(water_edge(mask, counts)):
         row = round(edge * HEIGHT)
         assert set(mask[row:, column][counts[row:, column] > 0].tolist()) <= {WATER}

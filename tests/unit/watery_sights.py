@@ -79,5 +79,21 @@ def seen(
 ) -> Memory:
     """The memory after one more picture from there; open water by default."""
     shown = edge if edge is not None else edge_of(boat)
-    memory = remember(memory, odometry(at_us, boat), None, PLANNER)
+    memory = gone(memory, at_us, boat)
     return remember(memory, None, evidence(at_us, shown, **changes), PLANNER)
+
+
+def gone(memory: Memory, at_us: int, boat: BoatPose) -> Memory:
+    """The memory of a boat that has gone on to there, as its odometry tells ten times a second."""
+    while memory.here is not None and memory.here.at_us < at_us:
+        here = memory.here
+        step_us = min(at_us - here.at_us, 100_000)
+        part = step_us / (at_us - here.at_us)
+        way_m = (boat.x_m - here.x_m, boat.y_m - here.y_m)
+        cos, sin = np.cos(boat.yaw_rad), np.sin(boat.yaw_rad)
+        speed = part * 1e6 / step_us
+        surge, sway = speed * (cos * way_m[0] + sin * way_m[1]), speed * (cos * way_m[1] - sin * way_m[0])
+        memory = remember(
+            memory, odometry(here.at_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
+        )
+    return memory if memory.here is not None else remember(memory, odometry(at_us, boat), None, PLANNER)

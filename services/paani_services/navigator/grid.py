@@ -10,7 +10,7 @@ import numpy as np
 
 from paani.config import PlannerConfig
 from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
-from paani_services.navigator.shown import CELL_M, Camera, Cells, Indices, Mask, hull_top, shown
+from paani_services.navigator.shown import CELL_M, Camera, Cells, Indices, Mask, Shown, hull_top, shown
 from paani_services.navigator.sighting import Sight
 
 CELLS = 100  # Q2
@@ -52,8 +52,9 @@ def lay(
     """The grid around the boat. sights: oldest first. moving: what moves occupies no cell.
 
     Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
-    free since. Occupied wins. Beside: what the picture does not show because it is too near, given that there is a
-    picture: whoever arms the boat answers for it at the start, and what drifts in from astern no camera sees anyway.
+    free since. Occupied wins, but for what one picture alone shows and `outvoted_by` later ones deny. Beside: what the
+    picture does not show because it is too near, given that there is a picture: whoever arms the boat answers for it at
+    the start, and what drifts in from astern no camera sees anyway.
     """
     west, south = (math.floor(at_m / CELL_M) - CELLS // 2 for at_m in position_m)
     longest_us, free_us, occupied_us = (
@@ -72,6 +73,8 @@ def lay(
     occupied_of = _last_shown([picture.occupied for picture in pictures], west, south)
     not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
     occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
+    if config.outvoted_by > 0:
+        occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
     shape = (CELLS, CELLS)
     grid = Grid(
@@ -101,17 +104,48 @@ def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float
     return reach_m if reach_m <= config.blind_m else 0.0
 
 
+def _outvoted(pictures: list[Shown], occupied_of: Indices, west: int, south: int, config: PlannerConfig) -> Mask:
+    """Cells that one of these pictures alone shows occupied, they and all around them, and enough later ones free.
+
+    occupied_of: the number of the last of them that shows each cell occupied.
+    """
+    number, cell = _all_shown([picture.occupied for picture in pictures], west, south)
+    first = np.full(CELLS * CELLS, len(pictures), np.int64)
+    first[cell[::-1]] = number[::-1]
+    earliest = _around(first.reshape(CELLS, CELLS), np.minimum)
+    latest = _around(occupied_of.reshape(CELLS, CELLS), np.maximum)
+    number, cell = _all_shown([picture.free for picture in pictures], west, south)
+    denied = np.bincount(cell[number > occupied_of[cell]], minlength=CELLS * CELLS)
+    return np.asarray((earliest == latest).ravel() & (denied >= config.outvoted_by))
+
+
+def _around(values: Indices, best: np.ufunc) -> Indices:
+    """The best of each cell and the eight around it."""
+    for _ in range(2):
+        found = values.copy()
+        best(found[1:], values[:-1], out=found[1:])
+        best(found[:-1], values[1:], out=found[:-1])
+        values = found.T
+    return values
+
+
 def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
     """The number of the last picture that shows each cell of the grid, -1 where none does [100 * 100]."""
     last = np.full(CELLS * CELLS, -1, np.int64)
+    number, cell = _all_shown(pictures, west, south)
+    last[cell] = number
+    return last
+
+
+def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, Indices]:
+    """Every cell of the grid that each picture shows: the picture's number, rising, and the cell's."""
     if not pictures:
-        return last
-    numbers = np.repeat(np.arange(len(pictures)), [picture.column.size for picture in pictures])
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    number = np.repeat(np.arange(len(pictures)), [picture.column.size for picture in pictures])
     column = np.concatenate([picture.column for picture in pictures]) - west
     row = np.concatenate([picture.row for picture in pictures]) - south
     inside = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
-    last[(row * CELLS + column)[inside]] = numbers[inside]
-    return last
+    return number[inside], (row * CELLS + column)[inside]
 
 
 def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Mask:

@@ -47,15 +47,19 @@ def steered(
 
     It is made anew for a new picture, another course or side, or after `replan_s`.
     """
-    held = pilot.plan
+    held, here = pilot.plan, pilot.memory.here
+    if here is None:
+        return pilot, Plan(odometry.yaw_rad, 0.0)
     is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
     is_new = is_other or pilot.memory.frame != pilot.frame
     if held is None or is_new or not 0.0 <= (now_us - pilot.planned_us) * 1e-6 < config.replan_s:
         sights = pilot.memory.sights
         moving = movers(sights, now_us, camera, config) if config.predict else ()
         boxes: Moving = frozenset().union(*(mover.boxes for mover in moving))
-        grid = lay(sights, (odometry.x_m, odometry.y_m), now_us, camera, config, boxes)
-        start = Start(odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.surge_mps, odometry.yaw_rate_radps)
-        held = plan(fenced(grid, fence), start, wish, held, config, moving)
+        grid = lay(sights, (here.x_m, here.y_m), now_us, camera, config, boxes)
+        grid = fenced(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
+        moves = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
+        start = Start(here.x_m, here.y_m, odometry.yaw_rad, *moves)
+        held = plan(grid, start, wish, held, config, moving)
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

@@ -17,6 +17,8 @@ from paani_services.navigator.projection import F64
 from paani_services.navigator.shown import CELL_M, Mask
 
 FIELD_CELLS = 10  # distances are known up to 2 m
+QUARTER = 0.5 * math.pi
+LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half a cell
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
 SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
@@ -43,6 +45,7 @@ class Start(NamedTuple):
     yaw_rad: float
     surge_mps: float = 0.0
     yaw_rate_radps: float = 0.0
+    sway_mps: float = 0.0
 
 
 class Ways(NamedTuple):
@@ -73,7 +76,9 @@ def plan(
     """The best of headings around the wanted course at two speeds, none of which meets anything.
 
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
-    moving thing is by then, or sweeps an unknown cell within the way to stop.
+    moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
+    margin is kept, or else a way is taken that leads out from beside something that stands: fans that are off leave the
+    boat to its way, wind and current.
     Costs: off the wanted course, not to the advised side, near to things, ahead of those that move, into the unknown,
     slow, another than before.
     """
@@ -82,55 +87,63 @@ def plan(
         return nowhere
     offsets, speeds = candidates(start, wish, config)
     ways = roll_out(start, offsets, speeds, config)
-    looked = ways.way_m <= config.look_m
     # What is out of sight may have drifted nearer.
     clear_m = np.minimum(distance_m(grid.occupied), np.maximum(distance_m(grid.hidden) - config.hidden_drift_m, 0.0))
     gap_m = _looked_up(grid, clear_m, ways)
-    blank_m = _looked_up(grid, distance_m(grid.unknown), ways)
-    spare_m = gap_m - footprint_m(ways.at_s, gap_m[0, 0], config)[:, None]
-    roomy_m = spare_m
-    for mover in (each for each in moving if each.age_s <= config.unseen_s):
-        own_m = _spare_m(mover, ways, start, config)
-        spare_m = np.minimum(spare_m, own_m)
-        roomy_m = np.minimum(roomy_m, np.minimum(own_m, _spare_m(_led(mover, config.lead_s), ways, start, config)))
-    met, unseen = spare_m < 0.0, blank_m < config.hull_radius_m
+    unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
+    blind = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
-    stopping = ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps)
-    refused = (met & (soon | (ways.way_m <= config.room_m))).any(axis=0) | (unseen & stopping).any(axis=0)
+    nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
+    movers = [each for each in moving if each.age_s <= config.unseen_s]
+    footprints = _footprints(config)
+    while True:
+        kept = footprints.pop(0)
+        still_m = gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None]
+        spare_m = np.minimum.reduce([still_m, *(_spare_m(mover, ways, start, kept) for mover in movers)])
+        met = spare_m < 0.0
+        refused = (met & nearby).any(axis=0) | blind
+        if not (refused.all() and footprints):
+            break
+    if refused.all():
+        refused = ~_leads_out(gap_m, nearby, soon) | ((spare_m < still_m) & met & nearby).any(axis=0) | blind
     if refused.all():
         return nowhere
+    led = (_spare_m(_led(mover, config.lead_s), ways, start, kept) for mover in movers)
     cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
+    roomy_m = np.minimum.reduce([spare_m, *led])
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
     best = int(np.where(refused, np.inf, cost).argmin())
     return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
 
 
 def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
-    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before."""
+    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before.
+
+    Where the wanted course lies abaft the beam, those on its far side are turned to the other way round.
+    """
     wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
     spacing_rad = math.radians(config.spacing_deg)
-    found: list[float] = []
-    for number in range(math.floor(config.span_deg / config.spacing_deg) + 1):
-        for off_rad in (number * spacing_rad, -number * spacing_rad)[: 1 + (number > 0)]:
-            heading_rad = wanted_rad + off_rad
-            if abs(heading_rad) <= math.pi:
-                found.append(heading_rad)
+    count = math.floor(config.span_deg / config.spacing_deg)
+    steps = [0, *(side * number for number in range(1, count + 1) for side in (1, -1))]
+    if 2 * count * config.spacing_deg >= 360.0:
+        steps.pop()  # the same as the one before
     speed_mps = min(wish.speed_mps, config.speed_mps)
-    offsets = np.array([heading for heading in found for _ in range(2)])
-    return offsets, np.array([speed_mps, SLOWER * speed_mps] * len(found))
+    offsets = np.array([wrap_rad(wanted_rad + step * spacing_rad) for step in steps for _ in range(2)])
+    return offsets, np.array([speed_mps, SLOWER * speed_mps] * len(steps))
 
 
 def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Ways:
     """Where the boat gets in steps of `step_s` up to `horizon_s`, then at full speed and twice as long up to `look_m`.
 
     Speed changes by `accel_mps2` at most; it turns towards the heading by `yaw_rate_radps` at most and on no tighter
-    circle than `turn_radius_m`, for fans that only push.
+    circle than `turn_radius_m`, for fans that only push. What carries it sideways now, wind or current, goes on to.
     """
     fine = round(config.horizon_s / config.step_s)
     coarse = math.ceil(config.look_m / (2.0 * config.step_s * config.speed_mps))
     steps_s = [config.step_s] * fine + [2.0 * config.step_s] * coarse
     count = offsets_rad.size
     cos, sin = (np.full(count, of(start.yaw_rad)) for of in (portable.cos, portable.sin))
+    east_mps, north_mps = -start.sway_mps * sin, start.sway_mps * cos
     x_m, y_m, way_m = np.full(count, start.x_m), np.full(count, start.y_m), np.zeros(count)
     turned, rate = np.zeros(count), np.full(count, start.yaw_rate_radps)
     speed = np.full(count, max(start.surge_mps, 0.0))
@@ -156,7 +169,8 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
             ((1.0 - half * half) * sin + 2.0 * half * cos) / scale,
         )
         along = speed * step_s
-        x_m, y_m, way_m = x_m + along * cos, y_m + along * sin, way_m + along
+        x_m, y_m = x_m + along * cos + step_s * east_mps, y_m + along * sin + step_s * north_mps
+        way_m = way_m + along
         rows.append((x_m, y_m, way_m))
     xs, ys, ways = (np.stack(column) for column in zip(*rows, strict=True))
     return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
@@ -175,6 +189,20 @@ def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
     drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
     return np.asarray(np.minimum(radius_m, np.maximum(0.0, gap_m - 0.5 * CELL_M)))
+
+
+def _footprints(config: PlannerConfig) -> list[PlannerConfig]:
+    """Margins and drift to keep, the largest first: the whole margin, Q6's, then the hull and half a cell."""
+    less = ((config.tight_margin_m, config.drift_mps), (0.5 * CELL_M, 0.0))
+    tighter = [(margin_m, drift_mps) for margin_m, drift_mps in less if margin_m < config.margin_m]
+    return [config, *(msgspec.structs.replace(config, margin_m=m, drift_mps=d) for m, d in tighter)]
+
+
+def _leads_out(gap_m: F64, nearby: Mask, soon: Mask) -> Mask:
+    """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates]."""
+    least_m = np.where(nearby, gap_m, np.inf).min(axis=0)
+    last_m = gap_m[int(soon.sum()) - 1]
+    return np.asarray((least_m >= gap_m[0, 0] - LOSE_M) & (last_m >= gap_m[0, 0] + GAIN_M))
 
 
 def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
@@ -234,12 +262,16 @@ def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:
 
 
 def _costs(offsets: F64, speeds: F64, start: Start, before: Plan | None) -> F64:
-    quarter = 0.5 * math.pi
-    cost = np.abs(offsets - offsets[0]) / quarter + SLOW * (1.0 - speeds / speeds[0])
+    cost = _apart_rad(offsets, float(offsets[0])) / QUARTER + SLOW * (1.0 - speeds / speeds[0])
     if before is not None and before.speed_mps > 0.0:
-        off = np.abs(offsets - wrap_rad(before.heading_rad - start.yaw_rad))
-        cost = cost + CHANGE * np.minimum(off, 2.0 * math.pi - off) / quarter
+        cost = cost + CHANGE * _apart_rad(offsets, wrap_rad(before.heading_rad - start.yaw_rad)) / QUARTER
     return np.asarray(cost)
+
+
+def _apart_rad(angles_rad: F64, other_rad: float) -> F64:
+    """Between each and the other, both wrapped [0, pi]."""
+    off = np.abs(angles_rad - other_rad)
+    return np.asarray(np.minimum(off, 2.0 * math.pi - off))
 
 
 def _unadvised(offsets: F64, side: float) -> F64:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from paani import portable
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Detection, Evidence, Label, Odometry, TimeBase
@@ -25,7 +26,7 @@ MOVABLE = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
 
 
 class Pose(msgspec.Struct, frozen=True):
-    """What one odometry said."""
+    """Where the boat was, reckoned, and how it lay."""
 
     at_us: int
     x_m: float
@@ -88,8 +89,13 @@ class Sight(msgspec.Struct, frozen=True):
 
 
 class Memory(msgspec.Struct, frozen=True):
-    """Poses and sights, oldest first; the newest frame heard of (epoch, sequence); the odometry's epoch."""
+    """Poses and sights, oldest first; the newest frame heard of (epoch, sequence); the odometry's epoch.
 
+    here: where the boat is by its way over ground since the memory began, in the map's axes. What was seen lies where
+    it was seen from there: a position that follows the wandering of GPS would carry it about (REP-105's `odom` frame).
+    """
+
+    here: Pose | None = None
     poses: tuple[Pose, ...] = ()
     sights: tuple[Sight, ...] = ()
     frame: tuple[int, int] = (-1, -1)
@@ -97,7 +103,7 @@ class Memory(msgspec.Struct, frozen=True):
 
 
 def remember(memory: Memory, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig) -> Memory:
-    """The memory with what is new. Another odometry epoch, or a jump of the position, forgets everything seen."""
+    """The memory with what is new. Another odometry epoch, or none for `max_reckon_s`, forgets everything seen."""
     if odometry is not None and odometry.healthy:
         memory = _with_pose(memory, odometry, config)
     if evidence is None or (evidence.frame_epoch, evidence.frame_seq) == memory.frame:
@@ -147,22 +153,30 @@ def pose_at(poses: tuple[Pose, ...], at_us: int, max_gap_s: float) -> Pose | Non
 
 def _with_pose(memory: Memory, odometry: Odometry, config: PlannerConfig) -> Memory:
     numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.roll_rad, odometry.pitch_rad)
-    if not all(map(math.isfinite, numbers)):
+    if not all(map(math.isfinite, (*numbers, odometry.surge_mps, odometry.sway_mps))):
         return memory
-    new = Pose(odometry.source_us, *numbers)
-    if odometry.epoch != memory.epoch:
-        return Memory(poses=(new,), frame=memory.frame, epoch=odometry.epoch)
-    if not memory.poses:
-        return msgspec.structs.replace(memory, poses=(new,))
-    last = memory.poses[-1]
-    if new.at_us <= last.at_us:
+    here = memory.here
+    if here is None or odometry.epoch != memory.epoch:
+        return _begun(memory, odometry)
+    step_s = (odometry.source_us - here.at_us) * 1e-6
+    if step_s <= 0.0:
         return memory
-    way_m = math.hypot(odometry.surge_mps, odometry.sway_mps) * (new.at_us - last.at_us) * 1e-6
-    if math.dist((new.x_m, new.y_m), (last.x_m, last.y_m)) > way_m + config.jump_m:
-        return Memory(poses=(new,), frame=memory.frame, epoch=odometry.epoch)
-    if new.at_us - last.at_us < POSE_SPACING_US:
+    if step_s > config.max_reckon_s:
+        return _begun(memory, odometry)
+    cos, sin = portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad)
+    east_m = (odometry.surge_mps * cos - odometry.sway_mps * sin) * step_s
+    north_m = (odometry.surge_mps * sin + odometry.sway_mps * cos) * step_s
+    here = Pose(odometry.source_us, here.x_m + east_m, here.y_m + north_m, *numbers[2:])
+    memory = msgspec.structs.replace(memory, here=here)
+    if here.at_us - memory.poses[-1].at_us < POSE_SPACING_US:
         return memory
-    return msgspec.structs.replace(memory, poses=(*memory.poses, new)[-POSES_KEPT:])
+    return msgspec.structs.replace(memory, poses=(*memory.poses, here)[-POSES_KEPT:])
+
+
+def _begun(memory: Memory, odometry: Odometry) -> Memory:
+    """Nothing seen, at the odometry's position."""
+    here = Pose(odometry.source_us, odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.roll_rad, odometry.pitch_rad)
+    return Memory(here, (here,), frame=memory.frame, epoch=odometry.epoch)
 
 
 def _sight(evidence: Evidence, pose: Pose) -> Sight:

@@ -60,6 +60,7 @@ class PlannerConfig(Section, frozen=True):
 
     `blind_m`: what no picture shows beside the boat counts as water that far, unless something was last seen in it; a
     camera that is blind beyond it leaves the rest unknown.
+    `outvoted_by`: so many later pictures that show water free a cell that one alone shows occupied: a glint; 0: never.
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. It may
     have come `hidden_drift_m` nearer meanwhile.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
@@ -78,6 +79,7 @@ class PlannerConfig(Section, frozen=True):
     horizon_slack_deg: NonNegative = 4.0
     free_s: Positive = 0.8  # Q3
     occupied_s: Positive = 2.0  # Q3
+    outvoted_by: Annotated[int, msgspec.Meta(ge=0)] = 2
     hidden_s: NonNegative = 20.0
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
@@ -90,7 +92,7 @@ class PlannerConfig(Section, frozen=True):
     person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes
     vessel_near_m: NonNegative = 0.2
     max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
-    jump_m: Positive = 1.0  # of the position between two odometries, beyond its way: what was seen is forgotten
+    max_reckon_s: Positive = 0.5  # no odometry for longer: what was seen is forgotten
     horizon_s: Positive = 3.0  # Q4
     step_s: Positive = 0.2  # Q4
     look_m: NonNegative = 5.0  # a quarter turn at `turn_radius_m`, the boat, and as much again
@@ -102,11 +104,12 @@ class PlannerConfig(Section, frozen=True):
     room_m: NonNegative = 3.0  # turn_radius_m, hull_radius_m and margin_m
     helm_speed_mps: NonNegative = 0.5  # measured: what one fan alone drives a boat at that turns as hard as it can
     hull_radius_m: Positive = 0.55  # Q6
-    margin_m: NonNegative = 0.45  # measured: least near misses in trials with truth for eyes; Q6: 0.25
+    margin_m: NonNegative = 0.45  # measured: least near misses in trials with truth for eyes
+    tight_margin_m: NonNegative = 0.25  # Q6; where nothing is free with the whole margin
     drift_mps: NonNegative = 0.15  # Q6
     stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
-    span_deg: Angle = 120.0  # headings to either side of the wanted course
+    span_deg: Angle = 180.0  # headings to either side of the wanted course
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
 
     def acts_on(self, calibration: CalibrationConfig) -> bool:
