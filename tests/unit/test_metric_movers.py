@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from paani.messages import Detection, Label
 from paani_services.navigator.grid import Grid, lay
-from paani_services.navigator.movers import Motion, Mover, movers
+from paani_services.navigator.movers import Motion, Mover, is_denied, movers
 from paani_services.navigator.planner import Plan, Start, Wish, gap_to_m, plan, roll_out
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import CAMERA, EYE, PLANNER, START_US, edge_of, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen
 
 PERIOD_S = 0.2
 CRUISING, RESTING = Start(0.0, 0.0, 0.0, 0.6), Start(0.0, 0.0, 0.0)
@@ -116,6 +116,21 @@ def test_reflections_taken_in_move_nothing() -> None:
         memory, at_us, _ = watched((3.5 + 0.05 * seed, 0.0), (0.0, 0.0), mistaken=0.15, seed=seed)
         said += len(movers(memory.sights, at_us, CAMERA, PLANNER))
     assert said <= 1
+
+
+@pytest.mark.parametrize(("looking", "denied"), [(AT_REST, True), (BoatPose(0.0, 0.0, -1.5), False)])
+def test_what_is_not_where_it_should_be_by_now_did_not_go_on(looking: BoatPose, denied: bool) -> None:
+    """Expected in the middle of pictures that show water there, it is denied after a second; out of them it is not."""
+    memory, at_us, _ = watched((5.0, -1.5), (0.0, 0.35), surge_mps=0.0)
+    found = []
+    for _ in range(20):
+        at_us += 200_000
+        memory = seen(looking, at_us=at_us, memory=memory)
+        (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+        grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, mover.boxes)
+        found.append(is_denied(mover, grid))
+    assert not any(found[:4])
+    assert found[-1] is denied
 
 
 def test_what_left_the_picture_goes_on_and_is_where_it_was_last_seen() -> None:

@@ -167,6 +167,17 @@ def test_less_margin_is_kept_where_the_whole_one_leaves_nothing(half_m: float, s
     assert plan(gap, ahead, AHEAD, None, PLANNER).speed_mps == speed_mps
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_boat_beside_a_hull_opens_away_before_it_turns_to_its_course(side: float) -> None:
+    """Nearer than the margin, no plan after another comes half a cell nearer: each leads further off."""
+    hull = (-6.0, min(side * 0.75, side * 2.5), 6.0, max(side * 0.75, side * 2.5))
+    quay = pool((2.5, min(side * 0.75, side * 2.5), 6.0, max(side * 0.75, side * 2.5)), hull)
+    start = Start(2.0, 0.0, 0.0, 0.4)
+    found = plan(quay, start, Wish(side * 1.2, 0.6), None, PLANNER)
+    assert found.speed_mps > 0.0
+    assert found.heading_rad * side <= 0.0
+
+
 def test_a_boat_is_carried_sideways_while_it_turns() -> None:
     """The sway it has now, in the map, all the way."""
     still, carried = (

@@ -11,9 +11,9 @@ import numpy as np
 
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.grid import Moving
+from paani_services.navigator.grid import CELLS, Grid, Moving
 from paani_services.navigator.projection import F64, lens_at, ranges_m, rays, together
-from paani_services.navigator.shown import Camera, hull_top
+from paani_services.navigator.shown import CELL_M, Camera, hull_top
 from paani_services.navigator.sighting import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 
 ROW_RAD = 0.0044  # one row of 240: how exactly a box's lower end is known
@@ -23,6 +23,7 @@ SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
 STILL_MPS = 0.08  # slower things stand: Q6's drift covers them
 FIXES, SPAN_S = 3, 0.7  # fewer or shorter say nothing
 FIXES_HZ = 5.0  # errors of pictures that follow faster are the same
+LOST_S = 1.0  # five pictures
 EXPECTED = 5.0  # degrees of freedom
 USUAL_MPS = 0.7  # of what moves: how far the fit goes from rest without evidence
 GATE_M, GATE_MPS = 0.5, 1.2  # between two places of one thing: its size, and how fast it may be
@@ -91,6 +92,16 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
             )
         )
     return tuple(found)
+
+
+def is_denied(mover: Mover, grid: Grid) -> bool:
+    """Out of sight for `LOST_S`, and the last pictures show water all over where it should be: it did not go on."""
+    if mover.age_s < LOST_S:
+        return False
+    column = np.floor((mover.east_m - grid.west_m) / CELL_M).astype(np.int64)
+    row = np.floor((mover.north_m - grid.south_m) / CELL_M).astype(np.int64)
+    on_grid = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
+    return bool(on_grid.all() and grid.free[row, column].all())
 
 
 def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:

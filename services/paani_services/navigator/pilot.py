@@ -10,7 +10,7 @@ from paani.messages import Evidence, Odometry
 from paani_services.navigator.fence import Fence
 from paani_services.navigator.fence_cells import fenced
 from paani_services.navigator.grid import Moving, lay
-from paani_services.navigator.movers import movers
+from paani_services.navigator.movers import is_denied, movers
 from paani_services.navigator.planner import Plan, Start, Wish, plan
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.sighting import Memory, remember
@@ -57,6 +57,7 @@ def steered(
         moving = movers(sights, now_us, camera, config) if config.predict else ()
         boxes: Moving = frozenset().union(*(mover.boxes for mover in moving))
         grid = lay(sights, (here.x_m, here.y_m), now_us, camera, config, boxes)
+        moving = tuple(mover for mover in moving if not is_denied(mover, grid))
         grid = fenced(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         moves = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         start = Start(here.x_m, here.y_m, odometry.yaw_rad, *moves)

@@ -24,6 +24,7 @@ SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
+WITHIN = 10.0  # a metre within hull and margin, all through the horizon: what leads out of it is better
 UNKNOWN = 0.3  # all of the way is unknown: turn to what is seen, and see further from there
 SLOW = 0.3  # a stop
 CHANGE = 0.15  # a quarter turn off the plan before
@@ -77,10 +78,10 @@ def plan(
 
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
     moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
-    margin is kept, or else a way is taken that leads out from beside something that stands: fans that are off leave the
+    margin is kept to what stands, or else a way is taken that leads out from beside it: fans that are off leave the
     boat to its way, wind and current.
-    Costs: off the wanted course, not to the advised side, near to things, ahead of those that move, into the unknown,
-    slow, another than before.
+    Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
+    the unknown, slow, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
     if wish.speed_mps <= 0.0 or not grid.free.any():
@@ -95,23 +96,31 @@ def plan(
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
     movers = [each for each in moving if each.age_s <= config.unseen_s]
+    # What moves keeps its whole margin: beside it, lying still is no worse.
+    moved_m = np.minimum.reduce(
+        [np.full(gap_m.shape, np.inf), *(_spare_m(each, ways, start, config) for each in movers)]
+    )
     footprints = _footprints(config)
     while True:
         kept = footprints.pop(0)
-        still_m = gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None]
-        spare_m = np.minimum.reduce([still_m, *(_spare_m(mover, ways, start, kept) for mover in movers)])
+        spare_m = np.minimum(gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None], moved_m)
         met = spare_m < 0.0
         refused = (met & nearby).any(axis=0) | blind
+        if kept is not config:
+            refused |= speeds == speeds[0]  # no faster than it must where there is less room
         if not (refused.all() and footprints):
             break
     if refused.all():
-        refused = ~_leads_out(gap_m, nearby, soon) | ((spare_m < still_m) & met & nearby).any(axis=0) | blind
+        refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | blind
     if refused.all():
         return nowhere
-    led = (_spare_m(_led(mover, config.lead_s), ways, start, kept) for mover in movers)
-    cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
+    led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
     roomy_m = np.minimum.reduce([spare_m, *led])
+    nearest_m = np.minimum.reduce([gap_m, *(gap_to_m(each, ways.x_m, ways.y_m, ways.at_s[:, None]) for each in movers)])
+    within_m = np.maximum(config.hull_radius_m + config.margin_m - nearest_m, 0.0)
+    cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
+    cost = cost + WITHIN * np.mean(within_m, axis=0, where=soon)
     best = int(np.where(refused, np.inf, cost).argmin())
     return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
 
