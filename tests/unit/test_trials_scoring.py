@@ -100,6 +100,14 @@ def test_a_corner_of_a_bank_counts() -> None:
     assert clearances_m(world, course(POND, [(0.2, 0.0, 0.0)]))[BANK][0] == pytest.approx(1.0 - HALF_WIDTH_M)
 
 
+@given(along_m=st.floats(-15.0, 40.0))
+def test_actors_lie_beyond_their_path_s_end_as_they_came(along_m: float) -> None:
+    """A boat that has arrived does not swing round to the east."""
+    path_m = np.array([[0.0, 0.0], [0.0, 10.0], [-8.0, 14.0]])
+    boat = dataclasses.replace(SWIMMER, closed=False, path_m=path_m, length_m=6.2)
+    assert actor_poses(boat, np.array([along_m]))[0] == pytest.approx(actor_at(boat, along_m), abs=1e-9)
+
+
 @given(along_m=st.floats(-5.0, 60.0))
 def test_actors_are_where_the_world_says(along_m: float) -> None:
     x, y, yaw = actor_poses(SWIMMER, np.array([along_m]))[0]

@@ -73,7 +73,11 @@ def actor_poses(actor: Actor, along_m: F64) -> F64:
 
     x, y = at(along_m)
     ahead, behind = at(along_m + 0.5 * actor.length_m), at(along_m - 0.5 * actor.length_m)
-    return np.column_stack([x, y, np.arctan2(ahead[1] - behind[1], ahead[0] - behind[0])])
+    east, north = ahead[0] - behind[0], ahead[1] - behind[1]
+    past = (east == 0.0) & (north == 0.0)  # beyond an end it lies as it came there
+    leg = np.where(along_m[past] > 0.0, len(line) - 2, 0)
+    east[past], north[past] = (line[leg + 1] - line[leg]).T
+    return np.column_stack([x, y, np.arctan2(north, east)])
 
 
 def could_see(world: World, what: str, course: Course, half_fov_rad: float, range_m: float, ahead_m: float) -> bool:
