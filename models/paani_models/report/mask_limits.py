@@ -18,7 +18,7 @@ Counts = NDArray[np.int64]
 
 REACHES_PX = (2, 4, 8)
 TENTHS = 10
-CELLS_HW = (64, 80)  # the shipped segmenter answers once per 4x4 pixels of its 256x320 input
+CELLS_HW = (64, 80)  # the shipped segmenter scores cells of 4x4 pixels of its 256x320 input, and interpolates
 _UNDECIDED = len(SEGMENTER_CLASSES)
 
 
