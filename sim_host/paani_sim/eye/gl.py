@@ -155,9 +155,18 @@ def draw_chunks(gl: ModuleType, batch: Batch, first: npt.NDArray[np.int64], coun
 
 
 def make_texture(
-    gl: ModuleType, picture: npt.NDArray[np.uint8], unit: int, *, wrap_u: bool = True, wrap_v: bool = True
+    gl: ModuleType,
+    picture: npt.NDArray[np.uint8],
+    unit: int,
+    *,
+    wrap_u: bool = True,
+    wrap_v: bool = True,
+    between_levels: bool = True,
 ) -> int:
-    """Upload `(h, w, c)` (or `(layers, h, w, c)`) with mip levels and leave it bound to `unit`."""
+    """Upload `(h, w, c)` (or `(layers, h, w, c)`) with mip levels and leave it bound to `unit`.
+
+    Without `between_levels` the nearest level is read: half the cost.
+    """
     layered = picture.ndim == 4
     kind = gl.GL_TEXTURE_2D_ARRAY if layered else gl.GL_TEXTURE_2D
     inside, outside = (gl.GL_RGBA8, gl.GL_RGBA) if picture.shape[-1] == 4 else (gl.GL_RGB8, gl.GL_RGB)
@@ -182,7 +191,8 @@ def make_texture(
     else:
         gl.glTexImage2D(kind, 0, inside, data.shape[1], data.shape[0], 0, outside, gl.GL_UNSIGNED_BYTE, data)
     gl.glGenerateMipmap(kind)
-    gl.glTexParameteri(kind, gl.GL_TEXTURE_MIN_FILTER, gl.GL_LINEAR_MIPMAP_LINEAR)
+    smooth = gl.GL_LINEAR_MIPMAP_LINEAR if between_levels else gl.GL_LINEAR_MIPMAP_NEAREST
+    gl.glTexParameteri(kind, gl.GL_TEXTURE_MIN_FILTER, smooth)
     gl.glTexParameteri(kind, gl.GL_TEXTURE_MAG_FILTER, gl.GL_LINEAR)
     for wraps, axis in ((wrap_u, gl.GL_TEXTURE_WRAP_S), (wrap_v, gl.GL_TEXTURE_WRAP_T)):
         if not wraps:
@@ -203,7 +213,7 @@ def make_target(
         gl.glActiveTexture(gl.GL_TEXTURE0 + unit + slot)
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
         gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, inside, width_px, height_px, 0, gl.GL_RGBA, number, None)
-        smooth = gl.GL_LINEAR if fine else gl.GL_LINEAR_MIPMAP_LINEAR if slot == 0 else gl.GL_NEAREST
+        smooth = gl.GL_LINEAR if fine else gl.GL_LINEAR_MIPMAP_NEAREST if slot == 0 else gl.GL_NEAREST
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, smooth)
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, gl.GL_LINEAR)
         gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_EDGE)

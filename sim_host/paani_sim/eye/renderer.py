@@ -17,7 +17,7 @@ from paani_sim.eye import gl as g
 from paani_sim.eye import ripples, shaders
 from paani_sim.eye.afloat import ride, sea_of
 from paani_sim.eye.camera import BoatPose, Camera, look_from, metres, view_projection
-from paani_sim.eye.chunks import Chunks, make_chunks, visible
+from paani_sim.eye.chunks import Chunks, in_view, make_chunks, visible
 from paani_sim.eye.labels import Labelled, read_labels
 from paani_sim.eye.lens import NEUTRAL, Lens
 from paani_sim.eye.mesh import rotation
@@ -32,6 +32,7 @@ from paani_sim.eye.weather import Uniforms, uniforms
 from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_at, along_at
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 _NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
 DETAILS_WITHIN_M = 80.0
 SHADES_WITHIN_M = 40.0
@@ -50,16 +51,20 @@ class Picture:
 
 
 class _Solid:
-    """Triangles with one place: drawn chunk by chunk, those ahead."""
+    """Triangles with one place: drawn chunk by chunk, those in the picture."""
 
-    def __init__(self, gl: ModuleType, rows: Rows, widths: tuple[int, ...], reach_m: npt.NDArray[np.float64]) -> None:
-        self.chunks: Chunks = make_chunks(rows.rows[:, :2].astype(float), rows.order, reach_m)
+    def __init__(self, gl: ModuleType, rows: Rows, widths: tuple[int, ...], reach_m: float | F64 = 0.0) -> None:
+        place_m = rows.rows[:, :3].astype(float)
+        self.chunks: Chunks = make_chunks(place_m, rows.order, np.broadcast_to(reach_m, place_m.shape))
         self.batch = g.make_batch(gl, rows.rows, widths, self.chunks.order)
 
 
 class _Afloat(NamedTuple):
+    """A thing that moves; `reach_m` is how far it extends from its origin, any way."""
+
     thing: Obstacle | Actor
     batch: g.Batch
+    reach_m: float
 
 
 class Eye:
@@ -118,18 +123,19 @@ class Eye:
 
     def _upload(self) -> None:
         gl, scene = self._gl, self.scene
-        g.make_texture(gl, noise_tile(self.world.seed), _NOISE)
+        g.make_texture(gl, noise_tile(self.world.seed), _NOISE, between_levels=False)
         sprites = paint_sprites(self.world.seed, self.world.season_frac)
         g.make_texture(gl, sprites, _SPRITES, wrap_u=False, wrap_v=False)
-        g.make_texture(gl, slope_tile(self.world.seed), _SLOPES)
-        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES)
+        g.make_texture(gl, slope_tile(self.world.seed), _SLOPES, between_levels=False)
+        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES, between_levels=False)
         width, height = self.camera.width_px, self.camera.height_px
-        self._mirror = g.make_target(gl, width, height, _MIRROR, slots=1)
+        self._mirror = g.make_target(gl, width // 2, height // 2, _MIRROR, slots=1)  # water blurs it twice over
         self._stirred = g.make_target(gl, width, height, _STIRRED, slots=1, fine=True)
         self._main = g.make_target(gl, round(width * self._scale), round(height * self._scale), _MAIN)
-        self._still = _Solid(gl, scene.still, ROW_WIDTHS, np.zeros(len(scene.still.rows)))
-        self._details = _Solid(gl, scene.details, ROW_WIDTHS, np.zeros(len(scene.details.rows)))
-        self._plants = _Solid(gl, scene.plants, PLANT_WIDTHS, 0.5 * scene.plants.rows[:, 3].astype(float))
+        self._still = _Solid(gl, scene.still, ROW_WIDTHS)
+        self._details = _Solid(gl, scene.details, ROW_WIDTHS)
+        wide_m, tall_m = scene.plants.rows[:, 3:5].astype(float).T
+        self._plants = _Solid(gl, scene.plants, PLANT_WIDTHS, np.stack([wide_m, wide_m, tall_m], axis=1))
         self._afloat, self._actors = self._bring(scene.afloat), self._bring(scene.actors)
         self._screen = g.make_batch(gl, _FLAT, (2,), _QUAD)
         self._shades: _Solid | None = None
@@ -139,7 +145,14 @@ class Eye:
         self._sky_texture: int | None = None
 
     def _bring(self, owned: Sequence[Own]) -> list[_Afloat]:
-        return [_Afloat(o.thing, g.make_batch(self._gl, o.rows.rows, ROW_WIDTHS, o.rows.order)) for o in owned]
+        return [
+            _Afloat(
+                o.thing,
+                g.make_batch(self._gl, o.rows.rows, ROW_WIDTHS, o.rows.order),
+                float(np.linalg.norm(o.rows.rows[:, :3], axis=1).max(initial=0.0)),
+            )
+            for o in owned
+        ]
 
     def set_weather(self, light: Light, wind: Wind) -> None:
         """Change sky, sun, rain and wind."""
@@ -147,7 +160,7 @@ class Eye:
         self._sky: Sky = paint_sky(light)
         if self._sky_texture is not None:
             self._gl.glDeleteTextures(1, [self._sky_texture])
-        self._sky_texture = g.make_texture(self._gl, self._sky.panorama, _SKY, wrap_v=False)
+        self._sky_texture = g.make_texture(self._gl, self._sky.panorama, _SKY, wrap_v=False, between_levels=False)
         self._light = light
         self._sea = sea_of(wind, self.world.waves)
         self._weather: Uniforms = uniforms(self.world, light, wind, self._sky)
@@ -160,7 +173,7 @@ class Eye:
         standing = ripples.standing_shadows((*self.world.obstacles, *self._extra), self._cast)
         rows = np.concatenate([ripples.tree_shadows(self.scene.grown, self._cast), standing]).astype(np.float32)
         patches = Rows(rows, ripples.patch_order(len(rows)))
-        self._shades = _Solid(self._gl, patches, ripples.PATCH_WIDTHS, np.zeros(len(rows)))
+        self._shades = _Solid(self._gl, patches, ripples.PATCH_WIDTHS)
 
     def place(self, obstacles: Sequence[Obstacle]) -> None:
         """Add obstacles to those of the world, in place of any added before."""
@@ -180,12 +193,12 @@ class Eye:
 
         Actors are `actors_along_m` down their paths, in the world's order; empty: as far as time says.
         """
-        self._draw(pose, t_s, actors_along_m)
+        self._draw(pose, t_s, actors_along_m, slots=1)
         return Picture(self._develop(pose, t_s))
 
     def render_labelled(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Labelled:
         """The picture with its class mask, the boxes of what is visible, and depth."""
-        self._draw(pose, t_s, actors_along_m)
+        self._draw(pose, t_s, actors_along_m, slots=2)
         labels = np.asarray(self._optics.nearest(g.read_target(self._gl, self._main, 1)), np.uint8)
         return read_labels(self._develop(pose, t_s), labels, self._depth_m(), self.things)
 
@@ -205,7 +218,7 @@ class Eye:
         smear_px = self.camera.focal_px * pose.yaw_rate_radps * self.camera.shutter_s
         return self._lens.apply(bgr, round(t_s * 1000.0), smear_px=smear_px)
 
-    def _draw(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float]) -> None:
+    def _draw(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float], slots: int) -> None:
         if self._optics_of != self.camera:
             self._optics, self._optics_of = Optics(self.camera, self._scale), self.camera
         gl, camera = self._gl, self._optics.pinhole
@@ -219,31 +232,30 @@ class Eye:
             "mapFromClip": np.linalg.inv(clip).astype(np.float32),
             "eye": position.astype(np.float32),
             "time": float(t_s),
-            "heading": pose.yaw_rad,
             "screen": np.array([self._main.width_px, self._main.height_px], np.float32),
         }
-        moved, stir = self._moved(t_s, actors_along_m, position)
+        moved, stir = self._moved(t_s, actors_along_m, position, clip)
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthFunc(gl.GL_LEQUAL)
         gl.glEnable(gl.GL_CLIP_DISTANCE0)
         g.begin_target(gl, self._mirror, 1)
-        self._draw_solids(shared, moved, -1.0)
+        self._draw_solids(shared, clip, moved, slots=0)
         gl.glActiveTexture(gl.GL_TEXTURE0 + _MIRROR)
         gl.glBindTexture(gl.GL_TEXTURE_2D, self._mirror.colour)
         gl.glGenerateMipmap(gl.GL_TEXTURE_2D)
         gl.glDisable(gl.GL_CLIP_DISTANCE0)
         self._draw_stir(shared, stir)
-        g.begin_target(gl, self._main, 2)
-        self._draw_solids(shared, moved, 1.0)
+        g.begin_target(gl, self._main, slots)
+        self._draw_solids(shared, clip, moved, slots)
         self._programs["water"].use(**shared)
         g.draw(gl, self._screen)
         self._programs["sky"].use(**shared)
         g.draw(gl, self._screen)
 
     def _moved(
-        self, t_s: float, actors_along_m: Sequence[float], eye_m: npt.NDArray[np.float64]
+        self, t_s: float, actors_along_m: Sequence[float], eye_m: F64, clip: F64
     ) -> tuple[list[tuple[F32, g.Batch]], F32]:
-        """Where every floating thing near enough is now, and the patches it leaves on the water."""
+        """Where every floating thing in the picture is now, and the patches those near leave on the water."""
         found: list[tuple[F32, g.Batch]] = []
         patches = [np.zeros((0, ripples.COLUMNS))]
         along_m = actors_along_m or [along_at(actor, t_s) for actor in self.world.actors]
@@ -252,8 +264,12 @@ class Eye:
             if isinstance(a.thing, Actor):
                 places.append((a, actor_at(a.thing, m)))
                 patches.append(ripples.wake(a.thing, m))
-        for a, pose in places:
-            found.append((_model(pose, *ride(self._sea, a.thing, pose, t_s)), a.batch))
+        middle_m = np.array([[pose.x_m, pose.y_m, 0.0] for _, pose in places]).reshape(-1, 3)
+        reach_m = np.array([[a.reach_m, a.reach_m, a.reach_m + self._sea.height_m] for a, _ in places]).reshape(-1, 3)
+        seen = in_view(middle_m, reach_m, clip)
+        for (a, pose), drawn in zip(places, seen.tolist(), strict=True):
+            if drawn:
+                found.append((_model(pose, *ride(self._sea, a.thing, pose, t_s)), a.batch))
             if np.hypot(pose.x_m - eye_m[0], pose.y_m - eye_m[1]) < DETAILS_WITHIN_M:
                 patches.append(ripples.floating_shadow(a.thing, pose, self._cast))
         return found, np.concatenate(patches).astype(np.float32)
@@ -273,9 +289,13 @@ class Eye:
         gl.glEnable(gl.GL_DEPTH_TEST)
         g.drop_batch(gl, batch)
 
-    def _draw_solids(self, shared: Uniforms, moved: list[tuple[F32, g.Batch]], flip: float) -> None:
+    def _draw_solids(self, shared: Uniforms, clip: F64, moved: list[tuple[F32, g.Batch]], slots: int) -> None:
+        """Everything but water and sky into the current target; without `slots` it is the mirror."""
         gl, solid = self._gl, self._programs["solid"]
-        mirrored = flip < 0.0
+        mirrored, eye_m = slots == 0, np.asarray(shared["eye"], float)
+        flip = -1.0 if mirrored else 1.0
+        if mirrored:
+            clip = clip * [1.0, 1.0, -1.0, 1.0]
         solid.use(**shared, flip=flip, mapFromModel=_IDENTITY)
         for model, batch in moved:
             solid.use(mapFromModel=model)
@@ -283,31 +303,24 @@ class Eye:
         solid.use(mapFromModel=_IDENTITY)
         if self._extra_still is not None:
             g.draw(gl, self._extra_still)
-        self._draw_ahead(self._details, shared, DETAILS_WITHIN_M)
-        self._draw_ahead(self._still, shared, MIRRORED_WITHIN_M if mirrored else np.inf)
+        self._draw_seen(self._details, clip, eye_m, DETAILS_WITHIN_M)
+        self._draw_seen(self._still, clip, eye_m, MIRRORED_WITHIN_M if mirrored else np.inf)
         if not mirrored and self._shades is not None:
-            self._draw_shades(self._shades, shared)
+            gl.glEnable(gl.GL_BLEND)
+            gl.glBlendFunc(gl.GL_ZERO, gl.GL_ONE_MINUS_SRC_ALPHA)
+            gl.glDepthMask(False)
+            g.aim_target(gl, 1)  # shades darken the ground; its labels stay
+            self._programs["shade"].use(**shared)
+            self._draw_seen(self._shades, clip, eye_m, SHADES_WITHIN_M)
+            g.aim_target(gl, slots)
+            gl.glDepthMask(True)
+            gl.glDisable(gl.GL_BLEND)
         self._programs["plant"].use(**shared, flip=flip)
-        self._draw_ahead(self._plants, shared, np.inf)
+        self._draw_seen(self._plants, clip, eye_m, np.inf)
 
-    def _draw_shades(self, shades: _Solid, shared: Uniforms) -> None:
-        """Darken the ground; its labels stay."""
-        gl = self._gl
-        g.aim_target(gl, 1)
-        gl.glEnable(gl.GL_BLEND)
-        gl.glBlendFunc(gl.GL_ZERO, gl.GL_ONE_MINUS_SRC_ALPHA)
-        gl.glDepthMask(False)
-        self._programs["shade"].use(**shared)
-        self._draw_ahead(shades, shared, SHADES_WITHIN_M)
-        gl.glDepthMask(True)
-        gl.glDisable(gl.GL_BLEND)
-        g.aim_target(gl, 2)
-
-    def _draw_ahead(self, solid: _Solid, shared: Uniforms, within_m: float) -> None:
-        """What of a batch can be in the picture, with room for the roll."""
-        half_rad = np.arctan(1.35 * np.tan(0.5 * np.radians(self._optics.pinhole.hfov_deg)))
-        eye_m, heading_rad = np.asarray(shared["eye"], float), float(shared["heading"])
-        found = visible(solid.chunks, eye_m, heading_rad, float(half_rad), within_m)
+    def _draw_seen(self, solid: _Solid, clip: F64, eye_m: F64, within_m: float) -> None:
+        """What of a batch can be in the picture."""
+        found = visible(solid.chunks, clip, eye_m, within_m)
         g.draw_chunks(self._gl, solid.batch, solid.chunks.first[found], solid.chunks.count[found])
 
     def close(self) -> None:

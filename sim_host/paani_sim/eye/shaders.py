@@ -237,8 +237,9 @@ vec4 swell(vec2 p, float tile, float turn, float speed) {
     vec2 way = mat2(cos(turn), sin(turn), -sin(turn), cos(turn)) * windWay;
     mat2 toTile = mat2(way.x, -way.y, way.y, way.x);
     vec4 s = texture(slopes, (toTile * p - vec2(speed * time, 0.0)) / tile);
-    vec2 slope = transpose(toTile) * ((s.xy - 0.5) * 8.0);
-    vec2 rough = max(s.zw * 16.0 - pow((s.xy - 0.5) * 8.0, vec2(2.0)), 0.0);
+    vec2 steep = (s.xy - 0.5) * 8.0;
+    vec2 slope = transpose(toTile) * steep;
+    vec2 rough = max(s.zw * 16.0 - steep * steep, 0.0);
     return vec4(slope, rough);
 }
 void main() {
@@ -265,19 +266,22 @@ void main() {
     vec3 r = reflect(-v, n);
     r.z = max(abs(r.z), 0.004);
     r = normalize(r);
-    float fresnel = 0.02 + 0.98 * pow(1.0 - clamp(facing, 0.0, 1.0), 5.0)
-        / (1.0 + 22.7 * pow(sigma, 1.5));
+    float graze = 1.0 - clamp(facing, 0.0, 1.0);
+    float fresnel = 0.02 + 0.98 * graze * graze * graze * graze * graze
+        / (1.0 + 22.7 * sigma * sqrt(sigma));
 
-    float near = textureLod(mirrorView, here, 2.5).a;
+    float near = textureLod(mirrorView, here, 1.0).a;
     float reach = max(-60.0 * log(clamp((near - 0.25) / 0.75, 0.3, 1.0)) - range, 0.4);
     vec3 sky = skyLight(r, clamp(2.0 + 14.0 * sigma, 1.0, 5.0));
+    float lod = clamp(log2(1.0 + 90.0 * sigma) - 1.0, 0.0, 2.0);
+    vec3 at = (clipFromMap * vec4(world, 1.0)).xyw;
+    vec3 level = reach * (clipFromMap * vec4(r.xy, 0.0, 0.0)).xyw, down = -reach * clipFromMap[2].xyw;
+    float flat2 = dot(r.xy, r.xy);
     vec3 mirrored = vec3(0.0);
     for (int k = 0; k < 3; k++) {
-        float bend = (float(k) - 1.0) * 1.6 * sigma;
-        vec3 d = normalize(vec3(r.xy, max(r.z + bend, 0.004)));
-        vec4 at = clipFromMap * vec4(world + vec3(d.xy, -d.z) * reach, 1.0);
-        vec2 uv = clamp(at.xy / max(at.w, 0.01) * 0.5 + 0.5, 0.002, 0.998);
-        float lod = clamp(log2(1.0 + 90.0 * sigma), 0.0, 3.0);
+        float rise = max(r.z + (float(k) - 1.0) * 1.6 * sigma, 0.004);
+        vec3 clip = at + (level + rise * down) * inversesqrt(flat2 + rise * rise);
+        vec2 uv = clamp(clip.xy / max(clip.z, 0.01) * 0.5 + 0.5, 0.002, 0.998);
         vec4 hit = textureLod(mirrorView, uv, lod);
         float solid = smoothstep(0.02, 0.22, hit.a);
         mirrored += mix(sky, hit.rgb * hit.rgb, solid) / 3.0;
