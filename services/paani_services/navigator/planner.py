@@ -201,7 +201,7 @@ def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
 
 
 def _footprints(config: PlannerConfig) -> list[PlannerConfig]:
-    """Margins and drift to keep, the largest first: the whole margin, half way to Q6's, that, the hull and half a cell."""
+    """Margins and drift to keep, the largest first: the whole one, half way to Q6's, that, the hull and half a cell."""
     half_way_m = 0.5 * (config.margin_m + config.tight_margin_m)
     less = ((half_way_m, config.drift_mps), (config.tight_margin_m, config.drift_mps), (0.5 * CELL_M, 0.0))
     tighter = [(margin_m, drift_mps) for margin_m, drift_mps in less if margin_m < config.margin_m]
