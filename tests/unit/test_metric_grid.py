@@ -222,9 +222,50 @@ def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     aslant = tuple(0.45 + 0.005 * column for column in range(80))
     box = (0.0, 0.42, 1.0, aslant[-1])
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
-    assert (grid_of(seen(edge=aslant, detections=(vessel,))).occupied == grid_of(seen(edge=aslant)).occupied).all()
+    with_box, by_mask = (grid_of(seen(edge=aslant, detections=boxes)) for boxes in ((vessel,), ()))
+    assert (with_box.occupied >= by_mask.occupied).all()
+    assert (with_box.free | with_box.occupied == by_mask.free | with_box.occupied).all()
     holed = (*aslant[:30], *([0.4] * 20), *aslant[50:])
     assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == (Foot(192, 320, math.ceil(aslant[-1] * 512)),)
+
+
+def test_a_hull_is_whole_and_as_deep_as_it_is_wide() -> None:
+    """The mask takes its bow for water, and shows its side alone: 2 m wide at 4 m, it is 2 m deep."""
+    side = edge_of(AT_REST, ((4.0, -1.0, 4.4, 1.0),))
+    columns = [column for column, end in enumerate(side) if end > 0.5]
+    bow = columns[: len(columns) // 3]
+    far = edge_of(AT_REST)[bow[0]]
+    holed = tuple(far if column in bow else end for column, end in enumerate(side))
+    box = (columns[0] / 80, 0.0, (columns[-1] + 1) / 80, max(side))  # mast and all
+    vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
+    grid = grid_of(seen(edge=holed, detections=(vessel,)))
+    for x_m, y_m, expected in ((4.2, 0.7, "occupied"), (4.2, -0.7, "occupied"), (5.7, 0.0, "occupied")):
+        assert cell(grid, x_m, y_m) == expected
+    assert cell(grid_of(seen(edge=holed)), 4.2, 0.7) == "free"
+    assert cell(grid, 3.4, 0.7) == cell(grid, 4.2, 1.5) == "free"
+
+
+def test_what_stands_before_a_vessel_is_no_part_of_it() -> None:
+    """A post 3 m ahead, a ship far behind it and one 6 m away: neither is drawn to the post."""
+    post = ((3.0, -0.1, 3.2, 0.1),)
+    for x_m, low in ((6.0, None), (60.0, 0.42)):
+        corners = np.array([[x_m, -1.5, 0.0], [x_m, 1.5, 0.0]])
+        (right, foot), (left, _) = project(corners, AT_REST, EYE) / [EYE.width_px, EYE.height_px]
+        box = (0.1, 0.0, 0.9, low) if low else (left, 0.0, right, foot)
+        vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
+        behind = ((6.0, -1.5, 6.4, 1.5),) if low is None else ()
+        grid = grid_of(seen(edge=edge_of(AT_REST, (*post, *behind)), detections=(vessel,)))
+        assert cell(grid, 3.1, 0.0) == "occupied"
+        assert cell(grid, 3.1, 0.7) == cell(grid, 3.1, -0.7) == "free"
+
+
+def test_a_hull_that_the_mask_misses_stands_at_the_end_of_its_box() -> None:
+    corners = np.array([[4.0, -0.8, 0.0], [4.0, 0.8, 0.0]])
+    (right, low), (left, _) = project(corners, AT_REST, EYE) / [EYE.width_px, EYE.height_px]
+    vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=(left, 0.0, right, low))
+    grid = grid_of(seen(detections=(vessel,)))
+    assert cell(grid, 4.1, 0.0) == cell(grid, 4.1, 0.6) == "occupied"
+    assert cell(grid, 3.4, 0.0) == "free"
 
 
 def test_a_box_cut_below_stands_nearer_than_the_picture_shows() -> None:

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from paani import portable
 from paani.config import CalibrationConfig, PlannerConfig
+from paani.messages import Label
 from paani_services.navigator.projection import F64, Lens, Rays, lens_at, ranges_m, rays
 from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Box, Foot, Sight
 
 CELL_M = 0.2  # Q2
 FOOT_COLUMNS = 24
 FOOT_DEEP_M = 1.5  # a thing is as deep as it is wide, but no deeper
+HULL_DEEP_M, HULL_LONG_M = 2.5, 6.0  # nor is a vessel: beam and length of most
 CUT_FRAC = 0.99  # a box that reaches this low goes on below the picture
 CUT_NEARER_M = 0.8
 ROWS = 2.0 / 64.0  # two of the mask: how far its edge is off a box's
@@ -65,14 +67,39 @@ def shown(sight: Sight, moving: tuple[Box, ...], camera: Camera, config: Planner
     water = ends.fall > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
     open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
     open_m[np.arange(edge.size) % every > 0] = 0.0
-    stays = np.isfinite(far_m)
+    gone = np.zeros(u.shape, np.bool_)
     for box in moving:
-        stays &= ~_ends_at(box, u, edge)
-    deep = math.ceil(config.thickness_m / CELL_M) + 1
-    points = [_points(lens, ends, far_m, np.where(stays, deep, 0.0))]
+        gone |= _ends_at(box, u, edge)
+    deep_m = np.full(u.shape, config.thickness_m)
+    for box in sight.boxes:
+        if box.label is Label.VESSEL and box not in moving:
+            _lay_hull(box, lens, u, ends, far_m, deep_m, config)
+    stays = np.isfinite(far_m) & ~gone
+    points = [_points(lens, ends, far_m, np.where(stays, np.ceil(deep_m / CELL_M) + 1.0, 0.0))]
     points += [_foot(lens, foot, camera, config) for foot in sight.feet if _stays(foot, moving)]
     free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M))
     return Shown(_cells(*free), _cells(*(np.concatenate(axis) for axis in zip(*points, strict=True))))
+
+
+def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> None:
+    """Complete a vessel in `far_m`, and how deep each column is in `deep_m`: it hides what of it lies behind.
+
+    Where the mask looks through part of it (a white bow is taken for water), that is as far away as the part beside
+    it; where through all of it, the box's lower end counts. What stands before it is not part of it.
+    """
+    across = np.flatnonzero((u > box.left / FOOT_STEPS) & (u < box.right / FOOT_STEPS))
+    low_m, least_m = (
+        ranges_m(lens, rays(lens, u[across], np.full(across.shape, box.low / FOOT_STEPS + below)), config.max_range_m)
+        for below in (0.0, ROWS)
+    )
+    if across.size == 0 or not np.isfinite(low_m).all():
+        return
+    own = far_m[across] >= least_m
+    seen = across[own & (far_m[across] <= low_m.min() + HULL_LONG_M)]
+    beside_m = low_m if seen.size == 0 else far_m[seen[np.abs(across[:, None] - seen[None, :]).argmin(axis=1)]]
+    far_m[across] = np.minimum(far_m[across], np.where(own, beside_m, np.inf))
+    wide_m = _width_m(Rays(*(axis[across] for axis in ends)), far_m[across])
+    deep_m[across] = np.maximum(deep_m[across], min(wide_m, HULL_DEEP_M))
 
 
 def hull_top(hull: Polygon, u: F64) -> F64:
