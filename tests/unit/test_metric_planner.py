@@ -143,20 +143,27 @@ def test_open_water_is_crossed_on_the_wanted_course_at_full_speed() -> None:
 
 
 def test_a_way_is_found_round_what_lies_abeam_of_the_goal() -> None:
-    """The goal lies abaft the port beam and a quay to port: the boat turns to starboard, away from it first."""
-    quay = (-6.0, 1.3, 9.0, 2.0)
-    for course in (1.9, 2.6):
-        found = plan(pool(quay), RESTING, Wish(course, 0.6), None, PLANNER)
-        assert found.speed_mps > 0.0
-        assert found.heading_rad < 0.0
+    """The goal lies abaft the port beam and a quay to port: the boat turns to starboard, away from it first.
+
+    It need not lie beside something to turn to its course; further off it waits for a way on the side of its course.
+    """
+    for off_m, leaves in ((0.9, True), (1.6, False)):
+        quay = (-6.0, off_m, 9.0, off_m + 0.7)
+        for course in (1.9, 2.6):
+            found = plan(pool(quay), Start(3.0, 0.0, 0.0), Wish(course, 0.6), None, PLANNER)
+            assert (found.speed_mps > 0.0 and found.heading_rad < -1.0) is leaves
 
 
-def test_every_heading_of_the_circle_is_tried_once() -> None:
+@pytest.mark.parametrize(("span_deg", "count"), [(120.0, 25), (180.0, 36)])
+def test_every_heading_round_the_course_is_tried_once(span_deg: float, count: int) -> None:
+    """Those on the far side of a course abaft the beam are turned to the other way round."""
+    config = msgspec.structs.replace(PLANNER, span_deg=span_deg)
     for course in (0.0, 1.0, -3.0, math.pi):
-        offsets, _ = candidates(RESTING, Wish(course, 0.6), PLANNER)
-        tried = np.sort(offsets[::2] % (2.0 * math.pi))
-        assert len(tried) == 36
-        assert np.diff(tried) == pytest.approx(math.radians(PLANNER.spacing_deg))
+        offsets, _ = candidates(RESTING, Wish(course, 0.6), config)
+        assert len(offsets[::2]) == len(set(np.round(offsets % (2.0 * math.pi), 6).tolist())) == count
+        off = np.abs((offsets - course + math.pi) % (2.0 * math.pi) - math.pi)
+        assert off.max() <= math.radians(span_deg) + 1e-9
+        assert np.abs(offsets).max() <= math.pi
 
 
 @pytest.mark.parametrize(("half_m", "speed_mps"), [(1.5, 0.6), (1.2, 0.3), (0.9, 0.3), (0.5, 0.0)])

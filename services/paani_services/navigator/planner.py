@@ -92,7 +92,9 @@ def plan(
     clear_m = np.minimum(distance_m(grid.occupied), np.maximum(distance_m(grid.hidden) - config.hidden_drift_m, 0.0))
     gap_m = _looked_up(grid, clear_m, ways)
     unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
-    blind = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
+    barred = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
+    if gap_m[0, 0] >= config.hull_radius_m + config.margin_m:  # before a dead end it waits, and does not circle
+        barred |= np.abs(offsets - offsets[0]) > math.radians(config.span_deg) + 1e-9
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
     movers = [each for each in moving if each.age_s <= config.unseen_s]
@@ -105,13 +107,13 @@ def plan(
         kept = footprints.pop(0)
         spare_m = np.minimum(gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None], moved_m)
         met = spare_m < 0.0
-        refused = (met & nearby).any(axis=0) | blind
+        refused = (met & nearby).any(axis=0) | barred
         if kept is not config:
             refused |= speeds == speeds[0]  # no faster than it must where there is less room
         if not (refused.all() and footprints):
             break
     if refused.all():
-        refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | blind
+        refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | barred
     if refused.all():
         return nowhere
     led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
@@ -128,7 +130,7 @@ def plan(
 def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
     """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before.
 
-    Where the wanted course lies abaft the beam, those on its far side are turned to the other way round.
+    Where the wanted course lies abaft the beam, those on its far side are turned to the other way round: a way out.
     """
     wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
     spacing_rad = math.radians(config.spacing_deg)

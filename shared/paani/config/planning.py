@@ -109,7 +109,7 @@ class PlannerConfig(Section, frozen=True):
     drift_mps: NonNegative = 0.15  # Q6
     stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
-    span_deg: Angle = 180.0  # headings to either side of the wanted course
+    span_deg: Angle = 120.0  # headings to either side of the wanted course
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
 
     def acts_on(self, calibration: CalibrationConfig) -> bool:
