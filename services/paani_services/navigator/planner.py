@@ -119,10 +119,10 @@ def plan(
     led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
     roomy_m = np.minimum.reduce([spare_m, *led])
     nearest_m = np.minimum.reduce([gap_m, *(gap_to_m(each, ways.x_m, ways.y_m, ways.at_s[:, None]) for each in movers)])
-    within_m = np.maximum(config.hull_radius_m + config.margin_m - nearest_m, 0.0)
+    within_m = np.where(soon, np.maximum(config.hull_radius_m + config.margin_m - nearest_m, 0.0), 0.0)
     cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
-    cost = cost + WITHIN * np.mean(within_m, axis=0, where=soon)
+    cost = cost + WITHIN * np.add.accumulate(within_m)[-1] / float(soon.sum())
     best = int(np.where(refused, np.inf, cost).argmin())
     return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
 
