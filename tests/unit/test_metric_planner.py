@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.config import load_config
+from paani.messages import Detection, Label
 from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.planner import (
     LOSE_M,
@@ -25,8 +26,8 @@ from paani_services.navigator.planner import (
 )
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
-from paani_sim.eye.camera import BoatPose
-from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, seen
+from paani_sim.eye.camera import BoatPose, project
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
 
 PAPER = load_config(profile="paper").navigator.planner
 AHEAD = Wish(0.0, 0.6)
@@ -183,6 +184,29 @@ def test_a_boat_beside_a_hull_opens_away_before_it_turns_to_its_course(side: flo
     found = plan(quay, start, Wish(side * 1.2, 0.6), None, PLANNER)
     assert found.speed_mps > 0.0
     assert found.heading_rad * side <= 0.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    ahead_m=st.floats(2.6, 4.5),
+    left_m=st.floats(-0.6, 0.6),
+    gone_m=st.floats(0.0, 3.5),
+    surge=st.floats(0.0, 0.6),
+    course=st.floats(-3.1, 3.1),
+)
+def test_nothing_leads_over_a_person(ahead_m: float, left_m: float, gone_m: float, surge: float, course: float) -> None:
+    """Within the room round a swimmer every way seems to come no nearer: hull and Q6's margin are kept all the same."""
+    corners = np.array([[ahead_m, left_m - 0.3, 0.0], [ahead_m, left_m + 0.3, 0.0]])
+    (right, low), (left, _) = project(corners, AT_REST, EYE) / [EYE.width_px, EYE.height_px]
+    swimmer = Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(left, low - 0.1, right, low))
+    grid = lay(seen(detections=(swimmer,)).sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    assert grid.people.any()
+    start = Start(min(gone_m, ahead_m - 0.3), 0.0, 0.0, surge)
+    found = plan(grid, start, Wish(course, 0.6), None, PLANNER)
+    if found.speed_mps > 0.0:
+        at_s, gap_m = swept_gap_m(grid._replace(occupied=grid.people), start, found)
+        near = at_s <= PLANNER.horizon_s
+        assert (gap_m[near] >= min(0.8, gap_m[0]) - CELL_M).all()
 
 
 def test_a_boat_is_carried_sideways_while_it_turns() -> None:

@@ -25,7 +25,8 @@ UNCALIBRATED = Camera()
 class Grid(NamedTuple):
     """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
 
-    west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago.
+    west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
+    a person is, without the room round them.
     """
 
     west_m: float
@@ -34,6 +35,7 @@ class Grid(NamedTuple):
     hidden: Mask
     free: Mask
     beside: Mask
+    people: Mask
 
     @property
     def unknown(self) -> Mask:
@@ -75,6 +77,8 @@ def lay(
     occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
     if config.outvoted_by > 0:
         occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
+    people_of = _last_shown([picture.people for picture in pictures], west, south)
+    people_now = occupied_now & (people_of >= 0) & ((people_of >= free_of) | (people_of >= first_occupied))
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
     shape = (CELLS, CELLS)
     grid = Grid(
@@ -84,6 +88,7 @@ def lay(
         hidden=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
         free=free_now.reshape(shape),
         beside=np.zeros(shape, np.bool_),
+        people=people_now.reshape(shape),
     )
     if first_free == len(known):
         return grid

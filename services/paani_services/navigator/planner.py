@@ -19,6 +19,7 @@ from paani_services.navigator.shown import CELL_M, Mask
 FIELD_CELLS = 10  # distances are known up to 2 m
 QUARTER = 0.5 * math.pi
 LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half a cell
+PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
 SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
@@ -79,7 +80,7 @@ def plan(
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
     moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
     margin is kept to what stands, or else a way is taken that leads out from beside it: fans that are off leave the
-    boat to its way, wind and current.
+    boat to its way, wind and current. No way leads nearer to a person than hull and `tight_margin_m`.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, slow, another than before.
     """
@@ -97,6 +98,9 @@ def plan(
         barred |= np.abs(offsets - offsets[0]) > math.radians(config.span_deg) + 1e-9
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
+    to_people_m = _looked_up(grid, distance_m(grid.people), ways)
+    kept_m = min(config.hull_radius_m + config.tight_margin_m, float(to_people_m[0, 0]))  # whatever else leads out
+    barred |= ((to_people_m < kept_m - PEOPLE_SLACK_M) & nearby).any(axis=0)
     movers = [each for each in moving if each.age_s <= config.unseen_s]
     # What moves keeps its whole margin: beside it, lying still is no worse.
     moved_m = np.minimum.reduce(

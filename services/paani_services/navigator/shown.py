@@ -7,6 +7,7 @@ import functools
 import math
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,10 +47,11 @@ class Cells(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What one picture shows; a cell may be both."""
+    """What one picture shows; a cell may be both. people: where they are, without the room that is kept round them."""
 
     free: Cells
     occupied: Cells
+    people: Cells
 
 
 @functools.lru_cache(maxsize=SIGHTS_HELD)
@@ -78,7 +80,9 @@ def shown(sight: Sight, moving: tuple[Box, ...], camera: Camera, config: Planner
     points = [_points(lens, ends, far_m, np.where(stays, np.ceil(deep_m / CELL_M) + 1.0, 0.0))]
     points += [_foot(lens, foot, camera, config) for foot in sight.feet if _stays(foot, moving)]
     free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M))
-    return Shown(_cells(*free), _cells(*(np.concatenate(axis) for axis in zip(*points, strict=True))))
+    alone = msgspec.structs.replace(config, person_room_m=0.0)
+    people = [_foot(lens, foot, camera, alone) for foot in sight.feet if foot.person and _stays(foot, moving)]
+    return Shown(_cells(*free), _joined(points), _joined(people))
 
 
 def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> None:
@@ -166,6 +170,11 @@ def _points(lens: Lens, given: Rays, first_m: F64, counts: F64) -> tuple[F64, F6
     place = np.arange(ray.size) - np.repeat(np.cumsum(times) - times, times)
     range_m = first_m[ray] + CELL_M * place
     return lens.at_m[0] + range_m * given.east[ray], lens.at_m[1] + range_m * given.north[ray]
+
+
+def _joined(points: list[tuple[F64, F64]]) -> Cells:
+    east_m, north_m = zip(*points, strict=True) if points else ((), ())
+    return _cells(np.concatenate([np.empty(0), *east_m]), np.concatenate([np.empty(0), *north_m]))
 
 
 def _cells(east_m: F64, north_m: F64) -> Cells:
