@@ -210,6 +210,7 @@ EVIDENCE = st.builds(
 
 @settings(max_examples=80, deadline=None)
 @given(st.lists(st.tuples(EVIDENCE, st.integers(-3_000_000, 3_000_000)), max_size=6))
+@pytest.mark.slow
 def test_any_evidence_gives_an_advisory_that_survives_the_wire(frames: list[tuple[m.Evidence, int]]) -> None:
     """Time backwards, epochs back and forth, NaN and inverted boxes: never raises; risks stay in [0, 1]; STOP whenever
     unusable, malformed, stale or future.

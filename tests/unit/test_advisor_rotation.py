@@ -252,6 +252,7 @@ FEW = ["advisor.tracker.max_tracks=5"]
 
 @settings(max_examples=80, deadline=None)
 @given(st.lists(STEP, min_size=1, max_size=10), st.booleans())
+@pytest.mark.slow
 def test_i20_compensation_removes_no_obstacle_and_lowers_no_risk(
     steps: list[tuple[list[m.Detection], int, float, float, float, int, bool]], few: bool
 ) -> None:

@@ -27,6 +27,7 @@ def test_both_ends_of_the_road_are_in_the_ground(world: str) -> None:
     assert ashore[:, 0].min() == pytest.approx(-ashore[:, 0].max(), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_nothing_grows_through_the_road() -> None:
     """Of the river's trees none stands on its bridge or on a ramp."""
     world = load_world("river")

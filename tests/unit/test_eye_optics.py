@@ -18,6 +18,7 @@ GREY = np.full((240, 320, 3), 120, np.uint8)
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-0.15, 0.15), st.floats(0.0, 0.06), st.floats(-0.45, 0.45), st.floats(-0.3, 0.3))
+@pytest.mark.slow
 def test_what_the_lens_shows_is_where_projection_says(k1: float, k2: float, left: float, up: float) -> None:
     """A point projected through the lens lands on the pixel that samples the pinhole's picture of it, within one."""
     camera = Camera(k1=k1, k2=k2)

@@ -170,6 +170,7 @@ def damage(data: st.DataObject, whole: bytes) -> bytes:
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
+@pytest.mark.slow
 def test_no_damage_raises_anything_but_a_user_error(tmp_path: Path, whole: bytes, data: st.DataObject) -> None:
     """What is read is what was written, and a replay ends with a verdict."""
     with contextlib.suppress(UserError):
@@ -185,6 +186,7 @@ def test_no_damage_raises_anything_but_a_user_error(tmp_path: Path, whole: bytes
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
+@pytest.mark.slow
 def test_nor_does_damage_that_no_checksum_finds(tmp_path: Path, bare: bytes, data: st.DataObject) -> None:
     """Payloads, ledger and states as damaged as they come: decisions differ or cannot be computed, nothing crashes."""
     with contextlib.suppress(UserError):
