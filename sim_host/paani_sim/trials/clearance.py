@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paani_sim.trials.outlines import AFLOAT_Z_M, is_round, placed, shape_of
+from paani_sim.trials.outlines import AFLOAT_Z_M
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Actor, Obstacle, Pose2, World
 from paani_sim.worlds.curves import Points
+from paani_sim.worlds.footprint import is_round, placed, shape_of
 
 F64 = NDArray[np.float64]
 FAR_M = 12.0  # what is farther counts as this far
@@ -133,13 +134,13 @@ def _to_thing_m(thing: Obstacle | Actor, poses: F64, course: Course) -> F64:
     if is_round(thing):
         gap = _to_core_m(rel, course.core_m)[:, 0] - 0.5 * thing.width_m
     else:
-        shape = shape_of(thing)[::2]
+        shape = shape_of(thing)
         turn = poses[near, 2] - course.yaw_rad[near]
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         corners = rel + np.stack(
             [cos * shape[:, 0] - sin * shape[:, 1], sin * shape[:, 0] + cos * shape[:, 1]], axis=-1
         )
-        mine = np.broadcast_to(course.core_m * SIGNS, corners.shape)
+        mine = np.broadcast_to(course.core_m * SIGNS, (len(near), *SIGNS.shape))
         gap = np.minimum(_to_core_m(corners, course.core_m).min(axis=1), _to_polygon_m(mine, corners).min(axis=1))
     away[near] = np.clip(gap - course.hull.radius_m, 0.0, FAR_M)
     return away

@@ -17,9 +17,10 @@ from paani.config import Config, CorridorConfig
 from paani_sim.eye.camera import look_from, view_projection
 from paani_sim.eye.mounted import camera_of, pose_of
 from paani_sim.trials.eyes import Sight
-from paani_sim.trials.outlines import heights_of, placed, shape_of, silhouettes
+from paani_sim.trials.outlines import heights_of, silhouettes
 from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_at, along_at
 from paani_sim.worlds.faults import active
+from paani_sim.worlds.footprint import placed, shape_of
 
 F64 = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""Things as outlines: their footprints in the plane, and their silhouettes in a picture. Pure numpy."""
+"""Things as their silhouettes in a picture. Pure numpy."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani_sim.eye.camera import NEAR_M
-from paani_sim.worlds import Actor, Obstacle, Pose2
+from paani_sim.worlds import Actor, Obstacle
+from paani_sim.worlds.footprint import CORNERS
 
 F64 = NDArray[np.float64]
-CORNERS = 8
 AFLOAT_Z_M = 0.2  # whatever stands higher stands on something else, or bridges the water
-_BOX = np.array([[1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], np.float64)
-_ANGLES = np.arange(CORNERS) * 2.0 * np.pi / CORNERS
-_ROUND = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 _RING = np.arange(CORNERS)
 _NEXT = (_RING + 1) % CORNERS
 _EDGES = np.concatenate(
@@ -25,27 +22,10 @@ _EDGES = np.concatenate(
 )
 
 
-def is_round(thing: Obstacle | Actor) -> bool:
-    """An upright cylinder; everything else is a box."""
-    return thing.length_m == thing.width_m
-
-
-def shape_of(thing: Obstacle | Actor) -> F64:
-    """Its outline about its own middle, `(8, 2)`, counter-clockwise."""
-    return (_ROUND if is_round(thing) else _BOX) * [0.5 * thing.length_m, 0.5 * thing.width_m]
-
-
 def heights_of(thing: Obstacle | Actor) -> tuple[float, float]:
     """Foot and top above the water [m]."""
     foot_m = thing.base_z_m if isinstance(thing, Obstacle) else 0.0
     return foot_m, foot_m + thing.height_m
-
-
-def placed(shape_m: F64, pose: Pose2) -> F64:
-    """The outline `(8, 2)` in the map."""
-    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
-    x, y = shape_m[:, 0], shape_m[:, 1]
-    return np.column_stack([pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y])
 
 
 def silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> list[F64]:

@@ -8,9 +8,10 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from paani_sim.trials.outlines import AFLOAT_Z_M, placed, shape_of
+from paani_sim.trials.outlines import AFLOAT_Z_M
 from paani_sim.trials.result import Closeness, TrialResult
 from paani_sim.worlds import World, actor_at, along_at
+from paani_sim.worlds.footprint import placed, shape_of
 
 F64 = NDArray[np.float64]
 WIDTH_PX = 520.0

@@ -8,6 +8,7 @@ import numpy as np
 
 from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.worlds.curves import Points, corners
+from paani_sim.worlds.footprint import BOWS, CORNERS, is_round, shape_of
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
 
 TIMESTEP_S = 0.01
@@ -18,6 +19,7 @@ SOLID_BIT = 2  # what everything else is; the boat looks for it
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SITE = mujoco.mjtObj.mjOBJ_SITE
 
@@ -115,6 +117,7 @@ def _add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> None:
     low_m = obstacle.base_z_m if obstacle.base_z_m > 2.0 else -_SUNK_M
     high_m = obstacle.base_z_m + obstacle.height_m
     _add_solid(
+        spec,
         spec.worldbody,
         obstacle,
         pos=[pose.x_m, pose.y_m, 0.5 * (low_m + high_m)],
@@ -133,6 +136,7 @@ def _add_actor(spec: mujoco.MjSpec, actor: Actor) -> None:
         quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
     )
     _add_solid(
+        spec,
         body,
         actor,
         pos=[0.0, 0.0, 0.5 * (actor.height_m - _SUNK_M)],
@@ -142,6 +146,7 @@ def _add_actor(spec: mujoco.MjSpec, actor: Actor) -> None:
 
 
 def _add_solid(
+    spec: mujoco.MjSpec,
     parent: mujoco.MjsBody,
     thing: Obstacle | Actor,
     *,
@@ -149,15 +154,23 @@ def _add_solid(
     yaw_rad: float,
     half_height_m: float,
 ) -> None:
-    """A box for what is long, an upright cylinder for what is round."""
-    round_plan = thing.length_m == thing.width_m
+    """A box for what is long, an upright cylinder for what is round, and a hull as it narrows."""
     half_length_m, half_width_m = 0.5 * thing.length_m, 0.5 * thing.width_m
+    kind, size = _BOX, [half_length_m, half_width_m, half_height_m]
+    if is_round(thing):
+        kind, size = _CYLINDER, [half_width_m, half_height_m, 0.0]
+    elif thing.look in BOWS:
+        kind = _MESH
+        around = shape_of(thing)
+        walls = [np.column_stack([around, np.full(CORNERS, z_m)]) for z_m in (-half_height_m, half_height_m)]
+        spec.add_mesh(name=thing.id, uservert=np.concatenate(walls).ravel())
     parent.add_geom(
         name=thing.id,
-        type=_CYLINDER if round_plan else _BOX,
+        type=kind,
+        meshname=thing.id if kind == _MESH else "",
         pos=pos,
         quat=[np.cos(yaw_rad / 2.0), 0.0, 0.0, np.sin(yaw_rad / 2.0)],
-        size=[half_width_m, half_height_m, 0.0] if round_plan else [half_length_m, half_width_m, half_height_m],
+        size=size,
         contype=SOLID_BIT,
         conaffinity=BOAT_BIT,
         rgba=[0.7, 0.25, 0.2, 1.0],
