@@ -37,7 +37,7 @@ class Fix(NamedTuple):
     """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
 
     box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
-    outline: points where it meets the water. whole: not cut by the picture's sides.
+    outline: points where it meets the water, left to right. cut: at the picture's left, at its right.
     """
 
     box: tuple[int, int]
@@ -47,7 +47,7 @@ class Fix(NamedTuple):
     weight: Symmetric
     along_m: float
     outline: tuple[F64, F64]
-    whole: bool
+    cut: tuple[bool, bool]
 
 
 class Motion(NamedTuple):
@@ -59,7 +59,7 @@ class Motion(NamedTuple):
 
 
 class Mover(NamedTuple):
-    """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen whole.
+    """A thing that moves: its outline now [n], the room to keep around it, its motion, when it was last seen for that.
 
     boxes: what it has left behind; where it was within `free_s` of when it was last seen stays occupied.
     """
@@ -73,14 +73,20 @@ class Mover(NamedTuple):
 
 
 def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
-    """Everything that moved for certain when it was last seen whole. sights: oldest first."""
+    """Everything that moved for certain when it was last seen. sights: oldest first."""
     found = []
     for track in _tracks(sights, now_us, camera, config):
-        whole = [fix for fix in track if fix.whole]
-        motion = motion_of(whole, config.fit_s)
+        whole = [fix for fix in track if not any(fix.cut)]
+        at_end = _at_shown_end(track)
+        motion = motion_of(at_end, config.fit_s)
+        is_cut = motion is not None
+        if motion is None:
+            motion = motion_of(whole, config.fit_s)
         if motion is None:
             continue
-        last = whole[-1]
+        last = (at_end if is_cut else whole)[-1]
+        # A turning hull shows another end of itself, as if it had moved: what it has left stays occupied, too.
+        left = () if is_cut else (fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s)
         found.append(
             Mover(
                 last.outline[0] - last.at_s * motion.east_mps,
@@ -88,10 +94,23 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
                 config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
                 motion,
                 -last.at_s,
-                frozenset(fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s),
+                frozenset(left),
             )
         )
     return tuple(found)
+
+
+def _at_shown_end(track: list[Fix]) -> list[Fix]:
+    """Of a vessel that the picture cuts off now: where the end stood that it still shows, in every picture with it."""
+    last = track[-1]
+    if last.label is not Label.VESSEL or last.cut not in {(True, False), (False, True)}:
+        return []
+    shown, end = (0, 0) if last.cut[1] else (1, -1)
+    return [
+        fix._replace(place_m=(float(fix.outline[0][end]), float(fix.outline[1][end])))
+        for fix in track
+        if not fix.cut[shown]
+    ]
 
 
 def is_denied(mover: Mover, grid: Grid) -> bool:
@@ -227,8 +246,9 @@ def _fix(key: tuple[int, int], box: Box, at_s: float, camera_m: Pair, height_m: 
         (along - across) * east * north,
         along * north * north + across * east * east,
     )
-    whole = box.left > CUT and max(box.right, box.low) < FOOT_STEPS - CUT
-    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, whole)
+    below = box.low >= FOOT_STEPS - CUT
+    cut = (below or box.left <= CUT, below or box.right >= FOOT_STEPS - CUT)
+    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, cut)
 
 
 def _times(a: Symmetric, b: Pair) -> Pair:

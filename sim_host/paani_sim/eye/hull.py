@@ -17,6 +17,7 @@ HULLS: tuple[Rgb, ...] = (
     (0.40, 0.62, 0.78),
 )
 TIMBER: Rgb = (0.50, 0.34, 0.20)
+LONGEST_RAKE_M = 0.5  # how far a bow overhangs the waterline
 
 
 def hull(
@@ -41,10 +42,11 @@ def hull(
     )
     half = 0.5 * width_m * np.maximum(half, 0.015)
     sheer = freeboard_m * (1.0 + 0.45 * np.clip((at - 0.4) / 0.6, 0.0, 1.0) ** 2)
-    rake = 0.10 * length_m * np.clip((at - 0.5) / 0.5, 0.0, 1.0) ** 2
+    raked_m = min(0.10 * length_m, LONGEST_RAKE_M)
+    rake = raked_m * np.clip((at - 0.5) / 0.5, 0.0, 1.0) ** 2
     depth = np.array([-0.25, 0.0, 0.10, 0.75, 0.92, 1.0])
     flare = np.array([0.70, 0.86, 0.89, 0.98, 1.0, 1.0])
-    x = (0.9 * at - 0.5)[:, None] * length_m + rake[:, None] * np.clip(depth, 0.0, 1.0)[None] ** 0.8
+    x = (at * (length_m - raked_m) - 0.5 * length_m)[:, None] + rake[:, None] * np.clip(depth, 0.0, 1.0)[None] ** 0.8
     y = half[:, None] * flare[None]
     z = np.where(depth < 0.0, depth * 1.2, depth * sheer[:, None])
     rows = np.array([bottom, bottom, topside, topside, stripe or topside, stripe or topside])
