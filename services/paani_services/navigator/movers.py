@@ -37,7 +37,8 @@ class Fix(NamedTuple):
     """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
 
     box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
-    outline: points where it meets the water, left to right. cut: at the picture's left, at its right.
+    outline: points where it meets the water, left to right. whole: not cut by the picture's sides; ends: or which of
+    its left and right ends shows where it meets the water.
     """
 
     box: tuple[int, int]
@@ -47,7 +48,8 @@ class Fix(NamedTuple):
     weight: Symmetric
     along_m: float
     outline: tuple[F64, F64]
-    cut: tuple[bool, bool]
+    whole: bool
+    ends: tuple[bool, bool]
 
 
 class Motion(NamedTuple):
@@ -76,15 +78,18 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     """Everything that moved for certain when it was last seen. sights: oldest first."""
     found = []
     for track in _tracks(sights, now_us, camera, config):
-        whole = [fix for fix in track if not any(fix.cut)]
-        at_end = _at_shown_end(track)
-        motion = motion_of(at_end, config.fit_s)
-        is_cut = motion is not None
+        told = [fix for fix in track if fix.whole]
+        motion, is_cut = None, False
+        for at_end in _at_shown_ends(track):
+            motion = motion_of(at_end, config.fit_s)
+            if motion is not None:
+                told, is_cut = at_end, True
+                break
         if motion is None:
-            motion = motion_of(whole, config.fit_s)
+            motion = motion_of(told, config.fit_s)
         if motion is None:
             continue
-        last = (at_end if is_cut else whole)[-1]
+        last = told[-1]
         # A turning hull shows another end of itself, as if it had moved: what it has left stays occupied, too.
         left = () if is_cut else (fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s)
         found.append(
@@ -100,17 +105,18 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     return tuple(found)
 
 
-def _at_shown_end(track: list[Fix]) -> list[Fix]:
-    """Of a vessel that the picture cuts off now: where the end stood that it still shows, in every picture with it."""
+def _at_shown_ends(track: list[Fix]) -> Iterator[list[Fix]]:
+    """Of a vessel that the picture cuts now, for each end that it shows: where that stood in every picture with it."""
     last = track[-1]
-    if last.label is not Label.VESSEL or last.cut not in {(True, False), (False, True)}:
-        return []
-    shown, end = (0, 0) if last.cut[1] else (1, -1)
-    return [
-        fix._replace(place_m=(float(fix.outline[0][end]), float(fix.outline[1][end])))
-        for fix in track
-        if not fix.cut[shown]
-    ]
+    if last.label is not Label.VESSEL or last.whole:
+        return
+    for end in (0, -1):
+        if last.ends[end]:
+            yield [
+                fix._replace(place_m=(float(fix.outline[0][end]), float(fix.outline[1][end])))
+                for fix in track
+                if fix.ends[end]
+            ]
 
 
 def is_denied(mover: Mover, grid: Grid) -> bool:
@@ -246,9 +252,10 @@ def _fix(key: tuple[int, int], box: Box, at_s: float, camera_m: Pair, height_m: 
         (along - across) * east * north,
         along * north * north + across * east * east,
     )
-    below = box.low >= FOOT_STEPS - CUT
-    cut = (below or box.left <= CUT, below or box.right >= FOOT_STEPS - CUT)
-    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, cut)
+    left, right = box.left > CUT, box.right < FOOT_STEPS - CUT
+    ends = (left and box.ends[0] < FOOT_STEPS - CUT, right and box.ends[-1] < FOOT_STEPS - CUT)
+    whole = left and right and box.low < FOOT_STEPS - CUT
+    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, whole, ends)
 
 
 def _times(a: Symmetric, b: Pair) -> Pair:
