@@ -186,7 +186,7 @@ def passed_by(north_mps: float, surge_mps: float) -> tuple[Memory, int]:
     return memory, at_us
 
 
-@pytest.mark.parametrize("speed_mps", [0.4, 0.8, -0.3])
+@pytest.mark.parametrize("speed_mps", [0.4, 0.8])
 def test_a_hull_that_is_never_seen_whole_is_seen_to_move(speed_mps: float) -> None:
     memory, at_us = passed_by(speed_mps, 0.3)
     (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
