@@ -16,7 +16,7 @@ from paani_services.navigator.movers import Motion, Mover, is_denied, movers
 from paani_services.navigator.planner import Plan, Start, Wish, gap_to_m, plan, roll_out
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen
 
 PERIOD_S = 0.2
 CRUISING, RESTING = Start(0.0, 0.0, 0.0, 0.6), Start(0.0, 0.0, 0.0)
@@ -164,42 +164,6 @@ def test_what_is_cut_by_the_picture_s_side_stays_occupied() -> None:
         found = movers(memory.sights, at_us, CAMERA, PLANNER)
         grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, frozenset().union(*(m.boxes for m in found)))
         assert grid.occupied.any(), k
-
-
-def vessel_box(boat: BoatPose, hull: Bar) -> Detection:
-    """A hull 1.5 m high, cut by the picture's sides."""
-    west, south, east, north = hull
-    corners = [(x, y, z) for x in (west, east) for y in (south, north) for z in (0.0, 1.5)]
-    pixels = project(np.array(corners), boat, EYE) / (320, 240)
-    (x1, y1), (x2, y2) = np.clip(pixels.min(axis=0), 0.0, 1.0).tolist(), np.clip(pixels.max(axis=0), 0.0, 1.0).tolist()
-    return Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=(x1, y1, x2, y2))
-
-
-def passed_by(north_mps: float, surge_mps: float) -> tuple[Memory, int]:
-    """A hull of 10 m across the course, 6 m ahead; its bow comes into the picture, its stern never does."""
-    memory, at_us = Memory(), START_US
-    for k in range(14):
-        t_s = PERIOD_S * k
-        at_us, boat = START_US + round(t_s * 1e6), BoatPose(surge_mps * t_s, 0.0, 0.0)
-        hull = (6.0, -11.0 + north_mps * t_s, 8.0, -1.0 + north_mps * t_s)
-        memory = seen(boat, edge_of(boat, (hull,)), at_us, memory, detections=(vessel_box(boat, hull),))
-    return memory, at_us
-
-
-@pytest.mark.parametrize("speed_mps", [0.4, 0.8])
-def test_a_hull_that_is_never_seen_whole_is_seen_to_move(speed_mps: float) -> None:
-    memory, at_us = passed_by(speed_mps, 0.3)
-    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
-    assert mover.motion.north_mps == pytest.approx(speed_mps, abs=0.15)
-    assert mover.motion.east_mps == pytest.approx(0.0, abs=0.2)
-    assert mover.north_m.max() == pytest.approx(-1.0 + 2.6 * speed_mps, abs=0.6)
-    assert not mover.boxes  # what it has left stays occupied: another end of a turning hull looks like a way made
-
-
-@pytest.mark.parametrize("surge_mps", [0.0, 0.3, 0.6])
-def test_a_moored_hull_that_the_picture_cuts_stands(surge_mps: float) -> None:
-    memory, at_us = passed_by(0.0, surge_mps)
-    assert movers(memory.sights, at_us, CAMERA, PLANNER) == ()
 
 
 def test_only_the_trail_of_what_moves_is_freed() -> None:

@@ -37,8 +37,7 @@ class Fix(NamedTuple):
     """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
 
     box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
-    outline: points where it meets the water, left to right. whole: not cut by the picture's sides; ends: or which of
-    its left and right ends shows where it meets the water.
+    outline: points where it meets the water. whole: not cut by the picture's sides.
     """
 
     box: tuple[int, int]
@@ -49,7 +48,6 @@ class Fix(NamedTuple):
     along_m: float
     outline: tuple[F64, F64]
     whole: bool
-    ends: tuple[bool, bool]
 
 
 class Motion(NamedTuple):
@@ -61,7 +59,7 @@ class Motion(NamedTuple):
 
 
 class Mover(NamedTuple):
-    """A thing that moves: its outline now [n], the room to keep around it, its motion, when it was last seen for that.
+    """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen whole.
 
     boxes: what it has left behind; where it was within `free_s` of when it was last seen stays occupied.
     """
@@ -75,23 +73,14 @@ class Mover(NamedTuple):
 
 
 def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
-    """Everything that moved for certain when it was last seen. sights: oldest first."""
+    """Everything that moved for certain when it was last seen whole. sights: oldest first."""
     found = []
     for track in _tracks(sights, now_us, camera, config):
-        told = [fix for fix in track if fix.whole]
-        motion, is_cut = None, False
-        for at_end in _at_shown_ends(track):
-            motion = motion_of(at_end, config.fit_s)
-            if motion is not None:
-                told, is_cut = at_end, True
-                break
-        if motion is None:
-            motion = motion_of(told, config.fit_s)
+        whole = [fix for fix in track if fix.whole]
+        motion = motion_of(whole, config.fit_s)
         if motion is None:
             continue
-        last = told[-1]
-        # A turning hull shows another end of itself, as if it had moved: what it has left stays occupied, too.
-        left = () if is_cut else (fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s)
+        last = whole[-1]
         found.append(
             Mover(
                 last.outline[0] - last.at_s * motion.east_mps,
@@ -99,24 +88,10 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
                 config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
                 motion,
                 -last.at_s,
-                frozenset(left),
+                frozenset(fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s),
             )
         )
     return tuple(found)
-
-
-def _at_shown_ends(track: list[Fix]) -> Iterator[list[Fix]]:
-    """Of a vessel that the picture cuts now, for each end that it shows: where that stood in every picture with it."""
-    last = track[-1]
-    if last.label is not Label.VESSEL or last.whole:
-        return
-    for end in (0, -1):
-        if last.ends[end]:
-            yield [
-                fix._replace(place_m=(float(fix.outline[0][end]), float(fix.outline[1][end])))
-                for fix in track
-                if fix.ends[end]
-            ]
 
 
 def is_denied(mover: Mover, grid: Grid) -> bool:
@@ -252,10 +227,8 @@ def _fix(key: tuple[int, int], box: Box, at_s: float, camera_m: Pair, height_m: 
         (along - across) * east * north,
         along * north * north + across * east * east,
     )
-    left, right = box.left > CUT, box.right < FOOT_STEPS - CUT
-    ends = (left and box.ends[0] < FOOT_STEPS - CUT, right and box.ends[-1] < FOOT_STEPS - CUT)
-    whole = left and right and box.low < FOOT_STEPS - CUT
-    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, whole, ends)
+    whole = box.left > CUT and max(box.right, box.low) < FOOT_STEPS - CUT
+    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, whole)
 
 
 def _times(a: Symmetric, b: Pair) -> Pair:
