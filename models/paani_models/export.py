@@ -81,7 +81,7 @@ CONTRACTS["gate"] = Model(
     output=Tensor("fitness", (1, 1)),
     classes=("fit",),
     preprocessing=Preprocessing("stretch", _UNCHANGED, (1.0, 1.0, 1.0)),
-    architecture="four strided convolutions, two dense layers",
+    architecture="first four stages of MobileNetV2, two dense layers",
     licence="weights: for research; see the terms of each training source",
 )
 CONTRACTS["yolo11n"] = msgspec.structs.replace(

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import torch
 from torch import Tensor, nn
 
+from paani_models.imagenet_segmenter import ImageNetSegmenter, load_imagenet
+
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
-WIDTHS = (16, 28, 40, 56)
-HIDDEN = 48
+FRONT_STAGES, FRONT_CHANNELS = 4, 64  # of MobileNetV2, down to stride 16
+MIXED_CHANNELS, HIDDEN = 48, 48
+ROWS, COLUMNS = 3, 5  # of the last map, after pooling
+FROZEN_STAGES = 2  # as in the segmenter: general, and the dearest to train
 
 
 class Gate(nn.Module):
@@ -18,25 +24,33 @@ class Gate(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        layers: list[nn.Module] = []
-        channels = 3
-        for width in WIDTHS:
-            layers += [
-                nn.Conv2d(channels, width, 3, stride=2, padding=1, bias=False),
-                nn.BatchNorm2d(width),
-                nn.ReLU(inplace=True),
-            ]
-            channels = width
-        self.features = nn.Sequential(*layers)
-        self.pool = nn.AvgPool2d(2)
+        whole = ImageNetSegmenter()
+        self.front = nn.Sequential(whole.stem, *list(whole.stages)[:FRONT_STAGES])
+        self.mix = nn.Sequential(
+            nn.Conv2d(FRONT_CHANNELS, MIXED_CHANNELS, 1), nn.ReLU(), nn.AvgPool2d((3, 2), stride=2)
+        )
         self.head = nn.Sequential(
-            nn.Flatten(), nn.Dropout(0.2), nn.Linear(channels * 4 * 5, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 1)
+            nn.Flatten(),
+            nn.Dropout(0.2),
+            nn.Linear(MIXED_CHANNELS * ROWS * COLUMNS, HIDDEN),
+            nn.ReLU(),
+            nn.Linear(HIDDEN, 1),
         )
 
     def logit(self, x: Tensor) -> Tensor:
         """Fitness before the sigmoid [N,1]."""
-        return self.head(self.pool(self.features(x - 0.5)))
+        return self.head(self.mix(self.front(2.0 * x - 1.0)))
 
     def forward(self, x: Tensor) -> Tensor:
         """Fitness [N,1]."""
         return torch.sigmoid(self.logit(x))
+
+
+def start_from_imagenet(gate: Gate, path: Path) -> None:
+    """Fill the front and freeze its first stages. Raises UserError where the file does not fit."""
+    whole = ImageNetSegmenter()
+    load_imagenet(whole, path)
+    for own, given in zip(gate.front, (whole.stem, *whole.stages), strict=False):
+        own.load_state_dict(given.state_dict())
+    for frozen in list(gate.front)[: 1 + FROZEN_STAGES]:
+        frozen.requires_grad_(False)

@@ -20,10 +20,7 @@ from paani_models.network_input import SIZE_WH, detector_input, gate_input, segm
 from paani_models.pictures import Pictures
 from paani_models.pseudo_labels import pseudo_labelled
 from paani_models.segmenter import Segmenter
-from paani_models.sources import (
-    RENDERED,
-    read_picture,
-)
+from paani_models.sources import read_picture
 from paani_models.train_detector import DetectorTraining
 from paani_models.train_gate import GateTraining
 from paani_models.train_segmenter import SegmenterTraining
@@ -146,9 +143,11 @@ def _train_gate(pictures: Pictures, plan: Plan) -> None:
     """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
     recipe = train_gate.Recipe()
     recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
-    drawn = [sample for sample in pictures.segmented(held_out=False) if sample.source.name != RENDERED]
+    never = {sample.picture: sample for sample in pictures.never_held_out()}
+    masked = {sample.picture: sample for sample in pictures.segmented(held_out=False) if sample.picture in never}
+    samples = list({**never, **masked}.values())
     segmenter = plan.start or verified_path("segmenter")
-    GateTraining(plan.folder, drawn, pictures.never_held_out(), segmenter, recipe).run()
+    GateTraining(plan.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
 
 
 def export_untrained_net(net: str, weights: Path) -> int:
