@@ -79,8 +79,9 @@ def plan(
 
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
     moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
-    margin is kept to what stands, or else a way is taken that leads out from beside it: fans that are off leave the
-    boat to its way, wind and current. No way leads nearer to a person than hull and `tight_margin_m`.
+    margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
+    furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
+    way leads nearer to a person than hull and `tight_margin_m`.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, slow, another than before.
     """
@@ -118,11 +119,15 @@ def plan(
             break
     if refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | barred
+    nearest_m = _nearest_m(gap_m, movers, ways)
+    if refused.all():
+        coast = coasting(start, ways.at_s, config)
+        coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
+        refused = ~_passes_wider(nearest_m, coast_m, soon, barred | (speeds == speeds[0]))
     if refused.all():
         return nowhere
     led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
     roomy_m = np.minimum.reduce([spare_m, *led])
-    nearest_m = np.minimum.reduce([gap_m, *(gap_to_m(each, ways.x_m, ways.y_m, ways.at_s[:, None]) for each in movers)])
     within_m = np.where(soon, np.maximum(config.hull_radius_m + config.margin_m - nearest_m, 0.0), 0.0)
     cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
@@ -191,6 +196,17 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
 
 
+def coasting(start: Start, at_s: F64, config: PlannerConfig) -> Ways:
+    """Where the boat gets with its fans off, on its heading, slower by half of `accel_mps2`: drag falls with speed."""
+    fall = 0.5 * config.accel_mps2
+    surge = max(start.surge_mps, 0.0)
+    ahead_s = np.minimum(at_s, surge / fall)
+    way_m = (surge * ahead_s - 0.5 * fall * ahead_s * ahead_s)[:, None]
+    cos, sin = portable.cos(start.yaw_rad), portable.sin(start.yaw_rad)
+    drift_m = (start.sway_mps * at_s)[:, None]
+    return Ways(start.x_m + cos * way_m - sin * drift_m, start.y_m + sin * way_m + cos * drift_m, way_m, at_s)
+
+
 def _between(values: F64, limit: float) -> F64:
     """Each, but no further from zero than the limit."""
     return np.asarray(np.minimum(np.maximum(values, -limit), limit))
@@ -219,6 +235,20 @@ def _leads_out(gap_m: F64, nearby: Mask, soon: Mask) -> Mask:
     least_m = np.where(nearby, gap_m, np.inf).min(axis=0)
     last_m = gap_m[int(soon.sum()) - 1]
     return np.asarray((least_m >= gap_m[0, 0] - LOSE_M) & (last_m >= gap_m[0, 0] + GAIN_M))
+
+
+def _passes_wider(nearest_m: F64, coast_m: F64, soon: Mask, barred: Mask) -> Mask:
+    """Ways that keep further off all through the horizon than a boat that coasts on, and hardly less than the best."""
+    least_m = np.where(barred, -np.inf, np.where(soon, nearest_m, np.inf).min(axis=0))
+    wider_m = float(np.where(soon, coast_m, np.inf).min()) + GAIN_M
+    return np.asarray(least_m >= max(wider_m, float(least_m.max()) - 0.5 * GAIN_M))
+
+
+def _nearest_m(gap_m: F64, movers: Sequence[Mover], ways: Ways) -> F64:
+    """To what stands and to what moves [times, candidates]."""
+    return np.asarray(
+        np.minimum.reduce([gap_m, *(gap_to_m(each, ways.x_m, ways.y_m, ways.at_s[:, None]) for each in movers)])
+    )
 
 
 def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
