@@ -19,6 +19,7 @@ from paani_services.navigator.planner import (
     Start,
     Wish,
     candidates,
+    coasting,
     distance_m,
     footprint_m,
     plan,
@@ -230,6 +231,33 @@ def test_nothing_seen_or_nothing_lately_is_nowhere_to_go() -> None:
 def test_a_wall_ahead_stops_the_boat() -> None:
     for start in (RESTING, CRUISING):
         assert plan(pool(bank_m=1.6), start, AHEAD, None, PLANNER).speed_mps == 0.0
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_boat_that_would_coast_onto_something_steers_past_it(side: float) -> None:
+    """No way keeps off it any more, but with its fans off the boat keeps off less: it runs straight on."""
+    low, high = sorted((0.1 * side, 0.4 * side))
+    grid, start = pool((1.7, low, 2.0, high)), Start(0.9, 0.0, 0.0, 0.6)
+    found = plan(grid, start, AHEAD, None, PLANNER)
+    assert found.speed_mps > 0.0
+    assert found.heading_rad * side < -0.3
+    at_s, gap_m = swept_gap_m(grid, start, found)
+    coast = coasting(start, at_s, PLANNER)
+    rows, columns = np.nonzero(grid.occupied)
+    cells = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
+    coast_m = np.hypot(coast.x_m - cells[0], coast.y_m - cells[1]).min(axis=1)
+    soon = at_s <= PLANNER.horizon_s
+    assert gap_m[soon].min() > coast_m[soon].min()
+
+
+def test_a_boat_coasts_as_far_as_its_drag_lets_it() -> None:
+    """From 0.6 m/s the drag of K5 takes 0.86 m; on its heading, and on with what carries it sideways."""
+    at_s = np.array([0.0, 1.0, 9.0])
+    way = coasting(Start(1.0, 2.0, math.pi / 2.0, 0.6, 0.0, 0.1), at_s, PLANNER)
+    assert way.y_m[:, 0] - 2.0 == pytest.approx(way.way_m[:, 0], abs=1e-6)
+    assert way.x_m[:, 0] == pytest.approx([1.0, 0.9, 0.1], abs=1e-6)
+    assert way.way_m[-1, 0] == pytest.approx(12.4 / 20.0 * math.log(1.0 + 20.0 * 0.6 / 4.0), abs=0.1)
+    assert coasting(RESTING, at_s, PLANNER).way_m.max() == 0.0
 
 
 def test_what_stands_in_the_way_is_passed_on_the_side_with_more_room() -> None:
