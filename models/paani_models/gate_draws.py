@@ -15,7 +15,7 @@ from paani_models.gate import INPUT_HEIGHT_PX, INPUT_WIDTH_PX
 from paani_models.gate_data import MIDDLE_WH, Bytes, Cell, Scene
 
 CLEAN, DRY = -1, -2  # beside the numbers of cells
-CROPPED_FRAC, LEAST_CROP = 0.6, 0.8
+CROPPED_FRAC, LEAST_CROP, LEAST_DRY = 0.6, 0.8, 0.5
 Rng = np.random.Generator
 
 
@@ -61,16 +61,22 @@ def net_input(bgr: Bytes) -> Bytes:
 
 def _varied(scene: Scene, rng: Rng) -> tuple[Bytes, Bytes]:
     picture, mask = scene.picture, scene.mask
-    width, height = MIDDLE_WH
     if rng.random() < 0.5:
         picture, mask = picture[:, ::-1], mask[:, ::-1]
     if rng.random() < CROPPED_FRAC:
-        w, h = (round(size * float(rng.uniform(LEAST_CROP, 1.0))) for size in (width, height))
-        x, y = int(rng.integers(width - w + 1)), int(rng.integers(height - h + 1))
-        picture = np.asarray(cv2.resize(picture[y : y + h, x : x + w], MIDDLE_WH), np.uint8)
-        mask = np.asarray(cv2.resize(mask[y : y + h, x : x + w], MIDDLE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
+        part = _part(rng, LEAST_CROP)
+        picture = np.asarray(cv2.resize(picture[part], MIDDLE_WH), np.uint8)
+        mask = np.asarray(cv2.resize(mask[part], MIDDLE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
     picture = cv2.convertScaleAbs(picture, alpha=float(rng.uniform(0.85, 1.15)))
     return np.ascontiguousarray(picture), np.ascontiguousarray(mask)
+
+
+def _part(rng: Rng, least: float) -> tuple[slice, slice]:
+    """Rows and columns of a part that is at least that share of the picture each way."""
+    width, height = MIDDLE_WH
+    w, h = (round(size * float(rng.uniform(least, 1.0))) for size in MIDDLE_WH)
+    x, y = int(rng.integers(width - w + 1)), int(rng.integers(height - h + 1))
+    return slice(y, y + h), slice(x, x + w)
 
 
 def _dry(picture: Bytes, mask: Bytes, rng: Rng) -> Bytes | None:
@@ -80,9 +86,7 @@ def _dry(picture: Bytes, mask: Bytes, rng: Rng) -> Bytes | None:
     if view is not None and kind < 0.4:
         return view
     if view is not None and kind < 0.7:
-        w, h = (round(size * float(rng.uniform(0.5, 1.0))) for size in MIDDLE_WH)
-        x, y = int(rng.integers(MIDDLE_WH[0] - w + 1)), int(rng.integers(MIDDLE_WH[1] - h + 1))
-        return np.asarray(cv2.resize(view[y : y + h, x : x + w], MIDDLE_WH), np.uint8)
+        return np.asarray(cv2.resize(view[_part(rng, LEAST_DRY)], MIDDLE_WH), np.uint8)
     part = land_crop(rng, picture, mask)
     if part is None:
         return view

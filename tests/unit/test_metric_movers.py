@@ -14,10 +14,9 @@ from paani.messages import Detection, Label
 from paani_services.navigator.grid import Grid, lay
 from paani_services.navigator.movers import Motion, Mover, is_denied, movers
 from paani_services.navigator.planner import Plan, Start, Ways, Wish, coasting, gap_to_m, plan, roll_out
-from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen, standing_gaps_m
 
 PERIOD_S = 0.2
 CRUISING, RESTING = Start(0.0, 0.0, 0.0, 0.6), Start(0.0, 0.0, 0.0)
@@ -285,9 +284,7 @@ def test_who_moves_opens_no_way_but_one_wider_than_coasting(
 def least_m(grid: Grid, mover: Mover, ways: Ways) -> float:
     """To what stands, within the 2 m that the planner knows, and to what moves, within its horizon."""
     soon = ways.at_s <= PLANNER.horizon_s + 1e-9
-    rows, columns = np.nonzero(grid.occupied)
-    cells = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
-    standing = np.hypot(ways.x_m[soon] - cells[0][None, :], ways.y_m[soon] - cells[1][None, :]).min(initial=2.0)
+    standing = standing_gaps_m(grid, ways)[soon].min(initial=2.0)
     return float(min(standing, gap_to_m(mover, ways.x_m[soon], ways.y_m[soon], ways.at_s[soon, None]).min()))
 
 

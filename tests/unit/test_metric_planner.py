@@ -28,7 +28,7 @@ from paani_services.navigator.planner import (
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen, standing_gaps_m
 
 PAPER = load_config(profile="paper").navigator.planner
 AHEAD = Wish(0.0, 0.6)
@@ -45,10 +45,7 @@ def swept_gap_m(grid: Grid, start: Start, found: Plan) -> tuple[np.ndarray, np.n
     """Times and distances from the middle of the nearest occupied cell, all the way that the plan leads."""
     off = (found.heading_rad - start.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
     ways = roll_out(start, np.array([off]), np.array([found.speed_mps]), PLANNER)
-    rows, columns = np.nonzero(grid.occupied)
-    x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
-    gaps = np.hypot(ways.x_m - x_m[None, :], ways.y_m - y_m[None, :])
-    return ways.at_s, gaps.min(axis=1, initial=math.inf)
+    return ways.at_s, standing_gaps_m(grid, ways)
 
 
 def test_q4_three_seconds_in_steps_of_0_2() -> None:
@@ -242,10 +239,7 @@ def test_a_boat_that_would_coast_onto_something_steers_past_it(side: float) -> N
     assert found.speed_mps > 0.0
     assert found.heading_rad * side < -0.3
     at_s, gap_m = swept_gap_m(grid, start, found)
-    coast = coasting(start, at_s, PLANNER)
-    rows, columns = np.nonzero(grid.occupied)
-    cells = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
-    coast_m = np.hypot(coast.x_m - cells[0], coast.y_m - cells[1]).min(axis=1)
+    coast_m = standing_gaps_m(grid, coasting(start, at_s, PLANNER))
     soon = at_s <= PLANNER.horizon_s
     assert gap_m[soon].min() > coast_m[soon].min()
 

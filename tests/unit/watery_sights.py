@@ -6,7 +6,9 @@ import numpy as np
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.navigator.shown import Camera
+from paani_services.navigator.grid import Grid
+from paani_services.navigator.planner import Ways
+from paani_services.navigator.shown import CELL_M, Camera
 from paani_services.navigator.sighting import Memory, remember
 from paani_sim.eye.camera import BoatPose, look_from
 from paani_sim.eye.camera import Camera as Eye
@@ -97,3 +99,11 @@ def gone(memory: Memory, at_us: int, boat: BoatPose) -> Memory:
             memory, odometry(here.at_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
         )
     return memory if memory.here is not None else remember(memory, odometry(at_us, boat), None, PLANNER)
+
+
+def standing_gaps_m(grid: Grid, ways: Ways) -> np.ndarray:
+    """From each place of one way to the middle of the nearest occupied cell [times]."""
+    rows, columns = np.nonzero(grid.occupied)
+    x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
+    gaps_m: np.ndarray = np.hypot(ways.x_m - x_m, ways.y_m - y_m).min(axis=1, initial=np.inf)
+    return gaps_m
