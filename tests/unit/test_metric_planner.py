@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from paani.config import load_config
 from paani.messages import Detection, Label
+from paani_services.navigator.distances import distance_m
 from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.planner import (
     LOSE_M,
@@ -19,8 +20,8 @@ from paani_services.navigator.planner import (
     Start,
     Wish,
     candidates,
+    clearance_m,
     coasting,
-    distance_m,
     footprint_m,
     plan,
     roll_out,
@@ -46,6 +47,14 @@ def swept_gap_m(grid: Grid, start: Start, found: Plan) -> tuple[np.ndarray, np.n
     off = (found.heading_rad - start.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
     ways = roll_out(start, np.array([off]), np.array([found.speed_mps]), PLANNER)
     return ways.at_s, standing_gaps_m(grid, ways)
+
+
+def clearance_along_m(grid: Grid, start: Start, found: Plan) -> np.ndarray:
+    """From where the plan leads within the horizon to what is occupied, negative within it."""
+    ways = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
+    column, row = ((axis[:, 0] + 10.0) / CELL_M for axis in (ways.x_m, ways.y_m))
+    near = ways.at_s <= PLANNER.horizon_s
+    return np.asarray(clearance_m(grid, PLANNER)[row.astype(int), column.astype(int)][near])
 
 
 def test_q4_three_seconds_in_steps_of_0_2() -> None:
@@ -302,6 +311,31 @@ def test_what_went_out_of_sight_below_the_picture_is_still_there() -> None:
     assert found.speed_mps == 0.0 or gap_m[at_s <= 3.0].min() > 0.5
     forgetful = lay(memory.sights, (boat.x_m, 0.0), at_us, CAMERA, PAPER)
     assert not forgetful.occupied[49:51, 50:58].any()
+
+
+@pytest.mark.parametrize("course", [0.0, 0.8, -0.8, 2.0])
+def test_a_boat_within_what_is_occupied_goes_no_deeper(course: float) -> None:
+    """What came alongside covers the boat: full ahead through it is no way out, though no cell there is further off."""
+    cells = np.zeros((CELLS, CELLS), np.bool_)
+    cells[40:60, 49:62] = True  # the boat lies 0.2 m inside its western side
+    free = ~cells
+    grid = Grid(-10.0, -10.0, cells, cells & False, free, cells & False, cells & False, cells & False)
+    found = plan(grid, RESTING, Wish(course, 0.6), None, PLANNER)
+    if found.speed_mps > 0.0:
+        assert clearance_along_m(grid, RESTING, found).min() >= -0.1 - 0.5 * CELL_M - LOSE_M
+        assert abs(found.heading_rad) > 1.5
+
+
+@pytest.mark.parametrize("surge", [0.0, 0.6])
+def test_near_anything_no_way_is_taken_at_full_speed(surge: float) -> None:
+    """Beside a wall 0.5 m off, less than hull and Q6's margin, it goes at half the speed; at 2 m at the whole."""
+    speeds = []
+    for wall_m in (0.4, 2.0):
+        cells = np.zeros((CELLS, CELLS), np.bool_)
+        cells[50 + round(wall_m / CELL_M) : 60, :] = True
+        grid = Grid(-10.0, -10.0, cells, cells & False, ~cells, cells & False, cells & False, cells & False)
+        speeds.append(plan(grid, Start(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
+    assert speeds == [0.3, 0.6]
 
 
 @settings(max_examples=10, deadline=None)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paani.config import PlannerConfig
+from paani_services.navigator.distances import distance_m
 from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
 from paani_services.navigator.shown import CELL_M, Camera, Cells, Indices, Mask, Shown, hull_top, shown
 from paani_services.navigator.sighting import Sight
@@ -26,7 +27,8 @@ class Grid(NamedTuple):
     """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
 
     west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
-    a person is, without the room round them.
+    a person is, without the room round them. swum: where a person out of sight may have got to, and no picture shows
+    water now.
     """
 
     west_m: float
@@ -36,6 +38,7 @@ class Grid(NamedTuple):
     free: Mask
     beside: Mask
     people: Mask
+    swum: Mask
 
     @property
     def unknown(self) -> Mask:
@@ -79,6 +82,7 @@ def lay(
         occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
     people_of = _last_shown([picture.people for picture in pictures], west, south)
     people_now = occupied_now & (people_of >= 0) & ((people_of >= free_of) | (people_of >= first_occupied))
+    is_sure = _times_shown([picture.people for picture in pictures], west, south) >= config.person_seen
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
     shape = (CELLS, CELLS)
     grid = Grid(
@@ -89,6 +93,7 @@ def lay(
         free=free_now.reshape(shape),
         beside=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
+        swum=_swum(people_now & is_sure, people_of, known, now_us, config) & ~free_now.reshape(shape),
     )
     if first_free == len(known):
         return grid
@@ -107,6 +112,19 @@ def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float
     east_m, north_m = lens.at_m[0] + near_m * given.east, lens.at_m[1] + near_m * given.north
     reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
     return reach_m if reach_m <= config.blind_m else 0.0
+
+
+def _swum(people: Mask, people_of: Indices, known: list[Sight], now_us: int, config: PlannerConfig) -> Mask:
+    """Cells that people last seen more than `occupied_s` ago can have swum to. people_of: the number of that sight."""
+    found = np.zeros((CELLS, CELLS), np.bool_)
+    if not people.any():
+        return found
+    age_s = np.array([(now_us - sight.at_us) * 1e-6 for sight in known])
+    reach_m = np.where(age_s > config.occupied_s, np.minimum(config.person_mps * age_s, config.person_reach_m), 0.0)
+    cells = np.ceil(reach_m / CELL_M)[people_of] * people
+    for reach in np.unique(cells[cells > 0.0]):
+        found |= distance_m((cells == reach).reshape(found.shape)) <= reach * CELL_M
+    return found
 
 
 def _outvoted(pictures: list[Shown], occupied_of: Indices, west: int, south: int, config: PlannerConfig) -> Mask:
@@ -140,6 +158,11 @@ def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
     number, cell = _all_shown(pictures, west, south)
     last[cell] = number
     return last
+
+
+def _times_shown(pictures: list[Cells], west: int, south: int) -> Indices:
+    """How many pictures show each cell of the grid [100 * 100]."""
+    return np.bincount(_all_shown(pictures, west, south)[1], minlength=CELLS * CELLS)
 
 
 def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, Indices]:

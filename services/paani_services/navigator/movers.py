@@ -16,8 +16,8 @@ from paani_services.navigator.projection import F64, lens_at, ranges_m, rays, to
 from paani_services.navigator.shown import CELL_M, Camera, hull_top
 from paani_services.navigator.sighting import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 
-ROW_RAD = 0.0044  # one row of 240: how exactly a box's lower end is known
-PLACE_M, ACROSS_RAD = 0.05, 0.01  # and everything else of its place, near and far
+ROW = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
+PLACE_M, ACROSS_ROWS = 0.05, 2.3  # and everything else of its place, near and far
 OF_WIDTH = 0.03  # what shows of a thing changes with the side it shows
 SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
 STILL_MPS = 0.08  # slower things stand: Q6's drift covers them
@@ -203,23 +203,32 @@ def _fixes(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     row = 0
     for sight, own in zip(shown, lenses, strict=True):
         camera_m, at_s = (float(own.at_m[0]), float(own.at_m[1])), (sight.at_us - now_us) * 1e-6
+        row_rad = ROW / float(own.focal[1])
         found = []
         for number, box in enumerate(sight.boxes, row):
             if number in reached:
                 key, outline = (sight.at_us, number - row), (east_m[number], north_m[number])
-                found.append(_fix(key, box, at_s, camera_m, camera.calibration.height_m, outline))
+                found.append(_fix(key, box, at_s, camera_m, camera.calibration.height_m, row_rad, outline))
         row += len(sight.boxes)
         yield found
 
 
-def _fix(key: tuple[int, int], box: Box, at_s: float, camera_m: Pair, height_m: float, outline: tuple[F64, F64]) -> Fix:
+def _fix(
+    key: tuple[int, int],
+    box: Box,
+    at_s: float,
+    camera_m: Pair,
+    height_m: float,
+    row_rad: float,
+    outline: tuple[F64, F64],
+) -> Fix:
     """One row of the picture is range^2 / height times its angle along the ray; across, much less."""
     easts, norths = (axis.tolist() for axis in outline)
     place_m = (sum(easts) / BOX_COLUMNS, sum(norths) / BOX_COLUMNS)
     away_m = max(math.dist(place_m, camera_m), PLACE_M)
     wide_m = OF_WIDTH * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
-    along_m = PLACE_M + wide_m + ROW_RAD * away_m * away_m / height_m
-    across_m = PLACE_M + wide_m + ACROSS_RAD * away_m
+    along_m = PLACE_M + wide_m + row_rad * away_m * away_m / height_m
+    across_m = PLACE_M + wide_m + ACROSS_ROWS * row_rad * away_m
     east, north = (place_m[0] - camera_m[0]) / away_m, (place_m[1] - camera_m[1]) / away_m
     along, across = 1.0 / (along_m * along_m), 1.0 / (across_m * across_m)
     weight = (

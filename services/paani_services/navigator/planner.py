@@ -6,17 +6,16 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from paani import portable
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
+from paani_services.navigator.distances import distance_m, signed_m
 from paani_services.navigator.grid import CELLS, Grid
 from paani_services.navigator.movers import Mover
 from paani_services.navigator.projection import F64
 from paani_services.navigator.shown import CELL_M, Mask
 
-FIELD_CELLS = 10  # distances are known up to 2 m
 QUARTER = 0.5 * math.pi
 LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half a cell
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
@@ -81,7 +80,7 @@ def plan(
     moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
     margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
-    way leads nearer to a person than hull and `tight_margin_m`.
+    way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, slow, another than before.
     """
@@ -90,8 +89,7 @@ def plan(
         return nowhere
     offsets, speeds = candidates(start, wish, config)
     ways = roll_out(start, offsets, speeds, config)
-    # What is out of sight may have drifted nearer.
-    clear_m = np.minimum(distance_m(grid.occupied), np.maximum(distance_m(grid.hidden) - config.hidden_drift_m, 0.0))
+    clear_m = clearance_m(grid, config)
     gap_m = _looked_up(grid, clear_m, ways)
     unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
     barred = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
@@ -107,6 +105,9 @@ def plan(
     moved_m = np.minimum.reduce(
         [np.full(gap_m.shape, np.inf), *(_spare_m(each, ways, start, config) for each in movers)]
     )
+    nearest_m = _nearest_m(gap_m, movers, ways)
+    near = ((nearest_m < config.hull_radius_m + config.tight_margin_m) & soon).any(axis=0)
+    barred |= near & (speeds == speeds[0])  # no faster than it must so near
     footprints = _footprints(config)
     while True:
         kept = footprints.pop(0)
@@ -114,12 +115,11 @@ def plan(
         met = spare_m < 0.0
         refused = (met & nearby).any(axis=0) | barred
         if kept is not config:
-            refused |= speeds == speeds[0]  # no faster than it must where there is less room
+            refused |= speeds == speeds[0]
         if not (refused.all() and footprints):
             break
     if refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | barred
-    nearest_m = _nearest_m(gap_m, movers, ways)
     if refused.all():
         coast = coasting(start, ways.at_s, config)
         coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
@@ -219,7 +219,7 @@ def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
     """
     drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
-    return np.asarray(np.minimum(radius_m, np.maximum(0.0, gap_m - 0.5 * CELL_M)))
+    return np.asarray(np.minimum(radius_m, gap_m - 0.5 * CELL_M))
 
 
 def _footprints(config: PlannerConfig) -> list[PlannerConfig]:
@@ -270,7 +270,8 @@ def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F
     at_s = ways.at_s[:, None]
     rest_m = gap_to_m(mover, np.full_like(at_s, start.x_m), np.full_like(at_s, start.y_m), at_s)[:, 0]
     rest_m = np.minimum.accumulate(np.where(ways.at_s <= config.horizon_s + 1e-9, rest_m, np.inf))
-    return np.asarray(gap_to_m(mover, ways.x_m, ways.y_m, at_s) - footprint_m(ways.at_s, rest_m, config)[:, None])
+    kept_m = np.maximum(footprint_m(ways.at_s, rest_m, config), 0.0)  # nothing excuses a way into its room
+    return np.asarray(gap_to_m(mover, ways.x_m, ways.y_m, at_s) - kept_m[:, None])
 
 
 def _led(mover: Mover, lead_s: float) -> Mover:
@@ -281,18 +282,14 @@ def _led(mover: Mover, lead_s: float) -> Mover:
     )
 
 
-def distance_m(cells: Mask) -> F64:
-    """From the middle of each cell to the middle of the nearest of these, at most 2 m [100, 100]."""
-    far = FIELD_CELLS * FIELD_CELLS
-    found: NDArray[np.int16] = np.where(cells, 0, far).astype(np.int16)
-    for axis in (0, 1):
-        given = found if axis == 0 else found.T
-        best = given.copy()
-        for off in range(1, FIELD_CELLS):
-            np.minimum(best[off:], given[:-off] + off * off, out=best[off:])
-            np.minimum(best[:-off], given[off:] + off * off, out=best[:-off])
-        found = best if axis == 0 else best.T
-    return CELL_M * np.sqrt(found.astype(np.float64))
+def clearance_m(grid: Grid, config: PlannerConfig) -> F64:
+    """From the middle of each cell to what is there, at most 2 m; negative within, the further in the less [100, 100].
+
+    What is out of sight may have drifted nearer; a person may be anywhere in `Grid.swum`.
+    """
+    drifted_m = signed_m(grid.hidden) - config.hidden_drift_m
+    found_m = np.minimum(signed_m(grid.occupied), drifted_m)
+    return np.minimum(found_m, signed_m(grid.swum)) if grid.swum.any() else found_m
 
 
 def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:

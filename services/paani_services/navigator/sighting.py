@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -23,6 +23,8 @@ BOXES_SPACING_US = 190_000  # between those kept for their boxes alone
 BOX_COLUMNS = 9
 SMALL = frozenset({Label.PERSON, Label.BUOY})
 MOVABLE = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
+CARRIES = frozenset({Label.VESSEL, Label.PIER})
+MASK_ROW = 1.0 / 64.0
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -180,6 +182,8 @@ def _begun(memory: Memory, odometry: Odometry) -> Memory:
 
 
 def _sight(evidence: Evidence, pose: Pose) -> Sight:
+    carriers = [detection for detection in evidence.detections if detection.label in CARRIES]
+    found = [each for each in evidence.detections if not _is_aboard(each, carriers, evidence.water_edge)]
     return Sight(
         evidence.source_us,
         pose.x_m,
@@ -189,8 +193,26 @@ def _sight(evidence: Evidence, pose: Pose) -> Sight:
         pose.pitch_rad,
         evidence.width_px / evidence.height_px,
         bytes(math.ceil(edge * EDGE_STEPS) for edge in evidence.water_edge),
-        tuple(foot for detection in evidence.detections for foot in _feet(detection, evidence.water_edge)),
-        tuple(_box(detection, evidence.water_edge) for detection in evidence.detections if detection.label in MOVABLE),
+        tuple(foot for detection in found for foot in _feet(detection, evidence.water_edge)),
+        tuple(_box(detection, evidence.water_edge) for detection in found if detection.label in MOVABLE),
+    )
+
+
+def _is_aboard(person: Detection, carriers: Sequence[Detection], edge: tuple[float, ...]) -> bool:
+    """A person on a vessel or a pier, whose foot is not on the water: what carries it is nearer, and counts instead.
+
+    It stands within the other's box, and most of the water before it ends lower than its foot.
+    """
+    if person.label is not Label.PERSON:
+        return False
+    x1, _, x2, foot = person.box_xyxy
+    first = min(int(x1 * len(edge)), len(edge) - 1)
+    ends = sorted(edge[first : max(math.ceil(x2 * len(edge)), first + 1)])
+    if ends[len(ends) // 2] <= foot + MASK_ROW:
+        return False
+    return any(
+        left <= 0.5 * (x1 + x2) <= right and top <= foot <= low - MASK_ROW
+        for left, top, right, low in (carrier.box_xyxy for carrier in carriers)
     )
 
 

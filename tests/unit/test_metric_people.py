@@ -1,0 +1,129 @@
+"""People: those out of sight may have swum on, those aboard something are not in the water."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from paani.messages import Detection, Label
+from paani_services.navigator.grid import Grid, lay
+from paani_services.navigator.planner import Start, Wish, clearance_m, plan
+from paani_services.navigator.shown import CELL_M
+from paani_services.navigator.sighting import Memory
+from paani_sim.eye.camera import BoatPose, project
+from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
+
+SWIMMER_M = (5.0, 0.0)
+ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
+
+
+def box_over(bar: Bar, high_m: float, label: Label = Label.PERSON, foot_m: float = 0.0) -> Detection:
+    """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
+    west, south, east, north = bar
+    corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
+    across, down = project(corners, AT_REST, EYE).T / np.array([[EYE.width_px], [EYE.height_px]])
+    box = (float(across.min()), float(down.min()), float(across.max()), float(down.max()))
+    return Detection(label=label, confidence=0.9, box_xyxy=box)
+
+
+def turned_away(seconds: float, pictures: int = 3) -> tuple[Memory, int]:
+    """Of a boat that saw a swimmer in so many pictures, and has looked astern since."""
+    swimmer = box_over((4.7, -0.3, 5.3, 0.3), 0.4)
+    memory, at_us = Memory(), START_US
+    for _ in range(pictures):
+        memory, at_us = seen(at_us=at_us, memory=memory, detections=(swimmer,)), at_us + 800_000
+    for _ in range(round(seconds / 0.8)):
+        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
+    return memory, at_us - 800_000
+
+
+def swum_m(grid: Grid) -> float:
+    """How near to the boat the nearest cell is that the swimmer may have got to."""
+    rows, columns = np.nonzero(grid.swum)
+    away_m = np.hypot(grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5))
+    return float(away_m.min(initial=np.inf))
+
+
+def test_a_person_out_of_sight_may_swim_on() -> None:
+    """0.3 m/s from where they were, 1.5 m at most; what that leaves of the way is less by as much."""
+    reached = []
+    for seconds in (3.2, 4.8, 8.0):
+        memory, now_us = turned_away(seconds)
+        grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
+        reached.append(swum_m(grid))
+        row, column = np.argwhere(grid.swum)[0]
+        assert clearance_m(grid, PLANNER)[row, column] < 0.0
+    assert reached == pytest.approx([4.7 - 0.96, 4.7 - 1.44, 4.7 - 1.5], abs=2.0 * CELL_M)
+    memory, now_us = turned_away(8.0)
+    for changes in ({"person_mps": 0.0}, {"person_reach_m": 0.0}, {"hidden_s": 0.0}):
+        assert swum_m(lay(memory.sights, (0.0, 0.0), now_us, CAMERA, msgspec.structs.replace(PLANNER, **changes))) > 1e9
+
+
+def test_what_few_pictures_take_for_a_person_swims_nowhere() -> None:
+    memory, now_us = turned_away(4.8, pictures=2)
+    assert swum_m(lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)) == np.inf
+
+
+def test_nobody_has_swum_to_where_a_picture_shows_water() -> None:
+    """The boat looks back: what is seen free is free, and the rest is not."""
+    memory, now_us = turned_away(4.8)
+    hidden = BoatPose(0.0, 0.0, 0.6)  # the swimmer's place is just outside the picture, half of what is round it is in
+    memory = seen(hidden, at_us=now_us + 200_000, memory=memory)
+    grid = lay(memory.sights, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
+    assert grid.swum.any()
+    assert not (grid.swum & grid.free).any()
+
+
+@pytest.mark.parametrize(("x_m", "y_m"), [(1.0, -2.0), (2.0, -1.6)])
+def test_the_boat_is_careful_where_a_person_may_be(x_m: float, y_m: float) -> None:
+    """A swimmer last seen 8 s ago beside the way: the boat goes slower than it would have at once, or not at all."""
+    memory, now_us = turned_away(8.0)
+    grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
+    grid = grid._replace(free=~grid.occupied)  # all else is known
+    start, wish = Start(x_m, y_m, 0.0, 0.6), Wish(0.0, 0.6)
+    found, at_once = (plan(given, start, wish, None, PLANNER) for given in (grid, grid._replace(swum=grid.people)))
+    assert found.speed_mps < at_once.speed_mps
+
+
+def test_a_person_aboard_is_not_in_the_water() -> None:
+    """In a kayak or on a pontoon: what carries them is nearer than where their foot would lie on the water."""
+    for label in (Label.VESSEL, Label.PIER):
+        side = (3.6, -1.2, 4.2, 1.2)
+        carrier, rider = box_over(side, 0.5, label), box_over((3.8, -0.25, 4.0, 0.25), 0.8, foot_m=0.35)
+        edge = edge_of(AT_REST, (side,))
+        sight = seen(edge=edge, detections=(carrier, rider)).sights[-1]
+        assert not any(foot.person for foot in sight.feet)
+        assert Label.PERSON not in {box.label for box in sight.boxes}
+
+
+@pytest.mark.parametrize(
+    ("swimmer", "carried"),
+    [
+        ((3.2, -0.3, 3.5, 0.3), True),  # before the hull
+        ((3.8, -0.3, 4.1, 0.3), False),  # nothing there that could carry them
+    ],
+)
+def test_a_swimmer_is_in_the_water(swimmer: Bar, carried: bool) -> None:
+    """Nearer than the vessel behind them, or with none about: they stay people, with their room."""
+    hull = (3.6, -1.2, 4.2, 1.2)
+    edge = edge_of(AT_REST, (hull, swimmer) if carried else (swimmer,))
+    boxes = (box_over(hull, 0.5, Label.VESSEL), box_over(swimmer, 0.4)) if carried else (box_over(swimmer, 0.4),)
+    sight = seen(edge=edge, detections=boxes).sights[-1]
+    assert any(foot.person for foot in sight.feet)
+    assert Label.PERSON in {box.label for box in sight.boxes}
+
+
+def test_a_swimmer_in_the_empty_corner_of_an_aslant_hull_s_box_is_in_the_water() -> None:
+    """The mask ends the water at the swimmer, not lower: nobody is carried there."""
+    near, far = (3.0, -1.6, 3.6, -1.0), (5.6, 0.8, 6.2, 1.4)
+    hull = tuple((3.0 + 0.26 * k, -1.6 + 0.24 * k, 3.6 + 0.26 * k, -1.0 + 0.24 * k) for k in range(11))
+    swimmer = (3.8, 0.3, 4.1, 0.9)
+    boxes = [box_over(part, 0.5).box_xyxy for part in (near, far)]
+    around = tuple(of(box[side] for box in boxes) for side, of in enumerate((min, min, max, max)))
+    vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=around)  # type: ignore[arg-type]
+    person = box_over(swimmer, 0.4)
+    assert around[0] < person.box_xyxy[0] < person.box_xyxy[2] < around[2]
+    assert person.box_xyxy[3] < around[3]
+    sight = seen(edge=edge_of(AT_REST, (*hull, swimmer)), detections=(vessel, person)).sights[-1]
+    assert any(foot.person for foot in sight.feet)
