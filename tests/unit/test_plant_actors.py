@@ -89,3 +89,15 @@ def test_who_has_waited_long_backs_off_and_tries_again() -> None:
     assert stopped_m == pytest.approx(furthest_m, abs=0.1)
     assert furthest_m + 2.5 < 30.0 - BOAT_REACH_M - KEEP_CLEAR_M + 0.1
     assert back_m == pytest.approx(stopped_m - 12.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("x_m", "sense"), [(1.0, -1.0), (-1.0, 1.0)])
+def test_who_makes_way_does_not_run_onto_a_boat_alongside(x_m: float, sense: float) -> None:
+    """Forward of the beam: astern. Abaft it: ahead, and not astern onto it."""
+    actors = Actors([straight(start_m=20.0)], EVERY_S, BOAT_REACH_M)
+    speeds = []
+    for step in range(round(20.0 / EVERY_S)):
+        actors.advance(EVERY_S * (step + 1), (actors.poses[0].x_m + x_m, 1.8))
+        speeds.append(actors.speeds_mps[0])
+    assert speeds[-1] == sense * 0.4
+    assert min(sense * speed for speed in speeds) >= 0.0

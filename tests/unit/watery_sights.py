@@ -13,7 +13,7 @@ from paani_services.navigator.sighting import Memory, remember
 from paani_sim.eye.camera import BoatPose, look_from
 from paani_sim.eye.mounted import camera_of
 
-CONFIG = load_config(sets=["eye.hfov_deg=70"])  # the lens that the numbers below are for
+CONFIG = load_config(sets=["eye.hfov_deg=70", "eye.pitch_down_deg=6"])  # the lens that the numbers below are for
 CAMERA = Camera(calibration_of(CONFIG.eye))
 PLANNER = CONFIG.navigator.planner
 EYE = camera_of(CONFIG.eye)

@@ -82,7 +82,6 @@ def lay(
         occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
     people_of = _last_shown([picture.people for picture in pictures], west, south)
     people_now = occupied_now & (people_of >= 0) & ((people_of >= free_of) | (people_of >= first_occupied))
-    is_sure = _times_shown([picture.people for picture in pictures], west, south) >= config.person_seen
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
     shape = (CELLS, CELLS)
     grid = Grid(
@@ -93,7 +92,7 @@ def lay(
         free=free_now.reshape(shape),
         beside=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
-        swum=_swum(people_now & is_sure, people_of, known, now_us, config) & ~free_now.reshape(shape),
+        swum=_swum(people_now, people_of, known, now_us, config) & ~free_now.reshape(shape),
     )
     if first_free == len(known):
         return grid
@@ -158,11 +157,6 @@ def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
     number, cell = _all_shown(pictures, west, south)
     last[cell] = number
     return last
-
-
-def _times_shown(pictures: list[Cells], west: int, south: int) -> Indices:
-    """How many pictures show each cell of the grid [100 * 100]."""
-    return np.bincount(_all_shown(pictures, west, south)[1], minlength=CELLS * CELLS)
 
 
 def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, Indices]:

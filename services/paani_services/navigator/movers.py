@@ -17,6 +17,7 @@ from paani_services.navigator.shown import CELL_M, Camera, hull_top
 from paani_services.navigator.sighting import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 
 ROW = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
+HULL_ROWS = 2.0  # and a hull's, which the mask ends: half a row of 64, and so for as long as it takes to the next
 PLACE_M, ACROSS_ROWS = 0.05, 2.3  # and everything else of its place, near and far
 OF_WIDTH = 0.03  # what shows of a thing changes with the side it shows
 SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
@@ -227,7 +228,8 @@ def _fix(
     place_m = (sum(easts) / BOX_COLUMNS, sum(norths) / BOX_COLUMNS)
     away_m = max(math.dist(place_m, camera_m), PLACE_M)
     wide_m = OF_WIDTH * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
-    along_m = PLACE_M + wide_m + row_rad * away_m * away_m / height_m
+    end_rad = row_rad if box.is_small else HULL_ROWS * row_rad
+    along_m = PLACE_M + wide_m + end_rad * away_m * away_m / height_m
     across_m = PLACE_M + wide_m + ACROSS_ROWS * row_rad * away_m
     east, north = (place_m[0] - camera_m[0]) / away_m, (place_m[1] - camera_m[1]) / away_m
     along, across = 1.0 / (along_m * along_m), 1.0 / (across_m * across_m)

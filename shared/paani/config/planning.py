@@ -63,8 +63,7 @@ class PlannerConfig(Section, frozen=True):
     `outvoted_by`: so many later pictures that show water free a cell that one alone shows occupied: a glint; 0: never.
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. It may
     have come `hidden_drift_m` nearer meanwhile.
-    `person_mps`: how fast a person who is out of sight may swim, `person_reach_m` at most, if `person_seen` pictures
-    showed them there.
+    `person_mps`: how fast a person who is out of sight may swim, `person_reach_m` at most.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
     `predict`: what moves counts where it will be, not where it was: velocities over `fit_s`, as far as `mover_range_m`;
@@ -86,9 +85,8 @@ class PlannerConfig(Section, frozen=True):
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
-    person_seen: Annotated[int, msgspec.Meta(ge=1)] = 3
-    person_mps: NonNegative = 0.3  # of a swimmer at ease
-    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=1.8)] = 1.5
+    person_mps: NonNegative = 0.4  # of a swimmer at ease
+    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=1.8)] = 1.8
     predict: bool = True
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5

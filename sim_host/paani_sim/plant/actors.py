@@ -11,7 +11,7 @@ from paani_sim.worlds.world import Actor, Behaviour, Pose2, along_at
 KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
 SLOWING_MPS2 = 0.15  # a small craft that throttles back
-# One who has stood still for the boat this long backs off for a while, and so lets it pass.
+# One who has stood still for the boat this long makes way for a while: astern, or ahead of a boat abaft the beam.
 PATIENCE_S, BACKING_MPS, BACKING_S = 8.0, 0.4, 30.0
 STANDING_MPS = 0.05
 
@@ -63,6 +63,11 @@ def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_re
     return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
 
 
+def ahead_of_m(pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
+    """How far the boat's middle is ahead of the actor's, along its heading."""
+    return math.cos(pose.yaw_rad) * (boat_xy_m[0] - pose.x_m) + math.sin(pose.yaw_rad) * (boat_xy_m[1] - pose.y_m)
+
+
 class Actors:
     """All actors of a world, advanced together every `every_s`."""
 
@@ -83,19 +88,20 @@ class Actors:
         for number, (actor, pose, along_m) in enumerate(zip(self._actors, self.poses, self.along_m, strict=True)):
             speed = 0.0
             if t_s > actor.start_s:
-                speed = self._patient(number, speed_mps(actor, pose, boat_xy_m, self._boat_reach_m))
+                sense = -1.0 if ahead_of_m(pose, boat_xy_m) > 0.0 else 1.0
+                speed = self._patient(number, speed_mps(actor, pose, boat_xy_m, self._boat_reach_m), sense)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
         self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, along, strict=True)]
 
-    def _patient(self, number: int, speed: float) -> float:
-        """The speed, or astern for `BACKING_S` after `PATIENCE_S` of standing still for the boat."""
+    def _patient(self, number: int, speed: float, sense: float) -> float:
+        """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `BACKING_S`."""
         waited_s = self._waited_s[number]
         if waited_s >= PATIENCE_S:
             self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + BACKING_S else 0.0
-            return -BACKING_MPS
+            return sense * BACKING_MPS
         stands = speed < STANDING_MPS < self._actors[number].speed_mps
         self._waited_s[number] = waited_s + self._every_s if stands else 0.0
         return speed
