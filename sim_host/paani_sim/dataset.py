@@ -143,7 +143,7 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
     eye.exposure = float(1.15 * np.exp(rng.normal(0.0, 0.28)))
     eye.camera = dataclasses.replace(
         eye.camera,
-        hfov_deg=float(rng.uniform(52.0, 108.0)),
+        hfov_deg=float(rng.uniform(52.0, 88.0)),
         up_m=float(rng.uniform(0.35, 1.6)),
         down_deg=float(rng.normal(3.5, 3.0)),
         k1=float(rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,

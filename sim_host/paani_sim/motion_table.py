@@ -27,10 +27,6 @@ from paani_sim.encounters import Course, Family, Look, course, looks, pose_at, r
 from paani_sim.eye.camera import Camera
 
 RATES_HZ = (0.5, 1.0, 2.0, 4.0, 5.0, 10.0)
-LENS = (
-    "eye.hfov_deg=70",
-    "eye.pitch_down_deg=6",
-)  # what the encounters are laid out for: who is cut by the picture's side
 UNCOMPENSATED = "no rotation"  # `paani` that takes its own turning for motion
 PROFILES = ("paani", UNCOMPENSATED, "paper")
 RULE_S, RULE_PERIODS = 1.5, 6.0
@@ -132,8 +128,8 @@ def part_of(rows: list[MotionRow]) -> Part:
 def config_of(profile: str) -> Config:
     """A profile's configuration."""
     if profile == UNCOMPENSATED:
-        return load_config(sets=[*LENS, "advisor.motion.compensate_rotation=false"])
-    return load_config(profile=profile, sets=LENS)
+        return load_config(sets=["advisor.motion.compensate_rotation=false"])
+    return load_config(profile=profile)
 
 
 def _moments(

@@ -30,11 +30,10 @@ from paani_services.advisor.rotation import (
 )
 from paani_services.advisor.tracker import is_accepted
 from paani_sim.eye.camera import BoatPose, Camera, project
-from tests.unit.advisor_evidence import CLEAR, PAPER, T0_US, box, seeing
+from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, seeing
 
 U = m.RotationUse
-NARROW = ("eye.hfov_deg=70", "eye.pitch_down_deg=6")  # the lens of `Camera`
-PAANI, OFF = load_config(sets=NARROW), load_config(sets=[*NARROW, "advisor.motion.compensate_rotation=false"])
+OFF = load_config(sets=["advisor.motion.compensate_rotation=false"])
 LENS = lens_of(CLEAR, PAANI)
 BUOY_M = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (0.0, 0.9)])
 
@@ -83,7 +82,7 @@ def test_a_turn_does_not_change_the_size(yaw_rad: float, down_deg: float, off: f
 
     What is left is the box around things that seem to lean, in a camera that looks down.
     """
-    lens = lens_of(CLEAR, load_config(sets=[*NARROW, f"eye.pitch_down_deg={down_deg}"]))
+    lens = lens_of(CLEAR, load_config(sets=[f"eye.pitch_down_deg={down_deg}"]))
     camera = Camera(down_deg=down_deg)
     ahead, aside = (seen_box(BoatPose(0.0, 0.0, yaw), (80.0, 0.0), 3.0, camera) for yaw in (0.0, yaw_rad))
     assert log_size(aside, lens) == pytest.approx(log_size(ahead, lens), abs=off)

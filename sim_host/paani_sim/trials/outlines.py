@@ -41,7 +41,7 @@ def silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> list[F64
     one, other = clip[:, _EDGES[:, 0]], clip[:, _EDGES[:, 1]]
     with np.errstate(divide="ignore", invalid="ignore"):
         part = (NEAR_M - one[..., 3]) / (other[..., 3] - one[..., 3])
-    cut = one + part[..., None] * (other - one)
+        cut = one + part[..., None] * (other - one)  # of an edge that crosses the plane; no other is used
     behind_one, behind_other = one[..., 3] < NEAR_M, other[..., 3] < NEAR_M
     first = np.where(behind_one[..., None], cut, one)
     second = np.where(behind_other[..., None], cut, other)
