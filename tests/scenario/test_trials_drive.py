@@ -152,9 +152,10 @@ def test_nothing_crosses_a_lost_link(launch: Launch) -> None:
     assert forces[9.5] > 0.0
 
 
-def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them() -> None:
-    """Things that face the boat, by label; nothing that the shore hides or the boat has passed."""
-    world, config = load_world("river"), config_of(Policy.ORACLE)
+@pytest.mark.parametrize("down_deg", [6.0, 0.0])
+def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float) -> None:
+    """Things that face the boat, by label; nothing that the shore hides or the boat has passed; level cameras too."""
+    world, config = load_world("river"), config_of(Policy.ORACLE, [f"eye.pitch_down_deg={down_deg}"])
     eyes = OracleEyes(world, (), config)
     start = world.start
     truth = m.TruePose(
