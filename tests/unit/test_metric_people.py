@@ -14,7 +14,6 @@ from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
 from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
 
-SWIMMER_M = (5.0, 0.0)
 ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
 
 

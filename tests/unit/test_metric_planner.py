@@ -18,6 +18,7 @@ from paani_services.navigator.planner import (
     LOSE_M,
     Plan,
     Start,
+    Ways,
     Wish,
     candidates,
     clearance_m,
@@ -44,15 +45,26 @@ def pool(*bars: Bar, bank_m: float = 500.0) -> Grid:
 
 def swept_gap_m(grid: Grid, start: Start, found: Plan) -> tuple[np.ndarray, np.ndarray]:
     """Times and distances from the middle of the nearest occupied cell, all the way that the plan leads."""
-    off = (found.heading_rad - start.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
-    ways = roll_out(start, np.array([off]), np.array([found.speed_mps]), PLANNER)
+    ways = led(start, found)
     return ways.at_s, standing_gaps_m(grid, ways)
+
+
+def led(start: Start, found: Plan) -> Ways:
+    """Where the plan leads."""
+    off = (found.heading_rad - start.yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
+    return roll_out(start, np.array([off]), np.array([found.speed_mps]), PLANNER)
+
+
+def round_about(occupied: np.ndarray) -> Grid:
+    """A grid round the origin where all that is not occupied is free."""
+    none = np.zeros_like(occupied)
+    return Grid(-10.0, -10.0, occupied, hidden=none, free=~occupied, beside=none, people=none, swum=none)
 
 
 def clearance_along_m(grid: Grid, start: Start, found: Plan) -> np.ndarray:
     """From where the plan leads within the horizon to what is occupied, negative within it."""
-    ways = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
-    column, row = ((axis[:, 0] + 10.0) / CELL_M for axis in (ways.x_m, ways.y_m))
+    ways = led(start, found)
+    column, row = (ways.x_m[:, 0] - grid.west_m) / CELL_M, (ways.y_m[:, 0] - grid.south_m) / CELL_M
     near = ways.at_s <= PLANNER.horizon_s
     return np.asarray(clearance_m(grid, PLANNER)[row.astype(int), column.astype(int)][near])
 
@@ -318,8 +330,7 @@ def test_a_boat_within_what_is_occupied_goes_no_deeper(course: float) -> None:
     """What came alongside covers the boat: full ahead through it is no way out, though no cell there is further off."""
     cells = np.zeros((CELLS, CELLS), np.bool_)
     cells[40:60, 49:62] = True  # the boat lies 0.2 m inside its western side
-    free = ~cells
-    grid = Grid(-10.0, -10.0, cells, cells & False, free, cells & False, cells & False, cells & False)
+    grid = round_about(cells)
     found = plan(grid, RESTING, Wish(course, 0.6), None, PLANNER)
     if found.speed_mps > 0.0:
         assert clearance_along_m(grid, RESTING, found).min() >= -0.1 - 0.5 * CELL_M - LOSE_M
@@ -333,8 +344,7 @@ def test_near_anything_no_way_is_taken_at_full_speed(surge: float) -> None:
     for wall_m in (0.4, 2.0):
         cells = np.zeros((CELLS, CELLS), np.bool_)
         cells[50 + round(wall_m / CELL_M) : 60, :] = True
-        grid = Grid(-10.0, -10.0, cells, cells & False, ~cells, cells & False, cells & False, cells & False)
-        speeds.append(plan(grid, Start(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
+        speeds.append(plan(round_about(cells), Start(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
     assert speeds == [0.3, 0.6]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from paani.config import PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.grid import CELLS, Grid, Moving
-from paani_services.navigator.projection import F64, lens_at, ranges_m, rays, together
+from paani_services.navigator.projection import F64, Lens, lens_at, ranges_m, rays, together
 from paani_services.navigator.shown import CELL_M, Camera, hull_top
 from paani_services.navigator.sighting import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 
@@ -203,27 +203,19 @@ def _fixes(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     reached = set(np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist())
     row = 0
     for sight, own in zip(shown, lenses, strict=True):
-        camera_m, at_s = (float(own.at_m[0]), float(own.at_m[1])), (sight.at_us - now_us) * 1e-6
-        row_rad = ROW / float(own.focal[1])
+        at_s = (sight.at_us - now_us) * 1e-6
         found = []
         for number, box in enumerate(sight.boxes, row):
             if number in reached:
                 key, outline = (sight.at_us, number - row), (east_m[number], north_m[number])
-                found.append(_fix(key, box, at_s, camera_m, camera.calibration.height_m, row_rad, outline))
+                found.append(_fix(key, box, at_s, own, camera.calibration.height_m, outline))
         row += len(sight.boxes)
         yield found
 
 
-def _fix(
-    key: tuple[int, int],
-    box: Box,
-    at_s: float,
-    camera_m: Pair,
-    height_m: float,
-    row_rad: float,
-    outline: tuple[F64, F64],
-) -> Fix:
+def _fix(key: tuple[int, int], box: Box, at_s: float, lens: Lens, height_m: float, outline: tuple[F64, F64]) -> Fix:
     """One row of the picture is range^2 / height times its angle along the ray; across, much less."""
+    camera_m, row_rad = (float(lens.at_m[0]), float(lens.at_m[1])), ROW / float(lens.focal[1])
     easts, norths = (axis.tolist() for axis in outline)
     place_m = (sum(easts) / BOX_COLUMNS, sum(norths) / BOX_COLUMNS)
     away_m = max(math.dist(place_m, camera_m), PLACE_M)

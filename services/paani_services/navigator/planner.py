@@ -88,6 +88,7 @@ def plan(
     if wish.speed_mps <= 0.0 or not grid.free.any():
         return nowhere
     offsets, speeds = candidates(start, wish, config)
+    is_full, tight_m = speeds == speeds[0], config.hull_radius_m + config.tight_margin_m
     ways = roll_out(start, offsets, speeds, config)
     clear_m = clearance_m(grid, config)
     gap_m = _looked_up(grid, clear_m, ways)
@@ -98,7 +99,7 @@ def plan(
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
     to_people_m = _looked_up(grid, distance_m(grid.people), ways)
-    kept_m = min(config.hull_radius_m + config.tight_margin_m, float(to_people_m[0, 0]))  # whatever else leads out
+    kept_m = min(tight_m, float(to_people_m[0, 0]))  # whatever else leads out
     barred |= ((to_people_m < kept_m - PEOPLE_SLACK_M) & nearby).any(axis=0)
     movers = [each for each in moving if each.age_s <= config.unseen_s]
     # What moves keeps its whole margin: beside it, lying still is no worse.
@@ -106,8 +107,7 @@ def plan(
         [np.full(gap_m.shape, np.inf), *(_spare_m(each, ways, start, config) for each in movers)]
     )
     nearest_m = _nearest_m(gap_m, movers, ways)
-    near = ((nearest_m < config.hull_radius_m + config.tight_margin_m) & soon).any(axis=0)
-    barred |= near & (speeds == speeds[0])  # no faster than it must so near
+    barred |= is_full & ((nearest_m < tight_m) & soon).any(axis=0)  # no faster than it must so near
     footprints = _footprints(config)
     while True:
         kept = footprints.pop(0)
@@ -115,7 +115,7 @@ def plan(
         met = spare_m < 0.0
         refused = (met & nearby).any(axis=0) | barred
         if kept is not config:
-            refused |= speeds == speeds[0]
+            refused |= is_full
         if not (refused.all() and footprints):
             break
     if refused.all():
@@ -123,7 +123,7 @@ def plan(
     if refused.all():
         coast = coasting(start, ways.at_s, config)
         coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
-        refused = ~_passes_wider(nearest_m, coast_m, soon, barred | (speeds == speeds[0]))
+        refused = ~_passes_wider(nearest_m, coast_m, soon, barred | is_full)
     if refused.all():
         return nowhere
     led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
@@ -216,6 +216,7 @@ def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
     """The radius that must be free at each time: hull, margin, and drift within the horizon (Q6).
 
     gap_m: to the nearest thing, boat at rest. Where that is less, a way that comes no nearer is allowed: it leads out.
+    Within a thing both are negative.
     """
     drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m

@@ -15,7 +15,7 @@ from paani import portable
 from paani.config import CalibrationConfig, PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.projection import F64, Lens, Rays, lens_at, ranges_m, rays
-from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, Box, Foot, Sight
+from paani_services.navigator.sighting import EDGE_STEPS, FOOT_STEPS, MASK_ROW, Box, Foot, Sight
 
 CELL_M = 0.2  # Q2
 FOOT_COLUMNS = 24
@@ -23,7 +23,7 @@ FOOT_DEEP_M = 1.5  # a thing is as deep as it is wide, but no deeper
 HULL_DEEP_M, HULL_LONG_M = 2.5, 6.0  # nor is a vessel: beam and length of most
 CUT_FRAC = 0.99  # a box that reaches this low goes on below the picture
 CUT_NEARER_M = 0.8
-ROWS = 2.0 / 64.0  # two of the mask: how far its edge is off a box's
+ROWS = 2.0 * MASK_ROW  # how far its edge is off a box's
 SIGHTS_HELD = 512
 WIDEST = 1 << 24  # columns of the map: 3,355 km
 

@@ -206,9 +206,8 @@ def _is_aboard(person: Detection, carriers: Sequence[Detection], edge: tuple[flo
     if person.label is not Label.PERSON:
         return False
     x1, _, x2, foot = person.box_xyxy
-    first = min(int(x1 * len(edge)), len(edge) - 1)
-    ends = sorted(edge[first : max(math.ceil(x2 * len(edge)), first + 1)])
-    if ends[len(ends) // 2] <= foot + MASK_ROW:
+    ends = sorted(edge[column] for column in _columns(person, edge))
+    if not ends or ends[len(ends) // 2] <= foot + MASK_ROW:
         return False
     return any(
         left <= 0.5 * (x1 + x2) <= right and top <= foot <= low - MASK_ROW
@@ -243,11 +242,16 @@ def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
         yield Foot(math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), low, person)
         return
     count = len(edge)
-    columns = range(math.floor(x1 * count), min(math.ceil(x2 * count), count))
-    for is_missed, run in itertools.groupby(columns, key=lambda column: edge[column] < y1):
+    for is_missed, run in itertools.groupby(_columns(detection, edge), key=lambda column: edge[column] < y1):
         if is_missed:
             missed = tuple(run)
             yield Foot(missed[0] * FOOT_STEPS // count, -(-(missed[-1] + 1) * FOOT_STEPS // count), low)
+
+
+def _columns(detection: Detection, edge: tuple[float, ...]) -> range:
+    """The mask's columns that its box covers."""
+    x1, _, x2, _ = detection.box_xyxy
+    return range(math.floor(x1 * len(edge)), min(math.ceil(x2 * len(edge)), len(edge)))
 
 
 def _kept(sights: tuple[Sight, ...], config: PlannerConfig) -> tuple[Sight, ...]:

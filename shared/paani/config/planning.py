@@ -86,7 +86,7 @@ class PlannerConfig(Section, frozen=True):
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
     person_mps: NonNegative = 0.4  # of a swimmer at ease
-    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=1.8)] = 1.8
+    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=1.8)] = 1.8  # the planner knows distances to 2 m
     predict: bool = True
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5

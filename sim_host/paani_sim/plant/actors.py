@@ -12,7 +12,7 @@ KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
 SLOWING_MPS2 = 0.15  # a small craft that throttles back
 # One who has stood still for the boat this long makes way for a while: astern, or ahead of a boat abaft the beam.
-PATIENCE_S, BACKING_MPS, BACKING_S = 8.0, 0.4, 30.0
+PATIENCE_S, MAKING_WAY_MPS, MAKING_WAY_S = 8.0, 0.4, 30.0
 STANDING_MPS = 0.05
 
 
@@ -54,18 +54,18 @@ def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_re
     """
     if actor.behaviour is not Behaviour.GIVES_WAY:
         return actor.speed_mps
-    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    east_m, north_m = boat_xy_m[0] - pose.x_m, boat_xy_m[1] - pose.y_m
-    ahead_m, aside_m = cos * east_m + sin * north_m, abs(cos * north_m - sin * east_m)
+    ahead_m, aside_m = boat_from_m(pose, boat_xy_m)
     if ahead_m <= -0.5 * actor.length_m - boat_reach_m or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
         return actor.speed_mps
     room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - KEEP_CLEAR_M
     return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
 
 
-def ahead_of_m(pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
-    """How far the boat's middle is ahead of the actor's, along its heading."""
-    return math.cos(pose.yaw_rad) * (boat_xy_m[0] - pose.x_m) + math.sin(pose.yaw_rad) * (boat_xy_m[1] - pose.y_m)
+def boat_from_m(pose: Pose2, boat_xy_m: tuple[float, float]) -> tuple[float, float]:
+    """How far the boat's middle is ahead of the actor's, along its heading, and how far aside, on either side."""
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    east_m, north_m = boat_xy_m[0] - pose.x_m, boat_xy_m[1] - pose.y_m
+    return cos * east_m + sin * north_m, abs(cos * north_m - sin * east_m)
 
 
 class Actors:
@@ -88,20 +88,20 @@ class Actors:
         for number, (actor, pose, along_m) in enumerate(zip(self._actors, self.poses, self.along_m, strict=True)):
             speed = 0.0
             if t_s > actor.start_s:
-                sense = -1.0 if ahead_of_m(pose, boat_xy_m) > 0.0 else 1.0
-                speed = self._patient(number, speed_mps(actor, pose, boat_xy_m, self._boat_reach_m), sense)
+                speed = speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
+                speed = self._patient(number, speed, pose, boat_xy_m)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
         self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, along, strict=True)]
 
-    def _patient(self, number: int, speed: float, sense: float) -> float:
-        """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `BACKING_S`."""
+    def _patient(self, number: int, speed: float, pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
+        """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `MAKING_WAY_S`."""
         waited_s = self._waited_s[number]
         if waited_s >= PATIENCE_S:
-            self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + BACKING_S else 0.0
-            return sense * BACKING_MPS
+            self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + MAKING_WAY_S else 0.0
+            return -MAKING_WAY_MPS if boat_from_m(pose, boat_xy_m)[0] > 0.0 else MAKING_WAY_MPS
         stands = speed < STANDING_MPS < self._actors[number].speed_mps
         self._waited_s[number] = waited_s + self._every_s if stands else 0.0
         return speed
