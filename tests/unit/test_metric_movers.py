@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from paani.messages import Detection, Label
 from paani_services.navigator.grid import Grid, lay
 from paani_services.navigator.movers import Motion, Mover, is_denied, movers
-from paani_services.navigator.planner import Plan, Start, Ways, Wish, coasting, gap_to_m, plan, roll_out
+from paani_services.navigator.planner import ASTRAY_MPS, Plan, Start, Ways, Wish, coasting, gap_to_m, plan, roll_out
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
 from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen, standing_gaps_m
@@ -61,6 +61,11 @@ def watched(
     return memory, at_us, boat
 
 
+def moving(memory: Memory, at_us: int) -> tuple[Mover, ...]:
+    """What moves for certain, without the people who may."""
+    return tuple(each for each in movers(memory.sights, at_us, CAMERA, PLANNER) if any(each.motion[:2]))
+
+
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
@@ -78,7 +83,7 @@ def test_a_swimmer_s_velocity_is_known_within_its_deviation(
     """From a boat that moves and turns, boxes that jitter: right to three deviations, or not said to move."""
     velocity = (speed * math.cos(toward), speed * math.sin(toward))
     memory, at_us, _ = watched((x_m, side * x_m), velocity, surge_mps=surge, yaw_radps=yaw, seed=seed)
-    for mover in movers(memory.sights, at_us, CAMERA, PLANNER):
+    for mover in moving(memory, at_us):
         off = math.hypot(mover.motion.east_mps - velocity[0], mover.motion.north_mps - velocity[1])
         assert off <= 3.5 * mover.motion.deviation_mps + 0.05
         assert mover.motion.deviation_mps < 0.3
@@ -88,7 +93,7 @@ def test_a_swimmer_s_velocity_is_known_within_its_deviation(
 @pytest.mark.parametrize("yaw", [-0.1, 0.0, 0.1])
 def test_a_swimmer_5_m_ahead_is_seen_to_move(velocity: tuple[float, float], yaw: float) -> None:
     memory, at_us, _ = watched((5.0, 0.0), velocity, yaw_radps=yaw)
-    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    (mover,) = moving(memory, at_us)
     assert mover.motion[:2] == pytest.approx(velocity, abs=0.13)
     assert math.hypot(mover.east_m.mean() - 5.0, mover.north_m.mean()) < 0.4
 
@@ -105,7 +110,7 @@ def test_a_swimmer_5_m_ahead_is_seen_to_move(velocity: tuple[float, float], yaw:
 def test_what_stands_is_not_seen_to_move(x_m: float, side: float, surge: float, yaw: float, seed: int) -> None:
     """From a boat that moves and turns, and boxes whose every side jitters by a pixel."""
     memory, at_us, _ = watched((x_m, side * x_m), (0.0, 0.0), surge_mps=surge, yaw_radps=yaw, seed=seed, jitter_px=1.0)
-    assert movers(memory.sights, at_us, CAMERA, PLANNER) == ()
+    assert moving(memory, at_us) == ()
 
 
 @pytest.mark.slow
@@ -114,8 +119,35 @@ def test_reflections_taken_in_move_nothing() -> None:
     said = 0
     for seed in range(100):
         memory, at_us, _ = watched((3.5 + 0.05 * seed, 0.0), (0.0, 0.0), mistaken=0.15, seed=seed)
-        said += len(movers(memory.sights, at_us, CAMERA, PLANNER))
+        said += len(moving(memory, at_us))
     assert said <= 1
+
+
+def test_a_person_may_swim_until_they_are_seen_to_stand() -> None:
+    """From one picture anybody may swim at ease, any way; the longer they are seen in one place the less."""
+    fastest = []
+    memory, at_us = Memory(), START_US
+    for seconds in (0.0, 1.0, 2.0, 3.0):
+        memory, at_us, _ = watched((4.0, 0.0), (0.0, 0.0), seconds=seconds, surge_mps=0.0)
+        (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+        assert mover.motion[:2] == (0.0, 0.0)
+        assert mover.boxes == frozenset()  # and they are where they are seen
+        fastest.append(mover.motion.deviation_mps)
+    assert fastest[0] == PLANNER.person_mps
+    assert fastest == sorted(fastest, reverse=True)
+    assert fastest[-1] < 0.15
+    assert movers(memory.sights, at_us + round(PLANNER.occupied_s * 1e6) + 1, CAMERA, PLANNER) == ()
+
+
+def test_a_person_cut_by_the_picture_s_side_is_seen_to_stand_too() -> None:
+    """One who has come to rest at the rim of the picture does not hold a boat up for ever."""
+    memory, at_us = Memory(), START_US
+    cut = Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(0.0, 0.55, 0.1, 0.65))
+    for _ in range(16):
+        at_us += 200_000
+        memory = seen(at_us=at_us, memory=memory, detections=(cut,))
+    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    assert mover.motion.deviation_mps < 0.15
 
 
 @pytest.mark.parametrize(("looking", "denied"), [(AT_REST, True), (BoatPose(0.0, 0.0, -1.5), False)])
@@ -126,7 +158,7 @@ def test_what_is_not_where_it_should_be_by_now_did_not_go_on(looking: BoatPose, 
     for _ in range(20):
         at_us += 200_000
         memory = seen(looking, at_us=at_us, memory=memory)
-        (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+        (mover,) = moving(memory, at_us)
         grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, mover.boxes)
         found.append(is_denied(mover, grid))
     assert not any(found[:4])
@@ -140,7 +172,7 @@ def test_what_left_the_picture_goes_on_and_is_where_it_was_last_seen() -> None:
     for _ in range(20):
         at_us += 200_000
         memory = seen(away, at_us=at_us, memory=memory)
-    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    (mover,) = moving(memory, at_us)
     assert mover.age_s == pytest.approx(4.0, abs=0.3)
     assert (mover.east_m.mean(), mover.north_m.mean()) == pytest.approx((5.0, 2.4), abs=0.6)
     now, later = (gap_to_m(each, np.zeros(1), np.zeros(1), np.zeros(1)) for each in (mover._replace(age_s=0.0), mover))
@@ -161,7 +193,7 @@ def test_what_is_cut_by_the_picture_s_side_stays_occupied() -> None:
     for k in range(1, 51):
         at_us += 200_000
         memory = seen(boat, at_us=at_us, memory=memory, detections=(cut,))
-        found = movers(memory.sights, at_us, CAMERA, PLANNER)
+        found = moving(memory, at_us)
         grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, frozenset().union(*(m.boxes for m in found)))
         assert grid.occupied.any(), k
 
@@ -175,7 +207,7 @@ def test_only_the_trail_of_what_moves_is_freed() -> None:
         at_us = START_US + 200_000 * k
         found = box_of(boat, 5.0, 0.2 + 0.07 * k, rng, 0.5)
         memory = seen(boat, edge, at_us, memory, detections=(found,) if found else ())
-    (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
+    (mover,) = moving(memory, at_us)
     before = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER)
     after = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER, mover.boxes)
     assert not (after.occupied & ~before.occupied).any()
@@ -189,6 +221,26 @@ def test_only_the_trail_of_what_moves_is_freed() -> None:
 
 def open_water() -> Grid:
     return lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_boat_waits_for_who_crosses_and_goes_on_behind_them(side: float) -> None:
+    """On open water and under way: it does not turn to run abreast of a swimmer, it lets them pass."""
+    memory = seen()
+    grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    found = [
+        plan(grid, CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, side * y_m, 0.0, side * 0.35),))
+        for y_m in (-2.0, -1.0, 0.0, 0.5, 1.5)
+    ]
+    assert [each.speed_mps for each in found] == [0.0, 0.0, 0.0, 0.3, 0.3]
+    assert all(side * each.heading_rad < 0.2 for each in found[3:])
+
+
+def test_who_was_seen_long_ago_may_be_further_off_their_course() -> None:
+    now, later = (
+        gap_to_m(swimmer(4.0, 0.0, 0.0, 0.0, age_s), np.zeros(1), np.zeros(1), np.zeros(1))[0] for age_s in (0.0, 12.0)
+    )
+    assert now - later == pytest.approx(12.0 * (ASTRAY_MPS + 0.05))
 
 
 def swimmer(x_m: float, y_m: float, east_mps: float, north_mps: float, age_s: float = 0.1) -> Mover:
@@ -278,7 +330,7 @@ def test_who_moves_opens_no_way_but_one_wider_than_coasting(
     rest_m = np.minimum.accumulate(gap_to_m(mover, np.zeros_like(at_s), np.zeros_like(at_s), at_s)[:, 0])
     keeps = (gap_m >= np.minimum(1.0, np.maximum(rest_m - 0.1, 0.0)) - 1e-9).all()
     if not keeps or plan(grid, start, AHEAD, None, PLANNER).speed_mps == 0.0:
-        assert least_m(grid, mover, ways) > least_m(grid, mover, coasting(start, ways.at_s, PLANNER))
+        assert least_m(grid, mover, ways) > least_m(grid, mover, coasting(start, ways.at_s))
 
 
 def least_m(grid: Grid, mover: Mover, ways: Ways) -> float:
@@ -291,6 +343,6 @@ def least_m(grid: Grid, mover: Mover, ways: Ways) -> float:
 def test_movers_repeat_bit_by_bit() -> None:
     memory, at_us, _ = watched((5.0, 0.5), (0.1, -0.3))
     again = msgspec.json.decode(msgspec.json.encode(memory), type=Memory)
-    first, second = (movers(each.sights, at_us, CAMERA, PLANNER) for each in (memory, again))
+    first, second = (moving(each, at_us) for each in (memory, again))
     assert first[0].motion == second[0].motion
     assert (first[0].east_m == second[0].east_m).all()

@@ -45,7 +45,7 @@ def swum_m(grid: Grid) -> float:
 
 
 def test_a_person_out_of_sight_may_swim_on() -> None:
-    """0.4 m/s from where they were, 1.8 m at most; what that leaves of the way is less by as much."""
+    """0.4 m/s from where they were, 3.6 m at most; what that leaves of the way is less by as much."""
     reached = []
     for seconds in (3.2, 4.8, 8.0):
         memory, now_us = turned_away(seconds)
@@ -53,7 +53,7 @@ def test_a_person_out_of_sight_may_swim_on() -> None:
         reached.append(swum_m(grid))
         row, column = np.argwhere(grid.swum)[0]
         assert clearance_m(grid, PLANNER)[row, column] < 0.0
-    assert reached == pytest.approx([4.7 - 1.28, 4.7 - 1.8, 4.7 - 1.8], abs=2.0 * CELL_M)
+    assert reached == pytest.approx([4.7 - 1.28, 4.7 - 1.92, 4.7 - 3.2], abs=2.0 * CELL_M)
     memory, now_us = turned_away(8.0)
     for changes in ({"person_mps": 0.0}, {"person_reach_m": 0.0}, {"hidden_s": 0.0}):
         assert swum_m(lay(memory.sights, (0.0, 0.0), now_us, CAMERA, msgspec.structs.replace(PLANNER, **changes))) > 1e9
@@ -106,6 +106,15 @@ def test_a_swimmer_is_in_the_water(swimmer: Bar, carried: bool) -> None:
     sight = seen(edge=edge, detections=boxes).sights[-1]
     assert any(foot.person for foot in sight.feet)
     assert Label.PERSON in {box.label for box in sight.boxes}
+
+
+def test_people_ashore_do_not_swim() -> None:
+    """On a bank, metres behind where the water ends; at the water's edge they may go in."""
+    edge = edge_of(AT_REST, bank_m=3.0)
+    for x_m, moves in ((5.5, False), (3.2, True)):
+        sight = seen(edge=edge, detections=(box_over((x_m, -0.3, x_m + 0.3, 0.3), 1.7),)).sights[-1]
+        assert any(foot.person for foot in sight.feet)
+        assert bool(sight.boxes) is moves
 
 
 def test_a_swimmer_in_the_empty_corner_of_an_aslant_hull_s_box_is_in_the_water() -> None:

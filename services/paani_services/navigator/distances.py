@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from paani_services.navigator.projection import F64
 from paani_services.navigator.shown import CELL_M, Mask
 
-FIELD_CELLS = 10  # distances are known up to 2 m
+FIELD_CELLS = 20  # distances are known up to 4 m
 
 
 def distance_m(cells: Mask) -> F64:
-    """From the middle of each cell to the middle of the nearest of these, at most 2 m; of the mask's shape."""
+    """From the middle of each cell to the middle of the nearest of these, at most 4 m; of the mask's shape."""
     far = FIELD_CELLS * FIELD_CELLS
     found: NDArray[np.int16] = np.where(cells, 0, far).astype(np.int16)
     for axis in (0, 1):
@@ -24,5 +24,5 @@ def distance_m(cells: Mask) -> F64:
 
 
 def signed_m(cells: Mask) -> F64:
-    """As `distance_m` outside, inside the negative of what leads out, at least -2 m."""
+    """As `distance_m` outside, inside the negative of what leads out, at least -4 m."""
     return np.asarray(distance_m(cells) - distance_m(~cells))

@@ -59,6 +59,17 @@ class Motion(NamedTuple):
     deviation_mps: float
 
 
+class Fit(NamedTuple):
+    """A velocity, and the inverse of its covariance times it, which says how far from chance it is.
+
+    deviation_mps: as in `Motion`.
+    """
+
+    velocity_mps: Pair
+    pull: Pair
+    deviation_mps: float
+
+
 class Mover(NamedTuple):
     """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen whole.
 
@@ -74,12 +85,14 @@ class Mover(NamedTuple):
 
 
 def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
-    """Everything that moved for certain when it was last seen whole. sights: oldest first."""
+    """Everything that moved for certain when it was last seen whole, and people in sight. sights: oldest first."""
     found = []
     for track in _tracks(sights, now_us, camera, config):
         whole = [fix for fix in track if fix.whole]
         motion = motion_of(whole, config.fit_s)
         if motion is None:
+            if track[-1].label is Label.PERSON and -track[-1].at_s <= config.occupied_s:
+                found.append(_person(track, config))
             continue
         last = whole[-1]
         found.append(
@@ -95,6 +108,15 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     return tuple(found)
 
 
+def _person(track: list[Fix], config: PlannerConfig) -> Mover:
+    """A person who may stand or swim anywhere: as fast as the fixes do not rule out, cut ones too; still occupied."""
+    fitted, last = _fitted(track, config.fit_s), track[-1]
+    fastest_mps = config.person_mps
+    if fitted is not None:
+        fastest_mps = min(fastest_mps, math.hypot(*fitted.velocity_mps) + fitted.deviation_mps)
+    return Mover(*last.outline, config.person_near_m, Motion(0.0, 0.0, fastest_mps), -last.at_s, frozenset())
+
+
 def is_denied(mover: Mover, grid: Grid) -> bool:
     """Out of sight for `LOST_S`, and the last pictures show water all over where it should be: it did not go on."""
     if mover.age_s < LOST_S:
@@ -106,7 +128,20 @@ def is_denied(mover: Mover, grid: Grid) -> bool:
 
 
 def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:
-    """The weighted least squares' velocity over the last `fit_s`, drawn towards rest; None where it may be chance.
+    """The velocity over the last `fit_s`; None where it may be chance."""
+    fitted = _fitted(fixes, fit_s)
+    if fitted is None:
+        return None
+    east_mps, north_mps = fitted.velocity_mps
+    if east_mps * fitted.pull[0] + north_mps * fitted.pull[1] < SIGNIFICANT * SIGNIFICANT:
+        return None
+    if math.hypot(east_mps, north_mps) < STILL_MPS:
+        return None
+    return Motion(east_mps, north_mps, fitted.deviation_mps)
+
+
+def _fitted(fixes: list[Fix], fit_s: float) -> Fit | None:
+    """The weighted least squares' velocity over the last `fit_s`, drawn towards rest; None of too few fixes.
 
     With place and velocity as unknowns the normal equations are [W, T; T, S] [p; v] = [a; b], each a 2 x 2 matrix:
     (S - T W^-1 T) v = b - T W^-1 a.
@@ -135,12 +170,7 @@ def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:
     rest = 1.0 / (USUAL_MPS * USUAL_MPS)
     covariance = _inverse(_plus((rest, 0.0, rest), share, told))
     pull = (share * pull[0], share * pull[1])
-    east_mps, north_mps = _times(covariance, pull)
-    if east_mps * pull[0] + north_mps * pull[1] < SIGNIFICANT * SIGNIFICANT:
-        return None
-    if math.hypot(east_mps, north_mps) < STILL_MPS:
-        return None
-    return Motion(east_mps, north_mps, math.sqrt(max(covariance[0], covariance[2])))
+    return Fit(_times(covariance, pull), pull, math.sqrt(max(covariance[0], covariance[2])))
 
 
 def _misfit(fixes: list[Fix], velocity: Pair, inverse: Symmetric, places: Pair, times: Symmetric) -> float:

@@ -18,15 +18,19 @@ from paani_services.navigator.shown import CELL_M, Mask
 
 QUARTER = 0.5 * math.pi
 LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half a cell
+ONWARD_RAD = math.radians(75.0)  # off the wanted course; further off, a quarter of the way at most is made good
+ASTRAY_MPS = 0.1  # what is out of sight changes its course and speed: measured, 1.2 m in 12 s
+DRAG_PER_S, DRAG_PER_M = 4.0 / 12.4, 20.0 / 12.4  # K4, K5
+CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
 SLOWER = 0.5  # the other speed tried
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
-CLOSE, CLEAR_M = 0.4, 0.8  # footprint touches something; less up to this clearance
+CLOSE, CLEAR_M = 0.6, 2.0  # footprint touches something; less up to this clearance, by the square
 WITHIN = 10.0  # a metre within hull and margin, all through the horizon: what leads out of it is better
 UNKNOWN = 0.3  # all of the way is unknown: turn to what is seen, and see further from there
-SLOW = 0.3  # a stop
+SLOW = 0.3  # nothing made good
 CHANGE = 0.15  # a quarter turn off the plan before
 ADVICE, ADVISED_RAD = 0.15, math.radians(25.0)  # not the advised side; nothing from a full turn to it on (M5)
 
@@ -81,8 +85,9 @@ def plan(
     margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
     way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
+    Where what moves leaves no way onward, the boat waits until it has passed, if it can: one that flees keeps abreast.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
-    the unknown, slow, another than before.
+    the unknown, little made good, another than before.
     """
     nowhere = Plan(start.yaw_rad, 0.0)
     if wish.speed_mps <= 0.0 or not grid.free.any():
@@ -118,11 +123,14 @@ def plan(
             refused |= is_full
         if not (refused.all() and footprints):
             break
+    coast = coasting(start, ways.at_s)
+    coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
+    moved = ((moved_m < 0.0) & nearby).any(axis=0)
+    if _is_held_up(offsets, refused, moved) and np.where(soon, coast_m, np.inf).min() >= tight_m:
+        return nowhere
     if refused.all():
-        refused = ~_leads_out(gap_m, nearby, soon) | ((moved_m < 0.0) & nearby).any(axis=0) | barred
+        refused = ~_leads_out(gap_m, nearby, soon) | moved | barred
     if refused.all():
-        coast = coasting(start, ways.at_s, config)
-        coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
         refused = ~_passes_wider(nearest_m, coast_m, soon, barred | is_full)
     if refused.all():
         return nowhere
@@ -196,12 +204,15 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
 
 
-def coasting(start: Start, at_s: F64, config: PlannerConfig) -> Ways:
-    """Where the boat gets with its fans off, on its heading, slower by half of `accel_mps2`: drag falls with speed."""
-    fall = 0.5 * config.accel_mps2
+def coasting(start: Start, at_s: F64) -> Ways:
+    """Where the boat gets with its fans off, on its heading: drag takes its way off, but for `CARRIED_MPS` of it."""
     surge = max(start.surge_mps, 0.0)
-    ahead_s = np.minimum(at_s, surge / fall)
-    way_m = (surge * ahead_s - 0.5 * fall * ahead_s * ahead_s)[:, None]
+    carried = min(surge, CARRIED_MPS)
+    own, way = surge - carried, [0.0]
+    for step_s in np.diff(at_s).tolist():
+        own /= 1.0 + step_s * (DRAG_PER_S + DRAG_PER_M * own)
+        way.append(way[-1] + step_s * (carried + own))
+    way_m = np.array(way)[:, None]
     cos, sin = portable.cos(start.yaw_rad), portable.sin(start.yaw_rad)
     drift_m = (start.sway_mps * at_s)[:, None]
     return Ways(start.x_m + cos * way_m - sin * drift_m, start.y_m + sin * way_m + cos * drift_m, way_m, at_s)
@@ -231,6 +242,12 @@ def _footprints(config: PlannerConfig) -> list[PlannerConfig]:
     return [config, *(msgspec.structs.replace(config, margin_m=m, drift_mps=d) for m, d in tighter)]
 
 
+def _is_held_up(offsets: F64, refused: Mask, moved: Mask) -> bool:
+    """Nothing leads onward, and something that moves is in the way there [candidates]."""
+    onward = _apart_rad(offsets, float(offsets[0])) <= ONWARD_RAD
+    return bool(refused[onward].all() and moved[onward].any())
+
+
 def _leads_out(gap_m: F64, nearby: Mask, soon: Mask) -> Mask:
     """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates]."""
     least_m = np.where(nearby, gap_m, np.inf).min(axis=0)
@@ -255,7 +272,7 @@ def _nearest_m(gap_m: F64, movers: Sequence[Mover], ways: Ways) -> F64:
 def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
     """From places to the outline of a thing that moves on, at these times from now; less what is kept beside it.
 
-    Uncertainty is one standard deviation of its velocity, from when it was last seen.
+    Uncertainty is one standard deviation of its velocity, and `ASTRAY_MPS` from when it was last seen.
     """
     motion = mover.motion
     east_m, north_m = x_m - at_s * motion.east_mps, y_m - at_s * motion.north_mps
@@ -263,7 +280,8 @@ def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
     for x, y in zip(mover.east_m.tolist(), mover.north_m.tolist(), strict=True):
         east, north = east_m - x, north_m - y
         square = np.minimum(square, east * east + north * north)
-    return np.asarray(np.sqrt(square) - mover.room_m - motion.deviation_mps * (at_s + mover.age_s))
+    astray_m = motion.deviation_mps * (at_s + mover.age_s) + ASTRAY_MPS * mover.age_s
+    return np.asarray(np.sqrt(square) - mover.room_m - astray_m)
 
 
 def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
@@ -284,7 +302,7 @@ def _led(mover: Mover, lead_s: float) -> Mover:
 
 
 def clearance_m(grid: Grid, config: PlannerConfig) -> F64:
-    """From the middle of each cell to what is there, at most 2 m; negative within, the further in the less [100, 100].
+    """From the middle of each cell to what is there, at most 4 m; negative within, the further in the less [100, 100].
 
     What is out of sight may have drifted nearer; a person may be anywhere in `Grid.swum`.
     """
@@ -306,7 +324,9 @@ def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:
 
 
 def _costs(offsets: F64, speeds: F64, start: Start, before: Plan | None) -> F64:
-    cost = _apart_rad(offsets, float(offsets[0])) / QUARTER + SLOW * (1.0 - speeds / speeds[0])
+    off_rad = _apart_rad(offsets, float(offsets[0]))
+    made_good = speeds / speeds[0] * np.array([portable.cos(each) for each in off_rad.tolist()])
+    cost = off_rad / QUARTER + SLOW * (1.0 - made_good)
     if before is not None and before.speed_mps > 0.0:
         cost = cost + CHANGE * _apart_rad(offsets, wrap_rad(before.heading_rad - start.yaw_rad)) / QUARTER
     return np.asarray(cost)
@@ -326,7 +346,8 @@ def _way_costs(ways: Ways, spare_m: F64, met: Mask, unseen: Mask, soon: Mask, co
     """spare_m: between the footprint and the nearest thing. soon: times within the horizon [times, 1]."""
     cost = UNKNOWN * unseen.sum(axis=0) / len(unseen)
     nearest = np.where(soon, spare_m, np.inf).min(axis=0)
-    cost = cost + CLOSE * np.clip(1.0 - nearest / CLEAR_M, 0.0, 1.0)
+    near = np.clip(1.0 - nearest / CLEAR_M, 0.0, 1.0)
+    cost = cost + CLOSE * near * near
     if config.look_m > 0.0:
         first_m = np.where(met, ways.way_m, np.inf).min(axis=0)
         cost = cost + SOON * np.clip(1.0 - first_m / config.look_m, 0.0, 1.0)

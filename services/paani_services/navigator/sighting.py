@@ -18,13 +18,14 @@ POSE_SPACING_US = 90_000
 POSES_KEPT = 14  # 1.2 s: longer than a picture is under way
 SIGHT_SPACING_US = 100_000
 OLD_SPACING_US = 800_000  # between those kept for what is out of sight
-SIGHTS_KEPT = 128
+SIGHTS_KEPT = 224
 BOXES_SPACING_US = 190_000  # between those kept for their boxes alone
 BOX_COLUMNS = 9
 SMALL = frozenset({Label.PERSON, Label.BUOY})
 MOVABLE = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
 CARRIES = frozenset({Label.VESSEL, Label.PIER})
 MASK_ROW = 1.0 / 64.0
+ASHORE_ROWS = 3.0  # of the mask, between where the water ends and a person's foot beyond it: metres, not a reflection
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -194,7 +195,7 @@ def _sight(evidence: Evidence, pose: Pose) -> Sight:
         evidence.width_px / evidence.height_px,
         bytes(math.ceil(edge * EDGE_STEPS) for edge in evidence.water_edge),
         tuple(foot for detection in found for foot in _feet(detection, evidence.water_edge)),
-        tuple(_box(detection, evidence.water_edge) for detection in found if detection.label in MOVABLE),
+        tuple(_box(detection, evidence.water_edge) for detection in found if _may_move(detection, evidence.water_edge)),
     )
 
 
@@ -203,16 +204,25 @@ def _is_aboard(person: Detection, carriers: Sequence[Detection], edge: tuple[flo
 
     It stands within the other's box, and most of the water before it ends lower than its foot.
     """
-    if person.label is not Label.PERSON:
+    if person.label is not Label.PERSON or _land_before(person, edge) <= MASK_ROW:
         return False
     x1, _, x2, foot = person.box_xyxy
-    ends = sorted(edge[column] for column in _columns(person, edge))
-    if not ends or ends[len(ends) // 2] <= foot + MASK_ROW:
-        return False
     return any(
         left <= 0.5 * (x1 + x2) <= right and top <= foot <= low - MASK_ROW
         for left, top, right, low in (carrier.box_xyxy for carrier in carriers)
     )
+
+
+def _may_move(detection: Detection, edge: tuple[float, ...]) -> bool:
+    """Whether it may move on the water: people ashore do not."""
+    is_ashore = detection.label is Label.PERSON and _land_before(detection, edge) > ASHORE_ROWS * MASK_ROW
+    return detection.label in MOVABLE and not is_ashore
+
+
+def _land_before(detection: Detection, edge: tuple[float, ...]) -> float:
+    """How far below its foot most of the water before it ends, of the picture; 0 or less: it stands in it."""
+    ends = sorted(edge[column] for column in _columns(detection, edge))
+    return ends[len(ends) // 2] - detection.box_xyxy[3] if ends else 0.0
 
 
 def _box(detection: Detection, edge: tuple[float, ...]) -> Box:

@@ -86,11 +86,11 @@ class PlannerConfig(Section, frozen=True):
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
     person_mps: NonNegative = 0.4  # of a swimmer at ease
-    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=1.8)] = 1.8  # the planner knows distances to 2 m
+    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=3.8)] = 3.6  # the planner knows distances to 4 m
     predict: bool = True
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5
-    unseen_s: NonNegative = 15.0
+    unseen_s: NonNegative = 30.0
     lead_s: NonNegative = 2.0
     person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes
     vessel_near_m: NonNegative = 0.2
