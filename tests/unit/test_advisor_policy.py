@@ -6,12 +6,13 @@ import msgspec
 import pytest
 
 from paani import messages as m
-from paani.config import Config
+from paani.config import Config, calibration_of
 from paani_services.advisor.advise import advise
 from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, box, lane, play, seeing, water
 
 D, R = m.Direction, m.Reason
 VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
+CALIBRATED = msgspec.structs.replace(PAANI, calibration=calibration_of(PAANI.eye))
 
 
 @pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
@@ -127,6 +128,31 @@ def test_j6_immediate_danger_occupies_at_once() -> None:
     assert advice[0].center.occupied
     assert advice[0].center.risk < 0.48
     assert (advice[0].direction, advice[0].reason) == (D.RIGHT, R.CENTER_OCCUPIED)
+
+
+@pytest.mark.parametrize(
+    ("label", "clear", "calibrated", "occupied"),
+    [
+        (PIER, 1.0, True, False),
+        (PIER, 0.95, True, True),
+        (PIER, 1.0, False, True),
+        (VESSEL, 1.0, True, True),
+    ],
+)
+def test_a_quay_occupies_no_lane_that_shows_water_all_across(
+    label: m.Label, clear: float, calibrated: bool, occupied: bool
+) -> None:
+    """One that lies aslant fills a box down to its near end, across lanes of open water: its box's foot is not there.
+
+    More cases in which the boat moves: it had stood 248 s before an open canal (canal-51).
+    """
+    quay = box(label, (0.31, 0.3, 1.0, 0.8))
+    water = msgspec.structs.replace(lane(0.05), clear_width=clear)
+    evidence = msgspec.structs.replace(seeing(quay), left=water, center=water, right=water)
+    config = CALIBRATED if calibrated else PAANI
+    _, advice, _ = play([evidence] * 4, config)
+    assert advice[-1].center.occupied is occupied
+    assert advice[-1].right.occupied is occupied
 
 
 def test_occupancy_does_not_count_republishes() -> None:

@@ -88,8 +88,8 @@ def _digest(state: AdvisorState, evidence: Evidence, config: Config) -> AdvisorS
     tracker = update(state.tracker, evidence, config)
     policy = state.policy
     if evidence.usable and fits:
-        obstacles = obstacles_of(tracker, config, evidence.width_px / max(1, evidence.height_px))
         water = {lane: water_of(evidence, lane, config) for lane in LANES}
+        obstacles = obstacles_of(tracker, config, evidence.width_px / max(1, evidence.height_px), water)
         lanes = {lane: components(water[lane], obstacles, lane, config) for lane in LANES}
         policy, decision = decide(state.policy, lanes, obstacles, config)
         why = counterfactual(state.policy, decision, water, obstacles, config)

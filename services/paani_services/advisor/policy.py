@@ -131,9 +131,9 @@ def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfi
 
 
 def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
-    """Low in the picture and wide enough to occupy the lane (J6)."""
+    """Low in the picture, before the lane's water, and wide enough to occupy it (J6)."""
     policy = config.advisor.policy
-    if obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
+    if lane in obstacle.behind or obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
     coverage = (

@@ -14,10 +14,14 @@ from paani_services.advisor.tracker import TrackerState, is_accepted, is_immedia
 LANES = ("left", "center", "right")
 NEAR_FROM, NEAR_SPAN, TALL_SPAN = 0.30, 0.70, 0.50  # resolution 6
 NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # resolution 6
+ALL_CLEAR = 1.0 - 1e-9  # every column of E6
 
 
 class Obstacle(msgspec.Struct, frozen=True):
-    """An accepted track as the policy weighs it; `presence` falls from 1 while it is not seen."""
+    """An accepted track as the policy weighs it; `presence` falls from 1 while it is not seen.
+
+    behind: the lanes where it stands behind water that the mask shows from side to side.
+    """
 
     id: int
     craft: bool
@@ -26,6 +30,7 @@ class Obstacle(msgspec.Struct, frozen=True):
     urgency: float
     presence: float
     danger: bool
+    behind: tuple[str, ...] = ()
 
 
 class Components(msgspec.Struct, frozen=True):
@@ -95,12 +100,18 @@ def total(non_water: float, obstacle: float, urgency: float, uncertainty: float,
     )
 
 
-def obstacles_of(state: TrackerState, config: Config, aspect: float) -> tuple[Obstacle, ...]:
+def obstacles_of(
+    state: TrackerState, config: Config, aspect: float, water: dict[str, LaneEvidence]
+) -> tuple[Obstacle, ...]:
     """Accepted tracks, confirmed or an immediate danger, that reach below the corridors' top.
 
-    aspect: width of the picture over its height.
+    aspect: width of the picture over its height. water: of each lane. A quay that lies aslant fills a box whose lower
+    end it reaches on one side alone: where the metric planner acts it stands where the mask ends the water.
     """
     settings = config.advisor.tracker
+    open_lanes: tuple[str, ...] = ()
+    if config.navigator.planner.acts_on(config.calibration):
+        open_lanes = tuple(lane for lane in LANES if water[lane].clear_width >= ALL_CLEAR)
 
     def weight(box: BoxXyxy) -> float:
         return relevance(box, aspect, config.calibration, config.advisor.risk)
@@ -114,6 +125,7 @@ def obstacles_of(state: TrackerState, config: Config, aspect: float) -> tuple[Ob
             urgency=urgency_now(track, state.at_us, settings) * weight(track.box),
             presence=presence(track, state.at_us, settings),
             danger=is_immediate_danger(track.box, settings),
+            behind=open_lanes if track.label == "pier" else (),
         )
         for track in state.tracks
         if track.box[3] > config.perception.corridors.top and is_accepted(track, settings)
