@@ -21,6 +21,7 @@ LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half 
 ONWARD_RAD = math.radians(75.0)  # off the wanted course; further off, a quarter of the way at most is made good
 ASTRAY_MPS = 0.1  # what is out of sight changes its course and speed: measured, 1.2 m in 12 s
 DRAG_PER_S, DRAG_PER_M = 4.0 / 12.4, 20.0 / 12.4  # K4, K5
+AHEAD_S = np.arange(0.0, 30.5, 0.5)  # a boat that turns away from what comes at 0.13 m/s takes 20 s
 CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
@@ -85,7 +86,8 @@ def plan(
     margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
     way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
-    Where what moves leaves no way onward, the boat waits until it has passed, if it can: one that flees keeps abreast.
+    Where what moves leaves no way onward, the boat waits until it has passed: one that flees keeps abreast. Where that
+    would come to a boat that waits, less of a margin is kept to it too.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, little made good, another than before.
     """
@@ -107,15 +109,17 @@ def plan(
     kept_m = min(tight_m, float(to_people_m[0, 0]))  # whatever else leads out
     barred |= ((to_people_m < kept_m - PEOPLE_SLACK_M) & nearby).any(axis=0)
     movers = [each for each in moving if each.age_s <= config.unseen_s]
-    # What moves keeps its whole margin: beside it, lying still is no worse.
-    moved_m = np.minimum.reduce(
-        [np.full(gap_m.shape, np.inf), *(_spare_m(each, ways, start, config) for each in movers)]
-    )
+    coast = coasting(start, ways.at_s)
+    coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
+    last = int(soon.sum()) - 1
+    is_met = _comes_near(movers, float(coast.x_m[last, 0]), float(coast.y_m[last, 0]), tight_m)
     nearest_m = _nearest_m(gap_m, movers, ways)
     barred |= is_full & ((nearest_m < tight_m) & soon).any(axis=0)  # no faster than it must so near
     footprints = _footprints(config)
     while True:
         kept = footprints.pop(0)
+        # What moves keeps its whole margin where lying still is no worse beside it.
+        moved_m = _all_spare_m(movers, ways, start, kept if is_met else config)
         spare_m = np.minimum(gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None], moved_m)
         met = spare_m < 0.0
         refused = (met & nearby).any(axis=0) | barred
@@ -123,10 +127,9 @@ def plan(
             refused |= is_full
         if not (refused.all() and footprints):
             break
-    coast = coasting(start, ways.at_s)
-    coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
-    moved = ((moved_m < 0.0) & nearby).any(axis=0)
-    if _is_held_up(offsets, refused, moved) and np.where(soon, coast_m, np.inf).min() >= tight_m:
+    moved: Mask = np.asarray(((moved_m < 0.0) & nearby).any(axis=0))
+    is_safe = not is_met and np.where(soon, coast_m, np.inf).min() >= tight_m
+    if is_safe and _is_held_up(offsets, refused, moved):
         return nowhere
     if refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | moved | barred
@@ -134,8 +137,8 @@ def plan(
         refused = ~_passes_wider(nearest_m, coast_m, soon, barred | is_full)
     if refused.all():
         return nowhere
-    led = (_spare_m(_led(mover, config.lead_s), ways, start, config) for mover in movers)
-    roomy_m = np.minimum.reduce([spare_m, *led])
+    led = [_led(mover, config.lead_s) for mover in movers]
+    roomy_m = np.minimum(spare_m, _all_spare_m(led, ways, start, config))
     within_m = np.where(soon, np.maximum(config.hull_radius_m + config.margin_m - nearest_m, 0.0), 0.0)
     cost = _costs(offsets, speeds, start, before) + _unadvised(offsets, wish.side)
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
@@ -248,6 +251,16 @@ def _is_held_up(offsets: F64, refused: Mask, moved: Mask) -> bool:
     return bool(refused[onward].all() and moved[onward].any())
 
 
+def _comes_near(movers: Sequence[Mover], x_m: float, y_m: float, tight_m: float) -> bool:
+    """Something that moves for certain comes to a boat that lies there, if it goes on as it does."""
+    for mover in movers:
+        as_it_does = mover._replace(motion=mover.motion._replace(deviation_mps=0.0))
+        gaps_m = gap_to_m(as_it_does, np.full_like(AHEAD_S, x_m), np.full_like(AHEAD_S, y_m), AHEAD_S)
+        if any(mover.motion[:2]) and gaps_m.min() < min(tight_m, gaps_m[0] - GAIN_M):
+            return True
+    return False
+
+
 def _leads_out(gap_m: F64, nearby: Mask, soon: Mask) -> Mask:
     """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates]."""
     least_m = np.where(nearby, gap_m, np.inf).min(axis=0)
@@ -282,6 +295,12 @@ def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
         square = np.minimum(square, east * east + north * north)
     astray_m = motion.deviation_mps * (at_s + mover.age_s) + ASTRAY_MPS * mover.age_s
     return np.asarray(np.sqrt(square) - mover.room_m - astray_m)
+
+
+def _all_spare_m(movers: Sequence[Mover], ways: Ways, start: Start, config: PlannerConfig) -> F64:
+    """`_spare_m` of the nearest; without any, without end."""
+    far_m = np.full(ways.x_m.shape, np.inf)
+    return np.asarray(np.minimum.reduce([far_m, *(_spare_m(each, ways, start, config) for each in movers)]))
 
 
 def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
