@@ -13,10 +13,22 @@ from hypothesis import strategies as st
 from paani.messages import Detection, Label
 from paani_services.navigator.grid import Grid, lay
 from paani_services.navigator.movers import Motion, Mover, is_denied, movers
+from paani_services.navigator.pilot import Pilot, steered
 from paani_services.navigator.planner import ASTRAY_MPS, Plan, Start, Ways, Wish, coasting, gap_to_m, plan, roll_out
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, edge_of, seen, standing_gaps_m
+from tests.unit.watery_sights import (
+    AT_REST,
+    CAMERA,
+    EYE,
+    PLANNER,
+    START_US,
+    box_over,
+    edge_of,
+    odometry,
+    seen,
+    standing_gaps_m,
+)
 
 PERIOD_S = 0.2
 CRUISING, RESTING = Start(0.0, 0.0, 0.0, 0.6), Start(0.0, 0.0, 0.0)
@@ -121,10 +133,12 @@ def test_reflections_taken_in_move_nothing() -> None:
 
 
 def test_a_person_may_swim_until_they_are_seen_to_stand() -> None:
-    """From one picture anybody may swim at ease, any way; the longer they are seen in one place the less."""
+    """From two pictures anybody may swim at ease, any way; the longer they are seen in one place the less."""
     fastest = []
     memory, at_us = Memory(), START_US
-    for seconds in (0.0, 1.0, 2.0, 3.0):
+    memory, at_us, _ = watched((4.0, 0.0), (0.0, 0.0), seconds=0.0, surge_mps=0.0)
+    assert movers(memory.sights, at_us, CAMERA, PLANNER) == ()  # once is nobody
+    for seconds in (0.2, 1.0, 2.0, 3.0):
         memory, at_us, _ = watched((4.0, 0.0), (0.0, 0.0), seconds=seconds, surge_mps=0.0)
         (mover,) = movers(memory.sights, at_us, CAMERA, PLANNER)
         assert mover.motion[:2] == (0.0, 0.0)
@@ -231,6 +245,31 @@ def test_a_boat_waits_for_who_crosses_and_goes_on_behind_them(side: float) -> No
     ]
     assert [each.speed_mps for each in found] == [0.0, 0.0, 0.0, 0.3, 0.3]
     assert all(side * each.heading_rad < 0.2 for each in found[3:])
+
+
+def test_patience_with_who_may_swim_but_does_not_ends() -> None:
+    """Who treads water in the way, or is taken for a person, is passed as what stands in the end."""
+    memory, at_us = seen(), START_US
+    grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER)
+    person = Mover(np.array([3.5]), np.array([0.5]), 0.5, Motion(0.0, 0.0, 0.2), 0.1, frozenset())
+    found = [plan(grid, RESTING, AHEAD, None, PLANNER, (person,), patient=patient) for patient in (True, False)]
+    assert [each.speed_mps > 0.0 for each in found] == [False, True]
+    crossing = swimmer(3.0, -1.0, 0.0, 0.35)
+    assert plan(grid, CRUISING, AHEAD, None, PLANNER, (crossing,), patient=False).speed_mps <= 0.3
+
+
+def test_a_boat_waits_no_longer_than_its_patience() -> None:
+    """Seen twice, a person 3.6 m ahead may swim anywhere: the boat waits, unless it has for `patience_s`."""
+    place = (3.6, 0.3, 4.0, 0.9)
+    memory, now_us = Memory(), START_US
+    for now_us in (START_US, START_US + 200_000):
+        memory = seen(edge=edge_of(AT_REST, (place,)), at_us=now_us, memory=memory, detections=(box_over(place, 0.4),))
+    here, wish = odometry(now_us, AT_REST), Wish(0.0, 0.6)
+    for waited_s, moves in ((None, False), (PLANNER.patience_s - 1.0, False), (PLANNER.patience_s + 1.0, True)):
+        waits_us = None if waited_s is None else now_us - round(waited_s * 1e6)
+        pilot, found = steered(Pilot(memory, waits_us=waits_us), here, wish, now_us, CAMERA, PLANNER)
+        assert (found.speed_mps > 0.0) is moves
+        assert pilot.waits_us == (None if moves else now_us if waits_us is None else waits_us)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -11,19 +11,10 @@ from paani_services.navigator.grid import Grid, lay
 from paani_services.navigator.planner import Start, Wish, clearance_m, plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
-from paani_sim.eye.camera import BoatPose, project
-from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen
+from paani_sim.eye.camera import BoatPose
+from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, box_over, edge_of, seen
 
 ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
-
-
-def box_over(bar: Bar, high_m: float, label: Label = Label.PERSON, foot_m: float = 0.0) -> Detection:
-    """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
-    west, south, east, north = bar
-    corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
-    across, down = project(corners, AT_REST, EYE).T / np.array([[EYE.width_px], [EYE.height_px]])
-    box = (float(across.min()), float(down.min()), float(across.max()), float(down.max()))
-    return Detection(label=label, confidence=0.9, box_xyxy=box)
 
 
 def turned_away(seconds: float) -> tuple[Memory, int]:

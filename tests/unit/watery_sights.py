@@ -10,7 +10,7 @@ from paani_services.navigator.grid import Grid
 from paani_services.navigator.planner import Ways
 from paani_services.navigator.shown import CELL_M, Camera
 from paani_services.navigator.sighting import Memory, remember
-from paani_sim.eye.camera import BoatPose, look_from
+from paani_sim.eye.camera import BoatPose, look_from, project
 from paani_sim.eye.camera import Camera as Eye
 
 CONFIG = load_config()
@@ -38,6 +38,15 @@ def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -
         ends |= (x_m >= west) & (x_m <= east_m) & (y_m >= south) & (y_m <= north_m)
     lowest = ROWS - ends[::-1].argmax(axis=0)
     return tuple(np.where(ends.any(axis=0), lowest / ROWS, 0.0).tolist())
+
+
+def box_over(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_m: float = 0.0) -> m.Detection:
+    """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
+    west, south, east, north = bar
+    corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
+    across, down = project(corners, AT_REST, EYE).T / np.array([[EYE.width_px], [EYE.height_px]])
+    box = (float(across.min()), float(down.min()), float(across.max()), float(down.max()))
+    return m.Detection(label=label, confidence=0.9, box_xyxy=box)
 
 
 def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Evidence:

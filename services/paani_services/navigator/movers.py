@@ -91,7 +91,7 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
         whole = [fix for fix in track if fix.whole]
         motion = motion_of(whole, config.fit_s)
         if motion is None:
-            if track[-1].label is Label.PERSON and -track[-1].at_s <= config.occupied_s:
+            if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].at_s <= config.occupied_s:
                 found.append(_person(track, config))
             continue
         last = whole[-1]
@@ -109,7 +109,10 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
 
 
 def _person(track: list[Fix], config: PlannerConfig) -> Mover:
-    """A person who may stand or swim anywhere: as fast as the fixes do not rule out, cut ones too; still occupied."""
+    """A person seen more than once, who may stand or swim anywhere: as fast as the fixes do not rule out, cut ones too.
+
+    Where they are stays occupied.
+    """
     fitted, last = _fitted(track, config.fit_s), track[-1]
     fastest_mps = config.person_mps
     if fitted is not None:

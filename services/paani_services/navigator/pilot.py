@@ -19,13 +19,17 @@ SAME_COURSE_RAD = math.radians(3.0)
 
 
 class Pilot(msgspec.Struct, frozen=True):
-    """What was seen, the plan in force, the course and side it was made for, when, and on which picture."""
+    """What was seen, the plan in force, the course and side it was made for, when, and on which picture.
+
+    waits_us: since when no plan moved the boat.
+    """
 
     memory: Memory = Memory()
     plan: Plan | None = None
     course_rad: float = 0.0
     side: float = 0.0
     planned_us: int = 0
+    waits_us: int | None = None
     frame: tuple[int, int] = (-1, -1)
 
 
@@ -61,6 +65,8 @@ def steered(
         grid = fenced(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         moves = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         start = Start(here.x_m, here.y_m, odometry.yaw_rad, *moves)
-        held = plan(grid, start, wish, held, config, moving)
-        pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, pilot.memory.frame)
+        waited_s = 0.0 if pilot.waits_us is None else (now_us - pilot.waits_us) * 1e-6
+        held = plan(grid, start, wish, held, config, moving, patient=waited_s < config.patience_s)
+        waits_us = None if held.speed_mps > 0.0 else now_us if pilot.waits_us is None else pilot.waits_us
+        pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, waits_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

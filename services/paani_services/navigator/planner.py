@@ -78,6 +78,8 @@ def plan(
     before: Plan | None,
     config: PlannerConfig,
     moving: Sequence[Mover] = (),
+    *,
+    patient: bool = True,
 ) -> Plan:
     """The best of headings around the wanted course at two speeds, none of which meets anything.
 
@@ -86,8 +88,9 @@ def plan(
     margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
     way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
-    Where what moves leaves no way onward, the boat waits until it has passed: one that flees keeps abreast. Where that
-    would come to a boat that waits, less of a margin is kept to it too.
+    Where what moves leaves no way onward, a patient boat waits until it has passed: one that flees keeps abreast. Where
+    that would come to a boat that waits, less of a margin is kept to it too. Who may swim, but was not seen to while it
+    waited, is kept clear of as what stands.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, little made good, another than before.
     """
@@ -108,7 +111,7 @@ def plan(
     to_people_m = _looked_up(grid, distance_m(grid.people), ways)
     kept_m = min(tight_m, float(to_people_m[0, 0]))  # whatever else leads out
     barred |= ((to_people_m < kept_m - PEOPLE_SLACK_M) & nearby).any(axis=0)
-    movers = [each for each in moving if each.age_s <= config.unseen_s]
+    movers = [each for each in moving if each.age_s <= config.unseen_s and (patient or any(each.motion[:2]))]
     coast = coasting(start, ways.at_s)
     coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
     last = int(soon.sum()) - 1
@@ -128,7 +131,7 @@ def plan(
         if not (refused.all() and footprints):
             break
     moved: Mask = np.asarray(((moved_m < 0.0) & nearby).any(axis=0))
-    is_safe = not is_met and np.where(soon, coast_m, np.inf).min() >= tight_m
+    is_safe = patient and not is_met and np.where(soon, coast_m, np.inf).min() >= tight_m
     if is_safe and _is_held_up(offsets, refused, moved):
         return nowhere
     if refused.all():

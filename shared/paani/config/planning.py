@@ -68,6 +68,7 @@ class PlannerConfig(Section, frozen=True):
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
     `predict`: what moves counts where it will be, not where it was: velocities over `fit_s`, as far as `mover_range_m`;
     expected to go on for `unseen_s` out of sight; where it was last seen stays occupied as anything else.
+    `patience_s`: waits so long for what moves to pass.
     `person_near_m`, `vessel_near_m`: kept free around what moves. `lead_s`: ways that come near where it will be so
     much later cost more, those astern do not.
     `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
@@ -91,6 +92,7 @@ class PlannerConfig(Section, frozen=True):
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5
     unseen_s: NonNegative = 30.0
+    patience_s: NonNegative = 15.0  # in which a swimmer at ease passes 6 m
     lead_s: NonNegative = 2.0
     person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes
     vessel_near_m: NonNegative = 0.2
