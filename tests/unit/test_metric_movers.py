@@ -75,7 +75,7 @@ def watched(
 
 def moving(memory: Memory, at_us: int) -> tuple[Mover, ...]:
     """What moves for certain, without the people who may."""
-    return tuple(each for each in movers(memory.sights, at_us, CAMERA, PLANNER) if any(each.motion[:2]))
+    return tuple(each for each in movers(memory.sights, at_us, CAMERA, PLANNER) if each.is_sure)
 
 
 @pytest.mark.slow
@@ -135,7 +135,6 @@ def test_reflections_taken_in_move_nothing() -> None:
 def test_a_person_may_swim_until_they_are_seen_to_stand() -> None:
     """From two pictures anybody may swim at ease, any way; the longer they are seen in one place the less."""
     fastest = []
-    memory, at_us = Memory(), START_US
     memory, at_us, _ = watched((4.0, 0.0), (0.0, 0.0), seconds=0.0, surge_mps=0.0)
     assert movers(memory.sights, at_us, CAMERA, PLANNER) == ()  # once is nobody
     for seconds in (0.2, 1.0, 2.0, 3.0):
@@ -237,8 +236,7 @@ def open_water() -> Grid:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_boat_waits_for_who_crosses_and_goes_on_behind_them(side: float) -> None:
     """On open water and under way: it does not turn to run abreast of a swimmer, it lets them pass."""
-    memory = seen()
-    grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    grid = open_water()
     found = [
         plan(grid, CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, side * y_m, 0.0, side * 0.35),))
         for y_m in (-2.0, -1.0, 0.0, 0.5, 1.5)
@@ -249,8 +247,7 @@ def test_a_boat_waits_for_who_crosses_and_goes_on_behind_them(side: float) -> No
 
 def test_patience_with_who_may_swim_but_does_not_ends() -> None:
     """Who treads water in the way, or is taken for a person, is passed as what stands in the end."""
-    memory, at_us = seen(), START_US
-    grid = lay(memory.sights, (0.0, 0.0), at_us, CAMERA, PLANNER)
+    grid = open_water()
     person = Mover(np.array([3.5]), np.array([0.5]), 0.5, Motion(0.0, 0.0, 0.2), 0.1, frozenset())
     found = [plan(grid, RESTING, AHEAD, None, PLANNER, (person,), patient=patient) for patient in (True, False)]
     assert [each.speed_mps > 0.0 for each in found] == [False, True]
@@ -264,10 +261,10 @@ def test_a_boat_waits_no_longer_than_its_patience() -> None:
     memory, now_us = Memory(), START_US
     for now_us in (START_US, START_US + 200_000):
         memory = seen(edge=edge_of(AT_REST, (place,)), at_us=now_us, memory=memory, detections=(box_over(place, 0.4),))
-    here, wish = odometry(now_us, AT_REST), Wish(0.0, 0.6)
+    here = odometry(now_us, AT_REST)
     for waited_s, moves in ((None, False), (PLANNER.patience_s - 1.0, False), (PLANNER.patience_s + 1.0, True)):
         waits_us = None if waited_s is None else now_us - round(waited_s * 1e6)
-        pilot, found = steered(Pilot(memory, waits_us=waits_us), here, wish, now_us, CAMERA, PLANNER)
+        pilot, found = steered(Pilot(memory, waits_us=waits_us), here, AHEAD, now_us, CAMERA, PLANNER)
         assert (found.speed_mps > 0.0) is moves
         assert pilot.waits_us == (None if moves else now_us if waits_us is None else waits_us)
 
@@ -275,8 +272,7 @@ def test_a_boat_waits_no_longer_than_its_patience() -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_boat_at_rest_goes_out_of_the_way_of_what_drifts_onto_it(side: float) -> None:
     """A kayak 2 m wide comes at 0.13 m/s and will be there in 20 s: it turns away while there is room to turn."""
-    memory = seen()
-    grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    grid = open_water()
     outline = (np.full(9, 3.8), side * 0.3 + np.linspace(-1.0, 1.0, 9))
     kayak = Mover(*outline, 0.2, Motion(-0.13, 0.0, 0.03), 0.1, frozenset())
     found = plan(grid, RESTING, AHEAD, None, PLANNER, (kayak,))
@@ -378,7 +374,7 @@ def test_who_moves_opens_no_way_but_one_wider_than_coasting(
     rest_m = np.minimum.accumulate(gap_to_m(mover, np.zeros_like(at_s), np.zeros_like(at_s), at_s)[:, 0])
     keeps = (gap_m >= np.minimum(1.0, np.maximum(rest_m - 0.1, 0.0)) - 1e-9).all()
     if not keeps or plan(grid, start, AHEAD, None, PLANNER).speed_mps == 0.0:
-        assert least_m(grid, mover, ways) > least_m(grid, mover, coasting(start, ways.at_s))
+        assert least_m(grid, mover, ways) > least_m(grid, mover, coasting(start, ways.at_s, PLANNER))
 
 
 def least_m(grid: Grid, mover: Mover, ways: Ways) -> float:

@@ -260,7 +260,7 @@ def test_a_boat_that_would_coast_onto_something_steers_past_it(side: float) -> N
     assert found.speed_mps > 0.0
     assert found.heading_rad * side < -0.3
     at_s, gap_m = swept_gap_m(grid, start, found)
-    coast_m = standing_gaps_m(grid, coasting(start, at_s))
+    coast_m = standing_gaps_m(grid, coasting(start, at_s, PLANNER))
     soon = at_s <= PLANNER.horizon_s
     assert gap_m[soon].min() > coast_m[soon].min()
 
@@ -268,12 +268,12 @@ def test_a_boat_that_would_coast_onto_something_steers_past_it(side: float) -> N
 def test_a_boat_coasts_as_far_as_its_drag_lets_it() -> None:
     """0.1 m/s of 0.6 may be wind and goes on; the drag of K5 takes the rest in 0.78 m, sideways it stays."""
     at_s = np.linspace(0.0, 20.0, 201)
-    way = coasting(Start(1.0, 2.0, math.pi / 2.0, 0.6, 0.0, 0.1), at_s)
+    way = coasting(Start(1.0, 2.0, math.pi / 2.0, 0.6, 0.0, 0.1), at_s, PLANNER)
     assert way.y_m[:, 0] - 2.0 == pytest.approx(way.way_m[:, 0], abs=1e-6)
     assert way.x_m[:, 0] == pytest.approx(1.0 - 0.1 * at_s, abs=1e-6)
     assert way.way_m[-1, 0] == pytest.approx(2.0 + 12.4 / 20.0 * math.log(1.0 + 20.0 * 0.5 / 4.0), abs=0.05)
-    assert coasting(Start(0.0, 0.0, 0.0, 0.06), at_s).way_m[-1, 0] == pytest.approx(0.06 * 20.0)
-    assert coasting(RESTING, at_s).way_m.max() == 0.0
+    assert coasting(Start(0.0, 0.0, 0.0, 0.06), at_s, PLANNER).way_m[-1, 0] == pytest.approx(0.06 * 20.0)
+    assert coasting(RESTING, at_s, PLANNER).way_m.max() == 0.0
 
 
 def test_what_stands_in_the_way_is_passed_on_the_side_with_more_room() -> None:

@@ -11,12 +11,12 @@ from paani_services.navigator.planner import Ways
 from paani_services.navigator.shown import CELL_M, Camera
 from paani_services.navigator.sighting import Memory, remember
 from paani_sim.eye.camera import BoatPose, look_from, project
-from paani_sim.eye.camera import Camera as Eye
+from paani_sim.eye.mounted import camera_of
 
 CONFIG = load_config()
 CAMERA = Camera(calibration_of(CONFIG.eye))
 PLANNER = CONFIG.navigator.planner
-EYE = Eye()
+EYE = camera_of(CONFIG.eye)
 ROWS, COLUMNS = 64, 80
 START_US = 5_000_000
 Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water

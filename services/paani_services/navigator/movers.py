@@ -83,6 +83,11 @@ class Mover(NamedTuple):
     age_s: float
     boxes: Moving
 
+    @property
+    def is_sure(self) -> bool:
+        """It moves for certain; a person who may swim has a deviation alone."""
+        return any(self.motion[:2])
+
 
 def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
     """Everything that moved for certain when it was last seen whole, and people in sight. sights: oldest first."""

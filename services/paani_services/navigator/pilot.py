@@ -65,8 +65,9 @@ def steered(
         grid = fenced(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         moves = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         start = Start(here.x_m, here.y_m, odometry.yaw_rad, *moves)
-        waited_s = 0.0 if pilot.waits_us is None else (now_us - pilot.waits_us) * 1e-6
-        held = plan(grid, start, wish, held, config, moving, patient=waited_s < config.patience_s)
-        waits_us = None if held.speed_mps > 0.0 else now_us if pilot.waits_us is None else pilot.waits_us
+        since_us = now_us if pilot.waits_us is None else pilot.waits_us
+        patient = (now_us - since_us) * 1e-6 < config.patience_s
+        held = plan(grid, start, wish, held, config, moving, patient=patient)
+        waits_us = None if held.speed_mps > 0.0 else since_us
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, waits_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))

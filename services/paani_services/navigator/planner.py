@@ -20,7 +20,6 @@ QUARTER = 0.5 * math.pi
 LOSE_M, GAIN_M = 0.2, 0.1  # of a way out: a turning boat's way ahead, and half a cell
 ONWARD_RAD = math.radians(75.0)  # off the wanted course; further off, a quarter of the way at most is made good
 ASTRAY_MPS = 0.1  # what is out of sight changes its course and speed: measured, 1.2 m in 12 s
-DRAG_PER_S, DRAG_PER_M = 4.0 / 12.4, 20.0 / 12.4  # K4, K5
 AHEAD_S = np.arange(0.0, 30.5, 0.5)  # a boat that turns away from what comes at 0.13 m/s takes 20 s
 CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
@@ -111,18 +110,18 @@ def plan(
     to_people_m = _looked_up(grid, distance_m(grid.people), ways)
     kept_m = min(tight_m, float(to_people_m[0, 0]))  # whatever else leads out
     barred |= ((to_people_m < kept_m - PEOPLE_SLACK_M) & nearby).any(axis=0)
-    movers = [each for each in moving if each.age_s <= config.unseen_s and (patient or any(each.motion[:2]))]
-    coast = coasting(start, ways.at_s)
-    coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
+    movers = [each for each in moving if each.age_s <= config.unseen_s and (patient or each.is_sure)]
+    coast = coasting(start, ways.at_s, config)
     last = int(soon.sum()) - 1
-    is_met = _comes_near(movers, float(coast.x_m[last, 0]), float(coast.y_m[last, 0]), tight_m)
+    is_approached = _comes_near(movers, coast.x_m[last], coast.y_m[last], tight_m)
     nearest_m = _nearest_m(gap_m, movers, ways)
     barred |= is_full & ((nearest_m < tight_m) & soon).any(axis=0)  # no faster than it must so near
+    moved_m = _all_spare_m(movers, ways, start, config)
     footprints = _footprints(config)
     while True:
         kept = footprints.pop(0)
-        # What moves keeps its whole margin where lying still is no worse beside it.
-        moved_m = _all_spare_m(movers, ways, start, kept if is_met else config)
+        if is_approached and kept is not config:  # else it keeps its whole margin: lying still is no worse beside it
+            moved_m = _all_spare_m(movers, ways, start, kept)
         spare_m = np.minimum(gap_m - footprint_m(ways.at_s, gap_m[0, 0], kept)[:, None], moved_m)
         met = spare_m < 0.0
         refused = (met & nearby).any(axis=0) | barred
@@ -131,8 +130,9 @@ def plan(
         if not (refused.all() and footprints):
             break
     moved: Mask = np.asarray(((moved_m < 0.0) & nearby).any(axis=0))
-    is_safe = patient and not is_met and np.where(soon, coast_m, np.inf).min() >= tight_m
-    if is_safe and _is_held_up(offsets, refused, moved):
+    coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
+    is_safe = not is_approached and np.where(soon, coast_m, np.inf).min() >= tight_m
+    if patient and is_safe and _is_held_up(offsets, refused, moved):
         return nowhere
     if refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | moved | barred
@@ -210,13 +210,13 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
 
 
-def coasting(start: Start, at_s: F64) -> Ways:
+def coasting(start: Start, at_s: F64, config: PlannerConfig) -> Ways:
     """Where the boat gets with its fans off, on its heading: drag takes its way off, but for `CARRIED_MPS` of it."""
     surge = max(start.surge_mps, 0.0)
     carried = min(surge, CARRIED_MPS)
     own, way = surge - carried, [0.0]
     for step_s in np.diff(at_s).tolist():
-        own /= 1.0 + step_s * (DRAG_PER_S + DRAG_PER_M * own)
+        own /= 1.0 + step_s * (config.drag_per_s + config.drag_per_m * own)
         way.append(way[-1] + step_s * (carried + own))
     way_m = np.array(way)[:, None]
     cos, sin = portable.cos(start.yaw_rad), portable.sin(start.yaw_rad)
@@ -254,12 +254,12 @@ def _is_held_up(offsets: F64, refused: Mask, moved: Mask) -> bool:
     return bool(refused[onward].all() and moved[onward].any())
 
 
-def _comes_near(movers: Sequence[Mover], x_m: float, y_m: float, tight_m: float) -> bool:
-    """Something that moves for certain comes to a boat that lies there, if it goes on as it does."""
+def _comes_near(movers: Sequence[Mover], x_m: F64, y_m: F64, tight_m: float) -> bool:
+    """Something that moves for certain comes to a boat that lies there [1], if it goes on as it does."""
     for mover in movers:
         as_it_does = mover._replace(motion=mover.motion._replace(deviation_mps=0.0))
-        gaps_m = gap_to_m(as_it_does, np.full_like(AHEAD_S, x_m), np.full_like(AHEAD_S, y_m), AHEAD_S)
-        if any(mover.motion[:2]) and gaps_m.min() < min(tight_m, gaps_m[0] - GAIN_M):
+        gaps_m = gap_to_m(as_it_does, x_m, y_m, AHEAD_S)
+        if mover.is_sure and gaps_m.min() < min(tight_m, gaps_m[0] - GAIN_M):
             return True
     return False
 

@@ -72,6 +72,7 @@ class PlannerConfig(Section, frozen=True):
     `person_near_m`, `vessel_near_m`: kept free around what moves. `lead_s`: ways that come near where it will be so
     much later cost more, those astern do not.
     `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
+    `drag_per_s`, `drag_per_m`: what slows a boat whose fans are off, per speed and per its square.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     """
 
@@ -105,6 +106,8 @@ class PlannerConfig(Section, frozen=True):
     yaw_rate_radps: Positive = 0.35  # Q5
     yaw_accel_radps2: Positive = 0.35
     accel_mps2: Positive = 0.4  # measured on K4, K5; the paper has 0.2 (Q5)
+    drag_per_s: NonNegative = 4.0 / 12.4  # K5 over K4
+    drag_per_m: NonNegative = 20.0 / 12.4  # K5 over K4
     turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
     room_m: NonNegative = 3.0  # turn_radius_m, hull_radius_m and margin_m
     helm_speed_mps: NonNegative = 0.5  # measured: what one fan alone drives a boat at that turns as hard as it can
