@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from paani.picture_faults import FAULTS, MOVES, SEVERITIES, WATER, spoilt
+from paani.picture_faults import FAULTS, MOVES, MUST_ACCEPT, MUST_REJECT, SEVERITIES, WATER, spoilt
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import RENDERED, Sample, read_mask, read_picture
 
 Bytes = NDArray[np.uint8]
 Segment = Callable[[Bytes], Bytes]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
 MIDDLE_WH = (320, 240)
-MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # mIoU of a cell below and above which the verdict is settled
 OPTIMISM = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
 GUESSED_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
 CHECKED = 10  # one training sequence in so many is not trained on and chooses the threshold

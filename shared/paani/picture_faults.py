@@ -5,6 +5,7 @@ geometry move what is seen, so they take a class mask along: `move(picture, mask
 """
 
 from collections.abc import Callable
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -18,6 +19,8 @@ SEVERITIES = (1, 2, 3, 4, 5)
 IGNORE = 255
 WATER = 0  # in class masks
 MIN_DRY_FRAC = 0.25  # a view without water needs this share of the picture's rows
+DRY = "above_water"  # as a fault's name: a view without water
+MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # the segmenter's mIoU on a fault below and above which the verdict is settled
 
 
 def black(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
@@ -234,6 +237,13 @@ def spoilt(name: str, picture: Bytes, mask: Bytes, severity: int, rng: np.random
     if name in MOVES:
         return MOVES[name](picture, mask, severity, rng)
     return FAULTS[name](picture, severity, rng), mask
+
+
+def due_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
+    """What the gate must do with pictures on which the segmenter reaches that mean IoU."""
+    if miou < MUST_REJECT or fault == DRY:
+        return "reject"
+    return "accept" if miou > MUST_ACCEPT else "free"
 
 
 def above_water(picture: Bytes, mask: Bytes) -> Bytes | None:

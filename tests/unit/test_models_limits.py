@@ -26,6 +26,7 @@ from paani_models.report.mask_limits import (
     mistakes,
     water_iou,
 )
+from paani_models.report.records import CleanSource, FaultCell, FaultReport, FaultTotals
 from paani_models.report.tried import PRESENT, Tried, encoded, read_tried, with_present
 from paani_models.sources import IGNORE, Sample, Source, choose
 from tests.unit.public_sets import own_data
@@ -163,6 +164,20 @@ def test_a_missed_box_bar_names_sizes_and_fates() -> None:
     assert (person.bar.metric, person.value, person.n) == ("person_ap50", 0.0, 1)
     assert "Of 1 objects under 8 px high 0 are found" in person.limit
     assert "1 not seen" in person.limit
+
+
+def test_a_gate_bar_is_kept_from_above_and_names_where_the_gate_is_wrong() -> None:
+    cells = (FaultCell("black", 1, 60, 60, 0.1), FaultCell("glare", 5, 60, 50, 0.59), FaultCell("fog", 1, 60, 0, 0.9))
+    totals = FaultTotals(false_accept_frac=10 / 120, false_reject_frac=0.0, clean_reject_frac=0.01)
+    faults = FaultReport(cells, (CleanSource("boats", 200, 2), CleanSource("river", 100, 0)), totals)
+    accepted, refused, clean = reached([], [], faults)
+    assert (accepted.value, accepted.n, accepted.met) == (pytest.approx(10 / 120, abs=1e-4), 180, False)
+    assert accepted.limit == "Wrong most often: 10 of 60 in glare 5 (mean IoU 0.59)."
+    assert (refused.met, refused.limit) == (True, "")
+    assert (clean.met, clean.limit) == (False, "Wrong most often: 2 of 200 in boats.")
+    text = bars_section([accepted], [])
+    assert "at most 0.0050" in text
+    assert "0.0833" in text
 
 
 def test_the_present_weights_take_their_place_in_the_record(tmp_path: Path) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from paani_models.report.box_limits import FATES, BoxLimits
 from paani_models.report.mask_limits import REACHES_PX, MaskLimits, edge_f1, mean_iou, water_iou
+from paani_models.report.records import FaultReport, gate_figures
 
 PHOTOGRAPHS = "photographs"  # every real source that boxes the class, pooled
 FAR_PX = REACHES_PX[-1]
@@ -17,12 +18,13 @@ _MASK_FIGURES = {"iou_water": water_iou, "miou": mean_iou}
 
 @dataclass(frozen=True)
 class Bar:
-    """The least that a figure should be, on held-out sequences of real pictures."""
+    """What a figure should be at least, or at most, on held-out sequences of real pictures."""
 
     net: str
     metric: str
     source: str
-    least: float
+    bound: float
+    at_most: bool = False
 
 
 BARS = (
@@ -33,7 +35,11 @@ BARS = (
     Bar("detector", "vessel_ap50", PHOTOGRAPHS, 0.75),
     Bar("detector", "buoy_ap50", PHOTOGRAPHS, 0.60),
     Bar("detector", "person_ap50", PHOTOGRAPHS, 0.50),
+    Bar("gate", "unfit_accepted_frac", "spoilt", 0.005, at_most=True),
+    Bar("gate", "fit_refused_frac", "spoilt", 0.01, at_most=True),
+    Bar("gate", "clean_refused_frac", "all", 0.002, at_most=True),
 )
+_WORST_CELLS = 5
 
 
 @dataclass(frozen=True)
@@ -47,12 +53,15 @@ class Reached:
 
     @property
     def met(self) -> bool:
-        """Whether the figure is at or above its bar."""
-        return self.value >= self.bar.least
+        """Whether the figure keeps its bar."""
+        return self.value <= self.bar.bound if self.bar.at_most else self.value >= self.bar.bound
 
 
-def reached(masks: Sequence[MaskLimits], boxes: Sequence[BoxLimits]) -> list[Reached]:
-    """Every bar whose pictures are at hand."""
+def reached(
+    masks: Sequence[MaskLimits], boxes: Sequence[BoxLimits], faults: FaultReport | None = None
+) -> list[Reached]:
+    """Every bar whose measurement is at hand."""
+    of_gate = {(figure.metric, figure.source): figure for figure in gate_figures(faults)} if faults else {}
     by_source = {limits.source.name: limits for limits in masks}
     by_kind = {f"{limits.kind}_ap50": limits for limits in boxes}
     found = []
@@ -61,7 +70,29 @@ def reached(masks: Sequence[MaskLimits], boxes: Sequence[BoxLimits]) -> list[Rea
             found.append(_of_masks(bar, by_source[bar.source]))
         elif bar.net == "detector" and bar.metric in by_kind:
             found.append(_of_boxes(bar, by_kind[bar.metric]))
+        elif bar.net == "gate" and faults and (figure := of_gate.get((bar.metric, bar.source))):
+            one = Reached(bar, figure.value, figure.n, "")
+            found.append(one if one.met else replace(one, limit=_wrong_verdicts(bar, faults)))
     return found
+
+
+def _wrong_verdicts(bar: Bar, faults: FaultReport) -> str:
+    """Where the gate is wrong most often."""
+    if bar.source == "all":
+        wrong = [(source.rejected, source.n, source.source) for source in faults.clean]
+    else:
+        verdict = "reject" if bar.metric == "unfit_accepted_frac" else "accept"
+        wrong = [
+            (
+                cell.n - cell.rejected if verdict == "reject" else cell.rejected,
+                cell.n,
+                f"{cell.fault.replace('_', ' ')} {cell.severity} (mean IoU {cell.miou:.2f})",
+            )
+            for cell in faults.cells
+            if cell.verdict == verdict
+        ]
+    worst = sorted((w for w in wrong if w[0]), key=lambda w: -w[0])[:_WORST_CELLS]
+    return f"Wrong most often: {'; '.join(f'{count} of {n} in {name}' for count, n, name in worst)}."
 
 
 def _of_masks(bar: Bar, limits: MaskLimits) -> Reached:
@@ -69,7 +100,7 @@ def _of_masks(bar: Bar, limits: MaskLimits) -> Reached:
         value, best = edge_f1(limits.edges), edge_f1(limits.best_edges)
     else:
         value, best = (_MASK_FIGURES[bar.metric](counts) for counts in (limits.counts, limits.best_counts))
-    if value >= bar.least:
+    if value >= bar.bound:
         return Reached(bar, value, limits.n, "")
     return Reached(bar, value, limits.n, f"{_mistakes(limits)} The best answer of the net's cells reaches {best:.3f}.")
 
@@ -87,7 +118,7 @@ def _mistakes(limits: MaskLimits) -> str:
 
 
 def _of_boxes(bar: Bar, limits: BoxLimits) -> Reached:
-    if limits.ap50 >= bar.least:
+    if limits.ap50 >= bar.bound:
         return Reached(bar, limits.ap50, limits.n, "")
     small, smalls = limits.found_between(0.0, SMALL_PX)
     near, nears = limits.found_between(NEAR_PX, float("inf"))

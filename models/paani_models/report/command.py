@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
     segment = segmenter(verified_path("segmenter", arguments.weights))
     limits = mask_limits([s for s in pictures.segmented(held_out=True) if s.source.name != RENDERED], segment)
     box_limited = box_limits(scored.boxes)
-    bars = reached(limits, box_limited)
+    bars = reached(limits, box_limited, faults)
     tried = with_present(tried, load_catalogue(arguments.weights), bars)
     masks, boxes = draw_masks(out, [*worst_masks, *best_masks], segment), draw_boxes(out, [*worst_boxes, *best_boxes])
     content = Content(

@@ -16,6 +16,7 @@ from paani_models.report.mask_limits import REACHES_PX, TENTHS, MaskLimits, edge
 from paani_models.report.tables import TITLES, as_table
 from paani_models.report.tried import Tried
 
+WHOLE = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a figure's name need not tell
 _TICKS = 4  # a chart's axis has this many steps, so that each trial stands on a whole number
 
 
@@ -23,8 +24,8 @@ def bars_section(found: Sequence[Reached], tried: Sequence[Tried]) -> str:
     """What is to be reached, what is, why not; then how each figure moved from recipe to recipe."""
     rows = [
         f'<tr class="{"met" if each.met else "missed"}"><th>{escape(_name(each.bar))}</th><td>{each.n}</td>'
-        f"<td>{each.bar.least:.2f}</td><td>{each.value:.3f}</td><td>{'met' if each.met else 'missed'}</td>"
-        f'<td class="text">{escape(each.limit)}</td></tr>'
+        f"<td>{_bound(each.bar)}</td><td>{each.value:.{_places(each.bar)}f}</td>"
+        f'<td>{"met" if each.met else "missed"}</td><td class="text">{escape(each.limit)}</td></tr>'
         for each in found
     ]
     head = '<th>figure</th><th>n</th><th>bar</th><th>reached</th><th></th><th class="text">what limits it</th>'
@@ -107,13 +108,14 @@ def _tried_chart(now: Reached, tried: Sequence[Tried]) -> str:
     points: Points = [(number, value) for number, value in enumerate(values, 1) if value is not None]
     asked = {number for number, row in enumerate(tried, 1) if row.asked}
     last = 1.0 + _TICKS * math.ceil(max(1, len(tried) - 1) / _TICKS)
-    least = min([bar.least, *(value for _, value in points)])
+    heights = [bar.bound, *(value for _, value in points)]
+    ends = (0.0, math.ceil(max(heights) * 50) / 50) if bar.at_most else (math.floor(min(heights) * 5) / 5, 1.0)
     series: dict[str, Points] = {
-        "bar": [(1.0, bar.least), (last, bar.least)],
+        "bar": [(1.0, bar.bound), (last, bar.bound)],
         "weights": [point for point in points if point[0] not in asked],
         "asked otherwise": [point for point in points if point[0] in asked],
     }
-    return lines(series, "recipe", _name(bar), (1.0, last), (math.floor(least * 5) / 5, 1.0))
+    return lines(series, "recipe", _name(bar), (1.0, last), ends)
 
 
 def _tried_table(now: Sequence[Reached], tried: Sequence[Tried]) -> str:
@@ -121,7 +123,9 @@ def _tried_table(now: Sequence[Reached], tried: Sequence[Tried]) -> str:
     rows = []
     for number, row in enumerate(tried, 1):
         values = [row.value(each.bar.metric, each.bar.source, each.n) for each in now]
-        cells = "".join("<td></td>" if value is None else f"<td>{value:.3f}</td>" for value in values)
+        cells = "".join("<td></td>" if value is None else f"<td>{value:.{_places(each.bar)}f}</td>"
+            for each, value in zip(now, values, strict=True)
+        )
         recipe = escape(f"{row.recipe}; {row.asked}" if row.asked else row.recipe)
         rows.append(f'<tr><th>{number}</th><td class="text">{recipe} <code>{row.sha256[:8]}</code></td>{cells}</tr>')
     return as_table(f'<th></th><th class="text">recipe</th>{head}', rows)
@@ -151,7 +155,16 @@ def _score_chart(limits: BoxLimits) -> str:
 
 def _name(bar: Bar) -> str:
     metric = TITLES.get(bar.metric) or bar.metric.replace("_ap50", " AP50")
-    return metric if bar.source == PHOTOGRAPHS else f"{metric}, {bar.source}"
+    return metric if bar.source in WHOLE else f"{metric}, {bar.source}"
+
+
+def _bound(bar: Bar) -> str:
+    return f"{'at most ' if bar.at_most else ''}{bar.bound:.{_places(bar)}f}"
+
+
+def _places(bar: Bar) -> int:
+    """Decimals of what stands near 0 and of what stands near 1."""
+    return 4 if bar.at_most else 3
 
 
 def _range(low: float, high: float) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.picture_faults import due_verdict
 from paani_models.catalogue import Figure
 from paani_models.report.charts import Points, lines
 
@@ -22,6 +23,11 @@ class FaultCell(msgspec.Struct, frozen=True):
     n: int
     rejected: int
     miou: float
+
+    @property
+    def verdict(self) -> str:
+        """What the gate must do here: "reject", "accept", or "free"."""
+        return due_verdict(self.fault, self.miou)
 
 
 class FaultTotals(msgspec.Struct, frozen=True):

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from html import escape
 
-from paani_services.faults.measure import MUST_ACCEPT, MUST_REJECT, CellFigures
+from paani.picture_faults import MUST_ACCEPT, MUST_REJECT
+from paani_services.faults.measure import CellFigures
 
 COLUMNS = 6
 PANEL_W, PANEL_H, LEFT, TOP, PLOT_W, PLOT_H = 170, 130, 30, 24, 124, 76

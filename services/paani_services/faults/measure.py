@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.messages import UnusableCause
-from paani.picture_faults import FAULTS, MOVES, SEVERITIES, above_water, spoilt
+from paani.picture_faults import DRY, FAULTS, MOVES, SEVERITIES, above_water, due_verdict, spoilt
 from paani_services.faults.corpus import Scene
 
 Bytes = NDArray[np.uint8]
-MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # mIoU of a cell below and above which the verdict is settled
-DRY = "above_water"
 Segment = Callable[[Bytes], Bytes]
 Judge = Callable[[Bytes], UnusableCause]
 
@@ -31,9 +29,7 @@ class CellFigures(msgspec.Struct, frozen=True):
     @property
     def verdict(self) -> str:
         """What the gate must do here: "reject", "accept", or "free"."""
-        if self.miou < MUST_REJECT or self.fault == DRY:
-            return "reject"
-        return "accept" if self.miou > MUST_ACCEPT else "free"
+        return due_verdict(self.fault, self.miou)
 
 
 class CleanFigures(msgspec.Struct, frozen=True):
