@@ -123,7 +123,8 @@ def _tried_table(now: Sequence[Reached], tried: Sequence[Tried]) -> str:
     rows = []
     for number, row in enumerate(tried, 1):
         values = [row.value(each.bar.metric, each.bar.source, each.n) for each in now]
-        cells = "".join("<td></td>" if value is None else f"<td>{value:.{_places(each.bar)}f}</td>"
+        cells = "".join(
+            "<td></td>" if value is None else f"<td>{value:.{_places(each.bar)}f}</td>"
             for each, value in zip(now, values, strict=True)
         )
         recipe = escape(f"{row.recipe}; {row.asked}" if row.asked else row.recipe)
