@@ -93,8 +93,8 @@ def reduced(bgr: Bytes) -> tuple[Bytes, Bytes, Floats]:
 
 def measure(middle: Bytes, small: Floats) -> Statistics:
     """Statistics of one picture, from its two reductions."""
-    fine = middle.astype(np.float32)
-    low, high = np.percentile(small, (1, 99))
+    ordered = np.sort(small, axis=None)
+    low, high = ordered[small.size // 100], ordered[-1 - small.size // 100]
     tile_mean, tile_std = _tiles(middle)
     covered = (tile_std < DARK_TILE_STD) & (tile_mean < DARK_TILE_MEAN)
     centred = small - small.mean()
@@ -108,8 +108,8 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
         upright_residual=float((small - small.mean(axis=0)).std() / (small.std() + 1e-3)),
         correlation=min(float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean()))
         / variance,
-        sigma=float(np.abs(cv2.filter2D(fine, -1, NOISE_MASK)).mean()) * NOISE_SCALE,
-        fineness=_edges(fine) / (_edges(small) + 1e-3),
+        sigma=cv2.norm(cv2.filter2D(middle, cv2.CV_16S, NOISE_MASK), cv2.NORM_L1) / middle.size * NOISE_SCALE,
+        fineness=_edges(middle) / (_edges(small) + 1e-3),
         covered_frac=float(covered.mean()),
         rest_mean=float(tile_mean[~covered].mean()) if not covered.all() else 0.0,
         skew=_skew(middle),
@@ -145,7 +145,7 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
     return UnusableCause.NONE
 
 
-def _edges(luma: Floats) -> float:
+def _edges(luma: Bytes | Floats) -> float:
     """Mean absolute central difference, both ways."""
     across = cv2.norm(luma[:, 2:], luma[:, :-2], cv2.NORM_L1) / luma[:, 2:].size
     down = cv2.norm(luma[2:], luma[:-2], cv2.NORM_L1) / luma[2:].size
