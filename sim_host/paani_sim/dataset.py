@@ -31,6 +31,8 @@ PICTURES_PER_SESSION = 24
 PICTURES_PER_SKY = 4
 FOG_FRAC, RAIN_FRAC = 0.12, 0.15  # of the skies
 LENS_FRAC = 0.35  # of the pictures come through a lens that bends
+HFOV_DEG = (52.0, 108.0)  # small board cameras, narrow to wide
+FLAT_FRAC, FLATTER = 0.35, 0.75  # sessions with a flatter picture, as 16:9 is to 4:3
 WATERS: tuple[tuple[float, float, float], ...] = (
     (0.30, 0.34, 0.22),
     (0.40, 0.36, 0.24),
@@ -73,7 +75,7 @@ def write_dataset(
 ) -> Manifest:
     """Write `n` labelled pictures to the new folder `out` and return its manifest.
 
-    Written beside and renamed when complete. Raises `UserError` for a folder that exists,
+    Some are flatter than `height_px`. Written beside and renamed when complete. Raises `UserError` for a folder that exists,
     an unknown world or missing OpenGL.
     """
     if out.exists():
@@ -85,14 +87,14 @@ def write_dataset(
         (beside / folder).mkdir(parents=True)
     items: list[Item] = []
     boxes = dict.fromkeys((str(kind) for kind in CLASSES), 0)
-    camera = Camera(width_px=width_px, height_px=height_px)
     with tqdm(total=n, unit="picture", desc=out.name) as progress:
         session = 0
         while len(items) < n:
             rng = np.random.default_rng([seed, session])
             world = _vary(places[session % len(places)], rng)
             seq = f"{world.name}_{seed}_{session:03d}"
-            with Eye(world, camera, supersample=2) as eye:
+            height = round(height_px * FLATTER) if rng.random() < FLAT_FRAC else height_px
+            with Eye(world, Camera(width_px=width_px, height_px=height), supersample=2) as eye:
                 for k in range(min(PICTURES_PER_SESSION, n - len(items))):
                     view = _one(eye, k, rng)
                     items.append(_write(beside, seq, k, view, rng))
@@ -141,12 +143,14 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
         wind = Wind(float(rng.gamma(1.6, 1.6)), float(rng.uniform(-np.pi, np.pi)))
         eye.set_weather(light, wind)
     eye.exposure = float(1.15 * np.exp(rng.normal(0.0, 0.28)))
+    hfov_deg = float(rng.uniform(*HFOV_DEG))
+    bend = min(1.0, (np.tan(np.radians(44.0)) / np.tan(np.radians(0.5 * hfov_deg))) ** 2)  # as much at the edge
     eye.camera = dataclasses.replace(
         eye.camera,
-        hfov_deg=float(rng.uniform(52.0, 88.0)),
+        hfov_deg=hfov_deg,
         up_m=float(rng.uniform(0.35, 1.6)),
         down_deg=float(rng.normal(3.5, 3.0)),
-        k1=float(rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
+        k1=float(bend * rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
         shutter_s=float(rng.uniform(0.0, 0.03)),
     )
     pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))

@@ -42,8 +42,8 @@ def check_is_fair(scenario: Scenario) -> None:
         track_m = fine(actor.path_m)
         assert clearance_m(world.shore_m, track_m).min() > 0.5 * actor.width_m, actor.id
         assert fixed_gap_m(world.obstacles, track_m).min() > 0.5 * actor.width_m, actor.id
-        skipper = actor.kind is Kind.VESSEL and actor.speed_mps > 0.19
-        assert (actor.behaviour is Behaviour.GIVES_WAY) is skipper, actor.id
+        adrift = actor.kind is Kind.VESSEL and actor.speed_mps <= 0.19
+        assert (actor.behaviour is Behaviour.HOLDS_ON) is adrift, actor.id
     for obstacle in world.obstacles:
         if obstacle.id.startswith("met_"):
             assert clearance_m(world.shore_m, np.array([obstacle.pose[:2]]))[0] > 0.5 * obstacle.width_m, obstacle.id

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
-from paani_sim.plant.actors import KEEP_CLEAR_M, Actors, Track, speed_mps
+from paani_sim.plant.actors import KEEP_CLEAR_M, SWIMMER_KEEPS_CLEAR_M, Actors, Track, speed_mps
 from paani_sim.worlds import Actor, Behaviour, Kind, Pose2, actor_at, load_world
 
 BOAT_REACH_M = 0.65
@@ -47,6 +47,18 @@ def test_skipper_stops_short_and_goes_on_when_clear() -> None:
     for step in range(200):
         actors.advance(24.0 + EVERY_S * (step + 1), (30.0, 8.0))
     assert actors.along_m[0] == pytest.approx(stopped_m + 10.0 * 1.5, rel=0.01)
+
+
+def test_a_swimmer_stops_short_of_a_boat_across_the_way_and_not_of_one_that_is_past() -> None:
+    swimmer = straight(kind=Kind.PERSON, look="swimming", speed_mps=0.3, length_m=1.1, width_m=0.6)
+    actors = Actors([swimmer], EVERY_S, BOAT_REACH_M)
+    for step in range(round(60.0 / EVERY_S)):
+        actors.advance(EVERY_S * (step + 1), (10.0, 0.5))
+    furthest_m = actors.along_m[0]
+    assert 10.0 - BOAT_REACH_M - 0.55 - furthest_m >= SWIMMER_KEEPS_CLEAR_M - 0.05
+    for step in range(round(60.0 / EVERY_S)):
+        actors.advance(60.0 + EVERY_S * (step + 1), (10.0, 4.0))
+    assert actors.along_m[0] > furthest_m + 10.0
 
 
 def test_who_holds_on_keeps_time_to_the_bit() -> None:

@@ -1,4 +1,4 @@
-"""Moving things: where they are on their paths, and how a skipper among them gives way to the boat."""
+"""Moving things: where they are on their paths, and how skippers and swimmers among them give way to the boat."""
 
 import bisect
 import math
@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paani_sim.worlds.world import Actor, Behaviour, Pose2, along_at
+from paani_sim.worlds.world import Actor, Behaviour, Kind, Pose2, along_at
 
 KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
+SWIMMER_KEEPS_CLEAR_M = 1.0
 ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
 SLOWING_MPS2 = 0.15  # a small craft that throttles back
 # One who has stood still for the boat this long makes way for a while: astern, or ahead of a boat abaft the beam.
@@ -49,15 +50,17 @@ class Track:
 def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
     """How fast the actor goes with the boat there; `boat_reach_m` is the boat's half length.
 
-    One that gives way slows so that it could stop `KEEP_CLEAR_M` short of a boat ahead, and goes on when that is clear;
-    with the boat close alongside it stands still and lets it draw ahead.
+    One that gives way slows so that it could stop short of a boat ahead, `KEEP_CLEAR_M` or, who swims,
+    `SWIMMER_KEEPS_CLEAR_M`, and goes on when that is clear; with the boat close alongside it stands still and lets it
+    draw ahead.
     """
     if actor.behaviour is not Behaviour.GIVES_WAY:
         return actor.speed_mps
     ahead_m, aside_m = boat_from_m(pose, boat_xy_m)
     if ahead_m <= -0.5 * actor.length_m - boat_reach_m or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
         return actor.speed_mps
-    room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - KEEP_CLEAR_M
+    keep_clear_m = SWIMMER_KEEPS_CLEAR_M if actor.kind is Kind.PERSON else KEEP_CLEAR_M
+    room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - keep_clear_m
     return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
 
 

@@ -156,7 +156,7 @@ def _swimmer(place: _Place, rng: np.random.Generator) -> Actor | None:
     run = meetings.crossing(
         place.world, place.way, place.at_m, speed_mps=speed_mps, length_m=1.2, turn_rad=turn_rad, boat_mps=BOAT_MPS
     )
-    return _moving(place, "swimming", run, speed_mps, Behaviour.HOLDS_ON, rng)
+    return _moving(place, "swimming", run, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
 def _adrift(place: _Place, rng: np.random.Generator) -> Actor | None:

@@ -51,7 +51,7 @@ class Obstacle:
 
 
 class Behaviour(StrEnum):
-    """How an actor follows its path: at its speed whatever comes, or stopping short of the boat as a skipper would."""
+    """How an actor follows its path: at its speed whatever comes, or stopping short of a boat that lies across it."""
 
     HOLDS_ON = "holds_on"
     GIVES_WAY = "gives_way"
