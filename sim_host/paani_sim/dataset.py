@@ -75,8 +75,8 @@ def write_dataset(
 ) -> Manifest:
     """Write `n` labelled pictures to the new folder `out` and return its manifest.
 
-    Some are flatter than `height_px`. Written beside and renamed when complete. Raises `UserError` for a folder that exists,
-    an unknown world or missing OpenGL.
+    Some are flatter than `height_px`. Written beside and renamed when complete. Raises `UserError` for a folder that
+    exists, an unknown world or missing OpenGL.
     """
     if out.exists():
         raise UserError(f"dataset: {out} already exists")
