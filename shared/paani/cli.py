@@ -8,7 +8,7 @@ import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from paani.config import Config, decode_config, load_config
+from paani.config import PROFILES, Config, decode_config, load_config
 from paani.errors import UserError
 from paani.process import run_service, services
 
@@ -53,7 +53,7 @@ def usage(commands: list[str], names: list[str]) -> str:
 
 def add_config_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that `config_from` reads."""
-    parser.add_argument("--profile", choices=("paani", "paper"), help="which set of constants (default: paani)")
+    parser.add_argument("--profile", choices=tuple(PROFILES), help="which set of constants (default: paani)")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML")
     parser.add_argument(
         "--set",

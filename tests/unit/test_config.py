@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
-from paani.config import Config, decode_config, encode_config, load_config
+from paani.config import Config, EyeConfig, decode_config, encode_config, load_config
 from paani.errors import UserError
 
 
@@ -83,6 +84,34 @@ def test_the_paper_profile_carries_the_papers_constants() -> None:
     assert (k.speed_kp, k.speed_feed_forward, k.heading_kp, k.heading_kd) == (0.08, 0.16, 0.08, 0.05)
     assert (c.plant.adapter.force_per_unit_n, c.plant.adapter.timeout_s) == (75.0, 0.5)
     assert c.localization.rate_hz == 20.0
+
+
+def aside_deg(eye: EyeConfig, x: float) -> float:
+    """Bearing of a column of the picture."""
+    return math.degrees(math.atan((x - 0.5) * 2.0 * math.tan(math.radians(0.5 * eye.hfov_deg))))
+
+
+def down_deg(eye: EyeConfig, y: float) -> float:
+    """Depression of a row of the picture, at its middle."""
+    widths = (y - 0.5) * eye.height_px / eye.width_px
+    return eye.pitch_down_deg + math.degrees(math.atan(widths * 2.0 * math.tan(math.radians(0.5 * eye.hfov_deg))))
+
+
+def test_the_wide_profile_means_the_same_angles() -> None:
+    plain, wide = load_config(), load_config(profile="wide")
+    for narrow, other in zip(_columns(plain), _columns(wide), strict=True):
+        assert aside_deg(wide.eye, other) == pytest.approx(aside_deg(plain.eye, narrow), abs=0.3)
+    rows = [(c.perception.corridors.top, c.advisor.policy.occupancy_bottom) for c in (plain, wide)]
+    for narrow, other in zip(*rows, strict=True):
+        assert down_deg(wide.eye, other) == pytest.approx(down_deg(plain.eye, narrow), abs=0.6)
+    assert down_deg(wide.eye, 1.0) == pytest.approx(down_deg(plain.eye, 1.0), abs=2.0)
+    sides = wide.perception.corridors.left[0], wide.perception.corridors.right[1]
+    assert sides == pytest.approx((0.02, 0.98))
+
+
+def _columns(config: Config) -> list[float]:
+    corridors, policy = config.perception.corridors, config.advisor.policy
+    return [corridors.left[1], *corridors.center, corridors.right[0], policy.core_left, policy.core_right]
 
 
 def test_a_configuration_survives_being_handed_to_a_child() -> None:

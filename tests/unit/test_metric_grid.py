@@ -229,6 +229,19 @@ def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == (Foot(192, 320, math.ceil(aslant[-1] * 512)),)
 
 
+def test_a_column_that_a_box_covers_in_part_is_not_looked_through() -> None:
+    """The near end of this hull is at the left; beside its right end the mask shows the water behind it."""
+    aslant = (*(0.99 - 0.012 * column for column in range(26)), *([0.3] * 54))
+    vessel, wider = (
+        Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=(0.0, 0.5, right, 0.99)) for right in (0.33, 0.35)
+    )
+    assert seen(edge=aslant, detections=(vessel,)).sights[-1].feet == ()
+    (foot,) = seen(edge=aslant, detections=(wider,)).sights[-1].feet
+    assert (foot.left, foot.right) == (26 * 512 // 80, -(-28 * 512 // 80))
+    thin = Detection(label=Label.PIER, confidence=0.9, box_xyxy=(0.505, 0.5, 0.511, 0.9))
+    assert len(seen(edge=aslant, detections=(thin,)).sights[-1].feet) == 1
+
+
 def test_a_hull_is_whole_and_as_deep_as_it_is_wide() -> None:
     """The mask takes its bow for water, and shows its side alone: 2 m wide at 4 m, it is 2 m deep."""
     side = edge_of(AT_REST, ((4.0, -1.0, 4.4, 1.0),))

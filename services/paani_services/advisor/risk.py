@@ -14,13 +14,12 @@ from paani_services.advisor.tracker import TrackerState, is_accepted, is_immedia
 LANES = ("left", "center", "right")
 NEAR_FROM, NEAR_SPAN, TALL_SPAN = 0.30, 0.70, 0.50  # resolution 6
 NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # resolution 6
-ALL_CLEAR = 1.0 - 1e-9  # every column of E6
 
 
 class Obstacle(msgspec.Struct, frozen=True):
     """An accepted track as the policy weighs it; `presence` falls from 1 while it is not seen.
 
-    behind: the lanes where it stands behind water that the mask shows from side to side.
+    behind: the lanes that show clear water across more than it may take of them, so that it occupies none.
     """
 
     id: int
@@ -111,7 +110,8 @@ def obstacles_of(
     settings = config.advisor.tracker
     open_lanes: tuple[str, ...] = ()
     if config.navigator.planner.acts_on(config.calibration):
-        open_lanes = tuple(lane for lane in LANES if water[lane].clear_width >= ALL_CLEAR)
+        clear = 1.0 - config.advisor.policy.planned_coverage
+        open_lanes = tuple(lane for lane in LANES if water[lane].clear_width > clear)
 
     def weight(box: BoxXyxy) -> float:
         return relevance(box, aspect, config.calibration, config.advisor.risk)

@@ -243,7 +243,8 @@ def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
     """Where a box stands on the water.
 
     A small thing's lower end is its foot. A long hull or pier that lies aslant reaches that low at one end only: it
-    stands where the mask ends the water, and on the box's lower end in columns where the mask looks through it.
+    stands where the mask ends the water, and on the box's lower end in columns where the mask looks through it. A
+    column that the box covers in part is no such: there the mask looks past it.
     """
     x1, y1, x2, y2 = detection.box_xyxy
     low = math.ceil(y2 * FOOT_STEPS)
@@ -252,7 +253,8 @@ def _feet(detection: Detection, edge: tuple[float, ...]) -> Iterator[Foot]:
         yield Foot(math.floor(x1 * FOOT_STEPS), math.ceil(x2 * FOOT_STEPS), low, person)
         return
     count = len(edge)
-    for is_missed, run in itertools.groupby(_columns(detection, edge), key=lambda column: edge[column] < y1):
+    columns = range(math.ceil(x1 * count), math.floor(x2 * count)) or _columns(detection, edge)
+    for is_missed, run in itertools.groupby(columns, key=lambda column: edge[column] < y1):
         if is_missed:
             missed = tuple(run)
             yield Foot(missed[0] * FOOT_STEPS // count, -(-(missed[-1] + 1) * FOOT_STEPS // count), low)

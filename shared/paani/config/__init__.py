@@ -4,6 +4,7 @@ from paani.config.guiding import ControllerConfig, LocalizationConfig, Navigator
 from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.planning import CalibrationConfig, PlannerConfig, calibration_of
+from paani.config.profiles import PROFILES
 from paani.config.recording import RecorderConfig
 from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, EngineName, GateConfig, PerceptionConfig
 from paani.config.simulating import (
@@ -16,6 +17,7 @@ from paani.config.simulating import (
 from paani.config.tree import BusConfig, Config, DashboardConfig
 
 __all__ = [
+    "PROFILES",
     "AdapterConfig",
     "AdvisorConfig",
     "BusConfig",

@@ -41,7 +41,7 @@ class DashboardConfig(Section, frozen=True):
 class Config(Section, frozen=True):
     """Defaults < TOML file < `PAANI_<SECTION>__<FIELD>` < `--set section.field=value`."""
 
-    profile: Literal["paani", "paper"] = "paani"
+    profile: Literal["paani", "wide", "paper"] = "paani"
     bus: BusConfig = BusConfig()
     camera: CameraConfig = CameraConfig()
     calibration: CalibrationConfig = CalibrationConfig()
@@ -68,7 +68,7 @@ class Config(Section, frozen=True):
         """Refuse settings that cannot work together; the message names the fields."""
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
         starved = 1.0 / rate_hz > motion.max_gap_s or rate_hz * motion.history_s + 1 < motion.min_samples
-        if self.profile == "paani" and not motion.follow_rate and starved:
+        if self.profile != "paper" and not motion.follow_rate and starved:
             raise ValueError(
                 f"advisor.motion: {motion.min_samples} samples in {motion.history_s} s"
                 f" cannot arrive at {rate_hz} Hz (perception.rate_hz, camera.rate_hz)"
