@@ -15,7 +15,7 @@ NOMINAL_MPS = Config().navigator.cruise_mps
 class Policy(StrEnum):
     """Who sees and who decides.
 
-    PAANI: camera and deciders of the profile `paani`. PAPER: those of the profile `paper`, at its rates and speed.
+    PAANI: camera and deciders of the profile `wide`. PAPER: those of the profile `paper`, at its rates and speed.
     BLIND: follows the route without looking, and without a planner. ORACLE: `paani` with evidence from truth.
     """
 
@@ -31,7 +31,7 @@ CAMERA = frozenset({Policy.PAANI, Policy.PAPER})
 def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
     """Its settings. threads: the two nets side by side, for a drive that has two cores; what they say is the same."""
     given = tuple(sets) if policy is not Policy.BLIND else ("navigator.planner.use=false", *sets)
-    config = load_config(profile="paper" if policy is Policy.PAPER else "paani", sets=given)
+    config = load_config(profile="paper" if policy is Policy.PAPER else "wide", sets=given)
     return msgspec.structs.replace(
         config,
         perception=msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1),
