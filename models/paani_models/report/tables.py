@@ -20,9 +20,9 @@ TITLES = {
     "recall_at_0.40": "recall",
     "recall_16px_at_0.40": "recall, near",
     "precision_at_0.40": "precision",
-    "unfit_accepted_frac": "share let through that must be refused",
-    "fit_refused_frac": "share refused that must be let through",
-    "clean_refused_frac": "share refused of pictures as they are",
+    "unfit_accepted_frac": "unfit, let through",
+    "fit_refused_frac": "fit, refused",
+    "clean_refused_frac": "as it is, refused",
 }
 MASK_METRICS = ("iou_water", "iou_obstacle", "iou_sky", "miou", "edge_f1")
 BOX_METRICS = ("ap50", "ap50_95", "recall_at_0.40", "recall_16px_at_0.40", "precision_at_0.40")
