@@ -43,7 +43,7 @@ DRAWS = {
     "bath_river": 140,
     "mastr1325": 40,
     "oasis": 40,
-    "rendered": 1200,
+    "rendered": 700,
 }
 NULL_DRAWS = 60
 

@@ -30,6 +30,7 @@ U8 = npt.NDArray[np.uint8]
 PICTURES_PER_SESSION = 24
 PICTURES_PER_SKY = 4
 FOG_FRAC, RAIN_FRAC = 0.12, 0.15  # of the skies
+SUN_AHEAD_FRAC, AHEAD_RAD = 0.2, 0.4  # of the skies: the sun before the camera, and glints on the water below it
 LENS_FRAC = 0.35  # of the pictures come through a lens that bends
 HFOV_DEG = (52.0, 108.0)  # small board cameras, narrow to wide
 FLAT_FRAC, FLATTER = 0.35, 0.75  # sessions with a flatter picture, as 16:9 is to 4:3
@@ -127,6 +128,7 @@ def _vary(world: World, rng: np.random.Generator) -> World:
 
 def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
     """One picture with its own pose, camera and things, and now and then another sky."""
+    pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))
     if k % PICTURES_PER_SKY == 0:
         light = Light(
             sky=str(rng.choice(SKIES, p=[0.2, 0.3, 0.22, 0.14, 0.14])),
@@ -135,6 +137,8 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
             visibility_m=float(120.0 * 15.0 ** rng.random()),
             seed=int(rng.integers(1 << 30)),
         )
+        if rng.random() < SUN_AHEAD_FRAC:
+            light = dataclasses.replace(light, sun_azimuth_rad=float(rng.normal(pose.yaw_rad, AHEAD_RAD)))
         if rng.random() < FOG_FRAC:
             light = dataclasses.replace(light, visibility_m=float(rng.uniform(18.0, 90.0)))
         if rng.random() < RAIN_FRAC:
@@ -153,7 +157,6 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
         k1=float(bend * rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
         shutter_s=float(rng.uniform(0.0, 0.03)),
     )
-    pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))
     eye.place(scatter(eye.world, pose, rng))
     view = eye.render_labelled(pose, float(rng.uniform(0.0, 600.0)))
     return dataclasses.replace(view, boxes=seen_boxes(view))

@@ -49,7 +49,7 @@ def driven(folder: Path, text: str, policy: Policy, *sets: str) -> TrialResult:
 @pytest.mark.gl
 def test_w14_a_whole_lap_by_camera_round_what_lies_on_it(tmp_path: Path) -> None:
     """W14, W6: rendered pictures and the nets alone lead a boat once round; who does not look runs into the buoy."""
-    seeing, blind = driven(tmp_path, LAP, Policy.PAANI), driven(tmp_path, LAP, Policy.BLIND)
+    seeing, blind = (driven(tmp_path, LAP, policy, "profile=paani") for policy in (Policy.PAANI, Policy.BLIND))
     assert blind.collisions > 0
     assert (seeing.why, seeing.collisions) == (Why.COMPLETED, 0)
     assert seeing.progress_m >= seeing.goal_m > 45.0
@@ -110,8 +110,8 @@ def test_w12_other_waters_ask_for_other_files_alone(world: str, tmp_path: Path) 
 def test_w12_other_rules_are_settings(tmp_path: Path) -> None:
     """W12: a task that asks for slow driving on one side of a line; the thing in the way is passed on the other."""
     fence = "[fence]\nkeep_in = [[[-5.0, -10.0], [30.0, -10.0], [30.0, 1.8], [-5.0, 1.8]]]\n"
-    plain = driven(tmp_path, AHEAD, Policy.ORACLE)
-    bound = driven(tmp_path, AHEAD + fence, Policy.ORACLE, "navigator.cruise_mps=0.3")
+    plain = driven(tmp_path, AHEAD, Policy.ORACLE, "profile=paani")
+    bound = driven(tmp_path, AHEAD + fence, Policy.ORACLE, "profile=paani", "navigator.cruise_mps=0.3")
     assert plain.completed
     assert bound.completed
     assert bound.seconds > 1.5 * plain.seconds

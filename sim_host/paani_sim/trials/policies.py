@@ -29,9 +29,12 @@ CAMERA = frozenset({Policy.PAANI, Policy.PAPER})
 
 
 def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
-    """Its settings. threads: the two nets side by side, for a drive that has two cores; what they say is the same."""
-    given = tuple(sets) if policy is not Policy.BLIND else ("navigator.planner.use=false", *sets)
-    config = load_config(profile="paper" if policy is Policy.PAPER else "wide", sets=given)
+    """Its settings; `sets` may choose another profile for those that are not the paper's.
+
+    threads: the two nets side by side, for a drive that has two cores; what they say is the same.
+    """
+    given = ("profile=wide", *(("navigator.planner.use=false",) if policy is Policy.BLIND else ()), *sets)
+    config = load_config(profile="paper" if policy is Policy.PAPER else None, sets=given)
     return msgspec.structs.replace(
         config,
         perception=msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1),
