@@ -9,7 +9,7 @@ import pytest
 from paani.errors import UserError
 from paani_sim.trials import command
 from paani_sim.trials.cases import FAULTS, SUITES, Case, cases_of, read_case, scenario_of
-from paani_sim.trials.policies import Policy
+from paani_sim.trials.policies import Policy, config_of
 from paani_sim.trials.provenance import MadeWith, Maker
 from paani_sim.trials.result import Reaction
 from paani_sim.trials.states import Why
@@ -171,3 +171,13 @@ def test_a_finished_run_is_only_read(tmp_path: Path, maker: Maker, capsys: pytes
     assert command.main(words) == 0
     assert json.loads(figures.read_bytes())["policies"]["blind"]["trials"] == 2
     assert "blind" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("policy", [Policy.PAANI, Policy.ORACLE, Policy.BLIND])
+def test_trials_look_through_the_wide_lens_unless_told(policy: Policy) -> None:
+    """The paper's policy is the paper's, whatever is set."""
+    assert config_of(policy).profile == "wide"
+    told = config_of(policy, ["profile=paani"])
+    assert (told.profile, told.eye.hfov_deg) == ("paani", 70.0)
+    assert told.navigator.planner.use is (policy is not Policy.BLIND)
+    assert config_of(Policy.PAPER, ["profile=paani"]).profile == "paper"
