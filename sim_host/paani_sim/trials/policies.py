@@ -33,8 +33,11 @@ def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False
 
     threads: the two nets side by side, for a drive that has two cores; what they say is the same.
     """
-    given = ("profile=wide", *(("navigator.planner.use=false",) if policy is Policy.BLIND else ()), *sets)
-    config = load_config(profile="paper" if policy is Policy.PAPER else None, sets=given)
+    if policy is Policy.PAPER:
+        config = load_config(profile="paper", sets=[each for each in sets if not each.startswith("profile=")])
+    else:
+        blind = ("navigator.planner.use=false",) if policy is Policy.BLIND else ()
+        config = load_config(sets=("profile=wide", *blind, *sets))
     return msgspec.structs.replace(
         config,
         perception=msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1),
