@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from paani_models.report.box_limits import FATES, BoxLimits
 from paani_models.report.mask_limits import REACHES_PX, MaskLimits, edge_f1, mean_iou, water_iou
@@ -25,6 +25,10 @@ class Bar:
     source: str
     bound: float
     at_most: bool = False
+
+    def is_kept(self, value: float) -> bool:
+        """Whether a figure of this value is good enough."""
+        return value <= self.bound if self.at_most else value >= self.bound
 
 
 BARS = (
@@ -54,7 +58,7 @@ class Reached:
     @property
     def met(self) -> bool:
         """Whether the figure keeps its bar."""
-        return self.value <= self.bar.bound if self.bar.at_most else self.value >= self.bar.bound
+        return self.bar.is_kept(self.value)
 
 
 def reached(
@@ -71,8 +75,8 @@ def reached(
         elif bar.net == "detector" and bar.metric in by_kind:
             found.append(_of_boxes(bar, by_kind[bar.metric]))
         elif bar.net == "gate" and faults and (figure := of_gate.get((bar.metric, bar.source))):
-            one = Reached(bar, figure.value, figure.n, "")
-            found.append(one if one.met else replace(one, limit=_wrong_verdicts(bar, faults)))
+            limit = "" if bar.is_kept(figure.value) else _wrong_verdicts(bar, faults)
+            found.append(Reached(bar, figure.value, figure.n, limit))
     return found
 
 
@@ -100,7 +104,7 @@ def _of_masks(bar: Bar, limits: MaskLimits) -> Reached:
         value, best = edge_f1(limits.edges), edge_f1(limits.best_edges)
     else:
         value, best = (_MASK_FIGURES[bar.metric](counts) for counts in (limits.counts, limits.best_counts))
-    if value >= bar.bound:
+    if bar.is_kept(value):
         return Reached(bar, value, limits.n, "")
     return Reached(bar, value, limits.n, f"{_mistakes(limits)} The best answer of the net's cells reaches {best:.3f}.")
 
@@ -118,7 +122,7 @@ def _mistakes(limits: MaskLimits) -> str:
 
 
 def _of_boxes(bar: Bar, limits: BoxLimits) -> Reached:
-    if limits.ap50 >= bar.bound:
+    if bar.is_kept(limits.ap50):
         return Reached(bar, limits.ap50, limits.n, "")
     small, smalls = limits.found_between(0.0, SMALL_PX)
     near, nears = limits.found_between(NEAR_PX, float("inf"))
