@@ -61,6 +61,7 @@ class Lockstep:
         self.adapter = ThrustAdapter(config.plant.adapter, DOMAIN)
         self.direction = Direction.STRAIGHT
         self.advisory: Advisory | None = None  # said instead of a bare direction
+        self.heading_rad: float | None = None  # ordered instead of the navigator's
         self.armed = True
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
@@ -108,6 +109,8 @@ class Lockstep:
             arming_us=now_us,
         )
         self.nav, self.command = navigate(self.nav, heard, self.mission, now_us, DOMAIN, self.config.navigator)
+        if self.heading_rad is not None:
+            self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)
         self.ctl, thrust = control(
             self.ctl,
             ControllerHeard(self.command, now_us, self.odometry, now_us),
@@ -237,6 +240,25 @@ def test_m8_advice_that_is_no_direction_stops_within_a_step(launch: Launch, advi
     assert boat.applied.zero_cause is ZeroCause.NOT_ENABLED
     boat.settle(15.0)
     assert abs(boat.plant.velocity[0]) < 0.02
+
+
+def test_a_boat_that_can_go_astern_turns_within_its_length(launch: Launch) -> None:
+    """Why it may: turned about before a quay, fans that only push carry it 2 m on."""
+    ahead_m = {}
+    for profile in ("paani", "fans"):
+        boat = launch(open_water("lake"), profile, "navigator.cruise_mps=0.06")
+        boat.settle(15.0)
+        start_m, start_rad = boat.plant.position_m, boat.plant.attitude.yaw_rad
+        boat.heading_rad = start_rad + math.radians(170.0)
+        way_m, turned = [], 0.0
+        for _ in boat.run(12.0):
+            off_m = np.subtract(boat.plant.position_m, start_m)
+            way_m.append(float(off_m @ (math.cos(start_rad), math.sin(start_rad))))
+            turned = wrap_rad(boat.plant.attitude.yaw_rad - start_rad)
+        assert abs(turned) > math.radians(100.0)
+        ahead_m[profile] = max(way_m)
+    assert ahead_m["paani"] < 0.5 * 1.3
+    assert ahead_m["fans"] > 1.3
 
 
 def test_disarmed_boat_stays(launch: Launch) -> None:

@@ -89,7 +89,7 @@ def test_refused_commands_leave_the_one_in_force(changes: dict[str, object], cau
     assert adapter.decide(NOW_US + 600_000).zero_cause is cause
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.01, 1.01])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.11, 1.01])
 def test_invalid_thrust_stops_at_once(value: float) -> None:
     adapter = ready()
     adapter.offer(thrust(), NOW_US)
@@ -98,6 +98,15 @@ def test_invalid_thrust_stops_at_once(value: float) -> None:
     assert (applied.left_n, applied.right_n, applied.zero_cause) == (0.0, 0.0, ZeroCause.INVALID)
     adapter.offer(thrust(seq=9), NOW_US)
     assert adapter.decide(NOW_US).zero_cause is ZeroCause.NONE
+
+
+@pytest.mark.parametrize(("astern", "cause"), [(0.10, ZeroCause.NONE), (0.0, ZeroCause.INVALID)])
+def test_astern_as_far_as_the_hull_allows(astern: float, cause: ZeroCause) -> None:
+    """With fans that only push, an order astern is out of range, and both stop."""
+    adapter = ready(msgspec.structs.replace(CONFIG, astern=astern))
+    assert adapter.offer(thrust(left=-0.10), NOW_US) is cause
+    given = adapter.decide(NOW_US)
+    assert (given.left_n, given.right_n) == pytest.approx((-7.5, 3.0) if astern else (0.0, 0.0))
 
 
 def test_a_burst_of_delayed_commands_is_refused_whole() -> None:
@@ -198,8 +207,8 @@ def test_force_is_always_within_limits(left: float, right: float, enabled: bool,
     adapter = ready()
     adapter.offer(thrust(left=left, right=right, enabled=enabled, echo_us=echo_us, domain=domain), NOW_US)
     applied = adapter.decide(NOW_US)
-    assert 0.0 <= applied.left_n <= 75.0
-    assert 0.0 <= applied.right_n <= 75.0
+    assert -7.5 <= applied.left_n <= 75.0
+    assert -7.5 <= applied.right_n <= 75.0
     if applied.left_n or applied.right_n:
         assert enabled
         assert domain == 43

@@ -43,7 +43,7 @@ def raw(message: m.Message, **changes: object) -> bytes:
         (b"{}", "wrong_type"),
         (b"[]", "wrong_type"),
         (raw(thrust(), left=1.5), "out_of_range"),
-        (raw(thrust(), left=-0.1), "out_of_range"),
+        (raw(thrust(), left=-1.1), "out_of_range"),
         (raw(thrust(), domain=42), "wrong_domain"),
         (raw(thrust(), producer="advisor"), "wrong_producer"),
         (raw(thrust(), source_us=NOW_US + 2_000_000), "future"),

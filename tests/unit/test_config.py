@@ -83,7 +83,28 @@ def test_the_paper_profile_carries_the_papers_constants() -> None:
     assert (k.rate_hz, k.max_speed_mps, k.max_forward, k.max_steer, k.slew_per_s) == (10.0, 0.30, 0.08, 0.04, 0.15)
     assert (k.speed_kp, k.speed_feed_forward, k.heading_kp, k.heading_kd) == (0.08, 0.16, 0.08, 0.05)
     assert (c.plant.adapter.force_per_unit_n, c.plant.adapter.timeout_s) == (75.0, 0.5)
+    assert (k.astern, c.plant.adapter.astern) == (0.0, 0.0)
     assert c.localization.rate_hz == 20.0
+
+
+@pytest.mark.parametrize(
+    ("sets", "field"),
+    [
+        (["controller.astern=0.2"], r"controller\.astern exceeds plant\.adapter\.astern"),
+        (["controller.astern=0.0"], r"navigator\.planner\.turn_radius_m must be above 0"),
+        (["controller.max_steer=0.2"], r"navigator\.planner\.turn_radius_m must be above 0"),
+    ],
+)
+def test_a_planner_that_turns_on_the_spot_needs_a_boat_that_can(sets: list[str], field: str) -> None:
+    """And the last gate must let through what the controller orders."""
+    with pytest.raises(UserError, match=field):
+        load_config(sets=sets)
+
+
+def test_fans_that_only_push_are_a_profile() -> None:
+    fans = load_config(profile="fans")
+    assert (fans.controller.astern, fans.plant.adapter.astern) == (0.0, 0.0)
+    assert fans.navigator.planner.turn_radius_m > load_config().navigator.planner.turn_radius_m == 0.0
 
 
 def aside_deg(eye: EyeConfig, x: float) -> float:

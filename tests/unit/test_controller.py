@@ -171,11 +171,11 @@ def test_integral_does_not_wind_up() -> None:
     yaw=st.floats(-4, 4),
     surge=st.floats(-3, 3),
     rate=st.floats(-3, 3),
-    left=st.floats(0, 1),
-    right=st.floats(0, 1),
+    left=st.floats(-1, 1),
+    right=st.floats(-1, 1),
     profile=st.sampled_from([PAPER, PAANI]),
 )
-def test_thrust_is_bounded_and_never_astern(
+def test_thrust_is_bounded_and_in_the_paper_never_astern(
     heading: float,
     speed: float,
     yaw: float,
@@ -185,11 +185,36 @@ def test_thrust_is_bounded_and_never_astern(
     right: float,
     profile: ControllerConfig,
 ) -> None:
-    """N7: whatever the inputs, both fans stay in [0, 1] and move no faster than the slew allows."""
+    """N7: whatever the inputs, both fans stay in range, in the paper never astern, and are slewed."""
+    left, right = max(left, -profile.astern), max(right, -profile.astern)
     start = ControlState(left=left, right=right, last_us=NOW_US - 100_000)
     pose = odometry(yaw_rad=yaw, surge_mps=surge, yaw_rate_radps=rate)
     _, thrust = run(profile, command(heading_rad=heading, speed_mps=speed), pose, start)
-    assert 0.0 <= thrust.left <= 1.0
-    assert 0.0 <= thrust.right <= 1.0
+    assert PAPER.astern == 0.0
+    assert -profile.astern <= thrust.left <= 1.0
+    assert -profile.astern <= thrust.right <= 1.0
     assert abs(thrust.left - left) <= profile.slew_per_s * 0.1 + 1e-9
     assert abs(thrust.right - right) <= profile.slew_per_s * 0.1 + 1e-9
+
+
+@pytest.mark.parametrize(("heading_rad", "fans"), [(1.5, (-0.10, 0.10)), (-1.5, (0.10, -0.10))])
+def test_a_turn_at_rest_is_a_pure_couple(heading_rad: float, fans: tuple[float, float]) -> None:
+    """As much astern as ahead: the boat turns where it lies."""
+    thrust = settle(PAANI, command(heading_rad=heading_rad, speed_mps=0.0), odometry(surge_mps=0.0))
+    assert (thrust.left, thrust.right) == pytest.approx(fans)
+
+
+def test_a_boat_faster_than_ordered_brakes() -> None:
+    """Astern on both sides, and no further than `astern`; fans that only push are off."""
+    fast = odometry(surge_mps=0.9)
+    braking = settle(PAANI, command(speed_mps=0.06), fast)
+    assert -PAANI.astern <= braking.left == braking.right < 0.0
+    pushing = settle(load_config(profile="fans").controller, command(speed_mps=0.06), fast)
+    assert (pushing.left, pushing.right) == (0.0, 0.0)
+
+
+def test_who_is_told_to_stop_is_not_driven_astern() -> None:
+    """A stop is zero thrust at once, whatever the fans did and however fast the boat is."""
+    start = ControlState(integral=-0.03, left=-0.1, right=-0.1, last_us=NOW_US - 100_000)
+    _, thrust = run(PAANI, command(enable=False, speed_mps=0.0), odometry(surge_mps=0.9), start)
+    assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)

@@ -89,7 +89,7 @@ def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) ->
 def test_no_way_where_the_fence_leaves_none() -> None:
     """With the same water and no fence there is one."""
     at_rest = odometry(START_US, AT_REST)
-    fence = (box(Keep.IN, -1.0, -1.0, 2.0, 1.0),)
+    fence = (box(Keep.IN, -1.0, -1.0, 1.6, 1.0),)
 
     def ordered(within: tuple[FenceArea, ...]) -> Plan:
         return steered(Pilot(memory_of()), at_rest, AHEAD, START_US, CAMERA, PLANNER, within)[1]

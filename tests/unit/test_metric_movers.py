@@ -235,20 +235,20 @@ def open_water() -> Grid:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_boat_waits_for_who_crosses_and_goes_on_behind_them(side: float) -> None:
-    """On open water and under way: it does not turn to run abreast of a swimmer, it lets them pass."""
+    """On open water and under way: it waits, or brakes and looks round, and lets a swimmer pass."""
     grid = open_water()
     found = [
         plan(grid, CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, side * y_m, 0.0, side * 0.35),))
         for y_m in (-2.0, -1.0, 0.0, 0.5, 1.5)
     ]
-    assert [each.speed_mps for each in found] == [0.0, 0.0, 0.0, 0.3, 0.3]
+    assert [each.speed_mps for each in found] == [0.06, 0.0, 0.06, 0.3, 0.3]
     assert all(side * each.heading_rad < 0.2 for each in found[3:])
 
 
 def test_patience_with_who_may_swim_but_does_not_ends() -> None:
     """Who treads water in the way, or is taken for a person, is passed as what stands in the end."""
     grid = open_water()
-    person = Mover(np.array([3.5]), np.array([0.5]), 0.5, Motion(0.0, 0.0, 0.2), 0.1, frozenset())
+    person = Mover(np.array([2.8]), np.array([0.5]), 0.5, Motion(0.0, 0.0, 0.2), 0.1, frozenset())
     found = [plan(grid, RESTING, AHEAD, None, PLANNER, (person,), patient=patient) for patient in (True, False)]
     assert [each.speed_mps > 0.0 for each in found] == [False, True]
     crossing = swimmer(3.0, -1.0, 0.0, 0.35)

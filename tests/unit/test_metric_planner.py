@@ -16,6 +16,8 @@ from paani_services.navigator.distances import distance_m
 from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.planner import (
     LOSE_M,
+    ON_THE_SPOT_RAD,
+    PARTS,
     Plan,
     Start,
     Ways,
@@ -180,15 +182,15 @@ def test_every_heading_round_the_course_is_tried_once(span_deg: float, count: in
     config = msgspec.structs.replace(PLANNER, span_deg=span_deg)
     for course in (0.0, 1.0, -3.0, math.pi):
         offsets, _ = candidates(RESTING, Wish(course, 0.6), config)
-        assert len(offsets[::2]) == len(set(np.round(offsets % (2.0 * math.pi), 6).tolist())) == count
+        assert len(offsets[::3]) == len(set(np.round(offsets % (2.0 * math.pi), 6).tolist())) == count
         off = np.abs((offsets - course + math.pi) % (2.0 * math.pi) - math.pi)
         assert off.max() <= math.radians(span_deg) + 1e-9
         assert np.abs(offsets).max() <= math.pi
 
 
-@pytest.mark.parametrize(("half_m", "speed_mps"), [(2.2, 0.6), (1.5, 0.3), (1.2, 0.3), (0.9, 0.3), (0.5, 0.0)])
+@pytest.mark.parametrize(("half_m", "speed_mps"), [(2.2, 0.6), (1.5, 0.3), (1.2, 0.06), (0.9, 0.06), (0.5, 0.06)])
 def test_less_margin_is_kept_where_the_whole_one_leaves_nothing(half_m: float, speed_mps: float) -> None:
-    """A boat under way goes on, slowly, through what its hull fits: without the fans it would coast in, unsteered."""
+    """A boat under way goes on, slowly; beyond half the margin it turns on the spot and looks round for another way."""
     ahead = Start(0.0, 0.0, 0.0, 0.5)
     gap = pool((1.8, half_m, 6.0, 4.0), (1.8, -4.0, 6.0, -half_m))
     assert plan(gap, ahead, AHEAD, None, PLANNER).speed_mps == speed_mps
@@ -246,9 +248,21 @@ def test_nothing_seen_or_nothing_lately_is_nowhere_to_go() -> None:
         assert plan(grid, RESTING, AHEAD, None, PLANNER).speed_mps == 0.0
 
 
-def test_a_wall_ahead_stops_the_boat() -> None:
+def test_a_boat_before_a_wall_turns_on_the_spot() -> None:
+    """Fans that only push are off: they would drive it on while it turns."""
+    fans = load_config(profile="fans").navigator.planner
     for start in (RESTING, CRUISING):
-        assert plan(pool(bank_m=1.6), start, AHEAD, None, PLANNER).speed_mps == 0.0
+        found = plan(pool(bank_m=1.6), start, AHEAD, None, PLANNER)
+        assert found.speed_mps == pytest.approx(PARTS[-1] * 0.6)
+        assert abs(found.heading_rad) > 1.0
+        assert plan(pool(bank_m=1.6), start, AHEAD, None, fans).speed_mps == 0.0
+
+
+def test_what_turns_on_the_spot_turns_by_more_than_a_little() -> None:
+    """A boat that may wait does not creep along."""
+    for bank_m in np.arange(1.0, 4.0, 0.1).tolist():
+        found = plan(pool(bank_m=bank_m), RESTING, AHEAD, None, PLANNER)
+        assert found.speed_mps in (0.0, 0.3, 0.6) or abs(found.heading_rad) >= ON_THE_SPOT_RAD
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -299,9 +313,9 @@ def test_nothing_within_the_way_to_stop_may_be_unknown() -> None:
     grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, near)
     speeds = [
         plan(grid, RESTING, AHEAD, None, msgspec.structs.replace(near, stop_s=stop_s)).speed_mps
-        for stop_s in (2.5, 6.0, 20.0)
+        for stop_s in (2.5, 6.0, 20.0, 40.0)
     ]
-    assert speeds == [0.6, 0.3, 0.0]
+    assert speeds == [0.6, 0.3, 0.06, 0.0]
     blind = msgspec.structs.replace(PLANNER, blind_m=0.0)
     grid = lay(memory.sights, (0.0, 0.0), START_US, CAMERA, blind)
     assert plan(grid, RESTING, AHEAD, None, blind).speed_mps == 0.0

@@ -34,7 +34,7 @@ class Heard(msgspec.Struct, frozen=True):
 def control(
     state: ControlState, heard: Heard, now_us: int, domain: int, config: ControllerConfig
 ) -> tuple[ControlState, Thrust]:
-    """One step: P + feed-forward speed, PD heading, mix, saturation, reverse suppression, slew (N7).
+    """One step: P + feed-forward speed, PD heading, mix, saturation, no more astern than `astern`, slew (N7).
 
     Anything missing, stale, invalid or disabled gives zero thrust at once, never slewed, and
     clears the state. The command's `source_us` and `echo_us` pass through.
@@ -64,7 +64,7 @@ def control(
         config.max_steer,
     )
     left, right = (
-        _slew(last, max(0.0, clip(wanted, -1.0, 1.0)), config.slew_per_s * step_s)
+        _slew(last, clip(wanted, 0.0 - config.astern, 1.0), config.slew_per_s * step_s)
         for last, wanted in ((state.left, forward - steer), (state.right, forward + steer))
     )
     return ControlState(integral, left, right, now_us), Thrust(
@@ -110,16 +110,16 @@ def _speed(
     step_s: float,
     config: ControllerConfig,
 ) -> tuple[float, float, float]:
-    """Speed error [m/s], forward thrust in [0, max_forward], and the new integral."""
+    """Speed error [m/s], forward thrust in [-astern, max_forward], and the new integral."""
     ordered_mps = min(command.speed_mps, config.max_speed_mps)
     if odometry.stopped and ordered_mps < STANDSTILL_ORDER_MPS:
         return 0.0, 0.0, 0.0  # L5: speed noise at rest must not turn the fans
     error_mps = ordered_mps - (0.0 if odometry.stopped else odometry.surge_mps)
     base = config.speed_kp * error_mps + _feed_forward(ordered_mps, config)
     grown = clip(integral + config.speed_ki * error_mps * step_s, -config.max_integral, config.max_integral)
-    if not 0.0 <= base + grown <= config.max_forward and abs(grown) > abs(integral):
+    if not -config.astern <= base + grown <= config.max_forward and abs(grown) > abs(integral):
         grown = integral  # saturated: winding up further would only overshoot later
-    return error_mps, clip(base + grown, 0.0, config.max_forward), grown
+    return error_mps, clip(base + grown, 0.0 - config.astern, config.max_forward), grown
 
 
 def _feed_forward(speed_mps: float, config: ControllerConfig) -> float:

@@ -24,7 +24,8 @@ AHEAD_S = np.arange(0.0, 30.5, 0.5)  # a boat that turns away from what comes at
 CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there
-SLOWER = 0.5  # the other speed tried
+PARTS = (1.0, 0.5, 0.1)  # of the speed allowed that are tried; at the last a boat turns all but on the spot, if it can
+ON_THE_SPOT_RAD = math.radians(20.0)  # by less it does not: it would creep along, where it may wait
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.6, 2.0  # footprint touches something; less up to this clearance, by the square
@@ -80,7 +81,7 @@ def plan(
     *,
     patient: bool = True,
 ) -> Plan:
-    """The best of headings around the wanted course at two speeds, none of which meets anything.
+    """The best of headings around the wanted course at three speeds, none of which meets anything.
 
     Refused is what sweeps an occupied cell within `horizon_s` or `room_m` (Q4, Q6), what comes too near to where a
     moving thing is by then, or sweeps an unknown cell within the way to stop. Where that is everything, less of a
@@ -98,11 +99,13 @@ def plan(
         return nowhere
     offsets, speeds = candidates(start, wish, config)
     is_full, tight_m = speeds == speeds[0], config.hull_radius_m + config.tight_margin_m
+    turns = speeds == PARTS[-1] * speeds[0]
     ways = roll_out(start, offsets, speeds, config)
     clear_m = clearance_m(grid, config)
     gap_m = _looked_up(grid, clear_m, ways)
     unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
     barred = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
+    barred |= turns & (np.minimum(np.abs(offsets), 2.0 * math.pi - np.abs(offsets)) < ON_THE_SPOT_RAD)
     if gap_m[0, 0] >= config.hull_radius_m + config.margin_m:  # before a dead end it waits, and does not circle
         barred |= np.abs(offsets - offsets[0]) > math.radians(config.span_deg) + 1e-9
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
@@ -127,12 +130,14 @@ def plan(
         refused = (met & nearby).any(axis=0) | barred
         if kept is not config:
             refused |= is_full
+        if footprints:
+            refused |= turns & (_apart_rad(offsets, float(offsets[0])) > ONWARD_RAD)
         if not (refused.all() and footprints):
             break
     moved: Mask = np.asarray(((moved_m < 0.0) & nearby).any(axis=0))
     coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
     is_safe = not is_approached and np.where(soon, coast_m, np.inf).min() >= tight_m
-    if patient and is_safe and _is_held_up(offsets, refused, moved):
+    if patient and is_safe and _is_held_up(offsets, refused | turns, moved):
         return nowhere
     if refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | moved | barred
@@ -162,8 +167,9 @@ def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F6
     if 2 * count * config.spacing_deg >= 360.0:
         steps.pop()  # the same as the one before
     speed_mps = min(wish.speed_mps, config.speed_mps)
-    offsets = np.array([wrap_rad(wanted_rad + step * spacing_rad) for step in steps for _ in range(2)])
-    return offsets, np.array([speed_mps, SLOWER * speed_mps] * len(steps))
+    parts = PARTS if config.turn_radius_m == 0.0 else PARTS[:-1]
+    offsets = np.array([wrap_rad(wanted_rad + step * spacing_rad) for step in steps for _ in parts])
+    return offsets, np.array([part * speed_mps for part in parts] * len(steps))
 
 
 def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Ways:

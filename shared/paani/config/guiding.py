@@ -69,6 +69,8 @@ class NavigatorConfig(Section, frozen=True):
 
 
 class ControllerConfig(Section, frozen=True):
+    """From order to thrust. `astern`: the most that a fan pushes astern, to brake and to turn on the spot; 0: never."""
+
     rate_hz: Positive = 10.0  # N1
     max_speed_mps: Positive = 0.9
     speed_kp: NonNegative = 0.15
@@ -82,6 +84,7 @@ class ControllerConfig(Section, frozen=True):
     heading_kd: NonNegative = 0.14
     max_forward: Fraction = 0.15
     max_steer: Fraction = 0.10
+    astern: Fraction = 0.10  # `max_steer`, so that a turn on the spot is a pure couple
     max_integral: Fraction = 0.03
     slew_per_s: Positive = 0.5
     command_max_receipt_s: Positive = 0.35

@@ -71,7 +71,8 @@ class PlannerConfig(Section, frozen=True):
     `patience_s`: waits so long for what moves to pass.
     `person_near_m`, `vessel_near_m`: kept free around what moves. `lead_s`: ways that come near where it will be so
     much later cost more, those astern do not.
-    `room_m`: free way that a boat without astern must keep ahead, to be able to turn away.
+    `room_m`: free way that a boat must keep ahead, to be able to turn away. `turn_radius_m`: no tighter circle at any
+    speed, and `helm_speed_mps`: driven at that by the helm alone; of fans that only push.
     `drag_per_s`, `drag_per_m`: what slows a boat whose fans are off, per speed and per its square.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     """
@@ -108,9 +109,9 @@ class PlannerConfig(Section, frozen=True):
     accel_mps2: Positive = 0.4  # measured on K4, K5; the paper has 0.2 (Q5)
     drag_per_s: NonNegative = 4.0 / 12.4  # K5 over K4
     drag_per_m: NonNegative = 20.0 / 12.4  # K5 over K4
-    turn_radius_m: NonNegative = 2.2  # measured: twin fans without astern, K5 drag, at any speed
-    room_m: NonNegative = 3.0  # turn_radius_m, hull_radius_m and margin_m
-    helm_speed_mps: NonNegative = 0.5  # measured: what one fan alone drives a boat at that turns as hard as it can
+    turn_radius_m: NonNegative = 0.0  # Q5
+    room_m: NonNegative = 1.5  # hull_radius_m, margin_m and what braking from half speed takes
+    helm_speed_mps: NonNegative = 0.0  # Q5
     hull_radius_m: Positive = 0.55  # Q6
     margin_m: NonNegative = 0.7  # measured: least near misses in trials by camera
     tight_margin_m: NonNegative = 0.25  # Q6; where nothing is free with the whole margin

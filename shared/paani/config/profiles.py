@@ -1,4 +1,4 @@
-"""The profiles `paper` and `wide`: each difference from the default is one value here."""
+"""The profiles `paper`, `wide` and `fans`: each difference from the default is one value here."""
 
 from __future__ import annotations
 
@@ -47,8 +47,6 @@ PAPER: dict[str, object] = {
             "person_room_m": 0.0,  # Q6
             "speed_mps": 0.4,  # Q5
             "accel_mps2": 0.2,  # Q5
-            "turn_radius_m": 0.0,  # Q5
-            "helm_speed_mps": 0.0,  # Q5
             "room_m": 0.0,  # Q4
             "look_m": 0.0,  # Q4
         },
@@ -64,7 +62,9 @@ PAPER: dict[str, object] = {
         "max_forward": 0.08,  # N5
         "max_steer": 0.04,  # N5
         "slew_per_s": 0.15,  # N6
+        "astern": 0.0,  # N7
     },
+    "plant": {"adapter": {"astern": 0.0}},
 }
 
 # A wide lens, level: who comes from 50 degrees off the bow is in the picture. What is meant by an angle, in the default
@@ -79,4 +79,18 @@ WIDE: dict[str, object] = {
     "advisor": {"policy": {"core_left": 0.446, "core_right": 0.554, "occupancy_bottom": 0.69}},
 }
 
-PROFILES: dict[str, dict[str, object]] = {"paani": {}, "wide": WIDE, "paper": PAPER}
+# Fans, or controllers of motors, that only push ahead: the boat turns by driving, and stops by drag alone.
+FANS: dict[str, object] = {
+    "profile": "fans",
+    "navigator": {
+        "planner": {
+            "turn_radius_m": 2.2,  # measured: K5 drag, at any speed
+            "helm_speed_mps": 0.5,  # measured: what one fan alone drives a boat at that turns as hard as it can
+            "room_m": 3.0,  # turn_radius_m, hull_radius_m and margin_m
+        }
+    },
+    "controller": {"astern": 0.0},
+    "plant": {"adapter": {"astern": 0.0}},
+}
+
+PROFILES: dict[str, dict[str, object]] = {"paani": {}, "wide": WIDE, "fans": FANS, "paper": PAPER}

@@ -33,9 +33,10 @@ class SensorsConfig(Section, frozen=True):
 
 
 class AdapterConfig(Section, frozen=True):
-    """The last gate before force."""
+    """The last gate before force. `astern`: the most that it lets a fan push astern."""
 
     force_per_unit_n: Positive = 75.0  # O1
+    astern: Fraction = 0.10  # `controller.astern`
     timeout_s: Positive = 0.5  # O2
     max_echo_age_s: Positive = 0.5
     arming_timeout_s: Positive = 0.5

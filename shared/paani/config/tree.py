@@ -41,7 +41,7 @@ class DashboardConfig(Section, frozen=True):
 class Config(Section, frozen=True):
     """Defaults < TOML file < `PAANI_<SECTION>__<FIELD>` < `--set section.field=value`."""
 
-    profile: Literal["paani", "wide", "paper"] = "paani"
+    profile: Literal["paani", "wide", "fans", "paper"] = "paani"
     bus: BusConfig = BusConfig()
     camera: CameraConfig = CameraConfig()
     calibration: CalibrationConfig = CalibrationConfig()
@@ -85,3 +85,11 @@ class Config(Section, frozen=True):
             raise ValueError("advisor.evidence_max_age_s exceeds advisor.lifetime_s")
         if self.controller.command_max_receipt_s > self.plant.adapter.timeout_s:
             raise ValueError("controller.command_max_receipt_s exceeds plant.adapter.timeout_s")
+        if self.controller.astern > self.plant.adapter.astern:
+            raise ValueError("controller.astern exceeds plant.adapter.astern")
+        planner, on_the_spot = self.navigator.planner, self.controller.astern >= self.controller.max_steer
+        if self.profile != "paper" and planner.use and planner.turn_radius_m == 0.0 and not on_the_spot:
+            raise ValueError(
+                f"navigator.planner.turn_radius_m must be above 0: with controller.astern {self.controller.astern},"
+                f" less than controller.max_steer, no boat turns on the spot (profile=fans is for fans that only push)"
+            )

@@ -26,7 +26,7 @@ from paani.messages.advisor import (
 from paani.messages.camera import PictureHeader, TimeBase
 from paani.messages.decision import HeardMessage, SentMessage, Step
 from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
-from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
 from paani.messages.perception import (
@@ -92,6 +92,7 @@ __all__ = [
     "SegmentationSource",
     "SentMessage",
     "Shadow",
+    "Signed",
     "SimTime",
     "Stamp",
     "Step",

@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.advisor import Direction
-from paani.messages.header import Count, Finite, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.header import Count, Finite, Message, NonNegative, Signed, Stamp, Text
 
 
 class Inhibit(StrEnum):
@@ -77,10 +77,10 @@ class Route(Message, frozen=True, kw_only=True):
 
 
 class Thrust(Message, frozen=True, kw_only=True):
-    """Normalised differential thrust, forward only (checklist B12, N7)."""
+    """Normalised differential thrust, negative: astern (checklist B12); not so where `controller.astern` is 0 (N7)."""
 
-    left: Unit
-    right: Unit
+    left: Signed
+    right: Signed
     enabled: bool
     echo_us: Stamp = 0
     inhibits: tuple[Inhibit, ...] = ()

@@ -7,6 +7,7 @@ from typing import Annotated
 import msgspec
 
 Unit = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Signed = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 Finite = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from paani.messages.header import Count, Finite, Message, NonNegative, Stamp, Text, Unit
+from paani.messages.header import Count, Finite, Message, NonNegative, Signed, Stamp, Text
 
 
 class SimTime(Message, frozen=True, kw_only=True):
@@ -64,13 +64,13 @@ class ZeroCause(StrEnum):
 class ThrustApplied(Message, frozen=True, kw_only=True):
     """What the last gate did: the force it applies now and why it is zero when it is.
 
-    `since_us` is when what is applied now came into force: this command, or zero.
+    Astern is negative. `since_us` is when what is applied now came into force: this command, or zero.
     """
 
-    left: Unit
-    right: Unit
-    left_n: NonNegative
-    right_n: NonNegative
+    left: Signed
+    right: Signed
+    left_n: Finite
+    right_n: Finite
     zero_cause: ZeroCause
     command_seq: Count = 0
     command_sent_us: Stamp = 0

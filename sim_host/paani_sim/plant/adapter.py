@@ -14,7 +14,7 @@ PRODUCER = "controller"
 
 
 class Applied(NamedTuple):
-    """Normalised thrust and force of each fan, and why they are zero when they are."""
+    """Normalised thrust and force of each fan, astern negative, and why they are zero when they are."""
 
     left: float
     right: float
@@ -110,6 +110,6 @@ class ThrustAdapter:
         if now_us - thrust.echo_us > self._config.max_echo_age_s * 1e6:
             return ZeroCause.STALE_ECHO
         fans = (thrust.left, thrust.right)
-        if not all(math.isfinite(fan) and 0.0 <= fan <= 1.0 for fan in fans):
+        if not all(math.isfinite(fan) and -self._config.astern <= fan <= 1.0 for fan in fans):
             return ZeroCause.INVALID
         return ZeroCause.NONE

@@ -10,7 +10,8 @@ export function renderMotion(store, now) {
   const applied = store.get("plant/thrust_applied"), fresh = store.isFresh("plant/thrust_applied", now);
   for (const side of ["left", "right"]) {
     const value = applied ? applied[side] : 0;
-    byId(`fan-${side}`).style.width = `${Math.min(1, value / FULL_SCALE) * 100}%`;
+    byId(`fan-${side}`).style.width = `${Math.min(1, Math.abs(value) / FULL_SCALE) * 100}%`;
+    byId(`fan-${side}`).classList.toggle("astern", value < 0);
     setText(byId(`fan-${side}-n`), applied ? `${fixed(applied[`${side}_n`], 1)} N` : "–");
   }
   document.querySelector(".fans")?.classList.toggle("stale", !fresh);
