@@ -8,7 +8,7 @@ import pytest
 from paani import messages as m
 from paani.config import Config, calibration_of
 from paani_services.advisor.advise import advise
-from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, box, lane, play, seeing, water
+from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, box, lane, murky, play, seeing, water
 
 D, R = m.Direction, m.Reason
 VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
@@ -155,6 +155,25 @@ def test_a_quay_occupies_no_lane_that_shows_water_across_more_than_half(
     _, advice, _ = play([evidence] * 4, config)
     assert advice[-1].center.occupied is occupied
     assert advice[-1].right.occupied is occupied
+
+
+HULLS = (box(VESSEL, (0.02, 0.3, 0.36, 0.6), 0.9), box(VESSEL, (0.64, 0.3, 0.98, 0.6), 0.9))
+
+
+@pytest.mark.parametrize(("hulls", "calibrated", "stops"), [((), False, True), ((), True, False), (HULLS, True, True)])
+def test_a_planned_way_in_is_looked_for_where_sides_are_crowded(
+    hulls: tuple[m.Detection, ...], calibrated: bool, stops: bool
+) -> None:
+    """Where the metric planner finds out whether there is room, a side is blocked at 0.75.
+
+    More cases in which the boat moves: hulls along a harbour make 0.57 to 0.66 of both sides with open water before
+    them, and it had lain there for good (harbour-55, harbour-63).
+    """
+    side = murky(0.63)
+    evidence = msgspec.structs.replace(CLEAR, center=lane(0.6), left=side, right=side, detections=hulls)
+    _, advice, _ = play([evidence] * 4, CALIBRATED if calibrated else PAANI)
+    assert (advice[-1].direction is D.STOP) is stops
+    assert advice[-1].side_block_risk == (0.75 if calibrated else 0.58)
 
 
 def test_occupancy_does_not_count_republishes() -> None:

@@ -152,7 +152,7 @@ def test_a_mirrored_scene_gives_mirrored_advice(given_scene: Scene, config: Conf
     risks = {lane: getattr(decision, lane).risk for lane in LANES}
     held, needed = side_held(given_scene.state, policy)
     gain = risks[held] - risks[OTHER[held]]
-    near = [abs(risks[lane] - limit_of(lane, given_scene.state, policy)) for lane in LANES]
+    near = [abs(risks[lane] - limit_of(lane, given_scene.state, config)) for lane in LANES]
     assume(min(*near, abs(gain - needed), abs(gain + needed)) > 1e-9)
     if R.TIE_STARBOARD in {decision.reason, other.reason}:
         assert decision.direction is other.direction is D.RIGHT

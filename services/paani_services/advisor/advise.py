@@ -17,7 +17,7 @@ from paani.messages import (
 )
 from paani_services.advisor.counterfactual import counterfactual
 from paani_services.advisor.explanation import explain
-from paani_services.advisor.policy import Decision, PolicyState, decide
+from paani_services.advisor.policy import Decision, PolicyState, decide, side_block_risk
 from paani_services.advisor.risk import LANES, components, obstacles_of, water_of
 from paani_services.advisor.tracker import TrackerState, hear, is_sound, published, update
 
@@ -134,7 +134,7 @@ def _advisory(decision: Decision, evidence: Evidence, now_us: int, config: Confi
         center=decision.center,
         right=decision.right,
         center_block_risk=config.advisor.policy.center_block_risk,
-        side_block_risk=config.advisor.policy.side_block_risk,
+        side_block_risk=side_block_risk(config),
         contributing_track_ids=tuple(sorted({i for lane in lanes for i in lane.track_ids})),
         evidence_age_s=clip((now_us - evidence.source_us) * 1e-6, -MAX_AGE_S, MAX_AGE_S),
         lifetime_s=config.advisor.lifetime_s,

@@ -224,7 +224,7 @@ def _scene(
             obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
             urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
             occupying=(*dry, *(bit.get(o.id) for o in filling if lasting or o.danger)),
-            limit=limit_of(lane, state, policy),
+            limit=limit_of(lane, state, config),
         )
     middle = lane_span("center", config.perception.corridors)
     places = [(place_in_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]

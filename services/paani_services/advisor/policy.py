@@ -66,7 +66,7 @@ def decide(
     policy = config.advisor.policy
     frames, occupied = _occupancy(state, obstacles, config)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
-    limits = {lane: limit_of(lane, state, policy) for lane in LANES}
+    limits = {lane: limit_of(lane, state, config) for lane in LANES}
     barred = {lane: occupied[lane] or is_dry(lanes[lane].non_water, policy) for lane in LANES}
     blocked = {
         lane: barred[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
@@ -167,9 +167,17 @@ def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:
     return "left" if box[2] <= policy.core_left else "right"
 
 
-def limit_of(lane: str, state: PolicyState, policy: PolicyConfig) -> float:
+def side_block_risk(config: Config) -> float:
+    """The risk at which a side is blocked (J5); another where the metric planner looks for the way in."""
+    policy = config.advisor.policy
+    is_planned = config.navigator.planner.acts_on(config.calibration)
+    return policy.planned_side_block_risk if is_planned else policy.side_block_risk
+
+
+def limit_of(lane: str, state: PolicyState, config: Config) -> float:
     """The risk at which a lane is blocked (J5); once blocked, it must be clearly below that to be free again."""
-    limit = policy.center_block_risk if lane == "center" else policy.side_block_risk
+    policy = config.advisor.policy
+    limit = policy.center_block_risk if lane == "center" else side_block_risk(config)
     return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
 
 

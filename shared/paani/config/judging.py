@@ -80,6 +80,7 @@ class RiskConfig(Section, frozen=True):
 class PolicyConfig(Section, frozen=True):
     center_block_risk: Fraction = 0.48  # J5
     side_block_risk: Fraction = 0.58  # J5
+    planned_side_block_risk: Fraction = 0.75  # J5 where the metric planner acts: hulls along a side leave a way between
     occupancy_bottom: Fraction = 0.65  # J6
     occupancy_coverage: Fraction = 0.25  # J6
     planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
