@@ -5,6 +5,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,21 @@ def test_an_interrupted_run_is_gone_on_with(tmp_path: Path, number: signal.Signa
     assert "no contact" in shown
     assert 1 <= len(list(done.glob("*.json"))) < 80
     assert not list(done.glob(".*"))
+
+
+def test_nobody_drives_on_for_a_run_that_was_killed(tmp_path: Path) -> None:
+    """Killed outright, the run leaves processes that end with the drive they are at."""
+    run = subprocess.Popen(
+        words(tmp_path, "--seeds", "1..32", "--jobs", "2"), stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    done = tmp_path / "run" / "trials"
+    while run.poll() is None and len(list(done.glob("*.json"))) < 1:
+        time.sleep(0.05)
+    run.kill()
+    run.wait()
+    count = len(list(done.glob("*.json")))
+    time.sleep(10.0)
+    assert len(list(done.glob("*.json"))) <= count + 4
 
 
 def test_a_recorded_drive_is_decided_again_to_the_byte(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

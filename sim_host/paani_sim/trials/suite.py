@@ -128,7 +128,10 @@ def encoded(record: Record) -> bytes:
 def _drive(
     folder: Path, case: Case, made_with: MadeWith, sets: tuple[str, ...], threads: bool
 ) -> TrialResult | Failure:
-    """In a process of its own."""
+    """In a process of its own, which ends with the one that asked: what nobody waits for is not driven."""
+    parent = multiprocessing.parent_process()
+    if parent is not None and not parent.is_alive():
+        os._exit(1)
     try:
         result, effort = run_case(case, sets, threads=threads)
     except UserError:
