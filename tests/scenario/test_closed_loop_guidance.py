@@ -62,6 +62,7 @@ class Lockstep:
         self.direction = Direction.STRAIGHT
         self.advisory: Advisory | None = None  # said instead of a bare direction
         self.heading_rad: float | None = None  # ordered instead of the navigator's
+        self.stands = False  # under orders
         self.armed = True
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
@@ -111,6 +112,8 @@ class Lockstep:
         self.nav, self.command = navigate(self.nav, heard, self.mission, now_us, DOMAIN, self.config.navigator)
         if self.heading_rad is not None:
             self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)
+        if self.stands:
+            self.command = msgspec.structs.replace(self.command, speed_mps=0.0)
         self.ctl, thrust = control(
             self.ctl,
             ControllerHeard(self.command, now_us, self.odometry, now_us),
@@ -259,6 +262,25 @@ def test_a_boat_that_can_go_astern_turns_within_its_length(launch: Launch) -> No
         ahead_m[profile] = max(way_m)
     assert ahead_m["paani"] < 0.5 * 1.3
     assert ahead_m["fans"] > 1.3
+
+
+def test_a_boat_ordered_to_stand_takes_its_way_off(launch: Launch) -> None:
+    """Why `planner.brake_s`: zero thrust carries it on until drag has stopped it."""
+    way_m = {}
+    for stands in (True, False):
+        boat = launch(open_water("lake"))
+        boat.settle(15.0)
+        start_m, brake_s = boat.plant.position_m, boat.config.navigator.planner.brake_s
+        boat.stands = stands
+        boat.direction = Direction.STRAIGHT if stands else Direction.STOP
+        boat.settle(brake_s)
+        if stands:
+            assert boat.plant.velocity[0] < 0.1
+        boat.direction = Direction.STOP
+        boat.settle(10.0)
+        way_m[stands] = math.dist(start_m, boat.plant.position_m)
+    assert way_m[True] < 0.5
+    assert way_m[True] < 0.5 * way_m[False]
 
 
 def test_disarmed_boat_stays(launch: Launch) -> None:

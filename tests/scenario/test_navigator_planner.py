@@ -188,7 +188,8 @@ def test_what_is_not_seen_free_is_not_entered() -> None:
     pool.looks = True
     assert pool.settle(2.0).enable
     pool.looks = False
-    assert pool.settle(1.2).inhibits == (Inhibit.NO_FREE_PATH,)
+    assert pool.settle(1.2).speed_mps == 0.0
+    assert pool.settle(CONFIG.planner.brake_s).inhibits == (Inhibit.NO_FREE_PATH,)
 
 
 def test_a_bar_on_the_route_is_passed_and_the_route_rejoined() -> None:
@@ -223,6 +224,32 @@ def test_a_dead_end_is_waited_in_until_it_opens() -> None:
     assert pool.gap_m() > 0.6
     pool.bars = ()
     assert pool.settle(21.5).enable
+
+
+def test_a_boat_under_way_brakes_before_it_gives_up() -> None:
+    """Nothing is seen any more: it is ordered to stand, for a while, and then there is no thrust."""
+    pool = Pool()
+    moving = pool.settle(6.0)
+    assert moving.enable
+    assert pool.speed_mps == pytest.approx(0.6)
+    pool.looks = False
+    orders = [order for order in pool.run(4.0) if order.speed_mps == 0.0]
+    braked = [order.enable for order in orders]
+    assert braked == sorted(braked, reverse=True)
+    assert sum(braked) * STEP_US * 1e-6 == pytest.approx(CONFIG.planner.brake_s, abs=0.2)
+    assert orders[-1].inhibits == (Inhibit.NO_FREE_PATH,)
+
+
+def test_a_boat_at_rest_has_nothing_to_brake() -> None:
+    """With nothing seen from the start no order is enabled, whatever it drifts at."""
+    pool = Pool()
+    pool.looks, pool.speed_mps = False, 0.09
+    assert not any(order.enable for order in pool.run(2.0))
+
+
+def test_a_boat_that_cannot_brake_gives_up_at_once() -> None:
+    fans = load_config(profile="fans").navigator
+    assert fans.planner.brake_s == 0.0
 
 
 def test_a_stuck_detection_does_not_spin_the_boat() -> None:

@@ -25,7 +25,7 @@ from paani_services.navigator.fence import bounded_speed, is_allowed
 from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
-from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, looked, steered
+from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, brakes, looked, steered
 from paani_services.navigator.planner import Wish
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
@@ -122,7 +122,7 @@ def navigate(
         pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner, mission.fence)
         state = msgspec.structs.replace(state, pilot=pilot)
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
-        if speed_mps <= 0.0:
+        if speed_mps <= 0.0 and not brakes(pilot, odometry, now_us, config.planner):
             inhibits.append(Inhibit.NO_FREE_PATH)
     if direction not in TURNS:
         on_course = abs(wrap_rad(heading_rad - wanted.course_rad)) <= SAME_COURSE_RAD

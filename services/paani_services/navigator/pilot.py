@@ -11,7 +11,7 @@ from paani_services.navigator.fence import Fence
 from paani_services.navigator.fence_cells import fenced
 from paani_services.navigator.grid import Moving, lay
 from paani_services.navigator.movers import is_denied, movers
-from paani_services.navigator.planner import Plan, Start, Wish, plan
+from paani_services.navigator.planner import CARRIED_MPS, Plan, Start, Wish, plan
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.sighting import Memory, remember
 
@@ -71,3 +71,10 @@ def steered(
         waits_us = None if held.speed_mps > 0.0 else since_us
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, waits_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))
+
+
+def brakes(pilot: Pilot, odometry: Odometry, now_us: int, config: PlannerConfig) -> bool:
+    """Whether a boat that no plan moves any more is still to take its way off: what is left may be wind and current."""
+    waits_us = pilot.waits_us
+    is_new = waits_us is not None and (now_us - waits_us) * 1e-6 < config.brake_s
+    return is_new and odometry.surge_mps > CARRIED_MPS

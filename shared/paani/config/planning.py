@@ -74,6 +74,7 @@ class PlannerConfig(Section, frozen=True):
     `room_m`: free way that a boat must keep ahead, to be able to turn away. `turn_radius_m`: no tighter circle at any
     speed, and `helm_speed_mps`: driven at that by the helm alone; of fans that only push.
     `drag_per_s`, `drag_per_m`: what slows a boat whose fans are off, per speed and per its square.
+    `brake_s`: so long at most a boat under way is ordered to stand, when nowhere is free; then there is no thrust.
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     """
 
@@ -116,6 +117,7 @@ class PlannerConfig(Section, frozen=True):
     margin_m: NonNegative = 0.7  # measured: least near misses in trials by camera
     tight_margin_m: NonNegative = 0.25  # Q6; where nothing is free with the whole margin
     drift_mps: NonNegative = 0.15  # Q6
+    brake_s: NonNegative = 1.5  # measured: 0.9 s from 0.6 m/s; picture and order before
     stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
     span_deg: Angle = 120.0  # headings to either side of the wanted course

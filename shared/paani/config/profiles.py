@@ -87,6 +87,7 @@ FANS: dict[str, object] = {
             "turn_radius_m": 2.2,  # measured: K5 drag, at any speed
             "helm_speed_mps": 0.5,  # measured: what one fan alone drives a boat at that turns as hard as it can
             "room_m": 3.0,  # turn_radius_m, hull_radius_m and margin_m
+            "brake_s": 0.0,
         }
     },
     "controller": {"astern": 0.0},
