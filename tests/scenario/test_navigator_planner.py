@@ -31,6 +31,7 @@ from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_services.navigator.planner import PARTS
 from paani_services.navigator.shown import Camera
 from paani_sim.eye.camera import BoatPose
 from tests.unit.watery_sights import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
@@ -48,7 +49,7 @@ class Pool:
     def __init__(self, *bars: Bar, bank_m: float = 500.0, boat: BoatPose = AT_REST, camera: Camera = CAMERA) -> None:
         self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
         self.state, self.now_us, self.speed_mps = NavState(), START_US, 0.0
-        self.direction, self.looks = Direction.STRAIGHT, True
+        self.direction, self.looks, self.shut_in = Direction.STRAIGHT, True, False
         self.order: NavCommand | None = None
         self.shown: Evidence | None = None
 
@@ -58,7 +59,10 @@ class Pool:
             self._drift()
             if self.looks:
                 self.shown = evidence(self.now_us, edge_of(self.boat, self.bars, self.bank_m))
-            advisory = Advisory(source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
+            side = LaneRisk(blocked=self.shut_in)
+            advisory = Advisory(
+                source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR, left=side, right=side
+            )
             heard = self.heard(advisory, odometry(self.now_us, self.boat, self.speed_mps))
             self.state, self.order = navigate(
                 self.state, heard, route_alone(EAST), self.now_us, 43, CONFIG, self.camera
@@ -260,6 +264,26 @@ def test_a_stuck_detection_does_not_spin_the_boat() -> None:
         pool.direction = Direction.LEFT
         turned = [math.degrees(pool.boat.yaw_rad) for _ in pool.run(42.0)]
         assert max(map(abs, turned)) < high_deg
+
+
+@pytest.mark.parametrize("turn", [Direction.LEFT, Direction.RIGHT])
+def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Direction) -> None:
+    """Advised when no way has been free for long: it looks there, and does not go, nor round for ever."""
+    pool = Pool((4.0, -2.0, 5.0, 2.0))
+    pool.direction, pool.shut_in = turn, True
+    ordered = [order.speed_mps for order in pool.run(60.0)]
+    assert max(ordered) <= PARTS[-1] * CONFIG.cruise_mps
+    assert math.hypot(pool.boat.x_m, pool.boat.y_m) < 0.3
+    side = 1.0 if turn is Direction.LEFT else -1.0
+    assert math.radians(60.0) < side * pool.boat.yaw_rad <= math.radians(CONFIG.planner.span_deg + 1.0)
+    assert ordered[-1] == 0.0
+
+
+def test_a_boat_without_room_does_not_turn_to_look() -> None:
+    """Advice gives way to the map: what its hull would sweep must be free."""
+    pool = Pool(bank_m=0.9)
+    pool.direction, pool.shut_in = Direction.LEFT, True
+    assert not any(order.enable for order in pool.run(3.0))
 
 
 def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import msgspec
 
 from paani import messages as m
-from paani.config import Config, load_config
+from paani.config import Config, calibration_of, load_config
 from paani_services.advisor.advise import AdvisorState, advise
 
 T0_US = 1_000_000_000
 PAANI, PAPER = load_config(), load_config(profile="paper")
+CALIBRATED = msgspec.structs.replace(PAANI, calibration=calibration_of(PAANI.eye))
 BUOY_AHEAD = m.Detection(label=m.Label.BUOY, confidence=0.8, box_xyxy=(0.45, 0.40, 0.55, 0.60))
 
 

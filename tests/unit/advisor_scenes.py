@@ -42,6 +42,7 @@ def scene(seed: int, tracks: int) -> Scene:
             turn=rng.choice((None, *m.SIDE_OF)),
             clear_frames=rng.randrange(3),
             blocked=(rng.random() < 0.3, rng.random() < 0.3, rng.random() < 0.3),
+            shut_frames=random.Random(~seed).choice((0, 39, 40, 41)),
         ),
         water=water,
         obstacles=tuple(_obstacle(rng, number) for number in rng.sample(range(1, 100), tracks)),

@@ -16,11 +16,11 @@ from paani_services.advisor.counterfactual import CLEAR_WATER, counterfactual, n
 from paani_services.advisor.explanation import explain
 from paani_services.advisor.policy import PolicyState, decide
 from paani_services.advisor.risk import LANES, components
-from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, lane, murky, play, seeing, water
+from tests.unit.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, T0_US, box, lane, murky, play, seeing, water
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
 D, R, By = m.Direction, m.Reason, m.ChangedBy
-CONFIGS = st.sampled_from((PAANI, PAPER))
+CONFIGS = st.sampled_from((PAANI, PAPER, CALIBRATED))
 Taken = tuple[tuple[int, ...], tuple[str, ...]]  # track ids, lanes
 
 

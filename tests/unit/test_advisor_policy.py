@@ -6,13 +6,12 @@ import msgspec
 import pytest
 
 from paani import messages as m
-from paani.config import Config, calibration_of
+from paani.config import Config, load_config
 from paani_services.advisor.advise import advise
-from tests.unit.advisor_evidence import CLEAR, PAANI, PAPER, box, lane, murky, play, seeing, water
+from tests.unit.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, box, lane, murky, play, seeing, water
 
 D, R = m.Direction, m.Reason
 VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
-CALIBRATED = msgspec.structs.replace(PAANI, calibration=calibration_of(PAANI.eye))
 
 
 @pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
@@ -174,6 +173,48 @@ def test_a_planned_way_in_is_looked_for_where_sides_are_crowded(
     _, advice, _ = play([evidence] * 4, CALIBRATED if calibrated else PAANI)
     assert (advice[-1].direction is D.STOP) is stops
     assert advice[-1].side_block_risk == (0.75 if calibrated else 0.58)
+
+
+FANS = msgspec.structs.replace(load_config(profile="fans"), calibration=CALIBRATED.calibration)
+DRY = water(0.55, 0.65, 0.70)
+SHUT_IN = msgspec.structs.replace(DRY, center=murky(0.6))
+
+
+@pytest.mark.parametrize(
+    ("config", "frame", "looks"),
+    [
+        (CALIBRATED, SHUT_IN, True),
+        (CALIBRATED, DRY, False),  # no water anywhere: a covered lens may read so
+        (PAANI, SHUT_IN, False),  # no map of what stands beside the boat
+        (FANS, SHUT_IN, False),  # it cannot turn where it is
+        (PAPER, water(0.6, 0.65, 0.65), False),  # J5
+    ],
+    ids=["paani", "dry", "uncalibrated", "fans", "paper"],
+)
+def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: m.Evidence, looks: bool) -> None:
+    """STOP for 40 frames, then a turn to the better side, and on to that, whatever the risks are, until a way is free.
+
+    More cases in which the boat moves, though only round: before a hull it had lain for good with open water abeam
+    (harbour-73, lake-54). That it does not go ahead meanwhile is the navigator's.
+    """
+    state, advice, _ = play([frame] * 60, config)
+    assert [a.direction for a in advice[:40]] == [D.STOP] * 40
+    assert {(a.direction, a.reason) for a in advice[40:]} == (
+        {(D.LEFT, R.NO_SIDE_LOOKS)} if looks else {(D.STOP, advice[0].reason)}
+    )
+    turned = msgspec.structs.replace(frame, left=frame.right, right=frame.left)
+    state, after, _ = play([turned] * 3 + [CLEAR] * 3 + [frame], config, state=state, first_seq=60)
+    assert [a.direction for a in after[:3]] == [D.LEFT if looks else D.STOP] * 3
+    assert after[5].direction is D.STRAIGHT
+    assert after[6].direction is D.STOP  # anew
+
+
+def test_one_frame_without_water_is_no_way_to_look_for() -> None:
+    """However long it has looked: STOP, and it waits anew."""
+    state, advice, _ = play([SHUT_IN] * 45, CALIBRATED)
+    assert advice[-1].reason is R.NO_SIDE_LOOKS
+    _, after, _ = play([DRY, *[SHUT_IN] * 39], CALIBRATED, state=state, first_seq=45)
+    assert {a.direction for a in after} == {D.STOP}
 
 
 def test_occupancy_does_not_count_republishes() -> None:

@@ -14,13 +14,13 @@ from paani.config import Config, load_config
 from paani.dithering import Dithering, dithering
 from paani_services.advisor.policy import OTHER, PolicyState, better_side, limit_of, side_held
 from paani_services.advisor.risk import LANES, components, severity
-from tests.unit.advisor_evidence import PAANI, PAPER, murky, play, water
+from tests.unit.advisor_evidence import CALIBRATED, PAANI, PAPER, murky, play, water
 from tests.unit.advisor_scenes import Scene, scene, scenes
 
 pytestmark = pytest.mark.slow
 
 D, R = m.Direction, m.Reason
-CONFIGS = st.sampled_from((PAANI, PAPER))
+CONFIGS = st.sampled_from((PAANI, PAPER, CALIBRATED))
 ABRUPT = load_config(sets=("advisor.policy.side_change_margin=0", "advisor.policy.release_margin=0"))
 MIRRORED = {
     D.LEFT: D.RIGHT, D.RIGHT: D.LEFT, D.SLIGHT_LEFT: D.SLIGHT_RIGHT, D.SLIGHT_RIGHT: D.SLIGHT_LEFT,
@@ -130,6 +130,7 @@ def mirrored(given_scene: Scene) -> Scene:
             turn=None if state.turn is None else MIRRORED[state.turn],
             clear_frames=state.clear_frames,
             blocked=state.blocked[::-1],
+            shut_frames=state.shut_frames,
         ),
         water={
             "left": given_scene.water["right"], "center": given_scene.water["center"],
@@ -148,9 +149,8 @@ def test_a_mirrored_scene_gives_mirrored_advice(given_scene: Scene, config: Conf
     """Resolution 13: port and starboard differ in nothing but the tie that no side has been taken in."""
     given_scene = off_grid(given_scene)
     decision, other = given_scene.decided(config), mirrored(given_scene).decided(config)
-    policy = config.advisor.policy
     risks = {lane: getattr(decision, lane).risk for lane in LANES}
-    held, needed = side_held(given_scene.state, policy)
+    held, needed = side_held(given_scene.state, config)
     gain = risks[held] - risks[OTHER[held]]
     near = [abs(risks[lane] - limit_of(lane, given_scene.state, config)) for lane in LANES]
     assume(min(*near, abs(gain - needed), abs(gain + needed)) > 1e-9)
@@ -166,7 +166,7 @@ def test_the_side_taken_is_never_much_the_worse(
     left: float, right: float, turn: m.Direction | None, config: Config
 ) -> None:
     policy = config.advisor.policy
-    side = better_side(PolicyState(turn=turn), {"left": left, "right": right}, policy)
+    side = better_side(PolicyState(turn=turn), {"left": left, "right": right}, config)
     risks = {"left": left, "right": right}
     assert risks[side] - risks[OTHER[side]] <= max(policy.tie, policy.side_change_margin)
 

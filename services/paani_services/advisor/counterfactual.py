@@ -31,6 +31,7 @@ from paani_services.advisor.policy import (
     is_dry,
     is_vessel_ahead,
     limit_of,
+    looks,
     place_in_center,
     side_held,
 )
@@ -42,7 +43,7 @@ Factors = tuple[tuple[int | None, float], ...]  # of a product: the bit of a pie
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
 MAX_SHOWN = 3
 CLEAR_WATER = LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
-SIDES = (None, "left", "right")
+SIDES = (None, "left", "right", None)
 LIMITS = {"left": Limit.LEFT_RISK, "center": Limit.CENTER_RISK, "right": Limit.RIGHT_RISK}
 
 
@@ -152,12 +153,12 @@ def nearest_limit(
         if lanes[lane].occupied or is_dry(lanes[lane].non_water, policy) or (lane == "center" and vessel):
             continue
         across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
-        moved = msgspec.structs.replace(standing, better=better_side(state, across, policy), **{lane: margin < 0.0})
+        moved = msgspec.structs.replace(standing, better=better_side(state, across, config), **{lane: margin < 0.0})
         if direct(moved) is not decision.direction:
             found.append((margin, LIMITS[lane]))
-    held, needed = side_held(state, policy)
+    held, needed = side_held(state, config)
     other_side = msgspec.structs.replace(standing, better=OTHER[standing.better])
-    if direct(other_side) is not decision.direction:
+    if needed < math.inf and direct(other_side) is not decision.direction:
         found.append((risks[held] - risks[OTHER[held]] - needed, Limit.SIDE_GAIN))
     if not found:
         return Limit.NONE, 0.0
@@ -168,12 +169,13 @@ def nearest_limit(
 class _Lane(NamedTuple):
     """One corridor. obstacles, urgencies: the factors of E for the tracks inside, in order.
 
-    water: the bit of its water (None: adds nothing). occupying: bits of the tracks that occupy it.
+    water: the bit of its water (None: adds nothing). is_dry: it shows none. occupying: bits of the tracks that do.
     """
 
     non_water: float
     uncertainty: float
     water: int | None
+    is_dry: bool
     obstacles: Factors
     urgencies: Factors
     occupying: tuple[int | None, ...]
@@ -196,6 +198,7 @@ class _Scene(NamedTuple):
     places: dict[str, tuple[int | None, ...]]
     held: str
     needed: float
+    looks: bool
     water_limit: float
     weights: RiskConfig
 
@@ -216,25 +219,27 @@ def _scene(
         inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
         filling = [o for o in obstacles if fills(o, lane, config)]
         lasting = before + 1 >= policy.occupancy_frames
-        dry = (wet.get(lane),) if is_dry(water[lane].non_water, policy) else ()
+        dry = is_dry(water[lane].non_water, policy)
         lanes[lane] = _Lane(
             non_water=water[lane].non_water,
             uncertainty=water[lane].uncertainty,
             water=wet.get(lane),
+            is_dry=dry,
             obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
             urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
-            occupying=(*dry, *(bit.get(o.id) for o in filling if lasting or o.danger)),
+            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
             limit=limit_of(lane, state, config),
         )
     middle = lane_span("center", config.perception.corridors)
     places = [(place_in_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]
-    held, needed = side_held(state, policy)
+    held, needed = side_held(state, config)
     return _Scene(
         lanes=lanes,
         vessels=tuple(bit.get(o.id) for o in obstacles if is_vessel_ahead(o, config)),
         places={name: tuple(i for place, i in places if place == name) for name in ("core", "left", "right")},
         held=held,
         needed=needed,
+        looks=looks(state, config),
         water_limit=policy.center_block_risk,
         weights=config.advisor.risk,
     )
@@ -243,6 +248,7 @@ def _scene(
 def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
     """What stands where, for each set."""
     count, kept = len(sets.members), sets.kept
+    none: Flags = np.zeros(count, bool)
 
     def any_left(bits: tuple[int | None, ...]) -> Flags:
         found: Flags = np.full(count, None in bits)
@@ -274,7 +280,10 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
         )
 
     risks = {name: risk(lane) for name, lane in scene.lanes.items()}
-    blocked = {name: (risks[name] >= lane.limit) | any_left(lane.occupying) for name, lane in scene.lanes.items()}
+    dry = {name: any_left((lane.water,)) if lane.is_dry else none for name, lane in scene.lanes.items()}
+    blocked = {
+        name: (risks[name] >= lane.limit) | dry[name] | any_left(lane.occupying) for name, lane in scene.lanes.items()
+    }
     center = scene.lanes["center"]
     wet = np.ones(count, bool) if center.water is None else kept[center.water]
     alone = scene.weights.non_water * center.non_water + scene.weights.uncertainty * center.uncertainty
@@ -288,11 +297,12 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
         + blocked["right"] * 4
         + (changes != (scene.held == "right")) * 8
         + np.where(edge, np.where(left, 16, 32), 0)
+        + (scene.looks & ~(dry["left"] & dry["center"] & dry["right"])) * 64
     )
     return codes
 
 
-CODES = 48
+CODES = 128
 
 
 def _direction_of(code: int) -> Direction:
@@ -302,7 +312,8 @@ def _direction_of(code: int) -> Direction:
             center=bool(code & 2),
             right=bool(code & 4),
             better="right" if code & 8 else "left",
-            incursion=SIDES[code >> 4],
+            incursion=SIDES[code >> 4 & 3],
+            looks=bool(code & 64),
         )
     )
 

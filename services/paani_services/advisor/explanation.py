@@ -124,6 +124,8 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"{centre}; the sides are alike, starboard by rule, {sides}"
         case Reason.NO_SAFE_SIDE:
             return f"{centre} and no side is safe, {sides}"
+        case Reason.NO_SIDE_LOOKS:
+            return f"{centre} and no side is free for long; looking for a way, {sides}"
         case Reason.NO_SIDE_UNOCCUPIED:
             return f"{centre} and the safer side is occupied, {sides}"
         case _:

@@ -1,5 +1,7 @@
 """From three corridors to one direction: thresholds, overrides, sides, hysteresis (checklist J5-J10). Pure."""
 
+import math
+
 import msgspec
 
 from paani.config import Config, PolicyConfig
@@ -17,13 +19,15 @@ class PolicyState(msgspec.Struct, frozen=True):
     """What one distinct frame leaves for the next.
 
     occupied_frames: frames in a row each lane was occupied. turn: the turn in progress. clear_frames: frames in a row
-    the centre was clear. blocked: which lanes were.
+    the centre was clear. blocked: which lanes were. shut_frames: frames in a row that showed water but no way that is
+    free, up to one more than `look_frames`.
     """
 
     occupied_frames: tuple[int, int, int] = (0, 0, 0)
     turn: Direction | None = None
     clear_frames: int = 0
     blocked: tuple[bool, bool, bool] = (False, False, False)
+    shut_frames: int = 0
 
 
 class Standing(msgspec.Struct, frozen=True):
@@ -31,6 +35,7 @@ class Standing(msgspec.Struct, frozen=True):
 
     left, center, right: is the lane blocked. incursion: the side from which obstacles reach into the centre but not its
     core. better: the side to take if both are free. kept: a turn that has not yet been clear for long enough.
+    looks: no way has been free for so long that the boat is to look for one, turning where it is.
     """
 
     left: bool = True
@@ -39,6 +44,7 @@ class Standing(msgspec.Struct, frozen=True):
     incursion: str | None = None
     better: str = "right"
     kept: Direction | None = None
+    looks: bool = False
 
 
 class Decision(msgspec.Struct, frozen=True):
@@ -71,6 +77,7 @@ def decide(
     blocked = {
         lane: barred[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
     }
+    shows_water = not all(is_dry(lanes[lane].non_water, policy) for lane in LANES)
     judged = {lane: _lane_risk(lanes[lane], limits[lane], occupied[lane], blocked[lane]) for lane in LANES}
     clear_frames = 0 if blocked["center"] else state.clear_frames + 1
     risks = {lane: lanes[lane].risk for lane in LANES}
@@ -79,7 +86,8 @@ def decide(
         center=blocked["center"],
         right=blocked["right"],
         incursion=_edge_incursion(judged["center"], obstacles, config),
-        better=better_side(state, risks, policy),
+        better=better_side(state, risks, config),
+        looks=shows_water and looks(state, config),
         kept=state.turn if clear_frames < policy.clear_frames else None,
     )
     direction = direct(standing)
@@ -87,16 +95,19 @@ def decide(
         reason = Reason.CENTER_CLEAR if direction is Direction.STRAIGHT else Reason.TURN_RETAINED
     elif direction is Direction.STOP:
         reason = _why_no_side(judged["left"], judged["right"])
+    elif is_shut(standing):
+        reason = Reason.NO_SIDE_LOOKS
     elif standing.incursion is not None:
         reason = Reason.CENTER_EDGE_INCURSION
-    elif not standing.left and not standing.right and _is_tie(state, risks, policy):
+    elif not standing.left and not standing.right and _is_tie(state, risks, config):
         reason = Reason.TIE_STARBOARD if state.turn is None else Reason.TIE_KEPT_SIDE
     else:
         reason = _why_blocked(judged["center"], vessel)
     turn = direction if direction in SIDE_OF else None
     if direction is Direction.STOP:
         turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
-    after = PolicyState(frames, turn, clear_frames, (standing.left, standing.center, standing.right))
+    shut_frames = min(state.shut_frames, policy.look_frames) + 1 if shows_water and is_shut(standing) else 0
+    after = PolicyState(frames, turn, clear_frames, (standing.left, standing.center, standing.right), shut_frames)
     return after, Decision(direction, reason, judged["left"], judged["center"], judged["right"], standing)
 
 
@@ -106,25 +117,45 @@ def direct(standing: Standing) -> Direction:
     if not standing.center:
         kept = standing.kept
         return kept if kept is not None and not blocked[SIDE_OF[kept]] else Direction.STRAIGHT
-    if standing.incursion is not None:
-        away = OTHER[standing.incursion]
-        return Direction.STOP if blocked[away] else SLIGHT_TURNS[away]  # the other way would turn towards it
-    free = [side for side in ("left", "right") if not blocked[side]]
-    if not free:
+    if is_shut(standing) and not standing.looks:
         return Direction.STOP
-    return TURNS[standing.better if len(free) == 2 else free[0]]
+    if standing.incursion is not None:
+        away = OTHER[standing.incursion]  # the other way would turn towards it
+        return TURNS[away] if blocked[away] else SLIGHT_TURNS[away]
+    free = [side for side in ("left", "right") if not blocked[side]]
+    return TURNS[free[0] if len(free) == 1 else standing.better]
 
 
-def side_held(state: PolicyState, policy: PolicyConfig) -> tuple[str, float]:
-    """The side to take unless the other is better, and by how much it must be (resolution 13)."""
+def is_shut(standing: Standing) -> bool:
+    """The centre is blocked, and so is each side that could be taken instead."""
+    away = OTHER.get(standing.incursion or "")
+    sides = {"left": standing.left, "right": standing.right}
+    return standing.center and (sides[away] if away is not None else all(sides.values()))
+
+
+def looks(state: PolicyState, config: Config) -> bool:
+    """No way was free for `look_frames`, and the boat can turn where it is, by a map of what stands around it."""
+    planner, needed = config.navigator.planner, config.advisor.policy.look_frames
+    can_turn = planner.acts_on(config.calibration) and planner.turn_radius_m == 0.0
+    return can_turn and 0 < needed <= state.shut_frames
+
+
+def side_held(state: PolicyState, config: Config) -> tuple[str, float]:
+    """The side to take unless the other is better, and by how much it must be (resolution 13).
+
+    A boat that looks for a way looks on to the side it began with.
+    """
+    policy = config.advisor.policy
     if state.turn is None:
         return "right", policy.tie
+    if looks(state, config) and state.shut_frames > policy.look_frames:
+        return SIDE_OF[state.turn], math.inf
     return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
 
 
-def better_side(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> str:
+def better_side(state: PolicyState, risks: dict[str, float], config: Config) -> str:
     """The side to take when both are free: the lower risk, but not for a small gain."""
-    held, needed = side_held(state, policy)
+    held, needed = side_held(state, config)
     other = OTHER[held]
     gain = risks[held] - risks[other]
     return other if gain > 0.0 and gain >= needed else held
@@ -181,11 +212,11 @@ def limit_of(lane: str, state: PolicyState, config: Config) -> float:
     return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
 
 
-def _is_tie(state: PolicyState, risks: dict[str, float], policy: PolicyConfig) -> bool:
+def _is_tie(state: PolicyState, risks: dict[str, float], config: Config) -> bool:
     """The side held is not the better one by a tie's width, and the other is no clear gain."""
-    held, needed = side_held(state, policy)
+    held, needed = side_held(state, config)
     gain = risks[held] - risks[OTHER[held]]
-    return -policy.tie < gain < needed
+    return -config.advisor.policy.tie < gain < needed
 
 
 def _why_blocked(center: LaneRisk, vessel: bool) -> Reason:

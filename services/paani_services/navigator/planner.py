@@ -64,11 +64,15 @@ class Ways(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """The wanted course and the speed allowed. side: the one advised, 1 port, -1 starboard, 0 neither."""
+    """The wanted course and the speed allowed. side: the one advised, 1 port, -1 starboard, 0 neither.
+
+    turns: no way ahead is asked for, but a turn to that side where the boat lies.
+    """
 
     course_rad: float
     speed_mps: float
     side: float = 0.0
+    turns: bool = False
 
 
 def plan(
@@ -106,6 +110,8 @@ def plan(
     unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
     barred = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
     barred |= turns & (np.minimum(np.abs(offsets), 2.0 * math.pi - np.abs(offsets)) < ON_THE_SPOT_RAD)
+    if wish.turns:
+        barred |= ~turns | (wish.side * offsets < ON_THE_SPOT_RAD)
     if gap_m[0, 0] >= config.hull_radius_m + config.margin_m:  # before a dead end it waits, and does not circle
         barred |= np.abs(offsets - offsets[0]) > math.radians(config.span_deg) + 1e-9
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
@@ -130,7 +136,7 @@ def plan(
         refused = (met & nearby).any(axis=0) | barred
         if kept is not config:
             refused |= is_full
-        if footprints:
+        if footprints and not wish.turns:
             refused |= turns & (_apart_rad(offsets, float(offsets[0])) > ONWARD_RAD)
         if not (refused.all() and footprints):
             break

@@ -9,6 +9,7 @@ import msgspec
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
 RemovalSize = Annotated[int, msgspec.Meta(ge=0, le=3)]  # the work grows with the cube
+FrameCount = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
 SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
 
 
@@ -93,6 +94,7 @@ class PolicyConfig(Section, frozen=True):
     side_change_margin: Fraction = 0.15  # measured: 95 % of what the sides' difference changes by between frames
     release_margin: Fraction = 0.08  # measured: 90 % of what the centre's risk changes by between frames
     clear_frames: Size = 2  # J10
+    look_frames: FrameCount = 40  # 8 s at 5 Hz with no way free; then the boat turns where it is. 0: never (J5)
 
 
 class TuningConfig(Section, frozen=True):

@@ -29,6 +29,7 @@ PAPER: dict[str, object] = {
             "side_change_margin": 0.0,  # J5, resolution 13: thresholds without memory
             "release_margin": 0.0,
             "dry": 1.0,  # J5: risk alone
+            "look_frames": 0,  # J5: no side, no motion
         },
     },
     "navigator": {
