@@ -200,7 +200,7 @@ def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: 
     state, advice, _ = play([frame] * 60, config)
     assert [a.direction for a in advice[:40]] == [D.STOP] * 40
     assert {(a.direction, a.reason) for a in advice[40:]} == (
-        {(D.LEFT, R.NO_SIDE_LOOKS)} if looks else {(D.STOP, advice[0].reason)}
+        {(D.LEFT, R.NO_SIDE_FOR_LONG)} if looks else {(D.STOP, advice[0].reason)}
     )
     turned = msgspec.structs.replace(frame, left=frame.right, right=frame.left)
     state, after, _ = play([turned] * 3 + [CLEAR] * 3 + [frame], config, state=state, first_seq=60)
@@ -212,7 +212,7 @@ def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: 
 def test_one_frame_without_water_is_no_way_to_look_for() -> None:
     """However long it has looked: STOP, and it waits anew."""
     state, advice, _ = play([SHUT_IN] * 45, CALIBRATED)
-    assert advice[-1].reason is R.NO_SIDE_LOOKS
+    assert advice[-1].reason is R.NO_SIDE_FOR_LONG
     _, after, _ = play([DRY, *[SHUT_IN] * 39], CALIBRATED, state=state, first_seq=45)
     assert {a.direction for a in after} == {D.STOP}
 

@@ -124,7 +124,7 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"{centre}; the sides are alike, starboard by rule, {sides}"
         case Reason.NO_SAFE_SIDE:
             return f"{centre} and no side is safe, {sides}"
-        case Reason.NO_SIDE_LOOKS:
+        case Reason.NO_SIDE_FOR_LONG:
             return f"{centre} and no side is free for long; looking for a way, {sides}"
         case Reason.NO_SIDE_UNOCCUPIED:
             return f"{centre} and the safer side is occupied, {sides}"

@@ -96,7 +96,7 @@ def decide(
     elif direction is Direction.STOP:
         reason = _why_no_side(judged["left"], judged["right"])
     elif is_shut(standing):
-        reason = Reason.NO_SIDE_LOOKS
+        reason = Reason.NO_SIDE_FOR_LONG
     elif standing.incursion is not None:
         reason = Reason.CENTER_EDGE_INCURSION
     elif not standing.left and not standing.right and _is_tie(state, risks, config):

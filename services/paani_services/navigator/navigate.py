@@ -118,7 +118,7 @@ def navigate(
     else:
         heading_rad = guarded_course(wanted.course_rad, state.guards)
     if plans and not inhibits and speed_mps > 0.0:
-        wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0), turns=_is_shut(advisory))
+        wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0), turns=_only_looks(advisory))
         pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner, mission.fence)
         state = msgspec.structs.replace(state, pilot=pilot)
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
@@ -142,7 +142,7 @@ def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorCo
     return msgspec.structs.replace(state, progress=progress, crab=crab)
 
 
-def _is_shut(advisory: Advisory | None) -> bool:
+def _only_looks(advisory: Advisory | None) -> bool:
     """A turn is advised to a side that is blocked: to look there, and not to go."""
     side = SIDE.get(advisory.direction, 0.0) if advisory is not None else 0.0
     return advisory is not None and ((side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked))
