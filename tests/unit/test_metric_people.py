@@ -28,9 +28,9 @@ def turned_away(seconds: float) -> tuple[Memory, int]:
     return memory, at_us - 800_000
 
 
-def swum_m(grid: Grid) -> float:
+def reached_m(grid: Grid) -> float:
     """How near to the boat the nearest cell is that the swimmer may have got to."""
-    rows, columns = np.nonzero(grid.swum)
+    rows, columns = np.nonzero(grid.strayed)
     away_m = np.hypot(grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5))
     return float(away_m.min(initial=np.inf))
 
@@ -41,13 +41,14 @@ def test_a_person_out_of_sight_may_swim_on() -> None:
     for seconds in (3.2, 4.8, 8.0):
         memory, now_us = turned_away(seconds)
         grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
-        reached.append(swum_m(grid))
-        row, column = np.argwhere(grid.swum)[0]
+        reached.append(reached_m(grid))
+        row, column = np.argwhere(grid.strayed)[0]
         assert clearance_m(grid, PLANNER)[row, column] < 0.0
     assert reached == pytest.approx([4.7 - 1.28, 4.7 - 1.92, 4.7 - 3.2], abs=2.0 * CELL_M)
     memory, now_us = turned_away(8.0)
     for changes in ({"person_mps": 0.0}, {"person_reach_m": 0.0}, {"hidden_s": 0.0}):
-        assert swum_m(lay(memory.sights, (0.0, 0.0), now_us, CAMERA, msgspec.structs.replace(PLANNER, **changes))) > 1e9
+        still = msgspec.structs.replace(PLANNER, **changes)
+        assert reached_m(lay(memory.sights, (0.0, 0.0), now_us, CAMERA, still)) > 1e9
 
 
 def test_nobody_has_swum_to_where_a_picture_shows_water() -> None:
@@ -56,8 +57,8 @@ def test_nobody_has_swum_to_where_a_picture_shows_water() -> None:
     hidden = BoatPose(0.0, 0.0, 0.6)  # the swimmer's place is just outside the picture, half of what is round it is in
     memory = seen(hidden, at_us=now_us + 200_000, memory=memory)
     grid = lay(memory.sights, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
-    assert grid.swum.any()
-    assert not (grid.swum & grid.free).any()
+    assert grid.strayed.any()
+    assert not (grid.strayed & grid.free).any()
 
 
 @pytest.mark.parametrize(("x_m", "y_m"), [(0.0, -2.0), (2.5, 2.4)])
@@ -67,7 +68,7 @@ def test_the_boat_is_careful_where_a_person_may_be(x_m: float, y_m: float) -> No
     grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
     grid = grid._replace(free=~grid.occupied)  # all else is known
     start, wish = Start(x_m, y_m, 0.0, 0.6), Wish(0.0, 0.6)
-    found, at_once = (plan(given, start, wish, None, PLANNER) for given in (grid, grid._replace(swum=grid.people)))
+    found, at_once = (plan(given, start, wish, None, PLANNER) for given in (grid, grid._replace(strayed=grid.people)))
     assert found.speed_mps < at_once.speed_mps
 
 

@@ -60,7 +60,7 @@ def led(start: Start, found: Plan) -> Ways:
 def round_about(occupied: np.ndarray) -> Grid:
     """A grid round the origin where all that is not occupied is free."""
     none = np.zeros_like(occupied)
-    return Grid(-10.0, -10.0, occupied, hidden=none, free=~occupied, beside=none, people=none, swum=none)
+    return Grid(-10.0, -10.0, occupied, hidden=none, free=~occupied, beside=none, people=none, strayed=none)
 
 
 def clearance_along_m(grid: Grid, start: Start, found: Plan) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paani.config import PlannerConfig
 from paani_services.navigator.distances import distance_m
-from paani_services.navigator.projection import Station, lens_at, ranges_m, rays
+from paani_services.navigator.projection import F64, Station, lens_at, ranges_m, rays
 from paani_services.navigator.shown import CELL_M, Camera, Cells, Indices, Mask, Shown, hull_top, shown
 from paani_services.navigator.sighting import Sight
 
@@ -27,8 +27,8 @@ class Grid(NamedTuple):
     """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
 
     west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
-    a person is, without the room round them. swum: where a person out of sight may have got to, and no picture shows
-    water now.
+    a person is, without the room round them. strayed: where a person or a vessel out of sight may have got to, and no
+    picture shows water now.
     """
 
     west_m: float
@@ -38,7 +38,7 @@ class Grid(NamedTuple):
     free: Mask
     beside: Mask
     people: Mask
-    swum: Mask
+    strayed: Mask
 
     @property
     def unknown(self) -> Mask:
@@ -81,8 +81,17 @@ def lay(
     if config.outvoted_by > 0:
         occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
     people_of = _last_shown([picture.people for picture in pictures], west, south)
-    people_now = occupied_now & (people_of >= 0) & ((people_of >= free_of) | (people_of >= first_occupied))
+    vessels_of = _last_shown([picture.vessels for picture in pictures], west, south)
+    people_now, vessels_now = (
+        occupied_now & (last_of >= 0) & ((last_of >= free_of) | (last_of >= first_occupied))
+        for last_of in (people_of, vessels_of)
+    )
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
+    ages_s = np.zeros(len(known) + 1)  # of what was lately in sight, or, at last, never
+    ages_s[:first_occupied] = [(now_us - sight.at_us) * 1e-6 for sight in known[:first_occupied]]
+    swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
+    drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
+    strayed = _reached(people_now, swum_m[people_of]) | _reached(vessels_now, drifted_m[vessels_of])
     shape = (CELLS, CELLS)
     grid = Grid(
         west * CELL_M,
@@ -92,7 +101,7 @@ def lay(
         free=free_now.reshape(shape),
         beside=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
-        swum=_swum(people_now, people_of, known, now_us, config) & ~free_now.reshape(shape),
+        strayed=strayed & ~free_now.reshape(shape),
     )
     if first_free == len(known):
         return grid
@@ -113,16 +122,12 @@ def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float
     return reach_m if reach_m <= config.blind_m else 0.0
 
 
-def _swum(people: Mask, people_of: Indices, known: list[Sight], now_us: int, config: PlannerConfig) -> Mask:
-    """Cells that people last seen more than `occupied_s` ago can have swum to. people_of: the number of that sight."""
+def _reached(cells: Mask, reach_m: F64) -> Mask:
+    """Cells that lie within the reach of these, each of its own [100 * 100]: in [100, 100]."""
     found = np.zeros((CELLS, CELLS), np.bool_)
-    if not people.any():
-        return found
-    age_s = np.array([(now_us - sight.at_us) * 1e-6 for sight in known])
-    reach_m = np.where(age_s > config.occupied_s, np.minimum(config.person_mps * age_s, config.person_reach_m), 0.0)
-    cells = np.ceil(reach_m / CELL_M)[people_of] * people
-    for reach in np.unique(cells[cells > 0.0]):
-        found |= distance_m((cells == reach).reshape(found.shape)) <= reach * CELL_M
+    steps = np.ceil(reach_m / CELL_M) * cells
+    for reach in np.unique(steps[steps > 0.0]):
+        found |= distance_m((steps == reach).reshape(found.shape)) <= reach * CELL_M
     return found
 
 

@@ -338,11 +338,11 @@ def _led(mover: Mover, lead_s: float) -> Mover:
 def clearance_m(grid: Grid, config: PlannerConfig) -> F64:
     """From the middle of each cell to what is there, at most 4 m; negative within, the further in the less [100, 100].
 
-    What is out of sight may have drifted nearer; a person may be anywhere in `Grid.swum`.
+    What is out of sight may have drifted nearer; a person or a vessel may be anywhere in `Grid.strayed`.
     """
     drifted_m = signed_m(grid.hidden) - config.hidden_drift_m
     found_m = np.minimum(signed_m(grid.occupied), drifted_m)
-    return np.minimum(found_m, signed_m(grid.swum)) if grid.swum.any() else found_m
+    return np.minimum(found_m, signed_m(grid.strayed)) if grid.strayed.any() else found_m
 
 
 def _looked_up(grid: Grid, field: F64, ways: Ways) -> F64:

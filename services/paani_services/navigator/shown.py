@@ -47,11 +47,15 @@ class Cells(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What one picture shows; a cell may be both. people: where they are, without the room that is kept round them."""
+    """What one picture shows; a cell may be both. people: where they are, without the room that is kept round them.
+
+    vessels: occupied by one.
+    """
 
     free: Cells
     occupied: Cells
     people: Cells
+    vessels: Cells
 
 
 @functools.lru_cache(maxsize=SIGHTS_HELD)
@@ -72,24 +76,27 @@ def shown(sight: Sight, moving: tuple[Box, ...], camera: Camera, config: Planner
     gone = np.zeros(u.shape, np.bool_)
     for box in moving:
         gone |= _ends_at(box, u, edge)
-    deep_m = np.full(u.shape, config.thickness_m)
+    deep_m, is_hull = np.full(u.shape, config.thickness_m), np.zeros(u.shape, np.bool_)
     for box in sight.boxes:
         if box.label is Label.VESSEL and box not in moving:
-            _lay_hull(box, lens, u, ends, far_m, deep_m, config)
+            is_hull[_lay_hull(box, lens, u, ends, far_m, deep_m, config)] = True
     stays = np.isfinite(far_m) & ~gone
-    points = [_points(lens, ends, far_m, np.where(stays, np.ceil(deep_m / CELL_M) + 1.0, 0.0))]
+    deep = np.where(stays, np.ceil(deep_m / CELL_M) + 1.0, 0.0)
+    points = [_points(lens, ends, far_m, deep)]
     points += [_foot(lens, foot, camera, config) for foot in sight.feet if _stays(foot, moving)]
     free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M))
     alone = msgspec.structs.replace(config, person_room_m=0.0)
     people = [_foot(lens, foot, camera, alone) for foot in sight.feet if foot.person and _stays(foot, moving)]
-    return Shown(_cells(*free), _joined(points), _joined(people))
+    hulls = _points(lens, ends, far_m, np.where(is_hull, deep, 0.0))
+    return Shown(_cells(*free), _joined(points), _joined(people), _cells(*hulls))
 
 
-def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> None:
+def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> Indices:
     """Complete a vessel in `far_m`, and how deep each column is in `deep_m`: it hides what of it lies behind.
 
     Where the mask looks through part of it (a white bow is taken for water), that is as far away as the part beside
-    it; where through all of it, the box's lower end counts. What stands before it is not part of it.
+    it; where through all of it, the box's lower end counts. What stands before it is not part of it. The columns that
+    are its own.
     """
     across = np.flatnonzero((u > box.left / FOOT_STEPS) & (u < box.right / FOOT_STEPS))
     low_m, least_m = (
@@ -97,13 +104,14 @@ def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64,
         for below in (0.0, ROWS)
     )
     if across.size == 0 or not np.isfinite(low_m).all():
-        return
+        return across[:0]
     own = far_m[across] >= least_m
     seen = across[own & (far_m[across] <= low_m.min() + HULL_LONG_M)]
     beside_m = low_m if seen.size == 0 else far_m[seen[np.abs(across[:, None] - seen[None, :]).argmin(axis=1)]]
     far_m[across] = np.minimum(far_m[across], np.where(own, beside_m, np.inf))
     wide_m = _width_m(Rays(*(axis[across] for axis in ends)), far_m[across])
     deep_m[across] = np.maximum(deep_m[across], min(wide_m, HULL_DEEP_M))
+    return across[own]
 
 
 def hull_top(hull: Polygon, u: F64) -> F64:

@@ -12,6 +12,7 @@ from paani.config.simulating import EyeConfig
 FieldOfView = Annotated[float, msgspec.Meta(ge=0.0, le=170.0)]
 Tilt = Annotated[float, msgspec.Meta(ge=-60.0, le=60.0)]
 Offset = Annotated[float, msgspec.Meta(ge=-50.0, le=50.0)]
+Reach = Annotated[float, msgspec.Meta(ge=0.0, le=3.8)]  # the planner knows distances to 4 m
 Height = Annotated[float, msgspec.Meta(ge=0.0, le=30.0)]
 Angle = Annotated[float, msgspec.Meta(gt=0.0, le=180.0)]
 
@@ -63,7 +64,8 @@ class PlannerConfig(Section, frozen=True):
     `outvoted_by`: so many later pictures that show water free a cell that one alone shows occupied: a glint; 0: never.
     `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. It may
     have come `hidden_drift_m` nearer meanwhile.
-    `person_mps`: how fast a person who is out of sight may swim, `person_reach_m` at most.
+    `person_mps`: how fast a person who is out of sight may swim, `person_reach_m` at most; a vessel drifts at
+    `drift_mps`, `vessel_reach_m` at most.
     `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
     `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
     `predict`: what moves counts where it will be, not where it was: velocities over `fit_s`, as far as `mover_range_m`;
@@ -90,7 +92,8 @@ class PlannerConfig(Section, frozen=True):
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
     person_mps: NonNegative = 0.4  # of a swimmer at ease
-    person_reach_m: Annotated[float, msgspec.Meta(ge=0.0, le=3.8)] = 3.6  # the planner knows distances to 4 m
+    person_reach_m: Reach = 3.6
+    vessel_reach_m: Reach = 1.2  # measured: what is adrift comes 0.5 to 1.5 m nearer while it is passed
     predict: bool = True
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5
