@@ -280,7 +280,7 @@ def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Dire
 
 
 def test_a_boat_that_looks_turns_the_long_way_round_too() -> None:
-    """The route leads on abaft the starboard beam, and port is advised: it had lain before a wall for good (canal-10)."""
+    """The route leads on abaft the starboard beam, port is advised: it had lain before a wall for good (canal-10)."""
     pool = Pool(boat=BoatPose(0.0, 0.0, math.radians(160.0)))
     pool.direction, pool.shut_in = Direction.LEFT, True
     pool.settle(20.0)
