@@ -12,21 +12,14 @@ from paani_services.navigator.planner import clearance_m
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose
-from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, box_over, edge_of, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, Bar, box_over, edge_of, looked_away, seen
 
-ASTERN = BoatPose(0.0, 0.0, 2.5)
 HULL: Bar = (4.0, -1.0, 5.0, 1.0)
 
 
 def passed(seconds: float, label: Label = Label.VESSEL) -> tuple[Memory, int]:
     """Of a boat that saw this ahead, and has looked astern since."""
-    box, edge = box_over(HULL, 0.8, label), edge_of(AT_REST, (HULL,))
-    memory, at_us = Memory(), START_US
-    for _ in range(3):
-        memory, at_us = seen(edge=edge, at_us=at_us, memory=memory, detections=(box,)), at_us + 800_000
-    for _ in range(round(seconds / 0.8)):
-        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
-    return memory, at_us - 800_000
+    return looked_away(seconds, box_over(HULL, 0.8, label), edge_of(AT_REST, (HULL,)))
 
 
 def off_m(grid: Grid) -> float:

@@ -12,20 +12,12 @@ from paani_services.navigator.planner import Start, Wish, clearance_m, plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose
-from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, box_over, edge_of, seen
-
-ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
+from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, Bar, box_over, edge_of, looked_away, seen
 
 
 def turned_away(seconds: float) -> tuple[Memory, int]:
     """Of a boat that saw a swimmer, and has looked astern since."""
-    swimmer = box_over((4.7, -0.3, 5.3, 0.3), 0.4)
-    memory, at_us = Memory(), START_US
-    for _ in range(3):
-        memory, at_us = seen(at_us=at_us, memory=memory, detections=(swimmer,)), at_us + 800_000
-    for _ in range(round(seconds / 0.8)):
-        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
-    return memory, at_us - 800_000
+    return looked_away(seconds, box_over((4.7, -0.3, 5.3, 0.3), 0.4))
 
 
 def reached_m(grid: Grid) -> float:

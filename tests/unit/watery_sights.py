@@ -22,6 +22,7 @@ START_US = 5_000_000
 Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
 FAR_M = 500.0
 AT_REST, NOTHING = BoatPose(0.0, 0.0, 0.0), Memory()
+ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
 
 
 def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
@@ -92,6 +93,16 @@ def seen(
     shown = edge if edge is not None else edge_of(boat)
     memory = gone(memory, at_us, boat)
     return remember(memory, None, evidence(at_us, shown, **changes), PLANNER)
+
+
+def looked_away(seconds: float, thing: m.Detection, edge: tuple[float, ...] | None = None) -> tuple[Memory, int]:
+    """The memory of a boat that saw this ahead three times, and has looked astern since; and when that is."""
+    memory, at_us = NOTHING, START_US
+    for _ in range(3):
+        memory, at_us = seen(edge=edge, at_us=at_us, memory=memory, detections=(thing,)), at_us + 800_000
+    for _ in range(round(seconds / 0.8)):
+        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
+    return memory, at_us - 800_000
 
 
 def gone(memory: Memory, at_us: int, boat: BoatPose) -> Memory:

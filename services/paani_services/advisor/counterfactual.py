@@ -248,7 +248,6 @@ def _scene(
 def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
     """What stands where, for each set."""
     count, kept = len(sets.members), sets.kept
-    none: Flags = np.zeros(count, bool)
 
     def any_left(bits: tuple[int | None, ...]) -> Flags:
         found: Flags = np.full(count, None in bits)
@@ -280,7 +279,7 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
         )
 
     risks = {name: risk(lane) for name, lane in scene.lanes.items()}
-    dry = {name: any_left((lane.water,)) if lane.is_dry else none for name, lane in scene.lanes.items()}
+    dry = {name: any_left((lane.water,) if lane.is_dry else ()) for name, lane in scene.lanes.items()}
     blocked = {
         name: (risks[name] >= lane.limit) | dry[name] | any_left(lane.occupying) for name, lane in scene.lanes.items()
     }

@@ -73,11 +73,12 @@ def decide(
     frames, occupied = _occupancy(state, obstacles, config)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     limits = {lane: limit_of(lane, state, config) for lane in LANES}
-    barred = {lane: occupied[lane] or is_dry(lanes[lane].non_water, policy) for lane in LANES}
+    dry = {lane: is_dry(lanes[lane].non_water, policy) for lane in LANES}
     blocked = {
-        lane: barred[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel) for lane in LANES
+        lane: occupied[lane] or dry[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel)
+        for lane in LANES
     }
-    shows_water = not all(is_dry(lanes[lane].non_water, policy) for lane in LANES)
+    shows_water = not all(dry.values())
     judged = {lane: _lane_risk(lanes[lane], limits[lane], occupied[lane], blocked[lane]) for lane in LANES}
     clear_frames = 0 if blocked["center"] else state.clear_frames + 1
     risks = {lane: lanes[lane].risk for lane in LANES}
@@ -135,8 +136,8 @@ def is_shut(standing: Standing) -> bool:
 
 def looks(state: PolicyState, config: Config) -> bool:
     """No way was free for `look_frames`, and the boat can turn where it is, by a map of what stands around it."""
-    planner, needed = config.navigator.planner, config.advisor.policy.look_frames
-    can_turn = planner.acts_on(config.calibration) and planner.turn_radius_m == 0.0
+    needed = config.advisor.policy.look_frames
+    can_turn = _is_planned(config) and config.navigator.planner.turn_radius_m == 0.0
     return can_turn and 0 < needed <= state.shut_frames
 
 
@@ -167,9 +168,7 @@ def fills(obstacle: Obstacle, lane: str, config: Config) -> bool:
     if lane in obstacle.behind or obstacle.presence < SEEN_ENOUGH or obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
-    coverage = (
-        policy.planned_coverage if config.navigator.planner.acts_on(config.calibration) else policy.occupancy_coverage
-    )
+    coverage = policy.planned_coverage if _is_planned(config) else policy.occupancy_coverage
     return 0.0 < shared_width(obstacle.box, span) >= coverage * (span[1] - span[0])
 
 
@@ -186,7 +185,7 @@ def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
     if not obstacle.craft or obstacle.presence < SEEN_ENOUGH:
         return False
     policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
-    if config.navigator.planner.acts_on(config.calibration):
+    if _is_planned(config):
         span = (policy.core_left, policy.core_right)
     return 0.0 < area(obstacle.box) * overlap(obstacle.box, span) >= policy.center_vessel_area
 
@@ -201,8 +200,7 @@ def place_in_center(box: BoxXyxy, policy: PolicyConfig) -> str:
 def side_block_risk(config: Config) -> float:
     """The risk at which a side is blocked (J5); another where the metric planner looks for the way in."""
     policy = config.advisor.policy
-    is_planned = config.navigator.planner.acts_on(config.calibration)
-    return policy.planned_side_block_risk if is_planned else policy.side_block_risk
+    return policy.planned_side_block_risk if _is_planned(config) else policy.side_block_risk
 
 
 def limit_of(lane: str, state: PolicyState, config: Config) -> float:
@@ -210,6 +208,11 @@ def limit_of(lane: str, state: PolicyState, config: Config) -> float:
     policy = config.advisor.policy
     limit = policy.center_block_risk if lane == "center" else side_block_risk(config)
     return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
+
+
+def _is_planned(config: Config) -> bool:
+    """The metric planner acts, and finds out in metres whether there is room."""
+    return config.navigator.planner.acts_on(config.calibration)
 
 
 def _is_tie(state: PolicyState, risks: dict[str, float], config: Config) -> bool:

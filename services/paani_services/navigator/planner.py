@@ -109,7 +109,7 @@ def plan(
     gap_m = _looked_up(grid, clear_m, ways)
     unseen = _looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m
     barred = (unseen & (ways.way_m <= config.stop_s * np.maximum(speeds, start.surge_mps))).any(axis=0)
-    barred |= turns & (np.minimum(np.abs(offsets), 2.0 * math.pi - np.abs(offsets)) < ON_THE_SPOT_RAD)
+    barred |= turns & (_apart_rad(offsets, 0.0) < ON_THE_SPOT_RAD)
     if wish.turns:
         barred |= ~turns | (wish.side * offsets < ON_THE_SPOT_RAD)
     span_rad = math.radians(config.span_deg) + 1e-9
