@@ -130,7 +130,7 @@ def test_the_wide_profile_means_the_same_angles() -> None:
     rows = [(c.perception.corridors.top, c.advisor.policy.occupancy_bottom) for c in (plain, wide)]
     for narrow, other in zip(*rows, strict=True):
         assert down_deg(wide.eye, other) == pytest.approx(down_deg(plain.eye, narrow), abs=0.6)
-    assert [nearest_m(wide.eye), nearest_m(plain.eye)] == pytest.approx([0.9, 1.35], abs=0.02)
+    assert [nearest_m(wide.eye), nearest_m(plain.eye)] == pytest.approx([1.08, 1.35], abs=0.02)
     sides = wide.perception.corridors.left[0], wide.perception.corridors.right[1]
     assert sides == pytest.approx((0.02, 0.98))
 
