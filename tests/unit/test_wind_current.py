@@ -4,6 +4,7 @@ import dataclasses
 import math
 import statistics
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -85,3 +86,18 @@ def test_current_of_open_water_runs_one_way() -> None:
 
 def test_still_water() -> None:
     assert CurrentField(load_world("lake")).at(0.0, 0.0) == (0.0, 0.0)
+
+
+def test_current_is_the_same_on_any_number_of_threads() -> None:
+    """Drives are the same to the byte on every machine, and in a worker of its own."""
+    world = dataclasses.replace(load_world("river"), current=Current(speed_mps=0.3))
+    sown, before = np.random.default_rng(5).uniform(-30.0, 300.0, (2000, 2)), cv2.getNumThreads()
+    found = []
+    try:
+        for threads in (1, 2, 4):
+            cv2.setNumThreads(threads)
+            field = CurrentField(world)
+            found.append([field.at(x_m, y_m) for x_m, y_m in sown])
+    finally:
+        cv2.setNumThreads(before)
+    assert found[0] == found[1] == found[2]

@@ -59,7 +59,8 @@ def _velocity_mps(world: World, low_m: Points, shape: tuple[int, int]) -> tuple[
     scale = 2**_SUBPIXEL_BITS / CELL_M
     water = np.zeros(shape, np.uint8)
     cv2.fillPoly(water, [np.rint((world.shore_m - low_m) * scale).astype(np.int32)], 1, shift=_SUBPIXEL_BITS)
-    bank_m = CELL_M * cv2.distanceTransform(water, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    bank_cells = cv2.distanceTransform(water, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    bank_m = CELL_M * np.sqrt(np.rint(bank_cells * bank_cells))  # OpenCV's last bit depends on its number of threads
     if world.channel_m is None:
         toward = world.current.toward_rad
         direction = np.array([[math.cos(toward), math.sin(toward)]])
