@@ -68,17 +68,16 @@ PAPER: dict[str, object] = {
     "plant": {"adapter": {"astern": 0.0}},
 }
 
-# A wide lens, looking down: who comes from 50 degrees off the bow is in the picture, and who lies 1.1 m before it.
-# What is meant by an angle, in the default for 70 degrees, 4:3 and 6 degrees down, stands where that angle lies in the
-# picture; but the side corridors go on to its sides, as a boat before a quay turns to water that a narrow lens does not
-# see, and all of them to its lower end.
+# A wide lens, level: who comes from 50 degrees off the bow is in the picture. What is meant by an angle, in the default
+# for 70 degrees, 4:3 and 6 degrees down, stands where that angle lies in the picture; but the side corridors go on to
+# its sides, as a boat before a quay turns to water that a narrow lens does not see.
 WIDE: dict[str, object] = {
     "profile": "wide",
-    "eye": {"hfov_deg": 102.0, "height_px": 180, "pitch_down_deg": 5.0},  # a Raspberry Pi Camera Module 3 Wide, 16:9
+    "eye": {"hfov_deg": 102.0, "height_px": 180, "pitch_down_deg": 0.0},  # as a Raspberry Pi Camera Module 3 Wide, 16:9
     "perception": {
-        "corridors": {"top": 0.36, "left": (0.02, 0.4375), "center": (0.392, 0.608), "right": (0.5625, 0.98)}
+        "corridors": {"top": 0.42, "left": (0.02, 0.4375), "center": (0.392, 0.608), "right": (0.5625, 0.98)}
     },
-    "advisor": {"policy": {"core_left": 0.446, "core_right": 0.554, "occupancy_bottom": 0.62}},
+    "advisor": {"policy": {"core_left": 0.446, "core_right": 0.554, "occupancy_bottom": 0.69}},
 }
 
 # Fans, or controllers of motors, that only push ahead: the boat turns by driving, and stops by drag alone.
