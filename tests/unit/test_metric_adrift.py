@@ -8,11 +8,12 @@ import pytest
 
 from paani.messages import Label
 from paani_services.navigator.grid import Grid, lay
+from paani_services.navigator.movers import Mover, movers
 from paani_services.navigator.planner import clearance_m
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose
-from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, Bar, box_over, edge_of, looked_away, seen
+from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, box_over, edge_of, looked_away, seen
 
 HULL: Bar = (4.0, -1.0, 5.0, 1.0)
 
@@ -54,3 +55,37 @@ def test_it_has_not_drifted_to_where_a_picture_shows_water() -> None:
     grid = lay(memory.sights, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
     assert grid.strayed.any()
     assert not (grid.strayed & grid.free).any()
+
+
+def watched(
+    velocity_mps: tuple[float, float], x_m: float, y_m: float, label: Label = Label.VESSEL
+) -> tuple[Mover, ...]:
+    """What moves for certain, when a boat at rest has watched this for 8 s; it came to that place last."""
+    memory, at_us = Memory(), START_US
+    for k in range(41):
+        left_s = 0.2 * (40 - k)
+        east, north = x_m - left_s * velocity_mps[0], y_m - left_s * velocity_mps[1]
+        hull: Bar = (east - 0.4, north - 1.0, east + 0.4, north + 1.0)
+        at_us = START_US + 200_000 * k
+        box = box_over(hull, 0.8, label)
+        x1, y1, x2, y2 = box.box_xyxy
+        cut = msgspec.structs.replace(box, box_xyxy=(max(x1, 0.0), y1, min(x2, 1.0), min(y2, 1.0)))
+        memory = seen(edge=edge_of(AT_REST, (hull,)), at_us=at_us, memory=memory, detections=(cut,))
+    return tuple(each for each in movers(memory.sights, at_us, CAMERA, PLANNER) if each.is_sure)
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.13), (-0.13, 0.0), (-0.09, -0.09)])
+@pytest.mark.parametrize("side_m", [0.0, 2.2, -2.2])  # at 2.2 m one end is outside the picture
+def test_a_vessel_adrift_is_told_from_a_moored_one_in_time(velocity: tuple[float, float], side_m: float) -> None:
+    """0.13 m/s is 0.33 m in `fit_s`, which one row of the mask is worth at 4 m; in 8 s it is 1 m."""
+    (vessel,) = watched(velocity, 4.0, side_m)
+    assert vessel.motion[:2] == pytest.approx(velocity, abs=0.06)
+
+
+@pytest.mark.parametrize("side_m", [0.0, 2.2])
+def test_a_moored_vessel_stands(side_m: float) -> None:
+    assert watched((0.0, 0.0), 4.0, side_m) == ()
+
+
+def test_a_pier_is_given_no_such_time() -> None:
+    assert watched((-0.1, 0.0), 4.0, 0.0, Label.PIER) == ()

@@ -22,6 +22,8 @@ PLACE_M, ACROSS_ROWS = 0.05, 2.3  # and everything else of its place, near and f
 OF_WIDTH = 0.03  # what shows of a thing changes with the side it shows
 SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
 STILL_MPS = 0.08  # slower things stand: Q6's drift covers them
+DRIFT_FIT_S, DRIFT_MPS = 8.0, 0.3  # what drifts goes a metre meanwhile, and no faster
+DRIFT_DEVIATION_MPS = 0.02  # a hull shows other parts of itself as it is passed
 FIXES, SPAN_S = 3, 0.7  # fewer or shorter say nothing
 FIXES_HZ = 5.0  # errors of pictures that follow faster are the same
 LOST_S = 1.0  # five pictures
@@ -38,7 +40,8 @@ class Fix(NamedTuple):
     """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
 
     box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
-    outline: points where it meets the water. whole: not cut by the picture's sides.
+    outline: points where it meets the water, from left to right. ends: whether the picture shows its left, its right
+    one; whole: both.
     """
 
     box: tuple[int, int]
@@ -48,7 +51,12 @@ class Fix(NamedTuple):
     weight: Symmetric
     along_m: float
     outline: tuple[F64, F64]
-    whole: bool
+    ends: tuple[bool, bool]
+
+    @property
+    def whole(self) -> bool:
+        """Not cut by the picture's sides."""
+        return all(self.ends)
 
 
 class Motion(NamedTuple):
@@ -68,6 +76,11 @@ class Fit(NamedTuple):
     velocity_mps: Pair
     pull: Pair
     deviation_mps: float
+
+    @property
+    def certainty(self) -> float:
+        """Standard deviations between it and rest, squared."""
+        return self.velocity_mps[0] * self.pull[0] + self.velocity_mps[1] * self.pull[1]
 
 
 class Mover(NamedTuple):
@@ -90,16 +103,20 @@ class Mover(NamedTuple):
 
 
 def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
-    """Everything that moved for certain when it was last seen whole, and people in sight. sights: oldest first."""
+    """Everything that moved for certain when it was last seen whole, vessels adrift, and people in sight.
+
+    sights: oldest first.
+    """
     found = []
     for track in _tracks(sights, now_us, camera, config):
         whole = [fix for fix in track if fix.whole]
-        motion = motion_of(whole, config.fit_s)
+        motion, last = motion_of(whole, config.fit_s), whole[-1] if whole else track[-1]
+        if motion is None and track[-1].label is Label.VESSEL:
+            motion, last = _drift_of(track), track[-1]
         if motion is None:
             if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].at_s <= config.occupied_s:
                 found.append(_person(track, config))
             continue
-        last = whole[-1]
         found.append(
             Mover(
                 last.outline[0] - last.at_s * motion.east_mps,
@@ -111,6 +128,25 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
             )
         )
     return tuple(found)
+
+
+def _drift_of(track: list[Fix]) -> Motion | None:
+    """Of a vessel, over `DRIFT_FIT_S`: of its middle, or of an end while the other is cut; what is least by chance."""
+    parts = [[fix for fix in track if fix.whole]]
+    for end, point in ((0, 0), (1, -1)):
+        shown = [fix for fix in track if fix.ends[end]]
+        parts.append(
+            [fix._replace(place_m=(float(fix.outline[0][point]), float(fix.outline[1][point]))) for fix in shown]
+        )
+    best, most = None, 0.0
+    for fixes in parts:
+        fitted = _fitted(fixes, DRIFT_FIT_S)
+        if fitted is None or track[-1].at_s - fixes[-1].at_s > DRIFT_FIT_S:
+            continue
+        motion = _unless_chance(fitted)
+        if motion is not None and fitted.certainty > most and math.hypot(*motion[:2]) <= DRIFT_MPS:
+            best, most = motion._replace(deviation_mps=max(motion.deviation_mps, DRIFT_DEVIATION_MPS)), fitted.certainty
+    return best
 
 
 def _person(track: list[Fix], config: PlannerConfig) -> Mover:
@@ -138,14 +174,13 @@ def is_denied(mover: Mover, grid: Grid) -> bool:
 def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:
     """The velocity over the last `fit_s`; None where it may be chance."""
     fitted = _fitted(fixes, fit_s)
-    if fitted is None:
+    return None if fitted is None else _unless_chance(fitted)
+
+
+def _unless_chance(fitted: Fit) -> Motion | None:
+    if fitted.certainty < SIGNIFICANT * SIGNIFICANT or math.hypot(*fitted.velocity_mps) < STILL_MPS:
         return None
-    east_mps, north_mps = fitted.velocity_mps
-    if east_mps * fitted.pull[0] + north_mps * fitted.pull[1] < SIGNIFICANT * SIGNIFICANT:
-        return None
-    if math.hypot(east_mps, north_mps) < STILL_MPS:
-        return None
-    return Motion(east_mps, north_mps, fitted.deviation_mps)
+    return Motion(*fitted.velocity_mps, fitted.deviation_mps)
 
 
 def _fitted(fixes: list[Fix], fit_s: float) -> Fit | None:
@@ -268,8 +303,9 @@ def _fix(key: tuple[int, int], box: Box, at_s: float, lens: Lens, height_m: floa
         (along - across) * east * north,
         along * north * north + across * east * east,
     )
-    whole = box.left > CUT and max(box.right, box.low) < FOOT_STEPS - CUT
-    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, whole)
+    foot = box.low < FOOT_STEPS - CUT
+    ends = (foot and box.left > CUT, foot and box.right < FOOT_STEPS - CUT)
+    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, ends)
 
 
 def _times(a: Symmetric, b: Pair) -> Pair:
