@@ -8,8 +8,8 @@ import pytest
 
 from paani.messages import Label
 from paani_services.navigator.grid import Grid, lay
-from paani_services.navigator.movers import Mover, movers
-from paani_services.navigator.planner import clearance_m
+from paani_services.navigator.movers import Motion, Mover, movers
+from paani_services.navigator.planner import Start, Wish, clearance_m, plan, roll_out
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_sim.eye.camera import BoatPose
@@ -89,3 +89,21 @@ def test_a_moored_vessel_stands(side_m: float) -> None:
 
 def test_a_pier_is_given_no_such_time() -> None:
     assert watched((-0.1, 0.0), 4.0, 0.0, Label.PIER) == ()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_boat_that_waits_turns_to_where_it_wants_to_go(side: float) -> None:
+    """What passes out of sight is seen so, and the course it keeps is told; hulls that cannot turn on the spot stay."""
+    grid = lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    resting, wish = Start(0.0, 0.0, 0.0), Wish(1.8 * side, 0.6)
+    drifting = Mover(np.array([0.3]), np.array([2.6 * side]), 0.2, Motion(0.08, 0.0, 0.03), 3.0, frozenset())
+    found = plan(grid, resting, wish, None, PLANNER, (drifting,))
+    assert found.speed_mps == pytest.approx(0.06)
+    assert found.heading_rad == pytest.approx(1.8 * side)
+    on = roll_out(resting, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
+    near = on.at_s <= PLANNER.horizon_s
+    assert np.hypot(on.x_m, on.y_m)[near].max() < 0.2
+    turned = Start(0.0, 0.0, 1.8 * side)
+    assert plan(grid, turned, wish, None, PLANNER, (drifting,)).speed_mps == 0.0
+    pushes_only = msgspec.structs.replace(PLANNER, turn_radius_m=0.5)
+    assert plan(grid, resting, wish, None, pushes_only, (drifting,)).speed_mps == 0.0

@@ -23,7 +23,7 @@ OF_WIDTH = 0.03  # what shows of a thing changes with the side it shows
 SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
 STILL_MPS = 0.08  # slower things stand: Q6's drift covers them
 DRIFT_FIT_S, DRIFT_MPS = 8.0, 0.3  # what drifts goes a metre meanwhile, and no faster
-DRIFT_DEVIATION_MPS = 0.02  # a hull shows other parts of itself as it is passed
+DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
 FIXES, SPAN_S = 3, 0.7  # fewer or shorter say nothing
 FIXES_HZ = 5.0  # errors of pictures that follow faster are the same
 LOST_S = 1.0  # five pictures
@@ -131,22 +131,22 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
 
 
 def _drift_of(track: list[Fix]) -> Motion | None:
-    """Of a vessel, over `DRIFT_FIT_S`: of its middle, or of an end while the other is cut; what is least by chance."""
-    parts = [[fix for fix in track if fix.whole]]
+    """Of a vessel, over `DRIFT_FIT_S`: of its middle; of an end where too few pictures show it whole."""
+    ends = []
     for end, point in ((0, 0), (1, -1)):
         shown = [fix for fix in track if fix.ends[end]]
-        parts.append(
+        ends.append(
             [fix._replace(place_m=(float(fix.outline[0][point]), float(fix.outline[1][point]))) for fix in shown]
         )
-    best, most = None, 0.0
-    for fixes in parts:
-        fitted = _fitted(fixes, DRIFT_FIT_S)
-        if fitted is None or track[-1].at_s - fixes[-1].at_s > DRIFT_FIT_S:
-            continue
-        motion = _unless_chance(fitted)
-        if motion is not None and fitted.certainty > most and math.hypot(*motion[:2]) <= DRIFT_MPS:
-            best, most = motion._replace(deviation_mps=max(motion.deviation_mps, DRIFT_DEVIATION_MPS)), fitted.certainty
-    return best
+    whole, left, right = (
+        _fitted(fixes, DRIFT_FIT_S) if fixes and track[-1].at_s - fixes[-1].at_s <= DRIFT_FIT_S else None
+        for fixes in ([fix for fix in track if fix.whole], *ends)
+    )
+    fits = [whole] if whole is not None else [fit for fit in (left, right) if fit is not None]
+    motion = _unless_chance(max(fits, key=lambda fit: fit.certainty)) if fits else None
+    if motion is None or math.hypot(*motion[:2]) > DRIFT_MPS:
+        return None
+    return motion._replace(deviation_mps=max(motion.deviation_mps, DRIFT_DEVIATION_MPS))
 
 
 def _person(track: list[Fix], config: PlannerConfig) -> Mover:

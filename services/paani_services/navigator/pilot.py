@@ -21,7 +21,7 @@ SAME_COURSE_RAD = math.radians(3.0)
 class Pilot(msgspec.Struct, frozen=True):
     """What was seen, the plan in force, the course and side it was made for, when, and on which picture.
 
-    waits_us: since when no plan moved the boat.
+    waits_us: since when no plan has led the boat on.
     """
 
     memory: Memory = Memory()
@@ -68,7 +68,7 @@ def steered(
         since_us = now_us if pilot.waits_us is None else pilot.waits_us
         patient = (now_us - since_us) * 1e-6 < config.patience_s
         held = plan(grid, start, wish, held, config, moving, patient=patient)
-        waits_us = None if held.speed_mps > 0.0 else since_us
+        waits_us = since_us if held.waits or held.speed_mps == 0.0 else None
         pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, waits_us, pilot.memory.frame)
     return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))
 

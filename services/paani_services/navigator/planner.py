@@ -37,10 +37,11 @@ ADVICE, ADVISED_RAD = 0.15, math.radians(25.0)  # not the advised side; nothing 
 
 
 class Plan(msgspec.Struct, frozen=True):
-    """Where to steer and how fast; 0: nowhere is free."""
+    """Where to steer and how fast; 0: nowhere is free. waits: until something has passed, but may turn meanwhile."""
 
     heading_rad: float
     speed_mps: float
+    waits: bool = False
 
 
 class Start(NamedTuple):
@@ -92,9 +93,9 @@ def plan(
     margin is kept to what stands, or else a way is taken that leads out from beside it, or at last the one that keeps
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
     way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
-    Where what moves leaves no way onward, a patient boat waits until it has passed: one that flees keeps abreast. Where
-    that would come to a boat that waits, less of a margin is kept to it too. Who may swim, but was not seen to while it
-    waited, is kept clear of as what stands.
+    Where what moves leaves no way onward, a patient boat waits until it has passed, turned to its course as far as
+    that brings it no nearer: one that flees keeps abreast. Where that would come to a boat that waits, less of a
+    margin is kept to it too. Who may swim, but was not seen to while it waited, is kept clear of as what stands.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, little made good, another than before.
     """
@@ -145,11 +146,12 @@ def plan(
     moved: Mask = np.asarray(((moved_m < 0.0) & nearby).any(axis=0))
     coast_m = _nearest_m(_looked_up(grid, clear_m, coast), movers, coast)
     is_safe = not is_approached and np.where(soon, coast_m, np.inf).min() >= tight_m
-    if patient and is_safe and _is_held_up(offsets, refused | turns, moved):
-        return nowhere
-    if refused.all():
+    waits = patient and is_safe and _is_held_up(offsets, refused | turns, moved)
+    if waits:
+        refused = barred | ~turns | (offsets != offsets[0]) | (met & soon).any(axis=0)  # it looks that way meanwhile
+    elif refused.all():
         refused = ~_leads_out(gap_m, nearby, soon) | moved | barred
-    if refused.all():
+    if refused.all() and not waits:
         refused = ~_passes_wider(nearest_m, coast_m, soon, barred | is_full)
     if refused.all():
         return nowhere
@@ -160,7 +162,7 @@ def plan(
     cost = cost + _way_costs(ways, roomy_m, met & looked, unseen & looked, soon, config)
     cost = cost + WITHIN * np.add.accumulate(within_m)[-1] / float(soon.sum())
     best = int(np.where(refused, np.inf, cost).argmin())
-    return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]))
+    return Plan(wrap_rad(start.yaw_rad + float(offsets[best])), float(speeds[best]), waits)
 
 
 def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
