@@ -279,15 +279,6 @@ def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Dire
     assert ordered[-1] == 0.0
 
 
-def test_a_boat_that_looks_turns_the_long_way_round_too() -> None:
-    """The route leads on abaft the starboard beam, port is advised: it had lain before a wall for good (canal-10)."""
-    pool = Pool(boat=BoatPose(0.0, 0.0, math.radians(160.0)))
-    pool.direction, pool.shut_in = Direction.LEFT, True
-    pool.settle(20.0)
-    turned = (pool.boat.yaw_rad - math.radians(160.0)) % (2.0 * math.pi)
-    assert math.radians(60.0) < turned < math.radians(320.0)
-
-
 def test_a_boat_without_room_does_not_turn_to_look() -> None:
     """Advice gives way to the map: what its hull would sweep must be free."""
     pool = Pool(bank_m=0.9)

@@ -209,6 +209,19 @@ def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: 
     assert after[6].direction is D.STOP  # anew
 
 
+def test_a_look_in_vain_is_followed_by_one_to_the_other_side() -> None:
+    """16 s to each side, however stuck what it sees is.
+
+    More cases in which the boat moves, though only round: it had lain before a wall for good, as it was advised to look
+    away from where its route led (canal-10).
+    """
+    state, advice, _ = play([SHUT_IN] * 360, CALIBRATED)
+    assert [a.direction for a in advice] == [D.STOP] * 40 + ([D.LEFT] * 80 + [D.RIGHT] * 80) * 2
+    assert {a.reason for a in advice[40:]} == {R.NO_SIDE_FOR_LONG}
+    _, after, _ = play([CLEAR] * 3 + [SHUT_IN] * 40, CALIBRATED, state=state, first_seq=360)
+    assert {a.direction for a in after[3:]} == {D.STOP}  # anew
+
+
 def test_one_frame_without_water_is_no_way_to_look_for() -> None:
     """However long it has looked: STOP, and it waits anew."""
     state, advice, _ = play([SHUT_IN] * 45, CALIBRATED)

@@ -20,7 +20,7 @@ class PolicyState(msgspec.Struct, frozen=True):
 
     occupied_frames: frames in a row each lane was occupied. turn: the turn in progress. clear_frames: frames in a row
     the centre was clear. blocked: which lanes were. shut_frames: frames in a row that showed water but no way that is
-    free, up to one more than `look_frames`.
+    free; a look to one side that was in vain counts no more when it begins to look to the other.
     """
 
     occupied_frames: tuple[int, int, int] = (0, 0, 0)
@@ -107,7 +107,9 @@ def decide(
     turn = direction if direction in SIDE_OF else None
     if direction is Direction.STOP:
         turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
-    shut_frames = min(state.shut_frames, policy.look_frames) + 1 if shows_water and is_shut(standing) else 0
+    shut_frames = 0
+    if shows_water and is_shut(standing):
+        shut_frames = 1 + (policy.look_frames if looks_in_vain(state, config) else state.shut_frames)
     after = PolicyState(frames, turn, clear_frames, (standing.left, standing.center, standing.right), shut_frames)
     return after, Decision(direction, reason, judged["left"], judged["center"], judged["right"], standing)
 
@@ -141,16 +143,22 @@ def looks(state: PolicyState, config: Config) -> bool:
     return can_turn and 0 < needed <= state.shut_frames
 
 
+def looks_in_vain(state: PolicyState, config: Config) -> bool:
+    """It has looked to one side for twice as long as it waited: at 0.35 rad/s and 5 Hz that is most of a turn about."""
+    return state.shut_frames >= 3 * config.advisor.policy.look_frames
+
+
 def side_held(state: PolicyState, config: Config) -> tuple[str, float]:
     """The side to take unless the other is better, and by how much it must be (resolution 13).
 
-    A boat that looks for a way looks on to the side it began with.
+    A boat that looks for a way looks on to the side it began with, and then, where that was in vain, to the other.
     """
     policy = config.advisor.policy
     if state.turn is None:
         return "right", policy.tie
     if looks(state, config) and state.shut_frames > policy.look_frames:
-        return SIDE_OF[state.turn], math.inf
+        side = SIDE_OF[state.turn]
+        return OTHER[side] if looks_in_vain(state, config) else side, math.inf
     return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
 
 

@@ -114,8 +114,7 @@ def plan(
     if wish.turns:
         barred |= ~turns | (wish.side * offsets < ON_THE_SPOT_RAD)
     span_rad = math.radians(config.span_deg) + 1e-9
-    is_astray = wish.turns and abs(offsets[0]) > span_rad + ON_THE_SPOT_RAD  # looks round the other way too
-    if gap_m[0, 0] >= config.hull_radius_m + config.margin_m and not is_astray:
+    if gap_m[0, 0] >= config.hull_radius_m + config.margin_m:
         barred |= np.abs(offsets - offsets[0]) > span_rad  # before a dead end it waits, and does not circle
     soon = (ways.at_s <= config.horizon_s + 1e-9)[:, None]
     nearby, looked = soon | (ways.way_m <= config.room_m), ways.way_m <= config.look_m
