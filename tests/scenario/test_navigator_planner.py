@@ -31,8 +31,8 @@ from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import route_alone
 from paani_services.navigator.navigate import Heard, NavState, navigate
-from paani_services.navigator.planner import PARTS
 from paani_services.navigator.shown import Camera
+from paani_services.navigator.ways import PARTS
 from paani_sim.eye.camera import BoatPose
 from tests.unit.watery_sights import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
 

@@ -14,9 +14,10 @@ from paani_services.navigator.fence import is_allowed
 from paani_services.navigator.fence_cells import fenced
 from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.pilot import Pilot, steered
-from paani_services.navigator.planner import Plan, Start, Wish, plan
+from paani_services.navigator.planner import Plan, plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
+from paani_services.navigator.ways import Start, Wish
 from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, odometry, seen
 
 ATHWART: Bar = (3.6, -0.9, 4.2, 0.9)

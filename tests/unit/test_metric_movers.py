@@ -11,11 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.messages import Detection, Label
+from paani_services.navigator.gaps import ASTRAY_MPS, gap_to_m
 from paani_services.navigator.grid import Grid, lay
 from paani_services.navigator.movers import Motion, Mover, is_denied, movers
 from paani_services.navigator.pilot import Pilot, steered
-from paani_services.navigator.planner import ASTRAY_MPS, Plan, Start, Ways, Wish, coasting, gap_to_m, plan, roll_out
+from paani_services.navigator.planner import Plan, plan
 from paani_services.navigator.sighting import Memory
+from paani_services.navigator.ways import Start, Ways, Wish, coasting, roll_out
 from paani_sim.eye.camera import BoatPose, project
 from tests.unit.watery_sights import (
     AT_REST,

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from paani.messages import Detection, Label
+from paani_services.navigator.gaps import clearance_m
 from paani_services.navigator.grid import Grid, lay
-from paani_services.navigator.planner import Start, Wish, clearance_m, plan
+from paani_services.navigator.planner import plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
+from paani_services.navigator.ways import Start, Wish
 from paani_sim.eye.camera import BoatPose
 from tests.unit.watery_sights import AT_REST, CAMERA, PLANNER, Bar, box_over, edge_of, looked_away, seen
 

@@ -13,24 +13,12 @@ from hypothesis import strategies as st
 from paani.config import load_config
 from paani.messages import Detection, Label
 from paani_services.navigator.distances import distance_m
+from paani_services.navigator.gaps import clearance_m, footprint_m
 from paani_services.navigator.grid import CELLS, Grid, lay
-from paani_services.navigator.planner import (
-    LOSE_M,
-    ON_THE_SPOT_RAD,
-    PARTS,
-    Plan,
-    Start,
-    Ways,
-    Wish,
-    candidates,
-    clearance_m,
-    coasting,
-    footprint_m,
-    plan,
-    roll_out,
-)
+from paani_services.navigator.planner import LOSE_M, ON_THE_SPOT_RAD, Plan, plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
+from paani_services.navigator.ways import PARTS, Start, Ways, Wish, candidates, coasting, roll_out
 from paani_sim.eye.camera import BoatPose, project
 from tests.unit.watery_sights import AT_REST, CAMERA, EYE, PLANNER, START_US, Bar, edge_of, seen, standing_gaps_m
 

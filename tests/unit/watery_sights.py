@@ -7,9 +7,9 @@ import numpy as np
 from paani import messages as m
 from paani.config import calibration_of, load_config
 from paani_services.navigator.grid import Grid
-from paani_services.navigator.planner import Ways
 from paani_services.navigator.shown import CELL_M, Camera
 from paani_services.navigator.sighting import Memory, remember
+from paani_services.navigator.ways import Ways
 from paani_sim.eye.camera import BoatPose, look_from, project
 from paani_sim.eye.mounted import camera_of
 

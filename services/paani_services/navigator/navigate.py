@@ -26,9 +26,9 @@ from paani_services.navigator.grid import UNCALIBRATED
 from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
 from paani_services.navigator.passing import Guards, guarded_course, watch
 from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, brakes, looked, steered
-from paani_services.navigator.planner import Wish
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
+from paani_services.navigator.ways import Wish
 
 
 class NavState(msgspec.Struct, frozen=True):

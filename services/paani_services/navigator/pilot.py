@@ -11,9 +11,10 @@ from paani_services.navigator.fence import Fence
 from paani_services.navigator.fence_cells import fenced
 from paani_services.navigator.grid import Moving, lay
 from paani_services.navigator.movers import is_denied, movers
-from paani_services.navigator.planner import CARRIED_MPS, Plan, Start, Wish, plan
+from paani_services.navigator.planner import Plan, plan
 from paani_services.navigator.shown import Camera
 from paani_services.navigator.sighting import Memory, remember
+from paani_services.navigator.ways import CARRIED_MPS, Start, Wish
 
 SAME_COURSE_RAD = math.radians(3.0)
 
