@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from paani.messages import Label
-from paani_services.navigator.gaps import clearance_m
-from paani_services.navigator.grid import Grid, lay
+from paani_services.navigator.gaps import clearance_m, gap_to_m
+from paani_services.navigator.grid import CELLS, Grid, lay
 from paani_services.navigator.movers import Motion, Mover, movers
-from paani_services.navigator.planner import plan
+from paani_services.navigator.planner import LOSE_M, plan
 from paani_services.navigator.shown import CELL_M
 from paani_services.navigator.sighting import Memory
 from paani_services.navigator.ways import Start, Wish, roll_out
@@ -109,3 +109,22 @@ def test_a_boat_that_waits_turns_to_where_it_wants_to_go(side: float) -> None:
     assert plan(grid, turned, wish, None, PLANNER, (drifting,)).speed_mps == 0.0
     pushes_only = msgspec.structs.replace(PLANNER, turn_radius_m=0.5)
     assert plan(grid, resting, wish, None, pushes_only, (drifting,)).speed_mps == 0.0
+
+
+@pytest.mark.parametrize("course_deg", [0.0, 60.0, 170.0])
+def test_a_boat_leaves_where_something_unseen_may_have_got_to(course_deg: float) -> None:
+    """More cases in which the boat moves: it had lain there, open water ahead, until it was run into (harbour-21)."""
+    grid, start = lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER), Start(0.0, 0.0, 0.0)
+    middle_m = CELL_M * (np.arange(CELLS) + 0.5)
+    east_m, north_m = grid.west_m + middle_m[None, :] + 1.6, grid.south_m + middle_m[:, None] - 1.2
+    grid = grid._replace(strayed=(np.hypot(east_m, north_m) < 2.8) & ~grid.free)
+    assert clearance_m(grid, PLANNER)[CELLS // 2, CELLS // 2] < -0.3
+    coming = Mover(np.array([-1.6]), np.array([1.2]), 0.2, Motion(0.1, -0.08, 0.05), 14.0, frozenset())
+    assert gap_to_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here already
+    found = plan(grid, start, Wish(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
+    assert 0.0 < found.speed_mps < 0.6
+    on = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
+    gaps_m = gap_to_m(coming, on.x_m, on.y_m, on.at_s[:, None])[on.at_s <= PLANNER.horizon_s]
+    rests_m = gap_to_m(coming, np.zeros(1), np.zeros(1), on.at_s[:, None])[on.at_s <= PLANNER.horizon_s]
+    assert (gaps_m >= rests_m - LOSE_M).all()
+    assert gaps_m[-1] > rests_m[-1]

@@ -17,6 +17,7 @@ from paani_services.navigator.gaps import (
     clearance_m,
     comes_near,
     footprint_m,
+    gap_to_m,
     led,
     looked_up,
     margins,
@@ -55,7 +56,8 @@ class Tried(NamedTuple):
     """What each candidate meets: [candidates], or [times, candidates] of `ways`.
 
     off_rad: off the wanted course. soon: times within the horizon [times, 1]. nearby: so soon, or within `room_m`.
-    gap_m: to what stands. nearest_m: to what moves, too. coast_m: the least of that within the horizon, fans off.
+    gap_m: to what stands. nearest_m: to what moves, too. coast: where it gets with its fans off. coast_m: how near it
+    comes there within the horizon.
     tight_m: hull and `tight_margin_m`. is_approached: what moves for certain comes that near to a boat that coasts.
     """
 
@@ -74,6 +76,7 @@ class Tried(NamedTuple):
     unseen: Mask
     tight_m: float
     is_approached: bool
+    coast: Ways
     coast_m: float
 
 
@@ -123,7 +126,7 @@ def plan(
         looks = way.turns & (way.offsets == way.offsets[0])
         refused = barred | ~looks | (room.met & way.soon).any(axis=0)
     elif refused.all():
-        refused = ~_leads_out(way) | room.moved | barred
+        refused = ~_leads_out(way) | ~_leads_away(way, start, config) | barred
     if refused.all() and not waits:
         refused = ~_passes_wider(way, barred | way.is_full)
     if refused.all():
@@ -156,6 +159,7 @@ def _tried(grid: Grid, start: Start, wish: Wish, movers: Sequence[Mover], config
         unseen=looked_up(grid, distance_m(grid.unknown), ways) < config.hull_radius_m,
         tight_m=tight_m,
         is_approached=comes_near(movers, coast.x_m[last], coast.y_m[last], tight_m),
+        coast=coast,
         coast_m=float(np.where(soon, coast_m, np.inf).min()),
     )
 
@@ -201,6 +205,23 @@ def _leads_out(way: Tried) -> Mask:
     least_m = np.where(way.nearby, way.gap_m, np.inf).min(axis=0)
     now_m, last_m = way.gap_m[0, 0], way.gap_m[int(way.soon.sum()) - 1]
     return np.asarray((least_m >= now_m - LOSE_M) & (last_m >= now_m + GAIN_M))
+
+
+def _leads_away(way: Tried, start: Start, config: PlannerConfig) -> Mask:
+    """Ways that keep clear of each thing that moves, or of where it may be by now: then like `_leads_out` [candidates].
+
+    Measured against a boat that coasts: what was not seen for long may be anywhere around it, the more the later.
+    """
+    fine, soon = np.ones(way.offsets.size, np.bool_), way.soon[:, 0]
+    kept = margins(config)[-1] if way.is_approached else config
+    for mover in way.movers:
+        is_clear = ((all_spare_m([mover], way.ways, start, kept) >= 0.0) | ~way.nearby).all(axis=0)
+        there_m, here_m = (
+            gap_to_m(mover, each.x_m, each.y_m, each.at_s[:, None])[soon] for each in (way.ways, way.coast)
+        )
+        is_left = (there_m >= here_m - LOSE_M).all(axis=0) & (there_m[-1] >= here_m[-1] + GAIN_M)
+        fine &= is_clear | is_left
+    return fine
 
 
 def _passes_wider(way: Tried, barred: Mask) -> Mask:
