@@ -29,7 +29,7 @@ from paani_sim.worlds.faults import is_linked
 PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`paani bench chain`), about 100 ms
 READY_LIMIT_S = 20.0
 MIN_READY_S = 2.0
-STALL_S, STALL_M = 60.0, 0.5  # who gets no further than this in that time is not waiting for anything that passes
+STALL_S, STALL_M = 120.0, 0.5  # who gets no further in that time neither waits for what passes nor goes round a barge
 ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
 END_M = 4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
 BELIEVED_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS

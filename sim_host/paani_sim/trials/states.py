@@ -14,7 +14,7 @@ class Phase(StrEnum):
 class Why(StrEnum):
     """How a drive ended. Only COMPLETED is a success; touching something does not end a drive.
 
-    STALLED: a minute without progress along the route.
+    STALLED: two minutes without progress along the route.
     """
 
     NONE = "none"
