@@ -1,4 +1,4 @@
-"""Vessels out of sight: one that is adrift too slowly to be told from moored comes nearer while it is passed."""
+"""Vessels adrift: told from moored ones in time; out of sight, they come nearer while they are passed or waited for."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def margins(config: PlannerConfig) -> list[PlannerConfig]:
     return [config, *(msgspec.structs.replace(config, margin_m=m, drift_mps=d) for m, d in tighter)]
 
 
-def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
+def spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
     """Between the footprint and a thing that moves. What comes near a boat at rest may come no nearer on the way."""
     at_s = ways.at_s[:, None]
     rest_m = gap_to_m(mover, np.full_like(at_s, start.x_m), np.full_like(at_s, start.y_m), at_s)[:, 0]
@@ -91,9 +91,9 @@ def _spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F
 
 
 def all_spare_m(movers: Sequence[Mover], ways: Ways, start: Start, config: PlannerConfig) -> F64:
-    """`_spare_m` of the nearest; without any, without end."""
+    """`spare_m` of the nearest; without any, without end."""
     far_m = np.full(ways.x_m.shape, np.inf)
-    return np.asarray(np.minimum.reduce([far_m, *(_spare_m(each, ways, start, config) for each in movers)]))
+    return np.asarray(np.minimum.reduce([far_m, *(spare_m(each, ways, start, config) for each in movers)]))
 
 
 def led(mover: Mover, lead_s: float) -> Mover:

@@ -84,7 +84,7 @@ class Fit(NamedTuple):
 
 
 class Mover(NamedTuple):
-    """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen whole.
+    """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen, whole or adrift.
 
     boxes: what it has left behind; where it was within `free_s` of when it was last seen stays occupied.
     """
@@ -112,7 +112,7 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
         whole = [fix for fix in track if fix.whole]
         motion, last = motion_of(whole, config.fit_s), whole[-1] if whole else track[-1]
         if motion is None and track[-1].label is Label.VESSEL:
-            motion, last = _drift_of(track), track[-1]
+            motion, last = _drift_of(track, whole), track[-1]
         if motion is None:
             if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].at_s <= config.occupied_s:
                 found.append(_person(track, config))
@@ -130,23 +130,29 @@ def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: Plann
     return tuple(found)
 
 
-def _drift_of(track: list[Fix]) -> Motion | None:
-    """Of a vessel, over `DRIFT_FIT_S`: of its middle; of an end where too few pictures show it whole."""
-    ends = []
-    for end, point in ((0, 0), (1, -1)):
-        shown = [fix for fix in track if fix.ends[end]]
-        ends.append(
-            [fix._replace(place_m=(float(fix.outline[0][point]), float(fix.outline[1][point]))) for fix in shown]
-        )
-    whole, left, right = (
-        _fitted(fixes, DRIFT_FIT_S) if fixes and track[-1].at_s - fixes[-1].at_s <= DRIFT_FIT_S else None
-        for fixes in ([fix for fix in track if fix.whole], *ends)
-    )
-    fits = [whole] if whole is not None else [fit for fit in (left, right) if fit is not None]
-    motion = _unless_chance(max(fits, key=lambda fit: fit.certainty)) if fits else None
+def _drift_of(track: list[Fix], whole: list[Fix]) -> Motion | None:
+    """Of a vessel, over `DRIFT_FIT_S`: of its middle; of the surer end where too few pictures show it whole."""
+    fitted = _lately_fitted(whole, track[-1].at_s)
+    if fitted is None:
+        ends = [_lately_fitted(_placed_at_end(track, end), track[-1].at_s) for end in (0, 1)]
+        fitted = max((fit for fit in ends if fit is not None), key=lambda fit: fit.certainty, default=None)
+    motion = _unless_chance(fitted)
     if motion is None or math.hypot(*motion[:2]) > DRIFT_MPS:
         return None
     return motion._replace(deviation_mps=max(motion.deviation_mps, DRIFT_DEVIATION_MPS))
+
+
+def _lately_fitted(fixes: list[Fix], last_s: float) -> Fit | None:
+    return _fitted(fixes, DRIFT_FIT_S) if fixes and last_s - fixes[-1].at_s <= DRIFT_FIT_S else None
+
+
+def _placed_at_end(track: list[Fix], end: int) -> list[Fix]:
+    """The fixes that show its left end, 0, or its right one, 1: placed there."""
+    return [
+        fix._replace(place_m=(float(fix.outline[0][-end]), float(fix.outline[1][-end])))
+        for fix in track
+        if fix.ends[end]
+    ]
 
 
 def _person(track: list[Fix], config: PlannerConfig) -> Mover:
@@ -173,12 +179,11 @@ def is_denied(mover: Mover, grid: Grid) -> bool:
 
 def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:
     """The velocity over the last `fit_s`; None where it may be chance."""
-    fitted = _fitted(fixes, fit_s)
-    return None if fitted is None else _unless_chance(fitted)
+    return _unless_chance(_fitted(fixes, fit_s))
 
 
-def _unless_chance(fitted: Fit) -> Motion | None:
-    if fitted.certainty < SIGNIFICANT * SIGNIFICANT or math.hypot(*fitted.velocity_mps) < STILL_MPS:
+def _unless_chance(fitted: Fit | None) -> Motion | None:
+    if fitted is None or fitted.certainty < SIGNIFICANT * SIGNIFICANT or math.hypot(*fitted.velocity_mps) < STILL_MPS:
         return None
     return Motion(*fitted.velocity_mps, fitted.deviation_mps)
 

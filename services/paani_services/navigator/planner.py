@@ -22,6 +22,7 @@ from paani_services.navigator.gaps import (
     looked_up,
     margins,
     nearest_m,
+    spare_m,
 )
 from paani_services.navigator.grid import Grid
 from paani_services.navigator.movers import Mover
@@ -127,8 +128,8 @@ def plan(
         refused = barred | ~looks | (room.met & way.soon).any(axis=0)
     elif refused.all():
         refused = ~_leads_out(way) | ~_leads_away(way, start, config) | barred
-    if refused.all() and not waits:
-        refused = ~_passes_wider(way, barred | way.is_full)
+        if refused.all():
+            refused = ~_passes_wider(way, barred | way.is_full)
     if refused.all():
         return nowhere
     cost = _costs(way, room, start, wish, before, config)
@@ -189,15 +190,15 @@ def _room(way: Tried, barred: Mask, start: Start, wish: Wish, config: PlannerCon
         kept = footprints.pop(0)
         if way.is_approached and kept is not config:
             moved_m = all_spare_m(way.movers, way.ways, start, kept)
-        spare_m = np.minimum(way.gap_m - footprint_m(way.ways.at_s, way.gap_m[0, 0], kept)[:, None], moved_m)
-        met = spare_m < 0.0
+        least_m = np.minimum(way.gap_m - footprint_m(way.ways.at_s, way.gap_m[0, 0], kept)[:, None], moved_m)
+        met = least_m < 0.0
         refused = (met & way.nearby).any(axis=0) | barred
         if kept is not config:
             refused |= way.is_full
         if footprints and not wish.turns:
             refused |= way.turns & (way.off_rad > ONWARD_RAD)
         if not (refused.all() and footprints):
-            return Room(refused, met, spare_m, np.asarray(((moved_m < 0.0) & way.nearby).any(axis=0)))
+            return Room(refused, met, least_m, np.asarray(((moved_m < 0.0) & way.nearby).any(axis=0)))
 
 
 def _leads_out(way: Tried) -> Mask:
@@ -215,7 +216,7 @@ def _leads_away(way: Tried, start: Start, config: PlannerConfig) -> Mask:
     fine, soon = np.ones(way.offsets.size, np.bool_), way.soon[:, 0]
     kept = margins(config)[-1] if way.is_approached else config
     for mover in way.movers:
-        is_clear = ((all_spare_m([mover], way.ways, start, kept) >= 0.0) | ~way.nearby).all(axis=0)
+        is_clear = ((spare_m(mover, way.ways, start, kept) >= 0.0) | ~way.nearby).all(axis=0)
         there_m, here_m = (
             gap_to_m(mover, each.x_m, each.y_m, each.at_s[:, None])[soon] for each in (way.ways, way.coast)
         )
