@@ -340,6 +340,19 @@ def test_a_boat_within_what_is_occupied_goes_no_deeper(course: float) -> None:
         assert abs(found.heading_rad) > 1.5
 
 
+@pytest.mark.parametrize("gap_m", [0.1, 0.2, 0.3])
+def test_a_boat_with_its_bow_to_something_turns_away_on_the_spot(gap_m: float) -> None:
+    """That leads it out, though it is no further off within the horizon: it lay there until it was drifted onto."""
+    cells = np.zeros((CELLS, CELLS), np.bool_)
+    cells[:, 50:60] = True
+    start = Start(-gap_m, 0.0, 0.0)
+    found = plan(round_about(cells), start, Wish(1.9, 0.3), None, PLANNER)
+    assert found.speed_mps == pytest.approx(PARTS[-1] * 0.3)
+    assert clearance_along_m(round_about(cells), start, found).min() >= gap_m - LOSE_M - 0.5 * CELL_M
+    cells[:, :48] = cells[:48] = cells[52:] = True  # and in a corner that leads nowhere it lies still
+    assert plan(round_about(cells), start, Wish(1.9, 0.3), None, PLANNER).speed_mps == 0.0
+
+
 @pytest.mark.parametrize("surge", [0.0, 0.6])
 def test_near_anything_no_way_is_taken_at_full_speed(surge: float) -> None:
     """Beside a wall 0.5 m off, less than hull and Q6's margin, it goes at half the speed; at 2 m at the whole."""

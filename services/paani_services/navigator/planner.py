@@ -202,9 +202,13 @@ def _room(way: Tried, barred: Mask, start: Start, wish: Wish, config: PlannerCon
 
 
 def _leads_out(way: Tried) -> Mask:
-    """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates]."""
+    """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates].
+
+    In the end of `room_m`: what begins with a turn on the spot gets nowhere within the horizon.
+    """
     least_m = np.where(way.nearby, way.gap_m, np.inf).min(axis=0)
-    now_m, last_m = way.gap_m[0, 0], way.gap_m[int(way.soon.sum()) - 1]
+    last = way.nearby.sum(axis=0) - 1
+    now_m, last_m = way.gap_m[0, 0], way.gap_m[last, np.arange(last.size)]
     return np.asarray((least_m >= now_m - LOSE_M) & (last_m >= now_m + GAIN_M))
 
 
