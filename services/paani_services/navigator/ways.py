@@ -68,8 +68,7 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     """Where the boat gets in steps of `step_s` up to `horizon_s`, then at full speed and twice as long up to `look_m`.
 
     Speed changes by `accel_mps2` at most; it turns towards the heading by `yaw_rate_radps` at most and on no tighter
-    circle than `turn_radius_m`, for fans that only push; what turns on the spot has turned before it goes on. What
-    carries it sideways now, wind or current, goes on to.
+    circle than `turn_radius_m`, for fans that only push. What carries it sideways now, wind or current, goes on to.
     """
     fine = round(config.horizon_s / config.step_s)
     coarse = math.ceil(config.look_m / (2.0 * config.step_s * config.speed_mps))
@@ -81,11 +80,9 @@ def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerCon
     turned, rate = np.zeros(count), np.full(count, start.yaw_rate_radps)
     speed = np.full(count, max(start.surge_mps, 0.0))
     rows = [(x_m, y_m, way_m)]
-    on_the_spot = (speeds_mps <= PARTS[-1] * config.speed_mps) & (config.turn_radius_m == 0.0)
     for number, step_s in enumerate(steps_s):
-        if number >= fine:  # from here on the way counts, not when
-            goes = ~on_the_spot | (np.abs(offsets_rad - turned) <= FULL_HELM_RAD)
-            speed, speeds_mps = (np.where(goes, np.maximum(at, config.speed_mps), at) for at in (speed, speeds_mps))
+        if number == fine:  # from here on the way counts, not when
+            speed, speeds_mps = np.maximum(speed, config.speed_mps), np.maximum(speeds_mps, config.speed_mps)
         helm = _between((offsets_rad - turned) / FULL_HELM_RAD, 1.0)
         gain = config.accel_mps2 * step_s
         driven = np.maximum(speeds_mps, config.helm_speed_mps * np.abs(helm))
