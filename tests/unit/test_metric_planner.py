@@ -160,7 +160,7 @@ def test_a_way_is_found_round_what_lies_abeam_of_the_goal() -> None:
     for off_m, leaves in ((0.9, True), (1.6, False)):
         quay = (-6.0, off_m, 9.0, off_m + 0.7)
         for course in (1.9, 2.6):
-            found = plan(pool(quay), Start(3.0, 0.0, 0.0), Wish(course, 0.6), None, PLANNER)
+            found = plan(pool(quay), Start(3.0, 0.0, 0.0), Wish(course, 0.6), Plan(0.0, 0.3), PLANNER)
             assert (found.speed_mps > 0.0 and found.heading_rad < -1.0) is leaves
 
 
@@ -347,11 +347,26 @@ def test_a_boat_with_its_bow_aslant_to_something_turns_away_on_the_spot(gap_m: f
     behind = column - 50 - np.rint(0.5 * (row - 50))
     cells = (behind >= 0) & (behind < 10)
     start = Start(-gap_m, 0.0, 0.0)
-    found = plan(round_about(cells), start, Wish(1.9, 0.3), None, PLANNER)
+    lay = Plan(0.0, 0.0)
+    found = plan(round_about(cells), start, Wish(1.9, 0.3), lay, PLANNER)
     assert found.speed_mps == pytest.approx(PARTS[-1] * 0.3)
     assert clearance_along_m(round_about(cells), start, found).min() >= gap_m - LOSE_M - 0.5 * CELL_M
     cells[:, :48] = cells[:48] = cells[52:] = True  # and in a corner that leads nowhere it lies still
-    assert plan(round_about(cells), start, Wish(1.9, 0.3), None, PLANNER).speed_mps == 0.0
+    assert plan(round_about(cells), start, Wish(1.9, 0.3), lay, PLANNER).speed_mps == 0.0
+
+
+@pytest.mark.parametrize("course", [1.2, 2.0, 2.8])
+def test_a_boat_that_lay_still_turns_to_what_it_does_not_see_before_it_goes(course: float) -> None:
+    """Something may have come up beside it: one went ahead, round, and into a hull that it had not seen for 30 s."""
+    row, column = np.indices((CELLS, CELLS))
+    cells = np.hypot(column - 49.5, row - 57.5) < 1.6  # abeam, 1.3 m off
+    wish, about = Wish(course, 0.6), Plan(pytest.approx(course), pytest.approx(PARTS[-1] * 0.6))
+    for before in (None, Plan(0.0, 0.0), Plan(course, PARTS[-1] * 0.6)):
+        assert plan(round_about(cells), RESTING, wish, before, PLANNER) == about
+    assert plan(round_about(cells), RESTING, wish, Plan(-2.0, PARTS[-1] * 0.6), PLANNER) != about  # it has looked there
+    assert plan(round_about(cells), CRUISING, wish, Plan(0.0, 0.6), PLANNER) != about
+    near = np.hypot(column - 49.5, row - 54.5) < 1.6
+    assert plan(round_about(near), RESTING, wish, None, PLANNER) != about  # there is no room for it
 
 
 @pytest.mark.parametrize("surge", [0.0, 0.6])

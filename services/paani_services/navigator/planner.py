@@ -28,13 +28,14 @@ from paani_services.navigator.grid import Grid
 from paani_services.navigator.movers import Mover
 from paani_services.navigator.projection import F64
 from paani_services.navigator.shown import Mask
-from paani_services.navigator.ways import PARTS, Start, Ways, Wish, candidates, coasting, roll_out
+from paani_services.navigator.ways import CARRIED_MPS, PARTS, Start, Ways, Wish, candidates, coasting, roll_out
 
 QUARTER = 0.5 * math.pi
 LOSE_M = 0.2  # on a way out: a turning boat's way ahead
 ONWARD_RAD = math.radians(75.0)  # off the wanted course; further off, a quarter of the way at most is made good
 PEOPLE_SLACK_M = 0.05  # a quarter of a cell, for looking it up
 ON_THE_SPOT_RAD = math.radians(20.0)  # by less it does not turn so: it would creep along, where it may wait
+IN_VIEW_RAD = math.radians(35.0)  # off the bow; no usual lens shows less
 # Weights of a candidate's cost: a quarter turn off the wanted course is 1.
 SOON = 3.0  # something on the way; less the farther, nothing beyond `look_m`
 CLOSE, CLEAR_M = 0.6, 2.0  # footprint touches something; less up to this clearance, by the square
@@ -108,7 +109,8 @@ def plan(
     furthest off, if that is further than coasting: fans that are off leave the boat to its way, wind and current. No
     way leads nearer to a person than hull and `tight_margin_m`; none within that of anything is taken at full speed.
     Where what moves leaves no way onward, a patient boat waits until it has passed, turned to its course as far as
-    that brings it no nearer: one that flees keeps abreast. Where that would come to a boat that waits, less of a
+    that brings it no nearer: one that flees keeps abreast. A boat that lay still turns to a course out of its view
+    before it goes: what came up meanwhile it has not seen. Where what moves would come to a boat that waits, less of a
     margin is kept to it too. Who may swim, but was not seen to while it waited, is kept clear of as what stands.
     Costs: off the wanted course, not to the advised side, near to things, within the margin, ahead of what moves, into
     the unknown, little made good, another than before.
@@ -124,8 +126,9 @@ def plan(
     is_held_up = bool((refused | way.turns)[onward].all() and room.moved[onward].any())
     waits = patient and is_held_up and not way.is_approached and way.coast_m >= way.tight_m
     if waits:
-        looks = way.turns & (way.offsets == way.offsets[0])
-        refused = barred | ~looks | (room.met & way.soon).any(axis=0)
+        refused = barred | ~_faces(way) | (room.met & way.soon).any(axis=0)
+    elif _lay_averted(way, start, before) and not (averted := _turns_about(way, barred, start, config)).all():
+        refused = averted
     elif refused.all():
         refused = ~_leads_out(way) | ~_leads_away(way, start, config) | barred
         if refused.all():
@@ -199,6 +202,29 @@ def _room(way: Tried, barred: Mask, start: Start, wish: Wish, config: PlannerCon
             refused |= way.turns & (way.off_rad > ONWARD_RAD)
         if not (refused.all() and footprints):
             return Room(refused, met, least_m, np.asarray(((moved_m < 0.0) & way.nearby).any(axis=0)))
+
+
+def _faces(way: Tried) -> Mask:
+    """The turn on the spot to the wanted course [candidates]."""
+    return np.asarray(way.turns & (way.offsets == way.offsets[0]))
+
+
+def _lay_averted(way: Tried, start: Start, before: Plan | None) -> bool:
+    """Whether a boat that lay still, or has begun to turn on the spot to its course since, does not see that way."""
+    if start.surge_mps > CARRIED_MPS or abs(float(way.offsets[0])) <= IN_VIEW_RAD:
+        return False
+    if before is None or before.speed_mps == 0.0:
+        return True
+    off_rad = wrap_rad(before.heading_rad - start.yaw_rad - float(way.offsets[0]))
+    return before.speed_mps <= PARTS[-1] * float(way.speeds[0]) and abs(off_rad) < 0.5 * ON_THE_SPOT_RAD
+
+
+def _turns_about(way: Tried, barred: Mask, start: Start, config: PlannerConfig) -> Mask:
+    """All but the turn on the spot to the wanted course, and that where hull and half a cell are not free for it."""
+    kept = margins(config)[-1]
+    moved_m = all_spare_m(way.movers, way.ways, start, kept if way.is_approached else config)
+    room_m = np.minimum(way.gap_m - (kept.hull_radius_m + kept.margin_m), moved_m)
+    return np.asarray(barred | ~_faces(way) | ((room_m < 0.0) & way.soon).any(axis=0))
 
 
 def _leads_out(way: Tried) -> Mask:
