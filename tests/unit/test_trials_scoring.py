@@ -193,7 +193,10 @@ def test_reaction_to_a_black_camera() -> None:
     """Fans off within one frame and half a second, and no sooner on again than the camera sees."""
     go, stop = Applying(at(4.0), False, 1), Applying(at(10.31), True, 0)
     assert reaction_of(go, stop) == (0.31, True)
-    assert reaction_of(go, stop, Applying(at(12.0), False, 2)) == (0.31, False)
+    assert reaction_of(go, stop, Applying(at(12.0), False, 2)) == (None, False)
+    assert reaction_of(go, stop, Applying(at(12.0), False, 2), Applying(at(14.0), True, 0)) == (4.0, False)
+    on = Applying(at(10.2), False, 1)  # it lay still for a moment as the camera failed, and was under way again
+    assert reaction_of(go, Applying(at(9.9), True, 0), on, Applying(at(10.5), True, 0)) == (0.5, True)
     assert reaction_of(go, stop, Applying(at(16.0), False, 2)) == (0.31, True)
     assert reaction_of(go, Applying(at(10.71), True, 0)) == (0.71, False)
     assert reaction_of(go) == (None, False)

@@ -32,34 +32,29 @@ def _reaction(fault: Fault, track: Track, frame_s: float) -> Reaction:
     start_us = START_US + round(fault.start_s * 1e6)
     end_s = min(fault.start_s + fault.duration_s, track.samples[-1].t_s)
     noticed = [stamp_us for stamp_us, _ in track.unusable if stamp_us >= start_us]
-    zero_s, held = _off(track.applied, fault.start_s, end_s)
+    zero_s = _off_s(track.applied, fault.start_s, end_s)
     return Reaction(
         fault=fault.kind.value,
         at_s=round(fault.start_s, 2),
         noticed_s=round((noticed[0] - start_us) * 1e-6, 3) if noticed else None,
         zero_thrust_s=round(zero_s, 3) if zero_s is not None else None,
         rest_s=_rest_s(track.samples, fault.start_s, end_s),
-        in_time=zero_s is not None and held and zero_s <= frame_s + IN_TIME_S,
+        in_time=zero_s is not None and zero_s <= frame_s + IN_TIME_S,
     )
 
 
-def _off(applied: Sequence[Applying], start_s: float, end_s: float) -> tuple[float | None, bool]:
-    """How long after the start the fans were off, and whether they stayed so until the end of the fault."""
-    is_zero, off_s, held = True, None, True
+def _off_s(applied: Sequence[Applying], start_s: float, end_s: float) -> float | None:
+    """How long after the start of the fault the fans went off for the rest of it; None: they did not."""
+    since_s: float | None = 0.0  # off before the first thrust
     for each in applied:
-        at_s = (each.at_us - START_US) * 1e-6
-        if at_s > start_s:
-            if is_zero and off_s is None:
-                off_s = 0.0
-            if at_s >= end_s:
-                break
-            if each.is_zero and off_s is None:
-                off_s = at_s - start_s
-            held &= each.is_zero or off_s is None
-        is_zero = each.is_zero
-    if off_s is None and is_zero:
-        off_s = 0.0
-    return off_s, held
+        after_s = (each.at_us - START_US) * 1e-6 - start_s
+        if after_s >= end_s - start_s:
+            break
+        if not each.is_zero:
+            since_s = None
+        elif since_s is None:
+            since_s = max(after_s, 0.0)
+    return since_s
 
 
 def _rest_s(samples: Sequence[Sample], start_s: float, end_s: float) -> float | None:

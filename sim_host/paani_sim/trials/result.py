@@ -64,8 +64,8 @@ class Stops(msgspec.Struct, frozen=True, kw_only=True):
 class Reaction(msgspec.Struct, frozen=True, kw_only=True):
     """What a camera fault led to, counted from its beginning [s]; None: never.
 
-    `noticed_s`: the picture first called unusable, or None where none came. `zero_thrust_s`, `rest_s`: fans off, boat
-    slower than 0.05 m/s. `in_time`: fans off within one frame and 0.5 s.
+    `noticed_s`: the picture first called unusable, or None where none came. `zero_thrust_s`, `rest_s`: fans off
+    until the fault is over, boat slower than 0.05 m/s. `in_time`: fans off within one frame and 0.5 s.
     """
 
     fault: str
