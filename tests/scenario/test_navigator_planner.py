@@ -182,11 +182,11 @@ def test_the_paper_has_no_planner() -> None:
 
 
 def test_what_is_not_seen_free_is_not_entered() -> None:
-    """No picture, then pictures that end: NO_FREE_PATH; before a bank the boat comes no nearer."""
+    """No picture, then pictures that end: NO_FREE_PATH; before a wall the boat comes no nearer."""
     pool = Pool()
     pool.looks = False
     assert pool.settle(1.0).inhibits == (Inhibit.NO_FREE_PATH,)
-    walled = Pool(bank_m=1.6)
+    walled = Pool((1.6, -40.0, 2.6, 40.0))
     walled.settle(20.0)
     assert walled.boat.x_m < 0.2
     pool.looks = True
