@@ -22,7 +22,7 @@ Fitness = Callable[[Bytes], float]
 DARK_LEVEL, BRIGHT_LEVEL = 6, 250  # of 255
 PLAIN_STD, DARK_TILE_STD, DARK_TILE_MEAN = 2.0, 3.0, 40.0
 # J. Immerkaer, Fast Noise Variance Estimation, 1996: a mask that image structure does not answer to.
-NOISE_MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
+NOISE_LINE = np.array([1, -2, 1], np.float32)  # the mask's factor, across and down
 NOISE_SCALE = float(np.sqrt(np.pi / 2.0)) / 6.0
 SKEW_ROWS, SKEW_PX = 2, (4, 10)  # lines this far apart, moved by so much against each other
 
@@ -75,10 +75,10 @@ def judge(
     still = known is not None and float(np.abs(small - known).mean()) < config.frozen_mad
     state = GateState(small, state.same + 1 if still else 1, epoch)
     cause = cause_of(measure(middle, small), config)
+    if fitness is not None and cause in (UnusableCause.NONE, UnusableCause.SKEWED):
+        cause = _asked(fitness, colour, cause, config)
     if cause is UnusableCause.NONE and state.same >= config.frozen_frames:
         cause = UnusableCause.FROZEN
-    if cause is UnusableCause.NONE and fitness is not None and not fitness(colour) >= config.min_fitness:
-        cause = UnusableCause.UNFIT
     return state, cause
 
 
@@ -93,8 +93,8 @@ def reduced(bgr: Bytes) -> tuple[Bytes, Bytes, Floats]:
 
 def measure(middle: Bytes, small: Floats) -> Statistics:
     """Statistics of one picture, from its two reductions."""
-    ordered = np.sort(small, axis=None)
-    low, high = ordered[small.size // 100], ordered[-1 - small.size // 100]
+    first, last = small.size // 100, small.size - 1 - small.size // 100
+    low, high = np.partition(small, (first, last), axis=None)[[first, last]]
     tile_mean, tile_std = _tiles(middle)
     covered = (tile_std < DARK_TILE_STD) & (tile_mean < DARK_TILE_MEAN)
     centred = small - small.mean()
@@ -108,7 +108,9 @@ def measure(middle: Bytes, small: Floats) -> Statistics:
         upright_residual=float((small - small.mean(axis=0)).std() / (small.std() + 1e-3)),
         correlation=min(float((centred[:, 1:] * centred[:, :-1]).mean()), float((centred[1:] * centred[:-1]).mean()))
         / variance,
-        sigma=cv2.norm(cv2.filter2D(middle, cv2.CV_16S, NOISE_MASK), cv2.NORM_L1) / middle.size * NOISE_SCALE,
+        sigma=cv2.norm(cv2.sepFilter2D(middle, cv2.CV_16S, NOISE_LINE, NOISE_LINE), cv2.NORM_L1)
+        / middle.size
+        * NOISE_SCALE,
         fineness=_edges(middle) / (_edges(small) + 1e-3),
         covered_frac=float(covered.mean()),
         rest_mean=float(tile_mean[~covered].mean()) if not covered.all() else 0.0,
@@ -143,6 +145,22 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
     if seen.skew < config.skew:
         return UnusableCause.SKEWED
     return UnusableCause.NONE
+
+
+def _asked(fitness: Fitness, colour: Bytes, cause: UnusableCause, config: GateConfig) -> UnusableCause:
+    """What the net makes of a picture whose statistics are sound, or whose lines may be of a wrong length.
+
+    A blurred or turned picture has such lines too: the net must be sure of it. One that it is not sure of, it is shown
+    upside down as well, because a picture that is fitter on its head stands on its head.
+    """
+    doubt = UnusableCause.UNFIT if cause is UnusableCause.NONE else cause
+    said = fitness(colour)
+    if not said >= config.min_fitness:
+        return doubt
+    if said >= config.sure_fitness:
+        return UnusableCause.NONE
+    upright = cause is UnusableCause.NONE and fitness(np.ascontiguousarray(colour[::-1, ::-1])) < said
+    return UnusableCause.NONE if upright else doubt
 
 
 def _edges(luma: Bytes | Floats) -> float:

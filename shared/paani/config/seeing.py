@@ -28,7 +28,8 @@ class GateConfig(Section, frozen=True):
     """Usable-picture gate: a picture beyond any of these limits is not evidence. `enabled=false` is the paper (J19).
 
     The limits lie between broken pictures and everything that real cameras deliver, fog, glare and night included.
-    `min_fitness` is what the gate's net must say at least, of 1; 0 leaves the net out.
+    `min_fitness` is what the gate's net must say at least, of 1; 0 leaves the net out. Below `sure_fitness` it looks
+    again, and does not speak for a picture whose lines may be of a wrong length.
     """
 
     enabled: bool = True
@@ -47,11 +48,12 @@ class GateConfig(Section, frozen=True):
     cover_frac: Fraction = 0.50  # of tiles dark and without texture, beside a bright rest
     cover_rest_mean: NonNegative = 58.0
     cover_total_frac: Fraction = 0.95  # whatever the rest
-    skew: Fraction = 0.82  # lines of a wrong length; measured: of 3,722 real pictures one has less
+    skew: Fraction = 0.82  # lines of a wrong length, unless the net is sure; of 3,722 real pictures one has less
     frozen_frames: Size = 3  # distinct frames that show the same: two periods of 0.2 s, and 0.1 s for the verdict
     frozen_mad: NonNegative = 0.05  # mean absolute difference of the small pictures
     model: str = ""  # path of an ONNX file; empty: the shipped model
     min_fitness: Fraction = 0.28  # chosen in training, on sequences that are not trained on: `paani models train gate`
+    sure_fitness: Fraction = 0.97
 
 
 class DetectorConfig(Section, frozen=True):
