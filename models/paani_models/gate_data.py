@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import cv2
@@ -20,7 +21,8 @@ Segment = Callable[[Bytes], Bytes]  # BGR uint8 [240,320,3] -> classes uint8 [24
 MIDDLE_WH = (320, 240)
 OPTIMISM = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
 GUESSED_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
-CHECKED = 10  # one training sequence in so many is not trained on and chooses the threshold
+# Whole sequences are not trained on and choose the threshold: of each source this share, and never more than so much.
+CHECKED_FRAC, MOST_CHECKED_FRAC = 0.1, 0.2
 
 
 class Cell(msgspec.Struct, frozen=True):
@@ -52,6 +54,7 @@ def scenes(samples: Sequence[Sample], segment: Segment) -> list[Scene]:
     What nobody segmented has the segmenter's own mask. Raises UserError naming an unreadable file.
     """
     found = []
+    held_back = checked_sequences(samples)
     for sample in tqdm(samples, desc="reading", unit="picture"):
         picture = middle(read_picture(sample.picture))
         rendered = sample.source.name == RENDERED
@@ -61,9 +64,23 @@ def scenes(samples: Sequence[Sample], segment: Segment) -> list[Scene]:
             mask = np.asarray(cv2.resize(read_mask(sample.mask), MIDDLE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
             if rendered and miou(segment(picture), mask) <= MUST_ACCEPT:
                 continue
-        checked = zlib.crc32(f"gate {sample.source.name} {sample.sequence}".encode()) % CHECKED == 0
+        checked = (sample.source.name, sample.sequence) in held_back
         found.append(Scene(picture, mask, sample.mask is not None and not rendered, checked))
     return found
+
+
+def checked_sequences(samples: Sequence[Sample]) -> set[tuple[str, str]]:
+    """Source and name of the sequences that are not trained on; none of a source whose sequences are all too long."""
+    lengths = Counter((sample.source.name, sample.sequence) for sample in samples)
+    totals = Counter(sample.source.name for sample in samples)
+    taken: Counter[str] = Counter()
+    chosen = set()
+    for source, sequence in sorted(lengths, key=lambda pair: zlib.crc32("gate {} {}".format(*pair).encode())):
+        grown = taken[source] + lengths[source, sequence]
+        if taken[source] < CHECKED_FRAC * totals[source] and grown <= MOST_CHECKED_FRAC * totals[source]:
+            taken[source] = grown
+            chosen.add((source, sequence))
+    return chosen
 
 
 def middle(rgb: Bytes) -> Bytes:

@@ -14,7 +14,7 @@ from paani.errors import UserError  # noqa: E402
 from paani.picture_faults import WATER  # noqa: E402
 from paani_models import train_gate  # noqa: E402
 from paani_models.gate import Gate, start_from_imagenet  # noqa: E402
-from paani_models.gate_data import Cell, Scene, scenes  # noqa: E402
+from paani_models.gate_data import Cell, Scene, checked_sequences, scenes  # noqa: E402
 from paani_models.gate_draws import CLEAN, DRY, example, plan  # noqa: E402
 from paani_models.imagenet_segmenter import ImageNetSegmenter  # noqa: E402
 from paani_models.sources import Sample, Source  # noqa: E402
@@ -77,6 +77,25 @@ def test_a_picture_that_nobody_segmented_is_dry_only_well_above_the_water_found(
     assert (one.mask[:115] != WATER).all()
     (none,) = scenes([sample], lambda bgr: np.ones(bgr.shape[:2], np.uint8))
     assert (none.mask == WATER).all()
+
+
+def test_every_source_of_many_sequences_has_some_to_check_and_none_loses_more_than_a_fifth() -> None:
+    lengths = {"canal": [9, 8, 7, 30, 6, 5, 12, 3], "boats": [1] * 50, "harbour": [80, 83], "pond": [10]}
+    samples = [
+        Sample(Source(source, source), f"run{index}", False, Path(f"{source}/{index}/{n}.jpg"), None, None)
+        for source, sequences in lengths.items()
+        for index, length in enumerate(sequences)
+        for n in range(length)
+    ]
+    chosen = checked_sequences(samples)
+    share = {
+        source: sum(lengths[source][int(name[3:])] for of, name in chosen if of == source) / sum(lengths[source])
+        for source in lengths
+    }
+    assert 0.1 <= share["canal"] <= 0.2
+    assert share["boats"] == pytest.approx(0.1)
+    assert share["harbour"] == share["pond"] == 0.0
+    assert checked_sequences(samples[::-1]) == chosen
 
 
 def test_the_threshold_refuses_few_enough() -> None:
