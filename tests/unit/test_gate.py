@@ -92,7 +92,8 @@ def test_a_net_that_says_no_number_refuses() -> None:
 @pytest.mark.parametrize(("upright", "on_its_head", "cause", "looks"), [
     (0.98, 0.99, C.NONE, 1),
     (0.80, 0.60, C.NONE, 2),
-    (0.80, 0.80, C.UNFIT, 2),
+    (0.80, 0.90, C.NONE, 2),
+    (0.80, 0.98, C.UNFIT, 2),
     (0.80, float("nan"), C.UNFIT, 2),
     (0.05, 0.01, C.UNFIT, 1),
 ])  # fmt: skip

@@ -151,7 +151,7 @@ def _asked(fitness: Fitness, colour: Bytes, cause: UnusableCause, config: GateCo
     """What the net makes of a picture whose statistics are sound, or whose lines may be of a wrong length.
 
     A blurred or turned picture has such lines too: the net must be sure of it. One that it is not sure of, it is shown
-    upside down as well, because a picture that is fitter on its head stands on its head.
+    upside down as well: if it is sure of that, the picture stands on its head.
     """
     doubt = UnusableCause.UNFIT if cause is UnusableCause.NONE else cause
     said = fitness(colour)
@@ -159,7 +159,7 @@ def _asked(fitness: Fitness, colour: Bytes, cause: UnusableCause, config: GateCo
         return doubt
     if said >= config.sure_fitness:
         return UnusableCause.NONE
-    upright = cause is UnusableCause.NONE and fitness(np.ascontiguousarray(colour[::-1, ::-1])) < said
+    upright = cause is UnusableCause.NONE and fitness(np.ascontiguousarray(colour[::-1, ::-1])) < config.sure_fitness
     return UnusableCause.NONE if upright else doubt
 
 
