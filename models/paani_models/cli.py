@@ -17,6 +17,7 @@ from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.data import command as data_command
 from paani_models.pictures import Pictures
 from paani_models.report import command as report_command
+from paani_models.sources import without_water
 
 DATA_VARIABLE = "PAANI_DATA"
 NETS = ("segmenter", "detector")
@@ -43,9 +44,7 @@ def main(argv: list[str]) -> int:
                 return data_command.prepare_public(arguments)
             return data_command.prepare_own(_pictures(arguments), arguments.manifest)
         if arguments.command == "held-out":
-            held = {s.picture.relative_to(arguments.data) for s in _pictures(arguments).samples if s.held_out}
-            sys.stdout.write("".join(f"{path.as_posix()}\n" for path in sorted(held)))
-            return 0
+            return _held_out(_pictures(arguments), arguments.without_water)
         if arguments.command == "pack":
             return data_command.make_bundle(arguments, _pictures(arguments))
         if arguments.command == "evaluate":
@@ -86,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     model_card.add_argument("--weights", type=Path, default=WEIGHTS)
 
     held_out = commands.add_parser("held-out", help="list the held-out pictures, for `paani faults --pictures`")
+    held_out.add_argument("--without-water", action="store_true", help="only those that show no water; else all others")
     check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
     data_command.add_prepare_arguments(check_data)
     pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
@@ -103,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
     train.add_argument("--epochs", type=int, help="detector and gate only")
     train.add_argument("--peak-rate", type=float)
+    train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
     export.add_argument("net", choices=TRAINED)
@@ -135,6 +136,16 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
     return parser
+
+
+def _held_out(pictures: Pictures, dry: bool) -> int:
+    """dry: also pictures that show no water and belong to no source."""
+    trained = {sample.picture for sample in pictures.never_held_out()}
+    held = {s.picture.relative_to(pictures.data).as_posix() for s in pictures.samples if s.held_out}
+    listed = {name for name in without_water() if (pictures.data / name).is_file()}
+    named = {name for name in listed if pictures.data / name not in trained} if dry else held - listed
+    sys.stdout.write("".join(f"{name}\n" for name in sorted(named)))
+    return 0
 
 
 def _check(weights: Path) -> int:
@@ -205,6 +216,7 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
             stages=tuple(arguments.stage),
             epochs=arguments.epochs,
             peak_rate=arguments.peak_rate,
+            unchecked=arguments.unchecked,
         )
         pipeline.train(arguments.net, pictures, plan, arguments.threads)
     else:

@@ -19,6 +19,7 @@ from paani_models.sources import RENDERED, Sample, read_mask, read_picture
 Bytes = NDArray[np.uint8]
 Segment = Callable[[Bytes], Bytes]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
 MIDDLE_WH = (320, 240)
+OBSTACLE = 1  # in class masks
 OPTIMISM = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
 GUESSED_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
 # Whole sequences are not trained on and choose the threshold: of each source this share, and never more than so much.
@@ -40,12 +41,17 @@ class Cell(msgspec.Struct, frozen=True):
 
 
 class Scene(msgspec.Struct, frozen=True):
-    """A picture that is fit as it is. BGR uint8 [240,320,3] and classes uint8 [240,320]; drawn: by people."""
+    """A picture that is fit as it is, or dry: without water, never fit.
+
+    picture: BGR uint8 [240,320,3]. mask: classes uint8 [240,320]. drawn: the classes are people's. checked: it is not
+    trained on.
+    """
 
     picture: Bytes
     mask: Bytes
     drawn: bool
     checked: bool
+    dry: bool = False
 
 
 def scenes(samples: Sequence[Sample], segment: Segment) -> list[Scene]:
@@ -58,14 +64,17 @@ def scenes(samples: Sequence[Sample], segment: Segment) -> list[Scene]:
     for sample in tqdm(samples, desc="reading", unit="picture"):
         picture = middle(read_picture(sample.picture))
         rendered = sample.source.name == RENDERED
-        if sample.mask is None:
+        if sample.without_water:
+            mask = np.full(picture.shape[:2], OBSTACLE, np.uint8)
+        elif sample.mask is None:
             mask = _careful(segment(picture))
         else:
             mask = np.asarray(cv2.resize(read_mask(sample.mask), MIDDLE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
             if rendered and miou(segment(picture), mask) <= MUST_ACCEPT:
                 continue
         checked = (sample.source.name, sample.sequence) in held_back
-        found.append(Scene(picture, mask, sample.mask is not None and not rendered, checked))
+        drawn = sample.mask is not None and not rendered
+        found.append(Scene(picture, mask, drawn, checked, sample.without_water))
     return found
 
 

@@ -40,8 +40,15 @@ def plan(count: int, weights: NDArray[np.float64], per_scene: int, rng: Rng) -> 
 
 
 def example(scene: Scene, shown: int, cells: Sequence[Cell], rng: Rng, vary: bool = True) -> Example:
-    """One picture. A scene without any dry view shows a fault instead. vary: mirrored, cropped, brighter or darker."""
+    """One picture. A scene without any dry view shows a fault instead. vary: mirrored, cropped, brighter or darker.
+
+    A dry scene is unfit as it is, and with any fault.
+    """
     picture, mask = _varied(scene, rng) if vary else (scene.picture, scene.mask)
+    if scene.dry:
+        if shown >= 0:
+            picture, _ = spoilt(cells[shown].fault, picture, mask, cells[shown].severity, rng)
+        return Example(net_input(picture), 0.0, DRY)
     if shown == DRY:
         dry = _dry(picture, mask, rng)
         if dry is not None:

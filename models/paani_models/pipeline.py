@@ -47,6 +47,7 @@ class Plan:
     stages: tuple[str, ...] = ()
     epochs: int | None = None
     peak_rate: float | None = None
+    unchecked: bool = False
 
 
 def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
@@ -141,7 +142,7 @@ def _train_yolo11n(pictures: Pictures, plan: Plan) -> None:
 
 def _train_gate(pictures: Pictures, plan: Plan) -> None:
     """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
-    recipe = train_gate.Recipe()
+    recipe = train_gate.Recipe(checked=not plan.unchecked)
     recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
     never = {sample.picture: sample for sample in pictures.never_held_out()}
     masked = {sample.picture: sample for sample in pictures.segmented(held_out=False) if sample.picture in never}

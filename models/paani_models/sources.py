@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -19,6 +20,7 @@ SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # checklist D6
 DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # checklist C2
 WATER_MASKS = "masks"
 ANNOTATIONS = Path(__file__).parent / "annotations"  # <source folder>/<picture>.txt, boxes that we drew
+WITHOUT_WATER = ANNOTATIONS / "without_water.txt"  # pictures that show none, a path below the data folder a line
 RENDERED = "rendered"  # the one source that is drawn, not photographed
 
 # Coded mask value -> segmenter class (checklist R10): 0 obstacle -> 1, 1 water -> 0, 2 sky -> 2, else ignored.
@@ -149,7 +151,7 @@ PREPARED_SOURCES = (
 
 @dataclass(frozen=True)
 class Sample:
-    """One annotated picture; `mask` or `label` is None where the source has none."""
+    """One annotated picture; `mask` or `label` is None where the source has none. without_water: it shows none."""
 
     source: Source
     sequence: str
@@ -157,6 +159,7 @@ class Sample:
     picture: Path
     mask: Path | None
     label: Path | None
+    without_water: bool = False
 
 
 class _Item(msgspec.Struct):
@@ -202,6 +205,12 @@ def read_samples(data: Path, sources: Iterable[Source], rendered: Path | None = 
     return samples
 
 
+@cache
+def without_water() -> frozenset[str]:
+    """Pictures that show no water, as looked at: paths below the data folder, of sources and of other folders."""
+    return frozenset(WITHOUT_WATER.read_text().split())
+
+
 def _read_source(folder: Path, source: Source) -> list[Sample]:
     path = folder / "manifest.json"
     try:
@@ -228,7 +237,8 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
                 continue
             label = None
         held_out = item.split != "train" if source.splits else is_held_out(source, sequence)
-        samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label))
+        dry = f"{source.folder}/{item.file}" in without_water()
+        samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label, dry))
     return samples
 
 

@@ -41,6 +41,7 @@ class Recipe:
     weight_decay: float = 1e-3
     per_scene: int = 4
     seed: int = 42
+    checked: bool = True  # False: also train on the sequences that would choose the threshold
 
 
 class CellErrors(nn.Module):
@@ -74,8 +75,8 @@ class GateTraining:
         segment = _segment(weights)
         found = scenes(samples, segment)
         self.cells = self._cells([one for one in found if one.drawn], segment)
-        self.scenes = [one for one in found if not one.checked]
-        self.checked = self._checked([one for one in found if one.checked])
+        self.scenes = [one for one in found if not (recipe.checked and one.checked)]
+        self.checked = self._checked([one for one in found if recipe.checked and one.checked])
         torch.manual_seed(recipe.seed)
         net = Gate()
         start_from_imagenet(net, imagenet)
@@ -85,12 +86,11 @@ class GateTraining:
         self.progress.resume(folder, self._identity)
 
     def run(self) -> None:
-        """Train to the last epoch; each is recorded with what its averaged weights do to the checked scenes."""
+        """Train to the last epoch; each is recorded with what its averaged weights do to the checked scenes, if any."""
         while self.progress.epoch < self.recipe.epochs:
             loss = self._epoch()
-            append_record(
-                self.folder / "log.jsonl", {"epoch": self.progress.epoch + 1, "loss": loss, **self._standing()}
-            )
+            stands = self._standing() if self.checked else {}
+            append_record(self.folder / "log.jsonl", {"epoch": self.progress.epoch + 1, "loss": loss, **stands})
             self.progress.finish_epoch(self.folder, self._identity, float(self.progress.epoch + 1))
 
     def _cells(self, drawn: list[Scene], segment: Segment) -> list[Cell]:

@@ -57,15 +57,28 @@ def test_only_listed_pictures_count(corpus: Path, tmp_path: Path, capsys: pytest
     assert "rivers                 1        0" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("what", ["nothing", "manifest", "list"])
+def test_pictures_without_water_must_be_refused(corpus: Path, tmp_path: Path) -> None:
+    dry, report = tmp_path / "dry.txt", tmp_path / "report.json"
+    dry.write_text("rivers/images/0.png\nrivers/images/1.png\n")
+    arguments = ["faults", str(corpus), "--scenes", "1", "--without-water", str(dry), "--json", str(report)]
+    assert main(arguments) == 0
+    last = json.loads(report.read_text())["cells"][-1]
+    assert (last["fault"], last["n"], last["rejected"]) == ("no_water", 2, 0)
+    assert CellFigures("no_water", 5, 2, 0.0, 0).verdict == "reject"
+
+
+@pytest.mark.parametrize("what", ["nothing", "manifest", "list", "dry", "no picture"])
 def test_mistakes_are_named(corpus: Path, what: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["faults", str(corpus)]
     if what == "nothing":
         arguments[1] = str(corpus / "rivers" / "images")
     elif what == "manifest":
         (corpus / "rivers" / "manifest.json").write_text("{")
+    elif what == "no picture":
+        (corpus / "dry.txt").write_text("rivers/images/7.png\n")
+        arguments += ["--without-water", str(corpus / "dry.txt")]
     else:
-        arguments += ["--pictures", str(corpus / "none.txt")]
+        arguments += ["--pictures" if what == "list" else "--without-water", str(corpus / "none.txt")]
     assert main(arguments) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1

@@ -1,5 +1,6 @@
 """The gate's training: what a fault's verdict becomes, what an epoch shows, which threshold is chosen, and resuming."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -79,6 +80,18 @@ def test_a_picture_that_nobody_segmented_is_dry_only_well_above_the_water_found(
     assert (none.mask == WATER).all()
 
 
+def test_a_picture_without_water_is_unfit_as_it_is_and_in_every_fault(tmp_path: Path) -> None:
+    path = tmp_path / "yard.png"
+    cv2.imwrite(str(path), river())
+    sample = Sample(Source("boats", "boats"), "run0", False, path, None, None, without_water=True)
+    (one,) = scenes([sample], lambda bgr: np.full(bgr.shape[:2], WATER, np.uint8))
+    assert one.dry
+    assert not (one.mask == WATER).any()
+    shown = [example(one, shown, CELLS, np.random.default_rng(0)) for shown in (CLEAN, DRY, 0, 1, 2, 3)]
+    assert {(each.target, each.shown) for each in shown} == {(0.0, DRY)}
+    assert not np.array_equal(shown[0].picture, shown[2].picture)
+
+
 def test_every_source_of_many_sequences_has_some_to_check_and_none_loses_more_than_a_fifth() -> None:
     lengths = {"canal": [9, 8, 7, 30, 6, 5, 12, 3], "boats": [1] * 50, "harbour": [80, 83], "pond": [10]}
     samples = [
@@ -140,6 +153,21 @@ def test_the_front_starts_from_imagenet_and_its_first_stages_stay(imagenet: Path
     learns = [any(p.requires_grad for p in part.parameters()) for part in net.front]
     assert learns == [False, False, False, True, True]
     assert net(torch.zeros(1, 3, 120, 160)).shape == (1, 1)
+
+
+def test_what_would_be_checked_is_trained_on_where_nothing_is_to_be_chosen(
+    tmp_path: Path, imagenet: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train_gate, "scenes", lambda *_: [shore(), shore(), shore(checked=True)])
+    monkeypatch.setattr(train_gate, "cells", lambda *_: CELLS)
+    monkeypatch.setattr(train_gate, "_segment", lambda *_: None)
+    weights = tmp_path / "segmenter.onnx"
+    weights.write_bytes(b"a segmenter")
+    recipe = train_gate.Recipe(epochs=1, batch=4, per_scene=2, checked=False)
+    training = GateTraining(tmp_path / "run", [], weights, imagenet, recipe)
+    assert (len(training.scenes), training.checked) == (3, [])
+    training.run()
+    assert set(json.loads((tmp_path / "run" / "log.jsonl").read_text())) == {"epoch", "loss"}
 
 
 def test_a_resumed_run_equals_an_unbroken_one_s11(

@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_models.cli import data_folder
+from paani_models.cli import data_folder, main
 from paani_models.pictures import Pictures
 from paani_models.sources import (
     ANNOTATIONS,
     DETECTOR_CLASSES,
     SOURCES,
+    WITHOUT_WATER,
     Source,
     choose,
     class_mask,
     is_held_out,
     read_boxes,
     read_samples,
+    without_water,
 )
 
 
@@ -87,6 +89,30 @@ def test_no_picture_is_on_both_sides_r8() -> None:
         sides = [{s.picture for s in samples if getattr(s, kind) and s.held_out == side} for side in (True, False)]
         assert sides[0]
         assert not sides[0] & sides[1]
+
+
+def test_pictures_without_water_are_listed_once_in_order() -> None:
+    listed = WITHOUT_WATER.read_text().splitlines()
+    assert listed == sorted(set(listed))
+    assert without_water() == set(listed)
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_pictures_without_water_exist_and_those_held_out_are_no_clean_pictures(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert all((data_folder() / name).is_file() for name in without_water())
+    assert main(["held-out", "--without-water"]) == 0
+    dry = set(capsys.readouterr().out.split())
+    assert main(["held-out"]) == 0
+    others = set(capsys.readouterr().out.split())
+    assert dry <= without_water()
+    assert not others & without_water()
+    trained = {s.picture for s in Pictures(data_folder(), [], None).never_held_out()}
+    assert len(dry) >= 15
+    assert not {data_folder() / name for name in dry} & trained
+    assert len([s for s in read_samples(data_folder(), SOURCES) if s.without_water and s.picture in trained]) >= 45
 
 
 def test_every_drawn_box_is_a_pier_inside_its_picture() -> None:

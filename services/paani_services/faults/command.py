@@ -13,7 +13,7 @@ from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani.messages import UnusableCause
 from paani.whole_file import write_whole
-from paani_services.faults.corpus import clean_pictures, scenes, sources
+from paani_services.faults.corpus import clean_pictures, listed_pictures, scenes, sources
 from paani_services.faults.curves import curves
 from paani_services.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
 from paani_services.perception.corridors import classify
@@ -58,6 +58,7 @@ def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="paani faults", description=__doc__)
     parser.add_argument("data", type=Path, help="folder of annotated sources, each with a manifest.json")
     parser.add_argument("--pictures", type=Path, metavar="FILE", help="only pictures listed here, one path a line")
+    parser.add_argument("--without-water", type=Path, metavar="FILE", help="pictures listed here show no water")
     parser.add_argument("--scenes", type=int, default=16, help="segmented pictures per source (default: 16)")
     parser.add_argument("--clean", type=int, default=200, help="pictures per source as they are (default: 200)")
     parser.add_argument("--json", type=Path, metavar="FILE")
@@ -66,8 +67,10 @@ def main(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     eyes = Eyes(config_from(options).perception)
     folders = sources(options.data)
-    only = _listed(options.pictures) if options.pictures else None
+    only = _listed("--pictures", options.pictures) if options.pictures else None
+    named = _listed("--without-water", options.without_water) if options.without_water else frozenset()
     spoiled = [scene for folder in folders for scene in scenes(folder, options.scenes, only)]
+    dry = listed_pictures(options.data, named)
     if not spoiled:
         raise UserError(f"{options.data}: no picture with a mask of three classes")
     clean = tuple(
@@ -76,7 +79,7 @@ def main(argv: list[str]) -> int:
         if (pictures := clean_pictures(folder, options.clean, only))
     )
     cells = []
-    for cell in cell_figures(spoiled, eyes.segment, eyes.judge):
+    for cell in cell_figures(spoiled, eyes.segment, eyes.judge, dry):
         cells.append(cell)
         sys.stderr.write(f"\r{len(cells):4} cells  {cell.fault:20}")
     sys.stderr.write("\r" + " " * 40 + "\r")
@@ -105,11 +108,11 @@ def table(report: Report) -> str:
     return "\n".join(lines)
 
 
-def _listed(path: Path) -> frozenset[str]:
+def _listed(option: str, path: Path) -> frozenset[str]:
     try:
         return frozenset(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"--pictures {path}: {error}") from error
+        raise UserError(f"{option} {path}: {error}") from error
 
 
 def _json(report: Report) -> str:

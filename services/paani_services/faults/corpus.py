@@ -57,6 +57,17 @@ def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = Non
     return [np.asarray(picture, np.uint8) for picture in read if picture is not None]
 
 
+def listed_pictures(folder: Path, names: frozenset[str]) -> list[Bytes]:
+    """The pictures of these paths below a folder. Raises UserError naming the first that is none."""
+    found = []
+    for name in sorted(names):
+        picture = cv2.imread(str(folder / name), cv2.IMREAD_COLOR)
+        if picture is None:
+            raise UserError(f"{folder / name}: not a readable picture")
+        found.append(np.asarray(picture, np.uint8))
+    return found
+
+
 def scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Scene]:
     """Pictures with masks of all three classes, evenly spread; none where the source has no such masks."""
     manifest = source / "manifest.json"
