@@ -19,8 +19,7 @@ SEVERITIES = (1, 2, 3, 4, 5)
 IGNORE = 255
 WATER = 0  # in class masks
 MIN_DRY_FRAC = 0.25  # a view without water needs this share of the picture's rows
-DRY = "above_water"  # as a fault's name: a view without water, cut from a picture
-NO_WATER = "no_water"  # as a fault's name: a picture that shows no water
+DRY = "above_water"  # as a fault's name: a view without water
 MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # the segmenter's mIoU on a fault below and above which the verdict is settled
 
 
@@ -242,7 +241,7 @@ def spoilt(name: str, picture: Bytes, mask: Bytes, severity: int, rng: np.random
 
 def due_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
     """What the gate must do with pictures on which the segmenter reaches that mean IoU."""
-    if miou < MUST_REJECT or fault in (DRY, NO_WATER):
+    if miou < MUST_REJECT or fault == DRY:
         return "reject"
     return "accept" if miou > MUST_ACCEPT else "free"
 

@@ -57,14 +57,14 @@ def test_only_listed_pictures_count(corpus: Path, tmp_path: Path, capsys: pytest
     assert "rivers                 1        0" in capsys.readouterr().out
 
 
-def test_pictures_without_water_must_be_refused(corpus: Path, tmp_path: Path) -> None:
+def test_pictures_without_water_are_counted(corpus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dry, report = tmp_path / "dry.txt", tmp_path / "report.json"
     dry.write_text("rivers/images/0.png\nrivers/images/1.png\n")
     arguments = ["faults", str(corpus), "--scenes", "1", "--without-water", str(dry), "--json", str(report)]
     assert main(arguments) == 0
-    last = json.loads(report.read_text())["cells"][-1]
-    assert (last["fault"], last["n"], last["rejected"]) == ("no_water", 2, 0)
-    assert CellFigures("no_water", 5, 2, 0.0, 0).verdict == "reject"
+    found = json.loads(report.read_text())["without_water"]
+    assert found == {"source": "without_water", "n": 2, "rejected": 0, "causes": []}
+    assert "pictures without water: 0 of 2 refused" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("what", ["nothing", "manifest", "list", "dry", "no picture"])

@@ -26,7 +26,7 @@ from paani_models.report.mask_limits import (
     mistakes,
     water_iou,
 )
-from paani_models.report.records import CleanSource, FaultCell, FaultReport, FaultTotals
+from paani_models.report.records import CleanSource, FaultCell, FaultReport, FaultTotals, gate_figures
 from paani_models.report.tried import PRESENT, Tried, encoded, read_tried, with_present
 from paani_models.sources import IGNORE, Sample, Source, choose
 from tests.unit.public_sets import own_data
@@ -216,3 +216,10 @@ def test_the_shipped_record_states_every_bar_of_the_shipped_weights() -> None:
         (present,) = [row for row in mine if row.sha256 == catalogue[bar.net].sha256 and not row.asked]
         assert (bar.metric, bar.source) in {(figure.metric, figure.source) for figure in present.figures}
         assert present.recipe != PRESENT
+
+
+def test_pictures_without_water_have_a_figure_of_their_own() -> None:
+    dry = CleanSource("without_water", 16, 12)
+    (figure,) = gate_figures(FaultReport((), without_water=dry))
+    assert (figure.metric, figure.source, figure.value, figure.n) == ("unfit_accepted_frac", "without_water", 0.25, 16)
+    assert gate_figures(FaultReport((), without_water=CleanSource("without_water", 0, 0))) == []

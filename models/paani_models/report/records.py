@@ -39,7 +39,7 @@ class FaultTotals(msgspec.Struct, frozen=True):
 
 
 class CleanSource(msgspec.Struct, frozen=True):
-    """n clean pictures of a source, and how many of them the gate refused."""
+    """n pictures of a source as they are, and how many of them the gate refused."""
 
     source: str
     n: int
@@ -52,6 +52,7 @@ class FaultReport(msgspec.Struct, frozen=True):
     cells: tuple[FaultCell, ...]
     clean: tuple[CleanSource, ...] = ()
     totals: FaultTotals | None = None
+    without_water: CleanSource | None = None
 
 
 def read_faults(path: Path) -> FaultReport:
@@ -76,6 +77,9 @@ def gate_figures(report: FaultReport) -> list[Figure]:
             Figure("fit_refused_frac", "spoilt", round(report.totals.false_reject_frac, 4), spoilt),
             Figure("clean_refused_frac", "all", round(report.totals.clean_reject_frac, 4), clean),
         ]
+    dry = report.without_water
+    if dry is not None and dry.n:
+        figures.append(Figure("unfit_accepted_frac", dry.source, round(1.0 - dry.rejected / dry.n, 4), dry.n))
     return figures
 
 

@@ -26,11 +26,12 @@ Bytes = NDArray[np.uint8]
 
 
 class Report(msgspec.Struct, frozen=True):
-    """What `--json` writes."""
+    """What `--json` writes. without_water: pictures of which every one must be refused, none where not asked for."""
 
     totals: Totals
     cells: tuple[CellFigures, ...]
     clean: tuple[CleanFigures, ...]
+    without_water: CleanFigures
 
 
 class Eyes:
@@ -79,11 +80,11 @@ def main(argv: list[str]) -> int:
         if (pictures := clean_pictures(folder, options.clean, only))
     )
     cells = []
-    for cell in cell_figures(spoiled, eyes.segment, eyes.judge, dry):
+    for cell in cell_figures(spoiled, eyes.segment, eyes.judge):
         cells.append(cell)
         sys.stderr.write(f"\r{len(cells):4} cells  {cell.fault:20}")
     sys.stderr.write("\r" + " " * 40 + "\r")
-    report = Report(totals(cells, clean), tuple(cells), clean)
+    report = Report(totals(cells, clean), tuple(cells), clean, clean_figures("without_water", dry, eyes.judge))
     sys.stdout.write(table(report))
     for path, text in ((options.json, _json(report)), (options.svg, curves(cells))):
         if path is not None:
@@ -100,6 +101,8 @@ def table(report: Report) -> str:
     ]
     lines += ["", "clean pictures         n  refused"]
     lines += [f"{s.source:18} {s.n:5} {s.rejected:8}  {', '.join(s.causes)}" for s in report.clean]
+    if report.without_water.n:
+        lines.append(f"\npictures without water: {report.without_water.rejected} of {report.without_water.n} refused")
     t = report.totals
     lines.append(
         f"\nlet through where it must refuse {t.false_accept_frac:.4f}; refused where it must not "

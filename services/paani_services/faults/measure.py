@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.messages import UnusableCause
-from paani.picture_faults import DRY, FAULTS, MOVES, NO_WATER, SEVERITIES, above_water, due_verdict, spoilt
+from paani.picture_faults import DRY, FAULTS, MOVES, SEVERITIES, above_water, due_verdict, spoilt
 from paani_services.faults.corpus import Scene
 
 Bytes = NDArray[np.uint8]
@@ -49,10 +49,8 @@ class Totals(msgspec.Struct, frozen=True):
     clean_reject_frac: float
 
 
-def cell_figures(
-    scenes: Sequence[Scene], segment: Segment, judge: Judge, without_water: Sequence[Bytes] = ()
-) -> Iterator[CellFigures]:
-    """Every cell in turn; the last are views without water, and pictures without water where there are any.
+def cell_figures(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Iterator[CellFigures]:
+    """Every cell in turn; the last is views without water.
 
     segment: BGR uint8 [H, W, 3] to classes uint8 [h, w]. judge: one picture, as the first of a new camera.
     """
@@ -66,9 +64,7 @@ def cell_figures(
                 rejected += judge(picture) is not UnusableCause.NONE
             yield CellFigures(name, severity, len(scenes), mean_iou(counts), rejected)
     dry = [view for scene in scenes if (view := above_water(scene.picture, scene.mask)) is not None]
-    for name, views in ((DRY, dry), (NO_WATER, without_water)):
-        if views or name == DRY:
-            yield CellFigures(name, 5, len(views), 0.0, sum(judge(view) is not UnusableCause.NONE for view in views))
+    yield CellFigures(DRY, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
 
 
 def clean_figures(source: str, pictures: Iterable[Bytes], judge: Judge) -> CleanFigures:
