@@ -93,7 +93,10 @@ def test_a_net_that_says_no_number_refuses() -> None:
     (0.98, 0.99, C.NONE, 1),
     (0.80, 0.60, C.NONE, 2),
     (0.80, 0.90, C.NONE, 2),
-    (0.80, 0.98, C.UNFIT, 2),
+    (0.80, 0.98, C.NONE, 2),  # a dark tunnel, a noisy picture: fit both ways up
+    (0.80, 0.995, C.UNFIT, 2),
+    (0.96, 0.99, C.NONE, 2),
+    (0.96, 0.999, C.UNFIT, 2),
     (0.80, float("nan"), C.UNFIT, 2),
     (0.05, 0.01, C.UNFIT, 1),
 ])  # fmt: skip

@@ -117,9 +117,13 @@ def test_the_threshold_refuses_few_enough() -> None:
     clean = np.arange(1601) >= 1001
     clean[1501:] = False
     found = standing(said, target, clean, np.zeros(1601, np.bool_))
-    assert found["min_fitness"] == pytest.approx(0.006)
+    assert found["min_fitness"] == pytest.approx(0.010)
     assert found["refused"] <= train_gate.WIDEST_REFUSED
     assert found["refused_clean"] == found["accepted"] == found["accepted_dry"] == 0.0
+    said[1001] = 0.001  # one odd photograph does not open the gate, a second one does
+    assert standing(said, target, clean, np.zeros(1601, np.bool_))["min_fitness"] == pytest.approx(0.010)
+    said[1002] = 0.002
+    assert standing(said, target, clean, np.zeros(1601, np.bool_))["min_fitness"] == pytest.approx(0.002)
 
 
 def test_cells_that_the_net_knows_are_drawn_less() -> None:
