@@ -13,6 +13,7 @@ from paani.cli import main as paani
 from paani.errors import UserError
 from paani_services.look.annotate import FONT, wrapped
 from paani_services.look.command import file_name, main
+from paani_services.look.sheet import COLUMNS, GAP_PX, MOST, THUMBNAIL_PX, ContactSheet
 from tests.unit.pictures import PICTURES, river
 
 FIELDS = ["path", "usable", "cause", "direction", "reason", "risk", "lanes", "detections", "explanation"]
@@ -127,3 +128,41 @@ def test_an_explanation_is_wrapped_by_its_drawn_width() -> None:
         assert all(cv2.getTextSize(line, FONT, 0.6, 1)[0][0] <= 400 for line in lines)
     assert wrapped("a " + "w" * 90 + " b", 0.6, 400) == ["a", "w" * 90, "b"]
     assert wrapped("", 0.6, 400) == []
+
+
+def test_a_sheet_shows_the_folder_in_one_picture(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sheet = tmp_path / "sheet.png"
+    assert main([str(folder), "--sheet", str(sheet)]) == 0
+    drawn = cv2.imread(str(sheet))
+    assert drawn is not None
+    assert drawn.shape[1] == COLUMNS * (THUMBNAIL_PX + GAP_PX)
+    top = [drawn[100:200, n * (THUMBNAIL_PX + GAP_PX) : (n + 1) * (THUMBNAIL_PX + GAP_PX)].mean() for n in range(4)]
+    assert top[0] < 30  # black, river, white, white noise
+    assert top[2] > 200
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pictures", "sheet.png"]
+
+
+def test_a_sheet_of_many_is_spread_over_all_of_them() -> None:
+    sheet = ContactSheet()
+    assert sheet.drawn() is None
+    for level in range(200):
+        sheet.add(np.full((60, 80, 3), level, np.uint8))
+    drawn = sheet.drawn()
+    assert drawn is not None
+    rows = drawn.shape[0] // (THUMBNAIL_PX * 60 // 80 + GAP_PX)
+    shown = [
+        int(drawn[row * (THUMBNAIL_PX * 60 // 80 + GAP_PX) + 9, column * (THUMBNAIL_PX + GAP_PX) + 9, 0])
+        for row in range(rows)
+        for column in range(COLUMNS)
+    ]
+    assert shown[:25] == list(range(0, 200, 8))
+    assert rows * COLUMNS <= MOST
+
+
+@pytest.mark.parametrize("name", ["sheet.gif", "nowhere/sheet.png"])
+def test_a_sheet_that_cannot_be_written_is_named(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert paani(["look", str(folder), "--sheet", str(folder / name)]) == 2
+    error = capsys.readouterr().err
+    assert name in error
+    assert error.count("\n") == 1

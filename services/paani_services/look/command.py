@@ -12,12 +12,15 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk, Reason, Text, Unit, UnusableCause
+from paani.whole_file import write_whole
 from paani_services.look.annotate import annotated
 from paani_services.look.judgement import Judgement, judged
+from paani_services.look.sheet import ContactSheet
 from paani_services.perception.pipeline import Perceiver
 
 EPOCHS_PER_PATH = 1_000_000
 JPEG_QUALITY = 90
+SHEET_SUFFIXES = (".jpg", ".jpeg", ".png")
 
 
 class Lanes(msgspec.Struct, frozen=True):
@@ -56,9 +59,12 @@ def main(argv: list[str]) -> int:
     for path in options.paths:
         if not path.exists():
             raise UserError(f"{path}: no such file or folder")
-    out: Path | None = options.out or (None if options.json else Path("look"))
+    if options.sheet is not None and options.sheet.suffix.lower() not in SHEET_SUFFIXES:
+        raise UserError(f"--sheet {options.sheet}: is not one of {', '.join(SHEET_SUFFIXES)}")
+    out: Path | None = options.out or (None if options.json or options.sheet else Path("look"))
     if out is not None:
         _make(out)
+    sheet = ContactSheet()
     perceiver = Perceiver(config.perception, stopwatch_ms)
     taken: set[str] = set()
     shown = 0
@@ -67,7 +73,7 @@ def main(argv: list[str]) -> int:
             for judgement in judged(path, index * EPOCHS_PER_PATH, perceiver, config):
                 shown += 1
                 sys.stdout.write(_line(judgement, options.json))
-                if out is not None and judgement.bgr is not None:
+                if (out or options.sheet) and judgement.bgr is not None:
                     picture = annotated(
                         judgement.bgr,
                         judgement.mask,
@@ -75,11 +81,16 @@ def main(argv: list[str]) -> int:
                         judgement.advisory,
                         config.perception.corridors,
                     )
-                    _save(out / file_name(judgement.name, taken), picture)
+                    if out is not None:
+                        _save(out / file_name(judgement.name, taken), picture)
+                    if options.sheet is not None:
+                        sheet.add(picture)
                 _progress(f"{shown}  {judgement.advisory.direction:12}  {judgement.name[-60:]}")
     finally:
         perceiver.close()
         _progress(None)
+    if options.sheet is not None and (drawn := sheet.drawn()) is not None:
+        write_whole(options.sheet, cv2.imencode(options.sheet.suffix, drawn)[1].tobytes(), "--sheet")
     if out is not None and sys.stderr.isatty():
         sys.stderr.write(f"{shown} judged, annotated pictures in {out}\n")
     return 0
@@ -127,6 +138,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="picture, folder or video")
     parser.add_argument("--json", action="store_true", help="one short JSON line per picture, no annotated pictures")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where annotated pictures go (default: look)")
+    parser.add_argument(
+        "--sheet", type=Path, metavar="FILE", help="a few dozen annotated pictures in one; alone, no --out"
+    )
     add_config_arguments(parser)
     return parser
 
