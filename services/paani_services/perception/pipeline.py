@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -21,7 +21,7 @@ from paani.messages import (
 from paani_services.perception.corridors import Lanes, classify, summarise, water_edge
 from paani_services.perception.decode import decode
 from paani_services.perception.decoding import decoded
-from paani_services.perception.engine import engine_named
+from paani_services.perception.engine import Engine, engine_named
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
@@ -30,7 +30,9 @@ from paani_services.perception.sight import counted, followed_roll_rad, is_own_h
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
+Detected = tuple[tuple[Detection, ...], float]  # what was found, and the time it took [ms]
 NO_SEGMENTER = "none"
+CLEARLY_SLOWER = 1.2  # nets that take about as long stay in their order, whatever one run of each says
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
@@ -60,9 +62,10 @@ class Perceiver:
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
         self._tables = [tables_for(engine.contract) for engine in engines]
-        self._beside = ThreadPoolExecutor(1, "segmenter") if config.concurrent else None
+        self._beside = ThreadPoolExecutor(1, "beside the gate") if config.concurrent else None
+        self._detector_begins = config.concurrent and self._takes_longer(self._detector, self._segmenter)
         self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
-        self._begun: list[Future[Segmentation]] = []
+        self._begun: list[Future[Any]] = []
         self._counts: dict[tuple[int, ...], Floats] = {}
 
     def perceive(
@@ -78,12 +81,16 @@ class Perceiver:
         bgr = decoded(data)
         decoded_ms = self._stopwatch_ms()
         roll_rad = followed_roll_rad(roll_rad, self._config.max_roll_rad) if self._config.follow_roll else 0.0
-        # The segmenter takes longest, so it begins beside the gate; its answer to a refused picture is dropped.
-        segmenting = None
+        # The slower net begins beside the gate; its answer to a refused picture is dropped.
+        detecting: Future[Detected] | None = None
+        segmenting: Future[Segmentation] | None = None
         if self._beside and bgr is not None and age_s <= self._config.max_frame_age_s:
             wait(self._begun)  # so that work never piles up, however fast pictures are refused
-            segmenting = self._beside.submit(self._segment, bgr, roll_rad)
-            self._begun = [segmenting]
+            if self._detector_begins:
+                detecting = self._beside.submit(self._detect, bgr)
+            else:
+                segmenting = self._beside.submit(self._segment, bgr, roll_rad)
+            self._begun = [begun for begun in (detecting, segmenting) if begun]
         cause = self._judge(bgr, header, age_s)
         gated_ms = self._stopwatch_ms()
         timing = InferenceTiming(
@@ -91,8 +98,12 @@ class Perceiver:
         )
         if bgr is None or cause is not UnusableCause.NONE:
             return self._evidence(header, bgr, cause, (), None, timing, start_ms), None
-        detections, detector_ms = self._detect(bgr)
-        segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: one after the other
+        if detecting:
+            segmentation = self._segment(bgr, roll_rad)
+            detections, detector_ms = detecting.result()
+        else:
+            detections, detector_ms = self._detect(bgr)
+            segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
         timing = msgspec.structs.replace(
             timing,
             detector_ms=detector_ms,
@@ -107,13 +118,25 @@ class Perceiver:
         if self._beside is not None:
             self._beside.shutdown()
 
+    def _takes_longer(self, one: Engine, other: Engine | None) -> bool:
+        """Whether one net is clearly slower than the other on this machine. What either says does not depend on it."""
+        if other is None:
+            return False
+        took_ms = []
+        for engine in (one, other, one, other):  # the first run of each reserves its memory
+            shape, dtype = engine.contract.input.shape, engine.contract.input.dtype
+            start_ms = self._stopwatch_ms()
+            engine.run(np.zeros(shape, dtype))
+            took_ms.append(self._stopwatch_ms() - start_ms)
+        return took_ms[2] > CLEARLY_SLOWER * took_ms[3]
+
     def _judge(self, bgr: Bytes | None, header: PictureHeader, age_s: float) -> UnusableCause:
         if bgr is None:
             return UnusableCause.UNDECODABLE
         self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate, self._fitness)
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
 
-    def _detect(self, bgr: Bytes) -> tuple[tuple[Detection, ...], float]:
+    def _detect(self, bgr: Bytes) -> Detected:
         start_ms = self._stopwatch_ms()
         contract = self._detector.contract
         height, width = contract.size_hw
