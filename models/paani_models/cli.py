@@ -140,11 +140,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def _held_out(pictures: Pictures, dry: bool) -> int:
     """dry: also pictures that show no water and belong to no source."""
-    trained = {sample.picture for sample in pictures.never_held_out()}
-    held = {s.picture.relative_to(pictures.data).as_posix() for s in pictures.samples if s.held_out}
-    listed = {name for name in without_water() if (pictures.data / name).is_file()}
-    named = {name for name in listed if pictures.data / name not in trained} if dry else held - listed
-    sys.stdout.write("".join(f"{name}\n" for name in sorted(named)))
+    if dry:
+        trained = {sample.picture for sample in pictures.never_held_out()}
+        listed = {pictures.data / name for name in without_water()}
+        held = {picture for picture in listed - trained if picture.is_file()}
+    else:
+        held = {sample.picture for sample in pictures.samples if sample.held_out and not sample.without_water}
+    sys.stdout.write("".join(f"{path.relative_to(pictures.data).as_posix()}\n" for path in sorted(held)))
     return 0
 
 

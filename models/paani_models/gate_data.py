@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.picture_faults import FAULTS, MOVES, MUST_ACCEPT, MUST_REJECT, SEVERITIES, WATER, spoilt
+from paani_models.augment import OBSTACLE
 from paani_models.segmenter_metrics import class_iou, confusion
 from paani_models.sources import RENDERED, Sample, read_mask, read_picture
 
 Bytes = NDArray[np.uint8]
 Segment = Callable[[Bytes], Bytes]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
 MIDDLE_WH = (320, 240)
-OBSTACLE = 1  # in class masks
 OPTIMISM = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
 GUESSED_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
 # Whole sequences are not trained on and choose the threshold: of each source this share, and never more than so much.

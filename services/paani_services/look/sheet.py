@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani_services.look.annotate import PAPER
+
 Bytes = NDArray[np.uint8]
 COLUMNS, THUMBNAIL_PX, GAP_PX = 4, 480, 6
-MOST = 48  # kept at once; with more, every second one goes
-PAPER = (28, 24, 22)
+MOST = 48  # kept at once, an even number; with more, every second one goes
 
 
 class ContactSheet:
@@ -24,10 +25,9 @@ class ContactSheet:
             if len(self._kept) == MOST:
                 self._kept = self._kept[::2]
                 self._every *= 2
-            if self._seen % self._every == 0:
-                height_px = max(1, round(bgr.shape[0] * THUMBNAIL_PX / bgr.shape[1]))
-                small = cv2.resize(bgr, (THUMBNAIL_PX, height_px), interpolation=cv2.INTER_AREA)
-                self._kept.append(np.asarray(small, np.uint8))
+            height_px = max(1, round(bgr.shape[0] * THUMBNAIL_PX / bgr.shape[1]))
+            small = cv2.resize(bgr, (THUMBNAIL_PX, height_px), interpolation=cv2.INTER_AREA)
+            self._kept.append(np.asarray(small, np.uint8))
         self._seen += 1
 
     def drawn(self) -> Bytes | None:

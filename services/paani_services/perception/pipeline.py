@@ -88,9 +88,10 @@ class Perceiver:
             wait(self._begun)  # so that work never piles up, however fast pictures are refused
             if self._detector_begins:
                 detecting = self._beside.submit(self._detect, bgr)
+                self._begun = [detecting]
             else:
                 segmenting = self._beside.submit(self._segment, bgr, roll_rad)
-            self._begun = [begun for begun in (detecting, segmenting) if begun]
+                self._begun = [segmenting]
         cause = self._judge(bgr, header, age_s)
         gated_ms = self._stopwatch_ms()
         timing = InferenceTiming(
