@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani_models.catalogue import verified_path
-from paani_models.cli import data_folder
-from paani_models.detection_metrics import ap50, decode, judge
-from paani_models.detector_data import plain, read_boxed
+from paani_models.commands.models import data_folder
+from paani_models.datasets.selection import Pictures
+from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_picture
+from paani_models.detector.data import plain, read_boxed
+from paani_models.detector.metrics import ap50, decode, judge
+from paani_models.engines.onnx_runner import open_net
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
-from paani_models.onnx_runner import open_net
-from paani_models.pictures import Pictures
-from paani_models.segmenter_metrics import class_iou, confusion
-from paani_models.segmenter_scores import as_label, read_truth, restrict, scored_classes
-from paani_models.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_picture
+from paani_models.segmenter.metrics import class_iou, confusion
+from paani_models.segmenter.scores import as_label, read_truth, restrict, scored_classes
 
 Floats = NDArray[np.float32]
 TIME_LIMIT_S = 900

@@ -1,7 +1,8 @@
 """How the shipped detector's boxes jitter while the boat nears a rendered thing: `python -m tests.bench.box_jitter N`.
 
-The constants of `paani_sim.encounters` come from the first table. The second lets the advisor judge those very boxes,
-so that the simulated detector stands beside the real one. Needs OpenGL; about ten seconds an encounter on one core.
+The constants of `paani_sim.studies.encounters` come from the first table. The second lets the advisor judge those
+very boxes, so that the simulated detector stands beside the real one. Needs OpenGL; about ten seconds an encounter on
+one core.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ from tqdm import tqdm
 
 from paani import keys
 from paani import messages as m
-from paani.bench.part import Part, part_text
 from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
+from paani.statistics.figure_table import Part, part_text
 from paani_services.advisor.association import iou
 from paani_services.perception.pipeline import Perceiver
 from paani_sim.eye.camera import BoatPose, Camera
 from paani_sim.eye.renderer import Eye
 from paani_sim.eye.scatter import random_pose
-from paani_sim.motion_table import LATENCY_S, MIN_CLOSING_PER_S, MIN_SIZE_PX, RULE_PERIODS, RULE_S
+from paani_sim.studies.motion_table import LATENCY_S, MIN_CLOSING_PER_S, MIN_SIZE_PX, RULE_PERIODS, RULE_S
 from paani_sim.worlds import load_world
 from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.world import Kind, Obstacle, Pose2

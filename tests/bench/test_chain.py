@@ -9,9 +9,9 @@ import sys
 import msgspec
 import pytest
 
-from paani.bench.table import Bench, text_of
 from paani.config import Config
-from paani.up.summary import STAGES
+from paani_tools.bench.chain import Bench, text_of
+from paani_tools.up.run_summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 

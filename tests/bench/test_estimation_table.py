@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from paani_sim.estimation_table import CONDITIONS, EstimationRow, estimation_table, part_of
+from paani_sim.studies.estimation_table import CONDITIONS, EstimationRow, estimation_table, part_of
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ import pytest
 
 from paani.config import CorridorConfig, DetectorConfig, load_config
 from paani.errors import UserError
-from paani_services.bench import paper_shaped
-from paani_services.bench.command import Eyes, main, text
-from paani_services.bench.eyes import Row, Step, measured, ratios, rows
 from paani_services.perception.corridors import classify, summarise
 from paani_services.perception.engine import OnnxEngine
-from tests.unit.pictures import river
+from paani_tools.bench.eyes import paper_shaped
+from paani_tools.bench.eyes.command import Eyes, main, text
+from paani_tools.bench.eyes.stages import Row, Step, measured, ratios, rows
+from tests.pictures import river
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 

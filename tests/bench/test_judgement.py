@@ -11,11 +11,11 @@ import pytest
 
 from paani import keys
 from paani import messages as m
-from paani.bench.judgement import BOXES, crowded
-from paani.bench.part import Part, part_text
-from paani.bench.steadiness import steadiness
 from paani.errors import UserError
-from tests.unit.small_logs import START_US, begin, put
+from paani.statistics.figure_table import Part, part_text
+from paani_tools.bench.judgement import BOXES, crowded
+from paani_tools.bench.steadiness import steadiness
+from tests.unit.paani.logs.small_logs import START_US, begin, put
 
 pytestmark = pytest.mark.integration
 

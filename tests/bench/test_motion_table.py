@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from paani_sim.encounters import Family
-from paani_sim.motion_table import MotionRow, motion_table
+from paani_sim.studies.encounters import Family
+from paani_sim.studies.motion_table import MotionRow, motion_table
 
 CLOSING = (Family.APPROACH, Family.APPROACH_TURNING)
 

@@ -4,7 +4,7 @@ import pytest
 
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.generate import random_scenario
-from tests.unit.fair_scenarios import check_is_fair
+from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 
 @pytest.mark.timeout(300)

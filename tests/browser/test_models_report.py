@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from paani_models.cli import main
-from tests.unit.public_sets import own_data
+from paani_models.commands.models import main
+from tests.unit.paani_models.datasets.public_sets import own_data
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 SOURCES = "tbiseg_dasha,mcoe_boats"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 import tomllib
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.places import ROOT
+
 COUNTS = {
     "A": 12, "B": 17, "C": 15, "D": 11, "E": 7, "F": 4, "G": 11, "H": 6, "I": 22, "J": 19, "K": 10, "L": 5, "M": 11,
     "N": 8, "O": 5, "P": 5, "Q": 6, "R": 11, "S": 12, "T": 6, "U": 10, "V": 24, "W": 15,

@@ -12,8 +12,8 @@ import pytest
 
 from paani import authority, keys
 from paani import messages as m
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).parent / "golden"
 ROWS: tuple[keys.Topic[Any], ...] = (*keys.TOPICS, keys.pulse("advisor"), keys.health("advisor"))
 

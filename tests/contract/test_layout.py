@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.places import ROOT
+
 NAMELESS = {"utils", "helpers", "common", "misc", "base", "manager", "types"}
 MAX_LINES, MAX_SERVICE_LINES = 400, 150
 
@@ -33,14 +34,17 @@ def test_one_file_one_job(path: Path) -> None:
     ("word", "allowed"),
     [
         ("import zenoh", "shared/paani/bus/"),
-        ("import onnxruntime", "services/paani_services/perception/engine.py models/paani_models/onnx_runner.py"),
-        ("ncnn.Net(", "models/paani_models/ncnn_runner.py"),
+        (
+            "import onnxruntime",
+            "services/paani_services/perception/engine.py models/paani_models/engines/onnx_runner.py",
+        ),
+        ("ncnn.Net(", "models/paani_models/engines/ncnn_runner.py"),
         ("import mujoco", "sim_host/paani_sim/"),
         ("filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/"),
         ("import serial", "services/paani_services/bridge/"),
         ("from mcap", "shared/paani/logs/"),
-        ("import gpxpy", "services/paani_services/navigator/gpx.py"),
+        ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
     ],
 )
 def test_each_library_has_one_importer(word: str, allowed: str) -> None:

@@ -26,7 +26,7 @@ from paani.logs.layout import MAGIC
 from paani.logs.reader import open_log
 from paani.logs.repair import is_finished, repair
 from tests.conftest import OpenAs, wait_alive
-from tests.unit.small_logs import JPEG
+from tests.unit.paani.logs.small_logs import JPEG
 
 KILLS = int(os.environ.get("RECORDER_KILLS", "10"))
 LOST_S = 1.0

@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani_services.perception.journal import FOLDER, NAME
 from tests.conftest import OpenAs, Spawn
-from tests.unit.pictures import noisy, river
+from tests.pictures import noisy, river
 
 pytestmark = pytest.mark.integration
 

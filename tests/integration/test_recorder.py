@@ -19,7 +19,7 @@ from paani.logs.folder import recordings
 from paani.logs.reader import open_log
 from paani.logs.repair import is_finished
 from tests.conftest import OpenAs, Spawn, put_raw
-from tests.unit.small_logs import JPEG, unfinished
+from tests.unit.paani.logs.small_logs import JPEG, unfinished
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()

@@ -20,7 +20,7 @@ from paani.clock import WallClock
 from paani.config import Config
 from paani.logs.reader import open_log
 from tests.conftest import OpenAs, Spawn, find_free_port
-from tests.unit.recorded_drive import drive, write_log
+from tests.unit.paani_tools.replay.recorded_drive import drive, write_log
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
@@ -101,10 +101,10 @@ def test_every_environment_computes_the_same_bytes(tmp_path: Path) -> None:
 def test_twenty_repeats_are_one() -> None:
     """In one process; the other test repeats in others."""
     from paani.decider import decider_of  # noqa: PLC0415
-    from paani.replay.check import check_service  # noqa: PLC0415
-    from paani.replay.ledger import Ledger  # noqa: PLC0415
-    from paani.replay.recompute import Losses  # noqa: PLC0415
-    from tests.unit.recorded_drive import CONFIG  # noqa: PLC0415
+    from paani_tools.replay.check import check_service  # noqa: PLC0415
+    from paani_tools.replay.ledger import Ledger  # noqa: PLC0415
+    from paani_tools.replay.recompute import Losses  # noqa: PLC0415
+    from tests.unit.paani_tools.replay.recorded_drive import CONFIG  # noqa: PLC0415
 
     records = drive(10.0)
     for service in keys.DECIDING_SERVICES:

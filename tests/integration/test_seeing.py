@@ -13,7 +13,7 @@ from paani import messages as m
 from paani.bus import Latest
 from paani.clock import WallClock
 from tests.conftest import OpenAs, Spawn
-from tests.unit.pictures import PICTURES, noisy, river
+from tests.pictures import PICTURES, noisy, river
 
 pytestmark = pytest.mark.integration
 CLEAR = m.LaneEvidence(non_water=0.05, uncertainty=0.05, clear_width=1.0)

@@ -17,7 +17,7 @@ from paani_services.advisor.service import run as advisor
 from paani_services.controller.service import run as controller
 from paani_services.navigator.service import run as navigator
 from tests.conftest import OpenAs
-from tests.unit.advisor_evidence import CLEAR
+from tests.unit.paani_services.advisor.advisor_evidence import CLEAR
 
 pytestmark = pytest.mark.integration
 Run = Callable[[Bus, Clock, Config], Awaitable[None]]

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from paani.replay import command as replay
 from paani_sim.trials.cases import Case, scenario_of
 from paani_sim.trials.drive import Drive
+from paani_sim.trials.drive_recorder import Recorder
+from paani_sim.trials.fingerprint import Maker
+from paani_sim.trials.ground_truth_evidence import OracleEyes
 from paani_sim.trials.one import config_for, run_case
-from paani_sim.trials.oracle import OracleEyes
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.provenance import Maker
-from paani_sim.trials.recording import Recorder
 from paani_sim.trials.suite import Record, encoded, look, result_path
 from paani_sim.worlds import Task
+from paani_tools.replay import command as replay
 
 pytestmark = pytest.mark.integration
 SHORT = """

@@ -19,9 +19,9 @@ from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
-from paani.tune.client import TOKEN
+from paani_tools.tune.client import TOKEN
 from tests.conftest import OpenAs, Spawn, put_raw
-from tests.unit.advisor_evidence import water
+from tests.unit.paani_services.advisor.advisor_evidence import water
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
 CLOCK = WallClock()

@@ -19,7 +19,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import stopwatch_ms
 from paani.config import Config
-from paani.up.summary import STAGES
+from paani_tools.up.run_summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 
@@ -48,7 +48,7 @@ class Up:
         for folder in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
                 words = (folder / "cmdline").read_text().rstrip("\0").split("\0")
-                if words[1:4] == ["-m", "paani.up.child", str(self.process.pid)]:
+                if words[1:4] == ["-m", "paani_tools.up.child", str(self.process.pid)]:
                     found[words[-1]] = int(folder.name)
         return found
 

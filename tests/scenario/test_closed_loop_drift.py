@@ -10,7 +10,7 @@ import pytest
 
 from paani.config import load_config
 from paani.messages import FenceArea, Inhibit, Keep, Waypoint
-from paani_services.navigator.fence import distance_m, is_allowed
+from paani_services.navigator.avoidance.fence import distance_m, is_allowed
 from paani_sim.worlds import Current, Wind, World
 from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
 

@@ -30,7 +30,7 @@ from paani.messages import (
 from paani_services.controller.control import ControlState, control
 from paani_services.controller.control import Heard as ControllerHeard
 from paani_services.localization.estimator import Estimator
-from paani_services.navigator.mission import route_alone
+from paani_services.navigator.guidance.mission import route_alone
 from paani_services.navigator.navigate import Heard as NavigatorHeard
 from paani_services.navigator.navigate import NavState, navigate
 from paani_sim.plant.adapter import Applied, ThrustAdapter

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from paani import messages as m
-from paani_sim.encounters import Course, Family, Look, course, looks, pose_at, range_at
 from paani_sim.eye.camera import Camera
-from paani_sim.motion_table import UNCOMPENSATED, motion_table, part_of
+from paani_sim.studies.encounters import Course, Family, Look, course, looks, pose_at, range_at
+from paani_sim.studies.motion_table import UNCOMPENSATED, motion_table, part_of
 
 C = m.MotionCause
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from paani.config import LocalizationConfig
 from paani.messages import GpsFix, ImuSample, Odometry
-from tests.unit.boat_ride import START_US, Ride, shifted, wandering
+from tests.unit.paani_services.localization.boat_ride import START_US, Ride, shifted, wandering
 
 
 @functools.cache

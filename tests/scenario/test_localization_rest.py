@@ -2,10 +2,8 @@
 
 import itertools
 import math
-import os
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -16,9 +14,10 @@ from paani.geometry import enu_from_geodetic
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.estimator import Estimator
 from paani_services.localization.nmea import fixes
-from tests.unit.boat_ride import Ride, wandering
+from tests.places import DATA
+from tests.unit.paani_services.localization.boat_ride import Ride, wandering
 
-LOGS = Path(os.environ.get("PAANI_DATA", Path(__file__).parents[3] / "shared" / "data")) / "logs"
+LOGS = DATA / "logs"
 
 
 def speed_mps(said: Odometry) -> float:

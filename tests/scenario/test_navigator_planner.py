@@ -27,14 +27,14 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
+from paani_services.navigator.avoidance.rollout import PARTS
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.grid import UNCALIBRATED
-from paani_services.navigator.mission import route_alone
+from paani_services.navigator.guidance.mission import route_alone
+from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
 from paani_services.navigator.navigate import Heard, NavState, navigate
-from paani_services.navigator.shown import Camera
-from paani_services.navigator.ways import PARTS
 from paani_sim.eye.camera import BoatPose
-from tests.unit.watery_sights import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
+from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
 
 CONFIG = load_config().navigator
 PAPER = load_config(profile="paper").navigator

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from paani_sim.plant.oracle import MANOEUVRES, Manoeuvre, compare, solved
+from paani_sim.plant.reference_model import MANOEUVRES, Manoeuvre, compare, solved
 
 STEADY = [manoeuvre for manoeuvre in MANOEUVRES if not manoeuvre.zigzag_rad]
 ZIGZAG = next(manoeuvre for manoeuvre in MANOEUVRES if manoeuvre.zigzag_rad)

@@ -10,7 +10,7 @@ from paani_sim.worlds import WORLDS, Scenario, actor_pose, load_world
 from paani_sim.worlds.generate import random_scenario
 from paani_sim.worlds.room import HEADROOM_M, footprint_gap_m
 from paani_sim.worlds.spec import build_spec
-from tests.unit.fair_scenarios import check_is_fair, fine
+from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair, fine
 
 SEEDS = 4
 

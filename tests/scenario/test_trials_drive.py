@@ -14,8 +14,8 @@ from paani_sim.eye.labels import WATER_CODE
 from paani_sim.eye.mounted import camera_of, pose_of
 from paani_sim.eye.renderer import Eye
 from paani_sim.trials.drive import Drive
+from paani_sim.trials.ground_truth_evidence import OracleEyes, levelled, water_edge
 from paani_sim.trials.one import eyes_of
-from paani_sim.trials.oracle import OracleEyes, levelled, water_edge
 from paani_sim.trials.policies import Policy, config_of, time_scale
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.scoring import score

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paani_models.detection_metrics import CONFIDENCE, average_precision, match, overlaps
-from paani_models.detector_scores import ScoredBoxes, annotating
-from paani_models.sources import DETECTOR_CLASSES, RENDERED
+from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED
+from paani_models.detector.metrics import CONFIDENCE, average_precision, match, overlaps
+from paani_models.detector.scores import ScoredBoxes, annotating
 
 HEIGHTS_PX = (0.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
 FATES = ("found", "scored too low", "taken for another class", "boxed badly", "not seen")

@@ -9,9 +9,9 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.statistics.charts import Points, lines
 from paani_models.report.bars import PHOTOGRAPHS, Bar, Reached
 from paani_models.report.box_limits import FATES, SCORE_STEPS, BoxLimits
-from paani_models.report.charts import Points, lines
 from paani_models.report.mask_limits import REACHES_PX, TENTHS, MaskLimits, edge_f1, water_iou
 from paani_models.report.tables import TITLES, as_table
 from paani_models.report.tried import Tried

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from paani_models.segmenter_metrics import boundary, class_iou, confusion, edge_counts, f1
-from paani_models.segmenter_scores import WATER, Mask, as_label, read_truth, restrict
-from paani_models.sources import IGNORE, SEGMENTER_CLASSES, Sample, Source, read_picture
+from paani_models.datasets.sources import IGNORE, SEGMENTER_CLASSES, Sample, Source, read_picture
+from paani_models.segmenter.metrics import boundary, class_iou, confusion, edge_counts, f1
+from paani_models.segmenter.scores import WATER, Mask, as_label, read_truth, restrict
 
 Counts = NDArray[np.int64]
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.errors import UserError
-from paani_models.detection_metrics import CONFIDENCE
-from paani_models.detector_scores import ScoredBoxes
+from paani_models.datasets.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
+from paani_models.detector.metrics import CONFIDENCE
+from paani_models.detector.scores import ScoredBoxes
 from paani_models.network_input import letterboxed
-from paani_models.segmenter_scores import OBSTACLE, SKY, WATER, Mask, ScoredMask, read_truth, restrict
-from paani_models.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
+from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, Mask, ScoredMask, read_truth, restrict
 
 Picture = NDArray[np.uint8]
 

@@ -8,12 +8,13 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
-from paani_models.detection_metrics import RECALL_STEPS
-from paani_models.estimates import ALARMS, Estimate, Evaluation
-from paani_models.evidence import TITLES, Evidence, Finding, sections
+from paani.statistics.charts import Points, lines
+from paani_models.datasets.sources import DETECTOR_CLASSES
+from paani_models.detector.metrics import RECALL_STEPS
 from paani_models.report.bars import Reached
 from paani_models.report.box_limits import BoxLimits
-from paani_models.report.charts import Points, lines
+from paani_models.report.estimates import ALARMS, Estimate, Evaluation
+from paani_models.report.evidence import TITLES, Evidence, Finding, sections
 from paani_models.report.limits_tables import bars_section, box_limits_section, mask_limits_section
 from paani_models.report.mask_limits import MaskLimits
 from paani_models.report.overlays import Drawn, gallery
@@ -27,7 +28,6 @@ from paani_models.report.tables import (
     sequence_table,
 )
 from paani_models.report.tried import Tried
-from paani_models.sources import DETECTOR_CLASSES
 
 MASK_KEY = (
     '<p class="key"><span style="background:#0072b2"></span>water<span style="background:#e69f00"></span>obstacle'

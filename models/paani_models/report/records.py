@@ -9,8 +9,8 @@ import msgspec
 
 from paani.errors import UserError
 from paani.picture_faults import due_verdict
+from paani.statistics.charts import Points, lines
 from paani_models.catalogue import Figure
-from paani_models.report.charts import Points, lines
 
 RECORDS = ("epochs.jsonl", "log.jsonl")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from paani_models.estimates import Confusion, Estimate
-from paani_models.evidence import Finding
-from paani_models.report.charts import bar
+from paani.statistics.charts import bar
+from paani_models.report.estimates import Confusion, Estimate
+from paani_models.report.evidence import Finding
 
 TITLES = {
     "iou_water": "water IoU",

@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.clock import Clock, patience_us
 from paani.config import CameraConfig, Config
-from paani_services.camera.sources import Bytes, Frame, Webcam, fitted, play, webcam_index
+from paani_services.camera.picture_sources import Bytes, Frame, Webcam, fitted, play, webcam_index
 
 T = TypeVar("T")
 

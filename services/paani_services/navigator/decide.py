@@ -4,9 +4,9 @@ from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani.messages import Mission, Route
-from paani_services.navigator.mission import route_alone
+from paani_services.navigator.guidance.mission import route_alone
+from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import Heard, NavState, navigate
-from paani_services.navigator.shown import Camera
 
 
 def decide(state: NavState, inputs: Inputs, now_us: int, config: Config) -> tuple[NavState, Outputs]:

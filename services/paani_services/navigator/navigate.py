@@ -20,15 +20,15 @@ from paani.messages import (
     Odometry,
     SimTime,
 )
-from paani_services.navigator.crab import Crab, learned, paused
-from paani_services.navigator.fence import bounded_speed, is_allowed
-from paani_services.navigator.grid import UNCALIBRATED
-from paani_services.navigator.mission import Aim, Progress, Scene, aim, follow, words
-from paani_services.navigator.passing import Guards, guarded_course, watch
-from paani_services.navigator.pilot import SAME_COURSE_RAD, Pilot, brakes, looked, steered
-from paani_services.navigator.shown import Camera
-from paani_services.navigator.turning import SIDE, TURNS, Turn, continuous_heading, latched
-from paani_services.navigator.ways import Wish
+from paani_services.navigator.avoidance.fence import bounded_speed, is_allowed
+from paani_services.navigator.avoidance.replanning import SAME_COURSE_RAD, Pilot, brakes, looked, steered
+from paani_services.navigator.avoidance.rollout import Wish
+from paani_services.navigator.guidance.ilos import Crab, learned, paused
+from paani_services.navigator.guidance.mission import Aim, Progress, Scene, aim, follow, words
+from paani_services.navigator.guidance.passed_obstacles import Guards, guarded_course, watch
+from paani_services.navigator.guidance.visual_turns import SIDE, TURNS, Turn, continuous_heading, latched
+from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
 
 
 class NavState(msgspec.Struct, frozen=True):

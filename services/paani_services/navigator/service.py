@@ -13,8 +13,8 @@ from paani.clock import Clock
 from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.logbook import Logbook
-from paani_services.navigator.mission_file import first_route, load_task
+from paani_services.navigator.files.mission_file import first_route, load_task
+from paani_services.navigator.files.mission_journal import Logbook
 
 EARLY_US = 5_000  # a wake-up this much before the period is over is on time
 

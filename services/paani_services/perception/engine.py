@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from paani.config import EngineName
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
-from paani_models.last_resize import before_resize
+from paani_models.engines.last_resize import before_resize
 from paani_services.perception.corridors import cells_only
 from paani_services.perception.ncnn_engine import NcnnEngine
 

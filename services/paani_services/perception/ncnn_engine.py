@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
-from paani_models.ncnn_runner import Run, converted, open_ncnn, resized
+from paani_models.engines.ncnn_runner import Run, converted, open_ncnn, resized
 from paani_services.perception.corridors import cells_only
 
 Floats = NDArray[np.float32]

@@ -18,13 +18,13 @@ from paani.messages import (
     SegmentationSource,
     UnusableCause,
 )
+from paani_services.perception.box_decoding import decode
 from paani_services.perception.corridors import Lanes, classify, summarise, water_edge
-from paani_services.perception.decode import decode
-from paani_services.perception.decoding import decoded
 from paani_services.perception.engine import Engine, engine_named
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.gate import GateState, judge
+from paani_services.perception.picture_decoding import decoded
 from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
 

@@ -1,19 +1,20 @@
 """Configuration: one frozen tree, layered from defaults, a file, the environment and the command line."""
 
-from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
-from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
+from paani.config.advisor import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
+from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
-from paani.config.planning import CalibrationConfig, PlannerConfig, calibration_of
-from paani.config.profiles import PROFILES
-from paani.config.recording import RecorderConfig
-from paani.config.seeing import CameraConfig, CorridorConfig, DetectorConfig, EngineName, GateConfig, PerceptionConfig
-from paani.config.simulating import (
-    AdapterConfig,
-    EyeConfig,
-    PlantConfig,
-    SensorsConfig,
-    WorldConfig,
+from paani.config.perception import (
+    CameraConfig,
+    CorridorConfig,
+    DetectorConfig,
+    EngineName,
+    GateConfig,
+    PerceptionConfig,
 )
+from paani.config.planner import CalibrationConfig, PlannerConfig, calibration_of
+from paani.config.profiles import PROFILES
+from paani.config.recorder import RecorderConfig
+from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, SensorsConfig, WorldConfig
 from paani.config.tree import BusConfig, Config, DashboardConfig
 
 __all__ = [

@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from paani.config.guiding import ControllerConfig, LocalizationConfig, NavigatorConfig
-from paani.config.judging import AdvisorConfig
-from paani.config.planning import CalibrationConfig
-from paani.config.recording import RecorderConfig
+from paani.config.advisor import AdvisorConfig
+from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
+from paani.config.perception import CameraConfig, PerceptionConfig
+from paani.config.planner import CalibrationConfig
+from paani.config.recorder import RecorderConfig
 from paani.config.section import Positive, Section
-from paani.config.seeing import CameraConfig, PerceptionConfig
-from paani.config.simulating import EyeConfig, PlantConfig, WorldConfig
+from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
 from paani.keys import SERVICES
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]

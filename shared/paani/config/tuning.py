@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from paani.config.judging import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
+from paani.config.advisor import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {
     "policy": PolicyConfig,

@@ -27,7 +27,7 @@ from paani_sim.eye.scene import FIRST_THING, PLANT_WIDTHS, ROW_WIDTHS, Own, Rows
 from paani_sim.eye.sky import Sky, paint_sky
 from paani_sim.eye.sprites import paint_sprites
 from paani_sim.eye.surfaces import surface_tiles
-from paani_sim.eye.waves import noise_tile, slope_tile
+from paani_sim.eye.wave_textures import noise_tile, slope_tile
 from paani_sim.eye.weather import Uniforms, uniforms
 from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_at, along_at
 

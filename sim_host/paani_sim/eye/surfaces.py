@@ -6,7 +6,7 @@ Every layer is `(TILE, TILE, 4)` uint8, periodic. Layer 0 is noise; in the other
 import numpy as np
 import numpy.typing as npt
 
-from paani_sim.eye.waves import TILE, noise_tile
+from paani_sim.eye.wave_textures import TILE, noise_tile
 
 U8 = npt.NDArray[np.uint8]
 F64 = npt.NDArray[np.float64]

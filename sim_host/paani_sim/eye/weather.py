@@ -7,7 +7,7 @@ from paani_sim.eye.afloat import Sea, sea_of
 from paani_sim.eye.rain import extinction_per_m
 from paani_sim.eye.sky import Sky
 from paani_sim.eye.surfaces import SPAN_M
-from paani_sim.eye.waves import mean_square_slope
+from paani_sim.eye.wave_textures import mean_square_slope
 from paani_sim.worlds.world import Light, Wind, World
 
 F32 = npt.NDArray[np.float32]

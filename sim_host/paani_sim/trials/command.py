@@ -14,13 +14,13 @@ from tqdm import tqdm
 from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_sim.trials.cases import SUITES, Case, cases_of, read_case
+from paani_sim.trials.fingerprint import Maker
 from paani_sim.trials.one import config_for, run_case
 from paani_sim.trials.policies import Policy, config_of
-from paani_sim.trials.provenance import Maker
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.states import Why
 from paani_sim.trials.suite import Failure, drive_all, look
-from paani_sim.trials.summary import summarise, table
+from paani_sim.trials.suite_summary import summarise, table
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.load import load_scenario
 
@@ -86,7 +86,7 @@ def _one(options: argparse.Namespace) -> int:
     """One drive in this process, its result printed."""
     case = read_case(options.one)
     if options.record:
-        from paani_sim.trials.recording import Recorder  # noqa: PLC0415
+        from paani_sim.trials.drive_recorder import Recorder  # noqa: PLC0415
 
         with Recorder(options.record, config_for(case, options.sets)) as recorder:
             result, effort = run_case(case, options.sets, threads=True, tap=recorder.tap)

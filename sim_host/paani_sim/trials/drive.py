@@ -17,7 +17,7 @@ from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
 from paani_sim.trials.board import Board
-from paani_sim.trials.eyes import Eyes, Sight
+from paani_sim.trials.evidence_source import Eyes, Sight
 from paani_sim.trials.outbox import START_US, Outbox, Tap
 from paani_sim.trials.policies import look_hz, time_scale
 from paani_sim.trials.route_progress import Along

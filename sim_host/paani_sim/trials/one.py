@@ -10,8 +10,8 @@ from paani.clock import process_cpu_s, stopwatch_ms
 from paani.config import Config
 from paani_sim.trials.cases import Case, scenario_of
 from paani_sim.trials.drive import Drive
-from paani_sim.trials.eyes import CameraEyes, Eyes
-from paani_sim.trials.oracle import OracleEyes
+from paani_sim.trials.evidence_source import CameraEyes, Eyes
+from paani_sim.trials.ground_truth_evidence import OracleEyes
 from paani_sim.trials.outbox import Tap
 from paani_sim.trials.policies import CAMERA, Policy, config_of
 from paani_sim.trials.result import TrialResult

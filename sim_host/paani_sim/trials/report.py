@@ -9,12 +9,12 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+from paani.statistics.charts import bar
 from paani.whole_file import write_whole
-from paani_models.report.charts import bar
 from paani_sim.trials.cases import Case, scenario_of
-from paani_sim.trials.plan_view import plan_view
 from paani_sim.trials.result import UNDER_M, Closeness, TrialResult
-from paani_sim.trials.summary import PolicyFigures, Share, Summary
+from paani_sim.trials.suite_summary import PolicyFigures, Share, Summary
+from paani_sim.trials.track_chart import plan_view
 from paani_sim.trials.worst import Again, drive_again, worst_of
 
 WORST = 6

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import msgspec
 
-from paani.dithering import Dithering
+from paani.statistics.dithering import Dithering
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.states import Why
 

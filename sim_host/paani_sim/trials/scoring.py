@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.config import EyeConfig
-from paani.dithering import dithering
-from paani.order_statistics import nearest_rank
+from paani.statistics.dithering import dithering
+from paani.statistics.order_statistics import nearest_rank
 from paani_sim.plant.plant import Hit
-from paani_sim.trials.clearance import BANK, FAR_M, Course, afloat, clearances_m, could_see
 from paani_sim.trials.drive import SAMPLE_HZ, Drive
+from paani_sim.trials.hull_clearance import BANK, FAR_M, Course, afloat, clearances_m, could_see
 from paani_sim.trials.policies import Policy, look_hz
 from paani_sim.trials.reactions import reactions_of
 from paani_sim.trials.result import (

@@ -16,8 +16,8 @@ import msgspec
 from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_sim.trials.cases import Case
+from paani_sim.trials.fingerprint import MadeWith, Maker
 from paani_sim.trials.one import run_case
-from paani_sim.trials.provenance import MadeWith, Maker
 from paani_sim.trials.result import TrialResult
 
 TRIALS, EFFORTS = "trials", "efforts"

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from paani import keys
 from paani import messages as m
 from paani_sim.trials.cases import Case
+from paani_sim.trials.drive_recorder import Recorder
 from paani_sim.trials.one import config_for, run_case
 from paani_sim.trials.outbox import START_US
-from paani_sim.trials.plan_view import worst_moment_s
 from paani_sim.trials.policies import CAMERA
-from paani_sim.trials.recording import Recorder
 from paani_sim.trials.result import TrialResult
+from paani_sim.trials.track_chart import worst_moment_s
 
 Bytes = NDArray[np.uint8]
 PICTURES, APART_S = 6, 1.0

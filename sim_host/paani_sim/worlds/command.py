@@ -83,7 +83,7 @@ def _mjcf(options: argparse.Namespace) -> int:
 
 
 def _dataset(options: argparse.Namespace) -> int:
-    from paani_sim.dataset import write_dataset  # noqa: PLC0415  the rest needs no OpenGL
+    from paani_sim.worlds.dataset import write_dataset  # noqa: PLC0415  the rest needs no OpenGL
 
     _require_folder(options.out)
     manifest = write_dataset(options.out, options.n, options.seed, options.worlds)

@@ -13,7 +13,7 @@ from paani_sim.worlds.world import World
 
 
 def fence_toml(world: World, areas: Iterable[FenceArea]) -> str:
-    """The fence file of areas in the world's map (format: `paani_services.navigator.fence_file`)."""
+    """The fence file of areas in the world's map (format: `paani_services.navigator.files.fence_file`)."""
     head = f"[origin]\nlatitude_deg = {world.origin_lat_deg}\nlongitude_deg = {world.origin_lon_deg}\n"
     parts = []
     for area in areas:

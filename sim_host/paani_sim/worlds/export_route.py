@@ -12,7 +12,7 @@ from paani_sim.worlds.world import World
 
 
 def route_toml(world: World, name: str) -> str:
-    """The route file of the world (format: `paani_services.navigator.route`), in map metres."""
+    """The route file of the world (format: `paani_services.navigator.files.route_file`), in map metres."""
     head = (
         f"name = {json.dumps(name[-100:])}\nrepeat = {json.dumps(world.route_closed)}\n\n[origin]\n"
         f"latitude_deg = {world.origin_lat_deg}\nlongitude_deg = {world.origin_lon_deg}\n"

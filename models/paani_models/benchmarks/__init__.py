@@ -1,0 +1,1 @@
+"""Public benchmarks: LaRS and MODS, their protocols and formats."""

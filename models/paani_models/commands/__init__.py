@@ -1,0 +1,1 @@
+"""`paani models`: one module per sub-command."""

@@ -1,0 +1,136 @@
+"""`paani models evaluate`: the exported nets on held-out sequences, as figures, as JSON, or into the manifest."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from paani.errors import UserError
+from paani.whole_file import write_whole
+from paani_models.benchmarks import run as benchmarks
+from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
+from paani_models.datasets.selection import Pictures
+from paani_models.datasets.sources import DETECTOR_CLASSES
+from paani_models.detector.scores import ScoredBoxes, false_alarms, score_boxes
+from paani_models.report import evaluate
+from paani_models.report.estimates import (
+    Evaluation,
+    Measured,
+    alarm_estimates,
+    box_confusion,
+    box_curves,
+    box_estimates,
+    mask_confusions,
+    mask_estimates,
+)
+from paani_models.report.records import gate_figures, read_faults
+from paani_models.segmenter.scores import ScoredMask, score_masks
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Beside --data, --sources, --rendered and --weights."""
+    parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
+    parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="the gate's figures, from `paani faults --json`")
+    parser.add_argument("--lars", type=Path, metavar="ROOT", help="score the segmenter by LaRS's protocol instead")
+    parser.add_argument("--mods", type=Path, metavar="ROOT", help="score both nets by MODS's protocol instead")
+    parser.add_argument(
+        "--predictions", type=Path, help="with --lars or --mods: write masks and boxes in their formats"
+    )
+    parser.add_argument("--json", type=Path, help="write figures with intervals, per source and sequence, to this file")
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Everything measured on labelled pictures, picture by picture."""
+
+    evaluation: Evaluation
+    masks: list[ScoredMask]
+    boxes: list[ScoredBoxes]
+
+
+def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
+    """Exit 0, or raise UserError."""
+    catalogue = load_catalogue(arguments.weights)
+    if arguments.faults:
+        _report("gate", gate_figures(read_faults(arguments.faults)), arguments)
+        return 0
+    for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
+        if net not in catalogue or not is_scored(catalogue[net].classes):
+            raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
+        _report(net, measure(net, arguments.weights, pictures), arguments)
+    if arguments.json:
+        write(arguments.json, score(arguments.weights, pictures).evaluation)
+    return 0
+
+
+def _report(net: str, figures: list[Figure], arguments: argparse.Namespace) -> None:
+    for figure in figures:
+        sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
+    if arguments.record:
+        catalogue = load_catalogue(arguments.weights)
+        if net not in catalogue:
+            raise UserError(f"{arguments.weights}: no model named {net!r}")
+        model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
+        save_catalogue({**catalogue, net: model}, arguments.weights)
+
+
+def run_benchmark(arguments: argparse.Namespace) -> int:
+    """Print one JSON object per benchmark. Exit 0, or raise UserError."""
+    segmenter_net = verified_path("segmenter", arguments.weights)
+    if arguments.lars:
+        _print(benchmarks.score_lars(segmenter_net, arguments.lars, arguments.predictions))
+    if arguments.mods:
+        detector_net = verified_path("detector", arguments.weights)
+        _print(benchmarks.score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
+    return 0
+
+
+def _print(figures: dict[str, float]) -> None:
+    rounded = {name: round(value, 3) if math.isfinite(value) else None for name, value in figures.items()}
+    sys.stdout.write(msgspec.json.encode(rounded).decode() + "\n")
+
+
+def is_scored(classes: tuple[str, ...]) -> bool:
+    """Whether a model of the manifest marks water or boxes: others are no matter of labelled pictures."""
+    return "water" in classes or classes == DETECTOR_CLASSES
+
+
+def measure(net: str, weights: Path, pictures: Pictures) -> list[Figure]:
+    """The manifest's figures of one net."""
+    path = verified_path(net, weights)
+    if "water" in load_catalogue(weights)[net].classes:
+        return evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
+    return [
+        *evaluate.detector_figures(path, pictures.boxed(held_out=True)),
+        *evaluate.false_alarm_figures(path, pictures.segmented(held_out=True)),
+    ]
+
+
+def score(weights: Path, pictures: Pictures) -> Scored:
+    """The shipped pair, picture by picture. Raises UserError where nothing is held out."""
+    segmented, boxed = pictures.segmented(held_out=True), pictures.boxed(held_out=True)
+    if not segmented and not boxed:
+        raise UserError("sources: nothing is held out")
+    catalogue = load_catalogue(weights)
+    masks = score_masks(verified_path("segmenter", weights), segmented) if segmented else []
+    boxes = score_boxes(verified_path("detector", weights), boxed) if boxed else []
+    rivers = [sample for sample in segmented if sample.source.empty_of]
+    alarms = alarm_estimates(rivers, false_alarms(verified_path("detector", weights), rivers)) if rivers else ()
+    evaluation = Evaluation(
+        models=tuple(Measured(name=n, sha256=catalogue[n].sha256) for n in ("segmenter", "detector") if n in catalogue),
+        estimates=(*mask_estimates(masks), *box_estimates(boxes), *alarms),
+        curves=box_curves(boxes),
+        confusions=(*mask_confusions(masks), *([box_confusion(boxes)] if boxes else [])),
+    )
+    return Scored(evaluation, masks, boxes)
+
+
+def write(path: Path, evaluation: Evaluation) -> None:
+    """Written beside, then renamed. Raises UserError naming a file that cannot be written."""
+    write_whole(path, msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")

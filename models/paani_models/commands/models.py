@@ -1,0 +1,229 @@
+"""`paani models`: look at the training data, train, export, evaluate, check what is shipped.
+
+Only the sub-commands that need PyTorch import it, so `paani models check` runs where it is not installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from paani.errors import UserError
+from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+from paani_models.commands import engines as engine_command
+from paani_models.commands import evaluate as evaluate_command
+from paani_models.commands import report as report_command
+from paani_models.datasets import command as data_command
+from paani_models.datasets.selection import Pictures
+from paani_models.datasets.sources import without_water
+from paani_models.engines import contract_check
+from paani_models.report import evaluate
+from paani_models.report.model_card import card
+
+DATA_VARIABLE = "PAANI_DATA"
+NETS = ("segmenter", "detector")
+TRAINED = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
+
+
+def data_folder() -> Path:
+    """The folder of annotated pictures: $PAANI_DATA, or shared/data beside the checkout."""
+    beside = Path(__file__).resolve().parents[4] / "shared" / "data"
+    return Path(os.environ.get(DATA_VARIABLE, beside))
+
+
+def main(argv: list[str]) -> int:
+    """Run one sub-command; 0 on success, 2 with one line on a user's mistake."""
+    arguments = _parser().parse_args(argv)
+    try:
+        if arguments.command == "check":
+            return _check_file(arguments) if arguments.model else _check(arguments.weights)
+        if arguments.command == "card":
+            sys.stdout.write(card(load_catalogue(arguments.weights)))
+            return 0
+        if arguments.command == "prepare":
+            if arguments.set != "own":
+                return data_command.prepare_public(arguments)
+            return data_command.prepare_own(_pictures(arguments), arguments.manifest)
+        if arguments.command == "held-out":
+            return _held_out(_pictures(arguments), arguments.without_water)
+        if arguments.command == "pack":
+            return data_command.make_bundle(arguments, _pictures(arguments))
+        if arguments.command == "evaluate":
+            if arguments.lars or arguments.mods:
+                return evaluate_command.run_benchmark(arguments)
+            return evaluate_command.run(arguments, _pictures(arguments))
+        if arguments.command == "report":
+            return report_command.run(arguments, _pictures(arguments))
+        if arguments.command == "quantise":
+            return _quantise(arguments)
+        if arguments.command == "convert":
+            return engine_command.convert(arguments)
+        if arguments.command == "bench":
+            return engine_command.bench(arguments)
+        if arguments.command == "variant":
+            return _variant(arguments.weights, arguments.out)
+        return _needs_torch(arguments)
+    except UserError as error:
+        sys.stderr.write(f"paani models: {error}\n")
+        return 2
+    except KeyboardInterrupt:
+        resumes = arguments.command == "train"
+        sys.stderr.write(f"stopped{'; the same command goes on from the last finished epoch' if resumes else ''}\n")
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani models", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    check = commands.add_parser("check", help="compare the shipped files with their manifest, or judge a file of yours")
+    check.add_argument("model", type=Path, nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
+    check.add_argument("--role", choices=NETS, help="told from the output if not given")
+    check.add_argument("--score", action="store_true", help="also its figures on the held-out pictures of --data")
+    check.add_argument("--weights", type=Path, default=WEIGHTS)
+
+    model_card = commands.add_parser("card", help="print the model card of a weights folder, as Markdown")
+    model_card.add_argument("--weights", type=Path, default=WEIGHTS)
+
+    held_out = commands.add_parser("held-out", help="list the held-out pictures, for `paani faults --pictures`")
+    held_out.add_argument("--without-water", action="store_true", help="only those that show no water; else all others")
+    check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
+    data_command.add_prepare_arguments(check_data)
+    pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
+    data_command.add_pack_arguments(pack)
+    train = commands.add_parser("train", help="train a net; goes on where it was stopped")
+    train.add_argument("net", choices=TRAINED)
+    train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
+    train.add_argument(
+        "--start",
+        type=Path,
+        help="checkpoint, or exported ONNX file, to begin from; for the gate: the segmenter that it guards",
+    )
+    train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
+    train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
+    train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
+    train.add_argument("--epochs", type=int, help="detector and gate only")
+    train.add_argument("--peak-rate", type=float)
+    train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
+    train.add_argument("--threads", type=int, default=2)
+    export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
+    export.add_argument("net", choices=TRAINED)
+    exported = export.add_mutually_exclusive_group(required=True)
+    exported.add_argument("--checkpoint", type=Path)
+    exported.add_argument("--untrained", action="store_true", help="random weights, to measure the speed of its shape")
+    evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
+    evaluate_command.add_arguments(evaluate)
+    report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
+    report_command.add_arguments(report)
+    for command in (export, evaluate, report):
+        command.add_argument("--weights", type=Path, default=WEIGHTS)
+    variant = commands.add_parser("variant", help="the same nets, taking pictures as bytes: a little faster")
+    variant.add_argument("--out", type=Path, required=True, help="folder for nets and manifest")
+    variant.add_argument("--weights", type=Path, default=WEIGHTS)
+    convert = commands.add_parser("convert", help="ONNX to ncnn, compared on real pictures; needs pnnx")
+    engine_command.add_convert_arguments(convert)
+    bench = commands.add_parser("bench", help="which engine runs the nets faster on this machine")
+    engine_command.add_bench_arguments(bench)
+    bench.add_argument("--weights", type=Path, default=WEIGHTS)
+    quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
+    quantise.add_argument("net", choices=NETS)
+    quantise.add_argument("--recipe", choices=("paper", "equalised"), default="equalised")
+    quantise.add_argument("--model", type=Path, metavar="FILE", help="FP32 ONNX file; the shipped one if not given")
+    quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
+    quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
+    quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
+    for command in (check, held_out, check_data, pack, train, export, evaluate, report, quantise, convert, bench):
+        command.add_argument("--data", type=Path, default=data_folder())
+        command.add_argument("--sources", default="", help="comma-separated; all if not given")
+        command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
+    return parser
+
+
+def _held_out(pictures: Pictures, dry: bool) -> int:
+    """dry: also pictures that show no water and belong to no source."""
+    if dry:
+        trained = {sample.picture for sample in pictures.never_held_out()}
+        listed = {pictures.data / name for name in without_water()}
+        held = {picture for picture in listed - trained if picture.is_file()}
+    else:
+        held = {sample.picture for sample in pictures.samples if sample.held_out and not sample.without_water}
+    sys.stdout.write("".join(f"{path.relative_to(pictures.data).as_posix()}\n" for path in sorted(held)))
+    return 0
+
+
+def _check(weights: Path) -> int:
+    for name, model in load_catalogue(weights).items():
+        verified_path(name, weights)
+        sys.stdout.write(f"{name}: {model.file} {model.size_bytes} bytes, {model.parameters} parameters, ok\n")
+    return 0
+
+
+def _check_file(arguments: argparse.Namespace) -> int:
+    """0 where the model can be used, 1 where it cannot."""
+    role = contract_check.role_of(arguments.model, arguments.role)
+    findings = contract_check.inspected(arguments.model, role)
+    for finding in findings:
+        sys.stdout.write(f"{finding.level:8} {finding.text}\n")
+    usable = all(finding.level != "error" for finding in findings)
+    if usable and arguments.score:
+        pictures = _pictures(arguments)
+        if role == "segmenter":
+            figures = evaluate.segmenter_figures(arguments.model, pictures.segmented(held_out=True))
+        else:
+            figures = evaluate.detector_figures(arguments.model, pictures.boxed(held_out=True))
+        for figure in figures:
+            sys.stdout.write(f"{'score':8} {figure.metric} on {figure.source}: {figure.value:.3f} (n {figure.n})\n")
+    use = f"paani up --set perception.{role}={arguments.model}"
+    sys.stdout.write(f"{arguments.model}: {f'can be used: {use}' if usable else 'cannot be used as it is'}\n")
+    return 0 if usable else 1
+
+
+def _pictures(arguments: argparse.Namespace) -> Pictures:
+    names = [name for name in arguments.sources.split(",") if name]
+    return Pictures(arguments.data, names, arguments.rendered)
+
+
+def _variant(weights: Path, out: Path) -> int:
+    try:
+        from paani_models.engines.runtime_variant import write_variant  # noqa: PLC0415 - onnx is not on the board
+    except ModuleNotFoundError as error:
+        raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    for name in NETS:
+        model = write_variant(name, load_catalogue(weights)[name], verified_path(name, weights), out)
+        sys.stdout.write(f"--set perception.{name}={out / model.file}\n")
+    return 0
+
+
+def _quantise(arguments: argparse.Namespace) -> int:
+    try:
+        from paani_models.commands import quantise as quantise_command  # noqa: PLC0415 - onnx is not on the board
+    except ModuleNotFoundError as error:
+        raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    return quantise_command.run(arguments, _pictures(arguments))
+
+
+def _needs_torch(arguments: argparse.Namespace) -> int:
+    try:
+        from paani_models.recipes import recipes as pipeline  # noqa: PLC0415 - PyTorch is not on the board
+    except ModuleNotFoundError as error:
+        raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
+    if arguments.command == "export" and arguments.untrained:
+        return pipeline.export_untrained_net(arguments.net, arguments.weights)
+    pictures = _pictures(arguments)
+    if arguments.command == "train":
+        plan = pipeline.Plan(
+            folder=arguments.folder,
+            start=arguments.start,
+            teacher=arguments.teacher,
+            labels_from=arguments.labels_from,
+            stages=tuple(arguments.stage),
+            epochs=arguments.epochs,
+            peak_rate=arguments.peak_rate,
+            unchecked=arguments.unchecked,
+        )
+        pipeline.train(arguments.net, pictures, plan, arguments.threads)
+    else:
+        pipeline.export_net(arguments.net, arguments.checkpoint, arguments.weights, pictures)
+    return 0

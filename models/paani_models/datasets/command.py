@@ -1,0 +1,71 @@
+"""`paani models prepare` and `pack`: what can be done with pictures where PyTorch is not installed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from paani.errors import UserError
+from paani_models.datasets import inventory, mastr1325, waterscenes
+from paani_models.datasets.manifest import count_boxes, counts_table
+from paani_models.datasets.pack import WEIGHTS_FOLDER, pack
+from paani_models.datasets.selection import Pictures
+
+SETS = ("own", "waterscenes", "mastr1325")
+
+
+def add_prepare_arguments(parser: argparse.ArgumentParser) -> None:
+    """Beside --data, --sources and --rendered."""
+    parser.add_argument("set", nargs="?", choices=SETS, default="own", help="own: the data folder (default)")
+    parser.add_argument("--raw", type=Path, help="public set: the folder in its official layout")
+    parser.add_argument("--out", type=Path, help="public set: the new folder")
+    parser.add_argument("--manifest", type=Path, help="own: write every picture, checksum and split to this file")
+    parser.add_argument("--by", choices=("sequence", "image"), default="sequence", help="mastr1325: image as the paper")
+    parser.add_argument("--strict", action="store_true", help="waterscenes: refuse official splits that share views")
+    parser.add_argument("--missing-is-empty", action="store_true", help="waterscenes: no label file, no object")
+
+
+def add_pack_arguments(parser: argparse.ArgumentParser) -> None:
+    """Beside --data, --sources and --rendered."""
+    parser.add_argument("--out", type=Path, required=True, help="the tar file")
+    parser.add_argument("--max-mb", type=float, default=60.0, help="its largest size, in millions of bytes")
+    parser.add_argument("--start", type=Path, action="append", default=[], help="checkpoint to add, repeatable")
+
+
+def prepare_own(pictures: Pictures, manifest: Path | None) -> int:
+    """Exit 0, or raise UserError."""
+    inventory.prepare(pictures.samples, pictures.folder, manifest)
+    return 0
+
+
+def prepare_public(arguments: argparse.Namespace) -> int:
+    """Exit 0, or raise UserError."""
+    if arguments.raw is None or arguments.out is None:
+        raise UserError(f"prepare {arguments.set}: needs --raw and --out")
+    if arguments.set == "waterscenes":
+        manifest, leaks = waterscenes.prepare(
+            arguments.raw, arguments.out, missing_is_empty=arguments.missing_is_empty, strict=arguments.strict
+        )
+    else:
+        manifest, leaks = mastr1325.prepare(arguments.raw, arguments.out, by=arguments.by)
+    sys.stdout.write(counts_table(count_boxes(manifest)))
+    if leaks:
+        sys.stdout.write(f"{len(leaks)} pairs of different splits share a view, the first: {leaks[0]}\n")
+    return 0
+
+
+def make_bundle(arguments: argparse.Namespace, pictures: Pictures) -> int:
+    """Exit 0, or raise UserError."""
+    packed = pack(
+        arguments.out,
+        pictures.samples,
+        pictures.folder,
+        max_mb=arguments.max_mb,
+        weights=sorted((pictures.data / WEIGHTS_FOLDER).glob("*")),
+        start=arguments.start,
+    )
+    sys.stdout.write(
+        f"{arguments.out}: {packed.size_bytes} bytes, {packed.pictures} pictures, JPEG quality {packed.quality}\n"
+    )
+    return 0

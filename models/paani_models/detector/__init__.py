@@ -1,0 +1,1 @@
+"""The obstacle detector: networks, losses, training and scores."""

@@ -1,0 +1,213 @@
+"""The detector: YOLOX-nano's shape (Ge et al. 2021) with batch norm folded away, four classes, joint scores.
+
+Input RGB 0..1 float32 [N,3,256,320]; output float32 [N,8,1680]: cx, cy, w, h in input pixels, then the scores
+of person, vessel, pier, buoy, each objectness times class, in 0..1 (checklist C1, C2, C4). Candidates run over
+strides 8, 16, 32 in that order, row by row.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from paani.errors import UserError
+from paani_models.datasets.sources import DETECTOR_CLASSES
+
+INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # checklist C1
+STRIDES = (8, 16, 32)
+CANDIDATES = sum((INPUT_HEIGHT_PX // s) * (INPUT_WIDTH_PX // s) for s in STRIDES)  # checklist C4: 1,680
+
+HEAD_CHANNELS = 64
+
+# Which of the 80 COCO rows each class of ours starts from: the nearest in kind, or in shape where COCO has no kind.
+COCO_ROWS = {
+    "person": (0,),
+    "vessel": (8,),  # boat
+    "pier": (13,),  # bench
+    "buoy": (9, 10, 32),  # traffic light, fire hydrant, sports ball
+}
+
+
+class Conv(nn.Module):
+    """Convolution with bias, then SiLU."""
+
+    def __init__(self, cin: int, cout: int, kernel: int = 1, stride: int = 1, groups: int = 1) -> None:
+        super().__init__()
+        self.conv = nn.Conv2d(cin, cout, kernel, stride, kernel // 2, groups=groups)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.silu(self.conv(x))
+
+
+def separable(cin: int, cout: int, stride: int = 1) -> nn.Sequential:
+    """Depthwise 3x3, then pointwise."""
+    return nn.Sequential(Conv(cin, cin, 3, stride, groups=cin), Conv(cin, cout))
+
+
+class Bottleneck(nn.Module):
+    """Pointwise, separable 3x3; residual on request."""
+
+    def __init__(self, channels: int, residual: bool) -> None:
+        super().__init__()
+        self.reduce = Conv(channels, channels)
+        self.expand = separable(channels, channels)
+        self.residual = residual
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = cast(Tensor, self.expand(self.reduce(x)))
+        return x + y if self.residual else y
+
+
+class SplitLayer(nn.Module):
+    """Cross-stage partial layer: half of the channels through `depth` bottlenecks, half past them."""
+
+    def __init__(self, cin: int, cout: int, depth: int, residual: bool) -> None:
+        super().__init__()
+        half = cout // 2
+        self.through = Conv(cin, half)
+        self.past = Conv(cin, half)
+        self.blocks = nn.Sequential(*(Bottleneck(half, residual) for _ in range(depth)))
+        self.join = Conv(cout, cout)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return cast(Tensor, self.join(torch.cat([self.blocks(self.through(x)), self.past(x)], 1)))
+
+
+class PyramidPooling(nn.Module):
+    """Spatial pyramid pooling over 5, 9 and 13 cells."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.reduce = Conv(channels, channels // 2)
+        self.join = Conv(channels * 2, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.reduce(x)
+        return cast(
+            Tensor,
+            self.join(torch.cat([y, *(F.max_pool2d(y, k, 1, k // 2) for k in (5, 9, 13))], 1)),
+        )
+
+
+class Head(nn.Module):
+    """One scale's predictions: [N, 4 box + 1 objectness + 4 class, H, W], all raw."""
+
+    def __init__(self, cin: int) -> None:
+        super().__init__()
+        width = HEAD_CHANNELS
+        self.stem = Conv(cin, width)
+        self.class_tower = nn.Sequential(separable(width, width), separable(width, width))
+        self.class_out = nn.Conv2d(width, len(DETECTOR_CLASSES), 1)
+        self.box_tower = nn.Sequential(separable(width, width), separable(width, width))
+        self.box_out = nn.Conv2d(width, 4, 1)
+        self.object_out = nn.Conv2d(width, 1, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        x = self.stem(x)
+        classes = self.class_out(self.class_tower(x))
+        box = self.box_tower(x)
+        return torch.cat([self.box_out(box), self.object_out(box), classes], 1)
+
+
+class Detector(nn.Module):
+    """Modules are registered in the order in which they run, which `load_yolox` relies on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stem = Conv(12, 16, 3)
+        self.dark2 = nn.Sequential(separable(16, 32, 2), SplitLayer(32, 32, 1, residual=True))
+        self.dark3 = nn.Sequential(separable(32, 64, 2), SplitLayer(64, 64, 3, residual=True))
+        self.dark4 = nn.Sequential(separable(64, 128, 2), SplitLayer(128, 128, 3, residual=True))
+        self.dark5 = nn.Sequential(separable(128, 256, 2), PyramidPooling(256), SplitLayer(256, 256, 1, residual=False))
+        self.narrow5 = Conv(256, 128)
+        self.merge4 = SplitLayer(256, 128, 1, residual=False)
+        self.narrow4 = Conv(128, 64)
+        self.merge3 = SplitLayer(128, 64, 1, residual=False)
+        self.down3 = separable(64, 64, 2)
+        self.out4 = SplitLayer(128, 128, 1, residual=False)
+        self.down4 = separable(128, 128, 2)
+        self.out5 = SplitLayer(256, 256, 1, residual=False)
+        self.heads = nn.ModuleList(Head(channels) for channels in (64, 128, 256))
+
+    def features(self, x: Tensor) -> list[Tensor]:
+        """Fused feature maps at strides 8, 16, 32 (64, 128, 256 channels)."""
+        corners = [x[..., row::2, column::2] for column in (0, 1) for row in (0, 1)]
+        c2 = self.dark2(self.stem(torch.cat(corners, 1)))
+        c3 = self.dark3(c2)
+        c4 = self.dark4(c3)
+        c5 = self.narrow5(self.dark5(c4))
+        p4 = self.narrow4(self.merge4(torch.cat([F.interpolate(c5, scale_factor=2.0), c4], 1)))
+        p3 = self.merge3(torch.cat([F.interpolate(p4, scale_factor=2.0), c3], 1))
+        n4 = self.out4(torch.cat([self.down3(p3), p4], 1))
+        n5 = self.out5(torch.cat([self.down4(n4), c5], 1))
+        return [p3, n4, n5]
+
+    def raw(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Boxes cx, cy, w, h in input pixels [N,A,4], and logits [N,A,5]: objectness, then the classes."""
+        boxes, logits = [], []
+        for feature, head, stride in zip(self.features(x), self.heads, STRIDES, strict=True):
+            output = head(feature)
+            flat = output.flatten(2).transpose(1, 2)
+            cells = cell_corners(output.shape[2], output.shape[3], output.device)
+            centre = (flat[..., :2] + cells) * stride
+            size = flat[..., 2:4].clamp(max=6.0).exp() * stride
+            boxes.append(torch.cat([centre, size], 2))
+            logits.append(flat[..., 4:])
+        return torch.cat(boxes, 1), torch.cat(logits, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        boxes, logits = self.raw(x)
+        scores = torch.sigmoid(logits[..., :1]) * torch.sigmoid(logits[..., 1:])
+        return torch.cat([boxes, scores], 2).transpose(1, 2)
+
+
+def cell_corners(rows: int, columns: int, device: torch.device) -> Tensor:
+    """Upper left corner (x, y) of every cell of a grid, in cells, row by row: float32 [rows * columns, 2]."""
+    y, x = torch.meshgrid(torch.arange(rows, device=device), torch.arange(columns, device=device), indexing="ij")
+    return torch.stack([x, y], 2).reshape(-1, 2).float()
+
+
+def load_yolox(model: Detector, path: Path) -> None:
+    """Start from a YOLOX-nano ONNX file of 80 COCO classes, whose input is BGR 0..255.
+
+    Its colour order and range go into the first convolution, so that the input here is RGB 0..1.
+    Raises UserError where the file's convolutions are not those of this net.
+    """
+    import onnx  # noqa: PLC0415 - needed for this start only
+    from onnx import numpy_helper  # noqa: PLC0415
+
+    graph = onnx.load(str(path)).graph
+    constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    theirs = [[constants[name] for name in node.input[1:3]] for node in graph.node if node.op_type == "Conv"]
+    ours = [module for module in model.modules() if isinstance(module, nn.Conv2d)]
+    if len(theirs) != len(ours):
+        raise UserError(f"{path}: {len(theirs)} convolutions, expected {len(ours)}")
+    rows = list(COCO_ROWS.values())
+    class_convs = {id(cast(Head, head).class_out) for head in model.heads}
+    for index, (conv, (stored, stored_bias)) in enumerate(zip(ours, theirs, strict=True)):
+        weight, bias = stored, stored_bias
+        if index == 0:  # four pixels of three colours each
+            weight = weight.reshape(-1, 4, 3, *weight.shape[2:])[:, :, ::-1].reshape(weight.shape) * 255.0
+        elif id(conv) in class_convs:
+            weight = np.stack([weight[list(chosen)].mean(0) for chosen in rows])
+            bias = np.stack([bias[list(chosen)].mean() for chosen in rows])
+        expected = tuple(conv.weight.shape)
+        if expected != weight.shape or conv.bias is None:
+            raise UserError(f"{path}: convolution {index} has shape {weight.shape}, expected {expected}")
+        conv.weight.data = torch.tensor(np.ascontiguousarray(weight, np.float32))
+        conv.bias.data = torch.tensor(np.ascontiguousarray(bias, np.float32))
+
+
+def candidate_grid(height_px: int, width_px: int) -> tuple[Tensor, Tensor]:
+    """Centre (x, y) in pixels [A,2] and stride [A] of every candidate of an input size."""
+    centres, strides = [], []
+    for stride in STRIDES:
+        cells = cell_corners(height_px // stride, width_px // stride, torch.device("cpu"))
+        centres.append((cells + 0.5) * stride)
+        strides.append(torch.full((len(cells),), float(stride)))
+    return torch.cat(centres), torch.cat(strides)

@@ -1,0 +1,166 @@
+"""Train the detector from YOLOX-nano's COCO weights or a checkpoint; resumable after any epoch."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from tqdm import tqdm
+
+from paani_models.datasets.sources import DETECTOR_CLASSES, SOURCES
+from paani_models.detector.data import BoxedPicture, Example, augmented, plain
+from paani_models.detector.loss import detector_loss
+from paani_models.detector.metrics import Found, class_figures, decode
+from paani_models.detector.shipped_shape import Detector
+from paani_models.network_input import SIZE_WH, detector_batch
+from paani_models.training.augment import null_picture
+from paani_models.training.loop import Prefetch, Progress, append_record, device, learning_rate, to_device
+
+# Pictures drawn per epoch and source; a source not named here is drawn once each.
+DRAWS = {
+    "hsu_shore_tiles": 420,
+    "uon_robotx": 150,
+    "tunai_sooke": 60,
+    "inland_vessel": 48,
+    "redyellow_buoy": 45,
+    "dasha_pier": 100,
+    "tampere_pier": 80,
+    "tbiseg_usvinland": 160,
+    "tbiseg_tampere": 60,
+    "tbiseg_dasha": 40,
+    "bath_river": 140,
+    "mastr1325": 40,
+    "oasis": 40,
+    "rendered": 700,
+}
+NULL_DRAWS = 60
+
+Batch = tuple[Tensor, list[Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides a detector training besides the pictures."""
+
+    epochs: int = 18
+    batch: int = 16
+    peak_rate: float = 1e-3  # checklist S3
+    weight_decay: float = 5e-4  # checklist S3
+    warmup_steps: int = 200
+    mosaic_frac: float = 0.35
+    plain_epochs: int = 4  # the last epochs, without mosaic
+    seed: int = 42  # checklist S4
+
+
+def draw_epoch(pictures: list[BoxedPicture], recipe: Recipe, epoch: int) -> list[int]:
+    """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
+    rng = np.random.default_rng((recipe.seed, epoch))
+    places: dict[str, list[int]] = defaultdict(list)
+    for index, item in enumerate(pictures):
+        places[item.source].append(index)
+    drawn: list[int] = [-1] * NULL_DRAWS
+    for name, indices in sorted(places.items()):
+        whole, rest = divmod(DRAWS.get(name, len(indices)), len(indices))
+        drawn.extend(indices * whole)
+        drawn.extend(int(i) for i in rng.choice(indices, rest, replace=False))
+    return [int(i) for i in rng.permutation(drawn)]
+
+
+class DetectorTraining:
+    """One training run in `folder`: `run()` goes on from its last finished epoch."""
+
+    def __init__(
+        self,
+        model: Detector,
+        recipe: Recipe,
+        folder: Path,
+        train: list[BoxedPicture],
+        held_out: list[BoxedPicture],
+    ) -> None:
+        self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
+        folder.mkdir(parents=True, exist_ok=True)
+        self.model = model
+        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay)
+
+    def run(self, until: int | None = None) -> None:
+        """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
+        recipe = asdict(self.recipe)
+        self.progress.resume(self.folder, recipe)
+        while self.progress.epoch < (self.recipe.epochs if until is None else until):
+            box_loss, score_loss = self._train_epoch()
+            figures = figures_by_class(self.progress.average.model, self.held_out)
+            losses = {"box_loss": box_loss, "score_loss": score_loss}
+            record = {"epoch": self.progress.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
+            append_record(self.folder / "epochs.jsonl", record)
+            ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
+            self.progress.finish_epoch(self.folder, recipe, float(np.mean(ap50)) if ap50 else 0.0)
+
+    def _train_epoch(self) -> tuple[float, float]:
+        recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
+        order = draw_epoch(self.train, recipe, epoch)
+        steps = len(order) // recipe.batch
+        total = steps * recipe.epochs
+
+        def make(index: int) -> Batch:
+            return self._batch(order, index, epoch)
+
+        self.model.train()
+        losses = []
+        title = f"epoch {epoch + 1}/{recipe.epochs}"
+        for pictures, truths, judged in tqdm(Prefetch[Batch]()(make, steps), title, steps, mininterval=5.0):
+            boxes, logits = self.model.raw(to_device(pictures))
+            known = [truth.to(device()) for truth in truths]
+            box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
+            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps)
+            progress.update(box_loss + score_loss, rate, clip_norm=10.0)
+            losses.append((box_loss.item(), score_loss.item()))
+        box_mean, score_mean = np.mean(losses, 0)
+        return round(float(box_mean), 4), round(float(score_mean), 4)
+
+    def _batch(self, order: list[int], index: int, epoch: int) -> Batch:
+        examples = []
+        for slot in range(index * self.recipe.batch, (index + 1) * self.recipe.batch):
+            rng = np.random.default_rng((self.recipe.seed, epoch, slot))
+            examples.append(self._example(rng, order, slot, epoch))
+        return (
+            torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
+            [torch.from_numpy(e.boxes) for e in examples],
+            torch.from_numpy(np.stack([e.judged for e in examples])),
+        )
+
+    def _example(self, rng: np.random.Generator, order: list[int], slot: int, epoch: int) -> Example:
+        if order[slot] < 0:
+            cells = (len(DETECTOR_CLASSES), SIZE_WH[1] // 8, SIZE_WH[0] // 8)
+            return Example(null_picture(rng, SIZE_WH), np.zeros((0, 5), np.float32), np.ones(cells, np.bool_))
+        chosen = [order[slot]]
+        late = epoch >= self.recipe.epochs - self.recipe.plain_epochs
+        if not late and rng.random() < self.recipe.mosaic_frac:
+            chosen += [max(0, order[int(i)]) for i in rng.integers(len(order), size=3)]
+        return augmented(rng, [self.train[i] for i in chosen], SIZE_WH)
+
+
+@torch.no_grad()
+def figures_by_class(model: torch.nn.Module, pictures: list[BoxedPicture]) -> dict[str, dict[str, float]]:
+    """Class name -> figures of `class_figures`, on letterboxed pictures of the sources that annotate the class."""
+    annotated = {source.name: source.annotated for source in SOURCES}
+    found: list[Found] = []
+    truths: list[NDArray[np.float32]] = []
+    names: list[str] = []
+    labelled = [item for item in pictures if annotated[item.source] and item.judged.ndim == 1]
+    for start in range(0, len(labelled), 16):
+        chunk = [plain(item, SIZE_WH) for item in labelled[start : start + 16]]
+        outputs = model(to_device(torch.from_numpy(detector_batch(np.stack([e.picture for e in chunk]))))).cpu().numpy()
+        found.extend(decode(output, confidence=0.01, limit=100) for output in outputs)
+        truths.extend(e.boxes for e in chunk)
+        names.extend(item.source for item in labelled[start : start + 16])
+    figures = {}
+    for kind, name in enumerate(DETECTOR_CLASSES):
+        chosen = [i for i, source in enumerate(names) if name in annotated[source]]
+        row = class_figures([found[i] for i in chosen], [truths[i] for i in chosen], kind)
+        figures[name] = {key: value if key == "n" else round(value, 4) for key, value in row.items()}
+    return figures

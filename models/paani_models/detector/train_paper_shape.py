@@ -1,0 +1,156 @@
+"""Train the YOLO11n-shaped detector by the paper's recipe (checklist S2 - S5); resumable after any epoch."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import torch
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from paani_models.detector.data import BoxedPicture, Example
+from paani_models.detector.paper_data import Augmentation, paper_example
+from paani_models.detector.paper_loss import task_aligned_loss
+from paani_models.detector.paper_shape import Yolo11n
+from paani_models.detector.train import figures_by_class
+from paani_models.network_input import detector_batch
+from paani_models.training.loop import Prefetch, Progress, append_record, device, learning_rate, to_device
+
+Batch = tuple[Tensor, list[Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides a training besides the pictures. The figures are the paper's."""
+
+    epochs: int = 60  # S2
+    batch: int = 32  # S2
+    workers: int = 4  # S2
+    side_px: int = 320  # S2: square
+    peak_rate: float = 1e-3  # S3
+    weight_decay: float = 5e-4  # S3
+    warmup_epochs: float = 3.0  # S3
+    momentum: float = 0.937  # S3: first moment of AdamW
+    warmup_momentum: float = 0.8  # S3
+    warmup_bias_rate: float = 0.1  # S3
+    nominal_batch: int = 64  # S3: gradients are added up to about as many pictures
+    plain_epochs: int = 10  # S5: the last epochs, without mosaic
+    patience: int = 12  # S4: epochs without a better one
+    seed: int = 42  # S4
+    augmentation: Augmentation = field(default_factory=Augmentation)  # S5
+
+
+class _Row(msgspec.Struct):
+    epoch: int
+    score: float
+
+
+class Yolo11nTraining:
+    """One training run in `folder`: `run()` goes on from its last finished epoch."""
+
+    def __init__(
+        self, model: Yolo11n, recipe: Recipe, folder: Path, train: list[BoxedPicture], held_out: list[BoxedPicture]
+    ) -> None:
+        self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
+        folder.mkdir(parents=True, exist_ok=True)
+        self.model = model
+        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay)
+        self.progress.optimiser = torch.optim.AdamW(
+            _groups(model, recipe), recipe.peak_rate, betas=(recipe.momentum, 0.999)
+        )
+
+    def run(self, until: int | None = None) -> None:
+        """Train to the end, to epoch `until`, or until the figures no longer rise; Ctrl-C loses no finished epoch."""
+        recipe = asdict(self.recipe)
+        self.progress.resume(self.folder, recipe)
+        last = self.recipe.epochs if until is None else until
+        while self.progress.epoch < last and self._since_best() < self.recipe.patience:
+            losses = self._train_epoch()
+            figures = figures_by_class(self.progress.average.model, self.held_out)
+            ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
+            score = round(float(np.mean(ap50)), 4) if ap50 else 0.0
+            row = {"epoch": self.progress.epoch + 1, "score": score, **losses, **figures}
+            append_record(self._records(), row)
+            self.progress.finish_epoch(self.folder, recipe, score)
+
+    def _records(self) -> Path:
+        return self.folder / "epochs.jsonl"
+
+    def _since_best(self) -> int:
+        """Finished epochs since the first of the best."""
+        if self.progress.epoch == 0:
+            return 0
+        rows = [msgspec.json.decode(line, type=_Row) for line in self._records().read_bytes().splitlines()]
+        scores = {row.epoch: row.score for row in rows if row.epoch <= self.progress.epoch}
+        return self.progress.epoch - max(scores, key=lambda epoch: (scores[epoch], -epoch))
+
+    def _train_epoch(self) -> dict[str, float]:
+        recipe, epoch = self.recipe, self.progress.epoch
+        order = np.random.default_rng((recipe.seed, epoch)).permutation(len(self.train)).tolist()
+        steps = max(1, len(order) // recipe.batch)
+        warmup_steps = max(1, round(recipe.warmup_epochs * steps))
+        cv_seed = (recipe.seed, epoch)
+        self.model.train()
+        losses = []
+        batches = Prefetch[Batch](recipe.workers, 2 * recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
+        for index, (pictures, truths, judged) in enumerate(tqdm(batches, f"epoch {epoch + 1}/{recipe.epochs}", steps)):
+            with torch.autocast(device().type, torch.bfloat16, enabled=device().type == "cuda"):  # S4
+                boxes, bins, logits = self.model.raw(to_device(pictures))
+            known = [truth.to(device()) for truth in truths]
+            size = (recipe.side_px, recipe.side_px)
+            parts = task_aligned_loss(boxes.float(), bins.float(), logits.float(), known, to_device(judged), size)
+            self._update(sum(parts), index == steps - 1, steps * recipe.epochs, warmup_steps)
+            losses.append([float(part.detach()) for part in parts])
+        box, score, spread = np.mean(losses, 0).round(4).tolist()
+        return {"box_loss": box, "score_loss": score, "bins_loss": spread}
+
+    def _update(self, loss: Tensor, is_last: bool, total_steps: int, warmup_steps: int) -> None:
+        """Add gradients up; step when about `nominal_batch` pictures are in, more often while warming up."""
+        recipe, progress = self.recipe, self.progress
+        warm = min(1.0, progress.step / warmup_steps)
+        rate = learning_rate(recipe.peak_rate, progress.step, total_steps, warmup_steps)
+        for group in progress.optimiser.param_groups:
+            bias = group["kind"] == "bias"
+            group["lr"] = (1.0 - warm) * recipe.warmup_bias_rate + warm * rate if bias else rate
+            group["betas"] = (recipe.warmup_momentum + warm * (recipe.momentum - recipe.warmup_momentum), 0.999)
+        every = max(1, round(1.0 + warm * (recipe.nominal_batch / recipe.batch - 1.0)))
+        torch.autograd.backward(loss)
+        progress.step += 1
+        if progress.step % every and not is_last:
+            return
+        nn.utils.clip_grad_norm_(self.model.parameters(), 10.0)
+        progress.optimiser.step()
+        progress.optimiser.zero_grad(set_to_none=True)
+        progress.average.update(self.model)
+
+    def _batch(self, order: list[int], index: int, seed: tuple[int, int]) -> Batch:
+        slots = range(index * self.recipe.batch, (index + 1) * self.recipe.batch)
+        examples = [self._example(np.random.default_rng((*seed, slot)), order, slot) for slot in slots]
+        return (
+            torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
+            [torch.from_numpy(e.boxes) for e in examples],
+            torch.from_numpy(np.stack([e.judged for e in examples])),
+        )
+
+    def _example(self, rng: np.random.Generator, order: list[int], slot: int) -> Example:
+        recipe = self.recipe
+        chosen = [order[slot % len(order)]]
+        late = self.progress.epoch >= recipe.epochs - recipe.plain_epochs
+        if not late and rng.random() < recipe.augmentation.mosaic_frac:
+            chosen += [order[int(i)] for i in rng.integers(len(order), size=3)]
+        pictures = [self.train[i] for i in chosen]
+        return paper_example(rng, pictures, (recipe.side_px, recipe.side_px), recipe.augmentation)
+
+
+def _groups(model: Yolo11n, recipe: Recipe) -> list[dict[str, object]]:
+    """Weights, which decay; normalisation scales and biases, which do not; biases warm up from above (S3)."""
+    kinds: dict[str, list[nn.Parameter]] = {"weight": [], "scale": [], "bias": []}
+    for name, parameter in model.named_parameters():
+        if parameter.requires_grad:
+            kind = "bias" if name.endswith("bias") else "scale" if parameter.dim() == 1 else "weight"
+            kinds[kind].append(parameter)
+    decay = {"weight": recipe.weight_decay}
+    return [{"params": p, "kind": kind, "weight_decay": decay.get(kind, 0.0)} for kind, p in kinds.items()]

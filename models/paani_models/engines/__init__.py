@@ -1,0 +1,1 @@
+"""Running exported networks: onnxruntime and ncnn, their parity, speed and cost."""

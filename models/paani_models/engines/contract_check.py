@@ -1,0 +1,165 @@
+"""What a user's model file lacks to be run here: shapes, classes, ranges, repeatability, behaviour on nothing."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.clock import stopwatch_ms
+from paani.errors import UserError
+from paani_models.catalogue import Model, described
+from paani_models.engines.onnx_runner import Session, open_session, run_net
+
+Floats = NDArray[np.float32]
+MAX_DIFFERENCE = 1e-3  # T2
+RUNS = 15
+MAX_WATER_IN_NOTHING = 0.05
+_QUANTISED = b"QuantizeLinear"
+_KINDS = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """One line of the report. A model with an `error` cannot be used; a `warning` is for its owner to judge."""
+
+    level: str
+    text: str
+
+
+def role_of(path: Path, asked: str | None) -> str:
+    """ "segmenter" or "detector" by what comes out. Raises UserError where that cannot be told."""
+    if asked is not None:
+        return asked
+    shape = open_session(path, 1).get_outputs()[0].shape
+    if len(shape) in (3, 4):
+        return "detector" if len(shape) == 3 else "segmenter"
+    raise UserError(f"{path}: output {list(shape)} is neither [1, 3, H, W] nor [1, 4 + classes, N]; say --role")
+
+
+def inspected(path: Path, role: str) -> list[Finding]:
+    """Every finding, in the order of the checks. Raises UserError for a file that is no ONNX model."""
+    contract = described(path, role)
+    session = open_session(path, 1)
+    findings = list(_shapes(session, contract, role))
+    if any(finding.level == "error" for finding in findings):
+        return findings
+    inputs = drawn_inputs(contract)
+    outputs = {name: run_net(session, tensor) for name, tensor in inputs.items()}
+    broken = [name for name, output in outputs.items() if not np.isfinite(output).all()]
+    if broken:
+        return [*findings, Finding("error", f"output is not finite on a picture of {', '.join(broken)}")]
+    findings += _segmenter_ranges(outputs, contract) if role == "segmenter" else _detector_ranges(outputs, contract)
+    plain = open_session(path, 1, optimised=False)
+    worst = max(difference(outputs[name], run_net(plain, tensor), role, contract) for name, tensor in inputs.items())
+    if _QUANTISED in path.read_bytes():
+        note = "8-bit steps are rounded elsewhere in the plain graph; `paani models quantise` judges by score"
+        findings.append(Finding("warning", f"optimised and plain graph differ by {worst:.1e}: {note}"))
+    else:
+        level = "ok" if worst <= MAX_DIFFERENCE else "error"
+        text = f"optimised and plain graph differ by {worst:.1e} (at most {MAX_DIFFERENCE:.0e})"
+        findings.append(Finding(level, text))
+    scene = inputs["a river"]
+    took_ms = []
+    for _ in range(RUNS):
+        start_ms = stopwatch_ms()
+        run_net(session, scene)
+        took_ms.append(stopwatch_ms() - start_ms)
+    return [*findings, Finding("ok", f"one run takes {statistics.median(took_ms):.1f} ms on one thread here")]
+
+
+def _shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
+    for what, ends, wanted in (
+        ("input", session.get_inputs(), contract.input),
+        ("output", session.get_outputs(), contract.output),
+    ):
+        if len(ends) != 1:
+            yield Finding("error", f"{len(ends)} {what}s, the contract has one")
+            continue
+        shape, kind = tuple(ends[0].shape), ends[0].type
+        if any(not isinstance(side, int) for side in shape):
+            yield Finding("error", f"{what} {list(shape)} is not static: export with fixed sizes and batch 1")
+        elif kind != _KINDS[wanted.dtype]:
+            yield Finding("error", f"{what} is {kind}, the contract has {_KINDS[wanted.dtype]}")
+        elif shape != wanted.shape:
+            hint = "a manifest.json beside the file may state another size" if what == "input" else _classes_hint(role)
+            yield Finding("error", f"{what} is {list(shape)}, the contract has {list(wanted.shape)}; {hint}")
+        else:
+            yield Finding("ok", f"{what} {list(shape)} {wanted.dtype}")
+    yield Finding("ok", f"classes {', '.join(contract.classes)} ({contract.preprocessing.resize})")
+
+
+def _classes_hint(role: str) -> str:
+    return "a manifest.json beside the file states its classes" if role == "detector" else "three classes are needed"
+
+
+def _segmenter_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Finding]:
+    scene = outputs["a river"][0]
+    if scene.min() >= 0.0 and np.allclose(scene.sum(axis=0), 1.0, atol=1e-3):
+        yield Finding("error", "output sums to one: export the scores before the softmax")
+    else:
+        yield Finding("ok", f"scores from {scene.min():.1f} to {scene.max():.1f}")
+    water = contract.classes.index("water")
+    for name in ("black", "white", "noise"):
+        share = float((outputs[name][0].argmax(axis=0) == water).mean())
+        level = "ok" if share <= MAX_WATER_IN_NOTHING else "warning"
+        yield Finding(level, f"{share:.0%} of a {name} picture is called water" + _gate_note(level))
+
+
+def _gate_note(level: str) -> str:
+    return "" if level == "ok" else ": only the gate then stands between this picture and motion"
+
+
+def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Finding]:
+    scores = np.concatenate([output[0, 4:].ravel() for output in outputs.values()])
+    boxes = np.concatenate([output[0, :4] for output in outputs.values()], axis=1)
+    if scores.min() < -1e-6 or scores.max() > 1.0 + 1e-6:
+        yield Finding("error", f"scores from {scores.min():.2f} to {scores.max():.2f} are no probabilities")
+    else:
+        yield Finding("ok", f"scores from {scores.min():.3f} to {scores.max():.3f}")
+    height, width = contract.size_hw
+    if boxes.max() <= 2.0:
+        yield Finding("error", "boxes end at 2: they seem normalised, the contract has input pixels")
+    elif not (0.0 <= np.median(boxes[0]) <= width and 0.0 <= np.median(boxes[1]) <= height):
+        yield Finding("error", f"box centres lie outside the input of {width}x{height} pixels")
+    else:
+        yield Finding("ok", "boxes are centre, width and height in input pixels")
+
+
+def difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
+    """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
+    apart = np.abs(one - other)
+    if role == "detector":
+        height, width = contract.size_hw
+        apart[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
+    return float(apart.max())
+
+
+def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
+    """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
+    height, width = contract.size_hw
+    rng = np.random.default_rng(0)
+    river = np.full((height, width, 3), (200, 190, 180), np.uint8)
+    river[height * 2 // 5 :] = (110, 120, 100)
+    cv2.rectangle(river, (width // 3, height // 3), (width // 2, height * 3 // 5), (40, 40, 150), -1)
+    river = np.asarray(np.clip(river + rng.normal(0.0, 6.0, river.shape), 0, 255), np.uint8)
+    drawn = {
+        "black": np.zeros_like(river),
+        "white": np.full_like(river, 255),
+        "noise": rng.integers(0, 256, river.shape).astype(np.uint8),
+        "a river": river,
+    }
+    return {name: as_input(picture, contract) for name, picture in drawn.items()}
+
+
+def as_input(picture: NDArray[np.uint8], contract: Model) -> Floats | NDArray[np.uint8]:
+    """A net-sized RGB picture [H,W,3] as the net takes it."""
+    if contract.input.dtype == "uint8":
+        return picture[None]
+    mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
+    scaled = (picture.astype(np.float32) / 255.0 - mean) / std
+    return np.ascontiguousarray(scaled.transpose(2, 0, 1)[None])

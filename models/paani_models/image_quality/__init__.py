@@ -1,0 +1,1 @@
+"""The network that says whether a picture is fit to be evidence: its shape, data and training."""

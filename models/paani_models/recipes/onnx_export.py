@@ -1,0 +1,228 @@
+"""Checkpoint -> static FP32 ONNX of opset 17, compared with the PyTorch net on real pictures (checklist T1, T2)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from paani.errors import UserError
+from paani_models.catalogue import (
+    Model,
+    Origin,
+    Preprocessing,
+    Tensor,
+    file_sha256,
+    load_catalogue,
+    save_catalogue,
+)
+from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
+from paani_models.detector import shipped_shape as detector
+from paani_models.detector.paper_shape import FUSED_PARAMETERS, Yolo11n
+from paani_models.detector.shipped_shape import Detector
+from paani_models.engines.onnx_runner import open_net
+from paani_models.image_quality import network as gate
+from paani_models.image_quality.network import Gate
+from paani_models.segmenter import paper_shape as segmenter
+from paani_models.segmenter.paper_shape import Segmenter, parameter_count
+from paani_models.segmenter.shipped_shape import ImageNetSegmenter
+from paani_models.training.loop import load_average, load_checkpoint
+
+OPSET = 17  # checklist T1
+TOLERANCE = 1e-3  # checklist T2
+
+_UNCHANGED: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+CONTRACTS = {
+    "segmenter": Model(
+        name="segmenter",
+        file="segmenter.onnx",
+        sha256="",
+        size_bytes=0,
+        parameters=0,
+        opset=OPSET,
+        input=Tensor("input", (1, 3, segmenter.INPUT_HEIGHT_PX, segmenter.INPUT_WIDTH_PX)),
+        output=Tensor("logits", (1, 3, segmenter.INPUT_HEIGHT_PX, segmenter.INPUT_WIDTH_PX)),
+        classes=SEGMENTER_CLASSES,
+        preprocessing=Preprocessing("stretch", (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)),
+        architecture="MobileNetV2 encoder at 11/16 size, 48-channel separable top-down decoder",
+        licence="weights: for research; see the terms of each training source",
+    ),
+    "detector": Model(
+        name="detector",
+        file="detector.onnx",
+        sha256="",
+        size_bytes=0,
+        parameters=0,
+        opset=OPSET,
+        input=Tensor("input", (1, 3, detector.INPUT_HEIGHT_PX, detector.INPUT_WIDTH_PX)),
+        output=Tensor("candidates", (1, 8, detector.CANDIDATES)),
+        classes=DETECTOR_CLASSES,
+        preprocessing=Preprocessing("letterbox", _UNCHANGED, (1.0, 1.0, 1.0), pad_grey=114),
+        architecture="YOLOX-nano shape, joint objectness and class scores",
+        licence="weights: for research; see the terms of each training source",
+    ),
+}
+
+
+CONTRACTS["gate"] = Model(
+    name="gate",
+    file="gate.onnx",
+    sha256="",
+    size_bytes=0,
+    parameters=0,
+    opset=OPSET,
+    input=Tensor("input", (1, 3, gate.INPUT_HEIGHT_PX, gate.INPUT_WIDTH_PX)),
+    output=Tensor("fitness", (1, 1)),
+    classes=("fit",),
+    preprocessing=Preprocessing("stretch", _UNCHANGED, (1.0, 1.0, 1.0)),
+    architecture="first four stages of MobileNetV2, two dense layers",
+    licence="weights: for research; see the terms of each training source",
+)
+CONTRACTS["yolo11n"] = msgspec.structs.replace(
+    CONTRACTS["detector"],
+    name="yolo11n",
+    file="yolo11n.onnx",
+    architecture="YOLO11n shape, independent implementation; not affiliated with its authors",
+)
+CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
+    CONTRACTS["segmenter"],
+    name="paper-segmenter",
+    file="paper-segmenter.onnx",
+    architecture="MobileNetV3-Small encoder, 64-channel top-down decoder",
+)
+
+
+def network(name: str) -> nn.Module:
+    """An untrained net of a contract."""
+    nets = {
+        "segmenter": ImageNetSegmenter,
+        "paper-segmenter": Segmenter,
+        "detector": Detector,
+        "yolo11n": Yolo11n,
+        "gate": Gate,
+    }
+    return nets[name]()
+
+
+def export(
+    name: str,
+    checkpoint: Path,
+    folder: Path,
+    inputs: Sequence[NDArray[np.float32]],
+    origins: tuple[Origin, ...],
+) -> Model:
+    """Write `folder`/<name>.onnx and its manifest entry, both by renaming, and return the entry.
+
+    inputs: real pictures, already preprocessed, [1,3,256,320] each, for the comparison. Figures are left empty.
+    Raises UserError where the checkpoint does not fit or the outputs differ by more than TOLERANCE.
+    """
+    net = network(name)
+    load_average(net, checkpoint)
+    return _placed(name, net, folder, inputs, origins, load_checkpoint(checkpoint)["recipe"]["seed"])
+
+
+def export_untrained(name: str, folder: Path) -> Model:
+    """Write a net of random weights and its manifest entry: as fast as a trained one, and good for nothing else."""
+    seed = 42
+    torch.manual_seed(seed)
+    shape = CONTRACTS[name].input.shape
+    noise = np.random.default_rng(seed).random(shape, dtype=np.float32)
+    net = network(name).train()
+    for module in net.modules():
+        if isinstance(module, nn.BatchNorm2d):
+            module.momentum = 1.0
+    with torch.no_grad():
+        net(torch.from_numpy(noise))  # without statistics the numbers shrink from step to step until they slow it down
+    return _placed(name, net.eval(), folder, [noise], (), seed)
+
+
+def _placed(
+    name: str,
+    net: nn.Module,
+    folder: Path,
+    inputs: Sequence[NDArray[np.float32]],
+    origins: tuple[Origin, ...],
+    seed: int,
+) -> Model:
+    contract = CONTRACTS[name]
+    folder.mkdir(parents=True, exist_ok=True)
+    beside = folder / f"{contract.file}.partial"
+    write_onnx(net, contract, beside)
+    difference = largest_difference(net, beside, inputs)
+    if not difference <= TOLERANCE:
+        beside.unlink()
+        raise UserError(f"{name}: the exported net differs by {difference:.2e}, more than {TOLERANCE:.0e}")
+    model = msgspec.structs.replace(
+        contract,
+        sha256=file_sha256(beside),
+        size_bytes=beside.stat().st_size,
+        parameters=FUSED_PARAMETERS if isinstance(net, Yolo11n) else parameter_count(net),
+        export_max_abs_diff=float(f"{difference:.2e}"),
+        origins=origins,
+        seed=seed,
+    )
+    catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
+    beside.replace(folder / contract.file)
+    save_catalogue({**catalogue, name: model}, folder)
+    return model
+
+
+def write_onnx(net: nn.Module, contract: Model, path: Path) -> None:
+    """Export in evaluation mode with static shapes, and check the file's structure."""
+    net.eval().to("cpu", memory_format=torch.contiguous_format)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the TorchScript exporter announces its age and every traced constant
+        torch.onnx.export(
+            net,
+            (torch.zeros(contract.input.shape),),
+            str(path),
+            input_names=[contract.input.name],
+            output_names=[contract.output.name],
+            opset_version=OPSET,
+            dynamo=False,
+        )
+    onnx.checker.check_model(onnx.load(str(path)), full_check=True)
+
+
+@torch.no_grad()
+def largest_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.float32]]) -> float:
+    """Largest absolute difference between the PyTorch net and the ONNX file over the inputs.
+
+    The detector's box rows are compared as fractions of the input's size: in pixels, the exponential that makes a
+    side of 300 px turns single-precision rounding of either engine into some 1e-3.
+    """
+    run = open_net(path)
+    worst = 0.0
+    for x in inputs:
+        difference = np.abs(net(torch.from_numpy(x)).numpy() - run(x))
+        if isinstance(net, Detector | Yolo11n):
+            height, width = x.shape[2:]
+            difference[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
+        worst = max(worst, float(difference.max()))
+    return worst
+
+
+class _Stated(msgspec.Struct):
+    repo: str = ""
+    commit: str = ""
+    licence: str = "not stated"
+
+
+def origin(folder: Path, source: Source) -> Origin:
+    """Read a source's provenance from its manifest; rendered pictures are the project's own."""
+    if source.name == RENDERED:
+        return Origin(source.name, "paani_sim", "", "Apache-2.0")
+    path = folder / "manifest.json"
+    try:
+        stated = msgspec.json.decode(path.read_bytes(), type=_Stated)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{path}: {error}") from error
+    return Origin(source.name, stated.repo, stated.commit, stated.licence)

@@ -1,0 +1,181 @@
+"""The training commands: which pictures go into which net, with which recipe."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from paani.errors import UserError
+from paani_models.catalogue import WEIGHTS, verified_path
+from paani_models.datasets.selection import Pictures
+from paani_models.datasets.sources import read_picture
+from paani_models.detector import data as detector_data
+from paani_models.detector import train as train_detector
+from paani_models.detector import train_paper_shape as train_yolo11n
+from paani_models.detector.paper_shape import Yolo11n
+from paani_models.detector.shipped_shape import Detector, load_yolox
+from paani_models.detector.train import DetectorTraining
+from paani_models.detector.train_paper_shape import Yolo11nTraining
+from paani_models.image_quality import train as train_gate
+from paani_models.image_quality.train import GateTraining
+from paani_models.network_input import SIZE_WH, detector_input, gate_input, segmenter_batch, segmenter_input
+from paani_models.recipes import onnx_export as export
+from paani_models.recipes.warm_start import load_exported
+from paani_models.segmenter import train as train_segmenter
+from paani_models.segmenter.distillation import Distillation
+from paani_models.segmenter.paper_shape import Segmenter
+from paani_models.segmenter.pseudo_labels import pseudo_labelled
+from paani_models.segmenter.shipped_shape import ImageNetSegmenter, load_imagenet
+from paani_models.segmenter.train import SegmenterTraining
+from paani_models.training.loop import Stage, load_average
+
+IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
+COCO_FILE = "_weights/yolox_nano_coco.onnx"
+COMPARED_PICTURES = 8
+
+IMAGENET_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the command line says about one training."""
+
+    folder: Path
+    start: Path | None = None
+    teacher: Path | None = None
+    labels_from: Path | None = None
+    stages: tuple[str, ...] = ()
+    epochs: int | None = None
+    peak_rate: float | None = None
+    unchecked: bool = False
+
+
+def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
+    """Train a net into `plan.folder`, from its last finished epoch if there is one."""
+    torch.set_num_threads(threads)
+    if net == "detector":
+        _train_detector(pictures, plan)
+    elif net == "yolo11n":
+        _train_yolo11n(pictures, plan)
+    elif net == "gate":
+        _train_gate(pictures, plan)
+    else:
+        _train_segmenter(net, pictures, plan)
+
+
+def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
+    """`4x128x160` -> Stage(4, 128, 160). Raises UserError where it is malformed or no multiple of 32."""
+    parsed = []
+    for text in stages:
+        fields = text.split("x")
+        if len(fields) != 3 or not all(field.isdigit() for field in fields):
+            raise UserError(f"stage: {text!r} is not EPOCHSxHEIGHTxWIDTH")
+        stage = Stage(*(int(field) for field in fields))
+        if stage.height_px % 32 or stage.width_px % 32:
+            raise UserError(f"stage: {text!r}: height and width must be multiples of 32")
+        parsed.append(stage)
+    return tuple(parsed)
+
+
+def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
+    recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.PAPER_RECIPE
+    recipe = replace(
+        recipe,
+        stages=parse_stages(plan.stages) or recipe.stages,
+        peak_rate=plan.peak_rate or recipe.peak_rate,
+    )
+    torch.manual_seed(recipe.seed)
+    model: ImageNetSegmenter | Segmenter = Segmenter()
+    if net == "segmenter":
+        model = ImageNetSegmenter()
+        load_imagenet(model, pictures.data / IMAGENET_FILE)
+    samples, distillation = pictures.segmented(held_out=False), None
+    if plan.teacher is not None:
+        teacher = ImageNetSegmenter()
+        load_average(teacher, plan.teacher)
+        distillation = Distillation(teacher)
+    if plan.teacher is not None or plan.labels_from is not None:
+        samples += pictures.unsegmented()
+    held_out = train_segmenter.cache(pictures.segmented(held_out=True))
+    cached = train_segmenter.cache(samples)
+    if plan.labels_from is not None:
+        labeller = ImageNetSegmenter()
+        load_average(labeller, plan.labels_from)
+        cached = pseudo_labelled(labeller, cached, samples)
+    training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
+    if plan.start is not None and plan.start.suffix == ".onnx":
+        shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
+        load_exported(model, plan.start, torch.from_numpy(segmenter_batch(shown)))
+        training.progress.average_from_model()
+    elif plan.start is not None:
+        training.progress.start_from(plan.start)
+    training.run()
+
+
+def _train_detector(pictures: Pictures, plan: Plan) -> None:
+    recipe = train_detector.Recipe()
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    torch.manual_seed(recipe.seed)
+    model = Detector()
+    if plan.start is None:
+        load_yolox(model, pictures.data / COCO_FILE)
+    elif plan.start.suffix == ".onnx":
+        load_exported(model, plan.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
+    else:
+        load_average(model, plan.start)
+    cached = detector_data.read_all(pictures.boxed(held_out=False))
+    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+    DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
+
+
+def _train_yolo11n(pictures: Pictures, plan: Plan) -> None:
+    recipe = train_yolo11n.Recipe()
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    torch.manual_seed(recipe.seed)
+    model = Yolo11n()
+    if plan.start is not None:
+        load_average(model, plan.start)
+    cached = detector_data.read_all(pictures.boxed(held_out=False))
+    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+    Yolo11nTraining(model, recipe, plan.folder, cached, held_out).run()
+
+
+def _train_gate(pictures: Pictures, plan: Plan) -> None:
+    """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
+    recipe = train_gate.Recipe(checked=not plan.unchecked)
+    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+    never = {sample.picture: sample for sample in pictures.never_held_out()}
+    masked = {sample.picture: sample for sample in pictures.segmented(held_out=False) if sample.picture in never}
+    samples = list({**never, **masked}.values())
+    segmenter = plan.start or verified_path("segmenter")
+    GateTraining(plan.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
+
+
+def export_untrained_net(net: str, weights: Path) -> int:
+    """Write the ONNX file and its manifest entry. Raises UserError rather than write among the shipped weights."""
+    if weights.resolve() == WEIGHTS.resolve():
+        raise UserError("--untrained: name a folder with --weights; the shipped nets stay")
+    model = export.export_untrained(net, weights)
+    sys.stdout.write(f"{weights / model.file}: {model.size_bytes} bytes, random weights\n")
+    return 0
+
+
+def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
+    """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
+    chosen = pictures.boxed(held_out=True) if net in ("detector", "yolo11n") else pictures.segmented(held_out=True)
+    step = max(1, len(chosen) // COMPARED_PICTURES)
+    prepared = {"detector": detector_input, "yolo11n": detector_input, "gate": gate_input}.get(net, segmenter_input)
+    inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
+    if not inputs:
+        raise UserError("sources: no held-out picture to compare the export on")
+    used = {sample.source.name for sample in pictures.samples}
+    origins = tuple(export.origin(pictures.folder(s), s) for s in pictures.sources if s.name in used)
+    model = export.export(net, checkpoint, weights, inputs, origins)
+    sys.stdout.write(
+        f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
+    )

@@ -1,0 +1,118 @@
+"""The model card, made from the manifest of a weights folder so that the two cannot differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from paani_models.catalogue import Figure, Model
+from paani_models.datasets.sources import DETECTOR_CLASSES
+
+_INTRODUCTION = """\
+# Model card
+
+Written by `paani models card` from `paani_models/weights/manifest.json`; a test keeps the two alike.
+
+## Intended use
+
+Seeing from a small, slow robot on rivers, canals, lakes and harbours, in daylight, with a forward camera near the
+water: where there is water, and where there are people, vessels, piers and buoys. What the nets find informs an
+advisory that a person can read and overrule; it stops the boat whenever the picture cannot be used.
+
+Not for: collision avoidance without a person in charge, ranging, search and rescue or any count of people, aerial or
+underwater pictures, surveillance, and ships that fall under the collision regulations.
+"""
+
+_LIMITS = """\
+## Limits
+
+* Held-out pictures come from the same cameras and places as training pictures of their source, or near them. Figures
+  of a source with one held-out sequence say little about another river.
+* People and buoys of a few pixels are missed; the recall of near objects and of all objects stand side by side above.
+* Piers and most people were learnt from rendered pictures and from few hand-drawn boxes.
+* Water that mirrors a wall, water under bridges, plants on the water and raindrops on the lens mislead the segmenter.
+* Night, snow and ice hardly occur in training.
+* No source was chosen for who or what it shows; people appear small and unidentifiable, as the cameras saw them.
+
+## Data
+
+No picture is part of the product. Terms are quoted as the sources state them; several state none, so the weights are
+for research. Whoever needs other terms trains again without a source: `paani models train --sources`.
+"""
+
+_BOX_METRICS = {
+    "ap50": "AP50",
+    "ap50_95": "AP50:95",
+    "recall_at_0.40": "recall",
+    "recall_16px_at_0.40": "recall, near",
+    "precision_at_0.40": "precision",
+}
+
+
+def card(catalogue: Mapping[str, Model]) -> str:
+    """Markdown text; the same for the same manifest."""
+    models = [catalogue[name] for name in sorted(catalogue)]
+    parts = [_INTRODUCTION, _models(models), "## Figures\n\nHeld-out sequences; n counts pictures, or true boxes.\n"]
+    parts += [_figures(model) for model in models if model.figures]
+    parts += [_LIMITS, _origins(models)]
+    return "\n".join(parts)
+
+
+def _models(models: Sequence[Model]) -> str:
+    rows = [
+        (
+            model.name,
+            model.architecture,
+            f"{model.parameters:,}",
+            f"{model.size_bytes:,}",
+            "x".join(str(side) for side in model.input.shape),
+            ", ".join(model.classes),
+            f"`{model.sha256[:16]}`",
+        )
+        for model in models
+    ]
+    terms = "".join(f"* {model.name}, {model.licence}.\n" for model in models)
+    head = ("model", "shape", "parameters", "bytes", "input", "classes", "SHA-256")
+    return f"## Models\n\n{_table(head, rows)}\nTerms of use:\n\n{terms}"
+
+
+def _figures(model: Model) -> str:
+    if model.classes == DETECTOR_CLASSES:
+        return f"### {model.name}\n\n{_boxes(model.figures)}"
+    metrics = list(dict.fromkeys(figure.metric for figure in model.figures))
+    rows = []
+    for source in dict.fromkeys(figure.source for figure in model.figures):
+        mine = {figure.metric: figure for figure in model.figures if figure.source == source}
+        n = next(iter(mine.values())).n
+        cells = [f"{mine[metric].value:.3f}" if metric in mine else "" for metric in metrics]
+        rows.append((source, str(n), *cells))
+    return f"### {model.name}\n\n{_table(('source', 'n', *metrics), rows)}"
+
+
+def _boxes(figures: Sequence[Figure]) -> str:
+    rows, others = [], []
+    for kind in DETECTOR_CLASSES:
+        mine = [figure for figure in figures if figure.metric.startswith(f"{kind}_")]
+        for source in dict.fromkeys(figure.source for figure in mine):
+            found = {f.metric.removeprefix(f"{kind}_"): f for f in mine if f.source == source}
+            cells = [f"{found[metric].value:.3f}" if metric in found else "" for metric in _BOX_METRICS]
+            rows.append((kind, source, str(next(iter(found.values())).n), *cells))
+    for figure in figures:
+        if not figure.metric.startswith(DETECTOR_CLASSES):
+            others.append((figure.metric, figure.source, f"{figure.value:.3f}", str(figure.n)))
+    table = _table(("class", "source", "n", *_BOX_METRICS.values()), rows)
+    return table + ("\n" + _table(("other figure", "source", "value", "n"), others) if others else "")
+
+
+def _origins(models: Sequence[Model]) -> str:
+    users: dict[tuple[str, str, str, str], list[str]] = {}
+    for model in models:
+        for origin in model.origins:
+            key = (origin.name, origin.repository, origin.commit[:12], origin.licence)
+            users.setdefault(key, []).append(model.name)
+    rows = [(*key, ", ".join(names)) for key, names in users.items()]
+    return _table(("source", "repository", "commit", "terms as stated or believed", "learnt by"), rows)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)

@@ -1,0 +1,1 @@
+"""The water segmenter: networks, losses, training and scores."""

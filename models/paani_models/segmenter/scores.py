@@ -1,0 +1,111 @@
+"""The exported segmenter on annotated pictures: counts per picture, from which every figure is added up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from paani.errors import UserError
+from paani_models.catalogue import described
+from paani_models.datasets.sources import SEGMENTER_CLASSES, WATER_MASKS, Sample, Source, read_mask, read_picture
+from paani_models.engines.onnx_runner import Floats, open_net
+from paani_models.segmenter.metrics import class_iou, confusion, edge_counts, f1
+
+WATER, OBSTACLE, SKY = (SEGMENTER_CLASSES.index(kind) for kind in ("water", "obstacle", "sky"))
+
+Mask = NDArray[np.uint8]
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ScoredMask:
+    """One picture: confusion counts int64 [3,3], rows truth; edge counts int64 [4], as `edge_counts` gives them."""
+
+    sample: Sample
+    counts: Counts
+    edges: Counts
+
+    @property
+    def share_right(self) -> float:
+        """Mean IoU over what is scored and occurs; 1 where nothing does."""
+        iou = class_iou(self.counts)[[SEGMENTER_CLASSES.index(kind) for kind in scored_classes(self.sample.source)]]
+        return float(np.nanmean(iou)) if np.isfinite(iou).any() else 1.0
+
+
+def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
+    """Run the net over samples with masks. Raises UserError naming a file that cannot be read."""
+    segment = segmenter(net)
+    scored = []
+    for sample in tqdm(samples, "segmenter", unit="picture", mininterval=2.0):
+        truth = read_truth(sample)
+        label = restrict(segment(read_picture(sample.picture), truth.shape), sample.source)
+        counts = confusion(label, truth, len(SEGMENTER_CLASSES))
+        scored.append(ScoredMask(sample, counts, np.array(edge_counts(label, truth), np.int64)))
+    return scored
+
+
+def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]:
+    """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W].
+
+    Size, preprocessing and order of classes are those of the net's contract.
+    """
+    run, contract = open_net(net), described(net, "segmenter")
+    size_wh = contract.input.shape[:1:-1]
+    mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
+    rows = [contract.classes.index(name) for name in SEGMENTER_CLASSES]
+
+    def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> Mask:
+        scaled = (cv2.resize(picture, size_wh).astype(np.float32) / 255.0 - mean) / std
+        return as_label(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
+
+    return segment
+
+
+def as_label(logits: Floats, shape: tuple[int, ...]) -> Mask:
+    """Logits [1,3,h,w] -> the best class, nearest pixel, uint8 [H,W]."""
+    label = logits[0].argmax(0).astype(np.uint8)
+    return np.asarray(cv2.resize(label, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
+
+
+def read_truth(sample: Sample) -> Mask:
+    """Read what people drew, in segmenter classes; where they drew only water, the rest is obstacle."""
+    if sample.mask is None:
+        raise UserError(f"{sample.picture}: has no mask")
+    drawn = sample.mask.parent.parent / WATER_MASKS / sample.mask.name if sample.source.water_only else sample.mask
+    return read_mask(drawn)
+
+
+def restrict(label: Mask, source: Source) -> Mask:
+    """Sky counts as obstacle where people told only water from the rest."""
+    return np.minimum(label, OBSTACLE) if source.water_only else label
+
+
+def scored_classes(source: Source) -> tuple[str, ...]:
+    """Classes that people drew in a source."""
+    return ("water",) if source.water_only else SEGMENTER_CLASSES
+
+
+def mask_measures(source: Source) -> dict[str, Callable[[Counts], float]]:
+    """Figures of one source by name, each a function of added counts int64 [13]: confusion, then edges (U3, U4)."""
+
+    def iou(kind: str) -> Callable[[Counts], float]:
+        return lambda sums: float(class_iou(sums[:9].reshape(3, 3))[SEGMENTER_CLASSES.index(kind)])
+
+    measures = {f"iou_{kind}": iou(kind) for kind in scored_classes(source)}
+    if not source.water_only:
+        measures["miou"] = lambda sums: float(np.nanmean(class_iou(sums[:9].reshape(3, 3))))
+    if not source.soft_edges:
+        measures["edge_f1"] = lambda sums: f1(*(int(count) for count in sums[9:]))
+    return measures
+
+
+def added(scored: Sequence[ScoredMask]) -> Counts:
+    """Counts of many pictures, int64 [13]."""
+    rows = [np.concatenate([item.counts.ravel(), item.edges]) for item in scored]
+    return np.sum(rows, axis=0, dtype=np.int64) if rows else np.zeros(13, np.int64)

@@ -1,0 +1,204 @@
+"""Train the segmenter from scratch, or go on from a checkpoint; resumable after any epoch."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import cast
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from paani_models.datasets.sources import IGNORE, RENDERED, SEGMENTER_CLASSES, Sample, read_mask, read_picture
+from paani_models.network_input import segmenter_batch
+from paani_models.segmenter.distillation import Distillation
+from paani_models.segmenter.metrics import class_iou, confusion
+from paani_models.segmenter.paper_shape import segmenter_loss
+from paani_models.segmenter.shipped_shape import ImageNetSegmenter
+from paani_models.training.augment import (
+    CONCRETE_FRAC,
+    LAND_FRAC,
+    concrete,
+    land_crop,
+    obstacle_patch,
+    segmenter_null,
+    segmenter_sample,
+)
+from paani_models.training.loop import Prefetch, Progress, Stage, append_record, learning_rate, stage_of, to_device
+
+CACHE_WH = (384, 288)
+NULL_FRAC = 0.12
+PASTE_FRAC = 0.9  # tries; about one donor in four has a patch to give
+UNSEGMENTED = "unsegmented"  # pictures of all sources without masks: only a teacher says what they show
+
+# Pictures drawn per epoch and source: sources with three human classes weigh more than their number.
+DRAWS = {
+    "tbiseg_usvinland": 340,
+    "tbiseg_tampere": 170,
+    "tbiseg_dasha": 130,
+    "bath_river": 300,
+    "mastr1325": 190,
+    "oasis": 170,
+    UNSEGMENTED: 600,
+}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides a segmenter training besides the pictures."""
+
+    stages: tuple[Stage, ...] = (Stage(18, 128, 160), Stage(8, 256, 320))
+    batch: int = 16
+    peak_rate: float = 2e-3
+    weight_decay: float = 1e-4  # checklist S7
+    warmup_steps: int = 100
+    final_frac: float = 0.01
+    rendered_frac: float = 0.2
+    seed: int = 42  # checklist S7
+
+    @property
+    def epochs(self) -> int:
+        """Length of the training."""
+        return sum(stage.epochs for stage in self.stages)
+
+
+# Checklist S6, S7: 50 epochs at full size, batches of 16, AdamW at 3e-4 with a cosine down to nothing.
+PAPER_RECIPE = Recipe(stages=(Stage(50, 256, 320),), peak_rate=3e-4, warmup_steps=0, final_frac=0.0)
+
+
+@dataclass(frozen=True)
+class CachedPicture:
+    """A decoded picture and its mask in segmenter classes, both CACHE_WH."""
+
+    source: str
+    picture: NDArray[np.uint8]
+    mask: NDArray[np.uint8]
+
+
+def cache(samples: list[Sample]) -> list[CachedPicture]:
+    """Decode once, keep small: 3,000 pictures take about 1.5 GB. A picture without a mask is ignored everywhere."""
+    cached = []
+    for sample in tqdm(samples, desc="decoding", unit="picture", mininterval=2.0):
+        picture = cv2.resize(read_picture(sample.picture), CACHE_WH, interpolation=cv2.INTER_AREA)
+        mask = np.full(CACHE_WH[::-1], IGNORE, np.uint8)
+        if sample.mask is not None:
+            mask = np.asarray(cv2.resize(read_mask(sample.mask), CACHE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
+        name = sample.source.name if sample.mask is not None else UNSEGMENTED
+        cached.append(CachedPicture(name, np.asarray(picture, np.uint8), mask))
+    return cached
+
+
+def draw_epoch(pictures: list[CachedPicture], recipe: Recipe, epoch: int) -> list[int]:
+    """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
+    rng = np.random.default_rng((recipe.seed, epoch))
+    drawn: list[int] = []
+    for name in sorted({p.source for p in pictures} - {RENDERED}):
+        drawn.extend(_draw(rng, [i for i, p in enumerate(pictures) if p.source == name], DRAWS.get(name, 100)))
+    rendered = [i for i, p in enumerate(pictures) if p.source == RENDERED]
+    if rendered:
+        real = len(drawn) or len(rendered)
+        drawn.extend(_draw(rng, rendered, round(real * recipe.rendered_frac / (1 - recipe.rendered_frac))))
+    drawn.extend([-1] * round(len(drawn) * NULL_FRAC / (1 - NULL_FRAC)))
+    return [int(i) for i in rng.permutation(drawn)]
+
+
+def _draw(rng: np.random.Generator, indices: list[int], count: int) -> list[int]:
+    whole, rest = divmod(count, len(indices))
+    return indices * whole + [int(i) for i in rng.choice(indices, rest, replace=False)]
+
+
+class SegmenterTraining:
+    """One training run in `folder`: `run()` goes on from its last finished epoch."""
+
+    def __init__(
+        self,
+        model: nn.Module,
+        recipe: Recipe,
+        folder: Path,
+        train: list[CachedPicture],
+        held_out: list[CachedPicture],
+        distillation: Distillation | None = None,
+    ) -> None:
+        self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
+        folder.mkdir(parents=True, exist_ok=True)
+        self.model, self.distillation = model, distillation
+        gentle = model.encoder() if isinstance(model, ImageNetSegmenter) else None
+        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
+
+    def run(self, until: int | None = None) -> None:
+        """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
+        recipe = asdict(self.recipe)
+        self.progress.resume(self.folder, recipe)
+        while self.progress.epoch < (self.recipe.epochs if until is None else until):
+            loss = self._train_epoch()
+            figures = self.validate()
+            record = {"epoch": self.progress.epoch + 1, "seed": self.recipe.seed, "loss": round(loss, 4), **figures}
+            append_record(self.folder / "epochs.jsonl", record)
+            self.progress.finish_epoch(self.folder, recipe, figures["miou"])
+
+    def _train_epoch(self) -> float:
+        recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
+        stage = stage_of(recipe.stages, epoch)
+        order = draw_epoch(self.train, recipe, epoch)
+        steps = len(order) // recipe.batch
+        total = steps * recipe.epochs
+
+        def make(index: int) -> tuple[Tensor, Tensor]:
+            return self._batch(order[index * recipe.batch : (index + 1) * recipe.batch], stage, (epoch, index))
+
+        self.model.train()
+        losses = []
+        title = f"epoch {epoch + 1}/{recipe.epochs} {stage.width_px}x{stage.height_px}"
+        for pictures, masks in tqdm(Prefetch[tuple[Tensor, Tensor]]()(make, steps), title, steps, mininterval=5.0):
+            loss = self._loss(to_device(pictures), to_device(masks))
+            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps, recipe.final_frac)
+            progress.update(loss, rate, clip_norm=5.0)
+            losses.append(loss.item())
+        return float(np.mean(losses))
+
+    def _loss(self, pictures: Tensor, masks: Tensor) -> Tensor:
+        if self.distillation is None:
+            return segmenter_loss(self.model(pictures), masks)
+        logits, distance = self.distillation(pictures, self.model)
+        return segmenter_loss(logits, masks) + cast(Tensor, distance)
+
+    def _batch(self, chosen: list[int], stage: Stage, place: tuple[int, int]) -> tuple[Tensor, Tensor]:
+        size = (stage.width_px, stage.height_px)
+        pairs = []
+        for slot, index in enumerate(chosen):
+            rng = np.random.default_rng((self.recipe.seed, *place, slot))
+            if index < 0:
+                pairs.append(segmenter_null(rng, size))
+            else:
+                item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
+                shown = land_crop(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
+                picture, mask = shown or (item.picture, item.mask)
+                wanted = rng.random() < PASTE_FRAC
+                patch = obstacle_patch(rng, donor.picture, donor.mask) if wanted else None
+                patch = concrete(rng) if rng.random() < CONCRETE_FRAC else patch
+                pairs.append(segmenter_sample(rng, picture, mask, size, patch))
+        pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
+        return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))
+
+    @torch.no_grad()
+    def validate(self) -> dict[str, float]:
+        """IoU of the averaged weights on the held-out pictures at the current input size."""
+        stage = stage_of(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
+        size = (stage.width_px, stage.height_px)
+        counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
+        for start in range(0, len(self.held_out), 16):
+            chunk = self.held_out[start : start + 16]
+            resized = np.stack([np.asarray(cv2.resize(p.picture, size), np.uint8) for p in chunk])
+            logits = self.progress.average.model(to_device(torch.from_numpy(segmenter_batch(resized))))
+            labels = logits.argmax(1).cpu().numpy().astype(np.uint8)
+            for item, label in zip(chunk, labels, strict=True):
+                truth = np.asarray(cv2.resize(item.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+                counts += confusion(label, truth, len(SEGMENTER_CLASSES))
+        iou = class_iou(counts)
+        return {"miou": round(float(np.nanmean(iou)), 4)} | {
+            name: round(float(value), 4) for name, value in zip(SEGMENTER_CLASSES, iou, strict=True)
+        }

@@ -1,0 +1,1 @@
+"""What all trainings share: the loop, augmentation, warm starts, recipes, export."""

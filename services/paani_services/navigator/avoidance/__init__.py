@@ -1,0 +1,1 @@
+"""Keeping clear: candidate trajectories, constraints and costs, the local planner, the fence."""

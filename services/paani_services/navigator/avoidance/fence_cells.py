@@ -1,0 +1,42 @@
+"""The fence on the planner's grid: what lies beyond it is no water to plan on. Pure."""
+
+import numpy as np
+
+from paani.messages import FenceArea, Keep
+from paani_services.navigator.avoidance.fence import Fence, edges
+from paani_services.navigator.mapping.observed_cells import CELL_M, Mask
+from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid
+
+
+def fenced(grid: Grid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0)) -> Grid:
+    """The grid with every cell occupied whose middle the fence does not allow; as `fence.is_allowed` but for edges.
+
+    offset_m: east and north of a place in the map, from where it is on the grid.
+    """
+    if not fence:
+        return grid
+    inner = [_inside(grid, area, offset_m) for area in fence if area.keep is Keep.IN]
+    allowed = np.logical_or.reduce(inner) if inner else np.ones((CELLS, CELLS), np.bool_)
+    for area in fence:
+        if area.keep is Keep.OUT:
+            allowed &= ~_inside(grid, area, offset_m)
+    return grid._replace(
+        occupied=grid.occupied | ~allowed,
+        hidden=grid.hidden & allowed,
+        free=grid.free & allowed,
+        beside=grid.beside & allowed,
+    )
+
+
+def _inside(grid: Grid, area: FenceArea, offset_m: tuple[float, float]) -> Mask:
+    """Cells from whose middle a ray to the east crosses the polygon's edge an odd number of times."""
+    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    x_m, y_m = grid.west_m + offset_m[0] + middle, grid.south_m + offset_m[1] + middle
+    inside = np.zeros((CELLS, CELLS), np.bool_)
+    for (x1, y1), (x2, y2) in edges(area):
+        first, last = np.searchsorted(y_m, sorted((y1, y2)))
+        if first == last:
+            continue
+        rows = slice(first, last)
+        inside[rows] ^= x_m < ((x2 - x1) * (y_m[rows] - y1) / (y2 - y1) + x1)[:, None]
+    return inside

@@ -1,0 +1,182 @@
+"""What is known of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (checklist Q2). Pure.
+
+The grid lies in the map's axes and is laid anew around the boat from the sights of the last seconds.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from paani.config import PlannerConfig
+from paani_services.navigator.mapping.distance_field import distance_m
+from paani_services.navigator.mapping.observation import Sight
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, Cells, Indices, Mask, Shown, hull_top, shown
+from paani_services.navigator.mapping.projection import F64, Station, lens_at, ranges_m, rays
+
+CELLS = 100  # Q2
+REST = Station(0.0, 0.0, 0.0, 0.0, 0.0)
+OLD_EVERY = 2  # columns of a picture that is too old to free a cell, and only says what is gone
+
+Moving = frozenset[tuple[int, int]]  # boxes of what moves: the sight's stamp and the box's number in it
+NOTHING_MOVES: Moving = frozenset()
+UNCALIBRATED = Camera()
+
+
+class Grid(NamedTuple):
+    """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
+
+    west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
+    a person is, without the room round them. strayed: where a person or a vessel out of sight may have got to, and no
+    picture shows water now.
+    """
+
+    west_m: float
+    south_m: float
+    occupied: Mask
+    hidden: Mask
+    free: Mask
+    beside: Mask
+    people: Mask
+    strayed: Mask
+
+    @property
+    def unknown(self) -> Mask:
+        """Nothing is known."""
+        return ~(self.occupied | self.free | self.beside)
+
+
+def lay(
+    sights: tuple[Sight, ...],
+    position_m: tuple[float, float],
+    now_us: int,
+    camera: Camera,
+    config: PlannerConfig,
+    moving: Moving = NOTHING_MOVES,
+) -> Grid:
+    """The grid around the boat. sights: oldest first. moving: what moves occupies no cell.
+
+    Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
+    free since. Occupied wins, but for what one picture alone shows and `outvoted_by` later ones deny. Beside: what the
+    picture does not show because it is too near, given that there is a picture: whoever arms the boat answers for it at
+    the start, and what drifts in from astern no camera sees anyway.
+    """
+    west, south = (math.floor(at_m / CELL_M) - CELLS // 2 for at_m in position_m)
+    longest_us, free_us, occupied_us = (
+        now_us - round(age_s * 1e6)
+        for age_s in (max(config.occupied_s, config.hidden_s), config.free_s, config.occupied_s)
+    )
+    known = [sight for sight in sights if longest_us <= sight.at_us <= now_us]
+    known = [sight for sight in known if len(sight.edge) == len(known[-1].edge)]
+    first_free = sum(sight.at_us < free_us for sight in known)
+    first_occupied = sum(sight.at_us < occupied_us for sight in known)
+    pictures = []
+    for number, sight in enumerate(known):
+        boxes = tuple(box for k, box in enumerate(sight.boxes) if (sight.at_us, k) in moving)
+        pictures.append(shown(sight, boxes, camera, config, every=OLD_EVERY if number < first_free else 1))
+    free_of = _last_shown([picture.free for picture in pictures], west, south)
+    occupied_of = _last_shown([picture.occupied for picture in pictures], west, south)
+    not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
+    occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
+    if config.outvoted_by > 0:
+        occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
+    people_of = _last_shown([picture.people for picture in pictures], west, south)
+    vessels_of = _last_shown([picture.vessels for picture in pictures], west, south)
+    people_now, vessels_now = (
+        occupied_now & (last_of >= 0) & ((last_of >= free_of) | (last_of >= first_occupied))
+        for last_of in (people_of, vessels_of)
+    )
+    free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
+    ages_s = np.zeros(len(known) + 1)  # of what was lately in sight, or, at last, never
+    ages_s[:first_occupied] = [(now_us - sight.at_us) * 1e-6 for sight in known[:first_occupied]]
+    swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
+    drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
+    strayed = _reached(people_now, swum_m[people_of]) | _reached(vessels_now, drifted_m[vessels_of])
+    shape = (CELLS, CELLS)
+    grid = Grid(
+        west * CELL_M,
+        south * CELL_M,
+        occupied=occupied_now.reshape(shape),
+        hidden=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
+        free=free_now.reshape(shape),
+        beside=np.zeros(shape, np.bool_),
+        people=people_now.reshape(shape),
+        strayed=strayed & ~free_now.reshape(shape),
+    )
+    if first_free == len(known):
+        return grid
+    reach_m = blind_reach_m(known[-1].aspect, camera, config)
+    return grid._replace(beside=_within(grid, position_m, reach_m) & ~(grid.occupied | grid.free))
+
+
+def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
+    """How far from the boat the water begins that a picture shows, boat at rest; 0 if that is beyond `blind_m`."""
+    lens = lens_at(REST, camera.calibration, aspect)
+    u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    given = rays(lens, u, hull_top(camera.hull, u))
+    near_m = ranges_m(lens, given, config.max_range_m)
+    if not np.isfinite(near_m).all():
+        return 0.0
+    east_m, north_m = lens.at_m[0] + near_m * given.east, lens.at_m[1] + near_m * given.north
+    reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
+    return reach_m if reach_m <= config.blind_m else 0.0
+
+
+def _reached(cells: Mask, reach_m: F64) -> Mask:
+    """Cells that lie within the reach of these, each of its own [100 * 100]: in [100, 100]."""
+    found = np.zeros((CELLS, CELLS), np.bool_)
+    steps = np.ceil(reach_m / CELL_M) * cells
+    for reach in np.unique(steps[steps > 0.0]):
+        found |= distance_m((steps == reach).reshape(found.shape)) <= reach * CELL_M
+    return found
+
+
+def _outvoted(pictures: list[Shown], occupied_of: Indices, west: int, south: int, config: PlannerConfig) -> Mask:
+    """Cells that one of these pictures alone shows occupied, they and all around them, and enough later ones free.
+
+    occupied_of: the number of the last of them that shows each cell occupied.
+    """
+    number, cell = _all_shown([picture.occupied for picture in pictures], west, south)
+    first = np.full(CELLS * CELLS, len(pictures), np.int64)
+    first[cell[::-1]] = number[::-1]
+    earliest = _around(first.reshape(CELLS, CELLS), np.minimum)
+    latest = _around(occupied_of.reshape(CELLS, CELLS), np.maximum)
+    number, cell = _all_shown([picture.free for picture in pictures], west, south)
+    denied = np.bincount(cell[number > occupied_of[cell]], minlength=CELLS * CELLS)
+    return np.asarray((earliest == latest).ravel() & (denied >= config.outvoted_by))
+
+
+def _around(values: Indices, best: np.ufunc) -> Indices:
+    """The best of each cell and the eight around it."""
+    for _ in range(2):
+        found = values.copy()
+        best(found[1:], values[:-1], out=found[1:])
+        best(found[:-1], values[1:], out=found[:-1])
+        values = found.T
+    return values
+
+
+def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
+    """The number of the last picture that shows each cell of the grid, -1 where none does [100 * 100]."""
+    last = np.full(CELLS * CELLS, -1, np.int64)
+    number, cell = _all_shown(pictures, west, south)
+    last[cell] = number
+    return last
+
+
+def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, Indices]:
+    """Every cell of the grid that each picture shows: the picture's number, rising, and the cell's."""
+    if not pictures:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    number = np.repeat(np.arange(len(pictures)), [picture.column.size for picture in pictures])
+    column = np.concatenate([picture.column for picture in pictures]) - west
+    row = np.concatenate([picture.row for picture in pictures]) - south
+    inside = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
+    return number[inside], (row * CELLS + column)[inside]
+
+
+def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Mask:
+    """Cells whose middle lies within reach."""
+    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    east_m, north_m = grid.west_m + middle - position_m[0], grid.south_m + middle - position_m[1]
+    return np.asarray((east_m * east_m)[None, :] + (north_m * north_m)[:, None] <= reach_m * reach_m)

@@ -1,0 +1,1 @@
+"""What people type: one package per command."""

@@ -1,0 +1,129 @@
+"""`paani bench chain`, `paani bench judgement`, `paani bench recorder`, and those of other packages."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from paani.cli import add_config_arguments, config_from
+from paani.errors import UserError
+from paani.statistics.figure_table import Part, installed_commands, installed_parts, part_text
+from paani.statistics.measured import Machine, Report, measured
+from paani.whole_file import write_whole
+from paani_tools.bench.chain import bench_of, text_of
+from paani_tools.bench.judgement import contract, step
+from paani_tools.bench.recording_cost import recorder
+from paani_tools.bench.steadiness import steadiness
+from paani_tools.replay.speed import replay
+from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.lifecycle import Outcome, drive
+from paani_tools.up.plan import make_plan
+from paani_tools.up.terminal import Display
+
+
+def main(argv: list[str]) -> int:
+    """Run one benchmark and print its figures."""
+    others = installed_commands()
+    if argv and argv[0] in others:
+        return int(others[argv[0]].load()(argv[1:]))
+    parser = argparse.ArgumentParser(prog="paani bench", description="Measure, and print the figures side by side.")
+    benches = parser.add_subparsers(
+        dest="what", required=True, metavar=" | ".join(["chain", "judgement", "recorder", *others])
+    )
+    chain = benches.add_parser("chain", help="the whole loop, from the picture to the thrust")
+    chain.add_argument("--world", help="river or lake (default: river)")
+    chain.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")
+    chain.add_argument("--json", action="store_true", help="print JSON; progress goes to standard error")
+    add_config_arguments(chain)
+    judgement = benches.add_parser("judgement", help="the advisor: its step, its counterfactuals, its messages")
+    judgement.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    judgement.add_argument(
+        "--frames", type=_count, default=1000, metavar="N", help="frames to step over; default: 1000"
+    )
+    judgement.add_argument(
+        "--drive",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="LOG",
+        help="count changes of direction on recordings, and decide them again",
+    )
+    judgement.add_argument("--only", action="append", default=[], metavar="PART", help="these parts alone")
+    add_config_arguments(judgement)
+    recording = benches.add_parser("recorder", help="what recording a drive costs")
+    recording.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")
+    recording.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    add_config_arguments(recording)
+    options = parser.parse_args(argv)
+    return {"chain": _chain, "judgement": _judgement, "recorder": _recorder}[options.what](options)
+
+
+def _chain(options: argparse.Namespace) -> int:
+    """Run the whole loop, headless, and print where the time goes. Exit codes as `paani up`."""
+    cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
+    outcome = asyncio.run(_run(options))
+    machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
+    bench = bench_of(outcome.report, machine)
+    sys.stdout.write(msgspec.json.encode(bench).decode() + "\n" if options.json else "\n" + text_of(bench))
+    if outcome.failure:
+        sys.stderr.write(f"paani: {outcome.failure}\n")
+        return 1
+    return 0
+
+
+async def _run(options: argparse.Namespace) -> Outcome:
+    sets = up_sets(world=options.world, camera=None, headless=True)
+    plan = await make_plan(config_from(options, sets))
+    return await drive(plan, options.seconds, Display(sys.stderr if options.json else sys.stdout))
+
+
+def _judgement(options: argparse.Namespace) -> int:
+    """Print each part as it is done. Raises UserError for a drive that cannot be read or a file not written."""
+    config = config_from(options)
+    parts: dict[str, Callable[[], Part]] = {
+        "step": lambda: step(config, options.frames),
+        "contract": lambda: contract(config, options.frames),
+    }
+    if options.drive:
+        parts["dithering"] = lambda: steadiness(options.drive)
+        parts["replay"] = lambda: replay(options.drive)
+    parts |= installed_parts()
+    for name in options.only:
+        if name not in parts:
+            raise UserError(f"--only {name}: no such part (have: {', '.join(parts)})")
+    report = measured(parts[name] for name in options.only or parts)
+    if options.json:
+        write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
+    return 0
+
+
+def _recorder(options: argparse.Namespace) -> int:
+    """Drive, record, print. Exit codes as `paani up`."""
+    if options.json is not None and not options.json.absolute().parent.is_dir():
+        raise UserError(f"--json {options.json}: no such folder")
+    cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
+    part, failure = recorder(options, Display(sys.stdout))
+    if failure:
+        sys.stderr.write(f"paani: {failure}\n")
+        return 1
+    machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
+    sys.stdout.write("\n" + part_text(part))
+    sys.stdout.write(
+        f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
+    )
+    if options.json:
+        write_whole(options.json, msgspec.json.encode(Report(machine=machine, parts=(part,))) + b"\n", "--json")
+    return 0
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return count

@@ -1,0 +1,86 @@
+"""`paani calibrate RECORDING|--live SECONDS --shore-m METRES`: a calibration section for the boat's settings."""
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+
+from paani.cli import add_config_arguments, config_from
+from paani.config import CalibrationConfig
+from paani.errors import UserError
+from paani.whole_file import write_whole
+from paani_tools.calibrate.gather import heard_live, looks, recorded
+from paani_tools.calibrate.mount import Mount, mount_of
+
+MAX_SECONDS = 3600.0
+
+
+def main(argv: list[str]) -> int:
+    """Print what was found, and write it. Raises UserError for input that cannot calibrate; then nothing is written."""
+    options = _parser().parse_args(argv)
+    config = config_from(options)
+    if (options.recording is None) == (options.live is None):
+        raise UserError("name a recording, or --live SECONDS")
+    if options.out is not None and not options.out.absolute().parent.is_dir():
+        raise UserError(f"--out {options.out}: no such folder")
+    for name in ("hfov_deg", "height_m"):
+        if getattr(config.calibration, name) <= 0.0:
+            raise UserError(f"calibration.{name} is not known (--set calibration.{name}=...)")
+    if options.live is not None:
+        heard = asyncio.run(heard_live(config.bus, options.live))
+    else:
+        heard = recorded(options.recording)
+    mount = mount_of(looks(*heard), config.calibration, options.shore_m)
+    sys.stdout.write(
+        f"pitch_down_deg {mount.pitch_down_deg:.2f}, roll_deg {mount.roll_deg:.2f}; {mount.pictures} pictures,"
+        f" {mount.spread_deg:.2f} degrees between them, {mount.residual_deg:.2f} between columns\n"
+    )
+    if options.out is not None:
+        write_whole(options.out, fragment(config.calibration, mount).encode(), "--out")
+    return 0
+
+
+def fragment(calibration: CalibrationConfig, mount: Mount) -> str:
+    """The section as TOML, for `paani up --config`."""
+    centre = ", ".join(f"{part:g}" for part in calibration.centre_frac)
+    return (
+        "[calibration]\n"
+        "valid = true\n"
+        f"hfov_deg = {calibration.hfov_deg:g}\n"
+        f"centre_frac = [{centre}]\n"
+        f"height_m = {calibration.height_m:g}\n"
+        f"forward_m = {calibration.forward_m:g}\n"
+        f"pitch_down_deg = {mount.pitch_down_deg:.3f}\n"
+        f"roll_deg = {mount.roll_deg:.3f}\n"
+        f"yaw_deg = {calibration.yaw_deg:g}\n"
+        f'measured_by = "paani calibrate: {mount.pictures} pictures, {mount.spread_deg:.2f} degrees between them"\n'
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="paani calibrate",
+        description="Pitch and roll of the camera's mount, from the far waterline and the boat's roll and pitch.",
+    )
+    parser.add_argument("recording", type=Path, nargs="?", help="a recording of the moored or slow boat")
+    parser.add_argument("--live", type=_seconds, metavar="SECONDS", help="listen to the running boat instead")
+    parser.add_argument(
+        "--shore-m", type=_metres, required=True, metavar="METRES", help="how far away the shore in the picture is"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the calibration section here (TOML)")
+    add_config_arguments(parser)
+    return parser
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 1.0 <= value <= MAX_SECONDS:
+        raise ValueError(text)
+    return value
+
+
+def _metres(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < 1e6:
+        raise ValueError(text)
+    return value

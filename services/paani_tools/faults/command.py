@@ -1,0 +1,122 @@
+"""`paani faults DATA`: what the gate refuses and what it lets through, beside what each fault does to the segmenter."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from paani.cli import add_config_arguments, config_from
+from paani.config import PerceptionConfig
+from paani.errors import UserError
+from paani.messages import UnusableCause
+from paani.whole_file import write_whole
+from paani_services.perception.corridors import classify
+from paani_services.perception.engine import engine_named
+from paani_services.perception.fitness import load_fitness
+from paani_services.perception.gate import GateState, judge
+from paani_services.perception.preprocess import stretch, tables_for
+from paani_tools.faults.corpus import clean_pictures, listed_pictures, scenes, sources
+from paani_tools.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
+from paani_tools.faults.severity_curves import curves
+
+Bytes = NDArray[np.uint8]
+
+
+class Report(msgspec.Struct, frozen=True):
+    """What `--json` writes. without_water: pictures of which every one must be refused, none where not asked for."""
+
+    totals: Totals
+    cells: tuple[CellFigures, ...]
+    clean: tuple[CleanFigures, ...]
+    without_water: CleanFigures
+
+
+class Eyes:
+    """The segmenter and the gate, each on one picture alone."""
+
+    def __init__(self, config: PerceptionConfig) -> None:
+        """Raises UserError for a model that cannot be used."""
+        self._config = config
+        self._segmenter = engine_named(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
+        self._table = tables_for(self._segmenter.contract)
+        self._fitness = load_fitness(config.gate, config.intra_op_threads)
+
+    def segment(self, bgr: Bytes) -> Bytes:
+        """Classes uint8 [64, 80]."""
+        height, width = self._segmenter.contract.size_hw
+        return classify(self._segmenter.run(stretch(bgr, height, width, self._table)), self._config.temperature)[0]
+
+    def judge(self, bgr: Bytes) -> UnusableCause:
+        """The gate's verdict, as on the first picture of a camera."""
+        return judge(GateState(), bgr, 0, self._config.gate, self._fitness)[1]
+
+
+def main(argv: list[str]) -> int:
+    """Measure, print, write what was asked for. Raises UserError naming the file or folder."""
+    parser = argparse.ArgumentParser(prog="paani faults", description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of annotated sources, each with a manifest.json")
+    parser.add_argument("--pictures", type=Path, metavar="FILE", help="only pictures listed here, one path a line")
+    parser.add_argument("--without-water", type=Path, metavar="FILE", help="pictures listed here show no water")
+    parser.add_argument("--scenes", type=int, default=16, help="segmented pictures per source (default: 16)")
+    parser.add_argument("--clean", type=int, default=200, help="pictures per source as they are (default: 200)")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="the curves")
+    add_config_arguments(parser)
+    options = parser.parse_args(argv)
+    eyes = Eyes(config_from(options).perception)
+    folders = sources(options.data)
+    only = _listed("--pictures", options.pictures) if options.pictures else None
+    named = _listed("--without-water", options.without_water) if options.without_water else frozenset()
+    spoiled = [scene for folder in folders for scene in scenes(folder, options.scenes, only)]
+    dry = listed_pictures(options.data, named)
+    if not spoiled:
+        raise UserError(f"{options.data}: no picture with a mask of three classes")
+    clean = tuple(
+        clean_figures(folder.name, pictures, eyes.judge)
+        for folder in folders
+        if (pictures := clean_pictures(folder, options.clean, only))
+    )
+    cells = []
+    for cell in cell_figures(spoiled, eyes.segment, eyes.judge):
+        cells.append(cell)
+        sys.stderr.write(f"\r{len(cells):4} cells  {cell.fault:20}")
+    sys.stderr.write("\r" + " " * 40 + "\r")
+    report = Report(totals(cells, clean), tuple(cells), clean, clean_figures("without_water", dry, eyes.judge))
+    sys.stdout.write(table(report))
+    for path, text in ((options.json, _json(report)), (options.svg, curves(cells))):
+        if path is not None:
+            write_whole(path, text.encode())
+    return 0
+
+
+def table(report: Report) -> str:
+    """The report as text."""
+    lines = ["fault            severity    n   mIoU  refused  must"]
+    lines += [
+        f"{c.fault:16} {c.severity:8} {c.n:4} {c.miou:6.3f} {c.rejected / max(1, c.n):8.3f}  {c.verdict}"
+        for c in report.cells
+    ]
+    lines += ["", "clean pictures         n  refused"]
+    lines += [f"{s.source:18} {s.n:5} {s.rejected:8}  {', '.join(s.causes)}" for s in report.clean]
+    if report.without_water.n:
+        lines.append(f"\npictures without water: {report.without_water.rejected} of {report.without_water.n} refused")
+    t = report.totals
+    lines.append(
+        f"\nlet through where it must refuse {t.false_accept_frac:.4f}; refused where it must not "
+        f"{t.false_reject_frac:.4f}; clean pictures refused {t.clean_reject_frac:.4f}\n"
+    )
+    return "\n".join(lines)
+
+
+def _listed(option: str, path: Path) -> frozenset[str]:
+    try:
+        return frozenset(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{option} {path}: {error}") from error
+
+
+def _json(report: Report) -> str:
+    return msgspec.json.format(msgspec.json.encode(report), indent=1).decode() + "\n"

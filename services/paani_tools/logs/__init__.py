@@ -1,0 +1,1 @@
+"""`paani logs`: look into recordings, repair them, export them."""

@@ -1,0 +1,108 @@
+"""`paani logs`: what is in recordings, mending them, and handing them to other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import msgspec
+
+from paani.errors import UserError
+from paani.logs.folder import recordings
+from paani.logs.reader import Log, Record, open_log
+from paani.logs.repair import repair
+from paani_tools.logs.export import export_csv, export_geojson, export_gpx
+from paani_tools.logs.info import info_of, list_text, text_of
+from paani_tools.progress import Progress
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 done, 2 user's mistake (one line on standard error)."""
+    options = _parser().parse_args(argv)
+    if options.what == "info":
+        return _info(options.path, as_json=options.json)
+    if options.what == "repair":
+        return _repair(options.path)
+    if options.what == "export":
+        return _export(options)
+    return _list(options.path)
+
+
+def _info(path: Path, *, as_json: bool) -> int:
+    log = open_log(path)
+    with Progress("reading") as progress:
+        info = info_of(log, Along(log, progress))
+    sys.stdout.write(msgspec.json.encode(info).decode() + "\n" if as_json else text_of(info))
+    return 0
+
+
+def _repair(path: Path) -> int:
+    repaired = repair(path)
+    if not repaired.changed:
+        sys.stdout.write(f"{path}: nothing to repair\n")
+        return 0
+    sys.stdout.write(f"{path}: {repaired.messages} messages kept\n")
+    sys.stdout.write("".join(f"lost: {line}\n" for line in repaired.lost))
+    if repaired.original is not None:
+        sys.stdout.write(f"the file as it was: {repaired.original}\n")
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    wanted = [
+        (export, path)
+        for export, path in ((export_csv, options.csv), (export_geojson, options.geojson), (export_gpx, options.gpx))
+        if path is not None
+    ]
+    if not wanted:
+        raise UserError("paani logs export: say what to write: --csv DIR, --geojson FILE or --gpx FILE")
+    log = open_log(options.path)
+    for export, path in wanted:
+        with Progress(path.name) as progress:
+            told = export(log, path, Along(log, progress))
+        sys.stdout.write(told + "\n")
+    for problem in log.problems:
+        sys.stderr.write(f"{problem}\n")
+    return 0
+
+
+def _list(folder: Path) -> int:
+    if not folder.is_dir():
+        raise UserError(f"{folder}: no such folder")
+    if not recordings(folder):
+        raise UserError(f"{folder}: no recordings in this folder")
+    sys.stdout.write(list_text(folder))
+    return 0
+
+
+class Along:
+    """Shows how far the reading of a log is."""
+
+    def __init__(self, log: Log, progress: Progress) -> None:
+        self._start_us, self._span_us = log.start_us, max(log.end_us - log.start_us, 1)
+        self._progress = progress
+        self._read = 0
+
+    def __call__(self, record: Record) -> None:
+        self._read += 1
+        if self._read % 500 == 0:
+            self._progress.at((record.log_us - self._start_us) / self._span_us)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani logs", description="Recordings of `paani up --record DIR`.")
+    commands = parser.add_subparsers(dest="what", required=True)
+    info = commands.add_parser("info", help="what a recording holds")
+    info.add_argument("path", type=Path, metavar="FILE|DIR")
+    info.add_argument("--json", action="store_true", help="for programs")
+    mend = commands.add_parser("repair", help="mend a recording that was cut short or damaged")
+    mend.add_argument("path", type=Path, metavar="FILE")
+    export = commands.add_parser("export", help="write tables or tracks")
+    export.add_argument("path", type=Path, metavar="FILE|DIR")
+    export.add_argument("--csv", type=Path, metavar="DIR", help="a table for each topic, into a new folder")
+    export.add_argument("--geojson", type=Path, metavar="FILE", help="the track, for maps")
+    export.add_argument("--gpx", type=Path, metavar="FILE", help="the track, for chart plotters")
+    listing = commands.add_parser("list", help="the recordings of a folder")
+    listing.add_argument("path", type=Path, metavar="DIR")
+    return parser

@@ -1,0 +1,166 @@
+"""`paani look PATH...`: judge pictures, folders and videos; no bus, no simulator."""
+
+import argparse
+import itertools
+import sys
+from pathlib import Path
+
+import cv2
+import msgspec
+
+from paani.cli import add_config_arguments, config_from
+from paani.clock import stopwatch_ms
+from paani.errors import UserError
+from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk, Reason, Text, Unit, UnusableCause
+from paani.whole_file import write_whole
+from paani_services.perception.pipeline import Perceiver
+from paani_tools.look.annotate import annotated
+from paani_tools.look.contact_sheet import ContactSheet
+from paani_tools.look.verdict import Judgement, judged
+
+EPOCHS_PER_PATH = 1_000_000
+JPEG_QUALITY = 90
+SHEET_SUFFIXES = (".jpg", ".jpeg", ".png")
+
+
+class Lanes(msgspec.Struct, frozen=True):
+    left: LaneRisk
+    center: LaneRisk
+    right: LaneRisk
+
+
+class Brief(msgspec.Struct, frozen=True):
+    """One line of `--json`: these fields, in this order. `risk` is left, centre, right; boxes are normalised xyxy."""
+
+    path: Text
+    usable: bool
+    cause: UnusableCause
+    direction: Direction
+    reason: Reason
+    risk: tuple[Unit, Unit, Unit]
+    lanes: Lanes
+    detections: tuple[Detection, ...]
+    explanation: Text
+
+
+class Full(msgspec.Struct, frozen=True):
+    """One line without `--json`."""
+
+    path: Text
+    evidence: Evidence
+    advice: Advisory
+    explanation: Text
+
+
+def main(argv: list[str]) -> int:
+    """Judge every path in turn. Raises UserError naming a path that cannot be read."""
+    options = _parser().parse_args(argv)
+    config = config_from(options)
+    for path in options.paths:
+        if not path.exists():
+            raise UserError(f"{path}: no such file or folder")
+    if options.sheet is not None and options.sheet.suffix.lower() not in SHEET_SUFFIXES:
+        raise UserError(f"--sheet {options.sheet}: is not one of {', '.join(SHEET_SUFFIXES)}")
+    out: Path | None = options.out or (None if options.json or options.sheet else Path("look"))
+    if out is not None:
+        _make(out)
+    sheet = ContactSheet()
+    perceiver = Perceiver(config.perception, stopwatch_ms)
+    taken: set[str] = set()
+    shown = 0
+    try:
+        for index, path in enumerate(options.paths):
+            for judgement in judged(path, index * EPOCHS_PER_PATH, perceiver, config):
+                shown += 1
+                sys.stdout.write(_line(judgement, options.json))
+                if (out or options.sheet) and judgement.bgr is not None:
+                    picture = annotated(
+                        judgement.bgr,
+                        judgement.mask,
+                        judgement.evidence,
+                        judgement.advisory,
+                        config.perception.corridors,
+                    )
+                    if out is not None:
+                        _save(out / file_name(judgement.name, taken), picture)
+                    if options.sheet is not None:
+                        sheet.add(picture)
+                _progress(f"{shown}  {judgement.advisory.direction:12}  {judgement.name[-60:]}")
+    finally:
+        perceiver.close()
+        _progress(None)
+    if options.sheet is not None and (drawn := sheet.drawn()) is not None:
+        write_whole(options.sheet, cv2.imencode(options.sheet.suffix, drawn)[1].tobytes(), "--sheet")
+    if out is not None and sys.stderr.isatty():
+        sys.stderr.write(f"{shown} judged, annotated pictures in {out}\n")
+    return 0
+
+
+def file_name(name: str, taken: set[str]) -> str:
+    """A name for the annotated picture that no other of this run has; `clip.mp4#7` becomes `clip_000007.jpg`."""
+    stem, _, number = Path(name).name.partition("#")
+    base = Path(stem).stem + (f"_{int(number):06d}" if number else "")
+    for attempt in itertools.count(1):
+        candidate = f"{base}.jpg" if attempt == 1 else f"{base}_{attempt}.jpg"
+        if candidate not in taken:
+            taken.add(candidate)
+            return candidate
+    raise AssertionError("count never ends")
+
+
+def _line(judgement: Judgement, brief: bool) -> str:
+    advice = judgement.advisory
+    line: Brief | Full
+    if brief:
+        lanes = (advice.left, advice.center, advice.right)
+        line = Brief(
+            path=judgement.name,
+            usable=judgement.evidence.usable,
+            cause=judgement.evidence.cause,
+            direction=advice.direction,
+            reason=advice.reason,
+            risk=(lanes[0].risk, lanes[1].risk, lanes[2].risk),
+            lanes=Lanes(*lanes),
+            detections=judgement.evidence.detections,
+            explanation=advice.explanation,
+        )
+    else:
+        line = Full(judgement.name, judgement.evidence, advice, advice.explanation)
+    return msgspec.json.encode(line).decode() + "\n"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="paani look",
+        description="Judge pictures, folders of pictures and videos as the boat would. Each still is judged alone, "
+        "shown to the advisor eight times 0.1 s apart; a video is judged in sequence.",
+    )
+    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="picture, folder or video")
+    parser.add_argument("--json", action="store_true", help="one short JSON line per picture, no annotated pictures")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where annotated pictures go (default: look)")
+    parser.add_argument(
+        "--sheet", type=Path, metavar="FILE", help="a few dozen annotated pictures in one; alone, no --out"
+    )
+    add_config_arguments(parser)
+    return parser
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}") from error
+
+
+def _save(file: Path, picture: object) -> None:
+    _, data = cv2.imencode(file.suffix, picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    try:
+        file.write_bytes(data.tobytes())
+    except OSError as error:
+        raise UserError(f"{file}: {error.strerror}") from error
+
+
+def _progress(text: str | None) -> None:
+    if sys.stderr.isatty():
+        sys.stderr.write("\r\x1b[K" + (text or ""))
+        sys.stderr.flush()

@@ -1,0 +1,168 @@
+"""Computes the decisions of one service again from what its steps had been given. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import msgspec
+
+from paani import messages as m
+from paani.config import Config
+from paani.decider import Decider
+from paani.logs.reader import Record
+from paani_tools.replay.ledger import LATE_US, NOTHING, Given, Ledger, Name
+
+
+class Skip(StrEnum):
+    """Why a step cannot be computed again."""
+
+    BEFORE_STATE = "before the first state in the log"
+    AFTER_BREAK = "no state since a break"
+    STATE_UNREADABLE = "its state does not decode"
+    LACKS_INPUT = "a message it had heard is not in the log"
+    FAILED = "the decider failed"
+
+
+class Excuse(StrEnum):
+    """Why it is right that a step cannot be computed again."""
+
+    START = "the log begins later than what it needs"
+    LOST = "what it needs was lost, as the recorder says"
+
+
+class Losses(NamedTuple):
+    """Messages of each topic that the recorder has counted as lost, and when each recording began and ended [us]."""
+
+    counted: Mapping[str, int]
+    recordings: tuple[tuple[int, int], ...]
+
+    def at_edge(self, log_us: int) -> bool:
+        """Whether a recording began or ended about then, so that what belongs together may not be in it together."""
+        return any(
+            0 <= log_us - start_us <= LATE_US or 0 <= end_us - log_us <= LATE_US for start_us, end_us in self.recordings
+        )
+
+
+class Again(NamedTuple):
+    """One step, computed again: what each sent message was, and what it is now; or why it is not.
+
+    state_same: whether the state before it is the recorded one; None where none is recorded.
+    missing_before: steps just before it that are not in the log, without excuse.
+    """
+
+    given: Given
+    outputs: tuple[tuple[m.SentMessage, bytes | None, bytes], ...] = ()
+    skip: Skip | None = None
+    detail: str = ""
+    excuse: Excuse | None = None
+    state_same: bool | None = None
+    missing_before: int = 0
+
+
+class Recompute:
+    """`steps` goes through the records once.
+
+    evolve: settings are changed, so a recorded state is only taken up at the start and after a break.
+    losses: what the recorder knows of its gaps. instead: as for `Ledger`. lost_steps: steps it has counted as lost.
+    """
+
+    def __init__(
+        self,
+        decider: Decider[Any],
+        config: Config,
+        losses: Losses,
+        *,
+        evolve: bool,
+        instead: Mapping[Name, bytes] = NOTHING,
+    ) -> None:
+        self.ledger = Ledger(decider, instead)
+        self._decider, self._config, self._evolve = decider, config, evolve
+        self._producers = {topic.name: topic.producer for topic in decider.outputs}
+        self._encoder = msgspec.json.Encoder()
+        self._states = msgspec.json.Decoder(type(decider.state()))
+        self._state: Any = None
+        self._reason = Skip.BEFORE_STATE
+        self._excuse: Excuse | None = Excuse.START
+        self._last: m.Step | None = None
+        self._lost = dict(losses.counted)
+        self._losses = losses
+        self._last_us = 0
+        self.lost_steps = 0
+
+    def steps(self, records: Iterable[Record]) -> Iterator[Again]:
+        """Every step that the log has, in order."""
+        for given in self.ledger.steps(records):
+            last, step = self._last, given.step
+            if last is not None and (step.epoch, step.seq) <= (last.epoch, last.seq):
+                continue  # the same twice
+            self._last, last_us, self._last_us = step, self._last_us, given.log_us
+            missing = 0
+            if last is not None:
+                begun = any(last_us < start_us <= given.log_us for start_us, _ in self._losses.recordings)
+                same = step.epoch == last.epoch
+                missing = step.seq - (last.seq + 1 if same else 0)
+                excuse = Excuse.START if begun else None
+                if missing and not begun and self.is_lost(self.ledger.step_topic, missing):
+                    excuse, self.lost_steps = Excuse.LOST, self.lost_steps + missing
+                if not same:  # the process began again
+                    self._state, self._reason, self._excuse = None, Skip.AFTER_BREAK, excuse
+                elif missing:
+                    self._lose(Skip.AFTER_BREAK, excuse)
+                missing = missing if excuse is None else 0
+            yield self._again(given)._replace(missing_before=missing)
+
+    def is_lost(self, topic: str, count: int = 1) -> bool:
+        """Whether the recorder has counted as many more messages of a topic as lost."""
+        if self._lost.get(topic, 0) < count:
+            return False
+        self._lost[topic] = self._lost.get(topic, 0) - count
+        return True
+
+    def _again(self, given: Given) -> Again:
+        step, same = given.step, None
+        if step.state:
+            try:
+                recorded = self._states.decode(step.state)
+            except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+                self._lose(Skip.STATE_UNREADABLE, None)
+                return Again(given, skip=Skip.STATE_UNREADABLE, detail=str(error))
+            if self._state is not None and not self._evolve:
+                same = self._encoder.encode(self._state).decode() == step.state
+            if self._state is None or not self._evolve:
+                self._state = recorded
+        if self._state is None:
+            return Again(given, skip=self._reason, excuse=self._excuse)
+        if given.inputs is None:
+            excuse = Excuse.START if given.early or self._losses.at_edge(given.log_us) else None
+            if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
+                excuse = Excuse.LOST
+            self._lose(Skip.AFTER_BREAK, excuse)
+            return Again(given, skip=Skip.LACKS_INPUT, detail=given.lacks, excuse=excuse)
+        try:
+            self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
+            compared = tuple(
+                (sent, recorded, self._encoded(sent, outputs[sent.topic])) for sent, recorded in given.sent
+            )
+        except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
+            self._lose(Skip.AFTER_BREAK, None)
+            return Again(given, skip=Skip.FAILED, detail=f"{type(error).__name__}: {error}")
+        return Again(given, compared, state_same=same)
+
+    def _encoded(self, sent: m.SentMessage, message: m.Message) -> bytes:
+        """As the bus would have sent it, with the header that the step has kept."""
+        return self._encoder.encode(
+            msgspec.structs.replace(
+                message,
+                seq=sent.seq,
+                epoch=sent.epoch,
+                domain=self._config.bus.domain,
+                producer=self._producers[sent.topic],
+                sent_us=sent.sent_us,
+            )
+        )
+
+    def _lose(self, reason: Skip, excuse: Excuse | None) -> None:
+        """The state is not known any more, until the next one recorded."""
+        self._state, self._reason, self._excuse = None, reason, excuse

@@ -1,0 +1,114 @@
+"""What other settings would have decided: the changed decisions of one service, in episodes. Pure."""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
+from paani.config import Config
+from paani.decider import Decider
+from paani.logs.reader import Record
+from paani_tools.replay.check import OnAgain
+from paani_tools.replay.decision_text import why, words
+from paani_tools.replay.difference import differing_fields
+from paani_tools.replay.ledger import Name
+from paani_tools.replay.recompute import Losses, Recompute
+
+GAP_US = 1_000_000  # changed decisions further apart are two episodes
+SHOWN_FIELDS = 6
+
+
+class Episode(msgspec.Struct, kw_only=True):
+    """Decisions in a row that changed in the same way. Times since the log's start; reasons of the first."""
+
+    topic: str
+    start_s: float
+    end_s: float
+    decisions: int
+    recorded: str
+    computed: str
+    recorded_why: str
+    computed_why: str
+
+
+class ServiceChanges(msgspec.Struct, frozen=True, kw_only=True):
+    """One service. changed: messages that say something else; numbers: those that differ in other fields only."""
+
+    service: str
+    messages: int
+    changed: int
+    numbers: int
+    skipped: int
+    fields: tuple[tuple[str, int], ...]
+    episodes: tuple[Episode, ...]
+
+
+def changes_of(
+    decider: Decider[Any],
+    config: Config,
+    records: Iterable[Record],
+    start_us: int,
+    losses: Losses,
+    instead: dict[Name, bytes],
+    on_again: OnAgain | None = None,
+) -> ServiceChanges:
+    """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one recorded,
+    and from the next one after a break.
+
+    instead: inputs given in place of the recorded ones; what is sent and differs is added to it.
+    """
+    decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in decider.outputs}
+    open_episodes: dict[str, Episode] = {}
+    episodes: list[Episode] = []
+    fields: collections.Counter[str] = collections.Counter()
+    messages = changed = numbers = skipped = 0
+    for again in Recompute(decider, config, losses, evolve=True, instead=instead).steps(records):
+        if on_again is not None:
+            on_again(again)
+        skipped += again.skip is not None
+        at_s = (again.given.step.source_us - start_us) * 1e-6
+        for sent, recorded, computed in again.outputs:
+            if recorded is None:
+                continue
+            messages += 1
+            if recorded == computed:
+                continue
+            instead[sent.topic, sent.epoch, sent.seq] = computed
+            try:
+                before, now = decoders[sent.topic].decode(recorded), decoders[sent.topic].decode(computed)
+            except msgspec.MsgspecError:
+                skipped += 1
+                continue
+            if words(before) == words(now):
+                numbers += 1
+                fields.update(path.partition("[")[0] for path, _, _ in differing_fields(recorded, computed))
+                continue
+            changed += 1
+            episode = open_episodes.get(sent.topic)
+            same = episode is not None and (episode.recorded, episode.computed) == (words(before), words(now))
+            if episode is not None and same and at_s - episode.end_s <= GAP_US * 1e-6:
+                episode.end_s, episode.decisions = at_s, episode.decisions + 1
+                continue
+            open_episodes[sent.topic] = Episode(
+                topic=sent.topic,
+                start_s=at_s,
+                end_s=at_s,
+                decisions=1,
+                recorded=words(before),
+                computed=words(now),
+                recorded_why=why(before),
+                computed_why=why(now),
+            )
+            episodes.append(open_episodes[sent.topic])
+    return ServiceChanges(
+        service=decider.service,
+        messages=messages,
+        changed=changed,
+        numbers=numbers,
+        skipped=skipped,
+        fields=tuple(fields.most_common(SHOWN_FIELDS)),
+        episodes=tuple(episodes),
+    )

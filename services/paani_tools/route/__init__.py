@@ -1,0 +1,1 @@
+"""`paani route`: routes converted between formats and checked."""

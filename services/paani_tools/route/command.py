@@ -1,0 +1,152 @@
+"""`paani route`: routes between GPX, GeoJSON and TOML, what is in them, and whether they can be sailed."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from paani.config import load_config
+from paani.errors import UserError
+from paani.geometry import geodetic_from_enu
+from paani.messages import FenceArea
+from paani.whole_file import write_whole
+from paani_services.navigator.avoidance.fence import trouble
+from paani_services.navigator.files.fence_file import load_fence
+from paani_services.navigator.files.line import Line, kept
+from paani_services.navigator.files.placing import LatLon
+from paani_services.navigator.files.route_file import (
+    load_route,
+    on_own_map,
+    points_m,
+    read_route,
+    require_sailable,
+    route_bytes,
+)
+
+EXPORT_FENCE = "paani_sim.worlds.export_fence"  # run as a module: services import no simulator
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 done, 2 user's mistake or a route that cannot be sailed."""
+    options = _parser().parse_args(argv)
+    run = {"convert": _convert, "info": _info, "check": _check}[options.command]
+    run(options)
+    return 0
+
+
+def _convert(options: argparse.Namespace) -> None:
+    where = str(options.source)
+    line = read_route(options.source, where)
+    if options.origin is not None and line.origin_deg is None:
+        line = replace(line, origin_deg=options.origin)
+    if options.thin is not None:
+        line = _thinned(line, options.thin, where)
+    if options.repeat:
+        line = replace(line, repeat=True)
+    require_sailable(line, where)
+    data = route_bytes(line, options.target.suffix, str(options.target))
+    write_whole(options.target, data)
+    sys.stdout.write(f"{options.target}: {len(line.spots)} waypoints\n")
+
+
+def _thinned(line: Line, tolerance_m: float, where: str) -> Line:
+    keep = kept(points_m(on_own_map(line, where)), tolerance_m)
+    sys.stderr.write(f"{where}: {len(line.spots)} waypoints, {len(keep)} kept within {tolerance_m} m\n")
+    return replace(line, spots=tuple(line.spots[number] for number in keep))
+
+
+def _info(options: argparse.Namespace) -> None:
+    where = str(options.source)
+    line = read_route(options.source, where)
+    require_sailable(line, where)
+    line = on_own_map(line, where)
+    points = points_m(line)
+    ring = (*points, points[0]) if line.repeat else points
+    lengths_m = [math.dist(one, other) for one, other in itertools.pairwise(ring)]
+    rows = [
+        ("name", line.name or "-"),
+        ("waypoints", f"{len(points)}, {'again and again' if line.repeat else 'once'}"),
+        ("length", f"{sum(lengths_m):.3f} m"),
+        ("legs", f"{len(lengths_m)}, {min(lengths_m):.2f} to {max(lengths_m):.2f} m"),
+        ("origin", _lat_lon(line.origin_deg) if line.origin_deg else "not given: metres on the map as it is"),
+    ]
+    (west_m, east_m), (south_m, north_m) = ((min(axis), max(axis)) for axis in zip(*points, strict=True))
+    rows.append(("bounds", f"x {west_m:.2f} to {east_m:.2f} m, y {south_m:.2f} to {north_m:.2f} m"))
+    if line.origin_deg is not None:
+        corners = (geodetic_from_enu(*corner, *line.origin_deg) for corner in ((west_m, south_m), (east_m, north_m)))
+        rows.append(("", " to ".join(_lat_lon(corner) for corner in corners)))
+    sys.stdout.write("".join(f"{name:10} {value}\n" for name, value in rows))
+
+
+def _check(options: argparse.Namespace) -> None:
+    where = str(options.source)
+    line = read_route(options.source, where)
+    map_deg = on_own_map(line, where).origin_deg
+    route = load_route(options.source, map_deg, "")
+    fences = [] if options.fence is None else [(str(options.fence), load_fence(options.fence, map_deg, ""))]
+    if options.world is not None:
+        fences.append((f"world {options.world}", _world_fence(options.world, map_deg)))
+    margin_m = load_config().navigator.fence_margin_m
+    for name, fence in fences:
+        found = trouble(fence, route.waypoints, margin_m, repeat=route.repeat)
+        if found is not None:
+            raise UserError(f"{where}: waypoints[{found[0]}]: {found[1]} ({name})")
+    sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, good{_inside(fences)}\n")
+
+
+def _inside(fences: list[tuple[str, tuple[FenceArea, ...]]]) -> str:
+    return f", inside {' and '.join(name for name, _ in fences)}" if fences else ""
+
+
+def _world_fence(world: str, map_deg: LatLon | None) -> tuple[FenceArea, ...]:
+    """The world's water as a fence."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "fence.toml"
+        command = [sys.executable, "-m", EXPORT_FENCE, world, str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise UserError((done.stderr.strip().splitlines() or [f"--world {world}: no such world"])[-1])
+        return load_fence(path, map_deg, f"--world {world}")
+
+
+def _lat_lon(lat_lon_deg: LatLon) -> str:
+    return f"{lat_lon_deg[0]:.7f}, {lat_lon_deg[1]:.7f}"
+
+
+def _origin(text: str) -> LatLon:
+    latitude_deg, longitude_deg = (float(part) for part in text.split(","))
+    if not (-90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0):
+        raise ValueError(text)
+    return latitude_deg, longitude_deg
+
+
+def _metres(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 1000.0:
+        raise ValueError(text)
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani route", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    convert = commands.add_parser("convert", help="between .gpx, .geojson and .toml")
+    convert.add_argument("source", type=Path, metavar="IN")
+    convert.add_argument("target", type=Path, metavar="OUT")
+    convert.add_argument("--thin", type=_metres, metavar="M", help="leave out points that bend the line by less")
+    convert.add_argument("--repeat", action="store_true", help="the last waypoint leads back to the first")
+    convert.add_argument("--origin", type=_origin, metavar="LAT,LON", help="of metres that have none")
+    info = commands.add_parser("info", help="length, legs, bounds, origin")
+    info.add_argument("source", type=Path, metavar="FILE")
+    check = commands.add_parser("check", help="whether the navigator can follow it")
+    check.add_argument("source", type=Path, metavar="FILE")
+    check.add_argument("--fence", type=Path, metavar="FILE", help="which it may not leave")
+    check.add_argument("--world", metavar="NAME", help="whose water it may not leave")
+    return parser

@@ -1,0 +1,107 @@
+"""`paani up`."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import msgspec
+
+from paani.cli import add_config_arguments, config_from
+from paani.errors import UserError
+from paani.whole_file import write_whole
+from paani_tools.up.lifecycle import Outcome, drive
+from paani_tools.up.plan import make_plan
+from paani_tools.up.run_summary import Report
+from paani_tools.up.terminal import Display
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 it ran to its end, 1 a service could not be kept alive, 2 user's mistake."""
+    options = _parser().parse_args(argv)
+    if options.summary is not None and not options.summary.absolute().parent.is_dir():
+        raise UserError(f"--summary {options.summary}: no such folder")
+    outcome = asyncio.run(_up(options))
+    sys.stdout.write(_result(outcome.report))
+    if options.summary is not None:
+        write_report(options.summary, outcome.report)
+    if outcome.failure:
+        sys.stderr.write(f"paani: {outcome.failure}\n")
+        return 1
+    return 0
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Beside the file first, then renamed. Raises UserError."""
+    write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--summary")
+
+
+def up_sets(
+    *,
+    world: str | None,
+    camera: str | None,
+    headless: bool,
+    record: Path | None = None,
+    mission: Path | None = None,
+    fence: Path | None = None,
+) -> tuple[str, ...]:
+    """Settings that the options of `paani up` stand for. The boat is a simulated one: the operator arms at start."""
+    sets = ["dashboard.arm_at_start=true"]
+    if world is not None:
+        sets.append(f"world.name={json.dumps(world)}")
+    if camera is not None:
+        sets.append(f"camera.source={json.dumps(camera)}")
+    if headless:
+        sets.append("dashboard.serve=false")
+    for field, file in (("mission", mission), ("fence", fence)):
+        if file is not None:
+            sets.append(f"navigator.{field}={json.dumps(str(file.absolute()))}")
+    if record is not None:
+        sets.append(f"recorder.folder={json.dumps(str(record.absolute()))}")
+    return tuple(sets)
+
+
+def seconds(text: str) -> float:
+    """A positive number of seconds."""
+    value = float(text)
+    if not 0.0 < value < 1e7:
+        raise ValueError(text)
+    return value
+
+
+def _result(report: Report) -> str:
+    rate_hz = report.services["perception"].rate_hz
+    return (
+        f"{report.duration_s:.0f} s: {report.distance_m:.1f} m, {report.waypoints_reached} waypoints, "
+        f"{report.collisions} collisions, perception {rate_hz:.1f} Hz\n"
+    )
+
+
+async def _up(options: argparse.Namespace) -> Outcome:
+    sets = up_sets(
+        world=options.world,
+        camera=options.camera,
+        headless=options.headless,
+        record=options.record,
+        mission=options.mission,
+        fence=options.fence,
+    )
+    plan = await make_plan(config_from(options, sets))
+    return await drive(plan, options.seconds, Display(sys.stdout))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paani up", description="Run the whole loop until Ctrl-C.")
+    parser.add_argument("--world", metavar="NAME|FILE", help="world or scenario (`paani world list`; default: river)")
+    parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
+    parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
+    parser.add_argument("--summary", type=Path, metavar="FILE", help="write the run's figures as JSON")
+    parser.add_argument("--record", type=Path, metavar="DIR", help="record everything into this folder")
+    parser.add_argument("--mission", type=Path, metavar="FILE", help="legs to run, TOML (default: the world's route)")
+    parser.add_argument("--fence", type=Path, metavar="FILE", help="areas to keep in and out of, TOML or GeoJSON")
+    parser.add_argument("--headless", action="store_true", help="serve no page")
+    add_config_arguments(parser)
+    return parser

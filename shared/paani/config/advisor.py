@@ -1,0 +1,118 @@
+"""Advisor settings. Ids in comments are checklist ids: the paper's constants."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+
+RemovalSize = Annotated[int, msgspec.Meta(ge=0, le=3)]  # the work grows with the cube
+FrameCount = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
+SlopeSize = Annotated[int, msgspec.Meta(ge=3, le=10_000)]  # fewer leave a slope without a spread
+
+
+class TrackerConfig(Section, frozen=True):
+    iou: Fraction = 0.25  # G2
+    hold_s: Positive = 3.0  # G3
+    confirm_hits: Size = 2  # G4
+    danger_bottom: Fraction = 0.65  # G5
+    danger_area: Fraction = 0.02  # G5
+    box_retain: Fraction = 0.35  # G6
+    confidence_retain: Fraction = 0.65  # G7
+    max_tracks: Size = 64
+    growth_full_scale_per_s: Positive = 0.16  # H1
+    centering_full_scale_per_s: Positive = 0.20  # H2
+    urgency_decay_s: Positive = 1.0  # H4
+    held_decay_s: Positive = 1.0  # how fast the obstacle weight of a box fades while it is not seen
+
+
+class MotionConfig(Section, frozen=True):
+    """Apparent motion. The paper's constants are those of the `paper` profile where they differ.
+
+    Measured: what `python -m paani_sim.studies.motion_table` showed best among the values tried.
+    """
+
+    history_s: Positive = 3.0  # measured; I5: 1.5
+    max_samples: Size = 24  # I5
+    min_samples: SlopeSize = 5  # I6
+    min_duration_s: Positive = 0.7  # measured; I6: 0.4
+    max_gap_s: Positive = 0.75  # I16
+    follow_rate: bool = True  # window and gap reach over at least so many periods between frames
+    history_periods: Positive = 6.0  # resolution 2
+    gap_periods: Positive = 2.5  # resolution 2
+    compensate_rotation: bool = True  # tell the boat's own turning apart from motion; I19: no
+    max_odometry_gap_s: NonNegative = 0.3  # between a picture and the odometry nearest to it: its freshness limit
+    deadband_per_s: Positive = 0.04  # I3
+    margin_floor_per_s: Positive = 0.01  # I2
+    margin_factor: Positive = 3.0  # I2
+    min_quality: Fraction = 0.25  # I8
+    max_confidence: Fraction = 0.9  # I9
+    full_duration_s: Positive = 1.0  # resolution 9
+    full_samples: Size = 8  # resolution 9
+    full_detection_confidence: Positive = 0.6  # resolution 9
+    min_detection_confidence: Fraction = 0.40  # C6
+    edge_margin: Fraction = 0.01  # of the picture; measured: three times the jitter of a box edge
+    max_aspect_change: Positive = 0.4  # of log(width / height); measured: four times the jitter of a 16 px box
+    shape_change_hits: Size = 2  # sightings of another shape before it is believed; I13: the first
+
+
+class RiskConfig(Section, frozen=True):
+    """`near_m`, `far_m`: with a valid calibration a thing counts fully up to one and not at all from the other on.
+
+    20 m are half a minute at cruise and more than the advisory's lifetime by a factor of nine; `far_m` 0: everything
+    counts, as in the paper.
+    """
+
+    non_water: NonNegative = 0.55  # J4
+    obstacle: NonNegative = 0.65  # J4
+    urgency: NonNegative = 0.20  # J4
+    uncertainty: NonNegative = 0.15  # J4
+    near_m: NonNegative = 10.0
+    far_m: NonNegative = 20.0
+
+    def __post_init__(self) -> None:
+        """What is far is farther than what is near."""
+        if self.far_m and self.far_m <= self.near_m:
+            raise ValueError("far_m: must be larger than near_m, or 0")
+
+
+class PolicyConfig(Section, frozen=True):
+    center_block_risk: Fraction = 0.48  # J5
+    side_block_risk: Fraction = 0.58  # J5
+    planned_side_block_risk: Fraction = 0.75  # J5 where the metric planner acts: hulls along a side leave a way between
+    occupancy_bottom: Fraction = 0.65  # J6
+    occupancy_coverage: Fraction = 0.25  # J6
+    planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
+    occupancy_frames: Size = 2  # J6
+    dry: Fraction = 0.95  # a lane of which more is no water is barred, as water alone is a risk of 0.7 at most
+    center_vessel_area: Fraction = 0.04  # J7
+    core_left: Fraction = 0.405  # J9
+    core_right: Fraction = 0.595  # J9
+    tie: Fraction = 0.02
+    side_change_margin: Fraction = 0.15  # measured: 95 % of what the sides' difference changes by between frames
+    release_margin: Fraction = 0.08  # measured: 90 % of what the centre's risk changes by between frames
+    clear_frames: Size = 2  # J10
+    look_frames: FrameCount = 40  # 8 s at 5 Hz with no way free; then the boat turns where it is. 0: never (J5)
+
+
+class TuningConfig(Section, frozen=True):
+    """When tried parameters may take effect: after 10 s of frames at the nominal rate, within the hour, at once."""
+
+    min_frames: Size = 50
+    max_proposal_age_s: Positive = 3600.0
+    max_request_age_s: Positive = 5.0  # a request that lay longer is refused, not obeyed late
+
+
+class AdvisorConfig(Section, frozen=True):
+    rate_hz: Positive = 5.0  # J17
+    evidence_max_age_s: Positive = 0.6  # J16 has 0.8: a silent camera stops the boat within a frame and 0.5 s
+    lifetime_s: Positive = 3.5  # J16
+    max_future_s: NonNegative = 0.1
+    counterfactual_size: RemovalSize = 3  # sets of up to so many pieces of evidence are sought; 0: none
+    tracker: TrackerConfig = TrackerConfig()
+    motion: MotionConfig = MotionConfig()
+    risk: RiskConfig = RiskConfig()
+    policy: PolicyConfig = PolicyConfig()
+    tuning: TuningConfig = TuningConfig()

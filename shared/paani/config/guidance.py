@@ -1,0 +1,91 @@
+"""Localization, navigator and controller settings. Ids in comments are checklist ids."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from paani.config.planner import PlannerConfig
+from paani.config.section import Fraction, NonNegative, Positive, Section
+
+Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+
+
+class LocalizationConfig(Section, frozen=True):
+    """`origin_lat_lon_deg` is where the map's (0, 0) lies; unset: the first fix."""
+
+    rate_hz: Positive = 20.0  # L1, L3
+    origin_lat_lon_deg: tuple[Latitude, Longitude] | None = None
+    gate_mahalanobis2: Positive = 25.0
+    gps_wander_s: Positive = 60.0  # over which a receiver's error forgets itself; `SensorsConfig.gps_bias_time_s`
+    calibration_s: NonNegative = 1.0
+    max_gps_age_s: Positive = 3.0
+    max_imu_age_s: Positive = 0.3
+    max_position_std_m: Positive = 8.0
+    max_yaw_std_rad: Positive = 0.35
+    stopped_speed_mps: NonNegative = 0.05  # L5
+    stopped_after_s: Positive = 2.0  # L5
+
+
+class NavigatorConfig(Section, frozen=True):
+    """`route`, `mission` and `fence` are paths of files (formats: navigator/README.md).
+
+    Neither route nor mission: no motion. Without a mission the route alone is followed; without a fence there is none.
+    """
+
+    route: str = ""
+    mission: str = ""
+    fence: str = ""
+    rate_hz: Positive = 10.0
+    acceptance_m: Positive = 1.5
+    pass_abeam_m: NonNegative = 6.0  # a waypoint left behind within this distance counts; 0: never
+    lookahead_m: NonNegative = 4.0  # line of sight along the leg; 0: plain waypoint bearing (M4)
+    # Gain of the integral against wind and current, sigma of Borhaug, Pavlov and Pettersen, CDC 2008; 0: none.
+    # The line is damped with half the root of cruise over gain: 0.77.
+    crab_gain_mps: NonNegative = 0.25
+    max_crab_deg: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] = 40.0  # holds against a drift of 0.64 of the speed
+    station_speed_frac: Fraction = 0.5  # of cruise, back to a station the boat drifted off
+    station_inner_frac: Fraction = 0.5  # of the station's radius: once adrift, driven back this far in
+    fence_margin_m: NonNegative = 1.5  # kept to the fence beside the way to stop; GPS bias is 0.8 m per axis
+    fence_stop_s: Positive = 5.0  # way to stop over speed; measured: 3.6 s for otter from 0.6 m/s, adrift in wind
+    fence_return: bool = False  # outside the fence, obey orders that lead straight back in
+    cruise_mps: Positive = 0.6
+    turn_speed_frac: Fraction = 0.5  # M7
+    turn_deg: Positive = 25.0  # M5
+    slight_turn_deg: Positive = 10.0  # M6
+    latch_turns: bool = True
+    turn_hold_s: NonNegative = 1.5  # on a latched heading before the next turn is added
+    max_total_turn_deg: Positive = 90.0
+    clear_m: NonNegative = 6.0  # past the last sight of something beside the bow; 0: turn back at once
+    advisory_max_age_s: Positive = 3.5  # M10
+    advisory_max_receipt_s: Positive = 0.6  # M10
+    odometry_max_age_s: Positive = 0.4
+    clock_max_age_s: Positive = 0.4
+    arming_max_age_s: Positive = 1.0
+    max_future_s: NonNegative = 0.1
+    planner: PlannerConfig = PlannerConfig()
+
+
+class ControllerConfig(Section, frozen=True):
+    """From order to thrust. `astern`: the most that a fan pushes astern, to brake and to turn on the spot; 0: never."""
+
+    rate_hz: Positive = 10.0  # N1
+    max_speed_mps: Positive = 0.9
+    speed_kp: NonNegative = 0.15
+    speed_ki: NonNegative = 0.05
+    speed_feed_forward: NonNegative = 0.0  # N3; used when `drag_feed_forward` is off
+    drag_feed_forward: bool = True
+    drag_linear: NonNegative = 4.0  # K5
+    drag_quadratic: NonNegative = 20.0  # K5
+    force_per_unit_n: Positive = 75.0  # O1
+    heading_kp: NonNegative = 0.20
+    heading_kd: NonNegative = 0.14
+    max_forward: Fraction = 0.15
+    max_steer: Fraction = 0.10
+    astern: Fraction = 0.10  # `max_steer`, so that a turn on the spot is a pure couple
+    max_integral: Fraction = 0.03
+    slew_per_s: Positive = 0.5
+    command_max_receipt_s: Positive = 0.35
+    odometry_max_age_s: Positive = 0.4

@@ -1,0 +1,1 @@
+"""Order statistics, dithering of decisions, and tables of measured figures."""

@@ -1,0 +1,1 @@
+"""Tables that compare the simulator and the estimators with the literature and with truth."""

@@ -1,0 +1,129 @@
+"""Flat water with bars across it, as the calibrated camera of the simulator would report it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paani import messages as m
+from paani.config import calibration_of, load_config
+from paani_services.navigator.avoidance.rollout import Ways
+from paani_services.navigator.mapping.observation import Memory, remember
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.occupancy_grid import Grid
+from paani_sim.eye.camera import BoatPose, look_from, project
+from paani_sim.eye.mounted import camera_of
+
+CONFIG = load_config()
+CAMERA = Camera(calibration_of(CONFIG.eye))
+PLANNER = CONFIG.navigator.planner
+EYE = camera_of(CONFIG.eye)
+ROWS, COLUMNS = 64, 80
+START_US = 5_000_000
+Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
+FAR_M = 500.0
+AT_REST, NOTHING = BoatPose(0.0, 0.0, 0.0), Memory()
+ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
+
+
+def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
+    """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
+    position, turn = look_from(boat, EYE)
+    right = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * EYE.width_px
+    up = (0.5 - (np.arange(ROWS) + 0.5) / ROWS) * EYE.height_px
+    pixels = np.stack(np.broadcast_arrays(right[None, :], up[:, None], -EYE.focal_px))
+    east, north, fall = np.einsum("ij,jrc->irc", turn * np.array([1.0, 1.0, -1.0])[:, None], pixels)
+    below = np.maximum(fall, 1e-9)
+    x_m, y_m = position[0] + position[2] / below * east, position[1] + position[2] / below * north
+    ends = (fall <= 0.0) | (np.hypot(x_m - position[0], y_m - position[1]) > bank_m)
+    for west, south, east_m, north_m in bars:
+        ends |= (x_m >= west) & (x_m <= east_m) & (y_m >= south) & (y_m <= north_m)
+    lowest = ROWS - ends[::-1].argmax(axis=0)
+    return tuple(np.where(ends.any(axis=0), lowest / ROWS, 0.0).tolist())
+
+
+def box_over(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_m: float = 0.0) -> m.Detection:
+    """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
+    west, south, east, north = bar
+    corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
+    across, down = project(corners, AT_REST, EYE).T / np.array([[EYE.width_px], [EYE.height_px]])
+    box = (float(across.min()), float(down.min()), float(across.max()), float(down.max()))
+    return m.Detection(label=label, confidence=0.9, box_xyxy=box)
+
+
+def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Evidence:
+    """Usable evidence of a frame taken then."""
+    given: dict[str, object] = {
+        "source_us": at_us,
+        "frame_seq": at_us // 1000,
+        "frame_epoch": 1,
+        "width_px": 320,
+        "height_px": 240,
+        "usable": True,
+        "navigation_eligible": True,
+        "segmentation": m.SegmentationSource.LEARNED,
+        "water_edge": edge,
+    }
+    return m.Evidence(**(given | changes))  # type: ignore[arg-type]
+
+
+def odometry(at_us: int, boat: BoatPose, surge_mps: float = 0.0, **changes: object) -> m.Odometry:
+    """Healthy odometry of a boat that lies so."""
+    given: dict[str, object] = {
+        "source_us": at_us,
+        "epoch": 1,
+        "x_m": boat.x_m,
+        "y_m": boat.y_m,
+        "yaw_rad": boat.yaw_rad,
+        "roll_rad": boat.roll_rad,
+        "pitch_rad": boat.pitch_rad,
+        "surge_mps": surge_mps,
+        "healthy": True,
+    }
+    return m.Odometry(**(given | changes))  # type: ignore[arg-type]
+
+
+def seen(
+    boat: BoatPose = AT_REST,
+    edge: tuple[float, ...] | None = None,
+    at_us: int = START_US,
+    memory: Memory = NOTHING,
+    **changes: object,
+) -> Memory:
+    """The memory after one more picture from there; open water by default."""
+    shown = edge if edge is not None else edge_of(boat)
+    memory = gone(memory, at_us, boat)
+    return remember(memory, None, evidence(at_us, shown, **changes), PLANNER)
+
+
+def looked_away(seconds: float, thing: m.Detection, edge: tuple[float, ...] | None = None) -> tuple[Memory, int]:
+    """The memory of a boat that saw this ahead three times, and has looked astern since; and when that is."""
+    memory, at_us = NOTHING, START_US
+    for _ in range(3):
+        memory, at_us = seen(edge=edge, at_us=at_us, memory=memory, detections=(thing,)), at_us + 800_000
+    for _ in range(round(seconds / 0.8)):
+        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
+    return memory, at_us - 800_000
+
+
+def gone(memory: Memory, at_us: int, boat: BoatPose) -> Memory:
+    """The memory of a boat that has gone on to there, as its odometry tells ten times a second."""
+    while memory.here is not None and memory.here.at_us < at_us:
+        here = memory.here
+        step_us = min(at_us - here.at_us, 100_000)
+        part = step_us / (at_us - here.at_us)
+        way_m = (boat.x_m - here.x_m, boat.y_m - here.y_m)
+        cos, sin = np.cos(boat.yaw_rad), np.sin(boat.yaw_rad)
+        speed = part * 1e6 / step_us
+        surge, sway = speed * (cos * way_m[0] + sin * way_m[1]), speed * (cos * way_m[1] - sin * way_m[0])
+        memory = remember(
+            memory, odometry(here.at_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
+        )
+    return memory if memory.here is not None else remember(memory, odometry(at_us, boat), None, PLANNER)
+
+
+def standing_gaps_m(grid: Grid, ways: Ways) -> np.ndarray:
+    """From each place of one way to the middle of the nearest occupied cell [times]."""
+    rows, columns = np.nonzero(grid.occupied)
+    x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
+    gaps_m: np.ndarray = np.hypot(ways.x_m - x_m, ways.y_m - y_m).min(axis=1, initial=np.inf)
+    return gaps_m

@@ -1,0 +1,133 @@
+"""Mask codes, box text, splits by sequence (checklist R8, R10)."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from paani.errors import UserError
+from paani_models.commands.models import data_folder, main
+from paani_models.datasets.selection import Pictures
+from paani_models.datasets.sources import (
+    ANNOTATIONS,
+    DETECTOR_CLASSES,
+    SOURCES,
+    WITHOUT_WATER,
+    Source,
+    choose,
+    class_mask,
+    is_held_out,
+    read_boxes,
+    read_samples,
+    without_water,
+)
+
+
+def write_source(folder: Path, files: dict[str, str]) -> None:
+    folder.mkdir(parents=True)
+    items = ",".join(f'{{"file":"images/{name}.jpg","seq":"{seq}"}}' for name, seq in files.items())
+    (folder / "manifest.json").write_text(f'{{"items":[{items}]}}')
+
+
+def test_mask_codes_r10() -> None:
+    assert class_mask(np.array([0, 1, 2, 3, 4, 255], np.uint8)).tolist() == [1, 0, 2, 255, 255, 255]
+
+
+def test_boxes_are_corners_clipped_to_the_picture(tmp_path: Path) -> None:
+    label = tmp_path / "a.txt"
+    label.write_text("1 0.5 0.5 0.2 0.4\n3 0.05 0.5 0.2 0.2 0.77\n\n")
+    np.testing.assert_allclose(read_boxes(label), [[1, 0.4, 0.3, 0.6, 0.7], [3, 0, 0.4, 0.15, 0.6]], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "text", ["4 .5 .5 .1 .1", "1 .5 .5 0 .1", "1 .5 .5 .1", "1 .5 x .1 .1", "1 1.5 .5 .1 .1", "1 nan .5 .1 .1"]
+)
+def test_bad_boxes_are_refused_with_their_line_r8(tmp_path: Path, text: str) -> None:
+    label = tmp_path / "a.txt"
+    label.write_text(f"1 .5 .5 .1 .1\n{text}\n")
+    with pytest.raises(UserError, match=r"a\.txt:2"):
+        read_boxes(label)
+
+
+def test_whole_sequences_are_held_out(tmp_path: Path) -> None:
+    write_source(tmp_path / "river", {f"f{i}": f"seq{i % 3}" for i in range(9)})
+    source = Source("river", "river", masks="masks", held_out=("seq1",))
+    samples = read_samples(tmp_path, [source])
+    assert {s.sequence for s in samples if s.held_out} == {"seq1"}
+    assert {s.sequence for s in samples if not s.held_out} == {"seq0", "seq2"}
+
+
+def test_a_source_without_sequences_is_cut_into_runs(tmp_path: Path) -> None:
+    write_source(tmp_path / "river", {f"f{i}": "" for i in range(50)})
+    samples = read_samples(tmp_path, [Source("river", "river", masks="masks", held_out=("run1",))])
+    assert [s.picture.stem for s in samples if s.held_out] == [f"f{i}" for i in range(24, 48)]
+
+
+def test_a_repeated_file_is_read_once(tmp_path: Path) -> None:
+    (tmp_path / "buoys").mkdir()
+    (tmp_path / "buoys" / "manifest.json").write_text('{"items":[{"file":"images/a.jpg"},{"file":"images/a.jpg"}]}')
+    assert len(read_samples(tmp_path, [Source("buoys", "buoys", masks="masks")])) == 1
+
+
+def test_about_one_sequence_in_eight_is_held_out_by_name() -> None:
+    share = np.mean([is_held_out(Source("x", "x"), f"cluster{i}") for i in range(2000)])
+    assert 0.10 < share < 0.15
+
+
+def test_unknown_source_and_missing_manifest_are_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="'nowhere'"):
+        choose(["nowhere"])
+    with pytest.raises(UserError, match=r"tbiseg_dasha.manifest\.json"):
+        read_samples(tmp_path, choose(["tbiseg_dasha"]))
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_no_picture_is_on_both_sides_r8() -> None:
+    samples = read_samples(data_folder(), SOURCES)
+    for kind in ("mask", "label"):
+        sides = [{s.picture for s in samples if getattr(s, kind) and s.held_out == side} for side in (True, False)]
+        assert sides[0]
+        assert not sides[0] & sides[1]
+
+
+def test_pictures_without_water_are_listed_once_in_order() -> None:
+    listed = WITHOUT_WATER.read_text().splitlines()
+    assert listed == sorted(set(listed))
+    assert without_water() == set(listed)
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_pictures_without_water_exist_and_those_held_out_are_no_clean_pictures(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert all((data_folder() / name).is_file() for name in without_water())
+    assert main(["held-out", "--without-water"]) == 0
+    dry = set(capsys.readouterr().out.split())
+    assert main(["held-out"]) == 0
+    others = set(capsys.readouterr().out.split())
+    assert dry <= without_water()
+    assert not others & without_water()
+    trained = {s.picture for s in Pictures(data_folder(), [], None).never_held_out()}
+    assert len(dry) >= 15
+    assert not {data_folder() / name for name in dry} & trained
+    assert len([s for s in read_samples(data_folder(), SOURCES) if s.without_water and s.picture in trained]) >= 45
+
+
+def test_every_drawn_box_is_a_pier_inside_its_picture() -> None:
+    drawn = sorted(ANNOTATIONS.glob("*/*.txt"))
+    assert len(drawn) > 100
+    for path in drawn:
+        assert (read_boxes(path)[:, 0] == DETECTOR_CLASSES.index("pier")).all(), path
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
+def test_drawn_boxes_belong_to_pictures_and_a_held_out_place_is_not_trained_on() -> None:
+    pictures = Pictures(data_folder(), [], None)
+    labels = {s.label for s in pictures.samples if s.source.drawn}
+    assert labels == set(ANNOTATIONS.glob("*/*.txt"))
+    held_out = {s.picture for s in pictures.boxed(held_out=True) if s.source.drawn}
+    assert 8 <= len(held_out) <= 20
+    assert not held_out & {s.picture for s in pictures.boxed(held_out=False)}

@@ -1,0 +1,268 @@
+"""The YOLO11n-shaped detector: size, contract, loss and recipe (checklist C1, C2, C4, C12, C13, S2 - S5, T1, T2)."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
+onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
+
+from paani import messages as m  # noqa: E402
+from paani.clock import stopwatch_ms  # noqa: E402
+from paani.config import DetectorConfig, PerceptionConfig  # noqa: E402
+from paani.errors import UserError  # noqa: E402
+from paani_models.catalogue import load_catalogue  # noqa: E402
+from paani_models.detector import train as train_detector  # noqa: E402
+from paani_models.detector.data import BoxedPicture  # noqa: E402
+from paani_models.detector.paper_data import Augmentation, jitter_hsv, paper_example  # noqa: E402
+from paani_models.detector.paper_loss import assign, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
+from paani_models.detector.paper_shape import FUSED_PARAMETERS, Head, Yolo11n, fused  # noqa: E402
+from paani_models.detector.shipped_shape import candidate_grid  # noqa: E402
+from paani_models.detector.train_paper_shape import Recipe, Yolo11nTraining  # noqa: E402
+from paani_models.recipes.onnx_export import CONTRACTS, export_untrained, largest_difference, write_onnx  # noqa: E402
+from paani_models.training.loop import load_checkpoint  # noqa: E402
+from paani_services.perception.box_decoding import decode  # noqa: E402
+from paani_services.perception.engine import OnnxEngine  # noqa: E402
+from paani_services.perception.pipeline import Perceiver  # noqa: E402
+from paani_services.perception.preprocess import Letterbox  # noqa: E402
+from tests.pictures import river  # noqa: E402
+
+pytestmark = pytest.mark.train
+
+COLOURS = ((220, 40, 40), (40, 220, 40), (230, 230, 40), (240, 240, 240))
+
+
+def picture(kind: int, seed: int, width: int = 160, height: int = 128) -> BoxedPicture:
+    """A plain scene with one coloured block, its class told by the colour."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.integers(5, width // 2), rng.integers(5, height // 2)
+    w, h = rng.integers(30, 60), rng.integers(25, 50)
+    rgb = np.full((height, width, 3), (60, 90, 110), np.uint8)
+    rgb[y : y + h, x : x + w] = COLOURS[kind]
+    box = np.array([[kind, x / width, y / height, (x + w) / width, (y + h) / height]], np.float32)
+    return BoxedPicture("rendered", rgb, box, np.ones(4, np.uint8))
+
+
+def with_statistics() -> Yolo11n:
+    """A net whose normalisations have seen something, so that folding them changes the weights."""
+    torch.manual_seed(1)
+    net = Yolo11n()
+    net.train()
+    with torch.no_grad():
+        net(torch.rand(2, 3, 64, 64))
+    net.eval()
+    return net
+
+
+def test_fused_parameters_c12() -> None:
+    net = with_statistics()
+    folded = fused(net)
+    assert sum(p.numel() for p in folded.parameters()) == 2_582_932 == FUSED_PARAMETERS
+    x = torch.rand(1, 3, 256, 320)
+    with torch.no_grad():
+        assert float((net(x) - folded(x)).abs().max()) < 1e-3
+
+
+def test_output_c1_c2_c4() -> None:
+    with torch.no_grad():
+        out = with_statistics()(torch.rand(1, 3, 256, 320))
+    assert tuple(out.shape) == (1, 8, 1680)
+    assert ((out[:, 4:] >= 0) & (out[:, 4:] <= 1)).all()
+    assert (out[:, 2:4] > 0).all()
+    assert CONTRACTS["yolo11n"].classes == ("person", "vessel", "pier", "buoy")
+    assert CONTRACTS["yolo11n"].preprocessing.resize == "letterbox"
+
+
+def test_candidates_lie_on_their_cells_in_input_pixels_c4() -> None:
+    """With even distributions every side is 7.5 strides from the centre of the cell."""
+    net = Yolo11n().eval()
+    for head in net.heads:
+        assert isinstance(head, Head)
+        torch.nn.init.zeros_(head.box[-1].weight)
+    with torch.no_grad():
+        boxes = net(torch.zeros(1, 3, 256, 320))[0, :4].T.numpy()
+    centres, strides = (t.numpy() for t in candidate_grid(256, 320))
+    np.testing.assert_allclose(boxes[:, :2], centres, atol=1e-3)
+    np.testing.assert_allclose(boxes[:, 2:], 15 * strides[:, None].repeat(2, 1), rtol=1e-5)
+
+
+def test_export_is_opset_17_of_the_papers_size_and_equals_the_net_t1_t2_c13(tmp_path: Path) -> None:
+    net = with_statistics()
+    write_onnx(net, CONTRACTS["yolo11n"], tmp_path / "net.onnx")
+    assert (tmp_path / "net.onnx").stat().st_size == pytest.approx(10_472_507, rel=0.015)
+    graph = onnx.load(str(tmp_path / "net.onnx"))
+    assert [o.version for o in graph.opset_import if not o.domain] == [17]
+    assert [d.dim_value for d in graph.graph.output[0].type.tensor_type.shape.dim] == [1, 8, 1680]
+    inputs = [np.random.default_rng(0).random((1, 3, 256, 320), dtype=np.float32)]
+    assert largest_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+
+
+def test_complete_iou_by_hand() -> None:
+    a = torch.tensor([[0.0, 0.0, 10.0, 10.0]])
+    assert float(complete_iou(a, a)) == pytest.approx(1.0, abs=1e-6)
+    beside = torch.tensor([[10.0, 0.0, 20.0, 10.0]])  # no overlap; centres 10 apart; hull 20 x 10
+    assert float(complete_iou(a, beside)) == pytest.approx(-100 / 500, abs=1e-6)
+    longer = torch.tensor([[0.0, 0.0, 20.0, 5.0]])
+    assert float(complete_iou(a, longer)) < float(complete_iou(a, torch.tensor([[0.0, 0.0, 10.0, 5.0]])))
+
+
+def test_bins_loss_is_least_where_the_mean_is_the_distance() -> None:
+    distance = torch.full((1, 4), 3.25)
+    right = torch.full((1, 4, 16), -30.0)
+    right[..., 3], right[..., 4] = float(np.log(0.75)), float(np.log(0.25))
+    entropy = -(0.75 * np.log(0.75) + 0.25 * np.log(0.25))
+    assert float(bins_loss(right, distance)) == pytest.approx(entropy, abs=1e-4)
+    assert float(bins_loss(torch.zeros(1, 4, 16), distance)) == pytest.approx(np.log(16), abs=1e-4)
+
+
+def test_assignment_takes_the_aligned_candidates_inside_the_object() -> None:
+    centres, _ = candidate_grid(64, 64)
+    truth = torch.tensor([[1.0, 8.0, 8.0, 40.0, 40.0], [0.0, 50.0, 50.0, 53.0, 53.0]])
+    boxes = truth[:1, 1:].repeat(len(centres), 1)
+    scores = torch.full((len(centres), 4), 0.1)
+    owner, wanted = assign(boxes, scores, truth, centres)
+    mine = centres[owner == 0]
+    assert len(mine) == 10
+    assert ((mine > 8) & (mine < 40)).all()
+    assert float(wanted.max()) == pytest.approx(1.0, abs=1e-3)
+    assert (owner == 1).any(), "an object between the centres still has a candidate"
+    assert (wanted[owner == -1] == 0).all()
+
+
+def test_only_judged_classes_are_punished_on_background() -> None:
+    net = Yolo11n().train()
+    boxes, bins, logits = net.raw(torch.rand(2, 3, 64, 64))
+    nothing = [torch.zeros(0, 5), torch.zeros(0, 5)]
+    judged = torch.zeros(2, 4, 8, 8, dtype=torch.bool)
+    silent = task_aligned_loss(boxes, bins, logits, nothing, judged, (64, 64))
+    assert [float(part.detach()) for part in silent] == [0.0, 0.0, 0.0]
+    judged[:, 2] = True
+    logits.retain_grad()
+    torch.autograd.backward(sum(task_aligned_loss(boxes, bins, logits, nothing, judged, (64, 64))))
+    assert (logits.grad[..., 2] > 0).all()
+    assert not logits.grad[..., [0, 1, 3]].any()
+
+
+def test_the_recipe_is_the_papers_s2_s3_s4_s5() -> None:
+    recipe = Recipe()
+    assert (recipe.epochs, recipe.batch, recipe.workers, recipe.side_px) == (60, 32, 4, 320)
+    assert (recipe.peak_rate, recipe.weight_decay, recipe.warmup_epochs) == (0.001, 0.0005, 3.0)
+    assert (recipe.momentum, recipe.warmup_momentum, recipe.warmup_bias_rate) == (0.937, 0.8, 0.1)
+    assert (recipe.nominal_batch, recipe.plain_epochs, recipe.patience, recipe.seed) == (64, 10, 12, 42)
+    augmentation = recipe.augmentation
+    assert (augmentation.hue, augmentation.saturation, augmentation.value) == (0.015, 0.5, 0.3)
+    assert (augmentation.translate_frac, augmentation.scale, augmentation.flip_frac) == (0.1, 0.3, 0.5)
+    assert (augmentation.mosaic_frac, augmentation.auto_augment, augmentation.erasing) == (1.0, "randaugment", 0.4)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_boxes_stay_on_their_blocks_through_the_augmentation_s5(count: int) -> None:
+    """The median colour inside each box is the block's, whatever was shifted, flipped, scaled or put together."""
+    plain = replace(Augmentation(), hue=0.0, saturation=0.0, value=0.0)
+    seen = 0
+    for seed in range(12):
+        items = [picture(kind, 10 * seed + kind) for kind in range(count)]
+        example = paper_example(np.random.default_rng(seed), items, (320, 320), plain)
+        assert example.picture.shape == (320, 320, 3)
+        assert example.judged.shape == (4, 40, 40)
+        for kind, x1, y1, x2, y2 in example.boxes.round().astype(int):
+            inside = np.median(example.picture[y1:y2, x1:x2].reshape(-1, 3), 0)
+            assert np.abs(inside - COLOURS[kind]).max() <= 6
+            seen += 1
+    assert seen >= 8
+
+
+def test_jitter_stays_within_its_gains_and_is_seeded_s5() -> None:
+    rgb = picture(0, 0).picture
+    one, same, other = (jitter_hsv(np.random.default_rng(seed), rgb, Augmentation()) for seed in (3, 3, 4))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
+    assert one.max() <= rgb.max() * 1.3 + 1
+
+
+def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
+    """Four pictures, learnt by heart. The normalisations follow quickly, as a long training would let them."""
+    torch.manual_seed(0)
+    items = [picture(kind, kind) for kind in range(4)]
+    recipe = Recipe(
+        epochs=epochs,
+        batch=4,
+        workers=1,
+        side_px=160,
+        peak_rate=2e-3,
+        warmup_epochs=1.0,
+        nominal_batch=4,
+        plain_epochs=epochs,
+        patience=100,
+        augmentation=Augmentation(scale=0.1, translate_frac=0.05),
+    )
+    net = Yolo11n()
+    for module in net.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.momentum = 0.3
+    run = Yolo11nTraining(net, recipe, folder, items * 4, items)
+    run.progress.average.decay = 0.8
+    return run
+
+
+def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    small_run(tmp_path, 12).run()
+    rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
+    totals = [sum(row[part] for part in ("box_loss", "score_loss", "bins_loss")) for row in rows]
+    assert totals[-1] < 0.5 * totals[0]
+    assert {"person", "vessel", "pier", "buoy", "score", "epoch"} <= rows[-1].keys()
+    assert rows[-1]["score"] > 0.5
+
+
+def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    small_run(tmp_path / "whole", 2).run()
+    small_run(tmp_path / "broken", 2).run(until=1)
+    torch.manual_seed(999)
+    small_run(tmp_path / "broken", 2).run()
+    one, other = (load_checkpoint(tmp_path / name / "last.pt")["average"] for name in ("whole", "broken"))
+    assert all(torch.equal(one[key], other[key]) for key in one)
+    with pytest.raises(UserError, match=r"last\.pt: was made with another recipe"):
+        small_run(tmp_path / "broken", 3).run()
+
+
+def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    run = small_run(tmp_path, 5)
+    run.recipe = replace(run.recipe, peak_rate=0.0, warmup_bias_rate=0.0, patience=1)
+    run.run()
+    assert run.progress.epoch == 2
+
+
+def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:
+    """Any file of the contract, with the manifest that export writes beside it."""
+    export_untrained("yolo11n", tmp_path)
+    model = load_catalogue(tmp_path)["yolo11n"]
+    assert model.parameters == FUSED_PARAMETERS
+    own = Perceiver(PerceptionConfig(detector=str(tmp_path / "yolo11n.onnx")), stopwatch_ms)
+    header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
+    evidence, _ = own.perceive(river(), header, 0.0)
+    assert evidence.usable
+    assert f"detector {model.sha256[:12]}" in evidence.models
+    graph = onnx.load(str(tmp_path / "yolo11n.onnx"))
+    graph.opset_import[0].version = 99
+    onnx.save(graph, str(tmp_path / "newer.onnx"))
+    with pytest.raises(UserError, match=r"newer\.onnx: not an ONNX model that can run here"):
+        OnnxEngine.load("detector", str(tmp_path / "newer.onnx"), 1)
+
+
+def test_rows_beyond_the_classes_are_no_boxes_c11() -> None:
+    """An export with mask coefficients is read for its boxes; the manifest leaves the other rows out. Ours has none."""
+    rows = np.zeros((1, 4 + 4 + 32, 3), np.float32)
+    rows[0, :6, 0] = (160, 128, 40, 30, 0.1, 0.9)
+    rows[0, 8:] = 7.0
+    classes = (*CONTRACTS["yolo11n"].classes, *["-"] * 32)
+    found = decode(rows, Letterbox(1.0, 1.0, 0, 0, 320, 256), DetectorConfig(), classes)
+    (only,) = found
+    assert only.label is m.Label.VESSEL
+    assert only.confidence == pytest.approx(0.9)
+    assert CONTRACTS["yolo11n"].output.shape[1] == 4 + len(CONTRACTS["yolo11n"].classes)

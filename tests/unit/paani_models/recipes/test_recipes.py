@@ -1,0 +1,201 @@
+"""Training machinery: schedule, order, averages, checkpoints, and a resumed run that equals an unbroken one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
+
+from paani.errors import UserError  # noqa: E402
+from paani_models.commands.models import main  # noqa: E402
+from paani_models.detector import train as train_detector  # noqa: E402
+from paani_models.detector.data import BoxedPicture  # noqa: E402
+from paani_models.detector.shipped_shape import Detector  # noqa: E402
+from paani_models.recipes.onnx_export import CONTRACTS, largest_difference, network, write_onnx  # noqa: E402
+from paani_models.recipes.recipes import parse_stages  # noqa: E402
+from paani_models.segmenter import train as train_segmenter  # noqa: E402
+from paani_models.segmenter.paper_shape import Segmenter  # noqa: E402
+from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
+from paani_models.training.loop import (  # noqa: E402
+    AveragedWeights,
+    Prefetch,
+    Progress,
+    Stage,
+    learning_rate,
+    load_checkpoint,
+    stage_of,
+)
+
+pytestmark = pytest.mark.train
+
+SMALL = train_segmenter.Recipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
+
+
+@pytest.fixture
+def river(monkeypatch: pytest.MonkeyPatch) -> list[CachedPicture]:
+    """Six striped pictures: sky above bank above water."""
+    monkeypatch.setitem(train_segmenter.DRAWS, "river", 7)
+    rng = np.random.default_rng(0)
+    pictures = []
+    for _ in range(6):
+        mask = np.zeros((CACHE_WH[1], CACHE_WH[0]), np.uint8)
+        top, bank = sorted(int(y) for y in rng.integers(40, 240, 2))
+        mask[:top], mask[top:bank] = 2, 1
+        colour = np.array([[30, 60, 90], [40, 90, 30], [200, 210, 230]], np.uint8)[mask]
+        pictures.append(CachedPicture("river", colour, mask))
+    return pictures
+
+
+def segmenter_run(folder: Path, pictures: list[CachedPicture]) -> SegmenterTraining:
+    torch.manual_seed(SMALL.seed)
+    return SegmenterTraining(Segmenter(), SMALL, folder, pictures, pictures[:2])
+
+
+@pytest.mark.train
+def test_a_resumed_run_equals_an_unbroken_one_s11(tmp_path: Path, river: list[CachedPicture]) -> None:
+    segmenter_run(tmp_path / "whole", river).run()
+    segmenter_run(tmp_path / "broken", river).run(until=1)
+    torch.manual_seed(999)
+    segmenter_run(tmp_path / "broken", river).run()
+    whole, broken = ((tmp_path / name / "epochs.jsonl").read_text() for name in ("whole", "broken"))
+    assert whole == broken
+    assert len(whole.splitlines()) == 2
+    one, other = (load_checkpoint(tmp_path / name / "last.pt")["average"] for name in ("whole", "broken"))
+    assert all(torch.equal(one[key], other[key]) for key in one)
+
+
+@pytest.mark.train
+def test_records_hold_loss_and_iou_per_class_s10(tmp_path: Path, river: list[CachedPicture]) -> None:
+    segmenter_run(tmp_path, river).run(until=1)
+    record = msgspec.json.decode((tmp_path / "epochs.jsonl").read_bytes())
+    assert {"epoch", "loss", "miou", "water", "obstacle", "sky"} <= set(record)
+    assert record["seed"] == SMALL.seed
+
+
+@pytest.mark.train
+def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPicture]) -> None:
+    segmenter_run(tmp_path, river).run(until=1)
+    other = SegmenterTraining(Segmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
+    with pytest.raises(UserError, match=r"last\.pt: was made with another recipe"):
+        other.run()
+
+
+@pytest.mark.train
+def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train_detector, "NULL_DRAWS", 1)
+    picture = np.full((256, 320, 3), 90, np.uint8)
+    picture[100:150, 100:200] = (200, 30, 30)
+    box = np.array([[1, 100 / 320, 100 / 256, 200 / 320, 150 / 256]], np.float32)
+    item = BoxedPicture("mcoe_boats", picture, box, np.array([0, 1, 0, 1], np.uint8))
+    recipe = train_detector.Recipe(epochs=2, batch=4, warmup_steps=1)
+    torch.manual_seed(0)
+    run = train_detector.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item])
+    run.run()
+    rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
+    assert rows[0]["vessel"]["n"] == 1
+    assert rows[0]["person"]["n"] == 0
+    assert sum(rows[1][k] for k in ("box_loss", "score_loss")) < sum(rows[0][k] for k in ("box_loss", "score_loss"))
+
+
+def test_epoch_order_depends_on_seed_and_epoch_only_and_holds_the_nulls(
+    river: list[CachedPicture],
+) -> None:
+    orders = [train_segmenter.draw_epoch(river, SMALL, epoch) for epoch in (0, 0, 1)]
+    assert orders[0] == orders[1] != orders[2]
+    assert orders[0].count(-1) == round(7 * 0.12 / 0.88)
+
+
+def test_rendered_pictures_are_two_in_ten_of_the_shown_ones(river: list[CachedPicture]) -> None:
+    rendered = [replace(item, source="rendered") for item in river]
+    order = train_segmenter.draw_epoch(river + rendered, SMALL, 0)
+    shown = [i for i in order if i >= 0]
+    assert sum(i >= len(river) for i in shown) == 2
+    assert len(shown) == 9
+
+
+def test_learning_rate_warms_up_and_ends_at_one_hundredth_s3() -> None:
+    rates = [learning_rate(1.0, step, 100, 10) for step in range(101)]
+    assert rates[0] == pytest.approx(0.1)
+    assert max(rates) == rates[10] == pytest.approx(1.0)
+    assert rates[100] == pytest.approx(0.01)
+
+
+def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
+    """50 epochs, batch 16, 320x256; AdamW at 3e-4, decay 1e-4, cosine over all 50 epochs to zero; seed 42."""
+    recipe = train_segmenter.PAPER_RECIPE
+    assert recipe.stages == (Stage(50, 256, 320),)
+    assert (recipe.epochs, recipe.batch, recipe.seed) == (50, 16, 42)
+    assert (recipe.peak_rate, recipe.weight_decay) == (3e-4, 1e-4)
+    rates = [learning_rate(recipe.peak_rate, s, 500, recipe.warmup_steps, recipe.final_frac) for s in (0, 250, 500)]
+    assert rates == pytest.approx([3e-4, 1.5e-4, 0.0], abs=1e-12)
+    progress = Progress(Segmenter(), recipe.peak_rate, recipe.weight_decay)
+    assert isinstance(progress.optimiser, torch.optim.AdamW)
+
+
+def test_stage_of() -> None:
+    stages = (Stage(2, 64, 64), Stage(1, 128, 128))
+    assert [stage_of(stages, epoch).height_px for epoch in range(3)] == [64, 64, 128]
+    with pytest.raises(IndexError):
+        stage_of(stages, 3)
+
+
+@pytest.mark.parametrize("text", ["4x128", "4x128x161", "axbxc", "4x128x160x1"])
+def test_a_malformed_stage_is_one_line(text: str) -> None:
+    with pytest.raises(UserError, match=r"^stage: "):
+        parse_stages((text,))
+
+
+def test_averaged_weights_follow_but_lag() -> None:
+    net = torch.nn.Linear(1, 1)
+    torch.nn.init.zeros_(net.weight)
+    average = AveragedWeights(net, decay=0.9)
+    torch.nn.init.ones_(net.weight)
+    seen = []
+    for _ in range(200):
+        average.update(net)
+        seen.append(float(average.model.state_dict()["weight"]))
+    assert 0.0 < seen[0] < 1.0
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_prefetch_keeps_the_order_and_passes_errors_on() -> None:
+    assert list(Prefetch[int](workers=2, ahead=3)(lambda i: i * i, 10)) == [i * i for i in range(10)]
+    with pytest.raises(ZeroDivisionError):
+        list(Prefetch[float]()(lambda i: 1 / (3 - i), 5))
+
+
+def test_an_unreadable_checkpoint_is_named(tmp_path: Path) -> None:
+    (tmp_path / "last.pt").write_bytes(b"not a checkpoint")
+    with pytest.raises(UserError, match=r"last\.pt: not a readable checkpoint"):
+        load_checkpoint(tmp_path / "last.pt")
+
+
+@pytest.mark.parametrize("name", CONTRACTS)
+def test_export_equals_the_net_on_pictures_t2(tmp_path: Path, name: str) -> None:
+    torch.manual_seed(1)
+    net = network(name)
+    write_onnx(net, CONTRACTS[name], tmp_path / "net.onnx")
+    rng = np.random.default_rng(0)
+    inputs = [rng.random(CONTRACTS[name].input.shape, dtype=np.float32) for _ in range(2)]
+    assert largest_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+
+
+def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> None:
+    write_onnx(Segmenter(), CONTRACTS["paper-segmenter"], tmp_path / "net.onnx")
+    assert (tmp_path / "net.onnx").stat().st_size == pytest.approx(4_344_661, rel=0.015)
+
+
+def test_export_notices_other_weights(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    write_onnx(Segmenter(), CONTRACTS["segmenter"], tmp_path / "net.onnx")
+    inputs = [np.random.default_rng(0).random((1, 3, 256, 320), dtype=np.float32)]
+    assert largest_difference(Segmenter().eval(), tmp_path / "net.onnx", inputs) > 1e-3
+
+
+def test_a_missing_data_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["prepare", "--data", str(tmp_path / "absent")]) == 2
+    assert capsys.readouterr().err == f"paani models: {tmp_path / 'absent'}: no such folder; set PAANI_DATA or --data\n"

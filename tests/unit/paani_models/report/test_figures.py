@@ -1,0 +1,74 @@
+"""The manifest's figures, measured again on part of the held-out pictures (checklist T3, U1 - U4)."""
+
+import pytest
+
+from paani_models.catalogue import Figure, load_catalogue, verified_path
+from paani_models.commands.models import data_folder
+from paani_models.datasets.sources import Sample, choose, read_samples
+from paani_models.report.evaluate import detector_figures, false_alarm_figures, null_figure, segmenter_figures
+
+pytestmark = pytest.mark.slow
+
+needs_data = pytest.mark.skipif(
+    not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA"
+)
+
+
+def recorded(net: str, source: str) -> dict[str, Figure]:
+    return {figure.metric: figure for figure in load_catalogue()[net].figures if figure.source == source}
+
+
+def held_out(*names: str) -> list[Sample]:
+    return [sample for sample in read_samples(data_folder(), choose(names)) if sample.held_out]
+
+
+@pytest.mark.data
+@needs_data
+def test_segmenter_figures_are_reproduced_t3_u3_u4() -> None:
+    measured = {f.metric: f for f in segmenter_figures(verified_path("segmenter"), held_out("mastr1325")) if f.n == 24}
+    expected = recorded("segmenter", "mastr1325")
+    assert set(measured) == {"iou_water", "iou_obstacle", "iou_sky", "miou"} == set(expected)
+    for metric, figure in measured.items():
+        assert figure.value == pytest.approx(expected[metric].value, abs=0.005)
+
+
+@pytest.mark.data
+@needs_data
+def test_detector_figures_are_reproduced_u1_u2() -> None:
+    measured = detector_figures(verified_path("detector"), held_out("tunai_sooke"))
+    expected = recorded("detector", "tunai_sooke")
+    for figure in measured:
+        if figure.source == "tunai_sooke":
+            assert figure.value == pytest.approx(expected[figure.metric].value, abs=0.02)
+            assert figure.n == expected[figure.metric].n > 0
+
+
+@pytest.mark.data
+@needs_data
+def test_water_is_water_on_rivers_never_seen_in_training() -> None:
+    """USVInland, six held-out sequences; Tampere, one."""
+    for name in ("tbiseg_usvinland", "tbiseg_tampere"):
+        measured = {f.metric: f.value for f in segmenter_figures(verified_path("segmenter"), held_out(name))}
+        assert measured["iou_water"] >= 0.93
+
+
+@pytest.mark.data
+@needs_data
+def test_rivers_without_craft_raise_few_alarms() -> None:
+    (figure,) = false_alarm_figures(verified_path("detector"), held_out("tbiseg_usvinland")[::4])
+    assert figure.value <= 0.3
+
+
+def test_nothing_reads_as_water_v15() -> None:
+    figure = null_figure(verified_path("segmenter"))
+    assert figure.value <= 0.05
+    assert figure.n == 200
+
+
+def test_every_model_states_figures_and_origins() -> None:
+    """The gate's figures are of pictures in every source that is held out, the others' of what people drew in them."""
+    for model in load_catalogue().values():
+        assert model.origins
+        assert all(origin.licence for origin in model.origins)
+        assert all(figure.value >= 0 and figure.n > 0 for figure in model.figures)
+        assert {figure.source for figure in model.figures} >= {"tbiseg_usvinland"}

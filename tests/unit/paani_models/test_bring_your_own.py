@@ -1,0 +1,189 @@
+"""A user's own models: what the check says of them, and sizes and class orders that a manifest declares."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from paani import messages as m
+from paani.cli import main
+from paani.clock import stopwatch_ms
+from paani.config import PerceptionConfig
+from paani.errors import UserError
+from paani_models.catalogue import Model, Preprocessing, Tensor, load_catalogue, save_catalogue, verified_path
+from paani_services.perception.engine import OnnxEngine
+from paani_services.perception.pipeline import Perceiver
+from tests.pictures import river
+
+SIZE = (96, 160)
+HEADER = m.PictureHeader(source_us=1_000_000, frame_seq=7, frame_epoch=3, width_px=320, height_px=240)
+
+
+def foreign_segmenter(path: Path, order: tuple[str, ...], bias: float = 0.0) -> None:
+    """A net that calls the lower part of any picture water and the upper part sky, rows in `order`."""
+    height, width = SIZE
+    rows = np.arange(height, dtype=np.float32)[:, None] * np.ones(width, np.float32)
+    scores = {"water": (rows - 45.0) / 4.0, "sky": (40.0 - rows) / 4.0, "obstacle": np.zeros_like(rows) + bias}
+    planes = np.stack([scores[name] for name in order])[None].astype(np.float32)
+    save(path, planes, [1, 3, *SIZE])
+
+
+def save(path: Path, answer: np.ndarray, input_shape: list[Any], kind: int = TensorProto.FLOAT) -> None:
+    """A net whose answer hardly depends on its input."""
+    nodes = [
+        helper.make_node("ReduceMean", ["input"], ["mean"], keepdims=0),
+        helper.make_node("Mul", ["mean", "little"], ["nudge"]),
+        helper.make_node("Add", ["answer", "nudge"], ["output"]),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "foreign",
+        [helper.make_tensor_value_info("input", kind, input_shape)],
+        [helper.make_tensor_value_info("output", TensorProto.FLOAT, list(answer.shape))],
+        [
+            numpy_helper.from_array(answer.astype(np.float32), "answer"),
+            numpy_helper.from_array(np.array(1e-4, np.float32), "little"),
+        ],
+    )
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), str(path))
+
+
+def stated(file: str, classes: tuple[str, ...]) -> Model:
+    return msgspec.structs.replace(
+        load_catalogue()["segmenter"],
+        file=file,
+        classes=classes,
+        input=Tensor("input", (1, 3, *SIZE)),
+        output=Tensor("output", (1, 3, *SIZE)),
+        preprocessing=Preprocessing("stretch", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    )
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """A segmenter of another maker, with the manifest that declares it."""
+    path = tmp_path / "lake.onnx"
+    order = ("sky", "obstacle", "water")
+    foreign_segmenter(path, order)
+    save_catalogue({"lake": stated("lake.onnx", order)}, tmp_path)
+    return path
+
+
+def test_a_foreign_segmenter_is_checked_and_used(foreign: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Another size, another order of classes: declared in the manifest, understood by the check and by perception."""
+    assert main(["models", "check", str(foreign)]) == 0
+    said = capsys.readouterr().out
+    assert "input [1, 3, 96, 160] float32" in said
+    assert "classes sky, obstacle, water" in said
+    assert "warning" in said  # it calls black water, so only the gate stands before motion
+    assert f"--set perception.segmenter={foreign}" in said
+    evidence, mask = Perceiver(PerceptionConfig(segmenter=str(foreign)), stopwatch_ms).perceive(river(), HEADER, 0.0)
+    assert mask is not None
+    assert (mask[-1] == 0).all()
+    assert (mask[0] == 2).all()
+    assert evidence.center.non_water < 0.35
+    assert evidence.navigation_eligible
+
+
+def test_without_a_manifest_the_shipped_contract_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "own.onnx"
+    foreign_segmenter(path, ("water", "obstacle", "sky"))
+    assert main(["models", "check", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert "input is [1, 3, 96, 160], the contract has [1, 3, 256, 320]; a manifest.json beside the file" in said
+    assert "cannot be used as it is" in said
+    with pytest.raises(UserError, match=r"own\.onnx: segmenter must have float32"):
+        OnnxEngine.load("segmenter", str(path), 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"classes": ("water", "land", "sky")}, "classes: 'land' is not one of water, obstacle, sky"),
+        ({"classes": ("water", "water", "sky")}, "classes: a segmenter has water, obstacle, sky, each once"),
+        ({"input": Tensor("input", (3, 96, 160))}, r"input\.shape"),
+        ({"preprocessing": Preprocessing("letterbox", (0.0,) * 3, (1.0,) * 3)}, r"preprocessing\.resize"),
+    ],
+)
+def test_a_manifest_that_cannot_be(foreign: Path, changes: dict[str, Any], named: str) -> None:
+    own = msgspec.structs.replace(stated("lake.onnx", ("sky", "obstacle", "water")), **changes)
+    save_catalogue({"lake": own}, foreign.parent)
+    with pytest.raises(UserError, match=named):
+        OnnxEngine.load("segmenter", str(foreign), 1)
+
+
+def probabilities() -> np.ndarray:
+    return np.full((1, 3, 256, 320), 1 / 3, np.float32)
+
+
+def candidates(scale: float, score: float) -> np.ndarray:
+    boxes = np.random.default_rng(0).uniform(0.1, 1.0, (1, 4, 1680)) * scale
+    return np.concatenate((boxes, np.full((1, 4, 1680), score)), axis=1).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("answer", "named"),
+    [
+        (probabilities(), "sums to one"),
+        (np.full((1, 3, 256, 320), np.nan, np.float32), "not finite on a picture of black"),
+        (candidates(1.0, 0.5), "seem normalised"),
+        (candidates(200.0, 3.0), "are no probabilities"),
+    ],
+)
+def test_outputs_that_are_not_of_the_contract(
+    answer: np.ndarray, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "own.onnx"
+    save(path, answer, [1, 3, 256, 320])
+    assert main(["models", "check", str(path)]) == 1
+    assert named in capsys.readouterr().out
+
+
+def test_dynamic_axes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "own.onnx"
+    save(path, candidates(200.0, 0.5), ["batch", 3, 256, 320])
+    assert main(["models", "check", str(path)]) == 1
+    assert "is not static" in capsys.readouterr().out
+
+
+def test_files_that_are_no_models(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Truncated, empty, foreign and missing files: one line that names the file, exit code 2."""
+    whole = verified_path("segmenter").read_bytes()
+    for name, data in (("cut.onnx", whole[: len(whole) // 2]), ("empty.onnx", b""), ("text.onnx", b"text" * 99)):
+        (tmp_path / name).write_bytes(data)
+        assert main(["models", "check", str(tmp_path / name)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert name in error
+    assert main(["models", "check", str(tmp_path / "none.onnx")]) == 2
+    assert "none.onnx" in capsys.readouterr().err
+
+
+def test_a_detector_with_other_classes(tmp_path: Path) -> None:
+    """Rows in another order, and rows that are left out: labels are those of the manifest."""
+    path = tmp_path / "boats.onnx"
+    boxes = np.zeros((1, 6, 1680), np.float32)
+    boxes[0, :4, 0] = (160.0, 200.0, 80.0, 60.0)
+    boxes[0, 4, 0], boxes[0, 5, 0] = 0.95, 0.8  # the left-out class scores higher
+    save(path, boxes, [1, 3, 256, 320])
+    shipped = load_catalogue()["detector"]
+    own = msgspec.structs.replace(shipped, file="boats.onnx", classes=("-", "vessel"), output=Tensor("o", (1, 6, 1680)))
+    save_catalogue({"boats": own}, tmp_path)
+    evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
+    assert [d.label for d in evidence.detections] == [m.Label.VESSEL]
+    assert evidence.detections[0].confidence == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_copy_of_the_shipped_model_scores_as_shipped(tmp_path: Path) -> None:
+    shutil.copy(verified_path("segmenter"), tmp_path / "copy.onnx")
+    own = Perceiver(PerceptionConfig(segmenter=str(tmp_path / "copy.onnx")), stopwatch_ms)
+    shipped = Perceiver(PerceptionConfig(), stopwatch_ms)
+    one, other = (eyes.perceive(river(), HEADER, 0.0)[0] for eyes in (own, shipped))
+    assert (one.left, one.center, one.right) == (other.left, other.center, other.right)

@@ -1,0 +1,122 @@
+"""The shipped model files: contract, checksum, and what they say to a picture that shows nothing."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from paani.errors import UserError
+from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+from paani_models.commands.models import main
+from paani_models.engines.onnx_runner import open_net
+from paani_models.network_input import detector_input, segmenter_input
+from paani_models.training.augment import null_picture
+
+onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
+
+SHAPES = {
+    "segmenter": ((1, 3, 256, 320), (1, 3, 256, 320)),
+    "detector": ((1, 3, 256, 320), (1, 8, 1680)),
+}
+WATER = 0
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(WEIGHTS, tmp_path / "weights"))
+
+
+def test_both_models_are_shipped_with_their_class_orders_c2_d6() -> None:
+    catalogue = load_catalogue()
+    assert set(catalogue) == {"segmenter", "detector", "gate"}
+    assert catalogue["segmenter"].classes == ("water", "obstacle", "sky")
+    assert catalogue["detector"].classes == ("person", "vessel", "pier", "buoy")
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_files_are_static_float32_opset_17_t1_c1_c4_d5(name: str) -> None:
+    graph = onnx.load(str(verified_path(name)))
+    assert [o.version for o in graph.opset_import if not o.domain] == [17]
+    model = load_catalogue()[name]
+    for value, tensor, shape in zip(
+        (*graph.graph.input, *graph.graph.output),
+        (model.input, model.output),
+        SHAPES[name],
+        strict=True,
+    ):
+        assert value.type.tensor_type.elem_type == onnx.TensorProto.FLOAT
+        assert tuple(d.dim_value for d in value.type.tensor_type.shape.dim) == shape == tensor.shape
+        assert value.name == tensor.name
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_export_stays_within_tolerance_t2(name: str) -> None:
+    assert 0.0 < load_catalogue()[name].export_max_abs_diff <= 1e-3
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_corrupt_file_is_named(copied: Path, name: str) -> None:
+    path = copied / f"{name}.onnx"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(UserError, match=rf"{name}\.onnx: corrupt"):
+        verified_path(name, copied)
+
+
+def test_a_missing_file_is_named(copied: Path) -> None:
+    (copied / "segmenter.onnx").unlink()
+    with pytest.raises(UserError, match=r"segmenter\.onnx: No such file"):
+        verified_path("segmenter", copied)
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"models":[{"name":"x"}]}', '{"models":[],"more":1}'])
+def test_a_malformed_manifest_is_named(copied: Path, text: str) -> None:
+    (copied / "manifest.json").write_text(text)
+    with pytest.raises(UserError, match=r"manifest\.json"):
+        load_catalogue(copied)
+
+
+def test_an_unknown_model_is_named() -> None:
+    with pytest.raises(UserError, match="'radar'"):
+        verified_path("radar")
+
+
+def test_check_command_needs_no_torch(capsys: pytest.CaptureFixture[str], copied: Path) -> None:
+    assert main(["check", "--weights", str(copied)]) == 0
+    assert "1362395 parameters, ok" in capsys.readouterr().out
+    (copied / "detector.onnx").write_bytes(b"not a net")
+    assert main(["check", "--weights", str(copied)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert "detector.onnx" in captured.err
+
+
+def nothing(kind: str) -> np.ndarray:
+    rng = np.random.default_rng(7)
+    flat = {
+        "black": (0, 0, 0),
+        "white": (255, 255, 255),
+        "grey": (128, 128, 128),
+        "brown lens cap": (60, 40, 25),
+    }
+    if kind == "noise":
+        return rng.integers(0, 256, (240, 320, 3)).astype(np.uint8)
+    picture = np.full((240, 320, 3), flat[kind.removeprefix("noisy ")], np.float32)
+    if kind.startswith("noisy "):
+        picture += rng.normal(0, 6, picture.shape)
+    return np.clip(picture, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["black", "noisy black", "white", "grey", "noisy grey", "noise", "brown lens cap"])
+def test_nothing_to_see_is_never_water_v15(kind: str) -> None:
+    """The paper's own failure: a black picture read as open water."""
+    label = open_net(verified_path("segmenter"), threads=1)(segmenter_input(nothing(kind)))[0].argmax(0)
+    assert (label == WATER).mean() < 0.02
+
+
+def test_null_pictures_hold_no_object_above_the_boards_threshold_c6() -> None:
+    run = open_net(verified_path("detector"), threads=1)
+    top = max(run(detector_input(null_picture(np.random.default_rng(s), (320, 256))))[0, 4:].max() for s in range(20))
+    assert top < 0.40

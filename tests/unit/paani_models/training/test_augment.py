@@ -1,0 +1,224 @@
+"""Augmentation is seeded, and picture, mask and boxes move together (checklist S8, S12)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from paani_models.datasets.sources import NO_CRAFT, Source
+from paani_models.detector.data import (
+    BoxedPicture,
+    augmented,
+    close_up,
+    judged_by_mask,
+    place,
+    plain,
+    random_placement,
+)
+from paani_models.network_input import letterbox_affine
+from paani_models.training import augment
+
+SIZE_WH = (320, 256)
+WATER_CLASS, OBSTACLE_CLASS = 0, 1
+
+
+def scene() -> tuple[np.ndarray, np.ndarray]:
+    """A bright square, class 1, on dark ground, class 0."""
+    picture, mask = np.full((288, 384, 3), 30, np.uint8), np.zeros((288, 384), np.uint8)
+    picture[100:180, 150:260] = 220
+    mask[100:180, 150:260] = OBSTACLE_CLASS
+    return picture, mask
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        augment.glare,
+        augment.jitter_colour,
+        augment.degrade,
+        lambda rng, _: augment.null_picture(rng, SIZE_WH),
+    ],
+    ids=["glare", "jitter", "degrade", "null"],
+)
+def test_the_same_seed_gives_the_same_bytes_s12(function: Callable[..., np.ndarray]) -> None:
+    picture = scene()[0]
+    pairs = [
+        (function(np.random.default_rng(s), picture), function(np.random.default_rng(s), picture)) for s in range(9)
+    ]
+    assert all(np.array_equal(a, b) for a, b in pairs)
+    assert len({a.tobytes() for a, _ in pairs}) > 1
+
+
+def test_glare_leaves_its_input_alone_and_brightens_the_dark_s8() -> None:
+    picture = scene()[0]
+    before = picture.copy()
+    lit = [augment.glare(np.random.default_rng(s), picture) for s in range(20)]
+    assert np.array_equal(picture, before)
+    dark = picture[..., 0] == 30
+    assert all((out[dark] >= 30).all() for out in lit)
+    assert sum(bool((out[dark] > 60).any()) for out in lit) >= 15
+
+
+def test_glare_frequencies_s8() -> None:
+    assert (augment.GLARE_FRAC, augment.BLOB_FRAC, augment.GLITTER_FRAC) == (0.35, 0.7, 0.6)
+
+
+def test_mask_follows_the_picture() -> None:
+    picture, mask = scene()
+    for seed in range(20):
+        affine = augment.random_affine(np.random.default_rng(seed), (384, 288), SIZE_WH, tilt_deg=8.0)
+        moved, labels = (
+            augment.warp_picture(picture, affine, SIZE_WH),
+            augment.warp_mask(mask, affine, SIZE_WH),
+        )
+        known = labels != 255
+        agree = (moved[..., 0] > 125) == (labels == OBSTACLE_CLASS)
+        assert agree[known].mean() > 0.98
+
+
+def test_null_pictures_are_all_obstacle_and_of_many_kinds() -> None:
+    pictures = []
+    for seed in range(60):
+        picture, mask = augment.segmenter_null(np.random.default_rng(seed), SIZE_WH)
+        assert (mask == OBSTACLE_CLASS).all()
+        pictures.append(picture)
+    means = [p.mean() for p in pictures]
+    assert min(means) < 15
+    assert max(means) > 235
+
+
+def boxed(judged: tuple[int, ...]) -> BoxedPicture:
+    picture, _ = scene()
+    box = np.array([[1, 150 / 384, 100 / 288, 260 / 384, 180 / 288]], np.float32)
+    return BoxedPicture("test", picture, box, np.array(judged, np.uint8))
+
+
+def test_letterbox_is_centred_c3() -> None:
+    """A 512 x 288 picture fills the width and leaves 38 px bars above and below."""
+    affine = letterbox_affine((512, 288), SIZE_WH)
+    np.testing.assert_allclose(affine, [[0.625, 0, 0], [0, 0.625, 38]])
+
+
+def test_boxes_follow_the_picture() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        example = place(boxed((1, 1, 1, 1)), random_placement(rng, (384, 288), SIZE_WH, (0.6, 1.2)), SIZE_WH)
+        bright = np.argwhere(example.picture[..., 0] > 170)
+        if len(example.boxes) == 0:
+            continue
+        low, high = bright.min(0)[::-1], bright.max(0)[::-1] + 1
+        np.testing.assert_allclose(example.boxes[0, 1:], [*low, *high], atol=2.5)
+
+
+def test_the_border_is_judged_and_the_unannotated_picture_is_not() -> None:
+    example = plain(boxed((0, 1, 0, 1)), SIZE_WH)
+    assert example.judged[1].all()
+    assert example.judged[0, 0].all()
+    assert not example.judged[0, 4:28].any()
+
+
+def test_a_box_cut_off_by_the_frame_is_neither_object_nor_background() -> None:
+    affine = np.array([[1.0, 0, -245.0], [0, 1.0, 0]], np.float32)
+    example = place(boxed((1, 1, 1, 1)), affine, SIZE_WH)
+    assert len(example.boxes) == 0
+    assert not example.judged[1, 13:22, 0].any()
+    assert example.judged[1, 13:22, 4:].all()
+
+
+def test_mosaic_keeps_each_pictures_own_judgement() -> None:
+    example = augmented(np.random.default_rng(3), [boxed((0, 1, 0, 0)), *[boxed((1, 1, 1, 1))] * 3], SIZE_WH)
+    assert example.judged[1].any()
+    assert not example.judged[0].all()
+    assert example.judged[0].any()
+
+
+def river_with_bow() -> np.ndarray:
+    """Sky, then bank, then water, and a bow in the bottom middle."""
+    mask = np.zeros((240, 320), np.uint8)
+    mask[:60], mask[60:120] = 2, 1
+    mask[200:, 140:180] = 1
+    return mask
+
+
+def test_a_mask_tells_where_nothing_floats() -> None:
+    mask = river_with_bow()
+    judged = judged_by_mask(Source("river", "river"), mask, np.zeros((*mask.shape, 3), np.uint8))
+    assert judged[:, 150, 20].all()
+    assert judged[:, 20, 20].all()
+    assert not judged[:, 90, 20].any()
+    assert not judged[:, 122, 20].any()  # too near the bank
+    assert not judged[:, 230, 160].any()
+
+
+def test_a_source_without_craft_and_an_own_hull_are_judged() -> None:
+    mask = river_with_bow()
+    picture = np.zeros((*mask.shape, 3), np.uint8)
+    judged = judged_by_mask(Source("river", "river", empty_of=NO_CRAFT), mask, picture)
+    assert judged[[1, 3]].all()
+    assert not judged[[0, 2], 90, 20].any()
+    judged = judged_by_mask(Source("river", "river", own_hull=True), mask, picture)
+    assert judged[:, 230, 160].all()
+    assert not judged[:, 90, 20].any()
+
+
+def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
+    picture, mask = np.full((256, 320, 3), 30, np.uint8), np.zeros((256, 320), np.uint8)
+    patch = np.full((60, 80, 3), 220, np.uint8)
+    shares = []
+    for seed in range(40):
+        shown, labels = augment.paste_obstacle(np.random.default_rng(seed), picture, mask, patch)
+        covered = labels == OBSTACLE_CLASS
+        assert (shown[~covered] == 30).all()
+        assert np.isin(labels, (0, OBSTACLE_CLASS)).all()
+        assert (shown[covered] > 100).mean() > 0.9
+        shares.append(covered.mean())
+    assert 0.02 < np.mean(shares) < 0.5
+    assert not mask.any()
+
+
+def test_concrete_is_smooth_grey_and_its_own_every_time() -> None:
+    walls = [augment.concrete(np.random.default_rng(seed)) for seed in range(12)]
+    assert len({wall.tobytes() for wall in walls}) == 12
+    assert all(np.abs(wall.astype(int) - wall.mean(2, keepdims=True)).mean() < 16 for wall in walls)
+
+
+def test_patches_are_cut_from_obstacle_only() -> None:
+    picture = np.zeros((288, 384, 3), np.uint8)
+    mask = np.zeros((288, 384), np.uint8)
+    mask[:200] = OBSTACLE_CLASS
+    picture[:200] = 9
+    patches = [augment.obstacle_patch(np.random.default_rng(seed), picture, mask) for seed in range(20)]
+    found = [patch for patch in patches if patch is not None]
+    assert len(found) >= 10
+    assert all((patch == 9).mean() >= 0.95 for patch in found)
+    assert augment.obstacle_patch(np.random.default_rng(0), picture, np.zeros_like(mask)) is None
+
+
+def test_mirrored_water_changes_water_only() -> None:
+    """Above the far edge the picture stays; in the water it takes on what stands there."""
+    picture = np.full((96, 128, 3), 40, np.uint8)
+    picture[:48] = (220, 30, 30)
+    mask = np.full((96, 128), 1, np.uint8)
+    mask[48:] = 0
+    mirrored = augment.mirror_water(np.random.default_rng(0), picture, mask)
+    assert np.array_equal(mirrored[:48], picture[:48])
+    assert mirrored[50:, :, 0].mean() > 60
+    dry = np.full((96, 128), 1, np.uint8)
+    assert np.array_equal(augment.mirror_water(np.random.default_rng(0), picture, dry), picture)
+
+
+def test_a_close_up_gives_a_small_object_its_pixels_and_keeps_it_in_view() -> None:
+    item = BoxedPicture(
+        "s",
+        np.zeros((240, 480, 3), np.uint8),
+        np.array([[0, 0.9, 0.1, 0.91, 0.13], [1, 0.1, 0.1, 0.6, 0.9]], np.float32),
+        np.ones(4, np.uint8),
+    )
+    for seed in range(30):
+        affine = close_up(np.random.default_rng(seed), item, (320, 256))
+        assert affine is not None
+        kept = {int(row[0]): row for row in place(item, affine, (320, 256)).boxes}
+        assert 0 in kept
+        assert 4.9 <= min(kept[0][3] - kept[0][1], kept[0][4] - kept[0][2]) <= 24.1
+    assert close_up(np.random.default_rng(0), replace(item, boxes=item.boxes[1:]), (320, 256)) is None

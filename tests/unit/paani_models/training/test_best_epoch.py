@@ -1,0 +1,36 @@
+"""The best epoch by validation is kept; the last is not put in its place (checklist S9)."""
+
+from pathlib import Path
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from paani_models.training.loop import Progress, load_checkpoint  # noqa: E402
+
+pytestmark = pytest.mark.train
+
+
+def finished(folder: Path, scores: list[float]) -> Progress:
+    """A run whose only weight counts the epochs."""
+    progress = Progress(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
+    for epoch, score in enumerate(scores, 1):
+        progress.average.model.weight.data.fill_(epoch)
+        progress.finish_epoch(folder, {}, score)
+    return progress
+
+
+@pytest.mark.parametrize(("scores", "best"), [([0.2, 0.9, 0.5, 0.8], 2), ([0.1, 0.2, 0.3], 3), ([0.3, 0.2, 0.1], 1)])
+def test_best_is_the_epoch_with_the_highest_validation_score_s9(tmp_path: Path, scores: list[float], best: int) -> None:
+    finished(tmp_path, scores)
+    kept, last = (load_checkpoint(tmp_path / f"{name}.pt") for name in ("best", "last"))
+    assert kept["average"]["weight"].item() == kept["epoch"] == best
+    assert last["average"]["weight"].item() == last["epoch"] == len(scores)
+
+
+def test_a_resumed_run_still_knows_its_best_s9(tmp_path: Path) -> None:
+    finished(tmp_path, [0.2, 0.9, 0.5])
+    resumed = Progress(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
+    resumed.resume(tmp_path, {})
+    resumed.finish_epoch(tmp_path, {}, 0.6)
+    assert load_checkpoint(tmp_path / "best.pt")["epoch"] == 2

@@ -1,0 +1,151 @@
+"""Shapes, sizes and orders of the two nets (checklist C1, C2, C4, D2 - D6, D9)."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
+
+from torch import Tensor, nn  # noqa: E402
+
+from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
+from paani_models.detector import shipped_shape as detector  # noqa: E402
+from paani_models.segmenter import paper_shape as segmenter  # noqa: E402
+from paani_models.segmenter.shipped_shape import ImageNetSegmenter  # noqa: E402
+
+pytestmark = pytest.mark.train
+
+
+def test_segmenter_parameters_d9() -> None:
+    assert segmenter.parameter_count(segmenter.Segmenter()) == 1_082_467
+
+
+def test_segmenter_taps_d1() -> None:
+    taps = segmenter.Segmenter().eval().taps(torch.zeros(1, 3, 256, 320))
+    assert [tuple(t.shape[1:]) for t in taps] == [
+        (16, 64, 80),
+        (24, 32, 40),
+        (48, 16, 20),
+        (576, 8, 10),
+    ]
+
+
+def test_segmenter_decoder_d2_d3_d4() -> None:
+    net = segmenter.Segmenter()
+    assert net.project.kernel_size == (1, 1)
+    assert net.project.out_channels == 64
+    assert len(net.refines) == len(net.laterals) == 3
+    assert net.head.kernel_size == (3, 3)
+
+
+def test_segmenter_output_is_piecewise_constant_over_four_pixels_d4_d5() -> None:
+    torch.manual_seed(0)
+    logits = segmenter.Segmenter().eval()(torch.rand(1, 3, 256, 320)).detach()
+    assert tuple(logits.shape) == (1, 3, 256, 320)
+    cells = logits[:, :, ::4, ::4]
+    assert torch.equal(cells.repeat_interleave(4, 2).repeat_interleave(4, 3), logits)
+
+
+def test_segmenter_class_order_d6() -> None:
+    assert SEGMENTER_CLASSES == ("water", "obstacle", "sky")
+
+
+def test_segmenter_loss_ignores_255() -> None:
+    logits = torch.tensor([10.0, 0.0, 0.0]).view(1, 3, 1, 1).repeat(1, 1, 4, 4)
+    target = torch.zeros(1, 4, 4, dtype=torch.int64)
+    spoiled = target.clone()
+    spoiled[0, :2] = 255
+    worse = target.clone()
+    worse[0, :2] = 1
+    assert segmenter.segmenter_loss(logits, spoiled) == pytest.approx(
+        float(segmenter.segmenter_loss(logits[:, :, 2:], target[:, 2:])), abs=1e-6
+    )
+    assert segmenter.segmenter_loss(logits, worse) > segmenter.segmenter_loss(logits, target) + 1.0
+
+
+def test_detector_output_c4() -> None:
+    torch.manual_seed(0)
+    out = detector.Detector().eval()(torch.rand(1, 3, 256, 320)).detach()
+    assert tuple(out.shape) == (1, 8, 1680)
+    assert detector.CANDIDATES == 1680
+    assert ((out[:, 4:] >= 0) & (out[:, 4:] <= 1)).all()
+    assert (out[:, 2:4] > 0).all()
+
+
+def test_detector_class_order_c2() -> None:
+    assert DETECTOR_CLASSES == ("person", "vessel", "pier", "buoy")
+
+
+def test_detector_candidates_run_over_strides_8_16_32_row_by_row() -> None:
+    """With zeroed box outputs each candidate is its cell: corner at (column, row) * stride, side = stride."""
+    net = detector.Detector().eval()
+    for head in net.heads:
+        assert isinstance(head, detector.Head)
+        torch.nn.init.zeros_(head.box_out.weight)
+        torch.nn.init.zeros_(head.box_out.bias)
+    boxes = net(torch.zeros(1, 3, 256, 320))[0, :4].T.detach().numpy()
+    np.testing.assert_allclose(boxes[0], [0, 0, 8, 8])
+    np.testing.assert_allclose(boxes[1], [8, 0, 8, 8])
+    np.testing.assert_allclose(boxes[40], [0, 8, 8, 8])
+    np.testing.assert_allclose(boxes[1280 + 21], [16, 16, 16, 16])
+    np.testing.assert_allclose(boxes[1600 + 79], [9 * 32, 7 * 32, 32, 32])
+
+
+def test_detector_score_is_objectness_times_class() -> None:
+    net = detector.Detector().eval()
+    for head in net.heads:
+        assert isinstance(head, detector.Head)
+        for out, bias in ((head.object_out, 0.0), (head.class_out, 1.0)):
+            torch.nn.init.zeros_(out.weight)
+            torch.nn.init.constant_(out.bias, bias)
+    scores = net(torch.zeros(1, 3, 256, 320))[0, 4:].detach().numpy()
+    np.testing.assert_allclose(scores, 0.5 / (1 + np.exp(-1.0)), rtol=1e-5)
+
+
+def test_candidate_grid_matches_the_output_order() -> None:
+    centres, strides = detector.candidate_grid(256, 320)
+    assert centres[41].tolist() == [12.0, 12.0]
+    assert centres[1280].tolist() == [8.0, 8.0]
+    assert [int((strides == s).sum()) for s in detector.STRIDES] == [1280, 320, 80]
+
+
+def multiply_adds(net: nn.Module) -> int:
+    total = 0
+
+    def count(conv: nn.Module, _inputs: tuple[Tensor, ...], output: Tensor) -> None:
+        nonlocal total
+        assert isinstance(conv, nn.Conv2d)
+        total += output.numel() * conv.weight[0].numel()
+
+    for module in net.modules():
+        if isinstance(module, nn.Conv2d):
+            module.register_forward_hook(count)
+    with torch.no_grad():
+        net.eval()(torch.zeros(1, 3, 256, 320))
+    return total
+
+
+def test_the_shipped_segmenter_costs_less_than_the_papers() -> None:
+    assert multiply_adds(segmenter.Segmenter()) == pytest.approx(357e6, rel=0.01)
+    assert multiply_adds(ImageNetSegmenter()) < 0.75 * multiply_adds(segmenter.Segmenter())
+
+
+def test_the_shipped_segmenter_is_bilinear_between_the_middles_of_its_cells() -> None:
+    """Pixel p of a row lies (p - 1.5) / 4 cells from the first middle; outside the middles nothing changes."""
+    torch.manual_seed(0)
+    net, heads = ImageNetSegmenter().eval(), []
+    net.head.register_forward_hook(lambda _head, _inputs, output: heads.append(output))
+    with torch.no_grad():
+        logits = net(torch.rand(1, 3, 256, 320))
+    (head,) = heads
+    assert tuple(logits.shape) == (1, 3, 256, 320)
+    assert tuple(head.shape) == (1, 3, 64, 80)
+    down, across = (_between(cells) for cells in (64, 80))
+    expected = torch.einsum("pi,ncij,qj->ncpq", down, head, across)
+    assert float((logits - expected).abs().max()) < 1e-5
+    assert not torch.equal(logits[:, :, ::4, ::4], logits[:, :, 1::4, 1::4])
+
+
+def _between(cells: int) -> Tensor:
+    """How much each of `cells` counts at each of four times as many pixels [4 cells, cells]."""
+    place = ((torch.arange(4 * cells) - 1.5) / 4).clamp(0, cells - 1)
+    return (1 - (place[:, None] - torch.arange(cells)[None]).abs()).clamp(0)

@@ -1,0 +1,44 @@
+"""Training under several seeds, on a miniature."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
+
+from paani_models.segmenter import train as train_segmenter  # noqa: E402
+from paani_models.segmenter.paper_shape import Segmenter  # noqa: E402
+from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
+from paani_models.training.loop import Stage  # noqa: E402
+
+RECIPE = train_segmenter.Recipe(stages=(Stage(3, 64, 64),), batch=4, warmup_steps=2)
+
+
+def striped(rng: np.random.Generator) -> CachedPicture:
+    """Sky above bank above water."""
+    mask = np.zeros((CACHE_WH[1], CACHE_WH[0]), np.uint8)
+    top, bank = sorted(int(y) for y in rng.integers(40, 240, 2))
+    mask[:top], mask[top:bank] = 2, 1
+    return CachedPicture("river", np.array([[30, 60, 90], [40, 90, 30], [200, 210, 230]], np.uint8)[mask], mask)
+
+
+@pytest.mark.train
+@pytest.mark.slow
+def test_w8_every_seed_learns_and_none_like_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """W8: the seed is the recipe's; three give three nets, whose loss falls, and one seed gives its net again."""
+    monkeypatch.setitem(train_segmenter.DRAWS, "river", 7)
+    pictures = [striped(np.random.default_rng(k)) for k in range(6)]
+
+    def losses(name: str, seed: int) -> list[float]:
+        torch.manual_seed(seed)
+        SegmenterTraining(Segmenter(), replace(RECIPE, seed=seed), tmp_path / name, pictures, pictures[:2]).run()
+        lines = (tmp_path / name / "epochs.jsonl").read_bytes().splitlines()
+        return [msgspec.json.decode(line)["loss"] for line in lines]
+
+    found = {seed: losses(str(seed), seed) for seed in (1, 2, 3)}
+    assert all(curve[-1] < curve[0] for curve in found.values())
+    assert len({tuple(curve) for curve in found.values()}) == 3
+    assert losses("again", 2) == found[2]

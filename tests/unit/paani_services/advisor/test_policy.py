@@ -1,0 +1,313 @@
+"""Thresholds, overrides, permitted sides and hysteresis."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from paani import messages as m
+from paani.config import Config, load_config
+from paani_services.advisor.advise import advise
+from tests.unit.paani_services.advisor.advisor_evidence import (
+    CALIBRATED,
+    CLEAR,
+    PAANI,
+    PAPER,
+    box,
+    lane,
+    murky,
+    play,
+    seeing,
+    water,
+)
+
+D, R = m.Direction, m.Reason
+VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
+
+
+@pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
+@pytest.mark.parametrize(
+    ("risks", "direction", "reason"),
+    [
+        pytest.param((0.3413, 0.2941, 0.1611), D.STRAIGHT, R.CENTER_CLEAR, id="V11-47266"),
+        pytest.param((0.4976, 0.5114, 0.4573), D.RIGHT, R.CENTER_RISK, id="V12-01703"),
+        pytest.param((0.3367, 0.4716, 0.6280), D.STRAIGHT, R.CENTER_CLEAR, id="V13-27011"),
+        pytest.param((0.0288, 0.0004, 0.0029), D.STRAIGHT, R.CENTER_CLEAR, id="V15-black-ungated"),
+    ],
+)
+def test_table_of_scenarios(
+    config: Config, risks: tuple[float, float, float], direction: m.Direction, reason: m.Reason
+) -> None:
+    """V11, V12, V13, V15, J5: the lanes' published risks give the published advice, frame after frame (U8: 8)."""
+    _, advice, _ = play([water(*risks)] * 8, config, period_s=0.1)
+    for given in advice:
+        assert (given.direction, given.reason) == (direction, reason)
+        assert (given.left.risk, given.center.risk, given.right.risk) == pytest.approx(risks)
+
+
+def test_v14_a_side_below_its_limit_may_still_be_occupied() -> None:
+    """V14, J6: .6615/.6025/.4489 is STOP because the right lane is occupied, not because of its score."""
+    risks = (0.6615, 0.6025, 0.4489)
+    moored = box(BUOY, (0.70, 0.56, 0.95, 0.66), 0.45)
+    obstacle = 0.45 * (0.6 * (0.66 - 0.30) / 0.70 + 0.4 * 0.10 / 0.50)
+    evidence = msgspec.structs.replace(water(risks[0], risks[1], risks[2] - 0.65 * obstacle), detections=(moored,))
+    _, advice, _ = play([evidence])
+    assert (advice[0].left.risk, advice[0].center.risk, advice[0].right.risk) == pytest.approx(risks, abs=1e-9)
+    assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SIDE_UNOCCUPIED)
+    assert advice[0].right.occupied
+    assert not advice[0].left.occupied
+
+
+@pytest.mark.parametrize(
+    ("risks", "direction", "reason"),
+    [
+        ((0.60, 0.60, 0.60), D.STOP, R.NO_SAFE_SIDE),
+        ((0.58, 0.48, 0.58), D.STOP, R.NO_SAFE_SIDE),  # thresholds block at equality
+        ((0.10, 0.48, 0.60), D.LEFT, R.CENTER_RISK),
+        ((0.60, 0.48, 0.10), D.RIGHT, R.CENTER_RISK),
+        ((0.30, 0.50, 0.40), D.LEFT, R.CENTER_RISK),
+        ((0.30, 0.50, 0.31), D.RIGHT, R.TIE_STARBOARD),
+        ((0.30, 0.4799, 0.31), D.STRAIGHT, R.CENTER_CLEAR),
+    ],
+)
+def test_thresholds_and_sides(risks: tuple[float, float, float], direction: m.Direction, reason: m.Reason) -> None:
+    """J5, J8, resolutions 13 and 14."""
+    _, advice, _ = play([water(*risks)])
+    assert (advice[0].direction, advice[0].reason) == (direction, reason)
+
+
+def test_a_tie_keeps_the_side_in_progress() -> None:
+    """Resolution 13: left by risk first, then alike: still left, and the reason says so."""
+    _, advice, _ = play([water(0.30, 0.50, 0.40), water(0.40, 0.50, 0.39)])
+    assert (advice[1].direction, advice[1].reason) == (D.LEFT, R.TIE_KEPT_SIDE)
+
+
+def test_a_tie_resumes_the_side_after_a_stop() -> None:
+    _, advice, _ = play([water(0.30, 0.50, 0.40), water(0.60, 0.60, 0.60), water(0.40, 0.50, 0.39)])
+    assert [a.direction for a in advice] == [D.LEFT, D.STOP, D.LEFT]
+
+
+@pytest.mark.parametrize(
+    ("xyxy", "direction", "reason"),
+    [
+        pytest.param((0.30, 0.30, 0.40, 0.62), D.SLIGHT_RIGHT, R.CENTER_EDGE_INCURSION, id="left-edge"),
+        pytest.param((0.60, 0.30, 0.70, 0.62), D.SLIGHT_LEFT, R.CENTER_EDGE_INCURSION, id="right-edge"),
+        pytest.param((0.40, 0.30, 0.50, 0.62), D.RIGHT, R.CENTER_RISK, id="core"),
+    ],
+)
+def test_j9_edge_is_slight_and_core_is_full(xyxy: m.BoxXyxy, direction: m.Direction, reason: m.Reason) -> None:
+    """J9, resolution 12."""
+    evidence = msgspec.structs.replace(
+        CLEAR, left=lane(0.25), center=lane(0.30), right=lane(0.20), detections=(box(PIER, xyxy, 0.9),)
+    )
+    if direction is D.SLIGHT_LEFT:
+        evidence = msgspec.structs.replace(evidence, left=lane(0.20), right=lane(0.25))
+    _, advice, _ = play([evidence] * 2)
+    assert advice[1].center.risk >= 0.48
+    assert (advice[1].direction, advice[1].reason) == (direction, reason)
+
+
+def test_an_edge_incursion_never_turns_towards_it() -> None:
+    """J8, J9: the way away is barred, so it stops though the near side has a low score."""
+    evidence = msgspec.structs.replace(
+        CLEAR, center=lane(0.30), right=lane(0.65), detections=(box(PIER, (0.30, 0.30, 0.40, 0.62), 0.9),)
+    )
+    _, advice, _ = play([evidence] * 2)
+    assert (advice[1].direction, advice[1].reason) == (D.STOP, R.NO_SAFE_SIDE)
+
+
+def test_blocking_water_is_no_edge_incursion() -> None:
+    evidence = msgspec.structs.replace(CLEAR, center=lane(0.50), detections=(box(PIER, (0.30, 0.30, 0.40, 0.62), 0.9),))
+    _, advice, _ = play([evidence] * 2)
+    assert advice[1].direction is D.RIGHT
+
+
+def test_j6_occupancy_needs_two_distinct_frames() -> None:
+    """J6: low and a quarter of the lane wide, in two distinct frames; by score alone the centre would be clear."""
+    low = box(BUOY, (0.45, 0.62, 0.58, 0.68), 0.42)  # area 0.0078: no immediate danger
+    _, advice, _ = play([msgspec.structs.replace(seeing(low), right=lane(0.01))] * 3)
+    assert [a.center.occupied for a in advice] == [False, False, True]  # accepted at 2, then 2 frames occupied
+    assert advice[2].center.risk < 0.48
+    assert (advice[2].direction, advice[2].reason) == (D.RIGHT, R.CENTER_OCCUPIED)
+
+
+def test_j6_immediate_danger_occupies_at_once() -> None:
+    """J6, G5."""
+    near = box(BUOY, (0.42, 0.56, 0.58, 0.70), 0.41)
+    _, advice, _ = play([msgspec.structs.replace(seeing(near), left=lane(0.2), right=lane(0.05))])
+    assert advice[0].center.occupied
+    assert advice[0].center.risk < 0.48
+    assert (advice[0].direction, advice[0].reason) == (D.RIGHT, R.CENTER_OCCUPIED)
+
+
+@pytest.mark.parametrize(
+    ("label", "clear", "calibrated", "occupied"),
+    [
+        (PIER, 1.0, True, False),
+        (PIER, 0.55, True, False),
+        (PIER, 0.5, True, True),
+        (PIER, 1.0, False, True),
+        (VESSEL, 1.0, True, True),
+    ],
+)
+def test_a_quay_occupies_no_lane_that_shows_water_across_more_than_half(
+    label: m.Label, clear: float, calibrated: bool, occupied: bool
+) -> None:
+    """One that lies aslant fills a box down to its near end, across lanes of open water: its box's foot is not there.
+
+    More cases in which the boat moves: it had stood 248 s before an open canal (canal-51), and 228 s with a quay ahead
+    that left most of the port corridor free (canal-31).
+    """
+    quay = box(label, (0.31, 0.3, 1.0, 0.8))
+    water = msgspec.structs.replace(lane(0.05), clear_width=clear)
+    evidence = msgspec.structs.replace(seeing(quay), left=water, center=water, right=water)
+    config = CALIBRATED if calibrated else PAANI
+    _, advice, _ = play([evidence] * 4, config)
+    assert advice[-1].center.occupied is occupied
+    assert advice[-1].right.occupied is occupied
+
+
+HULLS = (box(VESSEL, (0.02, 0.3, 0.36, 0.6), 0.9), box(VESSEL, (0.64, 0.3, 0.98, 0.6), 0.9))
+
+
+@pytest.mark.parametrize(("hulls", "calibrated", "stops"), [((), False, True), ((), True, False), (HULLS, True, True)])
+def test_a_planned_way_in_is_looked_for_where_sides_are_crowded(
+    hulls: tuple[m.Detection, ...], calibrated: bool, stops: bool
+) -> None:
+    """Where the metric planner finds out whether there is room, a side is blocked at 0.75.
+
+    More cases in which the boat moves: hulls along a harbour make 0.57 to 0.66 of both sides with open water before
+    them, and it had lain there for good (harbour-55, harbour-63).
+    """
+    side = murky(0.63)
+    evidence = msgspec.structs.replace(CLEAR, center=lane(0.6), left=side, right=side, detections=hulls)
+    _, advice, _ = play([evidence] * 4, CALIBRATED if calibrated else PAANI)
+    assert (advice[-1].direction is D.STOP) is stops
+    assert advice[-1].side_block_risk == (0.75 if calibrated else 0.58)
+
+
+FANS = msgspec.structs.replace(load_config(profile="fans"), calibration=CALIBRATED.calibration)
+DRY = water(0.55, 0.65, 0.70)
+SHUT_IN = msgspec.structs.replace(DRY, center=murky(0.6))
+
+
+@pytest.mark.parametrize(
+    ("config", "frame", "looks"),
+    [
+        (CALIBRATED, SHUT_IN, True),
+        (CALIBRATED, DRY, False),  # no water anywhere: a covered lens may read so
+        (PAANI, SHUT_IN, False),  # no map of what stands beside the boat
+        (FANS, SHUT_IN, False),  # it cannot turn where it is
+        (PAPER, water(0.6, 0.65, 0.65), False),  # J5
+    ],
+    ids=["paani", "dry", "uncalibrated", "fans", "paper"],
+)
+def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: m.Evidence, looks: bool) -> None:
+    """STOP for 40 frames, then a turn to the better side, and on to that, whatever the risks are, until a way is free.
+
+    More cases in which the boat moves, though only round: before a hull it had lain for good with open water abeam
+    (harbour-73, lake-54). That it does not go ahead meanwhile is the navigator's.
+    """
+    state, advice, _ = play([frame] * 60, config)
+    assert [a.direction for a in advice[:40]] == [D.STOP] * 40
+    assert {(a.direction, a.reason) for a in advice[40:]} == (
+        {(D.LEFT, R.NO_SIDE_FOR_LONG)} if looks else {(D.STOP, advice[0].reason)}
+    )
+    turned = msgspec.structs.replace(frame, left=frame.right, right=frame.left)
+    state, after, _ = play([turned] * 3 + [CLEAR] * 3 + [frame], config, state=state, first_seq=60)
+    assert [a.direction for a in after[:3]] == [D.LEFT if looks else D.STOP] * 3
+    assert after[5].direction is D.STRAIGHT
+    assert after[6].direction is D.STOP  # anew
+
+
+def test_a_look_in_vain_is_followed_by_one_to_the_other_side() -> None:
+    """16 s to each side, however stuck what it sees is.
+
+    More cases in which the boat moves, though only round: it had lain before a wall for good, as it was advised to look
+    away from where its route led (canal-10).
+    """
+    state, advice, _ = play([SHUT_IN] * 360, CALIBRATED)
+    assert [a.direction for a in advice] == [D.STOP] * 40 + ([D.LEFT] * 80 + [D.RIGHT] * 80) * 2
+    assert {a.reason for a in advice[40:]} == {R.NO_SIDE_FOR_LONG}
+    _, after, _ = play([CLEAR] * 3 + [SHUT_IN] * 40, CALIBRATED, state=state, first_seq=360)
+    assert {a.direction for a in after[3:]} == {D.STOP}  # anew
+
+
+def test_one_frame_without_water_is_no_way_to_look_for() -> None:
+    """However long it has looked: STOP, and it waits anew."""
+    state, advice, _ = play([SHUT_IN] * 45, CALIBRATED)
+    assert advice[-1].reason is R.NO_SIDE_FOR_LONG
+    _, after, _ = play([DRY, *[SHUT_IN] * 39], CALIBRATED, state=state, first_seq=45)
+    assert {a.direction for a in after} == {D.STOP}
+
+
+def test_occupancy_does_not_count_republishes() -> None:
+    """J6, J10: the same frame again is no second frame."""
+    low = box(BUOY, (0.45, 0.62, 0.58, 0.68), 0.42)
+    state, _, _ = play([seeing(low)] * 2)
+    evidence = state.evidence
+    assert evidence is not None
+    for repeat in range(5):
+        state, given, _ = advise(state, evidence, evidence.source_us + 1000 * repeat, PAANI)
+        assert not given.center.occupied
+
+
+def test_j7_center_vessel() -> None:
+    """J7: a vessel whose part inside the centre is at least 0.04 blocks it, a pier of that size does not."""
+    large = (0.40, 0.22, 0.60, 0.43)
+    sides = {"left": lane(0.2), "right": lane(0.05)}
+    for label, direction in ((VESSEL, D.RIGHT), (PIER, D.STRAIGHT)):
+        _, advice, _ = play([msgspec.structs.replace(seeing(box(label, large, 0.6)), **sides)] * 2)
+        assert advice[1].center.risk < 0.48
+        assert advice[1].direction is direction
+        if label is VESSEL:
+            assert advice[1].reason is R.CENTER_VESSEL
+
+
+def test_j10_a_turn_is_kept_until_two_distinct_clear_frames() -> None:
+    """J10: turn, one clear frame keeps it, the second releases it; a republish never counts."""
+    blocked, clear = water(0.05, 0.50, 0.30), CLEAR
+    state, advice, _ = play([blocked, clear])
+    assert [(a.direction, a.reason) for a in advice] == [(D.LEFT, R.CENTER_RISK), (D.LEFT, R.TURN_RETAINED)]
+    evidence = state.evidence
+    assert evidence is not None
+    for repeat in range(5):
+        state, given, _ = advise(state, evidence, evidence.source_us + 10_000 * repeat, PAANI)
+        assert given.reason is R.TURN_RETAINED
+    _, advice, _ = play([clear], state=state, first_seq=2)
+    assert (advice[0].direction, advice[0].reason) == (D.STRAIGHT, R.CENTER_CLEAR)
+
+
+def test_j10_an_unusable_frame_is_no_clear_frame() -> None:
+    black = msgspec.structs.replace(CLEAR, usable=False, cause=m.UnusableCause.BLACK)
+    _, advice, _ = play([water(0.05, 0.50, 0.30), CLEAR, black, CLEAR, CLEAR])
+    assert [a.direction for a in advice] == [D.LEFT, D.LEFT, D.STOP, D.LEFT, D.STRAIGHT]
+
+
+def test_j10_a_turn_is_not_kept_into_a_barred_side() -> None:
+    _, advice, _ = play([water(0.05, 0.50, 0.30), water(0.65, 0.05, 0.05)])
+    assert advice[1].direction is D.STRAIGHT
+
+
+def test_a_hidden_obstacle_fades_in_paani_and_stays_in_paper() -> None:
+    """G3, G11: held tracks stay listed; what they weigh while unseen is a setting."""
+    ahead = box(PIER, (0.40, 0.35, 0.60, 0.64), 0.9)
+    frames = [seeing(ahead)] * 2 + [CLEAR] * 10
+    _, fading, tracks = play(frames, PAANI)
+    _, lasting, _ = play(frames, PAPER)
+    assert [len(t.tracks) for t in tracks] == [1] * 12
+    assert fading[11].center.obstacle < 0.2 * fading[1].center.obstacle
+    assert lasting[11].center.obstacle == pytest.approx(lasting[1].center.obstacle)
+
+
+@pytest.mark.parametrize("shown", [0.96, 1.0])
+def test_no_turn_into_a_lane_without_water(shown: float) -> None:
+    """A beach from side to side, seen for certain, is a risk of 0.55 in each lane, and no side's limit is that low."""
+    dry = m.LaneEvidence(non_water=shown, uncertainty=0.0, clear_width=1.0 - shown)
+    beach = msgspec.structs.replace(CLEAR, left=dry, center=dry, right=dry)
+    _, advice, _ = play([beach])
+    assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SAFE_SIDE)
+    _, advice, _ = play([msgspec.structs.replace(beach, left=lane(0.4))])
+    assert advice[0].direction is D.LEFT
+    _, advice, _ = play([beach], PAPER)
+    assert advice[0].direction is D.RIGHT

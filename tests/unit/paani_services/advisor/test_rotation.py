@@ -1,0 +1,285 @@
+"""The boat's own turning: sizes as angles, places after a turn, identities that survive it, risks it cannot lower."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani import keys
+from paani import messages as m
+from paani.config import Config, load_config
+from paani.decider import Input
+from paani.geometry import wrap_rad
+from paani_services.advisor.advise import AdvisorState, advise
+from paani_services.advisor.decide import DECIDER
+from paani_services.advisor.rotation import (
+    ATTITUDES_KEPT,
+    Attitude,
+    View,
+    attitude_at,
+    expected,
+    heard,
+    lens_of,
+    log_size,
+    view_of,
+)
+from paani_services.advisor.tracker import is_accepted
+from paani_sim.eye.camera import BoatPose, Camera, project
+from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, seeing
+
+U = m.RotationUse
+OFF = load_config(sets=["advisor.motion.compensate_rotation=false"])
+LENS = lens_of(CLEAR, PAANI)
+BUOY_M = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (0.0, 0.9)])
+
+
+def odometry(source_us: int, yaw_rad: float, rate_radps: float = 0.0, **fields: float) -> m.Odometry:
+    return m.Odometry(
+        source_us=source_us, x_m=0.0, y_m=0.0, yaw_rad=yaw_rad, surge_mps=0.0, yaw_rate_radps=rate_radps,
+        **{"healthy": True} | fields,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def attitude(yaw_rad: float = 0.0, roll_rad: float = 0.0, pitch_rad: float = 0.0, epoch: int = 0) -> Attitude:
+    return Attitude(0, epoch, yaw_rad, 0.0, roll_rad, pitch_rad)
+
+
+def seen_box(pose: BoatPose, at_m: tuple[float, float], scale: float = 1.0, camera: Camera | None = None) -> m.BoxXyxy:
+    """Where the simulator's camera sees a buoy."""
+    pixels = project(scale * BUOY_M + [*at_m, 0.0], pose, camera or Camera()) / (320.0, 240.0)
+    (x1, y1), (x2, y2) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+    return (x1, y1, x2, y2)
+
+
+def test_the_eye_states_the_lens_of_simulated_pictures_alone() -> None:
+    """A user's camera says its own field of view; unknown, or too wide for a pinhole, is no lens."""
+    assert LENS is not None
+    assert LENS.focal_x == pytest.approx(0.5 / math.tan(math.radians(35.0)))
+    assert LENS.focal_y == pytest.approx(LENS.focal_x * 320 / 240)
+    recording = msgspec.structs.replace(CLEAR, time_base=m.TimeBase.MEDIA)
+    webcam, known = (
+        load_config(sets=["camera.source=webcam"]),
+        load_config(sets=["camera.source=webcam", "calibration.hfov_deg=60"]),
+    )
+    assert lens_of(recording, PAANI) is None
+    assert lens_of(CLEAR, webcam) is None
+    found = lens_of(CLEAR, known)
+    assert found is not None
+    assert found.focal_x == pytest.approx(0.5 / math.tan(math.radians(30.0)))
+    assert lens_of(CLEAR, load_config(sets=["eye.hfov_deg=200"])) is None
+    assert lens_of(msgspec.structs.replace(CLEAR, height_px=0), PAANI) is None
+
+
+@pytest.mark.parametrize("yaw_rad", [-0.5, -0.25, 0.0, 0.25, 0.5])
+@pytest.mark.parametrize(("down_deg", "off"), [(0.0, 0.005), (6.0, 0.045)])
+def test_a_turn_does_not_change_the_size(yaw_rad: float, down_deg: float, off: float) -> None:
+    """A turn is not an approach: 25 % in the flat picture at half a radian is less than 5 % in angle.
+
+    What is left is the box around things that seem to lean, in a camera that looks down.
+    """
+    lens = lens_of(CLEAR, load_config(sets=[f"eye.pitch_down_deg={down_deg}"]))
+    camera = Camera(down_deg=down_deg)
+    ahead, aside = (seen_box(BoatPose(0.0, 0.0, yaw), (80.0, 0.0), 3.0, camera) for yaw in (0.0, yaw_rad))
+    assert log_size(aside, lens) == pytest.approx(log_size(ahead, lens), abs=off)
+    if abs(yaw_rad) == 0.5:
+        assert log_size(aside, None) > log_size(ahead, None) + 0.19
+
+
+def test_the_size_follows_the_range() -> None:
+    """Half as far is twice the angle."""
+    far, near = (seen_box(BoatPose(0.0, 0.0, 0.0), (x_m, 0.0)) for x_m in (16.55, 8.55))
+    assert log_size(near, LENS) - log_size(far, LENS) == pytest.approx(math.log(2.0), abs=0.03)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.floats(-0.25, 0.25), st.floats(-0.3, 0.3), st.floats(-0.1, 0.1), st.floats(-0.06, 0.06), st.floats(-0.06, 0.06)
+)
+def test_turned_boxes_lie_where_the_camera_sees_them(
+    bearing: float, yaw_rad: float, before_roll: float, now_roll: float, pitch_rad: float
+) -> None:
+    """Far things, any small yaw, roll and pitch: within a pixel and a half of the simulator's own projection.
+
+    Half of what is left is the boat's origin, which is not the camera; the rest is the box around rolled corners.
+    """
+    at_m = (200.0 * math.cos(bearing), 200.0 * math.sin(bearing))
+    then = seen_box(BoatPose(0.0, 0.0, 0.0, roll_rad=before_roll), at_m, 10.0)
+    truth = seen_box(BoatPose(0.0, 0.0, yaw_rad, roll_rad=now_roll, pitch_rad=pitch_rad), at_m, 10.0)
+    view = View(U.KNOWN, LENS, attitude(yaw_rad, now_roll, pitch_rad))
+    (found,) = expected([(then, attitude(0.0, before_roll))], view)
+    if not all(0.02 < value < 0.98 for value in truth):
+        return
+    assert found is not None
+    assert found == pytest.approx(truth, abs=1.5 / 240)
+
+
+def test_what_turns_out_of_the_picture_has_no_place() -> None:
+    view = View(U.KNOWN, LENS, attitude(1.2))
+    ahead, behind = ((0.4, 0.4, 0.5, 0.5), attitude()), ((0.4, 0.4, 0.5, 0.5), attitude(math.pi))
+    assert expected([ahead, behind], view) == [None, None]
+
+
+def test_attitudes_of_different_epochs_do_not_compare() -> None:
+    view = View(U.KNOWN, LENS, attitude(0.3))
+    seen = (0.4, 0.4, 0.5, 0.5)
+    assert expected([(seen, attitude(epoch=1)), (seen, None)], view) == [seen, seen]
+    assert expected([(seen, attitude())], View(U.NO_ODOMETRY, LENS)) == [seen]
+
+
+def test_yaw_is_carried_to_the_capture_stamp() -> None:
+    """The nearest odometry, at its rate; none within the limit is none."""
+    attitudes: tuple[Attitude, ...] = ()
+    for k in range(10):
+        attitudes = heard(attitudes, odometry(T0_US + k * 100_000, 0.05 * k, 0.5))
+    found = attitude_at(attitudes, T0_US + 430_000, 0.3)
+    assert found is not None
+    assert found.at_us == T0_US + 430_000
+    assert found.yaw_rad == pytest.approx(0.215)
+    ahead = attitude_at(attitudes, T0_US + 1_100_000, 0.3)
+    assert ahead is not None
+    assert ahead.yaw_rad == pytest.approx(0.55)
+    assert attitude_at(attitudes, T0_US + 1_200_001, 0.3) is None
+    assert attitude_at((), T0_US, 0.3) is None
+
+
+def test_only_new_and_healthy_odometry_is_heard() -> None:
+    first = heard((), odometry(T0_US, 0.1))
+    assert len(first) == 1
+    for unfit in (
+        None,
+        odometry(T0_US, 0.2),
+        odometry(T0_US - 1, 0.2),
+        odometry(T0_US + 1, 0.2, healthy=False),
+        odometry(T0_US + 1, math.nan),
+        odometry(T0_US + 1, 0.2, math.inf),
+    ):
+        assert heard(first, unfit) is first
+    again = heard(first, odometry(T0_US - 5, 0.2, epoch=1))
+    assert [a.epoch for a in again] == [1]
+    many: tuple[Attitude, ...] = first
+    for k in range(100):
+        many = heard(many, odometry(T0_US + 1 + k, 0.1))
+    assert len(many) == ATTITUDES_KEPT
+
+
+@pytest.mark.parametrize(
+    ("config", "time_base", "age_s", "use"),
+    [
+        (PAANI, m.TimeBase.CAPTURE, 0.1, U.KNOWN),
+        (PAANI, m.TimeBase.CAPTURE, 0.31, U.NO_ODOMETRY),
+        (PAPER, m.TimeBase.CAPTURE, 0.1, U.OFF),
+        (load_config(sets=["camera.source=webcam"]), m.TimeBase.CAPTURE, 0.1, U.UNKNOWN_LENS),
+        (PAANI, m.TimeBase.MEDIA, 0.1, U.UNKNOWN_LENS),
+        (load_config(sets=["camera.source=x.mp4", "calibration.hfov_deg=60"]), m.TimeBase.MEDIA, 0.1, U.RECORDING),
+    ],
+)
+def test_the_tracks_say_what_was_known_of_the_turning(
+    config: Config, time_base: m.TimeBase, age_s: float, use: m.RotationUse
+) -> None:
+    """I19: `paper` has it off; without lens, odometry or a live camera it is off by itself and says so."""
+    frame = msgspec.structs.replace(CLEAR, time_base=time_base)
+    _, _, tracks = advise(AdvisorState(), frame, T0_US, config, odometry(T0_US - round(age_s * 1e6), 0.0))
+    assert tracks.rotation is use
+    state = heard((), odometry(T0_US - round(age_s * 1e6), 0.0))
+    assert (view_of(state, frame, config).attitude is not None) == (use is U.KNOWN)
+
+
+def test_the_decider_hears_odometry() -> None:
+    """What the ledger and a replay must know: odometry is an input of the step."""
+    assert keys.ODOMETRY in DECIDER.inputs
+    heard_now = {topic.name: Input() for topic in DECIDER.inputs} | {keys.EVIDENCE.name: Input(CLEAR, T0_US)}
+    for odometry_now, use in ((None, U.NO_ODOMETRY), (odometry(T0_US, 0.0), U.KNOWN)):
+        given_now = heard_now | {keys.ODOMETRY.name: Input(odometry_now, T0_US)}
+        _, said = DECIDER.decide(DECIDER.state(), given_now, T0_US + 100_000, PAANI)
+        tracks = said[keys.TRACKS.name]
+        assert isinstance(tracks, m.Tracks)
+        assert tracks.rotation is use
+
+
+def sweep(config: Config, rate_radps: float, period_s: float, count: int = 2) -> list[m.Tracks]:
+    """Tracks while the boat turns in place before `count` buoys in a row; frames a period apart, odometry at 10 Hz."""
+    state, found = AdvisorState(), []
+    frames = round(1.0 / abs(rate_radps) / period_s)
+    for k in range(frames):
+        t_s = k * period_s
+        yaw_rad = rate_radps * (t_s - 0.5 * frames * period_s)
+        pose = BoatPose(0.0, 0.0, yaw_rad)
+        boxes = [seen_box(pose, (10.0, 1.5 * i)) for i in range(count)]
+        whole = [b for b in boxes if min(b) >= 0.0 and max(b) <= 1.0]
+        stamp_us = T0_US + round(t_s * 1e6)
+        frame = msgspec.structs.replace(seeing(*(box(m.Label.BUOY, b) for b in whole)), source_us=stamp_us, frame_seq=k)
+        for late in range(max(1, round(period_s * 10))):
+            heard_us = stamp_us + 50_000 + 100_000 * late
+            yaw = yaw_rad + rate_radps * (heard_us - stamp_us) * 1e-6
+            state, _, tracks = advise(state, frame, heard_us, config, odometry(heard_us, wrap_rad(yaw), rate_radps))
+            if late == 0:
+                found.append(tracks)
+    return found
+
+
+@pytest.mark.parametrize("rate_radps", [0.5, -0.5])
+@pytest.mark.parametrize("period_s", [0.2, 0.5, 1.0])
+def test_a_fast_turn_loses_no_identity(rate_radps: float, period_s: float) -> None:
+    """Two like buoys in a row keep their numbers, and neither seems to approach."""
+    found = sweep(PAANI, rate_radps, period_s)
+    seen = [[t for t in frame.tracks if not t.held] for frame in found]
+    assert len({t.id for tracks in seen for t in tracks}) == 2
+    assert not {t.motion for tracks in seen for t in tracks} & {m.MotionState.APPROACHING, m.MotionState.RECEDING}
+    lost = sweep(OFF, rate_radps, period_s)
+    assert len({t.id for frame in lost for t in frame.tracks if not t.held}) > 2
+
+
+SPOT = st.builds(
+    lambda x, y, w, h, c: box(m.Label.VESSEL, (x, y, min(x + w, 1.0), min(y + h, 1.0)), c),
+    st.floats(0.0, 0.9), st.floats(0.2, 0.8), st.floats(0.03, 0.4), st.floats(0.03, 0.4), st.floats(0.41, 1.0),
+)  # fmt: skip
+STEP = st.tuples(
+    st.lists(SPOT, max_size=4),
+    st.integers(20_000, 900_000),
+    st.floats(-4.0, 4.0),
+    st.floats(-3.0, 3.0),
+    st.floats(-1.0, 1.0),
+    st.integers(0, 1),
+    st.booleans(),
+)
+FEW = ["advisor.tracker.max_tracks=5"]
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.lists(STEP, min_size=1, max_size=10), st.booleans())
+@pytest.mark.slow
+def test_i20_compensation_removes_no_obstacle_and_lowers_no_risk(
+    steps: list[tuple[list[m.Detection], int, float, float, float, int, bool]], few: bool
+) -> None:
+    """I20: whatever the odometry claims, true or not, every place, hold and weight is as without it.
+
+    What may differ: an identity carried over keeps its confirmation, so that more is accepted and risks rise.
+    """
+    known = load_config(sets=FEW) if few else PAANI
+    unknown = load_config(sets=[*FEW, "advisor.motion.compensate_rotation=false"]) if few else OFF
+    with_it, without, at_us = AdvisorState(), AdvisorState(), T0_US
+    for seq, (spots, later_us, yaw_rad, rate_radps, roll_rad, epoch, healthy) in enumerate(steps):
+        at_us += later_us
+        frame = msgspec.structs.replace(seeing(*spots), source_us=at_us, frame_seq=seq)
+        lying = odometry(at_us, yaw_rad, rate_radps, roll_rad=roll_rad, epoch=epoch, healthy=healthy)
+        with_it, given_with, _ = advise(with_it, frame, at_us, known, lying)
+        without, given_without, _ = advise(without, frame, at_us, unknown, lying)
+        pairs = list(zip(with_it.tracker.tracks, without.tracker.tracks, strict=True))
+        for a, b in pairs:
+            assert (a.box, a.hits, a.seen_us, a.held, a.urgency, a.display_box, a.display_confidence) == (
+                b.box, b.hits, b.seen_us, b.held, b.urgency, b.display_box, b.display_confidence,
+            )  # fmt: skip
+            assert is_accepted(a, known.advisor.tracker) >= is_accepted(b, unknown.advisor.tracker)
+        lanes = ("left", "center", "right")
+        for lane in lanes:
+            assert getattr(given_with, lane).risk >= getattr(given_without, lane).risk
+        if all(is_accepted(a, known.advisor.tracker) == is_accepted(b, unknown.advisor.tracker) for a, b in pairs):
+            assert [getattr(given_with, lane).risk for lane in lanes] == [
+                getattr(given_without, lane).risk for lane in lanes
+            ]
+        assert len({track.id for track in with_it.tracker.tracks}) == len(with_it.tracker.tracks)

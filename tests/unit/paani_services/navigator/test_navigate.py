@@ -1,0 +1,340 @@
+"""Advice and route to one order (M1-M11)."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani.config import NavigatorConfig, load_config
+from paani.messages import (
+    Advisory,
+    Arming,
+    Direction,
+    Inhibit,
+    LaneRisk,
+    NavCommand,
+    Odometry,
+    Reason,
+    Route,
+    SimTime,
+    Waypoint,
+)
+from paani_services.navigator.guidance.mission import Progress, route_alone
+from paani_services.navigator.navigate import Heard, NavState, navigate
+
+NOW_US = 20_000_000
+PAPER = load_config(profile="paper").navigator
+PAANI = load_config().navigator
+SQUARE = Route(
+    source_us=0,
+    name="square",
+    waypoints=tuple(Waypoint(x_m=x, y_m=y) for x, y in ((0, 0), (10, 0), (10, 10), (0, 10))),
+)
+HERE = Waypoint(x_m=3.0, y_m=0.0)
+RUNNING = NavState(progress=Progress(target=1, began=HERE), sim_us=1000, advanced_us=NOW_US - 50_000)
+
+
+def at_waypoint(target: int, reached: int = 0) -> NavState:
+    return msgspec.structs.replace(RUNNING, progress=Progress(target=target, began=HERE, reached=reached))
+
+
+def heard(now_us: int = NOW_US, /, **changes: object) -> Heard:
+    message = Heard(
+        advisory=advice(Direction.STRAIGHT, now_us),
+        advisory_us=now_us,
+        odometry=pose(3.0, 0.0, source_us=now_us),
+        odometry_us=now_us,
+        clock=SimTime(source_us=now_us, sim_us=now_us, stamp_us=777),
+        clock_us=now_us,
+        arming=Arming(source_us=now_us, armed=True),
+        arming_us=now_us,
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def advice(direction: Direction, source_us: int = NOW_US) -> Advisory:
+    return Advisory(source_us=source_us, direction=direction, reason=Reason.CENTER_CLEAR)
+
+
+def pose(x_m: float, y_m: float, yaw_rad: float = 0.0, source_us: int = NOW_US) -> Odometry:
+    return Odometry(source_us=source_us, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, surge_mps=0.3, healthy=True)
+
+
+def run(
+    config: NavigatorConfig, given_heard: Heard, state: NavState = RUNNING, now_us: int = NOW_US
+) -> tuple[NavState, NavCommand]:
+    return navigate(state, given_heard, route_alone(SQUARE), now_us, 43, config)
+
+
+class Drill:
+    """Repeats `navigate` at 10 Hz while the simulated clock runs."""
+
+    def __init__(self, config: NavigatorConfig, state: NavState = RUNNING) -> None:
+        self.config, self.state, self.now_us = config, state, NOW_US
+
+    def order(self, direction: Direction, at: Odometry, route: Route = SQUARE) -> NavCommand:
+        self.now_us += 100_000
+        given_heard = heard(
+            self.now_us,
+            advisory=advice(direction, self.now_us),
+            odometry=msgspec.structs.replace(at, source_us=self.now_us),
+        )
+        self.state, command = navigate(self.state, given_heard, route_alone(route), self.now_us, 43, self.config)
+        return command
+
+
+def test_m4_straight_is_the_waypoint_bearing() -> None:
+    """M4: atan2(y_w - y, x_w - x), at cruise speed."""
+    _, order = run(PAPER, heard(odometry=pose(3.0, -2.0)))
+    assert order.heading_rad == pytest.approx(math.atan2(2.0, 7.0))
+    assert (order.enable, order.speed_mps, order.inhibits) == (True, 0.15, ())
+
+
+def test_paani_steers_back_onto_the_leg() -> None:
+    """Line of sight: 2 m right of the leg with 4 m look-ahead steers atan(2/4) to the left."""
+    _, order = run(PAANI, heard(odometry=pose(3.0, -2.0)))
+    assert order.heading_rad == pytest.approx(math.atan2(2.0, 4.0))
+    assert order.cross_track_m == pytest.approx(-2.0)
+    assert order.speed_mps == 0.6
+
+
+@pytest.mark.parametrize(
+    ("direction", "turn_deg"),
+    [
+        (Direction.LEFT, 25.0),
+        (Direction.RIGHT, -25.0),
+        (Direction.SLIGHT_LEFT, 10.0),
+        (Direction.SLIGHT_RIGHT, -10.0),
+    ],
+)
+@pytest.mark.parametrize("config", [PAPER, PAANI])
+def test_m5_m6_m7_visual_turns(config: NavigatorConfig, direction: Direction, turn_deg: float) -> None:
+    """M5, M6: current yaw +/- 25 or 10 deg; M7, 1b #16: half of cruise, slight turns too."""
+    at = pose(3.0, 0.0, yaw_rad=3.1)
+    _, order = run(config, heard(odometry=at, advisory=advice(direction)))
+    wanted = 3.1 + math.radians(turn_deg)
+    assert math.cos(order.heading_rad - wanted) == pytest.approx(1.0)
+    assert -math.pi <= order.heading_rad < math.pi
+    assert order.speed_mps == pytest.approx(0.5 * config.cruise_mps)
+
+
+def test_m5_paper_turns_are_continuous() -> None:
+    """1b #15: in the paper's profile the order moves on with the boat's yaw, without end."""
+    drill = Drill(PAPER)
+    for step in range(40):
+        yaw_rad = 0.1 * step
+        order = drill.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad))
+        assert math.cos(order.heading_rad - yaw_rad) == pytest.approx(math.cos(math.radians(25.0)))
+        assert order.enable
+
+
+def test_paani_turns_are_latched() -> None:
+    """1b #15: the heading stays while the boat comes round to it."""
+    drill = Drill(PAANI)
+    for step in range(4):
+        order = drill.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad=0.08 * step))
+        assert order.heading_rad == pytest.approx(math.radians(25.0))
+
+
+def test_paani_adds_a_turn_only_after_holding_the_first() -> None:
+    drill = Drill(PAANI)
+    drill.order(Direction.LEFT, pose(3.0, 0.0))
+    on_heading = pose(3.0, 0.0, yaw_rad=math.radians(25.0))
+    orders = [drill.order(Direction.LEFT, on_heading) for _ in range(18)]
+    assert orders[14].heading_rad == pytest.approx(math.radians(25.0))
+    assert orders[17].heading_rad == pytest.approx(math.radians(50.0))
+
+
+@pytest.mark.parametrize("direction", [Direction.LEFT, Direction.RIGHT, Direction.SLIGHT_RIGHT])
+def test_a_stuck_detection_cannot_spin_the_boat(direction: Direction) -> None:
+    """1b #15: no order lies more than 90 deg from where the run of turns began, then TURN_CAPPED."""
+    drill, yaw_rad, steps = Drill(PAANI), 2.0, 0
+    while (order := drill.order(direction, pose(3.0, 0.0, yaw_rad))).enable:
+        steps += 1
+        assert steps < 600
+        off = (order.heading_rad - 2.0 + math.pi) % (2.0 * math.pi) - math.pi
+        assert abs(off) <= math.radians(90.0) + 1e-9
+        yaw_rad = order.heading_rad
+    assert order.inhibits == (Inhibit.TURN_CAPPED,)
+    assert drill.order(Direction.STOP, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.ADVISED_STOP,)
+    assert drill.order(direction, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.TURN_CAPPED,)
+    assert drill.order(Direction.STRAIGHT, pose(3.0, 0.0, yaw_rad)).enable
+    assert drill.order(direction, pose(3.0, 0.0, yaw_rad)).enable
+
+
+def test_turn_back_is_allowed_at_the_cap() -> None:
+    drill = Drill(PAANI)
+    drill.order(Direction.LEFT, pose(3.0, 0.0))
+    order = drill.order(Direction.RIGHT, pose(3.0, 0.0, yaw_rad=math.radians(88.0)))
+    assert order.enable
+    assert order.heading_rad == pytest.approx(math.radians(63.0))
+
+
+@pytest.mark.parametrize("direction", [Direction.LEFT, Direction.SLIGHT_LEFT])
+def test_the_route_is_not_resumed_into_what_was_just_passed(direction: Direction) -> None:
+    """Turned left, away from something: the way back to the right waits until `clear_m` further on."""
+    drill, yaw_rad = Drill(PAANI), math.radians(30.0)
+    drill.order(direction, pose(3.0, 1.0, yaw_rad))
+    beside = drill.order(Direction.STRAIGHT, pose(4.0, 1.5, yaw_rad))
+    assert beside.heading_rad == pytest.approx(yaw_rad)
+    past = drill.order(Direction.STRAIGHT, pose(3.0 + PAANI.clear_m, 3.0, yaw_rad))
+    assert past.heading_rad < 0.0
+
+
+def test_an_occupied_side_is_kept_off_while_going_straight() -> None:
+    drill = Drill(PAANI)
+    occupied = msgspec.structs.replace(advice(Direction.STRAIGHT), right=LaneRisk(occupied=True))
+    at = pose(3.0, 2.0)
+    given_heard = heard(drill.now_us, advisory=occupied, odometry=at)
+    _, command = navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAANI)
+    assert command.heading_rad == 0.0
+    open_water = heard(drill.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
+    assert navigate(RUNNING, open_water, route_alone(SQUARE), drill.now_us, 43, PAANI)[1].heading_rad < 0.0
+    assert navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAPER)[1].heading_rad < 0.0
+
+
+def test_m2_acceptance_radius_and_m3_repeat() -> None:
+    """M2: 1 m; M3: after the last waypoint comes the first."""
+    drill = Drill(PAPER)
+    assert drill.order(Direction.STRAIGHT, pose(8.9, 0.0)).waypoint_index == 1
+    assert drill.order(Direction.STRAIGHT, pose(9.1, 0.0)).waypoint_index == 2
+    order = drill.order(Direction.STRAIGHT, pose(9.8, 9.8))
+    assert (order.waypoint_index, order.waypoints_reached) == (3, 2)
+    order = drill.order(Direction.STRAIGHT, pose(0.5, 10.0))
+    assert (order.waypoint_index, order.waypoints_reached) == (0, 3)
+
+
+def test_m1_waypoint_is_kept_during_visual_turns() -> None:
+    """M1: passing through the waypoint in a turn does not change the target."""
+    drill = Drill(PAANI)
+    assert drill.order(Direction.LEFT, pose(10.0, 0.0)).waypoint_index == 1
+    assert drill.order(Direction.STOP, pose(10.0, 0.0)).waypoint_index == 1
+    assert drill.order(Direction.STRAIGHT, pose(10.0, 0.0)).waypoint_index == 2
+
+
+def test_waypoint_left_abeam_counts_in_paani_only() -> None:
+    """A waypoint that an obstacle covers is passed, not orbited."""
+    assert Drill(PAANI).order(Direction.STRAIGHT, pose(8.0, 1.0)).waypoint_index == 1
+    past = pose(10.5, 3.0)
+    assert Drill(PAANI).order(Direction.STRAIGHT, past).waypoint_index == 2
+    assert Drill(PAPER).order(Direction.STRAIGHT, past).waypoint_index == 1
+    far = pose(10.5, -7.0)
+    assert Drill(PAANI).order(Direction.STRAIGHT, far).waypoint_index == 1
+
+
+def test_beyond_its_end_no_line_leads_the_boat_away() -> None:
+    """Far past the last waypoint of an open route the boat turns back to it."""
+    route = msgspec.structs.replace(SQUARE, waypoints=SQUARE.waypoints[:2], repeat=False)
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
+    order = drill.order(Direction.STRAIGHT, pose(30.0, 0.0), route)
+    assert (order.enable, order.waypoints_reached) == (True, 0)
+    assert abs(order.heading_rad) == pytest.approx(math.pi)
+
+
+def test_joins_the_route_at_the_nearest_leg() -> None:
+    """A navigator that restarts goes on where the boat is; nothing counts as reached."""
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
+    order = drill.order(Direction.STRAIGHT, pose(6.0, 9.5))
+    assert (order.waypoint_index, order.waypoints_reached) == (3, 0)
+
+
+def test_route_without_repeat_ends() -> None:
+    route = msgspec.structs.replace(SQUARE, repeat=False)
+    drill = Drill(PAPER, at_waypoint(3))
+    order = drill.order(Direction.STRAIGHT, pose(0.2, 10.0), route)
+    assert (order.inhibits, order.waypoints_reached) == ((Inhibit.ROUTE_FINISHED,), 1)
+    assert not drill.order(Direction.STRAIGHT, pose(5.0, 5.0), route).enable
+
+
+OLD_US = NOW_US - 10_000_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "inhibit"),
+    [
+        ({"arming": None}, Inhibit.NOT_ARMED),
+        ({"arming": Arming(source_us=1, armed=False)}, Inhibit.NOT_ARMED),
+        ({"arming": Arming(source_us=1, armed=True, stopped=True)}, Inhibit.NOT_ARMED),
+        ({"arming_us": OLD_US}, Inhibit.NOT_ARMED),
+        ({"clock": None}, Inhibit.NO_CLOCK),
+        ({"clock_us": NOW_US - 400_001}, Inhibit.NO_CLOCK),
+        ({"clock": SimTime(source_us=1, sim_us=NOW_US, stamp_us=1, running=False)}, Inhibit.CLOCK_STOPPED),
+        ({"odometry": None}, Inhibit.NO_ODOMETRY),
+        ({"odometry_us": NOW_US - 400_001}, Inhibit.STALE_ODOMETRY),
+        ({"odometry": pose(3.0, 0.0, source_us=OLD_US)}, Inhibit.STALE_ODOMETRY),
+        ({"odometry": pose(3.0, 0.0, source_us=NOW_US + 200_000)}, Inhibit.STALE_ODOMETRY),
+        ({"odometry": pose(math.nan, 0.0)}, Inhibit.UNHEALTHY_ODOMETRY),
+        ({"odometry": msgspec.structs.replace(pose(0, 0), healthy=False)}, Inhibit.UNHEALTHY_ODOMETRY),
+        ({"advisory": None}, Inhibit.NO_ADVISORY),
+        ({"advisory_us": NOW_US - 600_001}, Inhibit.STALE_ADVISORY),
+        ({"advisory": advice(Direction.STRAIGHT, NOW_US - 3_500_001)}, Inhibit.STALE_ADVISORY),
+        ({"advisory": advice(Direction.STRAIGHT, NOW_US + 200_000)}, Inhibit.STALE_ADVISORY),
+        ({"advisory": advice(Direction.STOP)}, Inhibit.ADVISED_STOP),
+        ({"advisory": advice(Direction.NO_DATA)}, Inhibit.ADVISED_NO_DATA),
+        ({"odometry": msgspec.structs.replace(pose(3, 0), domain=42)}, Inhibit.WRONG_DOMAIN),
+    ],
+)
+@pytest.mark.parametrize("config", [PAPER, PAANI])
+def test_m8_m9_m10_m11_every_gate_is_named(
+    config: NavigatorConfig, changes: dict[str, object], inhibit: Inhibit
+) -> None:
+    _, order = run(config, heard(**changes))
+    assert inhibit in order.inhibits
+    assert (order.enable, order.speed_mps) == (False, 0.0)
+
+
+def test_m10_advice_may_be_3_5_s_old_but_must_keep_coming() -> None:
+    """M10: the allowance counts from the picture; receipt is bounded apart."""
+    old = heard(advisory=advice(Direction.STRAIGHT, NOW_US - 3_400_000))
+    assert run(PAPER, old)[1].enable
+
+
+def test_no_route_no_motion() -> None:
+    _, order = navigate(RUNNING, heard(), None, NOW_US, 43, PAANI)
+    assert order.inhibits == (Inhibit.NO_ROUTE,)
+
+
+def test_m9_m11_clock_must_advance_and_a_reset_must_advance_again() -> None:
+    """M9, M11: a paused clock stops the boat, and so does one that jumped back."""
+    state, now_us = NavState(), NOW_US
+    enabled = []
+    for sim_us in (100, 150, 150, 150, 150, 150, 200, 10, 60):
+        clock = SimTime(source_us=now_us, sim_us=sim_us, stamp_us=1)
+        state, order = run(PAANI, heard(now_us, clock=clock), state, now_us)
+        enabled.append(order.enable)
+        now_us += 110_000
+    assert enabled == [False, True, True, True, True, False, True, False, True]
+
+
+def test_after_a_reset_the_boat_joins_the_route_anew() -> None:
+    drill = Drill(PAANI, at_waypoint(3, reached=8))
+    back = heard(clock=SimTime(source_us=NOW_US, sim_us=5, stamp_us=1))
+    drill.state, order = run(PAANI, back, drill.state)
+    assert order.inhibits == (Inhibit.CLOCK_STOPPED,)
+    order = drill.order(Direction.STRAIGHT, pose(3.0, 0.0))
+    assert (order.waypoint_index, order.waypoints_reached, order.enable) == (1, 8, True)
+
+
+def test_evidence_and_plant_stamps_pass_through() -> None:
+    stamped = msgspec.structs.replace(advice(Direction.STRAIGHT, NOW_US - 400_000), sent_us=NOW_US - 5)
+    _, order = run(PAANI, heard(advisory=stamped))
+    assert (order.source_us, order.echo_us, order.advisory_sent_us) == (NOW_US - 400_000, 777, NOW_US - 5)
+
+
+@given(
+    x=st.floats(-50, 50),
+    y=st.floats(-50, 50),
+    yaw=st.floats(-3.14, 3.14),
+    direction=st.sampled_from(Direction),
+    profile=st.sampled_from([PAPER, PAANI]),
+)
+def test_an_order_that_moves_has_no_inhibits_and_is_finite(
+    x: float, y: float, yaw: float, direction: Direction, profile: NavigatorConfig
+) -> None:
+    _, order = run(profile, heard(odometry=pose(x, y, yaw), advisory=advice(direction)))
+    assert order.enable == (not order.inhibits)
+    assert order.enable == (direction not in {Direction.STOP, Direction.NO_DATA})
+    assert -math.pi <= order.heading_rad <= math.pi
+    assert 0.0 <= order.speed_mps <= profile.cruise_mps

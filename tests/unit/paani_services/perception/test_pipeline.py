@@ -1,0 +1,184 @@
+"""The whole of perception on real model files: evidence for good pictures, a cause for bad ones."""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+
+from paani import messages as m
+from paani.clock import stopwatch_ms
+from paani.config import PerceptionConfig, load_config
+from paani.errors import UserError
+from paani_models.catalogue import verified_path
+from paani_services.perception.engine import OnnxEngine
+from paani_services.perception.pipeline import Perceiver
+from tests.pictures import PICTURES, noisy, river
+
+HEADER = m.PictureHeader(source_us=1_000_000, frame_seq=7, frame_epoch=3, width_px=320, height_px=240)
+
+
+def perceiver(config: PerceptionConfig | None = None) -> Perceiver:
+    return Perceiver(config or PerceptionConfig(), stopwatch_ms)
+
+
+def jpeg(picture: np.ndarray) -> bytes:
+    return cv2.imencode(".jpg", picture)[1].tobytes()
+
+
+def test_b5_evidence_of_a_picture() -> None:
+    """B4, B5, B7: dimensions, source sequence, stamps, detections, lanes, timing, freshness; learned and eligible."""
+    evidence, mask = perceiver().perceive(jpeg(river()), HEADER, 0.12)
+    assert (evidence.source_us, evidence.frame_seq, evidence.frame_epoch) == (1_000_000, 7, 3)
+    assert (evidence.width_px, evidence.height_px, evidence.usable) == (320, 240, True)
+    assert (evidence.segmentation, evidence.navigation_eligible) == (m.SegmentationSource.LEARNED, True)
+    assert evidence.timing.frame_age_ms == pytest.approx(120.0)
+    timing = evidence.timing
+    assert 0.0 < timing.inference_ms <= timing.total_ms
+    assert min(timing.detector_ms, timing.segmenter_ms, timing.gate_ms, timing.decode_ms) > 0.0
+    assert evidence.confidence_threshold == 0.40
+    assert "detector" in evidence.models
+    assert mask is not None
+    assert mask.shape == (64, 80)
+    assert mask.dtype == np.uint8
+    assert set(np.unique(mask)) <= {0, 1, 2}
+    assert msgspec.json.decode(msgspec.json.encode(evidence), type=m.Evidence) == evidence
+
+
+def test_c15_the_threshold_is_one_setting_and_travels() -> None:
+    """C15."""
+    config = load_config(sets=["perception.detections.confidence=0.25"]).perception
+    evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
+    assert evidence.confidence_threshold == 0.25
+
+
+def test_concurrent_and_sequential_agree() -> None:
+    """B4: the order of the models changes nothing they say."""
+    one, _ = perceiver(PerceptionConfig(concurrent=True)).perceive(river(), HEADER, 0.0)
+    two, _ = perceiver(PerceptionConfig(concurrent=False)).perceive(river(), HEADER, 0.0)
+    assert (one.detections, one.left, one.center, one.right) == (two.detections, two.left, two.center, two.right)
+
+
+@pytest.mark.parametrize(("detector_ms", "begins"), [(30.0, "_detect"), (11.0, "_segment"), (5.0, "_segment")])
+def test_the_clearly_slower_net_begins_beside_the_gate(
+    detector_ms: float, begins: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What took 10 ms is the segmenter; the first run of each does not count. No answer depends on the order."""
+    readings = itertools.chain(
+        (0.0, 90.0, 90.0, 91.0, 100.0, 100.0 + detector_ms, 200.0, 210.0), itertools.repeat(211.0)
+    )
+    eyes = Perceiver(PerceptionConfig(), lambda: next(readings))
+    begun = []
+    submit = ThreadPoolExecutor.submit
+
+    def watched(pool: ThreadPoolExecutor, *call: Any) -> Future[Any]:
+        begun.append(call[0].__name__)
+        return submit(pool, *call)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", watched)
+    one, _ = eyes.perceive(river(), HEADER, 0.0)
+    two, _ = perceiver(PerceptionConfig(concurrent=False)).perceive(river(), HEADER, 0.0)
+    assert begun == [begins]
+    assert (one.detections, one.left, one.center, one.right) == (two.detections, two.left, two.center, two.right)
+    assert not eyes.perceive(PICTURES["black"], msgspec.structs.replace(HEADER, frame_epoch=2), 0.0)[0].usable
+    eyes.close()
+
+
+@pytest.mark.parametrize(
+    ("data", "cause"),
+    [
+        (b"", m.UnusableCause.UNDECODABLE),
+        (b"no picture", m.UnusableCause.UNDECODABLE),
+        (jpeg(river())[:200], m.UnusableCause.UNDECODABLE),
+        (jpeg(PICTURES["black"]), m.UnusableCause.BLACK),
+        (jpeg(PICTURES["white"]), m.UnusableCause.WHITE),
+        (jpeg(PICTURES["white_noise"]), m.UnusableCause.NOISE),
+        (jpeg(river()[:60]), m.UnusableCause.WRONG_SIZE),
+    ],
+)
+def test_a_bad_picture_is_a_value(data: bytes, cause: m.UnusableCause) -> None:
+    """J19, W1: unusable with its cause; no detections, no lanes, no mask."""
+    evidence, mask = perceiver().perceive(data, HEADER, 0.0)
+    assert (evidence.usable, evidence.cause, evidence.navigation_eligible) == (False, cause, False)
+    assert evidence.detections == ()
+    assert evidence.center.non_water == 1.0
+    assert evidence.water_edge == ()
+    assert mask is None
+
+
+def test_resolution_1_age_is_judged_at_the_start() -> None:
+    """J16: 0.8 s is still fresh, more is not looked at."""
+    assert perceiver().perceive(river(), HEADER, 0.8)[0].usable
+    old, _ = perceiver().perceive(river(), HEADER, 0.81)
+    assert (old.usable, old.cause) == (False, m.UnusableCause.STALE)
+
+
+def test_a_frozen_camera() -> None:
+    eyes = perceiver()
+    data = jpeg(river())
+    causes = [eyes.perceive(data, msgspec.structs.replace(HEADER, frame_seq=i), 0.0)[0].cause for i in range(6)]
+    assert causes == [m.UnusableCause.NONE] * 2 + [m.UnusableCause.FROZEN] * 4
+    assert eyes.perceive(jpeg(noisy(river(), 3.0)), HEADER, 0.0)[0].usable
+
+
+def test_f2_without_a_segmenter() -> None:
+    """F1, F2: a mask to look at, declared not learned and not eligible."""
+    evidence, mask = perceiver(PerceptionConfig(segmenter="none")).perceive(river(), HEADER, 0.0)
+    assert evidence.usable
+    assert (evidence.segmentation, evidence.navigation_eligible) == (m.SegmentationSource.FALLBACK, False)
+    assert mask is not None
+
+
+def test_a_missing_or_corrupt_model_is_the_users_to_mend(tmp_path: Path) -> None:
+    missing = tmp_path / "none.onnx"
+    with pytest.raises(UserError, match=r"none\.onnx"):
+        OnnxEngine.load("detector", str(missing), 1)
+    corrupt = tmp_path / "corrupt.onnx"
+    corrupt.write_bytes(verified_path("detector").read_bytes()[:1000])
+    with pytest.raises(UserError, match=r"corrupt\.onnx"):
+        OnnxEngine.load("detector", str(corrupt), 1)
+
+
+def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
+    """B7, C1, C4, D5: the contract is compared at start."""
+    file = tmp_path / "swapped.onnx"
+    shutil.copy(verified_path("segmenter"), file)
+    with pytest.raises(UserError, match=r"swapped\.onnx: detector must have"):
+        OnnxEngine.load("detector", str(file), 1)
+    assert OnnxEngine.load("segmenter", str(file), 1).info().startswith("segmenter ")
+
+
+def test_j19_the_paper_accepts_black() -> None:
+    """J19: no gate in the `paper` profile, so black is evidence like any other picture."""
+    paper = load_config(profile="paper").perception
+    evidence, _ = perceiver(paper).perceive(jpeg(PICTURES["black"]), HEADER, 0.0)
+    assert evidence.usable
+    assert not paper.concurrent
+
+
+def test_refused_pictures_leave_no_work_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One net begins beside the gate; however fast pictures are refused, one run at most is under way."""
+    eyes, begun = perceiver(), []
+    submit = ThreadPoolExecutor.submit
+
+    def watched(pool: ThreadPoolExecutor, *call: Any) -> Future[Any]:
+        begun.append(submit(pool, *call))
+        return begun[-1]
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", watched)
+    for epoch in range(20):
+        header = msgspec.structs.replace(HEADER, frame_epoch=epoch)
+        assert not eyes.perceive(PICTURES["black"], header, 0.0)[0].usable
+        assert sum(not work.done() for work in begun) <= 1
+    assert len(begun) == 20
+    assert eyes.perceive(river(), HEADER, 0.81)[0].cause is m.UnusableCause.STALE
+    assert len(begun) == 20, "what is too old costs nothing more"
+    assert eyes.perceive(river(), msgspec.structs.replace(HEADER, frame_epoch=99), 0.0)[0].usable
+    eyes.close()

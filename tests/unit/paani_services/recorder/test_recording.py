@@ -1,0 +1,255 @@
+"""Files that follow one another, a disk that fills up or fails, and what is said of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import shutil
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from mcap.reader import make_reader
+
+from paani import keys
+from paani.config import Config, RecorderConfig, load_config
+from paani.errors import UserError
+from paani.logs.folder import Recording as File
+from paani.logs.folder import free_path, recordings, require_folder, too_old
+from paani.logs.reader import open_log
+from paani.logs.repair import is_finished, repair
+from paani.logs.writer import read_head
+from paani_services.recorder.about import make_about
+from paani_services.recorder.backlog import Heard
+from paani_services.recorder.recording import Recording, remove_empty
+from tests.unit.paani.logs.small_logs import START_US, STEP_US, finished, odometry
+
+TOPICS = (keys.ODOMETRY, keys.PICTURE)
+
+
+def settings(folder: Path, **changes: Any) -> RecorderConfig:
+    values: dict[str, Any] = {"folder": str(folder), "min_free_mib": 0.0}
+    return RecorderConfig(**(values | changes))
+
+
+def heard(number: int, padding: int = 0) -> Heard:
+    data = msgspec.json.encode(odometry(number)) + b" " * padding
+    return Heard(keys.ODOMETRY, START_US + number * STEP_US, read_head(data), data, b"")
+
+
+def now_us(number: int) -> int:
+    return START_US + number * STEP_US
+
+
+def record(recording: Recording, numbers: range) -> None:
+    for number in numbers:
+        one = heard(number)
+        recording.counts.heard(one.topic.name, one.head)
+        recording.write([one], now_us(number))
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(file.name for file in folder.iterdir())
+
+
+def poses(folder: Path) -> list[int]:
+    return [record.seq for record in open_log(folder).records([keys.ODOMETRY.name])]
+
+
+def counted(recording: Recording) -> tuple[int, int]:
+    [topic] = recording.counts.topics()
+    return topic.written, topic.dropped
+
+
+def test_parts_follow_one_another_without_a_gap(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path, part_s=2.0), make_about(Config()), TOPICS)
+    record(recording, range(100))
+    recording.close([], now_us(100))
+    assert names(tmp_path) == ["20231114T221320Z-1.mcap", "20231114T221322Z-2.mcap", "20231114T221324Z-3.mcap"]
+    assert poses(tmp_path) == list(range(100))
+    log = open_log(tmp_path)
+    assert log.problems == []
+    assert log.config() == Config()
+    parts = [open_log(path).metadata("paani")["part"] for path in sorted(tmp_path.iterdir())]
+    assert parts == ["1", "2", "3"]
+    written = [open_log(path).metadata("recorder")[keys.ODOMETRY.name] for path in sorted(tmp_path.iterdir())]
+    assert sum(int(line.split()[0].removeprefix("written=")) for line in written) == 100
+    assert counted(recording) == (100, 0)
+
+
+def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path, part_mib=0.06, flush_s=0.1), make_about(Config()), TOPICS)
+    record(recording, range(1500))
+    recording.close([], now_us(1500))
+    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
+    assert len(sizes) > 2
+    assert max(sizes) < 0.06 * 2**20 * 1.6
+    assert poses(tmp_path) == list(range(1500))
+
+
+def test_a_crash_costs_at_most_what_was_not_flushed(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path, flush_s=0.5), make_about(Config()), TOPICS)
+    record(recording, range(95))
+    path = recording.path
+    assert path is not None
+    assert not is_finished(path)
+    with pytest.raises(UserError, match="is being written"):
+        repair(path)
+    crashed = tmp_path / "crashed"
+    crashed.mkdir()
+    shutil.copy(path, crashed)
+    repair(crashed / path.name)
+    kept = poses(crashed)
+    assert kept == list(range(len(kept)))
+    assert (95 - len(kept)) * STEP_US <= 0.5e6
+    recording.close([], now_us(95))
+
+
+def test_the_oldest_goes_when_the_budget_is_spent_unless_it_is_kept(tmp_path: Path) -> None:
+    """P3: rotation."""
+    finished(tmp_path, name="20200101T000000Z-1.mcap")
+    size = finished(tmp_path, name="20210101T000000Z-1.mcap").stat().st_size
+    finished(tmp_path, name="20220101T000000Z-1.mcap")
+    (tmp_path / "20200101T000000Z-1.mcap.keep").touch()
+    (tmp_path / "notes.mcap").write_bytes(b"x" * 10 * size)
+    budget_mib = 2.5 * size / 2**20
+    recording = Recording(settings(tmp_path, budget_mib=budget_mib), make_about(Config()), TOPICS)
+    record(recording, range(1))
+    assert "20210101T000000Z-1.mcap" not in names(tmp_path)
+    assert "20200101T000000Z-1.mcap" in names(tmp_path)
+    assert "20220101T000000Z-1.mcap" in names(tmp_path)
+    assert "notes.mcap" in names(tmp_path), "only recordings by their own name"
+    recording.close([], now_us(1))
+
+
+def test_kept_recordings_that_fill_the_budget_end_the_recording(tmp_path: Path) -> None:
+    size = finished(tmp_path, name="20200101T000000Z-1.mcap").stat().st_size
+    (tmp_path / "20200101T000000Z-1.mcap.keep").touch()
+    recording = Recording(settings(tmp_path, budget_mib=0.9 * size / 2**20), make_about(Config()), TOPICS)
+    record(recording, range(5))
+    assert recording.path is None
+    assert "recorder.budget_mib" in recording.problem
+    assert counted(recording) == (0, 5)
+
+
+def test_too_old_takes_no_more_than_it_must() -> None:
+    found = [File(Path(str(n)), 10, kept=n == 1) for n in range(5)]
+    assert too_old(found, 50) == []
+    assert too_old(found, 49) == [Path("0")]
+    assert too_old(found, 25) == [Path("0"), Path("2"), Path("3")]
+    assert too_old(found, 0) == [Path("0"), Path("2"), Path("3"), Path("4")]
+
+
+def test_a_disk_nearly_full_is_a_state_and_no_file(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path, min_free_mib=1e9), make_about(Config()), TOPICS)
+    record(recording, range(10))
+    assert recording.path is None
+    assert "recorder.min_free_mib" in recording.problem
+    assert counted(recording) == (0, 10)
+    recording.close([], now_us(10))
+    assert names(tmp_path) == []
+
+
+@contextlib.contextmanager
+def small_files() -> Iterator[None]:
+    """The system refuses to let a file grow beyond 60 kB, as a full disk would."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path, flush_s=0.1), make_about(Config()), TOPICS)
+    with small_files():
+        record(recording, range(1200))
+        recording.close([], now_us(1200))
+    assert len(names(tmp_path)) >= 2, "it began again"
+    written, dropped = counted(recording)
+    assert written + dropped == 1200
+    assert dropped > 0
+    for path in tmp_path.iterdir():
+        repair(path)
+    kept = poses(tmp_path)
+    assert len(kept) >= written
+    assert kept == sorted(set(kept))
+
+
+def test_a_folder_that_goes_away_is_a_state(tmp_path: Path) -> None:
+    folder = tmp_path / "r"
+    folder.mkdir()
+    recording = Recording(settings(folder), make_about(Config()), TOPICS)
+    record(recording, range(20))
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+    record(recording, range(20, 200))
+    assert recording.path is None
+    assert str(folder) in recording.problem
+    folder.mkdir()
+    record(recording, range(200, 500))
+    recording.close([], now_us(500))
+    assert recording.problem == ""
+    assert poses(folder)[-1] == 499
+
+
+def test_names_never_meet(tmp_path: Path) -> None:
+    first = free_path(tmp_path, START_US, 1)
+    first.touch()
+    assert free_path(tmp_path, START_US, 1).name == "20231114T221320Z-2.mcap"
+    for part in (2, 10, 9):
+        (tmp_path / f"20231114T221320Z-{part}.mcap").touch()
+    assert [file.path.name[17:-5] for file in recordings(tmp_path)] == ["1", "2", "9", "10"]
+    remove_empty(tmp_path)
+    assert recordings(tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(UserError, match=r"recorder\.folder .*file/below: Not a directory"):
+        require_folder(tmp_path / "file" / "below")
+    with pytest.raises(UserError, match="leave_out: no topic 'eye/pictures'"):
+        load_config(sets=('recorder.leave_out=["eye/pictures"]',))
+
+
+def test_what_made_it_is_known() -> None:
+    """A10: the recording names profile, settings, models and versions."""
+    about = make_about(Config())
+    versions = msgspec.json.decode(about.attachments["versions.json"])
+    assert versions["paani"] == about.version
+    assert versions["numpy"]
+    assert versions["python"].startswith("3.")
+    assert b"sha256" in about.attachments["models.json"]
+    assert about.facts == {"domain": "43", "vessel": "otter", "profile": "paani"}
+
+
+def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
+    recording = Recording(settings(tmp_path), make_about(Config()), TOPICS)
+    record(recording, range(30))
+    recording.close([heard(30)], now_us(30))
+    [path] = tmp_path.iterdir()
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        found = [one.sequence for _, channel, one in reader.iter_messages(topics=[keys.ODOMETRY.name])]
+    assert found == list(range(31))
+
+
+def test_what_is_finished_and_what_is_open_goes_to_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(os, "fdatasync", lambda fd: synced.append(Path(f"/proc/self/fd/{fd}").resolve().name))
+    recording = Recording(settings(tmp_path, part_s=1.0), make_about(Config()), TOPICS)
+    record(recording, range(30))
+    recording.sync()
+    assert sorted(synced) == names(tmp_path)
+    recording.close([], now_us(30))
+    synced.clear()
+    recording.sync()
+    assert synced == [names(tmp_path)[-1]], "the last, now that it is finished; the others are on the disk"

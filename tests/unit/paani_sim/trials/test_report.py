@@ -1,0 +1,75 @@
+"""The page about drives, its plans, and recordings that the replay reads."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from paani_sim.trials.cases import Case, scenario_of
+from paani_sim.trials.drive_recorder import Recorder
+from paani_sim.trials.one import config_for
+from paani_sim.trials.policies import Policy
+from paani_sim.trials.report import page
+from paani_sim.trials.result import Contact, TrialResult
+from paani_sim.trials.suite_summary import summarise
+from paani_sim.trials.track_chart import plan_view, worst_moment_s
+from paani_sim.trials.worst import Again, worst_of
+from tests.unit.paani_sim.trials.trial_results import RESULT
+
+CASES = [Case("lake", seed, Policy.PAANI) for seed in (1, 2, 3)]
+TOUCH = Contact(what="<met_1>", kind="buoy", at_s=7.0, x_m=0.0, y_m=0.0, speed_mps=0.5, visible=True)
+
+
+def touched(result: TrialResult) -> TrialResult:
+    return msgspec.structs.replace(result, contacts=(TOUCH,), collisions=1, collisions_visible=1)
+
+
+def test_the_worst_come_first() -> None:
+    late = msgspec.structs.replace(RESULT, completed=False)
+    results = {CASES[0]: RESULT, CASES[1]: late, CASES[2]: touched(RESULT)}
+    assert worst_of(results, 2) == [CASES[2], CASES[1]]
+    assert worst_of({Case("lake", 1, Policy.BLIND): RESULT}, 2) == [Case("lake", 1, Policy.BLIND)]
+
+
+def test_the_worst_moment() -> None:
+    """The touch, else the closest point, else where the drive ended."""
+    assert worst_moment_s(touched(RESULT)) == 7.0
+    assert worst_moment_s(RESULT) == 9.0
+    ended = msgspec.structs.replace(RESULT, completed=False, track=((3.0, 0.0, 0.0), (44.0, 9.0, 0.0)))
+    assert worst_moment_s(ended) == 44.0
+
+
+@pytest.mark.parametrize("world", ["lake", "canal"])
+def test_a_plan_is_well_formed_and_shows_the_track(world: str) -> None:
+    scenario = scenario_of(Case(world, 1, Policy.BLIND))
+    start = scenario.world.start
+    track = tuple((2.0 * k, start.x_m + k, start.y_m) for k in range(9))
+    plan = plan_view(scenario.world, touched(msgspec.structs.replace(RESULT, track=track)))
+    drawn = ElementTree.fromstring(plan)
+    kinds = [element.get("class") for element in drawn]
+    assert {"water", "route", "track", "start", "hit", "scale"} <= set(kinds)
+    numbers = [float(n) for n in re.findall(r"-?\d+\.\d+", drawn.find("*[@class='track']").get("points"))]  # type: ignore[union-attr, arg-type]
+    assert 0.0 < min(numbers) < max(numbers) < 520.0
+
+
+def test_the_page_stands_alone() -> None:
+    """Names are escaped, nothing is fetched, and the recording is linked."""
+    results = {CASES[0]: touched(RESULT), CASES[1]: RESULT, Case("lake", 1, Policy.BLIND): RESULT}
+    again = [Again(case=CASES[0], same=False, log="lake-1-paani.mcap", strip=b"png")]
+    text = page(summarise("quick", results), results, again, "all-drives")
+    assert "&lt;met_1&gt;" in text
+    assert "<met_1>" not in text
+    assert 'href="all-drives/lake-1-paani.mcap"' in text
+    assert "data:image/png;base64,cG5n" in text
+    assert "driven again it went otherwise" in text
+    assert not re.search(r"(src|href)=.(https?:)?//", text)
+    assert "NaN" not in text
+
+
+def test_a_recording_that_failed_is_not_there(tmp_path: Path) -> None:
+    file = tmp_path / "drive.mcap"
+    with pytest.raises(RuntimeError), Recorder(file, config_for(CASES[0])):
+        raise RuntimeError
+    assert not list(tmp_path.iterdir())

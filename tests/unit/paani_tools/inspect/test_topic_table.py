@@ -1,0 +1,35 @@
+"""The table of keys as people read it."""
+
+from __future__ import annotations
+
+import pytest
+
+from paani import keys
+from paani.errors import UserError
+from paani_tools.inspect.command import rate_line
+from paani_tools.inspect.topic_table import markdown, plain, topic_named
+
+
+def test_markdown_has_a_row_for_each_topic() -> None:
+    lines = markdown().splitlines()
+    assert len(lines) == 2 + len(keys.TOPICS)
+    assert len({line.count("|") for line in lines}) == 1
+    assert all(f"| `{topic.name}` |" in markdown() for topic in keys.TOPICS)
+
+
+def test_live_rates_are_a_column_of_their_own() -> None:
+    live = {topic.name: 4.25 for topic in keys.TOPICS}
+    assert plain(live).count("4.2") >= len(keys.TOPICS)
+    assert "now [Hz]" not in plain(None)
+
+
+def test_topics_are_found_by_name_and_mistakes_are_told() -> None:
+    assert topic_named("advisor/advisory") is keys.ADVISORY
+    assert topic_named("health/plant").producer == "plant"
+    with pytest.raises(UserError, match="advisor/advisory"):
+        topic_named("advisor/advisery")
+
+
+def test_rate_line_states_mean_and_spread() -> None:
+    assert rate_line([0.0, 100.0, 300.0], 5.0) == "6.67 Hz (nominal 5 Hz), gaps 100 to 200 ms, 3 messages"
+    assert rate_line([], 5.0).startswith("0 messages")

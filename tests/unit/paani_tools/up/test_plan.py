@@ -1,0 +1,129 @@
+"""What one start runs, and the settings it hands over."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import socket
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from paani import keys
+from paani.config import Config, decode_config, encode_config, load_config
+from paani.errors import UserError
+from paani_services.navigator.files.fence_file import load_fence
+from paani_services.navigator.files.route_file import load_route
+from paani_sim.worlds import WORLDS, load_world
+from paani_sim.worlds.load import load_scenario
+from paani_tools.up.command import up_sets
+from paani_tools.up.plan import make_plan
+from paani_tools.up.terminal import Display
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("name", sorted(WORLDS))
+async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_sets: tuple[str, ...]) -> None:
+    plan = await make_plan(load_config(sets=(*private_sets, f"world.name={name}")))
+    world = load_world(name)
+    route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
+    assert plan.config.localization.origin_lat_lon_deg == (world.origin_lat_deg, world.origin_lon_deg)
+    np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], world.route_m, atol=1e-4)
+    assert plan.services == tuple(name for name in keys.SERVICES if name != "recorder")
+    assert decode_config(encode_config(plan.config)) == plan.config
+
+
+async def test_a_scenario_s_open_route_and_fence_are_handed_over(private_sets: tuple[str, ...]) -> None:
+    plan = await make_plan(load_config(sets=(*private_sets, "world.name=harbour_crossing")))
+    scenario = await asyncio.to_thread(load_scenario, "harbour_crossing")
+    route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
+    fence = await asyncio.to_thread(load_fence, Path(plan.config.navigator.fence), None)
+    assert not route.repeat
+    np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], scenario.world.route_m, atol=1e-4)
+    assert fence == scenario.fence
+    plain = await make_plan(load_config(sets=(*private_sets, "world.name=harbour")))
+    assert not plain.config.navigator.fence
+
+
+async def test_the_simulator_s_camera_is_calibrated_and_no_other(private_sets: tuple[str, ...], tmp_path: Path) -> None:
+    """B16: a real camera's calibration is not established until somebody gives one."""
+    plan = await make_plan(load_config(sets=(*private_sets, "eye.pitch_down_deg=9.0")))
+    assert plan.config.calibration.valid
+    assert plan.config.calibration.pitch_down_deg == 9.0
+    own = ("calibration.hfov_deg=62", "calibration.height_m=0.8", "calibration.valid=true")
+    assert (await make_plan(load_config(sets=(*private_sets, *own)))).config.calibration.hfov_deg == 62.0
+    real = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
+    assert not real.config.calibration.valid
+
+
+async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> None:
+    own = ("navigator.route=mine.toml", "localization.origin_lat_lon_deg=[10.0, 20.0]")
+    plan = await make_plan(load_config(sets=(*private_sets, *own)))
+    assert plan.config.navigator.route == "mine.toml"
+    assert plan.config.localization.origin_lat_lon_deg == (10.0, 20.0)
+
+
+async def test_p4_a_start_runs_no_survey_benchmark_or_recorder(private_sets: tuple[str, ...]) -> None:
+    """P4: they are commands, or run only when asked for."""
+    commands = {point.name for point in entry_points(group="paani.commands")}
+    plan = await make_plan(load_config(sets=private_sets))
+    assert {"bench", "scenario", "logs"} <= commands
+    assert not commands & set(plan.services)
+    assert "recorder" not in plan.services
+
+
+async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_path: Path) -> None:
+    """The plant and everything else still run; the last gate waits for no pulse of the eye."""
+    plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
+    assert set(keys.SERVICES) - set(plan.services) == {"eye", "recorder"}
+    assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
+    with pytest.raises(UserError, match=r"camera\.source absent: no such file or folder"):
+        await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))
+
+
+async def test_a_busy_page_port_is_no_mistake_without_the_page(config: Config, private_sets: tuple[str, ...]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", config.dashboard.port))
+        taken.listen()
+        with pytest.raises(UserError, match=r"dashboard\.port"):
+            await make_plan(config)
+        await make_plan(load_config(sets=(*private_sets, "dashboard.serve=false")))
+
+
+def test_options_stand_for_settings(private_sets: tuple[str, ...]) -> None:
+    files = {"mission": Path("/a/m.toml"), "fence": Path("/a/f.toml")}
+    sets = up_sets(world="lake", camera="/some where/x.mp4", headless=True, **files)
+    config = load_config(sets=(*sets, *private_sets))
+    assert (config.world.name, config.camera.source) == ("lake", "/some where/x.mp4")
+    assert (config.navigator.mission, config.navigator.fence) == ("/a/m.toml", "/a/f.toml")
+    assert config.dashboard.arm_at_start
+    assert not config.dashboard.serve
+
+
+def test_a_plain_stream_gets_a_line_only_when_something_changes() -> None:
+    stream = io.StringIO()
+    display = Display(stream)
+    for elapsed_s in (0.0, 0.2, 0.4):
+        display.waiting(1, 2, ["eye"], elapsed_s)
+    display.say("all 2 processes alive after 0.6 s")
+    assert stream.getvalue().splitlines() == [
+        "starting  1/2   0.0 s  waiting for eye",
+        "all 2 processes alive after 0.6 s",
+    ]
+
+
+def test_a_terminal_has_one_line_that_is_updated() -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    stream = Terminal()
+    display = Display(stream)
+    display.waiting(0, 2, ["router", "eye"], 0.0)
+    display.waiting(1, 2, ["eye"], 0.2)
+    display.say("alive")
+    assert stream.getvalue().count("\n") == 1
+    assert stream.getvalue().endswith("\x1b[Kalive\n")
