@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from paani.arrays import U8
+
 WIDTH, HEIGHT = 320, 240
 
 
-def river(seed: int = 0) -> Bytes:
+def river(seed: int = 0) -> U8:
     """Sky, two banks with trees, rippled water, a boat."""
     rng = np.random.default_rng(seed)
     rows = np.linspace(0.0, 1.0, HEIGHT)[:, None, None]
@@ -25,16 +25,16 @@ def river(seed: int = 0) -> Bytes:
     return noisy(np.clip(picture, 0, 255).astype(np.uint8), 2.0, seed)
 
 
-def noisy(picture: Bytes, sigma: float, seed: int = 1) -> Bytes:
+def noisy(picture: U8, sigma: float, seed: int = 1) -> U8:
     noise = np.random.default_rng(seed).normal(0.0, sigma, picture.shape)
     return np.clip(picture + noise, 0, 255).astype(np.uint8)
 
 
-def solid(*bgr: int) -> Bytes:
+def solid(*bgr: int) -> U8:
     return np.asarray(np.full((HEIGHT, WIDTH, 3), bgr), np.uint8)
 
 
-def _test_card() -> Bytes:
+def _test_card() -> U8:
     card = solid(0, 0, 0)
     bars = ((255, 255, 255), (0, 255, 255), (255, 255, 0), (0, 255, 0), (255, 0, 255), (0, 0, 255), (255, 0, 0))
     for i, colour in enumerate(bars):
@@ -42,7 +42,7 @@ def _test_card() -> Bytes:
     return card
 
 
-def _salted(picture: Bytes) -> Bytes:
+def _salted(picture: U8) -> U8:
     where = np.random.default_rng(3).random(picture.shape[:2])
     salted = np.array(picture, np.uint8)
     salted[where < 0.15] = 0
@@ -50,17 +50,17 @@ def _salted(picture: Bytes) -> Bytes:
     return salted
 
 
-def _covered(share: float) -> Bytes:
+def _covered(share: float) -> U8:
     covered = river()
     covered[:, : round(share * WIDTH)] = noisy(solid(14, 12, 12), 1.5)[:, : round(share * WIDTH)]
     return covered
 
 
-def _scaled(gain: float, offset: float = 0.0) -> Bytes:
+def _scaled(gain: float, offset: float = 0.0) -> U8:
     return np.asarray(np.clip(river() * gain + offset, 0, 255), np.uint8)
 
 
-PICTURES: dict[str, Bytes] = {
+PICTURES: dict[str, U8] = {
     "river": river(),
     "river_in_fog": _scaled(0.25, 140.0),
     "river_at_dusk": _scaled(0.3),

@@ -9,22 +9,18 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from paani import messages as m
+from paani.arrays import U8
 from paani.config import LocalizationConfig, PerceptionConfig
 from paani.errors import UserError
-
-Bytes = NDArray[np.uint8]
 
 
 class Perceiving(Protocol):
     """Both nets and the gate, as `paani_services.perception` has them."""
 
     def perceive(
-        self, data: bytes | Bytes, header: m.PictureHeader, age_s: float, roll_rad: float = 0.0
-    ) -> tuple[m.Evidence, Bytes | None]:
+        self, data: bytes | U8, header: m.PictureHeader, age_s: float, roll_rad: float = 0.0
+    ) -> tuple[m.Evidence, U8 | None]:
         """Evidence of one distinct picture (encoded, or BGR uint8 [H, W, 3]), and its class mask uint8 [64, 80]."""
         ...
 

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-Fault = Callable[[Bytes, int, np.random.Generator], Bytes]
-Move = Callable[[Bytes, Bytes, int, np.random.Generator], tuple[Bytes, Bytes]]
+from paani.arrays import U8
+
+Fault = Callable[[U8, int, np.random.Generator], U8]
+Move = Callable[[U8, U8, int, np.random.Generator], tuple[U8, U8]]
 SEVERITIES = (1, 2, 3, 4, 5)
 IGNORE = 255
 WATER = 0  # in class masks
@@ -23,41 +23,41 @@ DRY = "above_water"  # as a fault's name: a view without water
 MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # the segmenter's mIoU on a fault below and above which the verdict is settled
 
 
-def black(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def black(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """No light: sensor noise alone."""
     return _clipped(rng.normal(2.0, 0.8 * severity, picture.shape))
 
 
-def white(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def white(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Nothing but light."""
     return _clipped(rng.normal(258.0 - severity, 0.8 * severity, picture.shape))
 
 
-def one_colour(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def one_colour(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """A hand, a wall, a lens cap in light: one colour, a slight gradient, sensor noise."""
     height = picture.shape[0]
     slope = np.linspace(-2.0 * severity, 2.0 * severity, height)[:, None, None]
     return _clipped(rng.uniform(30, 225, 3) + slope + rng.normal(0.0, 2.0, picture.shape))
 
 
-def underexposed(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def underexposed(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Too short a shutter: light lost, read-out noise left."""
     gain = (0.5, 0.25, 0.12, 0.05, 0.02)[severity - 1]
     return _clipped(picture * gain + rng.normal(0.0, 2.0, picture.shape))
 
 
-def overexposed(picture: Bytes, severity: int, _: np.random.Generator) -> Bytes:
+def overexposed(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Too long a shutter."""
     return _clipped(picture * (1.4, 2.0, 3.5, 7.0, 15.0)[severity - 1] + 5.0 * severity)
 
 
-def blur(picture: Bytes, severity: int, _: np.random.Generator) -> Bytes:
+def blur(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Out of focus, or grease on the lens."""
     sigma = (1.5, 3.0, 8.0, 14.0, 22.0)[severity - 1] * picture.shape[1] / 320
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), sigma), np.uint8)
 
 
-def motion_blur(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def motion_blur(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """The camera turned during the exposure."""
     length = round((5, 9, 15, 25, 41)[severity - 1] * picture.shape[1] / 320) | 1
     kernel = np.zeros((length, length), np.float32)
@@ -67,12 +67,12 @@ def motion_blur(picture: Bytes, severity: int, rng: np.random.Generator) -> Byte
     return np.asarray(cv2.filter2D(picture, -1, kernel / kernel.sum()), np.uint8)
 
 
-def noise(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def noise(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Gain without light."""
     return _clipped(picture + rng.normal(0.0, (8.0, 16.0, 40.0, 70.0, 110.0)[severity - 1], picture.shape))
 
 
-def salt_and_pepper(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def salt_and_pepper(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Dead and stuck pixels."""
     chance = rng.random(picture.shape[:2])
     share = (0.01, 0.05, 0.15, 0.3, 0.5)[severity - 1]
@@ -82,7 +82,7 @@ def salt_and_pepper(picture: Bytes, severity: int, rng: np.random.Generator) -> 
     return result
 
 
-def cover(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def cover(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Something dark before part of the lens, out of focus."""
     share = (0.15, 0.35, 0.6, 0.8, 0.97)[severity - 1]
     height, width = picture.shape[:2]
@@ -94,7 +94,7 @@ def cover(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
     return _clipped(picture * (1.0 - hidden) + hidden * (rng.uniform(0, 25, 3) + rng.normal(0, 1.5, picture.shape)))
 
 
-def drops(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def drops(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Water on the lens: each drop shows a blurred, shifted piece of the scene."""
     share = (0.05, 0.15, 0.35, 0.6, 0.9)[severity - 1]
     height, width = picture.shape[:2]
@@ -117,7 +117,7 @@ def drops(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
     return _clipped(picture * (1.0 - wet[:, :, None]) + shown * 1.1 * wet[:, :, None])
 
 
-def colour_bars(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def colour_bars(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """A receiver's test card over the picture, at the end nothing but the card."""
     height, width = picture.shape[:2]
     colours = np.array(
@@ -128,7 +128,7 @@ def colour_bars(picture: Bytes, severity: int, rng: np.random.Generator) -> Byte
     return _clipped(picture * (1.0 - share) + card * share + rng.normal(0.0, 1.0 + severity, picture.shape))
 
 
-def compression(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def compression(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Few bits, then broken ones: coarse JPEG, from severity 3 with damaged scan data."""
     quality = (20, 8, 8, 5, 3)[severity - 1]
     data = bytearray(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes())
@@ -141,7 +141,7 @@ def compression(picture: Bytes, severity: int, rng: np.random.Generator) -> Byte
     return np.asarray(broken, np.uint8) if whole else np.full_like(picture, 128)
 
 
-def drop_out(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def drop_out(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Bands of the picture were lost on the way and are grey."""
     result = picture.copy()
     rows = picture.shape[0] // 16
@@ -151,7 +151,7 @@ def drop_out(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
     return result
 
 
-def glare(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def glare(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """The low sun in the picture and on the water."""
     height, width = picture.shape[:2]
     y, x = np.mgrid[0:height, 0:width]
@@ -161,21 +161,21 @@ def glare(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
     return _clipped(picture + 255.0 * np.maximum(halo, streak)[:, :, None])
 
 
-def fog(picture: Bytes, severity: int, _: np.random.Generator) -> Bytes:
+def fog(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Contrast fades upwards, with distance."""
     left = (0.75, 0.55, 0.4, 0.25, 0.12)[severity - 1]
     clear = left + (1.0 - left) * np.linspace(0.0, 0.6, picture.shape[0])[:, None, None]
     return _clipped(picture * clear + 200.0 * (1.0 - clear))
 
 
-def night(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def night(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Little light and the gain turned up."""
     gain = (0.6, 0.45, 0.32, 0.22, 0.15)[severity - 1]
     dim = 255.0 * (picture / 255.0) ** 1.2 * gain * np.array((1.15, 1.0, 0.85))
     return _clipped(dim + rng.normal(0.0, 2.0 + severity, picture.shape))
 
 
-def rain(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
+def rain(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Streaks and a haze."""
     height, width = picture.shape[:2]
     seeds = (rng.random((height, width)) > 1.0 - 0.004 * severity).astype(np.float32)
@@ -187,14 +187,14 @@ def rain(picture: Bytes, severity: int, rng: np.random.Generator) -> Bytes:
     return _clipped((picture * (1.0 - haze) + 180.0 * haze) * (1.0 - 0.5 * streaks) + 220.0 * 0.5 * streaks)
 
 
-def false_colour(picture: Bytes, severity: int, _: np.random.Generator) -> Bytes:
+def false_colour(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Channels mixed up, at the end a negative."""
     orders = ((0, 0, 0), (2, 1, 0), (1, 2, 0), (1, 0, 2), (0, 1, 2))
     result = np.ascontiguousarray(picture[:, :, orders[severity - 1]])
     return np.asarray(255 - result, np.uint8) if severity == 5 else result
 
 
-def shuffled(picture: Bytes, mask: Bytes, severity: int, rng: np.random.Generator) -> tuple[Bytes, Bytes]:
+def shuffled(picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
     """Blocks in each other's place."""
     rows, columns = 6, 8
     places = np.arange(rows * columns)
@@ -203,18 +203,18 @@ def shuffled(picture: Bytes, mask: Bytes, severity: int, rng: np.random.Generato
     return _tiled(picture, places, rows, columns), _tiled(mask, places, rows, columns)
 
 
-def sheared(picture: Bytes, mask: Bytes, severity: int, _: np.random.Generator) -> tuple[Bytes, Bytes]:
+def sheared(picture: U8, mask: U8, severity: int, _: np.random.Generator) -> tuple[U8, U8]:
     """Lines of a wrong length: each row begins further along."""
     step = (0.05, 0.15, 0.4, 1.0, 3.0)[severity - 1]
 
-    def skewed(grid: Bytes) -> Bytes:
+    def skewed(grid: U8) -> U8:
         scale = grid.shape[1] / 320
         return np.stack([np.roll(row, round(i * step * scale), axis=0) for i, row in enumerate(grid)])
 
     return skewed(picture), skewed(mask)
 
 
-def tilted(picture: Bytes, mask: Bytes, severity: int, rng: np.random.Generator) -> tuple[Bytes, Bytes]:
+def tilted(picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
     """The camera is not upright: 12, 30, 60, 120, 180 degrees."""
     angle_deg = (12.0, 30.0, 60.0, 120.0, 180.0)[severity - 1] * float(rng.choice((-1.0, 1.0)))
     return _turned(picture, angle_deg, cv2.INTER_LINEAR, cv2.BORDER_REFLECT), _turned(
@@ -232,7 +232,7 @@ FAULTS: dict[str, Fault] = {
 MOVES: dict[str, Move] = {move.__name__: move for move in (shuffled, sheared, tilted)}
 
 
-def spoilt(name: str, picture: Bytes, mask: Bytes, severity: int, rng: np.random.Generator) -> tuple[Bytes, Bytes]:
+def spoilt(name: str, picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
     """A picture with one fault, and the mask of what it then shows (255 where nothing is known)."""
     if name in MOVES:
         return MOVES[name](picture, mask, severity, rng)
@@ -246,7 +246,7 @@ def due_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
     return "accept" if miou > MUST_ACCEPT else "free"
 
 
-def above_water(picture: Bytes, mask: Bytes) -> Bytes | None:
+def above_water(picture: U8, mask: U8) -> U8 | None:
     """The part of a picture above its water, as large as the picture: no water scene. None where that is too little."""
     height, width = picture.shape[:2]
     rows = np.flatnonzero((mask == WATER).mean(axis=1) > 0.02)
@@ -258,11 +258,11 @@ def above_water(picture: Bytes, mask: Bytes) -> Bytes | None:
     return np.asarray(cv2.resize(picture[:top, left : left + part], (width, height)), np.uint8)
 
 
-def _clipped(values: NDArray[np.floating]) -> Bytes:
+def _clipped(values: NDArray[np.floating]) -> U8:
     return np.asarray(np.clip(values, 0.0, 255.0), np.uint8)
 
 
-def _tiled(grid: Bytes, places: NDArray[np.intp], rows: int, columns: int) -> Bytes:
+def _tiled(grid: U8, places: NDArray[np.intp], rows: int, columns: int) -> U8:
     height, width = grid.shape[0] // rows, grid.shape[1] // columns
     result = grid.copy()
     for to, source in enumerate(places.tolist()):
@@ -273,7 +273,7 @@ def _tiled(grid: Bytes, places: NDArray[np.intp], rows: int, columns: int) -> By
     return result
 
 
-def _turned(grid: Bytes, angle_deg: float, interpolation: int, border: int) -> Bytes:
+def _turned(grid: U8, angle_deg: float, interpolation: int, border: int) -> U8:
     height, width = grid.shape[:2]
     turn = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), angle_deg, 1.0)
     return np.asarray(

@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani_models.catalogue import verified_path
 from paani_models.commands.models import data_folder
 from paani_models.datasets.selection import Pictures
@@ -30,7 +31,6 @@ from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
 from paani_models.segmenter.metrics import class_iou, confusion
 from paani_models.segmenter.scores import as_label, read_truth, restrict, scored_classes
 
-Floats = NDArray[np.float32]
 TIME_LIMIT_S = 900
 WORKER = """
 import sys, numpy as np, onnxruntime as ort
@@ -72,7 +72,7 @@ def main() -> int:
     return 0
 
 
-def _emulated(root: Path, net: Path, inputs: Floats) -> Floats:
+def _emulated(root: Path, net: Path, inputs: F32) -> F32:
     with tempfile.TemporaryDirectory() as folder:
         source, target, worker = (Path(folder) / name for name in ("inputs.npy", "outputs.npy", "worker.py"))
         np.save(source, inputs)
@@ -82,7 +82,7 @@ def _emulated(root: Path, net: Path, inputs: Floats) -> Floats:
         return np.asarray(np.load(target), np.float32)
 
 
-def _miou(outputs: Floats, samples: list[Sample]) -> float:
+def _miou(outputs: F32, samples: list[Sample]) -> float:
     """Mean IoU per source, averaged."""
     counts: dict[str, NDArray[np.int64]] = {}
     kinds = {sample.source.name: scored_classes(sample.source) for sample in samples}
@@ -94,7 +94,7 @@ def _miou(outputs: Floats, samples: list[Sample]) -> float:
     return float(np.mean([np.nanmean(iou) for iou in ious]))
 
 
-def _ap50(outputs: Floats, samples: list[Sample]) -> float:
+def _ap50(outputs: F32, samples: list[Sample]) -> float:
     """AP50 averaged over the classes that occur."""
     found = [decode(output, 0.01, 100) for output in outputs]
     truths = [plain(read_boxed(sample), SIZE_WH).boxes for sample in samples]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 
 import pytest
@@ -26,7 +27,8 @@ def test_the_file_is_complete() -> None:
 def test_a_row_is_proved_exempt_or_pending(claim: str) -> None:
     row = CLAIMS[claim]
     assert len(row.keys() & {"test", "exempt", "pending"}) == 1
-    assert row.keys() <= {"test", "exempt", "pending"}
+    assert row.keys() <= {"says", "test", "exempt", "pending"}
+    assert len(row["says"].split()) >= 4, "a statement is a sentence"
     for name in row.get("test", []):
         file, _, function = name.partition("::")
         assert (ROOT / file).is_file(), name
@@ -34,3 +36,14 @@ def test_a_row_is_proved_exempt_or_pending(claim: str) -> None:
         functions = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)}
         assert function in functions, name
     assert row.get("test", True), "an empty list of tests proves nothing"
+
+
+def test_every_cited_statement_is_in_the_file() -> None:
+    """An id in a docstring or comment, such as (J7) or (I1-I5), is a row of the file."""
+    cited = re.compile(r"\b([A-W])(\d{1,2})\b(?:\s?-\s?[A-W]?(\d{1,2})\b)?")
+    for folder in ("shared", "services", "sim_host", "models"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for bracket in re.findall(r"\(([A-W]\d[^()]{0,60})\)", path.read_text(encoding="utf-8")):
+                for letter, first, last in cited.findall(bracket):
+                    for number in (first, last or first):
+                        assert f"{letter}{int(number)}" in CLAIMS, (path, bracket)

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import U8, Bools
 from paani.errors import UserError
 from paani_models.datasets.checked_files import decode_picture, read_bytes
 from paani_models.datasets.sources import IGNORE
@@ -30,9 +31,6 @@ WATER_EROSION_PX = 21
 MIN_COVERAGE = 0.7
 
 _FROM_OURS = np.array([WATER, OBSTACLE, SKY], np.uint8)  # our classes are water 0, obstacle 1, sky 2
-
-Mask = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
 
 
 class Segment(msgspec.Struct, frozen=True):
@@ -61,8 +59,8 @@ class _Panoptic(msgspec.Struct, frozen=True):
 class Truth:
     """One annotated picture: semantic [H,W], panoptic RGB [H,W,3], and its segments."""
 
-    semantic: Mask
-    panoptic: Mask
+    semantic: U8
+    panoptic: U8
     segments: tuple[Segment, ...]
 
 
@@ -77,7 +75,7 @@ class Tally:
     missed: int = 0
     alarms: int = 0
 
-    def add(self, predicted: Mask, truth: Truth) -> None:
+    def add(self, predicted: U8, truth: Truth) -> None:
         """Count one picture. predicted: LaRS classes, any size; resized to the truth's, nearest pixel."""
         height, width = truth.semantic.shape
         label = np.asarray(cv2.resize(predicted, (width, height), interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
@@ -122,17 +120,17 @@ class Tally:
         }
 
 
-def from_ours(label: Mask) -> Mask:
+def from_ours(label: U8) -> U8:
     """Our classes 0..2 -> LaRS's."""
     return _FROM_OURS[label]
 
 
-def coloured(label: Mask) -> Mask:
+def coloured(label: U8) -> U8:
     """LaRS classes -> the RGB picture that the server reads, uint8 [H,W,3]."""
     return np.array(COLOURS, np.uint8)[label]
 
 
-def write_prediction(folder: Path, name: str, label: Mask) -> None:
+def write_prediction(folder: Path, name: str, label: U8) -> None:
     """Write `folder`/NAME.png in the server's colours. label: our classes."""
     path = folder / f"{name}.png"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -140,7 +138,7 @@ def write_prediction(folder: Path, name: str, label: Mask) -> None:
         raise UserError(f"{path}: cannot be written")
 
 
-def read_prediction(path: Path) -> Mask:
+def read_prediction(path: Path) -> U8:
     """A picture in the server's colours -> LaRS classes. Raises UserError naming one unreadable or of other colours."""
     picture = decode_picture(read_bytes(path), path)
     label = np.full(picture.shape[:2], IGNORE, np.uint8)
@@ -185,9 +183,9 @@ def read_truth(root: Path, name: str, segments: dict[str, tuple[Segment, ...]]) 
     return Truth(semantic[..., 0], panoptic, segments[name])
 
 
-def _dilated(mask: Flags, side: int) -> Flags:
+def _dilated(mask: Bools, side: int) -> Bools:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)), np.bool_)
 
 
-def _eroded(mask: Flags, side: int) -> Flags:
+def _eroded(mask: Bools, side: int) -> Bools:
     return np.asarray(cv2.erode(mask.astype(np.uint8), np.ones((side, side), np.uint8)), np.bool_)

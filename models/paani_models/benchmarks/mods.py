@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F64, U8, Bools
 from paani.errors import UserError
 
 OBSTACLE, WATER, SKY = 0, 1, 2
@@ -28,10 +29,6 @@ CAMERA_HEIGHT_M = 1.0
 ZONE_HALF_ANGLE_DEG = 40.0
 
 _FROM_OURS = np.array([WATER, OBSTACLE, SKY], np.uint8)  # our classes are water 0, obstacle 1, sky 2
-
-Mask = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
-Doubles = NDArray[np.float64]
 
 
 class Obstacle(msgspec.Struct, frozen=True):
@@ -91,7 +88,7 @@ class Tally:
     under_px: int = 0
     objects: NDArray[np.int64] = field(default_factory=lambda: np.zeros((2, 3), np.int64))
 
-    def add(self, label: Mask, frame: Frame, zone: Flags, *, exhaustive: bool = True) -> None:
+    def add(self, label: U8, frame: Frame, zone: Bools, *, exhaustive: bool = True) -> None:
         """Count one picture. label: MODS classes, at the size of the annotation; zone: True in the danger zone."""
         obstacle = label == OBSTACLE
         land = land_mask(frame.water_edges, obstacle.shape)
@@ -112,7 +109,7 @@ class Tally:
             "f1_zone": _f1(self.objects[1]),
         }
 
-    def _edge(self, obstacle: Flags, edge_row: NDArray[np.int64]) -> None:
+    def _edge(self, obstacle: Bools, edge_row: NDArray[np.int64]) -> None:
         """edge_row: first row below the land per column, 0 where none is judged."""
         height = len(obstacle)
         lower = np.zeros(obstacle.shape, np.bool_)
@@ -136,7 +133,7 @@ class Tally:
         if errors:
             self.frame_errors_px.append(float(np.mean(errors)))
 
-    def _objects(self, obstacle: Flags, frame: Frame, zone: Flags) -> list[Obstacle]:
+    def _objects(self, obstacle: Bools, frame: Frame, zone: Bools) -> list[Obstacle]:
         found = []
         for each in _judged(frame):
             spot = _box(each)
@@ -148,7 +145,7 @@ class Tally:
                 found.append(each)
         return found
 
-    def _alarms(self, obstacle: Flags, frame: Frame, land: Flags, zone: Flags, found: list[Obstacle]) -> None:
+    def _alarms(self, obstacle: Bools, frame: Frame, land: Bools, zone: Bools, found: list[Obstacle]) -> None:
         reach = int(np.ceil(EXPANDED_FRAC * obstacle.shape[1]))
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
         near = np.asarray(cv2.dilate(land.astype(np.uint8), kernel), np.bool_)
@@ -173,7 +170,7 @@ class Tally:
             self.objects[1, 2] += alarms if zone[y : y + height, x : x + width].any() else 0
 
 
-def land_mask(edges: tuple[WaterEdge, ...], shape: tuple[int, ...]) -> Flags:
+def land_mask(edges: tuple[WaterEdge, ...], shape: tuple[int, ...]) -> Bools:
     """True above any of the lines, bool [H,W]; False in columns without one."""
     rows = np.arange(shape[0])[:, None]
     land = np.zeros(shape[:2], np.bool_)
@@ -190,13 +187,13 @@ def land_mask(edges: tuple[WaterEdge, ...], shape: tuple[int, ...]) -> Flags:
 def danger_zone(
     roll_deg: float,
     pitch_deg: float,
-    camera: Doubles,
-    distortion: Doubles,
+    camera: F64,
+    distortion: F64,
     size_wh: tuple[int, int] = SIZE_WH,
     *,
     radius_m: float = ZONE_RADIUS_M,
     height_m: float = CAMERA_HEIGHT_M,
-) -> Flags:
+) -> Bools:
     """Water nearer than `radius_m` to a camera `height_m` above it, tilted as its IMU says: bool [H,W].
 
     camera: 3x3 matrix; distortion: OpenCV's coefficients.
@@ -216,12 +213,12 @@ def danger_zone(
     return mask.astype(np.bool_)
 
 
-def from_ours(label: Mask) -> Mask:
+def from_ours(label: U8) -> U8:
     """Our classes 0..2 -> MODS's."""
     return _FROM_OURS[label]
 
 
-def write_prediction(folder: Path, method: str, sequence: str, frame: str, label: Mask) -> None:
+def write_prediction(folder: Path, method: str, sequence: str, frame: str, label: U8) -> None:
     """Write `folder`/METHOD/SEQUENCE/FRAME.png in the benchmark's colours. label: MODS's classes."""
     path = folder / method / sequence / f"{Path(frame).stem}.png"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -250,7 +247,7 @@ def _box(obstacle: Obstacle, margin: int = 0) -> tuple[slice, slice]:
     )
 
 
-def _straddled(frame: Frame, land: Flags) -> Flags:
+def _straddled(frame: Frame, land: Bools) -> Bools:
     """Columns where an object stands across the water edge, which cannot be placed there."""
     columns = np.zeros(land.shape[1], np.bool_)
     for each in frame.obstacles:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.arrays import F32, Bools
 from paani.errors import UserError
 from paani_models.benchmarks import lars, mods, mods_tracks
 from paani_models.datasets.checked_files import decode_picture, read_bytes
@@ -24,9 +25,6 @@ from paani_models.network_input import SIZE_WH, detector_input, letterbox_affine
 from paani_models.segmenter.scores import segmenter
 
 METHOD = "paani"
-
-Rows = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 
 
 def score_lars(net: Path, root: Path, predictions: Path | None = None) -> dict[str, float]:
@@ -56,8 +54,8 @@ def score_mods(
     dataset = mods.read_dataset(root / "mods.json")
     segment, detect = segmenter(segmenter_net), open_net(detector_net)
     tally = mods.Tally()
-    above: list[tuple[Rows, Rows]] = []
-    near: list[tuple[Rows, Rows]] = []
+    above: list[tuple[F32, F32]] = []
+    near: list[tuple[F32, F32]] = []
     found: dict[tuple[int, int], tuple[mods_tracks.Detection, ...]] = {}
     for sequence in dataset.sequences:
         name = Path(sequence.path.strip("/")).parts[0]
@@ -95,7 +93,7 @@ def score_mods(
     }
 
 
-def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> Rows:
+def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> F32:
     """Net output [8,A] -> class and corners in picture pixels [n,5], above the board's threshold."""
     boxes = decode(output, CONFIDENCE)
     affine = letterbox_affine(size_wh, SIZE_WH)
@@ -104,7 +102,7 @@ def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> R
     return np.hstack([boxes.classes[:, None], inside]).astype(np.float32)
 
 
-def true_rows(obstacles: Sequence[mods.Obstacle]) -> Rows:
+def true_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
     """Type and corners [n,5] of what is annotated; regions that are not judged are left out."""
     types = {"ship": 0, "person": 1}
     rows = [
@@ -115,7 +113,7 @@ def true_rows(obstacles: Sequence[mods.Obstacle]) -> Rows:
     return np.array(rows, np.float32).reshape(-1, 5)
 
 
-def outside(rows: Rows, ignored: Flags) -> Rows:
+def outside(rows: F32, ignored: Bools) -> F32:
     """Rows of which no more than half lies in the ignored part of the picture."""
     kept = []
     for row in rows:

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.errors import UserError
-
-Picture = NDArray[np.uint8]
 
 MIN_SIDE_PX = 16  # below the deepest stride of either net there is nothing to learn from
 EDGE_SLACK = 0.01  # makers round to pixels; a box that passes the picture's edge by this share of it is clipped
@@ -50,7 +49,7 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def decode_picture(data: bytes, path: Path) -> Picture:
+def decode_picture(data: bytes, path: Path) -> U8:
     """RGB uint8 [H,W,3]. Raises UserError naming what is no picture, or one too small to show anything."""
     picture = _decoded(data, cv2.IMREAD_COLOR)
     if picture is None:
@@ -60,7 +59,7 @@ def decode_picture(data: bytes, path: Path) -> Picture:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)
 
 
-def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, int]) -> Picture:
+def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, int]) -> U8:
     """Codes as they are in the file, uint8 [H,W].
 
     Raises UserError naming a file that is no picture, has colours or more than 8 bits, another size than `wh`, or a
@@ -90,7 +89,7 @@ def _decoded(data: bytes, flags: int) -> NDArray[np.generic] | None:
 
 
 def read_yolo(path: Path, kinds: int) -> tuple[Box, ...]:
-    """Rows `class cx cy width height`, all shares of the picture (checklist R8).
+    """Rows `class cx cy width height`, all shares of the picture (R8).
 
     Raises UserError naming file and line of a row that is malformed or not finite, of an unknown class, and of a box
     without area or outside the picture. Boxes end inside it.

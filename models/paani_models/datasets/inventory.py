@@ -40,7 +40,7 @@ def read_everything(samples: Sequence[Sample], folder_of: FolderOf) -> list[Seen
     """Decode every picture, mask and label once.
 
     Raises UserError naming the first bad file and counting the others: missing, truncated or unreadable pictures and
-    masks, a mask of another size than its picture, a bad box (checklist R8), a picture of a prepared public set whose
+    masks, a mask of another size than its picture, a bad box (R8), a picture of a prepared public set whose
     checksum is no longer that of its manifest.
     """
     seen: list[Seen] = []

@@ -1,4 +1,4 @@
-"""MaSTr1325 in its official layout -> pictures and masks of three classes (checklist R9 - R11).
+"""MaSTr1325 in its official layout -> pictures and masks of three classes (R9 - R11).
 
 ROOT/MaSTr1325_images_512x384/0001.jpg      or ROOT/images/
 ROOT/MaSTr1325_masks_512x384/0001m.png      or ROOT/masks/     0 obstacle, 1 water, 2 sky, 4 unknown
@@ -26,9 +26,9 @@ from paani_models.datasets.sources import IGNORE
 SplitBy = Literal["image", "sequence"]
 
 SIZE_WH = (512, 384)
-SEED = 42  # checklist R9 names a seed; S4 and S7 use this one
-VAL_FRAC = 0.15  # checklist R9: 198 of 1,325
-UNKNOWN = 4  # checklist R10
+SEED = 42  # R9 names a seed; S4 and S7 use this one
+VAL_FRAC = 0.15  # R9: 198 of 1,325
+UNKNOWN = 4  # R10
 SEQUENCE_BITS = 24  # consecutive pictures whose hashes differ in more bits begin a new sequence
 CODES = frozenset({0, 1, 2, UNKNOWN, IGNORE})
 TERMS = SourceManifest(
@@ -42,9 +42,9 @@ TERMS = SourceManifest(
 
 
 def split_by_image(names: Sequence[str], seed: int = SEED) -> dict[str, Split]:
-    """A seeded 15 % of single pictures for validation, as the paper split them (checklist R9).
+    """A seeded 15 % of single pictures for validation, as the paper split them (R9).
 
-    Neighbours of a validation picture are trained on (checklist R11).
+    Neighbours of a validation picture are trained on (R11).
     """
     shuffled = sorted(names)
     random.Random(seed).shuffle(shuffled)

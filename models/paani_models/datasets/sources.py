@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from paani.errors import UserError
 
 IGNORE = 255
-SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # checklist D6
-DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # checklist C2
+SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
+DETECTOR_CLASSES = ("person", "vessel", "pier", "buoy")  # C2
 WATER_MASKS = "masks"
 ANNOTATIONS = Path(__file__).parents[1] / "annotations"  # <source folder>/<picture>.txt, boxes that we drew
 WITHOUT_WATER = ANNOTATIONS / "without_water.txt"  # pictures that show none, a path below the data folder a line
 RENDERED = "rendered"  # the one source that is drawn, not photographed
 
-# Coded mask value -> segmenter class (checklist R10): 0 obstacle -> 1, 1 water -> 0, 2 sky -> 2, else ignored.
+# Coded mask value -> segmenter class (R10): 0 obstacle -> 1, 1 water -> 0, 2 sky -> 2, else ignored.
 _MASK_CODES = np.full(256, IGNORE, np.uint8)
 _MASK_CODES[:3] = (1, 0, 2)
 
@@ -173,7 +173,7 @@ class _Manifest(msgspec.Struct):
 
 
 def class_mask(coded: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Mask in file codes, any shape -> segmenter classes water 0, obstacle 1, sky 2, 255 ignored (checklist R10)."""
+    """Mask in file codes, any shape -> segmenter classes water 0, obstacle 1, sky 2, 255 ignored (R10)."""
     return _MASK_CODES[coded]
 
 
@@ -252,7 +252,7 @@ def is_held_out(source: Source, sequence: str) -> bool:
 def read_boxes(label: Path) -> NDArray[np.float32]:
     """YOLO text -> float32 [n,5]: class, x1, y1, x2, y2 normalised and clipped to the picture.
 
-    Raises UserError where a row is malformed, a class unknown, or a box empty (checklist R8).
+    Raises UserError where a row is malformed, a class unknown, or a box empty (R8).
     """
     rows = []
     for number, line in enumerate(label.read_text().splitlines(), 1):

@@ -1,4 +1,4 @@
-"""WaterScenes in its official layout -> pictures and boxes of four classes (checklist R1 - R8).
+"""WaterScenes in its official layout -> pictures and boxes of four classes (R1 - R8).
 
     ROOT/image/000001.jpg
     ROOT/detection/yolo/000001.txt      class cx cy width height
@@ -23,9 +23,9 @@ from paani_models.datasets.manifest import SPLITS, SourceManifest, Split
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
 PIER, BUOY, SAILOR, SHIP, BOAT, VESSEL, KAYAK = range(7)
-SEED = 42  # checklist R2
-TRAIN_IMAGES = 10_000  # checklist R1
-RARE = frozenset({BUOY, SAILOR, KAYAK})  # checklist R2
+SEED = 42  # R2
+TRAIN_IMAGES = 10_000  # R1
+RARE = frozenset({BUOY, SAILOR, KAYAK})  # R2
 OUR_CLASS = {
     SAILOR: "person",
     SHIP: "vessel",
@@ -34,7 +34,7 @@ OUR_CLASS = {
     KAYAK: "vessel",
     PIER: "pier",
     BUOY: "buoy",
-}  # checklist R4
+}  # R4
 TERMS = SourceManifest(
     source="waterscenes",
     repo="WaterScenes/WaterScenes",
@@ -49,7 +49,7 @@ TERMS = SourceManifest(
 def read_lists(root: Path) -> dict[Split, tuple[str, ...]]:
     """Ids per split, in the official order.
 
-    Raises UserError naming a list that is missing or empty, an id named twice, or one in two splits (checklist R8).
+    Raises UserError naming a list that is missing or empty, an id named twice, or one in two splits (R8).
     """
     lists: dict[Split, tuple[str, ...]] = {}
     owner: dict[str, Split] = {}
@@ -71,7 +71,7 @@ def read_lists(root: Path) -> dict[Split, tuple[str, ...]]:
 
 
 def select_train(boxes: Mapping[str, Sequence[Box]], limit: int = TRAIN_IMAGES, seed: int = SEED) -> tuple[str, ...]:
-    """Choose `limit` ids: first those that show a buoy, sailor or kayak, then others at random (checklist R2).
+    """Choose `limit` ids: first those that show a buoy, sailor or kayak, then others at random (R2).
 
     boxes: by id, in WaterScenes classes. Sorted; the same for the same ids and seed, whatever their order.
     """
@@ -86,7 +86,7 @@ def select_train(boxes: Mapping[str, Sequence[Box]], limit: int = TRAIN_IMAGES, 
 
 
 def mapped(boxes: Sequence[Box]) -> tuple[Box, ...]:
-    """WaterScenes classes -> ours; every box is kept (checklist R3, R4)."""
+    """WaterScenes classes -> ours; every box is kept (R3, R4)."""
     return tuple(Box(DETECTOR_CLASSES.index(OUR_CLASS[b.kind]), b.cx, b.cy, b.width, b.height) for b in boxes)
 
 

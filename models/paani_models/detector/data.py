@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.arrays import F32
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, Source, read_boxes, read_mask, read_picture
 from paani_models.network_input import PAD_GREY, letterbox_affine
-from paani_models.training.augment import GLARE_FRAC, Affine, Rng, degrade, glare, jitter_colour
+from paani_models.training.augment import GLARE_FRAC, Rng, degrade, glare, jitter_colour
 
 LONG_SIDE_PX = 480
 CELL_PX = 8  # the finest stride of the detector
@@ -20,7 +21,7 @@ MIN_SIDE_PX = 3.0
 MIN_VISIBLE_FRAC = 0.35
 PSEUDO_PERSON_MIN_SCORE = 0.5
 SMALL_PX, SMALL_FRAC, CLOSE_UP_PX, CLOSE_UP_ZOOM = 12.0, 0.4, (5.0, 24.0), 4.0
-WATER, OBSTACLE, SKY = 0, 1, 2  # checklist D6
+WATER, OBSTACLE, SKY = 0, 1, 2  # D6
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def plain(item: BoxedPicture, target_wh: tuple[int, int]) -> Example:
     return place(item, letterbox_affine((width, height), target_wh), target_wh)
 
 
-def place(item: BoxedPicture, affine: Affine, target_wh: tuple[int, int]) -> Example:
+def place(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> Example:
     """Warp picture, boxes and judged map; what lies outside the picture is grey and judged empty.
 
     A box that is left too small or too hidden is dropped, and its class is not judged where it was.
@@ -141,7 +142,7 @@ def _cells(judged: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 def random_placement(
     rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], zoom: tuple[float, float]
-) -> Affine:
+) -> F32:
     """Letterbox, then flip, zoom with a little aspect jitter, and a shift that keeps most of the picture."""
     fit = min(target_wh[0] / source_wh[0], target_wh[1] / source_wh[1])
     scale = fit * np.exp(rng.uniform(np.log(zoom[0]), np.log(zoom[1])))
@@ -155,7 +156,7 @@ def random_placement(
     return np.array([[x_scale, 0, x_low], [0, scale / stretch, low[1]]], np.float32)
 
 
-def close_up(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> Affine | None:
+def close_up(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> F32 | None:
     """Zoom in on one small object, so that its shorter side gets CLOSE_UP_PX pixels; None where none is small."""
     source = np.array(item.picture.shape[1::-1], np.float64)
     fit = float((target_wh / source).min())

@@ -96,7 +96,7 @@ def detector_loss(
     """Box loss and score loss, each divided by the number of assigned candidates.
 
     boxes [N,A,4] and logits [N,A,5] as `Detector.raw` gives them. The score target of an assigned candidate is the
-    square root of its IoU, so that a good box of a small object still scores above the 0.40 threshold (checklist C6).
+    square root of its IoU, so that a good box of a small object still scores above the 0.40 threshold (C6).
     """
     centres, strides = (t.to(boxes.device) for t in candidate_grid(*size_hw))
     corners = box_corners(boxes)

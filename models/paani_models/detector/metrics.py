@@ -1,4 +1,4 @@
-"""Average precision by the 101-point rule (checklist U1, U2), and recall and false alarms at the board's threshold."""
+"""Average precision by the 101-point rule (U1, U2), and recall and false alarms at the board's threshold."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Doubles = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from paani.arrays import F32, F64, Bools
 
-IOU_STEPS = np.linspace(0.5, 0.95, 10)  # checklist U2
-RECALL_STEPS = np.linspace(0.0, 1.0, 101)  # checklist U1
-CONFIDENCE = 0.40  # checklist C6
-NMS_IOU = 0.45  # checklist C8
-NMS_INPUT = 256  # checklist C7
-MAX_BOXES = 24  # checklist C9
+IOU_STEPS = np.linspace(0.5, 0.95, 10)  # U2
+RECALL_STEPS = np.linspace(0.0, 1.0, 101)  # U1
+CONFIDENCE = 0.40  # C6
+NMS_IOU = 0.45  # C8
+NMS_INPUT = 256  # C7
+MAX_BOXES = 24  # C9
 NEAR_SIDE_PX = 16.0  # an object whose shorter side is at least this counts as near
 
 
@@ -26,8 +24,8 @@ NEAR_SIDE_PX = 16.0  # an object whose shorter side is at least this counts as n
 class Found:
     """What was found in one picture: corner boxes [n,4], scores [n], class ids [n]."""
 
-    boxes: Floats
-    scores: Floats
+    boxes: F32
+    scores: F32
     classes: NDArray[np.int64]
 
 
@@ -38,14 +36,14 @@ class Judged:
     hits: [10, n], by IOU_STEPS. near_found and near: true boxes of NEAR_SIDE_PX and more, found at CONFIDENCE and all.
     """
 
-    scores: Floats
-    hits: Flags
+    scores: F32
+    hits: Bools
     positives: int
     near_found: int
     near: int
 
 
-def decode(output: Floats, confidence: float, limit: int = MAX_BOXES) -> Found:
+def decode(output: F32, confidence: float, limit: int = MAX_BOXES) -> Found:
     """One picture's net output [8,A] -> boxes in input pixels: finite, best class, class-agnostic NMS."""
     output = output[:, np.isfinite(output).all(0)]
     best = output[4:].argmax(0)
@@ -64,7 +62,7 @@ def decode(output: Floats, confidence: float, limit: int = MAX_BOXES) -> Found:
     )
 
 
-def overlaps(a: Floats, b: Floats) -> Doubles:
+def overlaps(a: F32, b: F32) -> F64:
     """IoU matrix [len(a), len(b)] of corner boxes; 0 where both are empty."""
     first, second = a.astype(np.float64), b.astype(np.float64)
     low = np.maximum(first[:, None, :2], second[None, :, :2])
@@ -75,12 +73,12 @@ def overlaps(a: Floats, b: Floats) -> Doubles:
     return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
 
 
-def match(boxes: Floats, scores: Floats, truth: Floats, threshold: float) -> Flags:
+def match(boxes: F32, scores: F32, truth: F32, threshold: float) -> Bools:
     """Whether each box, best score first, hits a truth box not hit before; in the order of `boxes`."""
     return _match(overlaps(boxes, truth), scores, threshold)
 
 
-def _match(table: Doubles, scores: Floats, threshold: float) -> Flags:
+def _match(table: F64, scores: F32, threshold: float) -> Bools:
     hits = np.zeros(len(table), np.bool_)
     if table.size == 0:
         return hits
@@ -93,13 +91,13 @@ def _match(table: Doubles, scores: Floats, threshold: float) -> Flags:
     return hits
 
 
-def precision_recall(scores: Floats, hits: Flags, positives: int) -> tuple[Doubles, Doubles]:
+def precision_recall(scores: F32, hits: Bools, positives: int) -> tuple[F64, F64]:
     """Precision and recall after each box, best score first."""
     true = np.cumsum(hits[np.argsort(-scores, kind="stable")])
     return true / np.arange(1, len(true) + 1), true / positives
 
 
-def average_precision(scores: Floats, hits: Flags, positives: int) -> float:
+def average_precision(scores: F32, hits: Bools, positives: int) -> float:
     """Mean of the precision envelope at recalls 0, 0.01 .. 1; NaN without a positive."""
     if positives == 0:
         return float("nan")
@@ -109,7 +107,7 @@ def average_precision(scores: Floats, hits: Flags, positives: int) -> float:
     return float(np.where(places < len(envelope), np.append(envelope, 0.0)[places], 0.0).mean())
 
 
-def judge(found: Found, truth: Floats, kind: int) -> Judged:
+def judge(found: Found, truth: F32, kind: int) -> Judged:
     """One class of one picture. truth: [n,5], class and corners."""
     mine = found.classes == kind
     boxes, scores = found.boxes[mine], found.scores[mine]
@@ -153,12 +151,12 @@ def summary(judged: Sequence[Judged]) -> dict[str, float]:
     }
 
 
-def class_figures(found: list[Found], truths: list[Floats], kind: int) -> dict[str, float]:
+def class_figures(found: list[Found], truths: list[F32], kind: int) -> dict[str, float]:
     """`summary` of one class. truths: per picture float32 [n,5], class and corners."""
     return summary([judge(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
 
 
-def curve50(judged: Sequence[Judged]) -> tuple[Doubles, Doubles]:
+def curve50(judged: Sequence[Judged]) -> tuple[F64, F64]:
     """Precision and recall at IoU 0.5 after each box over all pictures, best score first; empty without a positive."""
     scores, hits, positives = _joined(judged)
     if positives == 0:
@@ -166,7 +164,7 @@ def curve50(judged: Sequence[Judged]) -> tuple[Doubles, Doubles]:
     return precision_recall(scores, hits[0], positives)
 
 
-def _joined(judged: Sequence[Judged]) -> tuple[Floats, Flags, int]:
+def _joined(judged: Sequence[Judged]) -> tuple[F32, Bools, int]:
     if not judged:
         return np.zeros(0, np.float32), np.zeros((len(IOU_STEPS), 0), np.bool_), 0
     scores = np.concatenate([j.scores for j in judged])

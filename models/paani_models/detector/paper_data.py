@@ -1,4 +1,4 @@
-"""Training pictures by the paper's recipe: letterboxed square, HSV, shift, scale, flip, mosaic (checklist S5)."""
+"""Training pictures by the paper's recipe: letterboxed square, HSV, shift, scale, flip, mosaic (S5)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani_models.datasets.sources import DETECTOR_CLASSES
 from paani_models.detector.data import CELL_PX, BoxedPicture, Example, place
 from paani_models.network_input import PAD_GREY, letterbox_affine
-from paani_models.training.augment import Affine, Rng
+from paani_models.training.augment import Rng
 
 
 @dataclass(frozen=True)
 class Augmentation:
-    """Checklist S5. Its vertical flip, rotation, shear, perspective, mixup, cutmix and copy-paste are all zero.
+    """The recipe of S5. Its vertical flip, rotation, shear, perspective, mixup, cutmix and copy-paste are all zero.
 
     `auto_augment` and `erasing` are recorded there beside the rest; they act on whole-picture classification alone.
     """
@@ -86,20 +87,20 @@ def _mosaic(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int], aug
     return Example(picture, np.vstack(boxes), judged)
 
 
-def _moved(rng: Rng, centre: NDArray[np.float64], target_wh: tuple[int, int], augmentation: Augmentation) -> Affine:
+def _moved(rng: Rng, centre: NDArray[np.float64], target_wh: tuple[int, int], augmentation: Augmentation) -> F32:
     """Scale about a point, which comes to lie near the target's middle."""
     scale = 1.0 + rng.uniform(-1, 1) * augmentation.scale
     middle = (0.5 + rng.uniform(-1, 1, 2) * augmentation.translate_frac) * target_wh
     return np.array([[scale, 0, middle[0] - scale * centre[0]], [0, scale, middle[1] - scale * centre[1]]], np.float32)
 
 
-def _flipped(rng: Rng, affine: Affine, width_px: int, augmentation: Augmentation) -> Affine:
+def _flipped(rng: Rng, affine: F32, width_px: int, augmentation: Augmentation) -> F32:
     if rng.random() >= augmentation.flip_frac:
         return affine
     return np.array([[-affine[0, 0], 0, width_px - affine[0, 2]], affine[1]], np.float32)
 
 
-def _after(first: Affine, second: Affine) -> Affine:
+def _after(first: F32, second: F32) -> F32:
     """`first`, then `second`."""
     linear = second[:, :2] @ first[:, :2]
     return np.hstack([linear, (second[:, :2] @ first[:, 2] + second[:, 2])[:, None]]).astype(np.float32)

@@ -19,7 +19,7 @@ from paani_models.detector.shipped_shape import candidate_grid
 
 TOP_K = 10
 SCORE_POWER, IOU_POWER = 0.5, 6.0
-BOX_GAIN, SCORE_GAIN, BINS_GAIN = 7.5, 0.5, 1.5  # checklist S4
+BOX_GAIN, SCORE_GAIN, BINS_GAIN = 7.5, 0.5, 1.5  # S4
 
 
 def complete_iou(a: Tensor, b: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""A detector of YOLO11n's published shape: 2,582,932 parameters once batch norm is folded (checklist C12).
+"""A detector of YOLO11n's published shape: 2,582,932 parameters once batch norm is folded (C12).
 
 Written from the architecture's description, with no code or weights of its authors. Same contract as
 `paani_models.detector.shipped_shape`: RGB 0..1 float32 [N,3,H,W] (H, W multiples of 32) -> float32 [N,8,A], rows
@@ -19,7 +19,7 @@ from paani_models.datasets.sources import DETECTOR_CLASSES
 from paani_models.detector.shipped_shape import cell_corners
 
 STRIDES = (8, 16, 32)
-FUSED_PARAMETERS = 2_582_932  # checklist C12
+FUSED_PARAMETERS = 2_582_932  # C12
 BINS = 16  # of the distribution over each distance, in strides
 HEAD_CHANNELS = 64
 SCORE_PRIOR = 0.01  # of an untrained net, so that background does not swamp the first steps

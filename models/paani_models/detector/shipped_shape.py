@@ -1,7 +1,7 @@
 """The detector: YOLOX-nano's shape (Ge et al. 2021) with batch norm folded away, four classes, joint scores.
 
 Input RGB 0..1 float32 [N,3,256,320]; output float32 [N,8,1680]: cx, cy, w, h in input pixels, then the scores
-of person, vessel, pier, buoy, each objectness times class, in 0..1 (checklist C1, C2, C4). Candidates run over
+of person, vessel, pier, buoy, each objectness times class, in 0..1 (C1, C2, C4). Candidates run over
 strides 8, 16, 32 in that order, row by row.
 """
 
@@ -18,9 +18,9 @@ from torch.nn import functional as F
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
-INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # checklist C1
+INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # C1
 STRIDES = (8, 16, 32)
-CANDIDATES = sum((INPUT_HEIGHT_PX // s) * (INPUT_WIDTH_PX // s) for s in STRIDES)  # checklist C4: 1,680
+CANDIDATES = sum((INPUT_HEIGHT_PX // s) * (INPUT_WIDTH_PX // s) for s in STRIDES)  # C4: 1,680
 
 HEAD_CHANNELS = 64
 

@@ -1,4 +1,4 @@
-"""Train the YOLO11n-shaped detector by the paper's recipe (checklist S2 - S5); resumable after any epoch."""
+"""Train the YOLO11n-shaped detector by the paper's recipe (S2 - S5); resumable after any epoch."""
 
 from __future__ import annotations
 

@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani_models.catalogue import Model, described
 from paani_models.engines.onnx_runner import Session, open_session, run_net
 
-Floats = NDArray[np.float32]
 MAX_DIFFERENCE = 1e-3  # T2
 RUNS = 15
 MAX_WATER_IN_NOTHING = 0.05
@@ -97,7 +97,7 @@ def _classes_hint(role: str) -> str:
     return "a manifest.json beside the file states its classes" if role == "detector" else "three classes are needed"
 
 
-def _segmenter_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Finding]:
+def _segmenter_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
     scene = outputs["a river"][0]
     if scene.min() >= 0.0 and np.allclose(scene.sum(axis=0), 1.0, atol=1e-3):
         yield Finding("error", "output sums to one: export the scores before the softmax")
@@ -114,7 +114,7 @@ def _gate_note(level: str) -> str:
     return "" if level == "ok" else ": only the gate then stands between this picture and motion"
 
 
-def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Finding]:
+def _detector_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
     scores = np.concatenate([output[0, 4:].ravel() for output in outputs.values()])
     boxes = np.concatenate([output[0, :4] for output in outputs.values()], axis=1)
     if scores.min() < -1e-6 or scores.max() > 1.0 + 1e-6:
@@ -130,7 +130,7 @@ def _detector_ranges(outputs: dict[str, Floats], contract: Model) -> Iterator[Fi
         yield Finding("ok", "boxes are centre, width and height in input pixels")
 
 
-def difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
+def difference(one: F32, other: F32, role: str, contract: Model) -> float:
     """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
     apart = np.abs(one - other)
     if role == "detector":
@@ -139,7 +139,7 @@ def difference(one: Floats, other: Floats, role: str, contract: Model) -> float:
     return float(apart.max())
 
 
-def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
+def drawn_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
     """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
     height, width = contract.size_hw
     rng = np.random.default_rng(0)
@@ -156,7 +156,7 @@ def drawn_inputs(contract: Model) -> dict[str, Floats | NDArray[np.uint8]]:
     return {name: as_input(picture, contract) for name, picture in drawn.items()}
 
 
-def as_input(picture: NDArray[np.uint8], contract: Model) -> Floats | NDArray[np.uint8]:
+def as_input(picture: NDArray[np.uint8], contract: Model) -> F32 | NDArray[np.uint8]:
     """A net-sized RGB picture [H,W,3] as the net takes it."""
     if contract.input.dtype == "uint8":
         return picture[None]

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani.errors import UserError
 from paani_models.catalogue import Record, file_sha256
 
-Floats = NDArray[np.float32]
-Run = Callable[[Floats], Floats]
+Run = Callable[[F32], F32]
 INPUT, OUTPUT = "in0", "out0"
 _CUBIC, _CORNERS_STAY = "0=3", "6=1"  # settings of ncnn's Interp
 NOT_INSTALLED = "ncnn is not installed; install the extra paani[ncnn]"
@@ -108,7 +107,7 @@ def open_ncnn(files: NcnnFiles, threads: int, output: str = OUTPUT) -> Run:
     if net.load_model(str(files.bin)) != 0:
         raise UserError(f"{files.bin}: not the weights of {files.param.name}")
 
-    def run(x: Floats) -> Floats:
+    def run(x: F32) -> F32:
         extractor = net.create_extractor()
         taken = extractor.input(INPUT, ncnn.Mat(np.ascontiguousarray(x[0], np.float32)))
         failed, answer = extractor.extract(output) if taken == 0 else (taken, None)

@@ -10,13 +10,13 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani.errors import UserError
 
-Floats = NDArray[np.float32]
 Session = Any  # onnxruntime is untyped
 
 
-def open_net(path: Path, threads: int = 2) -> Callable[[Floats], Floats]:
+def open_net(path: Path, threads: int = 2) -> Callable[[F32], F32]:
     """A function from input [1,3,H,W] to the first output. Raises UserError naming a file that cannot be loaded."""
     session = open_session(path, threads)
     return lambda x: run_net(session, x)
@@ -37,6 +37,6 @@ def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Ses
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
 
 
-def run_net(session: Session, x: Floats | NDArray[np.uint8]) -> Floats:
+def run_net(session: Session, x: F32 | NDArray[np.uint8]) -> F32:
     """The first output for one input."""
     return np.asarray(session.run(None, {session.get_inputs()[0].name: x})[0], np.float32)

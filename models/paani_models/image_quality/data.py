@@ -9,16 +9,15 @@ from collections.abc import Callable, Sequence
 import cv2
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.arrays import U8
 from paani.picture_faults import FAULTS, MOVES, MUST_ACCEPT, MUST_REJECT, SEVERITIES, WATER, spoilt
 from paani_models.datasets.sources import RENDERED, Sample, read_mask, read_picture
 from paani_models.segmenter.metrics import class_iou, confusion
 from paani_models.training.augment import OBSTACLE
 
-Bytes = NDArray[np.uint8]
-Segment = Callable[[Bytes], Bytes]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
+Segment = Callable[[U8], U8]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
 MIDDLE_WH = (320, 240)
 OPTIMISM = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
 GUESSED_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
@@ -47,8 +46,8 @@ class Scene(msgspec.Struct, frozen=True):
     trained on.
     """
 
-    picture: Bytes
-    mask: Bytes
+    picture: U8
+    mask: U8
     drawn: bool
     checked: bool
     dry: bool = False
@@ -92,12 +91,12 @@ def checked_sequences(samples: Sequence[Sample]) -> set[tuple[str, str]]:
     return chosen
 
 
-def middle(rgb: Bytes) -> Bytes:
+def middle(rgb: U8) -> U8:
     """BGR uint8 [240,320,3] of an RGB picture."""
     return np.asarray(cv2.resize(rgb, MIDDLE_WH, interpolation=cv2.INTER_AREA)[:, :, ::-1], np.uint8)
 
 
-def miou(predicted: Bytes, truth: Bytes) -> float:
+def miou(predicted: U8, truth: U8) -> float:
     """Mean over the classes that occur."""
     return float(np.nanmean(class_iou(confusion(predicted, truth, 3))))
 
@@ -116,7 +115,7 @@ def cells(chosen: Sequence[Scene], segment: Segment) -> list[Cell]:
     return found
 
 
-def _careful(guessed: Bytes) -> Bytes:
+def _careful(guessed: U8) -> U8:
     """The segmenter's classes, its water made larger; all of it water where there is little, so that nothing is dry."""
     water = (guessed == WATER).astype(np.uint8)
     if water.mean() < 0.1:

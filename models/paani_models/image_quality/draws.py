@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.picture_faults import above_water, spoilt
-from paani_models.image_quality.data import MIDDLE_WH, Bytes, Cell, Scene
+from paani_models.image_quality.data import MIDDLE_WH, Cell, Scene
 from paani_models.image_quality.network import INPUT_HEIGHT_PX, INPUT_WIDTH_PX
 from paani_models.training.augment import land_crop
 
@@ -22,7 +23,7 @@ Rng = np.random.Generator
 class Example(NamedTuple):
     """Net input uint8 [3,120,160], what the net should say of it, and what it shows: a cell's number, CLEAN or DRY."""
 
-    picture: Bytes
+    picture: U8
     target: float
     shown: int
 
@@ -60,13 +61,13 @@ def example(scene: Scene, shown: int, cells: Sequence[Cell], rng: Rng, vary: boo
     return Example(net_input(spoilt(cell.fault, picture, mask, cell.severity, rng)[0]), cell.target, shown)
 
 
-def net_input(bgr: Bytes) -> Bytes:
+def net_input(bgr: U8) -> U8:
     """BGR uint8 [240,320,3] -> RGB uint8 [3,120,160]."""
     small = cv2.resize(bgr, (INPUT_WIDTH_PX, INPUT_HEIGHT_PX), interpolation=cv2.INTER_AREA)
     return np.ascontiguousarray(small[:, :, ::-1].transpose(2, 0, 1))
 
 
-def _varied(scene: Scene, rng: Rng) -> tuple[Bytes, Bytes]:
+def _varied(scene: Scene, rng: Rng) -> tuple[U8, U8]:
     picture, mask = scene.picture, scene.mask
     if rng.random() < 0.5:
         picture, mask = picture[:, ::-1], mask[:, ::-1]
@@ -86,7 +87,7 @@ def _part(rng: Rng, least: float) -> tuple[slice, slice]:
     return slice(y, y + h), slice(x, x + w)
 
 
-def _dry(picture: Bytes, mask: Bytes, rng: Rng) -> Bytes | None:
+def _dry(picture: U8, mask: U8, rng: Rng) -> U8 | None:
     """A view without water: all that is above it, a part of that, or land alone."""
     view = above_water(picture, mask)
     kind = rng.random()

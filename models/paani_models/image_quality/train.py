@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from paani.arrays import U8
 from paani.errors import UserError
 from paani_models.catalogue import file_sha256
 from paani_models.datasets.sources import Sample
 from paani_models.engines.onnx_runner import open_net
-from paani_models.image_quality.data import Bytes, Cell, Scene, Segment, cells, scenes
+from paani_models.image_quality.data import Cell, Scene, Segment, cells, scenes
 from paani_models.image_quality.draws import CLEAN, DRY, Example, example, plan
 from paani_models.image_quality.network import Gate, start_from_imagenet
 from paani_models.network_input import segmenter_input
@@ -188,7 +189,7 @@ def standing(
 def _segment(weights: Path) -> Segment:
     run = open_net(weights)
 
-    def segment(bgr: Bytes) -> Bytes:
+    def segment(bgr: U8) -> U8:
         classes = run(segmenter_input(bgr[:, :, ::-1]))[0].argmax(0).astype(np.uint8)
         return np.asarray(cv2.resize(classes, bgr.shape[1::-1], interpolation=cv2.INTER_NEAREST), np.uint8)
 

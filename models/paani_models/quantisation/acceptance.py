@@ -1,4 +1,4 @@
-"""Does an INT8 net take the FP32 net's place? Decided by rule, and why in words (checklist T5)."""
+"""Does an INT8 net take the FP32 net's place? Decided by rule, and why in words (T5)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani.clock import stopwatch_ms
 from paani.statistics.order_statistics import median
 from paani_models.catalogue import Figure
@@ -18,8 +18,6 @@ from paani_models.detector.metrics import ap50
 from paani_models.detector.scores import annotating, score_boxes
 from paani_models.engines.onnx_runner import open_net
 from paani_models.segmenter.scores import added, mask_measures, score_masks, scored_classes
-
-Floats = NDArray[np.float32]
 
 MAX_LOSS_POINTS = 1.0
 MAX_TIME_RATIO = 1.0
@@ -131,14 +129,14 @@ def detector_score(net: Path, samples: Sequence[Sample]) -> tuple[float, tuple[F
     return float(np.mean([figure.value for figure in figures])), tuple(figures)
 
 
-def best_score(net: Path, inputs: Sequence[Floats]) -> float:
+def best_score(net: Path, inputs: Sequence[F32]) -> float:
     """The largest score over inputs of a detector."""
     run = open_net(net, THREADS)
     return max(float(run(x)[:, SCORE_ROWS:].max()) for x in inputs)
 
 
 def timing(
-    float_net: Path, int8_net: Path, x: Floats, stopwatch: Callable[[], float] = stopwatch_ms, threads: int = THREADS
+    float_net: Path, int8_net: Path, x: F32, stopwatch: Callable[[], float] = stopwatch_ms, threads: int = THREADS
 ) -> Timing:
     """Both nets in turn on one input, so that whatever else the machine does meets both."""
     runs = [open_net(net, threads) for net in (float_net, int8_net)]

@@ -1,4 +1,4 @@
-"""Pictures that an INT8 net is calibrated on: never those that decide about it (checklist T4, T6)."""
+"""Pictures that an INT8 net is calibrated on: never those that decide about it (T4, T6)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from paani.errors import UserError
 from paani_models.datasets.sources import RENDERED, Sample
 
-PICTURES = 200  # checklist T4
+PICTURES = 200  # T4
 
 
 def calibration_samples(samples: Sequence[Sample], listed: Path | None, *, spread: bool) -> list[Sample]:
@@ -33,7 +33,7 @@ def calibration_samples(samples: Sequence[Sample], listed: Path | None, *, sprea
 
 
 def refuse_held_out(chosen: Sequence[Sample], samples: Sequence[Sample]) -> None:
-    """Raises UserError naming a picture that is held out, or of a sequence that is (checklist T6)."""
+    """Raises UserError naming a picture that is held out, or of a sequence that is (T6)."""
     pictures = {sample.picture for sample in samples if sample.held_out}
     sequences = {(sample.source.name, sample.sequence) for sample in samples if sample.held_out}
     for sample in chosen:

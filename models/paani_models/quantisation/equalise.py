@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import onnx
-from numpy.typing import NDArray
 from onnx import numpy_helper
 
-Floats = NDArray[np.float32]
+from paani.arrays import F32
 
 ROUNDS = 30
 SETTLED = 1e-3  # largest logarithm of a factor that still counts as a change
@@ -46,7 +45,7 @@ def equalise(model: onnx.ModelProto) -> int:
     return len(groups)
 
 
-def _groups(graph: onnx.GraphProto, weights: dict[str, Floats]) -> list[_Group]:
+def _groups(graph: onnx.GraphProto, weights: dict[str, F32]) -> list[_Group]:
     parent: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -79,7 +78,7 @@ def _groups(graph: onnx.GraphProto, weights: dict[str, Floats]) -> list[_Group]:
     return list(found.values())
 
 
-def _is_plain(conv: onnx.NodeProto, weights: dict[str, Floats], uses: dict[str, int]) -> bool:
+def _is_plain(conv: onnx.NodeProto, weights: dict[str, F32], uses: dict[str, int]) -> bool:
     """Dense or depthwise, with weights of its own."""
     if any(name not in weights or uses[name] > 1 for name in conv.input[1:]):
         return False
@@ -90,12 +89,12 @@ def _split(conv: onnx.NodeProto) -> int:
     return next((int(a.i) for a in conv.attribute if a.name == "group"), 1)
 
 
-def _is_depthwise(conv: onnx.NodeProto, weights: dict[str, Floats]) -> bool:
+def _is_depthwise(conv: onnx.NodeProto, weights: dict[str, F32]) -> bool:
     weight = weights[conv.input[1]]
     return _split(conv) == weight.shape[0] and weight.shape[1] == 1
 
 
-def _balance(group: _Group, weights: dict[str, Floats]) -> float:
+def _balance(group: _Group, weights: dict[str, F32]) -> float:
     """One step; the largest logarithm of a factor."""
     written = np.max([_relative(weights[conv.input[1]], 0) for conv in group.writers], 0)
     read = np.max([_relative(weights[conv.input[1]], _input_axis(conv, weights)) for conv in group.readers], 0)
@@ -111,18 +110,18 @@ def _balance(group: _Group, weights: dict[str, Floats]) -> float:
     return float(np.abs(np.log(factor)).max())
 
 
-def _input_axis(conv: onnx.NodeProto, weights: dict[str, Floats]) -> int:
+def _input_axis(conv: onnx.NodeProto, weights: dict[str, F32]) -> int:
     return 0 if _is_depthwise(conv, weights) else 1
 
 
-def _relative(weight: Floats, axis: int) -> Floats:
+def _relative(weight: F32, axis: int) -> F32:
     """Largest absolute weight of each channel, as a share of the largest of all."""
     others = tuple(a for a in range(weight.ndim) if a != axis)
     largest = np.abs(weight).max(axis=others)
     return np.asarray(largest / max(float(largest.max()), 1e-12), np.float32)
 
 
-def _along(factor: Floats, axis: int, ndim: int) -> Floats:
+def _along(factor: F32, axis: int, ndim: int) -> F32:
     shape = [1] * ndim
     shape[axis] = -1
     return factor.reshape(shape)

@@ -1,4 +1,4 @@
-"""FP32 ONNX -> INT8 ONNX by a named recipe, calibrated on training pictures (checklist T4)."""
+"""FP32 ONNX -> INT8 ONNX by a named recipe, calibrated on training pictures (T4)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import onnx
-from numpy.typing import NDArray
 from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
 
+from paani.arrays import F32
 from paani.errors import UserError
 from paani_models.quantisation.equalise import equalise
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -60,14 +57,14 @@ RECIPES = {
 
 
 class _Inputs(CalibrationDataReader):
-    def __init__(self, name: str, inputs: Sequence[Floats]) -> None:
-        self._next: Iterator[dict[str, Floats]] = iter([{name: x} for x in inputs])
+    def __init__(self, name: str, inputs: Sequence[F32]) -> None:
+        self._next: Iterator[dict[str, F32]] = iter([{name: x} for x in inputs])
 
-    def get_next(self) -> dict[str, Floats] | None:
+    def get_next(self) -> dict[str, F32] | None:
         return next(self._next, None)
 
 
-def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[Floats]) -> None:
+def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[F32]) -> None:
     """Write `target`, beside and then by renaming.
 
     inputs: calibration inputs as the net gets them, [1,3,H,W] each. Raises UserError naming a file that is no ONNX net.

@@ -1,4 +1,4 @@
-"""Checkpoint -> static FP32 ONNX of opset 17, compared with the PyTorch net on real pictures (checklist T1, T2)."""
+"""Checkpoint -> static FP32 ONNX of opset 17, compared with the PyTorch net on real pictures (T1, T2)."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from paani_models.segmenter.paper_shape import Segmenter, parameter_count
 from paani_models.segmenter.shipped_shape import ImageNetSegmenter
 from paani_models.training.loop import load_average, load_checkpoint
 
-OPSET = 17  # checklist T1
-TOLERANCE = 1e-3  # checklist T2
+OPSET = 17  # T1
+TOLERANCE = 1e-3  # T2
 
 _UNCHANGED: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -69,7 +69,7 @@ class Measured(Record, frozen=True, kw_only=True):
 
 
 class Evaluation(Record, frozen=True, kw_only=True):
-    """Models on held-out sequences of labelled pictures, and on nothing else (checklist U7)."""
+    """Models on held-out sequences of labelled pictures, and on nothing else (U7)."""
 
     evidence: Evidence = Evidence.LABELLED
     models: tuple[Measured, ...] = ()

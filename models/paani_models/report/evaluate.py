@@ -1,4 +1,4 @@
-"""Figures of the exported nets on held-out sequences, per source (checklist T3, U1 - U4)."""
+"""Figures of the exported nets on held-out sequences, per source (T3, U1 - U4)."""
 
 from __future__ import annotations
 

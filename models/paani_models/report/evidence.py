@@ -1,4 +1,4 @@
-"""Four classes of evidence that are never pooled (checklist U7): a figure says which it is, and a mean refuses two."""
+"""Four classes of evidence that are never pooled (U7): a figure says which it is, and a mean refuses two."""
 
 from __future__ import annotations
 

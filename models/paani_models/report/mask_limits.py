@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.arrays import I64, U8
 from paani_models.datasets.sources import IGNORE, SEGMENTER_CLASSES, Sample, Source, read_picture
 from paani_models.segmenter.metrics import boundary, class_iou, confusion, edge_counts, f1
-from paani_models.segmenter.scores import WATER, Mask, as_label, read_truth, restrict
-
-Counts = NDArray[np.int64]
+from paani_models.segmenter.scores import WATER, as_label, read_truth, restrict
 
 REACHES_PX = (2, 4, 8)
 TENTHS = 10
@@ -33,14 +32,14 @@ class MaskLimits:
 
     source: Source
     n: int
-    counts: Counts
-    edges: Counts
-    best_counts: Counts
-    best_edges: Counts
-    near: Counts
-    false_water: Counts
-    missed_water: Counts
-    judged: Counts
+    counts: I64
+    edges: I64
+    best_counts: I64
+    best_edges: I64
+    near: I64
+    false_water: I64
+    missed_water: I64
+    judged: I64
 
     @property
     def wrong(self) -> int:
@@ -49,10 +48,10 @@ class MaskLimits:
 
 
 def mask_limits(
-    samples: Sequence[Sample], segment: Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]
+    samples: Sequence[Sample], segment: Callable[[NDArray[np.uint8], tuple[int, ...]], U8]
 ) -> list[MaskLimits]:
     """One per source. Raises UserError naming a file that cannot be read."""
-    found: dict[Source, list[Counts]] = {}
+    found: dict[Source, list[I64]] = {}
     for sample in tqdm(samples, "mistakes", unit="picture", mininterval=2.0):
         truth = read_truth(sample)
         label = restrict(segment(read_picture(sample.picture), truth.shape), sample.source)
@@ -67,7 +66,7 @@ def mask_limits(
     return limits
 
 
-def mistakes(label: Mask, truth: Mask) -> tuple[Counts, ...]:
+def mistakes(label: U8, truth: U8) -> tuple[I64, ...]:
     """The counts of one picture, in the order of MaskLimits."""
     decided = filled(truth)
     best = gridded(decided)
@@ -87,7 +86,7 @@ def mistakes(label: Mask, truth: Mask) -> tuple[Counts, ...]:
     )
 
 
-def filled(truth: Mask) -> Mask:
+def filled(truth: U8) -> U8:
     """Undecided pixels take the class of the nearest decided one; a mask without any stays as it is."""
     undecided = truth == IGNORE
     if undecided.all() or not undecided.any():
@@ -100,7 +99,7 @@ def filled(truth: Mask) -> Mask:
     return np.asarray(kinds[nearest], np.uint8)
 
 
-def gridded(truth: Mask) -> Mask:
+def gridded(truth: U8) -> U8:
     """Each of CELLS_HW takes the class that fills most of it: what a net with so many answers could say at best."""
     size_wh = CELLS_HW[::-1]
     shares = [
@@ -110,21 +109,21 @@ def gridded(truth: Mask) -> Mask:
     return as_label(np.stack(shares)[None], truth.shape)
 
 
-def by_tenth(flags: NDArray[np.bool_]) -> Counts:
+def by_tenth(flags: NDArray[np.bool_]) -> I64:
     """Set pixels per tenth of the height, int64 [10], top first."""
     return np.array([part.sum() for part in np.array_split(flags, TENTHS)], np.int64)
 
 
-def water_iou(counts: Counts) -> float:
+def water_iou(counts: I64) -> float:
     """IoU of water from a confusion matrix [3,3]."""
     return float(class_iou(counts)[WATER])
 
 
-def mean_iou(counts: Counts) -> float:
+def mean_iou(counts: I64) -> float:
     """Mean over the classes that occur."""
     return float(np.nanmean(class_iou(counts)))
 
 
-def edge_f1(edges: Counts) -> float:
+def edge_f1(edges: I64) -> float:
     """F1 of counts as `edge_counts` gives them."""
     return f1(*(int(count) for count in edges))

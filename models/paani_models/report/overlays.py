@@ -12,14 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
 from paani_models.detector.metrics import CONFIDENCE
 from paani_models.detector.scores import ScoredBoxes
 from paani_models.network_input import letterboxed
-from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, Mask, ScoredMask, read_truth, restrict
-
-Picture = NDArray[np.uint8]
+from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, ScoredMask, read_truth, restrict
 
 Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 
@@ -38,9 +37,7 @@ class Drawn:
     caption: str
 
 
-def draw_masks(
-    folder: Path, scored: Sequence[ScoredMask], segment: Callable[[Picture, tuple[int, ...]], Mask]
-) -> list[Drawn]:
+def draw_masks(folder: Path, scored: Sequence[ScoredMask], segment: Callable[[U8, tuple[int, ...]], U8]) -> list[Drawn]:
     """Tinted by class, pixels that differ from the truth in red. Writes into `folder`/pictures."""
     drawn = []
     for index, item in enumerate(scored):
@@ -121,7 +118,7 @@ def _varied(ordered: Sequence[Scored]) -> list[Scored]:
 
 
 def _rectangle(
-    picture: Picture, box: NDArray[np.float32], colour: tuple[int, int, int], width: int, text: str, *, below: bool
+    picture: U8, box: NDArray[np.float32], colour: tuple[int, int, int], width: int, text: str, *, below: bool
 ) -> None:
     x1, y1, x2, y2 = (round(2 * float(value)) for value in box)
     cv2.rectangle(picture, (x1, y1), (x2, y2), colour, width)
@@ -130,7 +127,7 @@ def _rectangle(
     cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 1, cv2.LINE_AA)
 
 
-def _save(folder: Path, stem: str, rgb: Picture, caption: str) -> Drawn:
+def _save(folder: Path, stem: str, rgb: U8, caption: str) -> Drawn:
     scale = _WIDTH_PX / rgb.shape[1]
     shown = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     name = f"{PICTURES}/{stem}.jpg"

@@ -1,4 +1,4 @@
-"""The page: four classes of evidence in four sections, each on its own (checklist U7)."""
+"""The page: four classes of evidence in four sections, each on its own (U7)."""
 
 from __future__ import annotations
 

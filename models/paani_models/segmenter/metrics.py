@@ -1,4 +1,4 @@
-"""Segmentation figures: intersection over union with ignored pixels, and boundary F1 (checklist U3, U4)."""
+"""Segmentation figures: intersection over union with ignored pixels, and boundary F1 (U3, U4)."""
 
 from __future__ import annotations
 
@@ -6,29 +6,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import I64, U8
 from paani_models.datasets.sources import IGNORE
 
-Mask = NDArray[np.uint8]
-Counts = NDArray[np.int64]
-
-EDGE_TOLERANCE_PX = 2  # checklist U4
+EDGE_TOLERANCE_PX = 2  # U4
 
 
-def confusion(predicted: Mask, truth: Mask, classes: int) -> Counts:
+def confusion(predicted: U8, truth: U8, classes: int) -> I64:
     """Counts int64 [classes, classes], rows truth, columns prediction; pixels of truth 255 are left out."""
     valid = truth != IGNORE
     joint = truth[valid].astype(np.int64) * classes + predicted[valid]
     return np.bincount(joint, minlength=classes * classes).reshape(classes, classes)
 
 
-def class_iou(counts: Counts) -> NDArray[np.float64]:
+def class_iou(counts: I64) -> NDArray[np.float64]:
     """IoU per class of a confusion matrix, float64 [classes]; NaN where a class neither occurs nor is predicted."""
     hits = np.diag(counts).astype(np.float64)
     union = counts.sum(0) + counts.sum(1) - np.diag(counts)
     return np.asarray(np.divide(hits, union, out=np.full(len(hits), np.nan), where=union > 0), np.float64)
 
 
-def boundary(mask: Mask) -> NDArray[np.bool_]:
+def boundary(mask: U8) -> NDArray[np.bool_]:
     """Pixels with a four-neighbour of another class, neither of them ignored."""
     edge = np.zeros(mask.shape, np.bool_)
     for first, second in (
@@ -41,7 +39,7 @@ def boundary(mask: Mask) -> NDArray[np.bool_]:
     return edge
 
 
-def edge_counts(predicted: Mask, truth: Mask) -> tuple[int, int, int, int]:
+def edge_counts(predicted: U8, truth: U8) -> tuple[int, int, int, int]:
     """(predicted edge pixels matched, predicted edge pixels, true edge pixels matched, true edge pixels).
 
     Matched means within EDGE_TOLERANCE_PX, Euclidean. Predicted edges on ignored truth are not judged.

@@ -1,4 +1,4 @@
-"""The segmenter: MobileNetV3-Small encoder, 64-channel top-down decoder (checklist D1-D5).
+"""The segmenter: MobileNetV3-Small encoder, 64-channel top-down decoder (D1-D5).
 
 Parameter names of the encoder follow torchvision's `mobilenet_v3_small().features`, so weights saved under
 those names load unchanged.
@@ -14,10 +14,10 @@ from torch.nn import functional as F
 
 from paani_models.datasets.sources import SEGMENTER_CLASSES
 
-INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # checklist D5
-PARAMETERS = 1_082_467  # checklist D9
+INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # D5
+PARAMETERS = 1_082_467  # D9
 
-DECODER_CHANNELS = 64  # checklist D2
+DECODER_CHANNELS = 64  # D2
 TAPS = (1, 3, 8, 12)  # feature indices at strides 4, 8, 16, 32
 TAP_CHANNELS = (16, 24, 48, 576)
 
@@ -153,7 +153,7 @@ def parameter_count(model: nn.Module) -> int:
 
 
 def segmenter_loss(logits: Tensor, target: Tensor) -> Tensor:
-    """Cross-entropy plus Dice, coefficient 1 each (checklist S7).
+    """Cross-entropy plus Dice, coefficient 1 each (S7).
 
     logits: float32 [N,3,H,W]. target: int64 [N,H,W], classes 0..2, 255 ignored by both terms.
     """

@@ -11,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from paani.arrays import F32, I64, U8
 from paani.errors import UserError
 from paani_models.catalogue import described
 from paani_models.datasets.sources import SEGMENTER_CLASSES, WATER_MASKS, Sample, Source, read_mask, read_picture
-from paani_models.engines.onnx_runner import Floats, open_net
+from paani_models.engines.onnx_runner import open_net
 from paani_models.segmenter.metrics import class_iou, confusion, edge_counts, f1
 
 WATER, OBSTACLE, SKY = (SEGMENTER_CLASSES.index(kind) for kind in ("water", "obstacle", "sky"))
-
-Mask = NDArray[np.uint8]
-Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -28,8 +26,8 @@ class ScoredMask:
     """One picture: confusion counts int64 [3,3], rows truth; edge counts int64 [4], as `edge_counts` gives them."""
 
     sample: Sample
-    counts: Counts
-    edges: Counts
+    counts: I64
+    edges: I64
 
     @property
     def share_right(self) -> float:
@@ -50,7 +48,7 @@ def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
     return scored
 
 
-def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]:
+def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], U8]:
     """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W].
 
     Size, preprocessing and order of classes are those of the net's contract.
@@ -60,20 +58,20 @@ def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], Mask]
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
     rows = [contract.classes.index(name) for name in SEGMENTER_CLASSES]
 
-    def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> Mask:
+    def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> U8:
         scaled = (cv2.resize(picture, size_wh).astype(np.float32) / 255.0 - mean) / std
         return as_label(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
 
     return segment
 
 
-def as_label(logits: Floats, shape: tuple[int, ...]) -> Mask:
+def as_label(logits: F32, shape: tuple[int, ...]) -> U8:
     """Logits [1,3,h,w] -> the best class, nearest pixel, uint8 [H,W]."""
     label = logits[0].argmax(0).astype(np.uint8)
     return np.asarray(cv2.resize(label, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
-def read_truth(sample: Sample) -> Mask:
+def read_truth(sample: Sample) -> U8:
     """Read what people drew, in segmenter classes; where they drew only water, the rest is obstacle."""
     if sample.mask is None:
         raise UserError(f"{sample.picture}: has no mask")
@@ -81,7 +79,7 @@ def read_truth(sample: Sample) -> Mask:
     return read_mask(drawn)
 
 
-def restrict(label: Mask, source: Source) -> Mask:
+def restrict(label: U8, source: Source) -> U8:
     """Sky counts as obstacle where people told only water from the rest."""
     return np.minimum(label, OBSTACLE) if source.water_only else label
 
@@ -91,10 +89,10 @@ def scored_classes(source: Source) -> tuple[str, ...]:
     return ("water",) if source.water_only else SEGMENTER_CLASSES
 
 
-def mask_measures(source: Source) -> dict[str, Callable[[Counts], float]]:
+def mask_measures(source: Source) -> dict[str, Callable[[I64], float]]:
     """Figures of one source by name, each a function of added counts int64 [13]: confusion, then edges (U3, U4)."""
 
-    def iou(kind: str) -> Callable[[Counts], float]:
+    def iou(kind: str) -> Callable[[I64], float]:
         return lambda sums: float(class_iou(sums[:9].reshape(3, 3))[SEGMENTER_CLASSES.index(kind)])
 
     measures = {f"iou_{kind}": iou(kind) for kind in scored_classes(source)}
@@ -105,7 +103,7 @@ def mask_measures(source: Source) -> dict[str, Callable[[Counts], float]]:
     return measures
 
 
-def added(scored: Sequence[ScoredMask]) -> Counts:
+def added(scored: Sequence[ScoredMask]) -> I64:
     """Counts of many pictures, int64 [13]."""
     rows = [np.concatenate([item.counts.ravel(), item.edges]) for item in scored]
     return np.sum(rows, axis=0, dtype=np.int64) if rows else np.zeros(13, np.int64)

@@ -54,11 +54,11 @@ class Recipe:
     stages: tuple[Stage, ...] = (Stage(18, 128, 160), Stage(8, 256, 320))
     batch: int = 16
     peak_rate: float = 2e-3
-    weight_decay: float = 1e-4  # checklist S7
+    weight_decay: float = 1e-4  # S7
     warmup_steps: int = 100
     final_frac: float = 0.01
     rendered_frac: float = 0.2
-    seed: int = 42  # checklist S7
+    seed: int = 42  # S7
 
     @property
     def epochs(self) -> int:
@@ -66,7 +66,7 @@ class Recipe:
         return sum(stage.epochs for stage in self.stages)
 
 
-# Checklist S6, S7: 50 epochs at full size, batches of 16, AdamW at 3e-4 with a cosine down to nothing.
+# S6, S7: 50 epochs at full size, batches of 16, AdamW at 3e-4 with a cosine down to nothing.
 PAPER_RECIPE = Recipe(stages=(Stage(50, 256, 320),), peak_rate=3e-4, warmup_steps=0, final_frac=0.0)
 
 

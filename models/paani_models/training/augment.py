@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani_models.datasets.sources import IGNORE
 
-Picture = NDArray[np.uint8]
-Affine = NDArray[np.float32]
 Rng = np.random.Generator
 
-# Checklist S8.
+# S8.
 GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
 MIRROR_FRAC = 0.3
 CONCRETE_FRAC = 0.12
@@ -24,7 +22,7 @@ LAND_FRAC = 0.15  # tries; about one in three pictures has such a part
 WATER, OBSTACLE = 0, 1
 
 
-def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], tilt_deg: float) -> Affine:
+def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], tilt_deg: float) -> F32:
     """Source pixels -> target pixels: flip, zoom 0.85..2.2 with aspect jitter, shift, roll.
 
     The roll is up to `tilt_deg`, rarely two and a half times that.
@@ -53,13 +51,13 @@ def random_affine(rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, in
     return np.hstack([linear, shift[:, None]]).astype(np.float32)
 
 
-def warp_picture(picture: Picture, affine: Affine, target_wh: tuple[int, int]) -> Picture:
+def warp_picture(picture: U8, affine: F32, target_wh: tuple[int, int]) -> U8:
     """Bilinear; the border repeats the edge, so no edge is drawn where the picture ends."""
     moved = cv2.warpAffine(picture, affine, target_wh, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(moved, np.uint8)
 
 
-def warp_mask(mask: Picture, affine: Affine, target_wh: tuple[int, int]) -> Picture:
+def warp_mask(mask: U8, affine: F32, target_wh: tuple[int, int]) -> U8:
     """Nearest; outside the picture is ignored."""
     moved = cv2.warpAffine(
         mask, affine, target_wh, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=(IGNORE,)
@@ -67,7 +65,7 @@ def warp_mask(mask: Picture, affine: Affine, target_wh: tuple[int, int]) -> Pict
     return np.asarray(moved, np.uint8)
 
 
-def jitter_colour(rng: Rng, picture: Picture) -> Picture:
+def jitter_colour(rng: Rng, picture: U8) -> U8:
     """Hue, saturation, gamma, contrast, brightness, white balance, within the range that weather and cameras give."""
     if rng.random() < 0.4:
         picture = np.clip(picture * rng.uniform(0.85, 1.15, 3), 0, 255).astype(np.uint8)
@@ -81,8 +79,8 @@ def jitter_colour(rng: Rng, picture: Picture) -> Picture:
     return np.asarray(cv2.cvtColor(cv2.merge(planes), cv2.COLOR_HSV2RGB), np.uint8)
 
 
-def glare(rng: Rng, picture: Picture) -> Picture:
-    """Sun on the water: a soft bright blob, and glitter of small strokes in the lower half (checklist S8, S12)."""
+def glare(rng: Rng, picture: U8) -> U8:
+    """Sun on the water: a soft bright blob, and glitter of small strokes in the lower half (S8, S12)."""
     height, width = picture.shape[:2]
     light = np.zeros((height, width), np.float32)
     if rng.random() < BLOB_FRAC:
@@ -113,7 +111,7 @@ def glare(rng: Rng, picture: Picture) -> Picture:
     return np.clip(lit, 0, 255).astype(np.uint8)
 
 
-def mirror_water(rng: Rng, picture: Picture, mask: Picture) -> Picture:
+def mirror_water(rng: Rng, picture: U8, mask: U8) -> U8:
     """Calm water: what stands above its far edge is mirrored in it, rippled, stretched and dimmed."""
     height, width = mask.shape
     water = mask == WATER
@@ -128,7 +126,7 @@ def mirror_water(rng: Rng, picture: Picture, mask: Picture) -> Picture:
     return np.clip(picture * (1 - share) + mirrored * rng.uniform(0.65, 1.0) * share, 0, 255).astype(np.uint8)
 
 
-def degrade(rng: Rng, picture: Picture) -> Picture:
+def degrade(rng: Rng, picture: U8) -> U8:
     """Lens and sensor: blur, haze, noise, JPEG blocks; each sometimes."""
     if rng.random() < 0.15:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.4, 1.8)).astype(np.uint8, copy=False)
@@ -144,13 +142,13 @@ def degrade(rng: Rng, picture: Picture) -> Picture:
     return picture
 
 
-def add_noise(rng: Rng, picture: Picture, sigma: float) -> Picture:
+def add_noise(rng: Rng, picture: U8, sigma: float) -> U8:
     """Gaussian sensor noise; sigma in grey levels."""
     noise = rng.standard_normal(picture.shape, dtype=np.float32)
     return np.clip(picture + noise * sigma, 0, 255).astype(np.uint8)
 
 
-def cut_out(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture]:
+def cut_out(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8]:
     """Cover one rectangle with a flat colour; what is covered is not judged."""
     height, width = mask.shape
     h, w = int(rng.integers(height // 16, height // 4)), int(rng.integers(width // 16, width // 4))
@@ -161,7 +159,7 @@ def cut_out(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture
     return picture, mask
 
 
-def land_crop(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Picture] | None:
+def land_crop(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8] | None:
     """A part of the picture without any water, at least 60 % obstacle; None where eight tries find none.
 
     What a boat against a bank sees: land down to the bottom of the picture.
@@ -180,7 +178,7 @@ def land_crop(rng: Rng, picture: Picture, mask: Picture) -> tuple[Picture, Pictu
     return None
 
 
-def obstacle_patch(rng: Rng, picture: Picture, mask: Picture) -> Picture | None:
+def obstacle_patch(rng: Rng, picture: U8, mask: U8) -> U8 | None:
     """Find a rectangle that is all obstacle, give or take a twentieth; None where six tries find none."""
     height, width = mask.shape
     for _ in range(6):
@@ -191,7 +189,7 @@ def obstacle_patch(rng: Rng, picture: Picture, mask: Picture) -> Picture | None:
     return None
 
 
-def concrete(rng: Rng) -> Picture:
+def concrete(rng: Rng) -> U8:
     """A smooth wall: one grey, stained in streaks that run down, sometimes with joints and a wet foot."""
     height, width = 120, 240
     wall = np.full((height, width, 3), rng.uniform(50, 215), np.float32) + rng.normal(0, 6, 3).astype(np.float32)
@@ -208,7 +206,7 @@ def concrete(rng: Rng) -> Picture:
     return add_noise(rng, np.clip(wall, 0, 255).astype(np.uint8), rng.uniform(0, 10))
 
 
-def paste_obstacle(rng: Rng, picture: Picture, mask: Picture, patch: Picture) -> tuple[Picture, Picture]:
+def paste_obstacle(rng: Rng, picture: U8, mask: U8, patch: U8) -> tuple[U8, U8]:
     """Stand a patch in the picture: as a wall along one side, receding, or as a block; what it covers is obstacle.
 
     It breaks the habit of rivers that whatever is at the bottom is water.
@@ -236,7 +234,7 @@ def paste_obstacle(rng: Rng, picture: Picture, mask: Picture, patch: Picture) ->
     )
 
 
-def null_picture(rng: Rng, target_wh: tuple[int, int]) -> Picture:
+def null_picture(rng: Rng, target_wh: tuple[int, int]) -> U8:
     """A picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, each with sensor noise."""
     width, height = target_wh
     kind = int(rng.integers(7))
@@ -274,8 +272,8 @@ def null_picture(rng: Rng, target_wh: tuple[int, int]) -> Picture:
 
 
 def segmenter_sample(
-    rng: Rng, picture: Picture, mask: Picture, target_wh: tuple[int, int], patch: Picture | None = None
-) -> tuple[Picture, Picture]:
+    rng: Rng, picture: U8, mask: U8, target_wh: tuple[int, int], patch: U8 | None = None
+) -> tuple[U8, U8]:
     """Make one training pair of the target size; a patch of obstacle, if given, is pasted in."""
     affine = random_affine(rng, (picture.shape[1], picture.shape[0]), target_wh, tilt_deg=8.0)
     picture, mask = warp_picture(picture, affine, target_wh), warp_mask(mask, affine, target_wh)
@@ -293,6 +291,6 @@ def segmenter_sample(
     return picture, mask
 
 
-def segmenter_null(rng: Rng, target_wh: tuple[int, int]) -> tuple[Picture, Picture]:
+def segmenter_null(rng: Rng, target_wh: tuple[int, int]) -> tuple[U8, U8]:
     """A picture that shows nothing is all obstacle, so an unusable picture can never read as open water."""
     return null_picture(rng, target_wh), np.full((target_wh[1], target_wh[0]), OBSTACLE, np.uint8)

@@ -41,7 +41,7 @@ def stage_of(stages: tuple[Stage, ...], epoch: int) -> Stage:
 
 
 def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int, final_frac: float = 0.01) -> float:
-    """Linear warm-up, then cosine down to a share of the peak: one hundredth (checklist S3) unless told."""
+    """Linear warm-up, then cosine down to a share of the peak: one hundredth (S3) unless told."""
     if step < warmup_steps:
         return peak * (step + 1) / warmup_steps
     progress = (step - warmup_steps) / max(1, total_steps - warmup_steps)
@@ -106,7 +106,7 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
 
 
 class Progress:
-    """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (checklist S11).
+    """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (S11).
 
     extra: parameters that are trained along with the model and are not part of it.
     gentle: a part of the model that is well trained already and learns at GENTLE_GAIN times the rate.
@@ -205,7 +205,7 @@ def load_average(model: nn.Module, checkpoint: Path) -> None:
 
 
 def append_record(path: Path, record: Mapping[str, object]) -> None:
-    """One JSON line per epoch (checklist S10)."""
+    """One JSON line per epoch (S10)."""
     with path.open("ab") as file:
         file.write(msgspec.json.encode(record) + b"\n")
 

@@ -1,4 +1,4 @@
-"""Which evidence decided: the smallest sets without which the advice would be another (beyond checklist J13). Pure.
+"""Which evidence decided: the smallest sets without which the advice would be another (beyond J13). Pure.
 
 A piece of evidence is an accepted track that overlaps a corridor, or the water of one corridor; water taken away means
 clear, certain water: N = 0 and U = 0. The policy is asked again about the same frame with the same memory, as if the
@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F64, Bools
 from paani.config import Config, RiskConfig
 from paani.messages import ChangedBy, Counterfactual, Direction, Lane, LaneEvidence, Limit, Reason, Removal
 from paani_services.advisor.policy import (
@@ -37,8 +38,6 @@ from paani_services.advisor.policy import (
 )
 from paani_services.advisor.risk import LANES, Obstacle, components, lane_span, overlap
 
-Flags = NDArray[np.bool_]  # one per set
-Numbers = NDArray[np.float64]  # one per set
 Factors = tuple[tuple[int | None, float], ...]  # of a product: the bit of a piece (None: it stays) and its factor
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
 MAX_SHOWN = 3
@@ -186,7 +185,7 @@ class _Sets(NamedTuple):
     """All sets of a size, in order; kept: pieces x sets, False where taken; taking: the sets that take each piece."""
 
     members: tuple[tuple[int, ...], ...]
-    kept: Flags
+    kept: Bools
     taking: tuple[NDArray[np.intp], ...]
 
 
@@ -249,14 +248,14 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
     """What stands where, for each set."""
     count, kept = len(sets.members), sets.kept
 
-    def any_left(bits: tuple[int | None, ...]) -> Flags:
-        found: Flags = np.full(count, None in bits)
+    def any_left(bits: tuple[int | None, ...]) -> Bools:
+        found: Bools = np.full(count, None in bits)
         for i in bits:
             if i is not None:
                 found |= kept[i]
         return found
 
-    def product(factors: Factors) -> Numbers:
+    def product(factors: Factors) -> F64:
         found = np.ones(count)
         for i, factor in factors:
             if i is None:
@@ -267,7 +266,7 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
                 found[sets.taking[i]] = without
         return found
 
-    def risk(lane: _Lane) -> Numbers:
+    def risk(lane: _Lane) -> F64:
         wet = np.ones(count, bool) if lane.water is None else kept[lane.water]
         weights = scene.weights
         return np.minimum(

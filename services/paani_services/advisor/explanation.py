@@ -1,4 +1,4 @@
-"""Plain words for people, made last, from the numbers in the advisory itself (checklist J12). Pure.
+"""Plain words for people, made last, from the numbers in the advisory itself (J12). Pure.
 
 One sentence says what is advised and why, the next what would change it.
 """

@@ -1,4 +1,4 @@
-"""Apparent motion of one tracked box: does it grow or shrink? Diagnostic only (checklist I20). Pure.
+"""Apparent motion of one tracked box: does it grow or shrink? Diagnostic only (I20). Pure.
 
 The slope's margin is not statistically calibrated and the confidence is not a probability (I21).
 """

@@ -1,4 +1,4 @@
-"""From three corridors to one direction: thresholds, overrides, sides, hysteresis (checklist J5-J10). Pure."""
+"""From three corridors to one direction: thresholds, overrides, sides, hysteresis (J5-J10). Pure."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""How bad each corridor is: the water's part, the obstacles' part, their sum R_j (checklist J1-J4). Pure."""
+"""How bad each corridor is: the water's part, the obstacles' part, their sum R_j (J1-J4). Pure."""
 
 import math
 from collections.abc import Iterable

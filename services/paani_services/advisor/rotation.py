@@ -1,6 +1,6 @@
 """What the boat's own turning does to a picture: where a box goes, and what size it has as an angle. Pure.
 
-Identity and apparent motion alone use it: what a box weighs in a corridor never depends on it (checklist I20).
+Identity and apparent motion alone use it: what a box weighs in a corridor never depends on it (I20).
 Body is x forward, y left, z up; positive pitch lowers the bow, positive roll lowers starboard.
 """
 

@@ -1,6 +1,6 @@
 """Boxes of one picture joined to the boxes before: identity, confirmation, hold, urgency. Pure.
 
-No motion filter and no re-identification (checklist G10): a box that is not seen stays where it was until its
+No motion filter and no re-identification (G10): a box that is not seen stays where it was until its
 hold ends. What the boat's own turning did to a box decides only whose identity it has.
 """
 

@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.config import CameraConfig
 from paani.errors import UserError
 from paani.messages import TimeBase
 
-Bytes = NDArray[np.uint8]
 PICTURE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"})
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mjpeg", ".mjpg"})
 MIN_LONG_SIDE_PX = 480
@@ -31,7 +30,7 @@ class Frame(NamedTuple):
     frame after the recording began again.
     """
 
-    bgr: Bytes | None
+    bgr: U8 | None
     name: str
     media_us: int
     time_base: TimeBase
@@ -81,7 +80,7 @@ def pictures_in(folder: Path) -> list[Path]:
         raise UserError(f"{folder}: {error.strerror}") from error
 
 
-def read_picture(file: Path) -> Bytes | None:
+def read_picture(file: Path) -> U8 | None:
     """BGR uint8 [H, W, 3], None where the file is no picture. Raises UserError naming a file that cannot be read."""
     try:
         data = np.frombuffer(file.read_bytes(), np.uint8)
@@ -94,7 +93,7 @@ def read_picture(file: Path) -> Bytes | None:
     return None if bgr is None else np.asarray(bgr, np.uint8)
 
 
-def fitted(bgr: Bytes, width_px: int) -> Bytes:
+def fitted(bgr: U8, width_px: int) -> U8:
     """Smaller if its long side exceeds max(`width_px`, 480), aspect kept."""
     height, width = bgr.shape[:2]
     scale = max(width_px, MIN_LONG_SIDE_PX) / max(height, width)
@@ -120,7 +119,7 @@ class Webcam:
             self._capture.release()
             raise UserError(f"camera.source webcam:{index}: {device} gives no pictures")
 
-    def read(self) -> Bytes | None:
+    def read(self) -> U8 | None:
         """The next picture, BGR uint8 [H, W, 3]; waits for it. None when the camera has gone."""
         there, bgr = self._capture.read()
         return np.asarray(bgr, np.uint8) if there else None

@@ -11,10 +11,11 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
+from paani.arrays import U8
 from paani.bus import Bus
 from paani.clock import Clock, patience_us
 from paani.config import CameraConfig, Config
-from paani_services.camera.picture_sources import Bytes, Frame, Webcam, fitted, play, webcam_index
+from paani_services.camera.picture_sources import Frame, Webcam, fitted, play, webcam_index
 
 T = TypeVar("T")
 
@@ -112,7 +113,7 @@ async def _replay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output
         await asyncio.Event().wait()
 
 
-def jpeg(bgr: Bytes, quality: int) -> bytes:
+def jpeg(bgr: U8, quality: int) -> bytes:
     """One encoded picture."""
     _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, min(quality, 100)])
     return data.tobytes()
@@ -122,7 +123,7 @@ def _encoded(frame: Frame, quality: int) -> bytes:
     return Path(frame.name).read_bytes() if frame.bgr is None else jpeg(frame.bgr, quality)
 
 
-def _header(bgr: Bytes | None, source_us: int, frame: Frame | None = None) -> m.PictureHeader:
+def _header(bgr: U8 | None, source_us: int, frame: Frame | None = None) -> m.PictureHeader:
     height, width = bgr.shape[:2] if bgr is not None else (0, 0)
     return m.PictureHeader(
         source_us=source_us,

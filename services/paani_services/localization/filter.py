@@ -8,12 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from filterpy.kalman import ExtendedKalmanFilter
 
+from paani.arrays import F64
 from paani.geometry import wrap_rad
-
-Array = npt.NDArray[np.float64]
 
 PX, PY, PSI, U, V, B, GX, GY, C, WX, WY = range(11)
 SIZE = 11
@@ -40,7 +38,7 @@ class Verdict(NamedTuple):
 class PlanarFilter:
     """Predicts with gyro and accelerometer; corrects with whatever the caller has."""
 
-    def __init__(self, x: Array, std: Array, gps_wander_s: float = 60.0) -> None:
+    def __init__(self, x: F64, std: F64, gps_wander_s: float = 60.0) -> None:
         """Start at state `x` (11,) with standard deviations `std` (11,).
 
         A yaw whose compass bias is unknown came from that compass: the two err against each other.
@@ -57,17 +55,17 @@ class PlanarFilter:
         self._noise = np.zeros((SIZE, SIZE))
 
     @property
-    def x(self) -> Array:
+    def x(self) -> F64:
         """State (11,)."""
         return np.asarray(self._ekf.x)
 
     @property
-    def std(self) -> Array:
+    def std(self) -> F64:
         """Standard deviation of each state (11,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
-    def covariance(self) -> Array:
+    def covariance(self) -> F64:
         """Covariance of the state (11, 11), symmetric."""
         return np.asarray(self._ekf.P)
 
@@ -166,11 +164,11 @@ class PlanarFilter:
         self._ekf.P[[PX, PY], [PX, PY]] += noise_m**2
         self._ekf.P[[PX, PY], [GX, GY]] = self._ekf.P[[GX, GY], [PX, PY]] = -(std_m**2)
 
-    def loosen(self, std: Array) -> None:
+    def loosen(self, std: F64) -> None:
         """Know each state less well by `std` (11,)."""
         self._ekf.P = self._ekf.P + np.diag(np.square(std))
 
-    def _growth(self, step_s: float, gps_std_m: float, stray: float, drift: float) -> Array:
+    def _growth(self, step_s: float, gps_std_m: float, stray: float, drift: float) -> F64:
         """What one step adds to the covariance."""
         diagonal = [
             POSITION_STD_M**2 * step_s,
@@ -187,7 +185,7 @@ class PlanarFilter:
         np.fill_diagonal(self._noise, diagonal + [0.0] * (SIZE - len(diagonal)))
         return self._noise
 
-    def _correct(self, residual: Array, jacobian: Array, std: float | Array, gate2: float) -> Verdict:
+    def _correct(self, residual: F64, jacobian: F64, std: float | F64, gate2: float) -> Verdict:
         """One update unless the squared Mahalanobis distance of the innovation exceeds `gate2`."""
         noise = _PICK[: len(residual), : len(residual)] * std**2
         if math.isfinite(gate2):

@@ -1,19 +1,19 @@
-"""Raw detector output to boxes in the picture (checklist C4-C10). Pure."""
+"""Raw detector output to boxes in the picture (C4-C10). Pure."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32
 from paani.config import DetectorConfig
 from paani.messages import Detection, Label
 from paani_services.perception.preprocess import Letterbox
 
-Floats = NDArray[np.float32]
 LABELS = tuple(Label)
 MIN_SIDE = 1e-4  # normalised; a box thinner than this has no size to speak of
 
 
 def decode(
-    output: Floats, place: Letterbox, config: DetectorConfig, classes: tuple[str, ...] = LABELS
+    output: F32, place: Letterbox, config: DetectorConfig, classes: tuple[str, ...] = LABELS
 ) -> tuple[Detection, ...]:
     """Boxes by falling confidence.
 
@@ -49,7 +49,7 @@ def decode(
     )
 
 
-def in_picture(centred: Floats, place: Letterbox) -> NDArray[np.float64]:
+def in_picture(centred: F32, place: Letterbox) -> NDArray[np.float64]:
     """cx, cy, w, h in net pixels [4, n] to normalised x1, y1, x2, y2 [4, n], cut at the picture's edges."""
     cx, cy, w, h = centred.astype(np.float64)
     x = np.stack((cx - w / 2, cx + w / 2))

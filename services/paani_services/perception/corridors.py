@@ -1,4 +1,4 @@
-"""Class scores of the mask to three corridors of water (checklist E1-E7). Pure.
+"""Class scores of the mask to three corridors of water (E1-E7). Pure.
 
 A cell is 4x4 pixels of the answer. Its score is what a net that ends with a fourfold resize gave before it; of any
 other answer, the pixel to the right of and below the cell's middle.
@@ -10,11 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.config import CorridorConfig
 from paani.messages import LaneEvidence
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 STRIDE, MIDDLE = 4, 2
 MIN_ROWS = 32
 MIN_COUNTED = 0.5  # a corridor of which less can be seen is unknown, which is blocked
@@ -37,7 +36,7 @@ def cells_only(shape: tuple[int, ...]) -> tuple[int, ...] | None:
     return cells if cells[2] < STRIDE * MIN_ROWS <= shape[2] else None
 
 
-def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
+def classify(logits: F32, temperature: float) -> tuple[U8, F32]:
     """Class mask and confidence of each cell (E1).
 
     logits: float32 [1, 3, H, W] of water, obstacle, sky. Returns uint8 and float32 [h, w]: argmax and largest softmax
@@ -50,7 +49,7 @@ def classify(logits: Floats, temperature: float) -> tuple[Bytes, Floats]:
     return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)
 
 
-def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig, counts: Floats | None = None) -> Lanes:
+def summarise(mask: U8, confidence: F32, corridors: CorridorConfig, counts: F32 | None = None) -> Lanes:
     """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside.
 
     counts: how much of each cell counts (own hull and what lies outside the picture do not); None: everything.
@@ -68,7 +67,7 @@ def summarise(mask: Bytes, confidence: Floats, corridors: CorridorConfig, counts
     )
 
 
-def water_edge(mask: Bytes, counts: Floats) -> tuple[float, ...]:
+def water_edge(mask: U8, counts: F32) -> tuple[float, ...]:
     """Where the water that begins at the picture's bottom ends, for each column: see `Evidence.water_edge`.
 
     mask: uint8 [h, w], as the picture is, not levelled. counts: how much of each cell is not own hull, [h, w].

@@ -4,8 +4,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.config import EngineName
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
@@ -13,8 +13,6 @@ from paani_models.engines.last_resize import before_resize
 from paani_services.perception.corridors import cells_only
 from paani_services.perception.ncnn_engine import NcnnEngine
 
-Floats = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 ORT_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
@@ -32,7 +30,7 @@ class Engine(Protocol):
         """
         ...
 
-    def run(self, tensor: Floats | Bytes) -> Floats:
+    def run(self, tensor: F32 | U8) -> F32:
         """One inference: the contract's input to its output. Other threads go on meanwhile.
 
         Of a segmenter that ends by resizing its scores fourfold: those scores, one per cell.
@@ -98,7 +96,7 @@ class OnnxEngine:
                 return cls.load(role, path, threads, spinning=spinning, whole=True)
         return cls(session, contract, f"{role} {checksum[:12]}")
 
-    def run(self, tensor: Floats | Bytes) -> Floats:
+    def run(self, tensor: F32 | U8) -> F32:
         """One inference: the contract's input to its output, or its cells."""
         return np.asarray(self._session.run(None, {self._input: tensor})[0], np.float32)
 

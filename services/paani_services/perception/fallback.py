@@ -1,15 +1,14 @@
-"""A mask from colours alone, for when there is no learned segmenter (checklist F1-F4). Pure.
+"""A mask from colours alone, for when there is no learned segmenter (F1-F4). Pure.
 
 For people to look at. It is not learned and never eligible for navigation: whoever uses it must say so.
 """
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani_services.perception.corridors import OBSTACLE, SKY, WATER
 
-Bytes = NDArray[np.uint8]
 GRID_WH = (80, 64)
 # OpenCV ranges: hue 0..179, saturation and value 0..255.
 WATER_HUE = (80, 135)
@@ -21,7 +20,7 @@ HORIZON = 0.45  # normalised height above which bright cells are sky
 CONFIDENCE = 0.5
 
 
-def colour_mask(bgr: Bytes) -> Bytes:
+def colour_mask(bgr: U8) -> U8:
     """uint8 [64, 80]: bluish or greyish cells below the horizon are water, bright ones above it sky."""
     small = cv2.resize(bgr, GRID_WH, interpolation=cv2.INTER_AREA)
     hue, saturation, value = cv2.split(cv2.cvtColor(small, cv2.COLOR_BGR2HSV))

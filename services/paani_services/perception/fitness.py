@@ -1,14 +1,10 @@
 """The gate's net: how far a picture looks like one that the segmenter can be trusted on."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paani.arrays import U8
 from paani.config import GateConfig
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.gate import Fitness
 from paani_services.perception.preprocess import shrunk, tables_for
-
-Bytes = NDArray[np.uint8]
 
 
 def load_fitness(config: GateConfig, threads: int) -> Fitness | None:
@@ -19,7 +15,7 @@ def load_fitness(config: GateConfig, threads: int) -> Fitness | None:
     height, width = engine.contract.size_hw
     table = tables_for(engine.contract)
 
-    def fitness(middle: Bytes) -> float:
+    def fitness(middle: U8) -> float:
         return float(engine.run(shrunk(middle, height, width, table))[0, 0])
 
     return fitness

@@ -1,4 +1,4 @@
-"""Is this picture fit to be evidence? A net calls black water, so this is asked first (checklist J19). Pure.
+"""Is this picture fit to be evidence? A net calls black water, so this is asked first (J19). Pure.
 
 Limits on statistics name what no camera should deliver; a small net, trained on what the segmenter does not survive,
 knows the rest: views without water, mixed-up or turned pictures, rain and drops that hide the scene.
@@ -11,14 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.config import GateConfig
 from paani.messages import UnusableCause
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-
 MIDDLE_WH, SMALL_WH, TILE_PX = (320, 240), (80, 60), 20
-Fitness = Callable[[Bytes], float]
+Fitness = Callable[[U8], float]
 DARK_LEVEL, BRIGHT_LEVEL = 6, 250  # of 255
 PLAIN_STD, DARK_TILE_STD, DARK_TILE_MEAN = 2.0, 3.0, 40.0
 # J. Immerkaer, Fast Noise Variance Estimation, 1996: a mask that image structure does not answer to.
@@ -32,7 +30,7 @@ SKEW_ROWS, SKEW_PX = 2, (4, 10)  # lines this far apart, moved by so much agains
 class GateState(NamedTuple):
     """The last distinct frame in small, and how many in a row have shown the same."""
 
-    small: Floats | None = None
+    small: F32 | None = None
     same: int = 1
     epoch: int = -1
 
@@ -59,7 +57,7 @@ class Statistics(NamedTuple):
 
 
 def judge(
-    state: GateState, bgr: Bytes, epoch: int, config: GateConfig, fitness: Fitness | None = None
+    state: GateState, bgr: U8, epoch: int, config: GateConfig, fitness: Fitness | None = None
 ) -> tuple[GateState, UnusableCause]:
     """Judge one distinct frame; NONE when it is fit.
 
@@ -84,7 +82,7 @@ def judge(
     return state, cause
 
 
-def reduced(bgr: Bytes) -> tuple[Bytes, Bytes, Floats]:
+def reduced(bgr: U8) -> tuple[U8, U8, F32]:
     """The picture at 320x240 (BGR uint8), its luma (uint8), and luma at 80x60 (float32)."""
     shrinks = bgr.shape[1] >= MIDDLE_WH[0]
     interpolation = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
@@ -93,7 +91,7 @@ def reduced(bgr: Bytes) -> tuple[Bytes, Bytes, Floats]:
     return colour, middle, np.asarray(cv2.resize(middle, SMALL_WH, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def measure(middle: Bytes, small: Floats) -> Statistics:
+def measure(middle: U8, small: F32) -> Statistics:
     """Statistics of one picture, from its two reductions."""
     first, last = small.size // 100, small.size - 1 - small.size // 100
     low, high = np.partition(small, (first, last), axis=None)[[first, last]]
@@ -149,7 +147,7 @@ def cause_of(seen: Statistics, config: GateConfig) -> UnusableCause:
     return UnusableCause.NONE
 
 
-def _asked(fitness: Fitness, colour: Bytes, cause: UnusableCause, config: GateConfig) -> UnusableCause:
+def _asked(fitness: Fitness, colour: U8, cause: UnusableCause, config: GateConfig) -> UnusableCause:
     """What the net makes of a picture whose statistics are sound, or whose lines may be of a wrong length.
 
     A blurred or turned picture has such lines too: the net must be sure of it. One that it is not sure of, it is shown
@@ -169,19 +167,19 @@ def _asked(fitness: Fitness, colour: Bytes, cause: UnusableCause, config: GateCo
     return UnusableCause.NONE if upright else doubt
 
 
-def _edges(luma: Bytes | Floats) -> float:
+def _edges(luma: U8 | F32) -> float:
     """Mean absolute central difference, both ways."""
     across = cv2.norm(luma[:, 2:], luma[:, :-2], cv2.NORM_L1) / luma[:, 2:].size
     down = cv2.norm(luma[2:], luma[:-2], cv2.NORM_L1) / luma[2:].size
     return float(across + down) / 4.0
 
 
-def _skew(middle: Bytes) -> float:
+def _skew(middle: U8) -> float:
     """Lines of a wrong length each begin further along: moved back, every line is like the one above it."""
     lines = np.ascontiguousarray(middle[::SKEW_ROWS])
     above, below = lines[:-1], lines[1:]
 
-    def unlike(first: Bytes, second: Bytes) -> float:
+    def unlike(first: U8, second: U8) -> float:
         return cv2.norm(first, second, cv2.NORM_L1) / first.size
 
     moved = min(
@@ -192,7 +190,7 @@ def _skew(middle: Bytes) -> float:
     return moved / (unlike(above, below) + 1e-3)
 
 
-def _tiles(middle: Bytes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _tiles(middle: U8) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean and standard deviation of each tile, from running sums that are exact."""
     sums = (np.asarray(table[::TILE_PX, ::TILE_PX], np.float64) for table in cv2.integral2(middle))
     mean, square = ((x[1:, 1:] - x[1:, :-1] - x[:-1, 1:] + x[:-1, :-1]) / TILE_PX**2 for x in sums)

@@ -3,15 +3,12 @@
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.errors import UserError
 from paani_models.catalogue import Model, chosen, file_sha256
 from paani_models.engines.ncnn_runner import Run, converted, open_ncnn, resized
 from paani_services.perception.corridors import cells_only
-
-Floats = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 
 
 class NcnnEngine:
@@ -38,7 +35,7 @@ class NcnnEngine:
             run = short if short(np.zeros(contract.input.shape, np.float32)).shape == cells else run
         return cls(run, contract, f"{role} {file_sha256(file)[:12]} ncnn")
 
-    def run(self, tensor: Floats | Bytes) -> Floats:
+    def run(self, tensor: F32 | U8) -> F32:
         """One inference: the contract's input to its output, or its cells."""
         return self._run(np.asarray(tensor, np.float32))
 

@@ -4,9 +4,9 @@ import struct
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from paani.arrays import U8
+
 MAX_PIXELS = 2**25  # 100 MB of BGR
 PNG_START = b"\x89PNG\r\n\x1a\n"
 JPEG_START = b"\xff\xd8"
@@ -14,7 +14,7 @@ JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start-of-frame
 JPEG_BARE = frozenset((0x01, *range(0xD0, 0xDA)))  # markers without a length
 
 
-def decoded(data: bytes | Bytes) -> Bytes | None:
+def decoded(data: bytes | U8) -> U8 | None:
     """BGR uint8 [H, W, 3] of an encoded picture, of its first frame where it has several; None where it is none.
 
     Grey, alpha, 16-bit and CMYK pictures become BGR. A picture of more than `MAX_PIXELS` is none.

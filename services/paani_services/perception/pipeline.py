@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.config import PerceptionConfig
 from paani.messages import (
     Detection,
@@ -28,8 +28,6 @@ from paani_services.perception.picture_decoding import decoded
 from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 Detected = tuple[tuple[Detection, ...], float]  # what was found, and the time it took [ms]
 NO_SEGMENTER = "none"
 CLEARLY_SLOWER = 1.2  # nets that take about as long stay in their order, whatever one run of each says
@@ -39,7 +37,7 @@ SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 class Segmentation(NamedTuple):
     """Mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), its water's edge and corridors, who drew it, time taken."""
 
-    mask: Bytes
+    mask: U8
     edge: tuple[float, ...]
     lanes: Lanes
     source: SegmentationSource
@@ -66,11 +64,11 @@ class Perceiver:
         self._detector_begins = config.concurrent and self._takes_longer(self._detector, self._segmenter)
         self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
         self._begun: list[Future[Any]] = []
-        self._counts: dict[tuple[int, ...], Floats] = {}
+        self._counts: dict[tuple[int, ...], F32] = {}
 
     def perceive(
-        self, data: bytes | Bytes, header: PictureHeader, age_s: float, roll_rad: float = 0.0
-    ) -> tuple[Evidence, Bytes | None]:
+        self, data: bytes | U8, header: PictureHeader, age_s: float, roll_rad: float = 0.0
+    ) -> tuple[Evidence, U8 | None]:
         """Evidence of one distinct frame, and its class mask uint8 [64, 80], None where the picture is unusable.
 
         data: an encoded picture, or BGR uint8 [H, W, 3]. age_s: the picture's age now, at the start (resolution 1).
@@ -131,13 +129,13 @@ class Perceiver:
             took_ms.append(self._stopwatch_ms() - start_ms)
         return took_ms[2] > CLEARLY_SLOWER * took_ms[3]
 
-    def _judge(self, bgr: Bytes | None, header: PictureHeader, age_s: float) -> UnusableCause:
+    def _judge(self, bgr: U8 | None, header: PictureHeader, age_s: float) -> UnusableCause:
         if bgr is None:
             return UnusableCause.UNDECODABLE
         self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate, self._fitness)
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
 
-    def _detect(self, bgr: Bytes) -> Detected:
+    def _detect(self, bgr: U8) -> Detected:
         start_ms = self._stopwatch_ms()
         contract = self._detector.contract
         height, width = contract.size_hw
@@ -148,13 +146,13 @@ class Perceiver:
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, counts))
         return detections, self._stopwatch_ms() - start_ms
 
-    def _counted(self, shape: tuple[int, ...]) -> Floats:
+    def _counted(self, shape: tuple[int, ...]) -> F32:
         """How much of each cell of a grid lies outside the own hull."""
         if shape not in self._counts:
             self._counts[shape] = counted(self._config.ego_polygon, *shape)
         return self._counts[shape]
 
-    def _segment(self, bgr: Bytes, roll_rad: float) -> Segmentation:
+    def _segment(self, bgr: U8, roll_rad: float) -> Segmentation:
         """The learned mask; the colour mask where there is no segmenter or its scores are not finite."""
         start_ms = self._stopwatch_ms()
         source, (mask, confidence) = SegmentationSource.LEARNED, self._learned_mask(bgr)
@@ -167,7 +165,7 @@ class Perceiver:
         lanes = summarise(flat.mask, flat.confidence, self._config.corridors, flat.counts)
         return Segmentation(mask, water_edge(mask, counts), lanes, source, self._stopwatch_ms() - start_ms)
 
-    def _learned_mask(self, bgr: Bytes) -> tuple[Bytes, Floats]:
+    def _learned_mask(self, bgr: U8) -> tuple[U8, F32]:
         """Mask and confidence; a confidence that is not finite where there is no segmenter."""
         if self._segmenter is None:
             return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
@@ -179,7 +177,7 @@ class Perceiver:
     def _evidence(
         self,
         header: PictureHeader,
-        bgr: Bytes | None,
+        bgr: U8 | None,
         cause: UnusableCause,
         detections: tuple[Detection, ...],
         segmentation: Segmentation | None,

@@ -1,4 +1,4 @@
-"""Pictures to net inputs: letterbox for the detector, stretch for the segmenter (checklist C3, D7, D8). Pure.
+"""Pictures to net inputs: letterbox for the detector, stretch for the segmenter (C3, D7, D8). Pure.
 
 Normalisation is one table look-up per channel, straight into the input tensor.
 """
@@ -7,12 +7,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani_models.catalogue import Model
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 
 class Letterbox(NamedTuple):
@@ -26,23 +23,21 @@ class Letterbox(NamedTuple):
     source_h_px: int
 
 
-def tables(mean: tuple[float, float, float], std: tuple[float, float, float]) -> Floats:
+def tables(mean: tuple[float, float, float], std: tuple[float, float, float]) -> F32:
     """(v / 255 - mean) / std for each of 256 levels, per RGB channel: float32 [3, 256]."""
     levels = np.arange(256, dtype=np.float32)[None] / 255.0
     scaled = (levels - np.array(mean, np.float32)[:, None]) / np.array(std, np.float32)[:, None]
     return np.asarray(scaled, np.float32)
 
 
-def tables_for(contract: Model) -> Floats | None:
+def tables_for(contract: Model) -> F32 | None:
     """`tables` of a net; None for one that takes bytes and scales them itself."""
     if contract.input.dtype == "uint8":
         return None
     return tables(contract.preprocessing.mean, contract.preprocessing.std)
 
 
-def letterbox(
-    bgr: Bytes, height_px: int, width_px: int, pad_grey: int, table: Floats | None
-) -> tuple[Floats | Bytes, Letterbox]:
+def letterbox(bgr: U8, height_px: int, width_px: int, pad_grey: int, table: F32 | None) -> tuple[F32 | U8, Letterbox]:
     """Aspect kept, bilinear, centred on grey: a net's input as `stretch` gives it, and where the picture lies in it."""
     source_h, source_w = bgr.shape[:2]
     scale = min(width_px / source_w, height_px / source_h)
@@ -54,18 +49,18 @@ def letterbox(
     return _normalised(boxed, table), Letterbox(inner_w / source_w, inner_h / source_h, left, top, source_w, source_h)
 
 
-def stretch(bgr: Bytes, height_px: int, width_px: int, table: Floats | None) -> Floats | Bytes:
+def stretch(bgr: U8, height_px: int, width_px: int, table: F32 | None) -> F32 | U8:
     """Fills the input, bilinear: float32 [1, 3, H, W] in RGB, or uint8 [1, H, W, 3] in RGB without a table."""
     return _normalised(np.asarray(cv2.resize(bgr, (width_px, height_px)), np.uint8), table)
 
 
-def shrunk(middle: Bytes, height_px: int, width_px: int, table: Floats | None) -> Floats | Bytes:
+def shrunk(middle: U8, height_px: int, width_px: int, table: F32 | None) -> F32 | U8:
     """A picture averaged down to the gate's input, as `stretch` gives it."""
     small = cv2.resize(middle, (width_px, height_px), interpolation=cv2.INTER_AREA)
     return _normalised(np.asarray(small, np.uint8), table)
 
 
-def _normalised(bgr: Bytes, table: Floats | None) -> Floats | Bytes:
+def _normalised(bgr: U8, table: F32 | None) -> F32 | U8:
     if table is None:
         return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)[None]
     tensor = np.empty((1, 3, *bgr.shape[:2]), np.float32)

@@ -8,12 +8,13 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
+from paani.arrays import U8
 from paani.bus import Bus, Picture
 from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.perception.journal import FOLDER, Journal
-from paani_services.perception.pipeline import Bytes, Perceiver
+from paani_services.perception.pipeline import Perceiver
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -66,7 +67,7 @@ def roll_at(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> fl
     return odometry.roll_rad
 
 
-def mask_picture(mask: Bytes, header: m.PictureHeader) -> Picture:
+def mask_picture(mask: U8, header: m.PictureHeader) -> Picture:
     """The mask as a PNG of class numbers, under the name of the frame it was drawn from."""
     height, width = mask.shape
     named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")

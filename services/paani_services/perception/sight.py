@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.geometry import clip
 from paani.messages import BoxXyxy
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 Polygon = tuple[tuple[float, float], ...]
 OWN_HULL_FRAC = 0.8  # a box that lies this far in the ego polygon is the boat itself
 FINE = 8  # the polygon is drawn this many times finer than the grid
@@ -22,12 +21,12 @@ FINE = 8  # the polygon is drawn this many times finer than the grid
 class Level(NamedTuple):
     """A class mask uint8 and confidence float32, level with the horizon, and how much of each cell counts: [h, w]."""
 
-    mask: Bytes
-    confidence: Floats
-    counts: Floats
+    mask: U8
+    confidence: F32
+    counts: F32
 
 
-def counted(polygon: Polygon, height: int, width: int) -> Floats:
+def counted(polygon: Polygon, height: int, width: int) -> F32:
     """How much of each cell lies outside the own hull: float32 [height, width] in [0, 1].
 
     polygon: normalised corners; empty: everything counts.
@@ -41,7 +40,7 @@ def counted(polygon: Polygon, height: int, width: int) -> Floats:
     return np.asarray(1.0 - covered, np.float32)
 
 
-def level(mask: Bytes, confidence: Floats, counts: Floats, roll_rad: float, aspect: float) -> Level:
+def level(mask: U8, confidence: F32, counts: F32, roll_rad: float, aspect: float) -> Level:
     """Turn the grids about the picture's centre so that the horizon lies flat.
 
     aspect: width over height of the picture in pixels. Cells that come from outside the picture count for nothing.
@@ -67,7 +66,7 @@ def level(mask: Bytes, confidence: Floats, counts: Floats, roll_rad: float, aspe
     )
 
 
-def is_own_hull(box: BoxXyxy, counts: Floats) -> bool:
+def is_own_hull(box: BoxXyxy, counts: F32) -> bool:
     """Does the box show little but the boat itself? counts: of the unturned picture."""
     height, width = counts.shape
     x1, y1, x2, y2 = box

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani.messages import Evidence
 
-F64 = NDArray[np.float64]
 NEAR_ROWS = 0.75  # of one mask row: how far an end may lie off the line
 MIN_SHARE = 0.5  # of the columns must lie on it
 TRIES = 80

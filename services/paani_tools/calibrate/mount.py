@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani.config import CalibrationConfig
 from paani.errors import UserError
 from paani_tools.calibrate.horizon import Waterline
 
-F64 = NDArray[np.float64]
 MIN_PICTURES = 20
 MAX_SPREAD_DEG = 1.0  # standard deviation between pictures
 MAX_TILT_DEG = 45.0

@@ -5,9 +5,8 @@ import sys
 from pathlib import Path
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.cli import add_config_arguments, config_from
 from paani.config import PerceptionConfig
 from paani.errors import UserError
@@ -21,8 +20,6 @@ from paani_services.perception.preprocess import stretch, tables_for
 from paani_tools.faults.corpus import clean_pictures, listed_pictures, scenes, sources
 from paani_tools.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
 from paani_tools.faults.severity_curves import curves
-
-Bytes = NDArray[np.uint8]
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -44,12 +41,12 @@ class Eyes:
         self._table = tables_for(self._segmenter.contract)
         self._fitness = load_fitness(config.gate, config.intra_op_threads)
 
-    def segment(self, bgr: Bytes) -> Bytes:
+    def segment(self, bgr: U8) -> U8:
         """Classes uint8 [64, 80]."""
         height, width = self._segmenter.contract.size_hw
         return classify(self._segmenter.run(stretch(bgr, height, width, self._table)), self._config.temperature)[0]
 
-    def judge(self, bgr: Bytes) -> UnusableCause:
+    def judge(self, bgr: U8) -> UnusableCause:
         """The gate's verdict, as on the first picture of a camera."""
         return judge(GateState(), bgr, 0, self._config.gate, self._fitness)[1]
 

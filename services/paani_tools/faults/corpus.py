@@ -6,11 +6,10 @@ from typing import NamedTuple, TypeVar
 import cv2
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.errors import UserError
 
-Bytes = NDArray[np.uint8]
 T = TypeVar("T")
 SIZE_WH = (320, 240)
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
@@ -25,8 +24,8 @@ class Scene(NamedTuple):
 
     source: str
     sequence: str
-    picture: Bytes
-    mask: Bytes
+    picture: U8
+    mask: U8
 
 
 class _Item(msgspec.Struct):
@@ -46,7 +45,7 @@ def sources(folder: Path) -> list[Path]:
     return found
 
 
-def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Bytes]:
+def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[U8]:
     """Pictures of a source as they are, evenly spread over it. only: paths below the data folder; None: all."""
     paths = sorted(
         path
@@ -57,7 +56,7 @@ def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = Non
     return [np.asarray(picture, np.uint8) for picture in read if picture is not None]
 
 
-def listed_pictures(folder: Path, names: frozenset[str]) -> list[Bytes]:
+def listed_pictures(folder: Path, names: frozenset[str]) -> list[U8]:
     """The pictures of these paths below a folder. Raises UserError naming the first that is none."""
     found = []
     for name in sorted(names):

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.messages import UnusableCause
 from paani.picture_faults import DRY, FAULTS, MOVES, SEVERITIES, above_water, due_verdict, spoilt
 from paani_tools.faults.corpus import Scene
 
-Bytes = NDArray[np.uint8]
-Segment = Callable[[Bytes], Bytes]
-Judge = Callable[[Bytes], UnusableCause]
+Segment = Callable[[U8], U8]
+Judge = Callable[[U8], UnusableCause]
 
 
 class CellFigures(msgspec.Struct, frozen=True):
@@ -67,7 +67,7 @@ def cell_figures(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Ite
     yield CellFigures(DRY, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
 
 
-def clean_figures(source: str, pictures: Iterable[Bytes], judge: Judge) -> CleanFigures:
+def clean_figures(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFigures:
     """Pictures that nothing was done to."""
     causes = [judge(picture) for picture in pictures]
     refused = sorted(str(cause) for cause in causes if cause is not UnusableCause.NONE)
@@ -89,7 +89,7 @@ def totals(cells: Sequence[CellFigures], clean: Sequence[CleanFigures]) -> Total
     )
 
 
-def joint(predicted: Bytes, truth: Bytes) -> NDArray[np.int64]:
+def joint(predicted: U8, truth: U8) -> NDArray[np.int64]:
     """Counts [3, 3], rows truth, columns prediction, where the truth is known; the truth is taken to its grid."""
     truth = np.asarray(cv2.resize(truth, predicted.shape[::-1], interpolation=cv2.INTER_NEAREST), np.uint8)
     known = truth < 3

@@ -2,12 +2,11 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.config import CorridorConfig
 from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk
 
-Bytes = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 WIDTH_PX, BANNER_PX, LINE_PX, MARGIN_PX = 800, 142, 24, 14
@@ -20,9 +19,7 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 ADVICE_COLOURS = {Direction.STRAIGHT: FREE, Direction.STOP: BLOCKED, Direction.NO_DATA: BLOCKED}
 
 
-def annotated(
-    bgr: Bytes, mask: Bytes | None, evidence: Evidence, advisory: Advisory, corridors: CorridorConfig
-) -> Bytes:
+def annotated(bgr: U8, mask: U8 | None, evidence: Evidence, advisory: Advisory, corridors: CorridorConfig) -> U8:
     """The picture, 800 px wide, with mask tint, corridors, boxes, and the advice below it.
 
     bgr: uint8 [H, W, 3]. mask: uint8 classes (0 water, 1 obstacle, 2 sky) of any size, or None.
@@ -48,7 +45,7 @@ def annotated(
     return np.vstack((canvas, _banner(evidence, advisory)))
 
 
-def _corridor(canvas: Bytes, span: tuple[float, float], top: float, lane: LaneRisk, inner: bool) -> None:
+def _corridor(canvas: U8, span: tuple[float, float], top: float, lane: LaneRisk, inner: bool) -> None:
     height, width = canvas.shape[:2]
     inset = 4 if inner else 0  # so that overlapping corridors stay apart
     corners = (round(span[0] * width), round(top * height) + inset), (round(span[1] * width), height - 2 - inset)
@@ -59,7 +56,7 @@ def _lane_colour(lane: LaneRisk) -> Colour:
     return BLOCKED if lane.blocked else FREE
 
 
-def _box(canvas: Bytes, detection: Detection) -> None:
+def _box(canvas: U8, detection: Detection) -> None:
     height, width = canvas.shape[:2]
     x1, y1, x2, y2 = detection.box_xyxy
     left, top, right, bottom = round(x1 * width), round(y1 * height), round(x2 * width), round(y2 * height)
@@ -68,7 +65,7 @@ def _box(canvas: Bytes, detection: Detection) -> None:
 
 
 def _label(
-    canvas: Bytes, text: str, at_px: tuple[int, int], scale: float, colour: Colour, *, centred: bool = False
+    canvas: U8, text: str, at_px: tuple[int, int], scale: float, colour: Colour, *, centred: bool = False
 ) -> None:
     """Text on a dark plate, kept inside the picture."""
     (width, height), base = cv2.getTextSize(text, FONT, scale, 1)
@@ -78,7 +75,7 @@ def _label(
     cv2.putText(canvas, text, (left, at_px[1]), FONT, scale, colour, 1, cv2.LINE_AA)
 
 
-def _banner(evidence: Evidence, advisory: Advisory) -> Bytes:
+def _banner(evidence: Evidence, advisory: Advisory) -> U8:
     banner = np.full((BANNER_PX, WIDTH_PX, 3), PAPER, np.uint8)
     colour = ADVICE_COLOURS.get(advisory.direction, BOX)
     cv2.putText(banner, advisory.direction.replace("_", " "), (MARGIN_PX, 46), FONT, 1.35, colour, 3, cv2.LINE_AA)

@@ -2,11 +2,10 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani_tools.look.annotate import PAPER
 
-Bytes = NDArray[np.uint8]
 COLUMNS, THUMBNAIL_PX, GAP_PX = 4, 480, 6
 MOST = 48  # kept at once, an even number; with more, every second one goes
 
@@ -15,11 +14,11 @@ class ContactSheet:
     """Takes annotated pictures one by one and keeps few of them, whatever their number."""
 
     def __init__(self) -> None:
-        self._kept: list[Bytes] = []
+        self._kept: list[U8] = []
         self._every = 1
         self._seen = 0
 
-    def add(self, bgr: Bytes) -> None:
+    def add(self, bgr: U8) -> None:
         """bgr: uint8 [H, W, 3]."""
         if self._seen % self._every == 0:
             if len(self._kept) == MOST:
@@ -30,7 +29,7 @@ class ContactSheet:
             self._kept.append(np.asarray(small, np.uint8))
         self._seen += 1
 
-    def drawn(self) -> Bytes | None:
+    def drawn(self) -> U8 | None:
         """The sheet, uint8 [H, W, 3]; None where nothing was added."""
         if not self._kept:
             return None
@@ -38,7 +37,7 @@ class ContactSheet:
         return np.vstack([_row(row) for row in rows])
 
 
-def _row(pictures: list[Bytes]) -> Bytes:
+def _row(pictures: list[U8]) -> U8:
     height_px = max(picture.shape[0] for picture in pictures) + GAP_PX
     row = np.full((height_px, COLUMNS * (THUMBNAIL_PX + GAP_PX), 3), PAPER, np.uint8)
     for column, picture in enumerate(pictures):

@@ -5,16 +5,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.config import Config
 from paani.messages import Advisory, Evidence, PictureHeader, Tracks
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, recording
 from paani_services.perception.pipeline import Perceiver
 
-Bytes = NDArray[np.uint8]
 PRESENTATIONS, PRESENTATION_US = 8, 100_000  # U8: a still is shown eight times at 10 Hz
 START_US = 1_000_000
 
@@ -23,8 +21,8 @@ class Judgement(NamedTuple):
     """One frame, what was seen in it (mask None when unusable), the advice, and the advisor's memory after it."""
 
     name: str
-    bgr: Bytes | None
-    mask: Bytes | None
+    bgr: U8 | None
+    mask: U8 | None
     evidence: Evidence
     advisory: Advisory
     tracks: Tracks
@@ -67,7 +65,7 @@ def judged_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config,
     return Judgement(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
 
 
-def _perceive(perceiver: Perceiver, frame: Frame, epoch: int, number: int) -> tuple[Evidence, Bytes | None]:
+def _perceive(perceiver: Perceiver, frame: Frame, epoch: int, number: int) -> tuple[Evidence, U8 | None]:
     height, width = frame.bgr.shape[:2] if frame.bgr is not None else (0, 0)
     header = PictureHeader(
         source_us=START_US + frame.media_us,

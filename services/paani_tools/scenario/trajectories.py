@@ -63,7 +63,7 @@ Trajectory = Callable[[float, float], list[Sighting]]
 
 
 def families(config: Config) -> tuple[Family, ...]:
-    """The six families (checklist U9), each over five rates and three sizes."""
+    """The six families (U9), each over five rates and three sizes."""
     unknown = MotionState.UNKNOWN
     return (
         _family("expansion", MotionState.APPROACHING, MotionCause.NONE, lambda rate, size: scaled(rate, size), config),

@@ -1,4 +1,7 @@
-"""Advisor settings. Ids in comments are checklist ids: the paper's constants."""
+"""Advisor settings.
+
+Ids such as `J7` name statements of the paper (`paani claims`).
+"""
 
 from __future__ import annotations
 

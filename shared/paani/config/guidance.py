@@ -1,4 +1,7 @@
-"""Localization, navigator and controller settings. Ids in comments are checklist ids."""
+"""Localization, navigator and controller settings.
+
+Ids such as `J7` name statements of the paper (`paani claims`).
+"""
 
 from __future__ import annotations
 

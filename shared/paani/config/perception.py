@@ -1,4 +1,7 @@
-"""Camera and perception settings. Ids in comments are checklist ids: the paper's constants."""
+"""Camera and perception settings.
+
+Ids such as `J7` name statements of the paper (`paani claims`).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Where the camera is on the boat, and the metric planner's settings. Ids in comments are checklist ids."""
+"""Where the camera is on the boat, and the metric planner's settings.
+
+Ids such as `J7` name statements of the paper (`paani claims`).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""World, plant, adapter and eye settings. Ids in comments are checklist ids."""
+"""World, plant, adapter and eye settings.
+
+Ids such as `J7` name statements of the paper (`paani claims`).
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from paani.messages.perception import Label, UnusableCause
 
 
 class Hazard(StrEnum):
-    """Compact hazard vocabulary, one to one with `Label` (checklist G8)."""
+    """Compact hazard vocabulary, one to one with `Label` (G8)."""
 
     SWIMMER = "swimmer"
     CRAFT = "craft"
@@ -20,7 +20,7 @@ class Hazard(StrEnum):
 
 
 class MotionState(StrEnum):
-    """Apparent motion: diagnostic only, it lowers no risk and authorises nothing (checklist I20)."""
+    """Apparent motion: diagnostic only, it lowers no risk and authorises nothing (I20)."""
 
     APPROACHING = "approaching"
     RECEDING = "receding"
@@ -46,7 +46,7 @@ class MotionCause(StrEnum):
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True):
-    """One tracked box. Acceptance and prediction are explicit, never hidden in the score (checklist G11)."""
+    """One tracked box. Acceptance and prediction are explicit, never hidden in the score (G11)."""
 
     id: Count
     label: Label
@@ -90,7 +90,7 @@ class Tracks(Message, frozen=True, kw_only=True):
 
 
 class Direction(StrEnum):
-    """The advised direction (checklist J18)."""
+    """The advised direction (J18)."""
 
     STRAIGHT = "STRAIGHT"
     SLIGHT_LEFT = "SLIGHT_LEFT"
@@ -131,7 +131,7 @@ class Reason(StrEnum):
 
 
 class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
-    """R_j and the four numbers it was made from (checklist J4), with the overrides that apply.
+    """R_j and the four numbers it was made from (J4), with the overrides that apply.
 
     limit: the risk at which this lane is blocked in this frame; lower where it already was.
     """
@@ -208,7 +208,7 @@ class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Advisory(Message, frozen=True, kw_only=True):
-    """What the advisor advises, the evidence it used (checklist J11), and what would change it."""
+    """What the advisor advises, the evidence it used (J11), and what would change it."""
 
     direction: Direction
     reason: Reason

@@ -8,7 +8,7 @@ from paani.messages.header import Count, Message, Stamp, Text
 
 
 class TimeBase(StrEnum):
-    """Which time tells the motion between pictures (checklist I17): `source_us` live, `media_us` in a replay.
+    """Which time tells the motion between pictures (I17): `source_us` live, `media_us` in a replay.
 
     MEDIA is the recording's own time, FRAME_INDEX the index over the replay rate. Freshness is always `source_us`.
     """

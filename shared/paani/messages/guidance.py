@@ -37,7 +37,7 @@ class Inhibit(StrEnum):
 
 
 class NavCommand(Message, frozen=True, kw_only=True):
-    """Atomic order to the controller: heading, speed, enable, frame, validity together (checklist B11).
+    """Atomic order to the controller: heading, speed, enable, frame, validity together (B11).
 
     `echo_us` is the newest plant stamp the navigator had heard: the plant judges age on its own clock.
     """
@@ -77,7 +77,7 @@ class Route(Message, frozen=True, kw_only=True):
 
 
 class Thrust(Message, frozen=True, kw_only=True):
-    """Normalised differential thrust, negative: astern (checklist B12); not so where `controller.astern` is 0 (N7)."""
+    """Normalised differential thrust, negative: astern (B12); not so where `controller.astern` is 0 (N7)."""
 
     left: Signed
     right: Signed
@@ -97,7 +97,7 @@ class Arming(Message, frozen=True, kw_only=True):
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """Estimated pose and body velocities; an estimate, never simulator truth (checklist L4).
+    """Estimated pose and body velocities; an estimate, never simulator truth (L4).
 
     nis: squared Mahalanobis distance of the newest GPS position from the expected one, 2 on average if the stated
     spread is right; 0: none yet. refused_fixes: how many lay too far off to be used, since the estimate began.

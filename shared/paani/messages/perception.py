@@ -11,7 +11,7 @@ from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, 
 
 
 class Label(StrEnum):
-    """Detector classes in output order (checklist C2)."""
+    """Detector classes in output order (C2)."""
 
     PERSON = "person"
     VESSEL = "vessel"
@@ -38,7 +38,7 @@ class UnusableCause(StrEnum):
 
 
 class SegmentationSource(StrEnum):
-    """Who drew the mask. Only LEARNED may count as free-space evidence (checklist F2)."""
+    """Who drew the mask. Only LEARNED may count as free-space evidence (F2)."""
 
     LEARNED = "learned"
     FALLBACK = "fallback"
@@ -52,7 +52,7 @@ class Detection(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
-    """One corridor of the mask: N_j, U_j and clear width (checklist E4-E6), fractions of the corridor."""
+    """One corridor of the mask: N_j, U_j and clear width (E4-E6), fractions of the corridor."""
 
     non_water: Unit = 1.0
     uncertainty: Unit = 1.0
@@ -72,7 +72,7 @@ class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Evidence(Message, frozen=True, kw_only=True):
-    """What perception saw in one picture (checklist B5).
+    """What perception saw in one picture (B5).
 
     `roll_rad`: the roll the corridors were levelled by. Boxes lie in the picture as it is.
     `water_edge`: for each column of the mask as it is, left to right, the lower edge of the first cell that is not

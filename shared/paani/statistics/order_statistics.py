@@ -1,4 +1,4 @@
-"""The two order statistics that every figure here uses (checklist U5)."""
+"""The two order statistics that every figure here uses (U5)."""
 
 from __future__ import annotations
 

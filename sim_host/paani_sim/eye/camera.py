@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F64
 from paani_sim.eye.mesh import rotation
 
-F64 = npt.NDArray[np.float64]
 NEAR_M = 0.15
-REST_Z_M = 0.177  # checklist K6: height of the boat's origin at rest
+REST_Z_M = 0.177  # K6: height of the boat's origin at rest
 FAR_M = 3000.0
 
 

@@ -4,12 +4,11 @@ from collections.abc import Iterable
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import U8
 from paani.picture_faults import black
 from paani_sim.worlds.faults import Fault, FaultKind, active, is_linked
 
-U8 = npt.NDArray[np.uint8]
 BLUR_PX = 8.0  # of a blur whose amount is not named: severity 3 of `paani.picture_faults.blur`
 DARK_SEVERITY = 3
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-CELL_M = 32.0
+from paani.arrays import F64, U32
 
-F64 = npt.NDArray[np.float64]
-U32 = npt.NDArray[np.uint32]
+CELL_M = 32.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F32, U8
 from paani_sim.eye.scene import FIRST_THING, SKY, WATER, Thing
 from paani_sim.worlds.world import Kind
 
@@ -17,9 +18,6 @@ MIN_PIXELS = 10
 MIN_CONTRAST = 9.0  # of 255: below it neither colour nor brightness tells a thing from what is around it
 MIN_FILLED = 0.06  # of a box: less are specks behind leaves and railings
 AROUND_PX = 3
-
-U8 = npt.NDArray[np.uint8]
-F32 = npt.NDArray[np.float32]
 
 
 class VisibleBox(NamedTuple):

@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F64
 from paani_sim.eye import sprites
 from paani_sim.eye.buildings import house
 from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
 from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, furniture, quay
 from paani_sim.eye.structures import bridge_reach_m
-from paani_sim.worlds.curves import Points, clearance_m, normals_left, resample_closed
+from paani_sim.worlds.curves import clearance_m, normals_left, resample_closed
 from paani_sim.worlds.world import Bank, Kind, World
 
-F64 = npt.NDArray[np.float64]
 REACH_M = 460.0
 ROWS_M = (-4.0, -1.6, -0.5, 0.0, 0.35, 0.9, 1.8, 3.2, 5.5, 9.0, 14.0, 21.0)
 COARSE_M, FAR_CELLS = 14.0, 3  # cells of the ground behind the banks; how many make one beyond `FAR_M`
@@ -156,7 +156,7 @@ def _houses(world: World, field: _Field, rng: np.random.Generator) -> tuple[Mesh
     found: list[Mesh] = []
     quayed = field.bank is Bank.QUAY
     near_m, far_m, most, apart_m = (PAVED_M + 5.5, 34.0, 30, 17.0) if quayed else (16.0, 46.0, 14, 20.0)
-    taken: list[Points] = [np.array(o.pose[:2]) for o in world.obstacles if o.kind is Kind.OTHER]
+    taken: list[F64] = [np.array(o.pose[:2]) for o in world.obstacles if o.kind is Kind.OTHER]
     for _ in range(160):
         index = int(rng.integers(400))
         spot = shore[index] + outward[index] * rng.uniform(near_m, far_m)

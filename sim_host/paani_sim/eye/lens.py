@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-U8 = npt.NDArray[np.uint8]
+from paani.arrays import U8
+
 NEUTRAL = (1.0, 1.0, 1.0)
 SHORTEST_PX = 0.7  # a smear that nobody sees
 

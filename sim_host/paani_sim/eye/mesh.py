@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-F32 = npt.NDArray[np.float32]
+from paani.arrays import F32
+
 Rgb = tuple[float, float, float]
 
 PAINT, LAND, WOOD, ROCK, GLASS, FACADE, BRICK, STONE, PAVING = range(9)

@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F64, U8
 from paani.errors import UserError
 from paani_sim.eye.camera import Camera
 
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
 STEPS = 40
 WIDEST = 4.0  # times the picture's corner: no farther than this does a lens reach
 

@@ -1,13 +1,11 @@
 """Quay walls around a world's water: masonry, coping, paved ground and what stands on it. Pure numpy."""
 
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import F64
 from paani_sim.eye.mesh import BRICK, PAVING, STONE, WOOD, Mesh, Rgb, box, grid_triangles, merge, mesh, placed, rod
-from paani_sim.worlds.curves import Points, clearance_m, closed_length_m, point_along_closed
+from paani_sim.worlds.curves import clearance_m, closed_length_m, point_along_closed
 from paani_sim.worlds.world import World
-
-F64 = npt.NDArray[np.float64]
 
 QUAY_TOP_M = 0.9
 PAVED_M = 9.0  # from the edge inland
@@ -34,7 +32,7 @@ def quay(world: World, rng: np.random.Generator) -> Mesh:
     return merge(_wall(ring, wall_rgb, wall_material), _paved(world, ring, ground_rgb))
 
 
-def _divided(shore_m: Points) -> Points:
+def _divided(shore_m: F64) -> F64:
     """The same polygon, its corners kept, with edges of at most `STEP_M`."""
     pieces = []
     for start, end in zip(shore_m, np.roll(shore_m, -1, axis=0), strict=True):
@@ -43,7 +41,7 @@ def _divided(shore_m: Points) -> Points:
     return np.vstack(pieces)
 
 
-def _outward(ring: Points) -> tuple[Points, Points]:
+def _outward(ring: F64) -> tuple[F64, F64]:
     """Unit normals `(n, 2)` of the edges towards land, and mitred ones of the points."""
     edge = np.roll(ring, -1, axis=0) - ring
     length = np.maximum(np.hypot(edge[:, 0], edge[:, 1]), 1e-9)
@@ -52,7 +50,7 @@ def _outward(ring: Points) -> tuple[Points, Points]:
     return normal, 2.0 * both / np.maximum((both**2).sum(axis=1, keepdims=True), 1.0)
 
 
-def _wall(ring: Points, rgb: Rgb, material: int) -> Mesh:
+def _wall(ring: F64, rgb: Rgb, material: int) -> Mesh:
     """Flat faces, each with its own normal: the wall, the coping's front, its overhang's top."""
     normal, mitre = _outward(ring)
     after, mitre_after = np.roll(ring, -1, axis=0), np.roll(mitre, -1, axis=0)
@@ -81,7 +79,7 @@ def _wall(ring: Points, rgb: Rgb, material: int) -> Mesh:
     return merge(*parts)
 
 
-def _paved(world: World, ring: Points, rgb: Rgb) -> Mesh:
+def _paved(world: World, ring: F64, rgb: Rgb) -> Mesh:
     """Level ground from the coping to `PAVED_M` inland: a strip along the edge, a grid for what it leaves open."""
     _, mitre = _outward(ring)
     rows = (EDGE_M, 1.2, 2.4, 4.0, 6.0, PAVED_M + 1.0)

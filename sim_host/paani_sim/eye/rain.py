@@ -6,10 +6,8 @@ falls about half a metre while the shutter is open, and shows the sky's light.
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-U8 = npt.NDArray[np.uint8]
-F32 = npt.NDArray[np.float32]
+from paani.arrays import F32, U8
 
 PAD_PX = 96
 DROP_LIFE_S = 9.0

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F32, F64
 from paani_sim.eye import gl as g
 from paani_sim.eye import ripples, shaders
 from paani_sim.eye.afloat import ride, sea_of
@@ -31,8 +32,6 @@ from paani_sim.eye.wave_textures import noise_tile, slope_tile
 from paani_sim.eye.weather import Uniforms, uniforms
 from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_at, along_at
 
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 _NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
 DETAILS_WITHIN_M = 80.0
 SHADES_WITHIN_M = 40.0

@@ -10,13 +10,11 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F32, F64
 from paani_sim.eye.afloat import floats
 from paani_sim.water.waves import GRAVITY_MPS2
-from paani_sim.worlds.curves import Points
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2
 
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 PATCH_WIDTHS = (3, 2, 4, 2)
 COLUMNS = sum(PATCH_WIDTHS)
 KELVIN = 0.354  # tangent of the wake's half angle, 19.47 degrees (Kelvin, 1887)
@@ -119,7 +117,7 @@ def _length_m(actor: Actor) -> float:
     return float(np.hypot(*np.diff(actor.path_m, axis=0).T).sum())
 
 
-def _points_at(actor: Actor, along_m: F64) -> Points:
+def _points_at(actor: Actor, along_m: F64) -> F64:
     path = np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     at = along_m % arc[-1] if actor.closed else np.clip(along_m, 0.0, arc[-1])

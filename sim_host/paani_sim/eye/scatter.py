@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from paani_sim.eye.boats import BOAT_LOOKS
 from paani_sim.eye.camera import BoatPose
@@ -11,8 +10,6 @@ from paani_sim.eye.quay import QUAY_TOP_M
 from paani_sim.eye.structures import BUOY_LOOKS
 from paani_sim.worlds.curves import clearance_m, normals_left, resample_closed
 from paani_sim.worlds.world import Bank, Kind, Obstacle, Pose2, World
-
-F64 = npt.NDArray[np.float64]
 
 BOAT_SIZES_M = {
     "rowboat": (3.2, 4.6, 0.37, 0.6),

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import F32, U32
 from paani_sim.eye.afloat import floats
 from paani_sim.eye.boats import boat
 from paani_sim.eye.buildings import crane, warehouse
@@ -19,9 +19,6 @@ from paani_sim.worlds.world import Actor, Kind, Obstacle, World
 SKY, WATER, LAND, FIRST_THING = 0, 1, 2, 3
 ROW_WIDTHS = (3, 3, 4, 1)
 PLANT_WIDTHS = (3, 4, 2)
-
-F32 = npt.NDArray[np.float32]
-U32 = npt.NDArray[np.uint32]
 
 
 class Thing(NamedTuple):

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F32
 from paani_sim.worlds.world import Light
 
 WIDTH = 1024
 HEIGHT = 192
-F32 = npt.NDArray[np.float32]
 SKIES = ("clear", "cloudy", "overcast", "dusk", "hazy")
 
 

@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import U8
+
 SIZE = 256
-U8 = npt.NDArray[np.uint8]
 Tone = tuple[float, float, float]
 
 BROADLEAF = (0, 1, 2, 3, 4)

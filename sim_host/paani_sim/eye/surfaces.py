@@ -4,12 +4,9 @@ Every layer is `(TILE, TILE, 4)` uint8, periodic. Layer 0 is noise; in the other
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import F64, U8
 from paani_sim.eye.wave_textures import TILE, noise_tile
-
-U8 = npt.NDArray[np.uint8]
-F64 = npt.NDArray[np.float64]
 
 NOISE, BRICKS, BLOCKS, SETTS = range(4)
 SPAN_M = (1.0, 1.92, 4.0, 3.2)  # what one tile of a layer spans on its surface; layer 0 is scaled in the shader

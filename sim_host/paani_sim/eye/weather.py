@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from paani.arrays import F32
 from paani_sim.eye.afloat import Sea, sea_of
 from paani_sim.eye.rain import extinction_per_m
 from paani_sim.eye.sky import Sky
@@ -10,7 +11,6 @@ from paani_sim.eye.surfaces import SPAN_M
 from paani_sim.eye.wave_textures import mean_square_slope
 from paani_sim.worlds.world import Light, Wind, World
 
-F32 = npt.NDArray[np.float32]
 Uniforms = dict[str, float | F32]
 
 SWELL_M = np.array([11.3, 4.1, 1.37])  # tiles of the water shader

@@ -1,4 +1,4 @@
-"""The last gate before force: trusts nobody, zero unless everything is in order (checklist O1, O2).
+"""The last gate before force: trusts nobody, zero unless everything is in order (O1, O2).
 
 Time is the plant's own monotonic clock. A command is as old as the plant stamp that it echoes, so
 no other clock matters and a burst of delayed commands is refused whole.

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
+from paani.arrays import F64
 from paani.config import PlantConfig
 from paani.geometry import wrap_rad
 from paani.statistics.figure_table import Part
@@ -29,8 +29,6 @@ OTTER_LAG_S = 0.1  # otter.py
 FRONTAL_M2, LATERAL_M2 = 0.15, 0.30
 EVERY_S = 0.1
 HALF_WIDTH_M = 300.0  # of the water below: the current is the same all about the boat
-
-Vector = npt.NDArray[np.float64]
 
 
 class Manoeuvre(NamedTuple):
@@ -77,13 +75,13 @@ def compare(vessel: str, manoeuvre: Manoeuvre) -> Difference:
     )
 
 
-def solved(vessel: str, manoeuvre: Manoeuvre) -> Vector:
+def solved(vessel: str, manoeuvre: Manoeuvre) -> F64:
     """`(n, 3)` x, y [m] and heading [rad] of the published model every `EVERY_S`."""
     times = np.arange(0.0, manoeuvre.seconds + 1e-9, EVERY_S)
     turn = manoeuvre.zigzag_rad
 
-    def passes(side: float) -> Callable[[float, Vector], float]:
-        def left_over(_: float, state: Vector) -> float:
+    def passes(side: float) -> Callable[[float, F64], float]:
+        def left_over(_: float, state: F64) -> float:
             return float(state[2] - side * turn)
 
         left_over.terminal = True  # type: ignore[attr-defined]  # how scipy is told to stop there
@@ -108,7 +106,7 @@ def solved(vessel: str, manoeuvre: Manoeuvre) -> Vector:
     return np.vstack(parts)[: len(times)]
 
 
-def _rates(state: Vector, vessel: str, manoeuvre: Manoeuvre, ordered_n: Vector) -> Vector:
+def _rates(state: F64, vessel: str, manoeuvre: Manoeuvre, ordered_n: F64) -> F64:
     """Of x, y, heading, u, v, r and the two fans' forces; u, v, r over ground."""
     heading, rate = state[2], state[5]
     cos, sin = math.cos(heading), math.sin(heading)
@@ -131,7 +129,7 @@ def _rates(state: Vector, vessel: str, manoeuvre: Manoeuvre, ordered_n: Vector) 
     return np.concatenate([rotation @ state[3:6], through_rate + current_rate, (ordered_n - state[6:8]) / OTTER_LAG_S])
 
 
-def _wind(through_air: Vector) -> Vector:
+def _wind(through_air: F64) -> F64:
     """Section 10.1: 0.5 rho V^2 (A_F c_x cos, A_L c_y sin, A_L L c_n sin 2) of the angle the air comes from."""
     speed_mps, angle = math.hypot(through_air[0], through_air[1]), math.atan2(through_air[1], through_air[0])
     shape = (
@@ -142,7 +140,7 @@ def _wind(through_air: Vector) -> Vector:
     return 0.5 * 1.225 * speed_mps**2 * np.array(shape)
 
 
-def driven(vessel: str, manoeuvre: Manoeuvre) -> Vector:
+def driven(vessel: str, manoeuvre: Manoeuvre) -> F64:
     """`(n, 3)` as `solved`, of the plant."""
     plant = Plant(_wide_water(manoeuvre), PlantConfig(vessel=vessel))
     try:

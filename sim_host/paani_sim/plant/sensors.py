@@ -1,4 +1,4 @@
-"""GPS, IMU and compass with their errors (checklist K9). Pure: state, truth and generator in.
+"""GPS, IMU and compass with their errors (K9). Pure: state, truth and generator in.
 
 A GPS error wanders (first-order Gauss-Markov) instead of being drawn anew for each fix, as a real
 receiver's does; gyro and compass carry one unknown bias for the whole run.

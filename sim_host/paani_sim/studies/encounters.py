@@ -10,12 +10,10 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import F64
 from paani.messages import BoxXyxy, Label
 from paani_sim.eye.camera import BoatPose, Camera, project
-
-F64 = npt.NDArray[np.float64]
 
 EDGE_JITTER_PX = 0.6  # of one box edge, standard deviation; the larger the box
 EDGE_JITTER_FRAC = 0.004  # of the box's size, added

@@ -6,17 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from paani import messages as m
+from paani.arrays import U8
 from paani.config import Config
 from paani.cores import perceiver_of
 from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.eye.mounted import open_eye, pose_of
 from paani_sim.worlds import Fault, World
-
-Bytes = NDArray[np.uint8]
 
 
 class Eyes(Protocol):
@@ -36,8 +32,8 @@ class Sight:
     """`bgr` uint8 [H, W, 3] and `mask` uint8 [64, 80] where there are any."""
 
     evidence: m.Evidence
-    bgr: Bytes | None = None
-    mask: Bytes | None = None
+    bgr: U8 | None = None
+    mask: U8 | None = None
 
 
 class CameraEyes:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani import messages as m
+from paani.arrays import F64, Bools
 from paani.config import Config, CorridorConfig
 from paani_sim.eye.camera import look_from, view_projection
 from paani_sim.eye.mounted import camera_of, pose_of
@@ -22,8 +23,6 @@ from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, act
 from paani_sim.worlds.faults import active
 from paani_sim.worlds.footprint import placed, shape_of
 
-F64 = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 ROWS, COLUMNS = 64, 80  # of the mask, as the segmenter's
 FAR_M = 90.0  # farther things are smaller than a box can be
 MIN_SIDE_PX = 4.0  # of a box
@@ -41,7 +40,7 @@ CAUSES = {
 class Seen(NamedTuple):
     """`water` `(64, 80)`: which cells show water. `boxes`: label and normalised corners."""
 
-    water: Flags
+    water: Bools
     boxes: tuple[tuple[m.Label, m.BoxXyxy], ...]
 
 
@@ -210,7 +209,7 @@ class _Lanes:
         self._clear = corridors.clear_column
         self._columns = [_shares(COLUMNS, *span) for span in (corridors.left, corridors.center, corridors.right)]
 
-    def of(self, water: Flags) -> list[m.LaneEvidence]:
+    def of(self, water: Bools) -> list[m.LaneEvidence]:
         """Left, centre, right."""
         of_column = (self._rows @ water) / self._rows.sum()
         return [self._lane(of_column, columns) for columns in self._columns]
@@ -227,7 +226,7 @@ class _Lanes:
         )
 
 
-def levelled(water: Flags, roll_rad: float, aspect: float) -> Flags:
+def levelled(water: Bools, roll_rad: float, aspect: float) -> Bools:
     """The mask turned about its middle so that the horizon is level; what comes in from outside is no water."""
     if abs(roll_rad) < 1e-3:
         return water
@@ -240,11 +239,11 @@ def levelled(water: Flags, roll_rad: float, aspect: float) -> Flags:
     column = np.floor((from_x + 0.5) * columns).astype(int)
     row = np.floor((from_y + 0.5) * rows).astype(int)
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    turned: Flags = inside & water[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+    turned: Bools = inside & water[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
     return turned
 
 
-def water_edge(water: Flags) -> tuple[float, ...]:
+def water_edge(water: Bools) -> tuple[float, ...]:
     """Of each column, left to right, the lower edge of the first cell from below that is not water; 0.0: none."""
     rows = water.shape[0]
     blocked = ~water

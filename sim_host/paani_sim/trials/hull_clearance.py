@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani_sim.trials.outlines import AFLOAT_Z_M
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Actor, Obstacle, Pose2, World
-from paani_sim.worlds.curves import Points
 from paani_sim.worlds.footprint import is_round, placed, shape_of
 
-F64 = NDArray[np.float64]
 FAR_M = 12.0  # what is farther counts as this far
 BANK = "bank"
 SIGNS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], np.float64)
@@ -146,7 +145,7 @@ def _to_thing_m(thing: Obstacle | Actor, poses: F64, course: Course) -> F64:
     return away
 
 
-def _to_bank_m(shore_m: Points, course: Course) -> F64:
+def _to_bank_m(shore_m: F64, course: Course) -> F64:
     away = np.full(len(course.x_m), FAR_M)
     ends_m = np.roll(shore_m, -1, axis=0)
     low, high = np.minimum(shore_m, ends_m), np.maximum(shore_m, ends_m)
@@ -202,7 +201,7 @@ def _to_polygon_m(points: F64, corners: F64) -> F64:
     return np.where(inside, 0.0, best)
 
 
-def _nearest_on_edges(polygon_m: Points, point: F64) -> F64:
+def _nearest_on_edges(polygon_m: F64, point: F64) -> F64:
     leg = np.roll(polygon_m, -1, axis=0) - polygon_m
     rel = point - polygon_m
     part = np.clip((rel * leg).sum(-1) / np.maximum((leg * leg).sum(-1), 1e-12), 0.0, 1.0)

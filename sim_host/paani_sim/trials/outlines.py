@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani_sim.eye.camera import NEAR_M
 from paani_sim.worlds import Actor, Obstacle
 from paani_sim.worlds.footprint import CORNERS
 
-F64 = NDArray[np.float64]
 AFLOAT_Z_M = 0.2  # whatever stands higher stands on something else, or bridges the water
 _RING = np.arange(CORNERS)
 _NEXT = (_RING + 1) % CORNERS

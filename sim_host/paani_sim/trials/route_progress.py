@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points
+from paani.arrays import F64
 
 BACK_M, AHEAD_M = 10.0, 30.0  # where the boat is looked for, so that a route that comes near itself is not cut short
 
@@ -14,7 +14,7 @@ BACK_M, AHEAD_M = 10.0, 30.0  # where the boat is looked for, so that a route th
 class Along:
     """Follows one boat. `now_m`: along the route since the start, laps added up; `best_m`: the farthest so far."""
 
-    def __init__(self, route_m: Points, *, closed: bool, start_m: tuple[float, float]) -> None:
+    def __init__(self, route_m: F64, *, closed: bool, start_m: tuple[float, float]) -> None:
         """route_m: `(n, 2)`. start_m: where the boat is at first; the nearest point of the route counts as 0."""
         line = np.vstack([route_m, route_m[:1]]) if closed else route_m
         self._first, self._legs = line[:-1], np.diff(line, axis=0)

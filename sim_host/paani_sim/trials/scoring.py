@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani.config import EyeConfig
 from paani.statistics.dithering import dithering
 from paani.statistics.order_statistics import nearest_rank
@@ -32,7 +32,6 @@ from paani_sim.trials.track import Applying, Halt, Sample
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
 
-F64 = NDArray[np.float64]
 ENCOUNTER_M = {"thing": 5.0, BANK: UNDER_M[Closeness.CLOSE]}  # a bank is always somewhere
 APART_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
 SEEN_BEFORE_S, SEEN_WITHIN_M = 5.0, 15.0

@@ -6,14 +6,13 @@ from collections.abc import Iterable
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani_sim.trials.outlines import AFLOAT_Z_M
 from paani_sim.trials.result import Closeness, TrialResult
 from paani_sim.worlds import World, actor_at, along_at
 from paani_sim.worlds.footprint import placed, shape_of
 
-F64 = NDArray[np.float64]
 WIDTH_PX = 520.0
 MARGIN_M = 9.0
 SCALE_BAR_M = 10.0

@@ -11,10 +11,10 @@ from typing import Any
 import cv2
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from paani import keys
 from paani import messages as m
+from paani.arrays import U8
 from paani_sim.trials.cases import Case
 from paani_sim.trials.drive_recorder import Recorder
 from paani_sim.trials.one import config_for, run_case
@@ -23,7 +23,6 @@ from paani_sim.trials.policies import CAMERA
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.track_chart import worst_moment_s
 
-Bytes = NDArray[np.uint8]
 PICTURES, APART_S = 6, 1.0
 BOX_BGR, TEXT_BGR = (0, 140, 255), (255, 255, 255)
 
@@ -107,7 +106,7 @@ def strip_of(watch: _Watch, at_s: float) -> bytes:
     return cv2.imencode(".png", np.hstack(shown))[1].tobytes()
 
 
-def _annotated(bgr: Bytes, evidence: m.Evidence | None, advice: m.Advisory | None, at_s: float) -> Bytes:
+def _annotated(bgr: U8, evidence: m.Evidence | None, advice: m.Advisory | None, at_s: float) -> U8:
     height, width = bgr.shape[:2]
     drawn = bgr.copy()
     for found in evidence.detections if evidence is not None else ():

@@ -11,14 +11,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from paani_sim.worlds.curves import Points
+from paani.arrays import F32, F64
 from paani_sim.worlds.world import World
 
 CELL_M = 1.0
 EXPONENT = 1.0 / 7.0
 _SUBPIXEL_BITS = 8
-
-Grid = npt.NDArray[np.float32]
 
 
 class CurrentField:
@@ -54,7 +52,7 @@ def _between(grid: list[list[float]], i: int, j: int, right: float, up: float) -
     return low + up * (above[i] + right * (above[i + 1] - above[i]) - low)
 
 
-def _velocity_mps(world: World, low_m: Points, shape: tuple[int, int]) -> tuple[Grid, Grid]:
+def _velocity_mps(world: World, low_m: F64, shape: tuple[int, int]) -> tuple[F32, F32]:
     """Both parts on the grid: full in mid-channel (or where land is furthest), nothing ashore."""
     scale = 2**_SUBPIXEL_BITS / CELL_M
     water = np.zeros(shape, np.uint8)
@@ -73,7 +71,7 @@ def _velocity_mps(world: World, low_m: Points, shape: tuple[int, int]) -> tuple[
     return speed_mps * direction[ahead, 0], speed_mps * direction[ahead, 1]
 
 
-def _channel(channel_m: Points, low_m: Points, shape: tuple[int, int]) -> tuple[Grid, npt.NDArray[np.int_], Points]:
+def _channel(channel_m: F64, low_m: F64, shape: tuple[int, int]) -> tuple[F32, npt.NDArray[np.int_], F64]:
     """Distance to the centre line, which of its points is nearest, and the directions of them all."""
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(channel_m, axis=0), axis=1))])
     along_m = np.arange(0.0, arc_m[-1] + CELL_M, CELL_M)

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from paani.arrays import F64
 from paani.errors import UserError
 from paani_sim.worlds import meetings
-from paani_sim.worlds.curves import Points
 from paani_sim.worlds.meetings import BOAT_MPS, Encounter, Run
 from paani_sim.worlds.scenario_file import ActorPart
 from paani_sim.worlds.sizes import SIZES, Size
@@ -66,7 +66,7 @@ def _standing(part: ActorPart, size: Size, world: World, where: str, fallback_id
     )
 
 
-def _path_m(part: ActorPart, world: World, where: str) -> Points:
+def _path_m(part: ActorPart, world: World, where: str) -> F64:
     points = part.path_m or ()
     path_m = np.array([_placed(part, world, where, point, 0.0)[:2] for point in points])
     check_legs(path_m, closed=part.closed, where=f"{where}.path_m")

@@ -3,16 +3,15 @@
 import numpy as np
 import numpy.typing as npt
 
-from paani_sim.worlds.curves import Points, normals_left
+from paani.arrays import F64
+from paani_sim.worlds.curves import normals_left
 from paani_sim.worlds.world import Pose2
 
 
 class Channel:
     """A centre line `centre_m` `(n, 2)` and half the width there `(n,)`, both at `along_m` `(n,)`, rising."""
 
-    def __init__(
-        self, along_m: npt.NDArray[np.float64], centre_m: Points, half_width_m: npt.NDArray[np.float64]
-    ) -> None:
+    def __init__(self, along_m: npt.NDArray[np.float64], centre_m: F64, half_width_m: npt.NDArray[np.float64]) -> None:
         self._along_m = along_m
         self._half_width_m = half_width_m
         self._left = normals_left(centre_m, closed=False)
@@ -35,14 +34,14 @@ class Channel:
         """`out_m` beyond the water's edge on the `side` (+1 left, -1 right; negative: afloat)."""
         return self.at(along_m, side * (self.half_width_m(along_m) + out_m), turn_rad)
 
-    def shore_m(self) -> Points:
+    def shore_m(self) -> F64:
         """The water's edge as one closed polygon, counter-clockwise, every third sample."""
         pick = np.arange(0, len(self._along_m), 3)
         offset = self._left[pick] * self._half_width_m[pick, None]
         right, left = self.centre_m[pick] - offset, self.centre_m[pick] + offset
         return np.vstack([right, left[::-1]])
 
-    def lane_m(self, first_m: float, last_m: float, lane_frac: float) -> Points:
+    def lane_m(self, first_m: float, last_m: float, lane_frac: float) -> F64:
         """A line down (or up) the channel at `lane_frac` of its width left of the centre."""
         step = 1.0 if last_m > first_m else -1.0
         return np.array(
@@ -52,11 +51,11 @@ class Channel:
             ]
         )
 
-    def loop_m(self, first_m: float, last_m: float, lane_frac: float) -> Points:
+    def loop_m(self, first_m: float, last_m: float, lane_frac: float) -> F64:
         """Down the channel on the starboard side and back on the other, with round ends."""
         turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)[1:-1]
 
-        def half_turn(along_m: float, toward: float) -> Points:
+        def half_turn(along_m: float, toward: float) -> F64:
             reach_m = 2.0 * lane_frac * self.half_width_m(along_m)
             return np.array(
                 [self.at(along_m + toward * 0.8 * reach_m * np.cos(a), toward * reach_m * np.sin(a))[:2] for a in turn]

@@ -5,20 +5,20 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 
-Points = npt.NDArray[np.float64]
+from paani.arrays import F64
 
 
-def closed_length_m(points_m: Points) -> float:
+def closed_length_m(points_m: F64) -> float:
     """Perimeter of the closed polygon `(n, 2)`."""
     return float(np.linalg.norm(np.roll(points_m, -1, axis=0) - points_m, axis=1).sum())
 
 
-def open_length_m(points_m: Points) -> float:
+def open_length_m(points_m: F64) -> float:
     """Length of the open line `(n, 2)`."""
     return float(np.linalg.norm(np.diff(points_m, axis=0), axis=1).sum())
 
 
-def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Points:
+def resample_closed(points_m: F64, count: int, start_m: float = 0.0) -> F64:
     """`count` points at equal arc length along the closed polygon, the first `start_m` along."""
     ring = np.vstack([points_m, points_m[:1]])
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
@@ -26,7 +26,7 @@ def resample_closed(points_m: Points, count: int, start_m: float = 0.0) -> Point
     return np.column_stack([np.interp(at_m, arc_m, ring[:, k]) for k in (0, 1)])
 
 
-def sampled_legs(line_m: Points, step_m: float, *, closed: bool) -> list[Points]:
+def sampled_legs(line_m: F64, step_m: float, *, closed: bool) -> list[F64]:
     """Each leg of the line as points at most `step_m` apart, both its ends included; 4000 points a leg at most."""
     ends_m = np.vstack([line_m, line_m[:1]]) if closed else line_m
     legs = []
@@ -36,17 +36,17 @@ def sampled_legs(line_m: Points, step_m: float, *, closed: bool) -> list[Points]
     return legs
 
 
-def point_along_closed(points_m: Points, distance_m: float) -> tuple[float, float, float]:
+def point_along_closed(points_m: F64, distance_m: float) -> tuple[float, float, float]:
     """`(x_m, y_m, yaw_rad)` at `distance_m` (wrapped) along the closed polygon."""
     return _point_along(np.vstack([points_m, points_m[:1]]), distance_m % closed_length_m(points_m))
 
 
-def point_along_open(points_m: Points, distance_m: float) -> tuple[float, float, float]:
+def point_along_open(points_m: F64, distance_m: float) -> tuple[float, float, float]:
     """`(x_m, y_m, yaw_rad)` at `distance_m` (held within its ends) along the open line."""
     return _point_along(points_m, min(max(distance_m, 0.0), open_length_m(points_m)))
 
 
-def _point_along(line_m: Points, at_m: float) -> tuple[float, float, float]:
+def _point_along(line_m: F64, at_m: float) -> tuple[float, float, float]:
     steps = np.diff(line_m, axis=0)
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
     leg = min(int(np.searchsorted(arc_m, at_m, side="right")) - 1, len(steps) - 1)
@@ -55,7 +55,7 @@ def _point_along(line_m: Points, at_m: float) -> tuple[float, float, float]:
     return float(x_m), float(y_m), float(np.arctan2(steps[leg, 1], steps[leg, 0]))
 
 
-def normals_left(points_m: Points, *, closed: bool) -> Points:
+def normals_left(points_m: F64, *, closed: bool) -> F64:
     """Unit normals `(n, 2)` to the left of the direction of travel, central differences."""
     around = np.vstack([points_m[-1:], points_m, points_m[:1]]) if closed else points_m
     tangent = np.gradient(around, axis=0)
@@ -64,7 +64,7 @@ def normals_left(points_m: Points, *, closed: bool) -> Points:
     return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
-def corners(points_m: Points, within_m: float) -> Points:
+def corners(points_m: F64, within_m: float) -> F64:
     """The closed polygon without the points that lie within `within_m` of the straight line past them."""
     kept = [0]
     first = 0
@@ -80,7 +80,7 @@ def corners(points_m: Points, within_m: float) -> Points:
     return points_m[kept]
 
 
-def _straight(points_m: Points, first: int, last: int, within_m: float) -> bool:
+def _straight(points_m: F64, first: int, last: int, within_m: float) -> bool:
     """Whether everything between two points of the closed polygon lies close to the line from one to the other."""
     between = points_m[first + 1 : last] - points_m[first]
     way = points_m[last % len(points_m)] - points_m[first]
@@ -91,7 +91,7 @@ def _straight(points_m: Points, first: int, last: int, within_m: float) -> bool:
     return bool(off_m.max() <= within_m)
 
 
-def inside(polygon_m: Points, points_m: Points) -> npt.NDArray[np.bool_]:
+def inside(polygon_m: F64, points_m: F64) -> npt.NDArray[np.bool_]:
     """Even-odd test of `(m, 2)` points against the closed polygon `(n, 2)`."""
     x, y = points_m[:, 0, None], points_m[:, 1, None]
     x0, y0 = polygon_m[None, :, 0], polygon_m[None, :, 1]
@@ -102,7 +102,7 @@ def inside(polygon_m: Points, points_m: Points) -> npt.NDArray[np.bool_]:
     return result
 
 
-def distance_to_edges_m(polygon_m: Points, points_m: Points) -> npt.NDArray[np.float64]:
+def distance_to_edges_m(polygon_m: F64, points_m: F64) -> npt.NDArray[np.float64]:
     """Unsigned distance `(m,)` from each point to the nearest edge of the closed polygon."""
     start = polygon_m[None, :, :]
     edge = np.roll(polygon_m, -1, axis=0)[None, :, :] - start
@@ -114,7 +114,7 @@ def distance_to_edges_m(polygon_m: Points, points_m: Points) -> npt.NDArray[np.f
     return best
 
 
-def clearance_m(polygon_m: Points, points_m: Points) -> npt.NDArray[np.float64]:
+def clearance_m(polygon_m: F64, points_m: F64) -> npt.NDArray[np.float64]:
     """Signed distance `(m,)` to the shore: positive in the water, negative on land."""
     sign = np.where(inside(polygon_m, points_m), 1.0, -1.0)
     return sign * distance_to_edges_m(polygon_m, points_m)

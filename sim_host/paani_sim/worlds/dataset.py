@@ -2,7 +2,7 @@
 
 The folder has the form of the real sources: `images/*.jpg`, `masks/*.png` (0 obstacle, 1 water,
 2 sky), `labels/*.txt` (class, then box centre and size, normalised; classes in the detector's
-order, checklist C2) and `manifest.json`. The same arguments give the same files.
+order, C2) and `manifest.json`. The same arguments give the same files.
 """
 
 import dataclasses
@@ -13,9 +13,9 @@ from pathlib import Path
 import cv2
 import msgspec
 import numpy as np
-import numpy.typing as npt
 from tqdm import tqdm
 
+from paani.arrays import U8
 from paani.errors import UserError
 from paani_sim.eye.camera import Camera
 from paani_sim.eye.labels import CLASSES, Labelled, seen_boxes
@@ -24,8 +24,6 @@ from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.sky import SKIES
 from paani_sim.worlds import WORLDS, load_world
 from paani_sim.worlds.world import Light, Wind, World
-
-U8 = npt.NDArray[np.uint8]
 
 PICTURES_PER_SESSION = 24
 PICTURES_PER_SKY = 4

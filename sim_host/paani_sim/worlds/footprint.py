@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F64
 from paani_sim.worlds.world import Actor, Obstacle, Pose2
 
-F64 = NDArray[np.float64]
 CORNERS = 8
 _BOX = np.array([[1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], np.float64)
 _ANGLES = np.arange(CORNERS) * 2.0 * np.pi / CORNERS

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from paani.arrays import F64
 from paani_sim.worlds import load_world, meetings
-from paani_sim.worlds.curves import Points
 from paani_sim.worlds.meetings import BOAT_MPS, Run
 from paani_sim.worlds.room import Lattice, fixed_gap_m
 from paani_sim.worlds.scenario import Scenario, Task
@@ -142,7 +142,7 @@ def _fixed(place: _Place, look: str, pose: Pose2, rng: np.random.Generator) -> O
     return thing if lies_free else None
 
 
-def _outline_m(length_m: float, width_m: float, pose: Pose2) -> Points:
+def _outline_m(length_m: float, width_m: float, pose: Pose2) -> F64:
     part, half = np.linspace(-0.5, 0.5, 9), np.full(9, 0.5)
     sides = [np.column_stack(edge) for edge in ((part, -half), (part, half), (-half, part), (half, part))]
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, closed_length_m, resample_closed
+from paani.arrays import F64
+from paani_sim.worlds.curves import closed_length_m, resample_closed
 from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
 
@@ -87,7 +88,7 @@ def harbour() -> World:
     )
 
 
-def _route() -> Points:
+def _route() -> F64:
     """The corners cut three times (Chaikin), then legs of equal length."""
     ring = np.array(ROUTE_M)
     for _ in range(3):

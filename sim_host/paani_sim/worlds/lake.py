@@ -1,21 +1,16 @@
-"""The open lake of checklist K1-K2, with the banks and obstacles that K3 found missing."""
+"""The open lake of K1-K2, with the banks and obstacles that K3 found missing."""
 
 import numpy as np
 
-from paani_sim.worlds.curves import (
-    Points,
-    closed_length_m,
-    normals_left,
-    point_along_closed,
-    resample_closed,
-)
+from paani.arrays import F64
+from paani_sim.worlds.curves import closed_length_m, normals_left, point_along_closed, resample_closed
 from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
-EXTENT_X_M = 208.699  # checklist K1
-EXTENT_Y_M = 126.000  # checklist K1
-ROUTE_COUNT = 59  # checklist K2
-ROUTE_LENGTH_M = 465.443  # checklist K2
+EXTENT_X_M = 208.699  # K1
+EXTENT_Y_M = 126.000  # K1
+ROUTE_COUNT = 59  # K2
+ROUTE_LENGTH_M = 465.443  # K2
 SHORE_COUNT = 240
 
 
@@ -38,7 +33,7 @@ def lake() -> World:
     )
 
 
-def _shore() -> Points:
+def _shore() -> F64:
     """Superellipse with bays, stretched to the exact extents."""
     angle = np.linspace(0.0, 2.0 * np.pi, SHORE_COUNT, endpoint=False)
     cos, sin = np.cos(angle), np.sin(angle)
@@ -50,12 +45,12 @@ def _shore() -> Points:
     return np.asarray(unit * np.array([EXTENT_X_M, EXTENT_Y_M]))
 
 
-def _route(shore_m: Points) -> Points:
+def _route(shore_m: F64) -> F64:
     """A loop along the shore, offset inwards until 59 equal legs add up to the exact length."""
     fine_m = resample_closed(shore_m, 720)
     inward = normals_left(fine_m, closed=True)
 
-    def loop(offset_m: float) -> Points:
+    def loop(offset_m: float) -> F64:
         return resample_closed(fine_m + offset_m * inward, ROUTE_COUNT, start_m=20.0)
 
     low_m, high_m = 5.0, 25.0
@@ -69,7 +64,7 @@ def _route(shore_m: Points) -> Points:
     return route_m * (ROUTE_LENGTH_M / closed_length_m(route_m))
 
 
-def _obstacles(shore_m: Points) -> tuple[Obstacle, ...]:
+def _obstacles(shore_m: F64) -> tuple[Obstacle, ...]:
     def ashore(part: float, offset_m: float) -> Pose2:
         """A place `offset_m` off the shore (positive: in the water), heading into the lake."""
         length_m = closed_length_m(shore_m)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, clearance_m, sampled_legs
+from paani.arrays import F64
+from paani_sim.worlds.curves import clearance_m, sampled_legs
 from paani_sim.worlds.room import fixed_gap_m
 from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Actor, Pose2, World
@@ -32,7 +33,7 @@ class Encounter(StrEnum):
 class Run(NamedTuple):
     """An open path, and when and from how far along it a thing sets out."""
 
-    path_m: Points
+    path_m: F64
     start_m: float
     start_s: float
 
@@ -94,12 +95,12 @@ def is_free_path(world: World, actor: Actor) -> bool:
     )
 
 
-def is_afloat(world: World, points_m: Points, room_m: float) -> bool:
+def is_afloat(world: World, points_m: F64, room_m: float) -> bool:
     """Whether all points are in the water and this far from its edge."""
     return bool((clearance_m(world.shore_m, points_m) > room_m).all())
 
 
-def _set_out(path_m: Points, before_m: float, at_s: float, speed_mps: float) -> Run:
+def _set_out(path_m: F64, before_m: float, at_s: float, speed_mps: float) -> Run:
     """Along the path so that `before_m` of it is done at `at_s`: later, or already some way down it."""
     start_s = at_s - before_m / speed_mps
     return Run(path_m, max(0.0, -start_s) * speed_mps, max(0.0, start_s))

@@ -7,11 +7,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from paani_sim.worlds.curves import Points
+from paani.arrays import F64, U8
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose
 
-U8 = npt.NDArray[np.uint8]
 Bgr = tuple[int, int, int]
 
 WATER: Bgr = (222, 196, 160)
@@ -60,12 +59,12 @@ def plan_view(scenario: Scenario, width_px: int, height_px: int, views: Sequence
     return sheet.picture
 
 
-def _surroundings(scenario: Scenario) -> Points:
+def _surroundings(scenario: Scenario) -> F64:
     route_m = scenario.world.route_m
     return np.vstack([route_m - 2.0 * MARGIN_M, route_m + 2.0 * MARGIN_M])
 
 
-def _outline(thing: Obstacle | Actor, pose: Pose2) -> Points:
+def _outline(thing: Obstacle | Actor, pose: Pose2) -> F64:
     """The footprint's corners, of what is long with a bow."""
     half = np.array([0.5 * thing.length_m, 0.5 * thing.width_m])
     corners = np.array([[-1.0, -1.0], [0.55, -1.0], [1.0, 0.0], [0.55, 1.0], [-1.0, 1.0]])
@@ -78,29 +77,29 @@ def _outline(thing: Obstacle | Actor, pose: Pose2) -> Points:
 class _Sheet:
     """A picture with map coordinates."""
 
-    def __init__(self, around_m: Points, width_px: int, height_px: int) -> None:
+    def __init__(self, around_m: F64, width_px: int, height_px: int) -> None:
         low, high = around_m.min(axis=0) - MARGIN_M, around_m.max(axis=0) + MARGIN_M
         self._per_m = float(min(width_px / (high - low)[0], height_px / (high - low)[1]))
         self._middle_m = 0.5 * (low + high)
         self._middle_px = np.array([0.5 * width_px, 0.5 * height_px])
         self.picture: U8 = np.zeros((height_px, width_px, 3), np.uint8)
 
-    def _px(self, points_m: Points) -> npt.NDArray[np.int32]:
+    def _px(self, points_m: F64) -> npt.NDArray[np.int32]:
         """In fractions of a pixel, as OpenCV takes them."""
         px = (np.asarray(points_m) - self._middle_m) * [self._per_m, -self._per_m] + self._middle_px
         return np.asarray(np.round(np.clip(px, -3e4, 3e4) * (1 << SUB_BITS)), np.int32)
 
-    def fill(self, polygon_m: Points, bgr: Bgr) -> None:
+    def fill(self, polygon_m: F64, bgr: Bgr) -> None:
         """What would be smaller than a dot becomes one."""
         if np.ptp(polygon_m, axis=0).max() * self._per_m < 2.0 * LEAST_PX:
             self.dot(polygon_m.mean(axis=0), bgr, LEAST_PX)
         else:
             cv2.fillPoly(self.picture, [self._px(polygon_m)], bgr, cv2.LINE_AA, SUB_BITS)
 
-    def line(self, line_m: Points, bgr: Bgr, *, closed: bool, width_px: int = 1) -> None:
+    def line(self, line_m: F64, bgr: Bgr, *, closed: bool, width_px: int = 1) -> None:
         cv2.polylines(self.picture, [self._px(line_m)], closed, bgr, width_px, cv2.LINE_AA, SUB_BITS)
 
-    def dot(self, at_m: Points | tuple[float, float], bgr: Bgr, radius_px: float) -> None:
+    def dot(self, at_m: F64 | tuple[float, float], bgr: Bgr, radius_px: float) -> None:
         x, y = (int(v) for v in self._px(np.asarray(at_m)))
         cv2.circle(self.picture, (x, y), round(radius_px * (1 << SUB_BITS)), bgr, -1, cv2.LINE_AA, SUB_BITS)
 

@@ -5,8 +5,9 @@ Everything is placed in channel coordinates; `along_m` is the centre line's x.
 
 import numpy as np
 
+from paani.arrays import F64
 from paani_sim.worlds.channel import Channel
-from paani_sim.worlds.curves import Points, resample_closed
+from paani_sim.worlds.curves import resample_closed
 from paani_sim.worlds.way import start_of
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
@@ -51,7 +52,7 @@ def _channel() -> Channel:
     return Channel(x, np.column_stack([x, bend_m + ends_m]), half_width_m)
 
 
-def _route(channel: Channel) -> Points:
+def _route(channel: Channel) -> F64:
     loop_m = channel.loop_m(ROUTE_START_M, ROUTE_END_M, LANE_M)
     length_m = float(np.linalg.norm(np.roll(loop_m, -1, axis=0) - loop_m, axis=1).sum())
     return resample_closed(loop_m, round(length_m / LEG_M))

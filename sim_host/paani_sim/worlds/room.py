@@ -3,14 +3,12 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from paani_sim.worlds.curves import Points, clearance_m
+from paani.arrays import F64, Bools
+from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Actor, Obstacle, Pose2, World, actor_pose
 
-F64 = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 HEADROOM_M = 2.0  # a thing whose foot is higher can be passed underneath
 SIDE_M = 14.0
 NEAR_M = 5.0
@@ -20,7 +18,7 @@ STEP_S = 4.0
 FINALLY_S = 1e5
 
 
-def footprint_gap_m(thing: Obstacle | Actor, pose: Pose2, points_m: Points) -> F64:
+def footprint_gap_m(thing: Obstacle | Actor, pose: Pose2, points_m: F64) -> F64:
     """Distance `(n,)` from the points `(n, 2)` to the thing's footprint at `pose`; zero inside."""
     cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
     rel = points_m - np.array(pose[:2])
@@ -30,7 +28,7 @@ def footprint_gap_m(thing: Obstacle | Actor, pose: Pose2, points_m: Points) -> F
     return gap_m
 
 
-def fixed_gap_m(obstacles: Iterable[Obstacle], points_m: Points) -> F64:
+def fixed_gap_m(obstacles: Iterable[Obstacle], points_m: F64) -> F64:
     """Distance `(n,)` from each point to the nearest obstacle that a boat cannot pass underneath."""
     gap_m = np.full(len(points_m), np.inf)
     for obstacle in obstacles:
@@ -70,14 +68,14 @@ class Lattice:
         at_last = self._free(still_m, actors, FINALLY_S, half_m)
         return _leads_on(at_last, self._lane) and bool(at_last[-1, self._lane].all())
 
-    def _free(self, still_m: F64, actors: Sequence[Actor], t_s: float, half_m: float) -> Flags:
+    def _free(self, still_m: F64, actors: Sequence[Actor], t_s: float, half_m: float) -> Bools:
         gap_m = still_m
         for actor in actors:
             gap_m = np.minimum(gap_m, footprint_gap_m(actor, actor_pose(actor, t_s), self.points_m))
         return (gap_m >= half_m).reshape(self._shape)
 
 
-def _leads_on(free: Flags, from_columns: Flags) -> bool:
+def _leads_on(free: Bools, from_columns: Bools) -> bool:
     """Whether free cells connect these columns of the first row with the last row, never going back."""
     if not len(free):
         return True

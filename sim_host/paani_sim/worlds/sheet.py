@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from paani.arrays import U8
 from paani_sim.eye.camera import BoatPose, Camera
 from paani_sim.eye.renderer import Eye
 from paani_sim.worlds.casting import route_way
@@ -16,7 +16,6 @@ from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Pose2
 
-U8 = npt.NDArray[np.uint8]
 COLUMNS = 4
 VIEWS = 8
 CLEAR_M = 1.5

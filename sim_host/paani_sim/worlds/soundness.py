@@ -4,9 +4,10 @@ from collections import Counter
 
 import numpy as np
 
+from paani.arrays import F64
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
-from paani_sim.worlds.curves import Points, clearance_m, inside, sampled_legs
+from paani_sim.worlds.curves import clearance_m, inside, sampled_legs
 from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose
@@ -33,7 +34,7 @@ def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
             _check_thing(world, thing, f"{where}: {names[thing.id]}")
 
 
-def check_legs(line_m: Points, *, closed: bool, where: str) -> None:
+def check_legs(line_m: F64, *, closed: bool, where: str) -> None:
     """Raises UserError for a leg without length, to be called before anything runs along the line."""
     after_m = np.roll(line_m, -1, axis=0) if closed else line_m[1:]
     legs_m = np.linalg.norm(after_m - line_m[: len(after_m)], axis=1)
@@ -76,12 +77,12 @@ def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
             raise UserError(f"{where}: its way runs over land at {at} (leg {number})")
 
 
-def _check_area(corners_m: Points, where: str) -> None:
+def _check_area(corners_m: F64, where: str) -> None:
     """A simple polygon: no edge meets another but its neighbours'."""
     check_legs(corners_m, closed=True, where=where)
     start, end = corners_m, np.roll(corners_m, -1, axis=0)
 
-    def side(of: Points) -> Points:
+    def side(of: F64) -> F64:
         """Left (1) or right (-1) of edge i lies point j, `(edges, points)`."""
         way, rel = (end - start)[:, None], of[None] - start[:, None]
         return np.asarray(np.sign(way[..., 0] * rel[..., 1] - way[..., 1] * rel[..., 0]))
@@ -101,7 +102,7 @@ def _floats(thing: Obstacle | Actor) -> bool:
     return thing.kind in {Kind.VESSEL, Kind.BUOY} or thing.look == "swimming"
 
 
-def _allowed(fence: tuple[FenceArea, ...], points_m: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _allowed(fence: tuple[FenceArea, ...], points_m: F64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     within = np.zeros(len(points_m), np.bool_)
     allowed = np.ones(len(points_m), np.bool_)
     for area in fence:
@@ -113,5 +114,5 @@ def _allowed(fence: tuple[FenceArea, ...], points_m: Points) -> np.ndarray[tuple
     return allowed & within if any(area.keep is Keep.IN for area in fence) else allowed
 
 
-def _at(point: Points) -> str:
+def _at(point: F64) -> str:
     return f"({point[0]:.1f}, {point[1]:.1f}) m"

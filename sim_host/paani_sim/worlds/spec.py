@@ -6,8 +6,9 @@ Gravity is -9.81 and there is no fluid: buoyancy, drag and thrust are the plant'
 import mujoco
 import numpy as np
 
+from paani.arrays import F64
 from paani_sim.vessels import Vessel, load_vessel
-from paani_sim.worlds.curves import Points, corners
+from paani_sim.worlds.curves import corners
 from paani_sim.worlds.footprint import BOWS, CORNERS, is_round, shape_of
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
 
@@ -90,7 +91,7 @@ def _add_boat(spec: mujoco.MjSpec, world: World, vessel: Vessel) -> None:
         spec.add_sensor(name=name, type=kind, objtype=_SITE, objname="imu")
 
 
-def _add_banks(spec: mujoco.MjSpec, shore_m: Points) -> None:
+def _add_banks(spec: mujoco.MjSpec, shore_m: F64) -> None:
     """One box behind each straight stretch of the shore, overlapping its neighbours."""
     starts_m = corners(shore_m, _STRAIGHT_M)
     ends_m = np.roll(starts_m, -1, axis=0)

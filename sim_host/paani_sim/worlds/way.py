@@ -4,7 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, point_along_closed, point_along_open
+from paani.arrays import F64
+from paani_sim.worlds.curves import point_along_closed, point_along_open
 from paani_sim.worlds.world import Pose2, World
 
 LEG_M = 7.5
@@ -13,7 +14,7 @@ LEG_M = 7.5
 class Way:
     """`along_m` 0 is the boat's start. Around an open route's ends it goes straight on."""
 
-    def __init__(self, route_m: Points, *, closed: bool, first_m: float = 0.0) -> None:
+    def __init__(self, route_m: F64, *, closed: bool, first_m: float = 0.0) -> None:
         self._route_m = route_m
         self._closed = closed
         self._first_m = first_m
@@ -35,7 +36,7 @@ class Way:
             yaw_rad + turn_rad,
         )
 
-    def line_m(self, first_m: float, last_m: float, left_m: float = 0.0) -> Points:
+    def line_m(self, first_m: float, last_m: float, left_m: float = 0.0) -> F64:
         """Points about every metre from `first_m` to `last_m`, either way, `left_m` to the left of the way."""
         count = max(2, round(abs(last_m - first_m)) + 1)
         return np.array([self.at(float(along_m), left_m)[:2] for along_m in np.linspace(first_m, last_m, count)])
@@ -49,7 +50,7 @@ def stretch(world: World, from_m: float, length_m: float) -> World:
     return dataclasses.replace(world, route_m=route_m, route_closed=False, start=start_of(route_m))
 
 
-def start_of(route_m: Points) -> Pose2:
+def start_of(route_m: F64) -> Pose2:
     """The pose on the first waypoint, heading for the second."""
     (x_m, y_m), (east_m, north_m) = route_m[0], route_m[1] - route_m[0]
     return Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m)))

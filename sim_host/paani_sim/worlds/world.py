@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paani_sim.worlds.curves import Points, closed_length_m, open_length_m, point_along_closed, point_along_open
+from paani.arrays import F64
+from paani_sim.worlds.curves import closed_length_m, open_length_m, point_along_closed, point_along_open
 
 
 class Kind(StrEnum):
-    """What a thing is; the first four are the detector's classes in its order (checklist C2)."""
+    """What a thing is; the first four are the detector's classes in its order (C2)."""
 
     PERSON = "person"
     VESSEL = "vessel"
@@ -67,7 +68,7 @@ class Actor:
     id: str
     kind: Kind
     look: str
-    path_m: Points
+    path_m: F64
     speed_mps: float
     length_m: float
     width_m: float
@@ -146,8 +147,8 @@ class World:
     seed: int
     origin_lat_deg: float
     origin_lon_deg: float
-    shore_m: Points
-    route_m: Points
+    shore_m: F64
+    route_m: F64
     start: Pose2
     obstacles: tuple[Obstacle, ...]
     actors: tuple[Actor, ...]
@@ -157,7 +158,7 @@ class World:
     season_frac: float = 0.2
     bank: Bank = Bank.GRASS
     route_closed: bool = True
-    channel_m: Points | None = None
+    channel_m: F64 | None = None
     waves: Waves = field(default_factory=Waves)
     current: Current = field(default_factory=Current)
 

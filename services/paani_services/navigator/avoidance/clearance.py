@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
+from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani_services.navigator.avoidance.rollout import Start, Ways
 from paani_services.navigator.mapping.distance_field import signed_m
 from paani_services.navigator.mapping.dynamic_obstacles import Mover
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid
-from paani_services.navigator.mapping.projection import F64
 
 ASTRAY_MPS = 0.1  # what is out of sight changes its course and speed: measured, 1.2 m in 12 s
 AHEAD_S = np.arange(0.0, 30.5, 0.5)  # a boat that turns away from what comes at 0.13 m/s takes 20 s

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from paani.arrays import Bools
 from paani.messages import FenceArea, Keep
 from paani_services.navigator.avoidance.fence import Fence, edges
-from paani_services.navigator.mapping.observed_cells import CELL_M, Mask
+from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid
 
 
@@ -28,7 +29,7 @@ def fenced(grid: Grid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0))
     )
 
 
-def _inside(grid: Grid, area: FenceArea, offset_m: tuple[float, float]) -> Mask:
+def _inside(grid: Grid, area: FenceArea, offset_m: tuple[float, float]) -> Bools:
     """Cells from whose middle a ray to the east crosses the polygon's edge an odd number of times."""
     middle = (np.arange(CELLS) + 0.5) * CELL_M
     x_m, y_m = grid.west_m + offset_m[0] + middle, grid.south_m + offset_m[1] + middle

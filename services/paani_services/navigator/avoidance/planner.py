@@ -1,4 +1,4 @@
-"""Heading and speed on water that is known to be free: swept footprints over the grid (checklist Q4-Q6). Pure."""
+"""Heading and speed on water that is known to be free: swept footprints over the grid (Q4-Q6). Pure."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from paani import portable
+from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani_services.navigator.avoidance.clearance import (
@@ -35,9 +36,7 @@ from paani_services.navigator.avoidance.rollout import (
 )
 from paani_services.navigator.mapping.distance_field import distance_m
 from paani_services.navigator.mapping.dynamic_obstacles import Mover
-from paani_services.navigator.mapping.observed_cells import Mask
 from paani_services.navigator.mapping.occupancy_grid import Grid
-from paani_services.navigator.mapping.projection import F64
 
 QUARTER = 0.5 * math.pi
 LOSE_M = 0.2  # on a way out: a turning boat's way ahead
@@ -76,15 +75,15 @@ class Tried(NamedTuple):
     offsets: F64
     speeds: F64
     off_rad: F64
-    is_full: Mask
-    turns: Mask
+    is_full: Bools
+    turns: Bools
     ways: Ways
-    soon: Mask
-    nearby: Mask
+    soon: Bools
+    nearby: Bools
     gap_m: F64
     nearest_m: F64
     to_people_m: F64
-    unseen: Mask
+    unseen: Bools
     tight_m: float
     is_approached: bool
     coast: Ways
@@ -94,10 +93,10 @@ class Tried(NamedTuple):
 class Room(NamedTuple):
     """What a margin leaves of them: refused, and moved: met by what moves [candidates]; met, spare_m as in `Tried`."""
 
-    refused: Mask
-    met: Mask
+    refused: Bools
+    met: Bools
     spare_m: F64
-    moved: Mask
+    moved: Bools
 
 
 def plan(
@@ -177,10 +176,10 @@ def _tried(grid: Grid, start: Start, wish: Wish, movers: Sequence[Mover], config
     )
 
 
-def _barred(way: Tried, start: Start, wish: Wish, config: PlannerConfig) -> Mask:
+def _barred(way: Tried, start: Start, wish: Wish, config: PlannerConfig) -> Bools:
     """What no lesser margin allows [candidates]."""
     to_rest_m = config.stop_s * np.maximum(way.speeds, start.surge_mps)
-    barred: Mask = np.asarray((way.unseen & (way.ways.way_m <= to_rest_m)).any(axis=0))
+    barred: Bools = np.asarray((way.unseen & (way.ways.way_m <= to_rest_m)).any(axis=0))
     barred |= way.turns & (_apart_rad(way.offsets, 0.0) < ON_THE_SPOT_RAD)
     if wish.turns:
         barred |= ~way.turns | (wish.side * way.offsets < ON_THE_SPOT_RAD)
@@ -191,7 +190,7 @@ def _barred(way: Tried, start: Start, wish: Wish, config: PlannerConfig) -> Mask
     return barred | (way.is_full & ((way.nearest_m < way.tight_m) & way.soon).any(axis=0))
 
 
-def _room(way: Tried, barred: Mask, start: Start, wish: Wish, config: PlannerConfig) -> Room:
+def _room(way: Tried, barred: Bools, start: Start, wish: Wish, config: PlannerConfig) -> Room:
     """With the largest margin that leaves a way; else with the least.
 
     To what moves the whole margin is kept, unless it comes to a boat at rest: else lying still is no worse beside it.
@@ -213,7 +212,7 @@ def _room(way: Tried, barred: Mask, start: Start, wish: Wish, config: PlannerCon
             return Room(refused, met, least_m, np.asarray(((moved_m < 0.0) & way.nearby).any(axis=0)))
 
 
-def _faces(way: Tried) -> Mask:
+def _faces(way: Tried) -> Bools:
     """The turn on the spot to the wanted course [candidates]."""
     return np.asarray(way.turns & (way.offsets == way.offsets[0]))
 
@@ -228,7 +227,7 @@ def _lay_averted(way: Tried, start: Start, before: Plan | None) -> bool:
     return before.speed_mps <= PARTS[-1] * float(way.speeds[0]) and abs(off_rad) < 0.5 * ON_THE_SPOT_RAD
 
 
-def _turns_about(way: Tried, barred: Mask, start: Start, config: PlannerConfig) -> Mask:
+def _turns_about(way: Tried, barred: Bools, start: Start, config: PlannerConfig) -> Bools:
     """All but the turn on the spot to the wanted course, and that where hull and half a cell are not free for it."""
     kept = margins(config)[-1]
     moved_m = all_spare_m(way.movers, way.ways, start, kept if way.is_approached else config)
@@ -236,7 +235,7 @@ def _turns_about(way: Tried, barred: Mask, start: Start, config: PlannerConfig) 
     return np.asarray(barred | ~_faces(way) | ((room_m < 0.0) & way.soon).any(axis=0))
 
 
-def _leads_out(way: Tried) -> Mask:
+def _leads_out(way: Tried) -> Bools:
     """Ways along which what stands comes hardly nearer than it is, and is further away in the end [candidates].
 
     In the end of `room_m`: what begins with a turn on the spot gets nowhere within the horizon.
@@ -247,7 +246,7 @@ def _leads_out(way: Tried) -> Mask:
     return np.asarray((least_m >= now_m - LOSE_M) & (last_m >= now_m + GAIN_M))
 
 
-def _leads_away(way: Tried, start: Start, config: PlannerConfig) -> Mask:
+def _leads_away(way: Tried, start: Start, config: PlannerConfig) -> Bools:
     """Ways that keep clear of each thing that moves, or of where it may be by now: then like `_leads_out` [candidates].
 
     Measured against a boat that coasts: what was not seen for long may be anywhere around it, the more the later.
@@ -264,7 +263,7 @@ def _leads_away(way: Tried, start: Start, config: PlannerConfig) -> Mask:
     return fine
 
 
-def _passes_wider(way: Tried, barred: Mask) -> Mask:
+def _passes_wider(way: Tried, barred: Bools) -> Bools:
     """Ways that keep further off all through the horizon than a boat that coasts on, and hardly less than the best."""
     least_m = np.where(barred, -np.inf, np.where(way.soon, way.nearest_m, np.inf).min(axis=0))
     return np.asarray(least_m >= max(way.coast_m + GAIN_M, float(least_m.max()) - 0.5 * GAIN_M))

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from paani import portable
+from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani_services.navigator.mapping.projection import F64
 
 CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
 FULL_HELM_RAD = 0.5  # the controller's steering saturates there

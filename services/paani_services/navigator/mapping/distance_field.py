@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from paani_services.navigator.mapping.observed_cells import CELL_M, Mask
-from paani_services.navigator.mapping.projection import F64
+from paani.arrays import F64, Bools
+from paani_services.navigator.mapping.observed_cells import CELL_M
 
 FIELD_CELLS = 20  # distances are known up to 4 m
 
 
-def distance_m(cells: Mask) -> F64:
+def distance_m(cells: Bools) -> F64:
     """From the middle of each cell to the middle of the nearest of these, at most 4 m; of the mask's shape."""
     far = FIELD_CELLS * FIELD_CELLS
     found: NDArray[np.int16] = np.where(cells, 0, far).astype(np.int16)
@@ -23,6 +23,6 @@ def distance_m(cells: Mask) -> F64:
     return CELL_M * np.sqrt(found.astype(np.float64))
 
 
-def signed_m(cells: Mask) -> F64:
+def signed_m(cells: Bools) -> F64:
     """As `distance_m` outside, inside the negative of what leads out, at least -4 m."""
     return np.asarray(distance_m(cells) - distance_m(~cells))

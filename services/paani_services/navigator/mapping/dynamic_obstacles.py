@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.mapping.observation import BOX_COLUMNS, FOOT_STEPS, Box, Sight
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, hull_top
 from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid, Moving
-from paani_services.navigator.mapping.projection import F64, Lens, lens_at, ranges_m, rays, together
+from paani_services.navigator.mapping.projection import Lens, lens_at, ranges_m, rays, together
 
 ROW = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
 HULL_ROWS = 2.0  # and a hull's, which the mask ends: half a row of 64, and so for as long as it takes to the next

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from paani import portable
+from paani.arrays import F64, I64, Bools
 from paani.config import CalibrationConfig, PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.mapping.observation import EDGE_STEPS, FOOT_STEPS, MASK_ROW, Box, Foot, Sight
-from paani_services.navigator.mapping.projection import F64, Lens, Rays, lens_at, ranges_m, rays
+from paani_services.navigator.mapping.projection import Lens, Rays, lens_at, ranges_m, rays
 
 CELL_M = 0.2  # Q2
 FOOT_COLUMNS = 24
@@ -27,8 +27,6 @@ ROWS = 2.0 * MASK_ROW  # how far its edge is off a box's
 SIGHTS_HELD = 512
 WIDEST = 1 << 24  # columns of the map: 3,355 km
 
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 Polygon = tuple[tuple[float, float], ...]
 
 
@@ -42,8 +40,8 @@ class Camera(NamedTuple):
 class Cells(NamedTuple):
     """Cells of the map [n], each once; cell (0, 0) has its south-west corner in the map's origin."""
 
-    column: Indices
-    row: Indices
+    column: I64
+    row: I64
 
 
 class Shown(NamedTuple):
@@ -91,7 +89,7 @@ def shown(sight: Sight, moving: tuple[Box, ...], camera: Camera, config: Planner
     return Shown(_cells(*free), _joined(points), _joined(people), _cells(*hulls))
 
 
-def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> Indices:
+def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> I64:
     """Complete a vessel in `far_m`, and how deep each column is in `deep_m`: it hides what of it lies behind.
 
     Where the mask looks through part of it (a white bow is taken for water), that is as far away as the part beside
@@ -125,7 +123,7 @@ def hull_top(hull: Polygon, u: F64) -> F64:
     return top
 
 
-def _ends_at(box: Box, u: F64, edge: F64) -> Mask:
+def _ends_at(box: Box, u: F64, edge: F64) -> Bools:
     """Columns where it is this thing that ends the water: near its foot; a hull's lies as high as half its box."""
     left, top, right, low = (side / FOOT_STEPS for side in (box.left, box.top, box.right, box.low))
     wide = 1.0 / len(u)

@@ -1,4 +1,4 @@
-"""What is known of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (checklist Q2). Pure.
+"""What is known of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (Q2). Pure.
 
 The grid lies in the map's axes and is laid anew around the boat from the sights of the last seconds.
 """
@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from paani.arrays import F64, I64, Bools
 from paani.config import PlannerConfig
 from paani_services.navigator.mapping.distance_field import distance_m
 from paani_services.navigator.mapping.observation import Sight
-from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, Cells, Indices, Mask, Shown, hull_top, shown
-from paani_services.navigator.mapping.projection import F64, Station, lens_at, ranges_m, rays
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, Cells, Shown, hull_top, shown
+from paani_services.navigator.mapping.projection import Station, lens_at, ranges_m, rays
 
 CELLS = 100  # Q2
 REST = Station(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -33,15 +34,15 @@ class Grid(NamedTuple):
 
     west_m: float
     south_m: float
-    occupied: Mask
-    hidden: Mask
-    free: Mask
-    beside: Mask
-    people: Mask
-    strayed: Mask
+    occupied: Bools
+    hidden: Bools
+    free: Bools
+    beside: Bools
+    people: Bools
+    strayed: Bools
 
     @property
-    def unknown(self) -> Mask:
+    def unknown(self) -> Bools:
         """Nothing is known."""
         return ~(self.occupied | self.free | self.beside)
 
@@ -122,7 +123,7 @@ def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float
     return reach_m if reach_m <= config.blind_m else 0.0
 
 
-def _reached(cells: Mask, reach_m: F64) -> Mask:
+def _reached(cells: Bools, reach_m: F64) -> Bools:
     """Cells that lie within the reach of these, each of its own [100 * 100]: in [100, 100]."""
     found = np.zeros((CELLS, CELLS), np.bool_)
     steps = np.ceil(reach_m / CELL_M) * cells
@@ -131,7 +132,7 @@ def _reached(cells: Mask, reach_m: F64) -> Mask:
     return found
 
 
-def _outvoted(pictures: list[Shown], occupied_of: Indices, west: int, south: int, config: PlannerConfig) -> Mask:
+def _outvoted(pictures: list[Shown], occupied_of: I64, west: int, south: int, config: PlannerConfig) -> Bools:
     """Cells that one of these pictures alone shows occupied, they and all around them, and enough later ones free.
 
     occupied_of: the number of the last of them that shows each cell occupied.
@@ -146,7 +147,7 @@ def _outvoted(pictures: list[Shown], occupied_of: Indices, west: int, south: int
     return np.asarray((earliest == latest).ravel() & (denied >= config.outvoted_by))
 
 
-def _around(values: Indices, best: np.ufunc) -> Indices:
+def _around(values: I64, best: np.ufunc) -> I64:
     """The best of each cell and the eight around it."""
     for _ in range(2):
         found = values.copy()
@@ -156,7 +157,7 @@ def _around(values: Indices, best: np.ufunc) -> Indices:
     return values
 
 
-def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
+def _last_shown(pictures: list[Cells], west: int, south: int) -> I64:
     """The number of the last picture that shows each cell of the grid, -1 where none does [100 * 100]."""
     last = np.full(CELLS * CELLS, -1, np.int64)
     number, cell = _all_shown(pictures, west, south)
@@ -164,7 +165,7 @@ def _last_shown(pictures: list[Cells], west: int, south: int) -> Indices:
     return last
 
 
-def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, Indices]:
+def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[I64, I64]:
     """Every cell of the grid that each picture shows: the picture's number, rising, and the cell's."""
     if not pictures:
         return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -175,7 +176,7 @@ def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[Indices, I
     return number[inside], (row * CELLS + column)[inside]
 
 
-def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Mask:
+def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Bools:
     """Cells whose middle lies within reach."""
     middle = (np.arange(CELLS) + 0.5) * CELL_M
     east_m, north_m = grid.west_m + middle - position_m[0], grid.south_m + middle - position_m[1]

@@ -1,4 +1,4 @@
-"""From the picture to the water: a pinhole's rays meet the surface (checklist Q1). Pure, the same bits everywhere.
+"""From the picture to the water: a pinhole's rays meet the surface (Q1). Pure, the same bits everywhere.
 
 Body is x forward, y left, z up with its origin on the water; positive pitch lowers the bow, positive roll starboard.
 Elementary arithmetic alone, element by element: no reduction whose order could differ.
@@ -10,12 +10,11 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paani import portable
+from paani.arrays import F64
 from paani.config import CalibrationConfig
 
-F64 = NDArray[np.float64]
 Number = float | F64
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]  # by rows

@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config, PerceptionConfig
@@ -24,7 +24,6 @@ from paani_tools.bench.eyes.memory import Footprint
 from paani_tools.bench.eyes.stages import Candidate, Ratio, Row, fit, measured, ratios, rows, steps
 from paani_tools.bench.eyes.work import Work, work
 
-Bytes = NDArray[np.uint8]
 SUFFIXES = {".jpg", ".jpeg", ".png"}
 MAX_PICTURES = 64
 RSS_BAR_MIB = 200.0
@@ -145,7 +144,7 @@ def _candidate(folder: Path) -> Candidate:
     return Candidate(folder.name, files["detector"], files["segmenter"])
 
 
-def _read(folder: Path) -> list[Bytes]:
+def _read(folder: Path) -> list[U8]:
     """At most MAX_PICTURES pictures, evenly from the sorted ones. Raises UserError naming what cannot be read."""
     if not folder.is_dir():
         raise UserError(f"--folder {folder}: no such folder")

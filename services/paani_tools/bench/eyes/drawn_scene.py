@@ -2,13 +2,13 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from paani.arrays import U8
+
 SIZE_WH = (320, 240)  # A8
 
 
-def drawn(seed: int) -> Bytes:
+def drawn(seed: int) -> U8:
     """Sky, textured banks, rippled water: BGR uint8 [240, 320, 3]."""
     rng = np.random.default_rng(seed)
     width, height = SIZE_WH

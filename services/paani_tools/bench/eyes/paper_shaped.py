@@ -1,7 +1,7 @@
 """Perception as the paper's text describes it, for comparison: default sessions, one after the other, plain numpy.
 
-Letterbox and stretch by arithmetic on whole arrays, softmax over every pixel, greedy suppression in Python (checklist
-B4, C3-C9, D7, E1-E6). No gate.
+Letterbox and stretch by arithmetic on whole arrays, softmax over every pixel, greedy suppression in Python
+(B4, C3-C9, D7, E1-E6). No image-quality check.
 """
 
 from collections.abc import Callable
@@ -9,13 +9,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import F32, U8
 from paani.config import CorridorConfig, DetectorConfig
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-Run = Callable[[Floats], Floats]
+Run = Callable[[F32], F32]
 MEAN, STD = np.array([0.485, 0.456, 0.406], np.float32), np.array([0.229, 0.224, 0.225], np.float32)  # D7
 PAD_GREY = 114
 WATER = 0
@@ -24,16 +22,16 @@ WATER = 0
 class Seen(NamedTuple):
     """Boxes x1, y1, x2, y2 in net pixels with their scores; N, U and clear width of each corridor."""
 
-    boxes: list[tuple[Floats, float]]
+    boxes: list[tuple[F32, float]]
     lanes: list[tuple[float, float, float]]
 
 
-def perceive(bgr: Bytes, detect: Run, segment: Run, detections: DetectorConfig, corridors: CorridorConfig) -> Seen:
+def perceive(bgr: U8, detect: Run, segment: Run, detections: DetectorConfig, corridors: CorridorConfig) -> Seen:
     """One picture, BGR uint8 [H, W, 3]."""
     return Seen(boxes(detect(boxed(bgr)), detections), lanes(segment(stretched(bgr)), corridors))
 
 
-def boxed(bgr: Bytes) -> Floats:
+def boxed(bgr: U8) -> F32:
     """float32 [1, 3, 256, 320]."""
     scale = min(320 / bgr.shape[1], 256 / bgr.shape[0])
     inner = cv2.resize(bgr, (round(bgr.shape[1] * scale), round(bgr.shape[0] * scale)))
@@ -44,13 +42,13 @@ def boxed(bgr: Bytes) -> Floats:
     return np.ascontiguousarray(rgb.transpose(2, 0, 1)[None])
 
 
-def stretched(bgr: Bytes) -> Floats:
+def stretched(bgr: U8) -> F32:
     """float32 [1, 3, 256, 320], normalised."""
     rgb = cv2.cvtColor(cv2.resize(bgr, (320, 256)), cv2.COLOR_BGR2RGB).astype(np.float32) / 255.0
     return np.ascontiguousarray(((rgb - MEAN) / STD).transpose(2, 0, 1)[None])
 
 
-def boxes(output: Floats, config: DetectorConfig) -> list[tuple[Floats, float]]:
+def boxes(output: F32, config: DetectorConfig) -> list[tuple[F32, float]]:
     """Best first."""
     rows = output[0].T
     rows = rows[np.isfinite(rows).all(axis=1)]
@@ -61,14 +59,14 @@ def boxes(output: Floats, config: DetectorConfig) -> list[tuple[Floats, float]]:
         if scores[i] > config.confidence:
             cx, cy, w, h = rows[i, :4]
             found.append((np.array([cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2], np.float32), float(scores[i])))
-    kept: list[tuple[Floats, float]] = []
+    kept: list[tuple[F32, float]] = []
     for box, score in found:
         if all(overlap(box, other) <= config.nms_iou for other, _ in kept):
             kept.append((box, score))
     return kept[: config.max_boxes]
 
 
-def overlap(a: Floats, b: Floats) -> float:
+def overlap(a: F32, b: F32) -> float:
     """Intersection over union."""
     width = max(0.0, float(min(a[2], b[2]) - max(a[0], b[0])))
     height = max(0.0, float(min(a[3], b[3]) - max(a[1], b[1])))
@@ -76,7 +74,7 @@ def overlap(a: Floats, b: Floats) -> float:
     return both / (float((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1])) - both + 1e-9)
 
 
-def lanes(logits: Floats, config: CorridorConfig) -> list[tuple[float, float, float]]:
+def lanes(logits: F32, config: CorridorConfig) -> list[tuple[float, float, float]]:
     """Left, centre, right."""
     scores = np.exp(logits[0] - logits[0].max(axis=0))
     probability = scores / scores.sum(axis=0)

@@ -7,8 +7,8 @@ from time import sleep
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from paani.arrays import U8
 from paani.config import PerceptionConfig
 from paani.messages import PictureHeader, UnusableCause
 from paani.statistics.order_statistics import median, nearest_rank
@@ -21,8 +21,7 @@ from paani_services.perception.pipeline import Perceiver
 from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_tools.bench.eyes import paper_shaped
 
-Bytes = NDArray[np.uint8]
-Step = Callable[[Bytes], object]
+Step = Callable[[U8], object]
 WARM_ROUNDS = 5
 SPIN_S = 0.08  # idle threads of default sessions stay busy for 40 ms, measured, and would slow whatever comes next
 PIPELINE, BARE, PAPER_SHAPED, PAPER_PAIR = "pipeline", "two bare runs", "paper-shaped", "paper-shaped, paper's pair"
@@ -58,14 +57,14 @@ class Candidate(msgspec.Struct, frozen=True):
     segmenter: str = ""
 
 
-def fit(pictures: Sequence[Bytes], config: PerceptionConfig) -> list[Bytes]:
+def fit(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
     """Those that the gate lets through: the others would cost a pipeline nothing."""
     fitness = load_fitness(config.gate, 1)
     return [p for p in pictures if judge(GateState(), p, 0, config.gate, fitness)[1] is UnusableCause.NONE]
 
 
 def measured(
-    steps: dict[str, Step], pictures: Sequence[Bytes], rounds: int, stopwatch_ms: Callable[[], float]
+    steps: dict[str, Step], pictures: Sequence[U8], rounds: int, stopwatch_ms: Callable[[], float]
 ) -> Iterator[tuple[int, dict[str, list[float]]]]:
     """Run all steps in turn on each picture; yields the round and all times so far, [ms]. A few rounds warm up."""
     taken: dict[str, list[float]] = {name: [] for name in steps}
@@ -176,7 +175,7 @@ def _bare(config: PerceptionConfig, threads: int) -> Step:
     segmenter = engine_named(config.engine).load("segmenter", config.segmenter, threads)
     inputs = [np.zeros(e.contract.input.shape, e.contract.input.dtype) for e in (detector, segmenter)]
 
-    def both(_: Bytes) -> None:
+    def both(_: U8) -> None:
         detector.run(inputs[0])
         segmenter.run(inputs[1])
 
@@ -188,7 +187,7 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
     perceiver = Perceiver(chosen, stopwatch_ms)
     epochs = count()  # each picture is a camera of its own, so that none is called frozen
 
-    def perceive(bgr: Bytes) -> None:
+    def perceive(bgr: U8) -> None:
         header = PictureHeader(source_us=0, frame_seq=0, frame_epoch=next(epochs), width_px=320, height_px=240)
         evidence, _ = perceiver.perceive(bgr, header, 0.0)
         assert evidence.usable

@@ -1,4 +1,4 @@
-"""Percentile and median as the paper defines them (checklist U5)."""
+"""Percentile and median as the paper defines them (U5)."""
 
 import math
 

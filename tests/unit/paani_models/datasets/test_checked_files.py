@@ -1,4 +1,4 @@
-"""Pictures, masks and boxes as other people leave them: read, or refused by name (checklist R8, R10)."""
+"""Pictures, masks and boxes as other people leave them: read, or refused by name (R8, R10)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MaSTr1325 in its official layout: mask codes, both splits, refusals (checklist R9 - R11)."""
+"""MaSTr1325 in its official layout: mask codes, both splits, refusals (R9 - R11)."""
 
 from collections import Counter
 from collections.abc import Callable

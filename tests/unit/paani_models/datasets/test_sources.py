@@ -1,4 +1,4 @@
-"""Mask codes, box text, splits by sequence (checklist R8, R10)."""
+"""Mask codes, box text, splits by sequence (R8, R10)."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""WaterScenes in its official layout: lists, selection, mapping, refusals (checklist R1 - R8)."""
+"""WaterScenes in its official layout: lists, selection, mapping, refusals (R1 - R8)."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Our average precision against an independent evaluator on random boxes (checklist U1, U2)."""
+"""Our average precision against an independent evaluator on random boxes (U1, U2)."""
 
 from __future__ import annotations
 

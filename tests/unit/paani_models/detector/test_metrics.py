@@ -1,4 +1,4 @@
-"""The evaluators against cases worked by hand (checklist U1 - U4, C5 - C9)."""
+"""The evaluators against cases worked by hand (U1 - U4, C5 - C9)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The YOLO11n-shaped detector: size, contract, loss and recipe (checklist C1, C2, C4, C12, C13, S2 - S5, T1, T2)."""
+"""The YOLO11n-shaped detector: size, contract, loss and recipe (C1, C2, C4, C12, C13, S2 - S5, T1, T2)."""
 
 from dataclasses import replace
 from pathlib import Path

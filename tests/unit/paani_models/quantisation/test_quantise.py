@@ -15,6 +15,7 @@ onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402
 
 from paani import messages as m  # noqa: E402
+from paani.arrays import F32  # noqa: E402
 from paani.clock import stopwatch_ms  # noqa: E402
 from paani.config import PerceptionConfig  # noqa: E402
 from paani.errors import UserError  # noqa: E402
@@ -33,7 +34,6 @@ from tests.pictures import river  # noqa: E402
 
 pytestmark = pytest.mark.train
 
-Floats = np.ndarray[Any, np.dtype[np.float32]]
 SHAPE = (1, 3, 16, 16)
 
 
@@ -96,7 +96,7 @@ def small_net(path: Path, seed: int = 0, spread: float = 1.0) -> None:
     onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), str(path))
 
 
-def inputs(count: int) -> list[Floats]:
+def inputs(count: int) -> list[F32]:
     rng = np.random.default_rng(5)
     return [rng.normal(size=SHAPE).astype(np.float32) for _ in range(count)]
 

@@ -1,4 +1,4 @@
-"""Intervals draw whole sequences again (checklist U3 with an interval)."""
+"""Intervals draw whole sequences again (U3 with an interval)."""
 
 import math
 

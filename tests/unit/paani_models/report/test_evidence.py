@@ -1,4 +1,4 @@
-"""Four classes of evidence stay apart (checklist U7)."""
+"""Four classes of evidence stay apart (U7)."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The manifest's figures, measured again on part of the held-out pictures (checklist T3, U1 - U4)."""
+"""The manifest's figures, measured again on part of the held-out pictures (T3, U1 - U4)."""
 
 import pytest
 

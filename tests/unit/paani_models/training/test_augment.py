@@ -1,4 +1,4 @@
-"""Augmentation is seeded, and picture, mask and boxes move together (checklist S8, S12)."""
+"""Augmentation is seeded, and picture, mask and boxes move together (S8, S12)."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The best epoch by validation is kept; the last is not put in its place (checklist S9)."""
+"""The best epoch by validation is kept; the last is not put in its place (S9)."""
 
 from pathlib import Path
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from paani.arrays import F64, U32
 from paani_sim.eye.camera import BoatPose, Camera, project, view_projection
-from paani_sim.eye.chunks import F64, U32, in_view, make_chunks, visible
+from paani_sim.eye.chunks import in_view, make_chunks, visible
 
 CAMERA = Camera()
 

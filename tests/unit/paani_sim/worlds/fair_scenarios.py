@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from paani.arrays import F64
 from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose
-from paani_sim.worlds.curves import Points, clearance_m, open_length_m
+from paani_sim.worlds.curves import clearance_m, open_length_m
 from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
 
 BOAT_MPS = 0.6
@@ -18,7 +19,7 @@ def met(scenario: Scenario) -> tuple[Obstacle | Actor, ...]:
     return (*fixed, *scenario.world.actors)
 
 
-def fine(line_m: Points, step_m: float = 0.5) -> Points:
+def fine(line_m: F64, step_m: float = 0.5) -> F64:
     """The open line with a point about every `step_m`."""
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))])
     at_m = np.linspace(0.0, arc_m[-1], max(2, round(arc_m[-1] / step_m)))

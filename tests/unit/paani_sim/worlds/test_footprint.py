@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from paani.arrays import F64
 from paani_sim.eye.boats import boat
 from paani_sim.eye.hull import HULLS
 from paani_sim.worlds import Obstacle, Pose2, load_world
-from paani_sim.worlds.footprint import BOWS, F64, placed, shape_of
+from paani_sim.worlds.footprint import BOWS, placed, shape_of
 from paani_sim.worlds.sizes import SIZES
 from paani_sim.worlds.spec import build_spec
 from paani_sim.worlds.world import World

@@ -5,16 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from paani.arrays import F64
 from paani.errors import UserError
 from paani_sim.worlds import WORLDS, Kind, World, actor_pose, load_world
-from paani_sim.worlds.curves import (
-    Points,
-    clearance_m,
-    closed_length_m,
-    inside,
-    point_along_closed,
-    resample_closed,
-)
+from paani_sim.worlds.curves import clearance_m, closed_length_m, inside, point_along_closed, resample_closed
 from paani_sim.worlds.room import footprint_gap_m
 
 pytestmark = pytest.mark.slow
@@ -56,7 +50,7 @@ def test_river_is_a_channel_of_varying_width() -> None:
     assert np.ptp(river.route_m[:, 1]) > 40.0
 
 
-def _middle(river: World) -> Points:
+def _middle(river: World) -> F64:
     half = len(river.shore_m) // 2
     right, left = river.shore_m[:half], river.shore_m[half:][::-1]
     middle = 0.5 * (right + left)
@@ -148,7 +142,7 @@ def test_something_stands_in_the_way_and_leaves_room(world: World) -> None:
         assert _longest_run(free_m) * 0.5 >= 4.0, obstacle.id
 
 
-def _across_route(world: World, at_m: tuple[float, float], side_m: float) -> Points:
+def _across_route(world: World, at_m: tuple[float, float], side_m: float) -> F64:
     fine_m = resample_closed(world.route_m, 2000)
     index = int(np.argmin(np.linalg.norm(fine_m - np.asarray(at_m), axis=1)))
     way = fine_m[(index + 5) % 2000] - fine_m[index - 5]
