@@ -11,7 +11,7 @@ BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
 DEBIAN_TEST := $(DEBIAN) chromium
 
-.PHONY: run test check lint setup setup-test system system-test lock clean
+.PHONY: run test check lint docs setup setup-test system system-test lock clean
 
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
@@ -28,6 +28,9 @@ lint:
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/.stamp-host-docs ## build the documentation into runs/docs, strictly: a broken link fails
+	$(BIN)/python -m docs.build runs/docs
+
 setup: $(VENV)/.stamp-host system
 setup-test: $(VENV)/.stamp-$(subst $(comma),-,$(EXTRAS)) system-test
 
@@ -37,6 +40,7 @@ $(VENV)/bin/python:
 
 $(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
 	$(BIN)/python -m pip install -q -c requirements.lock -e ".[$(subst -,$(comma),$*)]"
+	@mkdir -p runs
 	@touch $@
 
 system:

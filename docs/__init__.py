@@ -1,0 +1,1 @@
+"""The documentation: pages beside this file, and what builds them."""

@@ -1,0 +1,1 @@
+"""Files to begin with; README.md says what each is for."""

@@ -1,0 +1,63 @@
+"""The documentation builds as `make docs` builds it, and what is broken fails the build."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from docs.build import HERE, build, gather
+from docs.links import problems_of
+
+
+@pytest.fixture(scope="module")
+def gathered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("docs")
+    gather(HERE, folder)
+    return folder
+
+
+def test_the_pages_build_without_a_broken_link(gathered: Path) -> None:
+    assert build(gathered) == []
+    assert len(list((gathered / "site").rglob("*.html"))) >= 20
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("[x](how-to/no-such-page.md)", "page does not exist"),
+        ("[x](tutorial.md#no-such-heading)", "anchor does not exist"),
+        ("![x](no-such-picture.png)", "no-such-picture.png leads nowhere"),
+        ("![x](https://example.org/picture.png)", "from another host"),
+    ],
+)
+def test_a_broken_link_fails_the_build(gathered: Path, line: str, fault: str) -> None:
+    page = gathered / "pages" / "index.md"
+    whole = page.read_text(encoding="utf-8")
+    try:
+        page.write_text(f"{whole}\n{line}\n", encoding="utf-8")
+        assert any(fault in problem for problem in build(gathered))
+    finally:
+        page.write_text(whole, encoding="utf-8")
+
+
+def test_a_page_that_no_menu_leads_to_fails_the_build(gathered: Path) -> None:
+    lost = gathered / "pages" / "lost.md"
+    lost.write_text("# Lost\n", encoding="utf-8")
+    try:
+        assert "lost.md: is not in the menu of zensical.toml" in build(gathered)
+    finally:
+        lost.unlink()
+
+
+def test_links_are_followed_by_file_and_anchor(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top"></h1><a href="b.html#here"></a><a href="#top"></a><a href="b.html"></a>'
+    )
+    (tmp_path / "b.html").write_text(
+        '<p id="here"></p><a href="a.html#gone"></a><script src="//cdn.example/x"></script>'
+    )
+    assert problems_of(tmp_path) == [
+        "b.html: loads //cdn.example/x from another host",
+        "b.html: a.html#gone leads nowhere",
+    ]
