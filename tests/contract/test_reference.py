@@ -5,15 +5,20 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 
 import msgspec
+import pytest
 
 from docs.reference.commands import commands, commands_page
+from docs.reference.markdown import STATEMENT
 from docs.reference.messages import enum_types, message_types, messages_page
-from docs.reference.settings import settings_page
+from docs.reference.settings import Setting, sections, settings_page
 from docs.reference.statements import read_statements, statements_page
 from docs.reference.topics import topics_page
 from paani import keys
 from paani import messages as m
 from paani.config import Config
+
+SETTINGS = [setting for section in sections() for setting in section.settings]
+STATEMENTS = set(read_statements())
 
 
 def leaves(kind: type[msgspec.Struct], path: str = "") -> list[str]:
@@ -39,6 +44,12 @@ def test_every_setting_has_its_row() -> None:
     rows = settings_page().splitlines()
     for path in leaves(Config):
         assert any(row.startswith(f"| `{path}` |") for row in rows), path
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.path)
+def test_a_setting_says_why(setting: Setting) -> None:
+    """In words, or by the statement of the paper that it is taken from."""
+    assert set(STATEMENT.findall(setting.why)) & STATEMENTS or len(setting.why.split()) >= 2
 
 
 def test_a_row_gives_unit_range_default_and_reason() -> None:

@@ -24,7 +24,7 @@ class TrackerConfig(Section, frozen=True):
     danger_area: Fraction = 0.02  # G5
     box_retain: Fraction = 0.35  # G6
     confidence_retain: Fraction = 0.65  # G7
-    max_tracks: Size = 64
+    max_tracks: Size = 64  # bounds the time that a step takes
     growth_full_scale_per_s: Positive = 0.16  # H1
     centering_full_scale_per_s: Positive = 0.20  # H2
     urgency_decay_s: Positive = 1.0  # H4
@@ -93,7 +93,7 @@ class PolicyConfig(Section, frozen=True):
     center_vessel_area: Fraction = 0.04  # J7
     core_left: Fraction = 0.405  # J9
     core_right: Fraction = 0.595  # J9
-    tie: Fraction = 0.02
+    tie: Fraction = 0.02  # two sides that differ by less are equally good
     side_change_margin: Fraction = 0.15  # measured: 95 % of what the sides' difference changes by between frames
     release_margin: Fraction = 0.08  # measured: 90 % of what the centre's risk changes by between frames
     clear_frames: Size = 2  # J10
@@ -103,8 +103,8 @@ class PolicyConfig(Section, frozen=True):
 class TuningConfig(Section, frozen=True):
     """When tried parameters may take effect: after 10 s of frames at the nominal rate, within the hour, at once."""
 
-    min_frames: Size = 50
-    max_proposal_age_s: Positive = 3600.0
+    min_frames: Size = 50  # 10 s at the nominal rate
+    max_proposal_age_s: Positive = 3600.0  # what was proposed longer ago is no longer meant
     max_request_age_s: Positive = 5.0  # a request that lay longer is refused, not obeyed late
 
 
@@ -112,7 +112,7 @@ class AdvisorConfig(Section, frozen=True):
     rate_hz: Positive = 5.0  # J17
     evidence_max_age_s: Positive = 0.6  # J16 has 0.8: a silent camera stops the boat within a frame and 0.5 s
     lifetime_s: Positive = 3.5  # J16
-    max_future_s: NonNegative = 0.1
+    max_future_s: NonNegative = 0.1  # clocks on one machine agree to less
     counterfactual_size: RemovalSize = 3  # sets of up to so many pieces of evidence are sought; 0: none
     tracker: TrackerConfig = TrackerConfig()
     motion: MotionConfig = MotionConfig()

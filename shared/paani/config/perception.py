@@ -19,12 +19,13 @@ class CameraConfig(Section, frozen=True):
     """
 
     source: str = "sim"
-    rate_hz: Positive = 5.0
+    rate_hz: Positive = 5.0  # a picture each 0.2 s: 12 cm of way at cruise
+    # `fixed` plays recordings at `rate_hz`, `original` a video at its own times.
     timing: Literal["fixed", "original"] = "fixed"
-    loop: bool = True
+    loop: bool = True  # a recording begins again at its end
     width_px: Size = 320  # A8
     height_px: Size = 240  # A8
-    jpeg_quality: Size = 85
+    jpeg_quality: Size = 85  # of 100: small enough for a slow link, fine enough for the networks
 
 
 class GateConfig(Section, frozen=True):
@@ -35,9 +36,9 @@ class GateConfig(Section, frozen=True):
     again, and does not speak for a picture whose lines may be of a wrong length.
     """
 
-    enabled: bool = True
-    min_width_px: Size = 160
-    min_height_px: Size = 120
+    enabled: bool = True  # J19: the paper judges every picture
+    min_width_px: Size = 160  # half the networks' input; smaller pictures hide what is small
+    min_height_px: Size = 120  # half of `camera.height_px`
     dark_mean: NonNegative = 3.5  # of 255
     dark_frac: Fraction = 0.96  # of pixels at most 6
     bright_frac: Fraction = 0.80  # of pixels at least 250
@@ -45,11 +46,11 @@ class GateConfig(Section, frozen=True):
     flat_frac: Fraction = 0.95  # of tiles without texture
     flat_residual: Fraction = 0.15  # of the variation is not vertical stripes
     noise_correlation: Fraction = 0.25  # of neighbours in the small picture
-    noise_sigma: NonNegative = 30.0
+    noise_sigma: NonNegative = 30.0  # of 255, standard deviation of the noise
     noise_fineness: NonNegative = 3.6  # fine over coarse edges
-    blur_fineness: NonNegative = 0.25
+    blur_fineness: NonNegative = 0.25  # fine over coarse edges; less is out of focus
     cover_frac: Fraction = 0.50  # of tiles dark and without texture, beside a bright rest
-    cover_rest_mean: NonNegative = 58.0
+    cover_rest_mean: NonNegative = 58.0  # of 255, beside what is covered; a darker rest means dusk, no covered lens
     cover_total_frac: Fraction = 0.95  # whatever the rest
     skew: Fraction = 0.82  # lines of a wrong length, unless the net is sure; of 3,722 real pictures one has less
     frozen_frames: Size = 3  # distinct frames that show the same: two periods of 0.2 s, and 0.1 s for the verdict
@@ -91,20 +92,20 @@ class PerceptionConfig(Section, frozen=True):
     `paani models bench` on the machine itself. The gate's net always runs by onnxruntime.
     """
 
-    rate_hz: Positive = 5.0
+    rate_hz: Positive = 5.0  # as often as the camera gives pictures
     max_frame_age_s: Positive = 0.8  # J16, judged at inference start
-    concurrent: bool = True
+    concurrent: bool = True  # both networks at once on two cores; B4: one after the other
     engine: EngineName = "onnxruntime"
-    intra_op_threads: Size = 1
+    intra_op_threads: Size = 1  # of each network; two networks with one each use two cores best
     segmenter: str = ""  # path of an ONNX file; empty: the shipped model; "none": the fallback alone (F1)
     detector: str = ""  # path of an ONNX file; empty: the shipped model
-    temperature: Positive = 1.0
+    temperature: Positive = 1.0  # of the softmax of the mask; above 1 it is less sure of itself
     fallback_non_water: Fraction = 1.0  # F3
-    fallback_uncertainty: Fraction = 1.0
+    fallback_uncertainty: Fraction = 1.0  # F3: a mask drawn by rule is taken as unsure throughout
     ego_polygon: tuple[tuple[Fraction, Fraction], ...] = ()
     follow_roll: bool = True  # corridors stay level while the boat rolls
-    max_roll_rad: NonNegative = 0.35
-    max_roll_age_s: Positive = 0.3
+    max_roll_rad: NonNegative = 0.35  # 20 degrees; corridors are not turned further
+    max_roll_age_s: Positive = 0.3  # older odometry says nothing about the roll in the picture
     journal_max_mib: NonNegative = 8.0  # P2: of the observations kept on disk, half an hour at 5 Hz; 0: none
     corridors: CorridorConfig = CorridorConfig()
     gate: GateConfig = GateConfig()

@@ -83,7 +83,7 @@ class PlannerConfig(Section, frozen=True):
     `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
     """
 
-    use: bool = True
+    use: bool = True  # whether the metric planner steers; without it the advice turns the boat by angles
     max_range_m: Positive = 8.0  # one mask row is 1.2 m there, seen from 0.9 m
     blind_m: NonNegative = 3.0
     horizon_slack_deg: NonNegative = 4.0
@@ -112,7 +112,7 @@ class PlannerConfig(Section, frozen=True):
     look_m: NonNegative = 5.0  # a quarter turn at `turn_radius_m`, the boat, and as much again
     speed_mps: Positive = 0.6  # cap while the planner steers; the paper has 0.4 (Q5)
     yaw_rate_radps: Positive = 0.35  # Q5
-    yaw_accel_radps2: Positive = 0.35
+    yaw_accel_radps2: Positive = 0.35  # a second to the full turn rate
     accel_mps2: Positive = 0.4  # measured on K4, K5; the paper has 0.2 (Q5)
     drag_per_s: NonNegative = 4.0 / 12.4  # K5 over K4
     drag_per_m: NonNegative = 20.0 / 12.4  # K5 over K4
@@ -127,6 +127,7 @@ class PlannerConfig(Section, frozen=True):
     stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
     replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
     span_deg: Angle = 120.0  # headings to either side of the wanted course
+    # Between the headings that are tried: the time of a plan goes with their number.
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
 
     def acts_on(self, calibration: CalibrationConfig) -> bool:

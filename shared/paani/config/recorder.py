@@ -16,8 +16,8 @@ class RecorderConfig(Section, frozen=True):
 
     folder: str = ""
     leave_out: tuple[str, ...] = ("eye/picture",)
-    queue_messages: Size = 2000
-    queue_mib: Positive = 16.0
+    queue_messages: Size = 2000  # waiting to be written: about five seconds of everything
+    queue_mib: Positive = 16.0  # waiting to be written; beyond it pictures are dropped first, and counted
     flush_s: Positive = 0.4  # a crash costs at most this, one write and one look at the bus
     part_s: Positive = 600.0
     part_mib: Positive = 512.0

@@ -23,24 +23,25 @@ class BusConfig(Section, frozen=True):
     """`runtime_dir` holds credentials and the stop latch; empty: a folder of this user's."""
 
     domain: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 43  # A6
-    vessel: ShortName = "otter"
-    router: str = "tcp/127.0.0.1:7447"
+    vessel: ShortName = "otter"  # the boat's name in every key
+    router: str = "tcp/127.0.0.1:7447"  # where the router listens: this machine alone
     runtime_dir: str = ""
-    lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000
-    max_future_s: Positive = 1.0
+    lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000  # a link that was silent for so long counts as cut
+    max_future_s: Positive = 1.0  # a stamp further ahead than two machines' clocks may differ is refused
 
 
 class DashboardConfig(Section, frozen=True):
-    host: str = "127.0.0.1"
-    port: Port = 8043
-    serve: bool = True
-    arm_at_start: bool = False
-    picture_rate_hz: Positive = 10.0
+    host: str = "127.0.0.1"  # this machine alone: the page asks for no password
+    port: Port = 8043  # ends in the paper's domain
+    serve: bool = True  # whether there is a page; the operator's process runs without it too
+    arm_at_start: bool = False  # a boat waits for its operator; `paani up`, whose boat is simulated, arms it
+    picture_rate_hz: Positive = 10.0  # at most so many pictures are sent to a page
 
 
 class Config(Section, frozen=True):
     """Defaults < TOML file < `PAANI_<SECTION>__<FIELD>` < `--set section.field=value`."""
 
+    # Which set of values the others are compared with; `paani` is the default.
     profile: Literal["paani", "wide", "fans", "paper"] = "paani"
     bus: BusConfig = BusConfig()
     camera: CameraConfig = CameraConfig()
