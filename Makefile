@@ -50,7 +50,7 @@ system-test:
 	@sh deploy/system-packages.sh $(DEBIAN_TEST)
 
 lock: ## pin what the next installation takes
-	$(BIN)/uv pip compile -q --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
+	$(BIN)/uv pip compile -q --python-version 3.11 --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis
