@@ -1,29 +1,60 @@
-"""Runs a decider on the live bus and keeps the ledger of its steps."""
+"""Runs a decider on a bus, live or in lockstep, and keeps the ledger of its steps."""
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 
 from paani import keys
 from paani import messages as m
-from paani.bus.bus import Bus
-from paani.bus.inbox import Latest
 from paani.clock import Clock
 from paani.config import Config
 from paani.decider import Decider, Input, Outputs
 
-S = TypeVar("S")
 STATE_EVERY_US = 2_000_000  # a message lost on the way to the recorder costs a replay no more steps than this
 
 
-class Stepper(Generic[S]):
+class NewestMessage(Protocol):
+    """An inbox of depth one."""
+
+    @property
+    def newest(self) -> Input:
+        """The newest message and when it was received."""
+        ...
+
+
+class MessagePublisher(Protocol):
+    """The right to write one topic."""
+
+    def put(self, message: Any) -> Any:
+        """Fill in the header and publish; returns the message as sent."""
+        ...
+
+
+S = TypeVar("S")
+I = TypeVar("I", bound=NewestMessage)  # noqa: E741  # the inbox of the bus in use
+I_co = TypeVar("I_co", bound=NewestMessage, covariant=True)
+
+
+class StepperBus(Protocol[I_co]):
+    """What a decider's steps need of a bus: the live `Bus`, or the lockstep bus of a trial."""
+
+    def latest(self, topic: keys.Topic[Any]) -> I_co:
+        """Subscribe, newest wins."""
+        ...
+
+    def publisher(self, topic: keys.Topic[Any]) -> MessagePublisher:
+        """Write one topic."""
+        ...
+
+
+class Stepper(Generic[S, I]):
     """`decide` calls the decider with the newest of every input; `conclude` publishes and writes the step."""
 
-    def __init__(self, bus: Bus, clock: Clock, config: Config, decider: Decider[S]) -> None:
+    def __init__(self, bus: StepperBus[I], clock: Clock, config: Config, decider: Decider[S]) -> None:
         self._clock, self._config, self._decider = clock, config, decider
-        self.inboxes: dict[str, Latest[Any]] = {topic.name: bus.latest(topic) for topic in decider.inputs}
+        self.inboxes: dict[str, I] = {topic.name: bus.latest(topic) for topic in decider.inputs}
         self._publishers = {topic.name: bus.publisher(topic) for topic in (*decider.outputs, *decider.own)}
         self._steps = bus.publisher(keys.STEPS[decider.service])
         self._own: dict[str, Input] = {}

@@ -16,9 +16,9 @@ from paani.cores import estimator_of
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
-from paani_sim.trials.board import Board
+from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.evidence_source import Eyes, Sight
-from paani_sim.trials.outbox import START_US, Outbox, Tap
+from paani_sim.trials.lockstep_bus import START_US, LockstepBus, MessageTap, PlantClock
 from paani_sim.trials.policies import look_hz, time_scale
 from paani_sim.trials.route_progress import Along
 from paani_sim.trials.states import Phase, Why
@@ -56,7 +56,7 @@ class Drive:
         config: Config,
         eyes: Eyes | None,
         *,
-        tap: Tap | None = None,
+        tap: MessageTap | None = None,
         perception_latency_s: float = PERCEPTION_LATENCY_S,
     ) -> None:
         """eyes None: nobody looks, the advice is always to go straight on."""
@@ -66,8 +66,9 @@ class Drive:
         self.plant = Plant.of(scenario, config.plant)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
         self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
-        self._out = Outbox(config.bus.domain, tap)
-        self.board = Board(config, mission_of(scenario), self._out, blind=eyes is None)
+        self._clock = PlantClock(self.plant)
+        self._bus = LockstepBus(self._clock, config.bus.domain, tap)
+        self.autonomy = AutonomyStack(config, mission_of(scenario), self._bus, self._clock, blind=eyes is None)
         self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
         self.applied: Applied = self.adapter.decide(START_US)
         self.along = Along(world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m))
@@ -104,7 +105,7 @@ class Drive:
     @property
     def now_us(self) -> int:
         """The drive's clock: every stamp in its messages is of it."""
-        return START_US + self.plant.sim_us
+        return self._clock.now_us()
 
     @property
     def elapsed_s(self) -> float:
@@ -131,7 +132,7 @@ class Drive:
         self._estimate(now_us, linked=linked)
         self._look(now_us, linked=linked)
         self._supervise(now_us, linked=linked)
-        thrust = self.board.step(now_us)
+        thrust = self.autonomy.step()
         if thrust is not None and linked:
             self.adapter.offer(thrust, now_us)
         self._report(now_us)
@@ -153,32 +154,32 @@ class Drive:
 
     def _measure(self, now_us: int) -> None:
         if self._is_due("imu"):
-            self._samples.append(self._out.put(keys.IMU, imu_message(self.plant, now_us), now_us))
+            self._samples.append(self._bus.put(keys.IMU, imu_message(self.plant, now_us)))
         if self._is_due("gps"):
-            self._fix = self._out.put(keys.GPS, gps_message(self.plant, now_us), now_us)
+            self._fix = self._bus.put(keys.GPS, gps_message(self.plant, now_us))
 
     def _estimate(self, now_us: int, *, linked: bool) -> None:
         if not self._is_due("estimate"):
             return
         local, odometry = self._estimator.step(self._samples, self._fix, now_us)
         self._samples, self._fix = [], None
-        if self._out.tap is not None:
-            self._out.put(keys.LOCAL_ODOMETRY, local, now_us)
-        self._odometry = self._out.put(keys.ODOMETRY, odometry, now_us)
+        if self._bus.tap is not None:
+            self._bus.put(keys.LOCAL_ODOMETRY, local)
+        self._odometry = self._bus.put(keys.ODOMETRY, odometry)
         if linked:
-            self.board.hear(keys.ODOMETRY, self._odometry, now_us)
+            self.autonomy.deliver(keys.ODOMETRY, self._odometry)
 
     def _look(self, now_us: int, *, linked: bool) -> None:
         if self._coming and now_us >= self._coming[0][0]:
-            evidence = self._out.put(keys.EVIDENCE, self._coming.pop(0)[1], now_us)
+            evidence = self._bus.put(keys.EVIDENCE, self._coming.pop(0)[1])
             self.track.evidence(evidence, now_us)
-            self.board.hear(keys.EVIDENCE, evidence, now_us)
+            self.autonomy.deliver(keys.EVIDENCE, evidence)
         if self._eyes is None or not linked or not self._is_due("look"):
             return
         header = m.PictureHeader(
             source_us=now_us,
             frame_seq=self.frames,
-            frame_epoch=self._out.epoch,
+            frame_epoch=self._bus.epoch,
             width_px=self.config.eye.width_px,
             height_px=self.config.eye.height_px,
         )
@@ -188,36 +189,36 @@ class Drive:
             return
         self.frames += 1
         self._coming.append((now_us + self._late_us, sight.evidence))
-        if self._out.tap is not None:
-            self._show(sight, header, now_us)
+        if self._bus.tap is not None:
+            self._show(sight, header)
 
-    def _show(self, sight: Sight, header: m.PictureHeader, now_us: int) -> None:
+    def _show(self, sight: Sight, header: m.PictureHeader) -> None:
         """Picture and mask, for the recording."""
         if sight.bgr is not None:
             quality = [cv2.IMWRITE_JPEG_QUALITY, self.config.camera.jpeg_quality]
-            self._out.put(keys.PICTURE, header, now_us, cv2.imencode(".jpg", sight.bgr, quality)[1].tobytes())
+            self._bus.put(keys.PICTURE, header, cv2.imencode(".jpg", sight.bgr, quality)[1].tobytes())
         if sight.mask is not None:
             height, width = sight.mask.shape
             named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
-            self._out.put(keys.MASK, named, now_us, cv2.imencode(".png", sight.mask)[1].tobytes())
+            self._bus.put(keys.MASK, named, cv2.imencode(".png", sight.mask)[1].tobytes())
 
     def _supervise(self, now_us: int, *, linked: bool) -> None:
         """The operator's word, the pulses, and the plant's clock."""
         if self._is_due("arming"):
             arming = m.Arming(source_us=now_us, armed=self.phase is Phase.RUNNING)
-            arming = self._out.put(keys.ARMING, arming, now_us)
+            arming = self._bus.put(keys.ARMING, arming)
             self.adapter.hear_arming(arming, now_us)
             if linked:
-                self.board.hear(keys.ARMING, arming, now_us)
+                self.autonomy.deliver(keys.ARMING, arming)
         if self._is_due("pulse"):
             for service in self.config.plant.adapter.require_pulses:
                 if linked or service not in keys.BOARD_SERVICES:
                     self.adapter.hear_pulse(service, now_us)
         if self._is_due("report"):
             clock = m.SimTime(source_us=now_us, sim_us=self.plant.sim_us, stamp_us=now_us)
-            clock = self._out.put(keys.SIM_TIME, clock, now_us)
+            clock = self._bus.put(keys.SIM_TIME, clock)
             if linked:
-                self.board.hear(keys.SIM_TIME, clock, now_us)
+                self.autonomy.deliver(keys.SIM_TIME, clock)
 
     def _report(self, now_us: int) -> None:
         """What the last gate does, and truth."""
@@ -225,17 +226,17 @@ class Drive:
         if in_force is not self._in_force:
             self._in_force, self._since_us = in_force, now_us
         self.track.thrust(self.applied, in_force, now_us)
-        if self._out.tap is not None and self._is_due("report"):
-            self._out.put(keys.TRUE_POSE, pose_message(self.plant, now_us), now_us)
+        if self._bus.tap is not None and self._is_due("report"):
+            self._bus.put(keys.TRUE_POSE, pose_message(self.plant, now_us))
             applied = applied_message(self.adapter, self.applied, now_us, self._since_us)
-            self._out.put(keys.THRUST_APPLIED, applied, now_us)
+            self._bus.put(keys.THRUST_APPLIED, applied)
 
     def _advance(self, now_us: int) -> None:
         """The state machine, and the samples that are scored."""
         if self._is_due("sample"):
             self.along.update(self.plant.position_m)
             if self.phase is Phase.RUNNING:
-                self.track.sample(self.plant, self.along, self.board, self.applied)
+                self.track.sample(self.plant, self.along, self.autonomy, self.applied)
         if self.phase is Phase.READY:
             waited_s = self.plant.sim_us * 1e-6
             if waited_s >= MIN_READY_S and self._is_ready():
@@ -253,13 +254,13 @@ class Drive:
 
     def _is_ready(self) -> bool:
         """Nothing but the operator's word is missing, or what the eyes advise."""
-        command = self.board.command
+        command = self.autonomy.command
         waiting = {m.Inhibit.NOT_ARMED, m.Inhibit.ADVISED_STOP}
         return command is not None and bool(command.inhibits) and waiting.issuperset(command.inhibits)
 
     def _is_finished(self) -> bool:
         """The navigator says that the route has no more waypoints."""
-        command = self.board.command
+        command = self.autonomy.command
         done = {m.Inhibit.ROUTE_FINISHED, m.Inhibit.MISSION_DONE}
         return command is not None and not done.isdisjoint(command.inhibits)
 

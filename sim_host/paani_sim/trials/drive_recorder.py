@@ -16,7 +16,7 @@ from paani.config import Config, encode_config
 from paani.errors import UserError
 from paani.logs.writer import About, Head, LogWriter
 from paani_models.catalogue import MANIFEST, WEIGHTS
-from paani_sim.trials.outbox import START_US
+from paani_sim.trials.lockstep_bus import START_US
 
 PACKAGES = ("paani", "numpy", "onnxruntime", "msgspec", "mujoco", "opencv-python-headless")
 
@@ -37,7 +37,7 @@ class Recorder:
             raise UserError(f"--record {path}: {error.strerror}") from error
 
     def tap(self, topic: keys.Topic[Any], message: m.Message, now_us: int, data: bytes = b"") -> None:
-        """See `Tap`."""
+        """See `MessageTap`."""
         head = Head(message.source_us, message.seq, message.epoch, message.sent_us)
         encoded = self._encoder.encode(message)
         if topic.stance is keys.Stance.PICTURE:

@@ -12,7 +12,7 @@ from paani_sim.trials.cases import Case, scenario_of
 from paani_sim.trials.drive import Drive
 from paani_sim.trials.evidence_source import CameraEyes, Eyes
 from paani_sim.trials.ground_truth_evidence import OracleEyes
-from paani_sim.trials.outbox import Tap
+from paani_sim.trials.lockstep_bus import MessageTap
 from paani_sim.trials.policies import CAMERA, Policy, config_of
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.scoring import score
@@ -42,7 +42,7 @@ def config_for(case: Case, sets: Iterable[str] = (), *, threads: bool = False) -
     return msgspec.structs.replace(config, plant=msgspec.structs.replace(config.plant, vessel=vessel))
 
 
-def drive_of(case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap: Tap | None = None) -> Drive:
+def drive_of(case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None) -> Drive:
     """Ready to begin; to be closed. Raises UserError for the scenario or a setting."""
     config, scenario = config_for(case, sets, threads=threads), scenario_of(case)
     eyes = eyes_of(case.policy, scenario, config)
@@ -55,7 +55,7 @@ def drive_of(case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap
 
 
 def run_case(
-    case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap: Tap | None = None
+    case: Case, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
 ) -> tuple[TrialResult, Effort]:
     """Drive to the end and score. Raises UserError as `drive_of`."""
     wall_ms, cpu_s = stopwatch_ms(), process_cpu_s()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from paani_sim.trials.outbox import START_US
+from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.result import Reaction
 from paani_sim.trials.track import Applying, Sample, Track
 from paani_sim.worlds import Fault, FaultKind

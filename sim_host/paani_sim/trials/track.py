@@ -7,7 +7,7 @@ from typing import NamedTuple
 from paani import messages as m
 from paani_sim.plant.adapter import Applied
 from paani_sim.plant.plant import Plant
-from paani_sim.trials.board import Board
+from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.route_progress import Along
 
 
@@ -69,7 +69,7 @@ class Track:
             self.applied.append(Applying(now_us, is_zero, picture_us))
         self._in_force, self._was_zero = in_force, is_zero
 
-    def sample(self, plant: Plant, along: Along, board: Board, applied: Applied) -> None:
+    def sample(self, plant: Plant, along: Along, autonomy: AutonomyStack, applied: Applied) -> None:
         """Take one."""
         t_s = plant.sim_us * 1e-6
         x_m, y_m = plant.position_m
@@ -81,7 +81,7 @@ class Track:
                 plant.collisions, plant.in_contact, actors_along_m,
             )
         )  # fmt: skip
-        advisory, command = board.advisory, board.command
+        advisory, command = autonomy.advisory, autonomy.command
         if advisory is not None and (not self.advisories or advisory is not self.advisories[-1]):
             self.advisories.append(advisory)
         if command is not None:

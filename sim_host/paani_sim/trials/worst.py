@@ -17,8 +17,8 @@ from paani import messages as m
 from paani.arrays import U8
 from paani_sim.trials.cases import Case
 from paani_sim.trials.drive_recorder import Recorder
+from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.one import config_for, run_case
-from paani_sim.trials.outbox import START_US
 from paani_sim.trials.policies import CAMERA
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.track_chart import worst_moment_s

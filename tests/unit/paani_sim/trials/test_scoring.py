@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani_sim.trials.hull_clearance import BANK, FAR_M, Course, actor_poses, clearances_m, could_see
 from paani_sim.trials.intervals import wilson
-from paani_sim.trials.outbox import START_US
+from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.reactions import reactions_of
 from paani_sim.trials.result import Closeness, Contact
 from paani_sim.trials.route_progress import Along
