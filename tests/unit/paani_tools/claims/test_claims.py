@@ -1,0 +1,48 @@
+"""`paani claims` lists every statement with its proof."""
+
+from __future__ import annotations
+
+import tomllib
+
+import msgspec
+import pytest
+
+from paani import cli
+from tests.places import ROOT
+
+ROWS = tomllib.loads((ROOT / "tests" / "claims.toml").read_text(encoding="utf-8"))
+
+
+def test_every_statement_is_listed_with_its_proof(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["claims", "--json"]) == 0
+    listed = msgspec.json.decode(capsys.readouterr().out)
+    assert [each["id"] for each in listed] == list(ROWS)
+    for each in listed:
+        row = ROWS[each["id"]]
+        assert each["says"] == row["says"]
+        assert each["proof"] == row.get("test", [row.get("exempt") or row.get("pending")])
+        assert (each["state"] == "proved") == ("test" in row)
+
+
+@pytest.mark.parametrize(
+    ("words", "ids"),
+    [
+        (["J7"], ["J7"]),
+        (["j5-j7", "O4"], ["J5", "J6", "J7", "O4"]),
+        (["N"], [f"N{number}" for number in range(1, 9)]),
+        (["O", "--find", "1,000 ms", "--state", "pending", "proved"], ["O4"]),
+    ],
+)
+def test_statements_are_chosen_by_id_words_and_state(
+    words: list[str], ids: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["claims", *words]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in printed if not line.startswith(" ")][:-1] == ids
+    assert printed[-1].startswith(f"{len(ids)} statement")
+
+
+@pytest.mark.parametrize("name", ["X1", "J99", "J7-K2", "7"])
+def test_an_unknown_id_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["claims", name]) == 2
+    assert capsys.readouterr().err.startswith(f"paani: {name}: no such statement")
