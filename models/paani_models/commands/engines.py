@@ -13,6 +13,7 @@ import msgspec
 
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
+from paani.option_paths import output_file
 from paani.whole_file import write_whole
 from paani_models.catalogue import described, verified_path
 from paani_models.datasets.selection import Pictures
@@ -37,7 +38,7 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--engine", choices=("all", *engine_bench.ENGINES), default="all")
     parser.add_argument("--threads", type=_counts, default=(1, 2), metavar="N,N", help="default: 1,2")
     parser.add_argument("--rounds", type=_count, default=30, metavar="N", help="runs of each (default: 30)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
 
 
 def convert(arguments: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_whole
 from paani_models.benchmarks import run as benchmarks
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
@@ -36,13 +37,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources, --rendered and --weights."""
     parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
     parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="the gate's figures, from `paani faults --json`")
-    parser.add_argument("--lars", type=Path, metavar="ROOT", help="score the segmenter by LaRS's protocol instead")
-    parser.add_argument("--mods", type=Path, metavar="ROOT", help="score both nets by MODS's protocol instead")
+    parser.add_argument(
+        "--faults", type=input_file("--faults"), metavar="FILE", help="the gate's figures, from `paani faults --json`"
+    )
+    parser.add_argument(
+        "--lars", type=input_folder("--lars"), metavar="ROOT", help="score the segmenter by LaRS's protocol instead"
+    )
+    parser.add_argument(
+        "--mods", type=input_folder("--mods"), metavar="ROOT", help="score both nets by MODS's protocol instead"
+    )
     parser.add_argument(
         "--predictions", type=Path, help="with --lars or --mods: write masks and boxes in their formats"
     )
-    parser.add_argument("--json", type=Path, help="write figures with intervals, per source and sequence, to this file")
+    parser.add_argument(
+        "--json", type=output_file("--json"), help="write figures with intervals, per source and sequence, to this file"
+    )
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.option_paths import input_file, output_folder
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue, verified_path
 from paani_models.commands.evaluate import score, write
@@ -28,9 +29,11 @@ PAGE = "index.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources, --rendered and --weights."""
-    parser.add_argument("--out", type=Path, required=True, help="folder outside any repository; made if missing")
+    parser.add_argument(
+        "--out", type=output_folder("--out"), required=True, help="folder outside any repository; made if missing"
+    )
     parser.add_argument("--runs", type=Path, action="append", default=[], help="folder of a training, repeatable")
-    parser.add_argument("--faults", type=Path, help="file written by `paani faults --json`")
+    parser.add_argument("--faults", type=input_file("--faults"), help="file written by `paani faults --json`")
     parser.add_argument(
         "--evidence", type=Path, action="append", default=[], help="findings of another class, repeatable"
     )

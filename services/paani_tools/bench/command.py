@@ -13,6 +13,7 @@ import msgspec
 
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
+from paani.option_paths import output_file
 from paani.statistics.figure_table import Part, installed_commands, installed_parts, part_text
 from paani.statistics.measured import Machine, Report, measured
 from paani.whole_file import write_whole
@@ -42,7 +43,7 @@ def main(argv: list[str]) -> int:
     chain.add_argument("--json", action="store_true", help="print JSON; progress goes to standard error")
     add_config_arguments(chain)
     judgement = benches.add_parser("judgement", help="the advisor: its step, its counterfactuals, its messages")
-    judgement.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    judgement.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     judgement.add_argument(
         "--frames", type=_count, default=1000, metavar="N", help="frames to step over; default: 1000"
     )
@@ -58,7 +59,7 @@ def main(argv: list[str]) -> int:
     add_config_arguments(judgement)
     recording = benches.add_parser("recorder", help="what recording a drive costs")
     recording.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")
-    recording.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    recording.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(recording)
     options = parser.parse_args(argv)
     return {"chain": _chain, "judgement": _judgement, "recorder": _recorder}[options.what](options)

@@ -3,11 +3,11 @@
 import argparse
 import asyncio
 import sys
-from pathlib import Path
 
 from paani.cli import add_config_arguments, config_from
 from paani.config import CalibrationConfig
 from paani.errors import UserError
+from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
 from paani_tools.calibrate.gather import heard_live, looks, recorded
 from paani_tools.calibrate.mount import Mount, mount_of
@@ -21,8 +21,6 @@ def main(argv: list[str]) -> int:
     config = config_from(options)
     if (options.recording is None) == (options.live is None):
         raise UserError("name a recording, or --live SECONDS")
-    if options.out is not None and not options.out.absolute().parent.is_dir():
-        raise UserError(f"--out {options.out}: no such folder")
     for name in ("hfov_deg", "height_m"):
         if getattr(config.calibration, name) <= 0.0:
             raise UserError(f"calibration.{name} is not known (--set calibration.{name}=...)")
@@ -62,12 +60,14 @@ def _parser() -> argparse.ArgumentParser:
         prog="paani calibrate",
         description="Pitch and roll of the camera's mount, from the far waterline and the boat's roll and pitch.",
     )
-    parser.add_argument("recording", type=Path, nargs="?", help="a recording of the moored or slow boat")
+    parser.add_argument("recording", type=input_path(), nargs="?", help="a recording of the moored or slow boat")
     parser.add_argument("--live", type=_seconds, metavar="SECONDS", help="listen to the running boat instead")
     parser.add_argument(
         "--shore-m", type=_metres, required=True, metavar="METRES", help="how far away the shore in the picture is"
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the calibration section here (TOML)")
+    parser.add_argument(
+        "--out", type=output_file("--out"), metavar="FILE", help="write the calibration section here (TOML)"
+    )
     add_config_arguments(parser)
     return parser
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from paani.config import CorridorConfig
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
+from paani.option_paths import input_path, output_file
 from paani_tools.explain.moment import Moment, last_change_us, moment_at
 from paani_tools.explain.narrative import story_of
 from paani_tools.look.annotate import annotated
@@ -25,12 +26,14 @@ DAY_US = 86_400_000_000
 def main(argv: list[str]) -> int:
     """Tell one decision. Exit codes: 0 told, 2 user's mistake."""
     parser = argparse.ArgumentParser(prog="paani explain", description="One decision of a recorded drive, explained.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, or a folder of its parts")
+    parser.add_argument("file", type=input_path(), metavar="FILE", help="a recording, or a folder of its parts")
     parser.add_argument(
         "--at", metavar="T", help="seconds since the start, or UTC (12:30:05, 2027-01-31T12:30:05Z); "
         "default: the last change of direction",
     )  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="write the annotated picture (.png or .jpg)")
+    parser.add_argument(
+        "--picture", type=output_file("--picture"), metavar="FILE", help="write the annotated picture (.png or .jpg)"
+    )
     options = parser.parse_args(argv)
     log = open_log(options.file)
     config = provenance_of(log, force=True).config

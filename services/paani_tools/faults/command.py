@@ -11,6 +11,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani.messages import UnusableCause
+from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_whole
 from paani_services.perception.corridors import classify
 from paani_services.perception.engine import engine_named
@@ -54,13 +55,17 @@ class Eyes:
 def main(argv: list[str]) -> int:
     """Measure, print, write what was asked for. Raises UserError naming the file or folder."""
     parser = argparse.ArgumentParser(prog="paani faults", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of annotated sources, each with a manifest.json")
-    parser.add_argument("--pictures", type=Path, metavar="FILE", help="only pictures listed here, one path a line")
-    parser.add_argument("--without-water", type=Path, metavar="FILE", help="pictures listed here show no water")
+    parser.add_argument("data", type=input_folder(), help="folder of annotated sources, each with a manifest.json")
+    parser.add_argument(
+        "--pictures", type=input_file("--pictures"), metavar="FILE", help="only pictures listed here, one path a line"
+    )
+    parser.add_argument(
+        "--without-water", type=input_file("--without-water"), metavar="FILE", help="pictures listed here show no water"
+    )
     parser.add_argument("--scenes", type=int, default=16, help="segmented pictures per source (default: 16)")
     parser.add_argument("--clean", type=int, default=200, help="pictures per source as they are (default: 200)")
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="the curves")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE")
+    parser.add_argument("--svg", type=output_file("--svg"), metavar="FILE", help="the curves")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     eyes = Eyes(config_from(options).perception)

@@ -12,6 +12,7 @@ from paani.errors import UserError
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
+from paani.option_paths import input_path, output_file, output_folder
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
 from paani_tools.logs.info import info_of, list_text, text_of
 from paani_tools.progress import Progress
@@ -94,15 +95,17 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani logs", description="Recordings of `paani up --record DIR`.")
     commands = parser.add_subparsers(dest="what", required=True)
     info = commands.add_parser("info", help="what a recording holds")
-    info.add_argument("path", type=Path, metavar="FILE|DIR")
+    info.add_argument("path", type=input_path(), metavar="FILE|DIR")
     info.add_argument("--json", action="store_true", help="for programs")
     mend = commands.add_parser("repair", help="mend a recording that was cut short or damaged")
-    mend.add_argument("path", type=Path, metavar="FILE")
+    mend.add_argument("path", type=input_path(), metavar="FILE")
     export = commands.add_parser("export", help="write tables or tracks")
-    export.add_argument("path", type=Path, metavar="FILE|DIR")
-    export.add_argument("--csv", type=Path, metavar="DIR", help="a table for each topic, into a new folder")
-    export.add_argument("--geojson", type=Path, metavar="FILE", help="the track, for maps")
-    export.add_argument("--gpx", type=Path, metavar="FILE", help="the track, for chart plotters")
+    export.add_argument("path", type=input_path(), metavar="FILE|DIR")
+    export.add_argument(
+        "--csv", type=output_folder("--csv"), metavar="DIR", help="a table for each topic, into a new folder"
+    )
+    export.add_argument("--geojson", type=output_file("--geojson"), metavar="FILE", help="the track, for maps")
+    export.add_argument("--gpx", type=output_file("--gpx"), metavar="FILE", help="the track, for chart plotters")
     listing = commands.add_parser("list", help="the recordings of a folder")
-    listing.add_argument("path", type=Path, metavar="DIR")
+    listing.add_argument("path", type=input_path(), metavar="DIR")
     return parser

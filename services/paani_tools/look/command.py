@@ -11,7 +11,8 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
-from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk, Reason, Text, Unit, UnusableCause
+from paani.messages import Detection, Direction, LaneRisk, Reason, Text, Unit, UnusableCause
+from paani.option_paths import input_path, output_file, output_folder
 from paani.whole_file import write_whole
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.annotate import annotated
@@ -19,6 +20,7 @@ from paani_tools.look.contact_sheet import ContactSheet
 from paani_tools.look.verdict import Judgement, judged
 
 EPOCHS_PER_PATH = 1_000_000
+DEFAULT_OUT = Path("runs/look")
 JPEG_QUALITY = 90
 SHEET_SUFFIXES = (".jpg", ".jpeg", ".png")
 
@@ -43,25 +45,13 @@ class Brief(msgspec.Struct, frozen=True):
     explanation: Text
 
 
-class Full(msgspec.Struct, frozen=True):
-    """One line without `--json`."""
-
-    path: Text
-    evidence: Evidence
-    advice: Advisory
-    explanation: Text
-
-
 def main(argv: list[str]) -> int:
     """Judge every path in turn. Raises UserError naming a path that cannot be read."""
     options = _parser().parse_args(argv)
     config = config_from(options)
-    for path in options.paths:
-        if not path.exists():
-            raise UserError(f"{path}: no such file or folder")
     if options.sheet is not None and options.sheet.suffix.lower() not in SHEET_SUFFIXES:
         raise UserError(f"--sheet {options.sheet}: is not one of {', '.join(SHEET_SUFFIXES)}")
-    out: Path | None = options.out or (None if options.json or options.sheet else Path("look"))
+    out: Path | None = options.out or (None if options.json or options.sheet else DEFAULT_OUT)
     if out is not None:
         _make(out)
     sheet = ContactSheet()
@@ -72,7 +62,7 @@ def main(argv: list[str]) -> int:
         for index, path in enumerate(options.paths):
             for judgement in judged(path, index * EPOCHS_PER_PATH, perceiver, config):
                 shown += 1
-                sys.stdout.write(_line(judgement, options.json))
+                sys.stdout.write(json_line(judgement) if options.json else readable_line(judgement))
                 if (out or options.sheet) and judgement.bgr is not None:
                     picture = annotated(
                         judgement.bgr,
@@ -108,24 +98,30 @@ def file_name(name: str, taken: set[str]) -> str:
     raise AssertionError("count never ends")
 
 
-def _line(judgement: Judgement, brief: bool) -> str:
+def readable_line(judgement: Judgement) -> str:
+    """One line for people: picture, direction, reason (and what is wrong with the picture), risks, why in words."""
+    advice, evidence = judgement.advisory, judgement.evidence
+    reason = advice.reason.value if evidence.usable else f"{advice.reason.value} ({evidence.cause.value})"
+    risks = " ".join(f"{lane.risk:.2f}" for lane in (advice.left, advice.center, advice.right))
+    shown = risks if evidence.usable else "-"
+    return f"{judgement.name}  {advice.direction.value:<12}  {reason}  risk {shown}  {advice.explanation}\n"
+
+
+def json_line(judgement: Judgement) -> str:
+    """One line for programs: `Brief`."""
     advice = judgement.advisory
-    line: Brief | Full
-    if brief:
-        lanes = (advice.left, advice.center, advice.right)
-        line = Brief(
-            path=judgement.name,
-            usable=judgement.evidence.usable,
-            cause=judgement.evidence.cause,
-            direction=advice.direction,
-            reason=advice.reason,
-            risk=(lanes[0].risk, lanes[1].risk, lanes[2].risk),
-            lanes=Lanes(*lanes),
-            detections=judgement.evidence.detections,
-            explanation=advice.explanation,
-        )
-    else:
-        line = Full(judgement.name, judgement.evidence, advice, advice.explanation)
+    lanes = (advice.left, advice.center, advice.right)
+    line = Brief(
+        path=judgement.name,
+        usable=judgement.evidence.usable,
+        cause=judgement.evidence.cause,
+        direction=advice.direction,
+        reason=advice.reason,
+        risk=(lanes[0].risk, lanes[1].risk, lanes[2].risk),
+        lanes=Lanes(*lanes),
+        detections=judgement.evidence.detections,
+        explanation=advice.explanation,
+    )
     return msgspec.json.encode(line).decode() + "\n"
 
 
@@ -135,11 +131,16 @@ def _parser() -> argparse.ArgumentParser:
         description="Judge pictures, folders of pictures and videos as the boat would. Each still is judged alone, "
         "shown to the advisor eight times 0.1 s apart; a video is judged in sequence.",
     )
-    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="picture, folder or video")
-    parser.add_argument("--json", action="store_true", help="one short JSON line per picture, no annotated pictures")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where annotated pictures go (default: look)")
+    parser.add_argument("paths", nargs="+", type=input_path(), metavar="PATH", help="picture, folder or video")
+    parser.add_argument("--json", action="store_true", help="a JSON line per picture, no annotated pictures")
     parser.add_argument(
-        "--sheet", type=Path, metavar="FILE", help="a few dozen annotated pictures in one; alone, no --out"
+        "--out", type=output_folder("--out"), metavar="DIR", help="where annotated pictures go (default: runs/look)"
+    )
+    parser.add_argument(
+        "--sheet",
+        type=output_file("--sheet"),
+        metavar="FILE",
+        help="a few dozen annotated pictures in one; alone, no --out",
     )
     add_config_arguments(parser)
     return parser

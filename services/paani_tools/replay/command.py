@@ -16,6 +16,7 @@ import msgspec
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
+from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
 from paani_tools.progress import Progress
 from paani_tools.replay.compatibility import provenance_of
@@ -106,13 +107,13 @@ def _parser() -> argparse.ArgumentParser:
         prog="paani replay",
         description="Republish a recorded drive on a bus of its own; or, with --check, decide everything again.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, or a folder of its parts")
+    parser.add_argument("file", type=input_path(), metavar="FILE", help="a recording, or a folder of its parts")
     again = parser.add_argument_group("deciding again")
     again.add_argument("--check", action="store_true", help="compute every decision again and compare it to the byte")
     again.add_argument(
         "--chain", action="store_true", help="with --set: each service is given what the one before says"
     )
-    again.add_argument("--json", type=Path, metavar="FILE", help="write the report as JSON too")
+    again.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the report as JSON too")
     again.add_argument("--force", action="store_true", help="go on with a log of other settings or weights")
     play = parser.add_argument_group("republishing")
     play.add_argument("--speed", type=_positive, default=1.0, metavar="X", help="X times as fast")

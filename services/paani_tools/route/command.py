@@ -16,6 +16,7 @@ from paani.config import load_config
 from paani.errors import UserError
 from paani.geometry import geodetic_from_enu
 from paani.messages import FenceArea
+from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
 from paani_services.navigator.avoidance.fence import trouble
 from paani_services.navigator.files.fence_file import load_fence
@@ -138,15 +139,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani route", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     convert = commands.add_parser("convert", help="between .gpx, .geojson and .toml")
-    convert.add_argument("source", type=Path, metavar="IN")
-    convert.add_argument("target", type=Path, metavar="OUT")
+    convert.add_argument("source", type=input_file(), metavar="IN")
+    convert.add_argument("target", type=output_file(""), metavar="OUT")
     convert.add_argument("--thin", type=_metres, metavar="M", help="leave out points that bend the line by less")
     convert.add_argument("--repeat", action="store_true", help="the last waypoint leads back to the first")
     convert.add_argument("--origin", type=_origin, metavar="LAT,LON", help="of metres that have none")
     info = commands.add_parser("info", help="length, legs, bounds, origin")
-    info.add_argument("source", type=Path, metavar="FILE")
+    info.add_argument("source", type=input_file(), metavar="FILE")
     check = commands.add_parser("check", help="whether the navigator can follow it")
-    check.add_argument("source", type=Path, metavar="FILE")
-    check.add_argument("--fence", type=Path, metavar="FILE", help="which it may not leave")
+    check.add_argument("source", type=input_file(), metavar="FILE")
+    check.add_argument("--fence", type=input_file("--fence"), metavar="FILE", help="which it may not leave")
     check.add_argument("--world", metavar="NAME", help="whose water it may not leave")
     return parser

@@ -11,6 +11,7 @@ from paani.clock import stopwatch_ms
 from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Text
+from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.verdict import PRESENTATION_US, PRESENTATIONS, Judgement
@@ -47,8 +48,6 @@ def main(argv: list[str]) -> int:
     if options.trajectories == bool(options.paths):
         parser.error("give pictures, or --trajectories")
     config = config_from(options)
-    if options.json is not None and not options.json.parent.is_dir():
-        raise UserError(f"--json {options.json}: no such folder")
     report: StillsReport | TrajectoriesReport
     if options.trajectories:
         report = TrajectoriesReport(profile=config.profile, families=families(config))
@@ -100,8 +99,8 @@ def _parser() -> argparse.ArgumentParser:
         description="Show each picture to the boat eight times, 0.1 s apart, then a black one; then ask again when the "
         "last picture is 9.3 s old. Prints corridor risks, advice, why and apparent motion.",
     )
-    parser.add_argument("paths", nargs="*", type=Path, metavar="PATH", help="picture or folder of pictures")
+    parser.add_argument("paths", nargs="*", type=input_path(), metavar="PATH", help="picture or folder of pictures")
     parser.add_argument("--trajectories", action="store_true", help="generated boxes instead of pictures")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the report there")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="also write the report there")
     add_config_arguments(parser)
     return parser

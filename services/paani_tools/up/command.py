@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from paani.cli import add_config_arguments, config_from
-from paani.errors import UserError
+from paani.option_paths import input_file, output_file, output_folder
 from paani.whole_file import write_whole
 from paani_tools.up.lifecycle import Outcome, drive
 from paani_tools.up.plan import make_plan
@@ -22,8 +22,6 @@ from paani_tools.up.terminal import Display
 def main(argv: list[str]) -> int:
     """Exit codes: 0 it ran to its end, 1 a service could not be kept alive, 2 user's mistake."""
     options = _parser().parse_args(argv)
-    if options.summary is not None and not options.summary.absolute().parent.is_dir():
-        raise UserError(f"--summary {options.summary}: no such folder")
     outcome = asyncio.run(_up(options))
     sys.stdout.write(_result(outcome.report))
     if options.summary is not None:
@@ -98,10 +96,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--world", metavar="NAME|FILE", help="world or scenario (`paani world list`; default: river)")
     parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
     parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
-    parser.add_argument("--summary", type=Path, metavar="FILE", help="write the run's figures as JSON")
-    parser.add_argument("--record", type=Path, metavar="DIR", help="record everything into this folder")
-    parser.add_argument("--mission", type=Path, metavar="FILE", help="legs to run, TOML (default: the world's route)")
-    parser.add_argument("--fence", type=Path, metavar="FILE", help="areas to keep in and out of, TOML or GeoJSON")
+    parser.add_argument(
+        "--summary", type=output_file("--summary"), metavar="FILE", help="write the run's figures as JSON"
+    )
+    parser.add_argument(
+        "--record", type=output_folder("--record"), metavar="DIR", help="record everything into this folder"
+    )
+    parser.add_argument(
+        "--mission", type=input_file("--mission"), metavar="FILE", help="legs to run, TOML (default: the world's route)"
+    )
+    parser.add_argument(
+        "--fence", type=input_file("--fence"), metavar="FILE", help="areas to keep in and out of, TOML or GeoJSON"
+    )
     parser.add_argument("--headless", action="store_true", help="serve no page")
     add_config_arguments(parser)
     return parser

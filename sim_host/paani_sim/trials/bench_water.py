@@ -8,13 +8,13 @@ import dataclasses
 import multiprocessing
 import os
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import msgspec
 
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
+from paani.option_paths import output_file
 from paani.statistics.charts import lines
 from paani.statistics.figure_table import Cell, Part
 from paani.statistics.measured import measured
@@ -58,12 +58,11 @@ def main(argv: list[str]) -> int:
     }  # fmt: skip
     parser = argparse.ArgumentParser(prog="paani bench water", description="How fast the simulator is, and how true.")
     parser.add_argument("--only", nargs="+", choices=tuple(parts), metavar="PART", help=f"of {', '.join(parts)}")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="plot cost against actors and picture size there")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
+    parser.add_argument(
+        "--svg", type=output_file("--svg"), metavar="FILE", help="plot cost against actors and picture size there"
+    )
     options = parser.parse_args(argv)
-    for name, file in (("--json", options.json), ("--svg", options.svg)):
-        if file is not None and not file.absolute().parent.is_dir():
-            raise UserError(f"{name} {file}: no such folder")
     names = options.only or list(parts)
     if options.svg and "cost" not in names:
         raise UserError("--svg needs the part cost")

@@ -12,6 +12,7 @@ import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
 from paani_sim.trials.cases import SUITES, Case, cases_of, read_case
 from paani_sim.trials.fingerprint import Maker
@@ -28,9 +29,6 @@ from paani_sim.worlds.load import load_scenario
 def main(argv: list[str]) -> int:
     """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake, 130 Ctrl-C."""
     options = _parser().parse_args(argv)
-    for name, file in (("--json", options.json), ("--report", options.report), ("--record", options.record)):
-        if file is not None and not file.absolute().parent.is_dir():
-            raise UserError(f"{name} {file}: no such folder")
     if options.one:
         return _one(options)
     if options.record:
@@ -129,15 +127,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
     parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
     parser.add_argument("--jobs", type=_count, default=os.cpu_count() or 1, metavar="N", help="drives side by side")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where results are kept (default: runs/trial-SUITE)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures there")
-    parser.add_argument("--report", type=Path, metavar="FILE", help="also write a page with plots there")
+    parser.add_argument(
+        "--out", type=output_folder("--out"), metavar="DIR", help="where results are kept (default: runs/trial-SUITE)"
+    )
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="also write the figures there")
+    parser.add_argument(
+        "--report", type=output_file("--report"), metavar="FILE", help="also write a page with plots there"
+    )
     parser.add_argument(
         "--set", action="append", default=[], metavar="SECTION.FIELD=VALUE", dest="sets",
         help="one setting, for every policy; may be repeated",
     )  # fmt: skip
     parser.add_argument("--one", metavar="WORLD[+FAULT]:SEED:POLICY", help="this drive alone, here")
-    parser.add_argument("--record", type=Path, metavar="FILE", help="write the one drive there as MCAP")
+    parser.add_argument(
+        "--record", type=output_file("--record"), metavar="FILE", help="write the one drive there as MCAP"
+    )
     return parser
 
 

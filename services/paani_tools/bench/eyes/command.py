@@ -16,6 +16,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config, PerceptionConfig
 from paani.errors import UserError
+from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_whole
 from paani_models.catalogue import verified_path
 from paani_services.perception.picture_decoding import decoded
@@ -50,8 +51,8 @@ def main(argv: list[str]) -> int:
     """Measure, print, write. Raises UserError naming the folder or model that cannot be used."""
     parser = argparse.ArgumentParser(prog="paani bench eyes", description="Time every step of perception.")
     parser.add_argument("--rounds", type=_count, default=100, metavar="N", help="runs of each step (default: 100)")
-    parser.add_argument("--folder", type=Path, help="pictures to perceive; drawn ones if not given")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    parser.add_argument("--folder", type=input_folder("--folder"), help="pictures to perceive; drawn ones if not given")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     parser.add_argument(
         "--with",
         dest="others",
@@ -61,7 +62,12 @@ def main(argv: list[str]) -> int:
         metavar="FOLDER",
         help="also a pipeline with the detector*.onnx and segmenter*.onnx of a folder; may be repeated",
     )
-    parser.add_argument("--paper-pair", type=Path, metavar="FOLDER", help="yolo11n.onnx and paper-segmenter.onnx")
+    parser.add_argument(
+        "--paper-pair",
+        type=input_folder("--paper-pair"),
+        metavar="FOLDER",
+        help="yolo11n.onnx and paper-segmenter.onnx",
+    )
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     config = config_from(options)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from paani.cli import main as paani
-from paani.errors import UserError
 from paani_tools.look.annotate import FONT, wrapped
 from paani_tools.look.command import file_name, main
 from paani_tools.look.contact_sheet import COLUMNS, GAP_PX, MOST, THUMBNAIL_PX, ContactSheet
@@ -54,12 +53,21 @@ def test_json_lines(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatc
     assert [p.name for p in folder.parent.iterdir()] == ["pictures"]
 
 
-def test_pictures_and_full_lines(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """J12: evidence, advice and its explanation on one line; one annotated picture each, larger than the original."""
+def test_readable_lines_and_annotated_pictures(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """J12: advice and its explanation on one line; one annotated picture each, larger than the original."""
+    assert main([str(folder), "--json"]) == 0
+    told = lines(capsys)
     out = tmp_path / "out"
     assert main([str(folder), "--out", str(out)]) == 0
-    found = lines(capsys)
-    assert list(found["river"]) == ["path", "evidence", "advice", "explanation"]
+    found = {Path(line.split("  ")[0]).stem: line for line in capsys.readouterr().out.splitlines()}
+    assert found.keys() == told.keys()
+    for name, line in found.items():
+        assert str(told[name]["direction"]) in line
+        assert str(told[name]["reason"]) in line
+        assert line.endswith(str(told[name]["explanation"]))
+    assert "UNUSABLE_IMAGE (black)  risk -" in found["black"]
     assert sorted(p.name for p in out.iterdir()) == ["black.jpg", "river.jpg", "white.jpg", "white_noise.jpg"]
     drawn = cv2.imread(str(out / "river.jpg"))
     assert drawn is not None
@@ -110,8 +118,34 @@ def test_a_mistake_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.Capture
         assert captured.out == ""
         assert captured.err.count("\n") == 1
         assert str(path) in captured.err
-    with pytest.raises(UserError, match="out"):
-        main([str(spoilt), "--out", str(spoilt / "below")])
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--out", "spoilt.jpg/below"], "--out spoilt.jpg/below"),
+        (["--sheet", "missing/sheet.png"], "--sheet missing/sheet.png"),
+        (["--sheet", "sheet.txt"], "--sheet sheet.txt"),
+    ],
+)
+def test_an_impossible_output_is_refused_before_the_first_picture(
+    options: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("spoilt.jpg").write_bytes(b"spoilt")
+    cv2.imwrite("river.png", river())
+    assert paani(["look", "river.png", *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith(f"paani: {named}: ")
+    assert sorted(path.name for path in Path().iterdir()) == ["river.png", "spoilt.jpg"]
+
+
+def test_annotated_pictures_go_below_runs_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    cv2.imwrite("river.png", river())
+    assert main(["river.png"]) == 0
+    assert sorted(str(path) for path in Path().rglob("*.jpg")) == ["runs/look/river.jpg"]
 
 
 def test_names_never_clash() -> None:

@@ -1,0 +1,80 @@
+"""Paths that a command is given, checked while its options are parsed: a mistake is told before any work begins.
+
+Each function gives an argparse `type` for the option of that name ("" for a positional), which turns the text into a
+`Path` and raises UserError naming the option and the path.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from paani.errors import UserError
+
+PathOf = Callable[[str], Path]
+
+
+def input_path(option: str = "") -> PathOf:
+    """A file or folder that exists."""
+    return _checked(option, _input_problem)
+
+
+def input_file(option: str = "") -> PathOf:
+    """A file that exists and can be read."""
+    return _checked(option, lambda path: _input_problem(path) or ("is a folder, not a file" if path.is_dir() else ""))
+
+
+def input_folder(option: str = "") -> PathOf:
+    """A folder that exists."""
+    return _checked(
+        option, lambda path: "" if path.is_dir() else "is not a folder" if path.exists() else "no such folder"
+    )
+
+
+def output_file(option: str) -> PathOf:
+    """A file that can be written: its folder exists and takes files, and it is no folder itself."""
+    return _checked(option, _output_file_problem)
+
+
+def output_folder(option: str) -> PathOf:
+    """A folder that exists and takes files, or that can be made."""
+    return _checked(option, _output_folder_problem)
+
+
+def _checked(option: str, problem_of: Callable[[Path], str]) -> PathOf:
+    def parse(text: str) -> Path:
+        path = Path(text)
+        try:
+            problem = problem_of(path)
+        except OSError as error:  # a name that is too long, a loop of links
+            problem = error.strerror or str(error)
+        if problem:
+            raise UserError(f"{option} {path}: {problem}".strip())
+        return path
+
+    return parse
+
+
+def _input_problem(path: Path) -> str:
+    if not path.exists():
+        return "no such file or folder"
+    return "" if os.access(path, os.R_OK) else "may not be read"
+
+
+def _output_file_problem(path: Path) -> str:
+    folder = path.absolute().parent
+    if path.is_dir():
+        return "is a folder, not a file"
+    if not folder.is_dir():
+        return f"no such folder: {folder}"
+    return "" if os.access(folder, os.W_OK) else f"may not write into {folder}"
+
+
+def _output_folder_problem(path: Path) -> str:
+    nearest = path.absolute()
+    while not nearest.exists():
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        return f"{nearest} is a file, not a folder"
+    return "" if os.access(nearest, os.W_OK) else f"may not write into {nearest}"

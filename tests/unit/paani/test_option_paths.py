@@ -1,0 +1,56 @@
+"""Options that name files are checked before a command begins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from paani.errors import UserError
+from paani.option_paths import PathOf, input_file, input_folder, input_path, output_file, output_folder
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    Path("file").write_text("text", encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("path_of", "text"),
+    [
+        (input_path("--in"), "file"),
+        (input_path("--in"), "folder"),
+        (input_file("--in"), "file"),
+        (input_folder("--in"), "folder"),
+        (output_file("--out"), "file"),
+        (output_file("--out"), "folder/new"),
+        (output_folder("--out"), "folder"),
+        (output_folder("--out"), "folder/new/below"),
+    ],
+)
+def test_what_can_be_used_is_a_path(path_of: PathOf, text: str) -> None:
+    assert path_of(text) == Path(text)
+    assert sorted(path.name for path in Path().rglob("*")) == ["file", "folder"], "checking makes nothing"
+
+
+@pytest.mark.parametrize(
+    ("path_of", "text", "problem"),
+    [
+        (input_path("--in"), "missing", "--in missing: no such file or folder"),
+        (input_file(), "missing", "missing: no such file or folder"),
+        (input_file("--in"), "folder", "--in folder: is a folder, not a file"),
+        (input_folder("--in"), "file", "--in file: is not a folder"),
+        (input_folder("--in"), "missing", "--in missing: no such folder"),
+        (output_file("--out"), "folder", "--out folder: is a folder, not a file"),
+        (output_file("--out"), "missing/new", "--out missing/new: no such folder: "),
+        (output_file("--out"), "file/new", "--out file/new: no such folder: "),
+        (output_folder("--out"), "file", "--out file: .*file is a file, not a folder"),
+        (output_folder("--out"), "file/new", "--out file/new: .*file is a file, not a folder"),
+        (output_file("--out"), "n" * 300, "--out n+: File name too long"),
+    ],
+)
+def test_what_cannot_be_used_is_named_with_its_option(path_of: PathOf, text: str, problem: str) -> None:
+    with pytest.raises(UserError, match=f"^{problem}"):
+        path_of(text)
