@@ -138,8 +138,8 @@ def test_bad_input_is_one_line_and_writes_nothing(
     [
         (["no.mcap", "--shore-m", "150", *KNOWN], "no.mcap"),
         (["--shore-m", "150", *KNOWN], "name a recording, or --live"),
-        (["no.mcap", "--shore-m", "150"], "calibration.hfov_deg is not known"),
-        (["no.mcap", "--shore-m", "150", "--out", "no/such/file", *KNOWN], "--out no/such/file"),
+        ([__file__, "--shore-m", "150"], "calibration.hfov_deg is not known"),
+        ([__file__, "--shore-m", "150", "--out", "no/such/file", *KNOWN], "--out no/such/file"),
         (["--live", "2", "--shore-m", "150", *KNOWN, "--set", "bus.router=tcp/127.0.0.1:1"], "nothing listens there"),
     ],
 )

@@ -154,7 +154,7 @@ def test_mistakes_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     path = finished(tmp_path)
     empty = tmp_path / "empty"
     empty.mkdir()
-    assert "No such file" in refused(capsys, "info", tmp_path / "none.mcap")
+    assert "no such file" in refused(capsys, "info", tmp_path / "none.mcap")
     assert str(empty) in refused(capsys, "info", empty)
     assert str(empty) in refused(capsys, "list", empty)
     assert "no such folder" in refused(capsys, "list", path)
