@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 STATEMENT = re.compile(r"\b([A-W]\d{1,2})\b")
 
@@ -21,11 +21,12 @@ def prose(text: str | None) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
-def with_statement_links(text: str, known: frozenset[str]) -> str:
-    """Every id of a statement of the paper (`J5`) becomes a link to what it says."""
+def with_statement_links(text: str, known: Mapping[str, str]) -> str:
+    """Every id of a statement of the paper (`J5`) becomes a link, which shows what the statement says."""
 
     def link(found: re.Match[str]) -> str:
-        return f"[{found[1]}](statements.md#{found[1].lower()})" if found[1] in known else found[1]
+        says = known.get(found[1], "").replace('"', "'")
+        return f'[{found[1]}](statements.md#{found[1].lower()} "{says}")' if says else found[1]
 
     return STATEMENT.sub(link, text)
 

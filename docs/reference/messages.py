@@ -10,7 +10,7 @@ import msgspec
 from msgspec import inspect as types
 
 from docs.reference.markdown import prose, table, with_statement_links
-from docs.reference.statements import read_statements
+from docs.reference.statements import what_statements_say
 from docs.reference.value_types import kind_of, range_of, text_of, unit_of
 from paani import keys
 from paani import messages as m
@@ -42,7 +42,7 @@ def enum_types() -> list[type[Enum]]:
 
 def messages_page() -> str:
     """Every message, what it is made of, and what its words may be."""
-    known = frozenset(read_statements())
+    known = what_statements_say()
     parts = [INTRODUCTION, _header()]
     for kind in message_types():
         parts.append(

@@ -7,14 +7,14 @@ import inspect
 import re
 import textwrap
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from io import StringIO
 from typing import Any, NamedTuple
 
 import msgspec
 
 from docs.reference.markdown import STATEMENT, prose, table, with_statement_links
-from docs.reference.statements import read_statements
+from docs.reference.statements import what_statements_say
 from docs.reference.value_types import kind_of, range_of, text_of, unit_of
 from paani.config import PROFILES, Config
 from paani.config.tuning import TUNABLE
@@ -89,7 +89,7 @@ def reasons_of(kind: type[msgspec.Struct]) -> dict[str, str]:
 
 def settings_page() -> str:
     """Every setting, section by section, and what each profile changes."""
-    known = frozenset(read_statements())
+    known = what_statements_say()
     parts = [INTRODUCTION]
     header = ("setting", "unit", "kind", "range", "default", "why")
     for section in sections():
@@ -112,13 +112,13 @@ def _tuning(section: SettingsSection) -> str:
     return TRIED + (f", but for {' and '.join(fixed)}" if fixed else "") + ".\n\n"
 
 
-def _why(text: str, known: frozenset[str]) -> str:
+def _why(text: str, known: Mapping[str, str]) -> str:
     """The reason; one that is an id alone says that the value is the paper's."""
     words = f"the paper's: {text}" if text and not STATEMENT.sub("", text).strip(" ,") else text
     return with_statement_links(words, known)
 
 
-def _profiles(known: frozenset[str]) -> str:
+def _profiles(known: Mapping[str, str]) -> str:
     parts = ["## Profiles\n\nA profile is the default with these values instead.\n\n"]
     for name, tree in PROFILES.items():
         values = tuple((f"`{path}`", f"`{text_of(value)}`") for path, value in _leaves(tree) if path != "profile")

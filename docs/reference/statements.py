@@ -33,6 +33,11 @@ def read_statements() -> dict[str, dict[str, Any]]:
     return tomllib.loads(CLAIMS.read_text(encoding="utf-8"))
 
 
+def what_statements_say() -> dict[str, str]:
+    """Each statement in a sentence or two, by its id."""
+    return {name: prose(row["says"]) for name, row in read_statements().items()}
+
+
 def statements_page() -> str:
     """Every statement with its proof, grouped by the letter of its id."""
     parts = [INTRODUCTION]

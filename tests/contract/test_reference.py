@@ -11,7 +11,7 @@ from docs.reference.commands import commands, commands_page
 from docs.reference.markdown import STATEMENT
 from docs.reference.messages import enum_types, message_types, messages_page
 from docs.reference.settings import Setting, sections, settings_page
-from docs.reference.statements import read_statements, statements_page
+from docs.reference.statements import read_statements, statements_page, what_statements_say
 from docs.reference.topics import topics_page
 from paani import keys
 from paani import messages as m
@@ -56,7 +56,7 @@ def test_a_row_gives_unit_range_default_and_reason() -> None:
     (row,) = [row for row in settings_page().splitlines() if row.startswith("| `advisor.tracker.hold_s` |")]
     cells = [cell.strip() for cell in row.strip("|").split(" | ")]
     assert cells[1:5] == ["s", "number", "> 0", "`3.0`"]
-    assert "[G3](statements.md#g3)" in cells[5]
+    assert f'[G3](statements.md#g3 "{what_statements_say()["G3"]}")' in cells[5]
 
 
 def test_every_command_is_shown_with_its_options() -> None:
