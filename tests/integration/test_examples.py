@@ -20,7 +20,7 @@ import pytest
 from examples.draw_pictures import VIEWS, draw
 from paani import cli
 from paani.config import Config
-from paani_services.navigator.files.mission_file import load_task
+from paani_services.navigator.files.mission_file import load_route_and_mission
 from paani_sim.worlds.load import load_scenario
 from paani_tools.up.command import up_sets
 from tests.conftest import Spawn
@@ -74,7 +74,7 @@ def require_loadable(options: argparse.Namespace) -> Config:
     config = cli.config_from(options, up_sets(**{name: getattr(options, name) for name in names}))
     world = load_scenario(config.world.name).world
     if config.navigator.mission:
-        assert load_task(config.navigator, (world.origin_lat_deg, world.origin_lon_deg))[1] is not None
+        assert load_route_and_mission(config.navigator, (world.origin_lat_deg, world.origin_lon_deg))[1] is not None
     if config.camera.source not in {"sim", "webcam"}:
         assert Path(config.camera.source).exists()
     return config

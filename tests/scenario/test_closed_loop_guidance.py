@@ -27,12 +27,10 @@ from paani.messages import (
     Waypoint,
     ZeroCause,
 )
-from paani_services.controller.control import ControlState, control
-from paani_services.controller.control import Heard as ControllerHeard
+from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.localization.estimator import Estimator
-from paani_services.navigator.guidance.mission import route_alone
-from paani_services.navigator.navigate import Heard as NavigatorHeard
-from paani_services.navigator.navigate import NavState, navigate
+from paani_services.navigator.guidance.mission_progress import mission_of_route
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
@@ -56,8 +54,8 @@ class Lockstep:
             name=world.name,
             waypoints=tuple(Waypoint(x_m=x, y_m=y) for x, y in world.route_m.tolist()),
         )
-        self.mission = route_alone(self.route)
-        self.nav, self.ctl = NavState(), ControlState()
+        self.mission = mission_of_route(self.route)
+        self.nav, self.ctl = NavigatorState(), ControllerState()
         self.adapter = ThrustAdapter(config.plant.adapter, DOMAIN)
         self.direction = Direction.STRAIGHT
         self.advisory: Advisory | None = None  # said instead of a bare direction
@@ -99,7 +97,7 @@ class Lockstep:
     def _guide(self, now_us: int) -> None:
         arming = Arming(source_us=now_us, armed=self.armed)
         advisory = self.advisory or Advisory(source_us=now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
-        heard = NavigatorHeard(
+        heard = NavigatorInputs(
             advisory=advisory,
             advisory_us=now_us,
             odometry=self.odometry,
@@ -114,9 +112,9 @@ class Lockstep:
             self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)
         if self.stands:
             self.command = msgspec.structs.replace(self.command, speed_mps=0.0)
-        self.ctl, thrust = control(
+        self.ctl, thrust = compute_thrust(
             self.ctl,
-            ControllerHeard(self.command, now_us, self.odometry, now_us),
+            ControllerInputs(self.command, now_us, self.odometry, now_us),
             now_us,
             DOMAIN,
             self.config.controller,
@@ -164,7 +162,7 @@ def test_l4_m3_follows_three_waypoints_of_the_lake(launch: Launch) -> None:
         if boat.plant.sim_us > 10e6:
             speeds.append(boat.plant.velocity[0])
             off_m.append(off_route_m(boat.world, boat.plant.position_m))
-    assert boat.nav.progress.reached >= 3
+    assert boat.nav.progress.waypoints_reached >= 3
     assert boat.plant.collisions == 0
     assert boat.applied.zero_cause is ZeroCause.NONE
     assert statistics.fmean(speeds) == pytest.approx(0.6, abs=0.02)
@@ -183,7 +181,7 @@ def test_cruise_at_0_6_is_smooth_and_on_the_line(launch: Launch, name: str) -> N
         if boat.plant.sim_us > 15e6:
             off_m.append(off_route_m(boat.world, boat.plant.position_m))
             steering.append(boat.thrust.right - boat.thrust.left)
-    assert boat.nav.progress.reached >= 10
+    assert boat.nav.progress.waypoints_reached >= 10
     assert max(off_m) < 0.15
     assert statistics.pstdev(steering) < 0.02
 

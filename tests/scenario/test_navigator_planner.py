@@ -29,10 +29,10 @@ from paani.messages import (
 )
 from paani_services.navigator.avoidance.rollout import PARTS
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.guidance.mission import route_alone
+from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
-from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
 
@@ -48,7 +48,7 @@ class Pool:
 
     def __init__(self, *bars: Bar, bank_m: float = 500.0, boat: BoatPose = AT_REST, camera: Camera = CAMERA) -> None:
         self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
-        self.state, self.now_us, self.speed_mps = NavState(), START_US, 0.0
+        self.state, self.now_us, self.speed_mps = NavigatorState(), START_US, 0.0
         self.direction, self.looks, self.shut_in = Direction.STRAIGHT, True, False
         self.order: NavCommand | None = None
         self.shown: Evidence | None = None
@@ -65,13 +65,13 @@ class Pool:
             )
             heard = self.heard(advisory, odometry(self.now_us, self.boat, self.speed_mps))
             self.state, self.order = navigate(
-                self.state, heard, route_alone(EAST), self.now_us, 43, CONFIG, self.camera
+                self.state, heard, mission_of_route(EAST), self.now_us, 43, CONFIG, self.camera
             )
             yield self.order
 
-    def heard(self, advisory: Advisory, at: Odometry) -> Heard:
+    def heard(self, advisory: Advisory, at: Odometry) -> NavigatorInputs:
         """All of it fresh, the boat armed."""
-        return Heard(
+        return NavigatorInputs(
             advisory=advisory,
             advisory_us=self.now_us,
             odometry=at,
@@ -172,7 +172,9 @@ def test_the_decider_gives_it_the_pictures_and_the_calibration() -> None:
     inputs = {topic.name: Input() for topic in DECIDER.inputs}
     shown = evidence(START_US, edge_of(AT_REST))
     inputs |= {keys.EVIDENCE.name: Input(shown), keys.ODOMETRY.name: Input(odometry(START_US, AT_REST), START_US)}
-    sights = [DECIDER.decide(NavState(), inputs, START_US, c)[0].pilot.memory.sights for c in (seeing, config)]
+    sights = [
+        DECIDER.decide(NavigatorState(), inputs, START_US, c)[0].planner_state.memory.sights for c in (seeing, config)
+    ]
     assert [len(each) for each in sights] == [1, 0]
 
 
@@ -297,7 +299,7 @@ def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
         heard = pool.heard(
             msgspec.structs.replace(advisory, source_us=pool.now_us), odometry(pool.now_us, BoatPose(0.0, 2.0, 0.0))
         )
-        _, order = navigate(pool.state, heard, route_alone(EAST), pool.now_us, 43, CONFIG, camera)
+        _, order = navigate(pool.state, heard, mission_of_route(EAST), pool.now_us, 43, CONFIG, camera)
         assert (order.heading_rad < -0.1) is steers
 
 
@@ -308,7 +310,11 @@ def test_the_state_is_small_and_loses_nothing_as_json() -> None:
     data = msgspec.json.encode(pool.state)
     assert len(data) < 12_000
     again = Pool((10.0, -0.6, 10.8, 0.4), boat=pool.boat)
-    again.state, again.now_us, again.speed_mps = msgspec.json.decode(data, type=NavState), pool.now_us, pool.speed_mps
+    again.state, again.now_us, again.speed_mps = (
+        msgspec.json.decode(data, type=NavigatorState),
+        pool.now_us,
+        pool.speed_mps,
+    )
     again.order, again.shown = pool.order, pool.shown
     assert again.state == pool.state
     for one, other in zip(pool.run(3.0), again.run(3.0), strict=True):

@@ -1,1 +1,1 @@
-"""Heading and speed to normalised differential thrust."""
+"""Speed and heading controller: an order to the normalised thrust of two fans."""

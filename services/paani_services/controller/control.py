@@ -1,4 +1,11 @@
-"""From an ordered heading and speed to the thrust of two fans. Pure: no clock, no bus, no logging."""
+"""Speed and heading controller: from an order to the thrust of two fans. Pure: no clock, no bus, no logging.
+
+Speed: P and I with a feed-forward. Heading: P and D. Both are added and subtracted for two fans (differential thrust)
+and limited in size and in rate of change (N1-N8).
+
+Ours are the feed-forward, which inverts the hull's drag, the integral, which does not wind up while the thrust is
+saturated, and thrust astern, which brakes and turns the boat on the spot; the paper's fans only push.
+"""
 
 import math
 
@@ -9,12 +16,12 @@ from paani.geometry import clip, wrap_rad
 from paani.messages import Inhibit, NavCommand, Odometry, Thrust
 
 MAP_FRAME = "map"
-STANDSTILL_ORDER_MPS = 0.01  # an order below it asks for no way on
-MAX_STEP_S = 0.3  # a longer gap since the last call counts as this long
+STANDSTILL_ORDER_MPS = 0.01  # a slower order asks the boat to stand still
+MAX_STEP_S = 0.3  # a longer gap since the last step is integrated and slewed as this long, three periods at 10 Hz
 
 
-class ControlState(msgspec.Struct, frozen=True):
-    """What one call leaves for the next: integral of the speed error [units of thrust], last thrust."""
+class ControllerState(msgspec.Struct, frozen=True):
+    """What one step leaves for the next: integral of the speed error [normalised thrust], last thrust and its time."""
 
     integral: float = 0.0
     left: float = 0.0
@@ -22,8 +29,8 @@ class ControlState(msgspec.Struct, frozen=True):
     last_us: int = 0
 
 
-class Heard(msgspec.Struct, frozen=True):
-    """The newest messages, and when they came [us]."""
+class ControllerInputs(msgspec.Struct, frozen=True):
+    """The newest messages, and when they were received [us]."""
 
     command: NavCommand | None = None
     command_us: int = 0
@@ -31,18 +38,18 @@ class Heard(msgspec.Struct, frozen=True):
     odometry_us: int = 0
 
 
-def control(
-    state: ControlState, heard: Heard, now_us: int, domain: int, config: ControllerConfig
-) -> tuple[ControlState, Thrust]:
-    """One step: P + feed-forward speed, PD heading, mix, saturation, no more astern than `astern`, slew (N7).
+def compute_thrust(
+    state: ControllerState, inputs: ControllerInputs, now_us: int, domain: int, config: ControllerConfig
+) -> tuple[ControllerState, Thrust]:
+    """One step: forward thrust, steering, mixing, saturation (no more astern than `astern`), slew limit (N7).
 
-    Anything missing, stale, invalid or disabled gives zero thrust at once, never slewed, and
-    clears the state. The command's `source_us` and `echo_us` pass through.
+    Where an input is missing, stale, invalid or disabled, the thrust is zero at once, without slew limit, and the
+    state is cleared. The order's `source_us` and `echo_us` pass through.
     """
-    inhibits = inhibits_of(heard, now_us, domain, config)
-    command, odometry = heard.command, heard.odometry
+    inhibits = find_inhibits(inputs, now_us, domain, config)
+    command, odometry = inputs.command, inputs.odometry
     if command is None or odometry is None or inhibits:
-        return ControlState(), Thrust(
+        return ControllerState(), Thrust(
             source_us=command.source_us if command else now_us,
             left=0.0,
             right=0.0,
@@ -56,18 +63,18 @@ def control(
     if state.last_us:
         step_s = clip((now_us - state.last_us) * 1e-6, 0.0, MAX_STEP_S)
 
-    speed_error_mps, forward, integral = _speed(state.integral, command, odometry, step_s, config)
+    speed_error_mps, forward, integral = _forward_thrust(state.integral, command, odometry, step_s, config)
     heading_error_rad = wrap_rad(command.heading_rad - odometry.yaw_rad)
-    steer = clip(
+    steering = clip(
         config.heading_kp * heading_error_rad - config.heading_kd * odometry.yaw_rate_radps,
         -config.max_steer,
         config.max_steer,
     )
     left, right = (
-        _slew(last, clip(wanted, 0.0 - config.astern, 1.0), config.slew_per_s * step_s)
-        for last, wanted in ((state.left, forward - steer), (state.right, forward + steer))
+        _limit_slew(last, clip(wanted, 0.0 - config.astern, 1.0), config.slew_per_s * step_s)
+        for last, wanted in ((state.left, forward - steering), (state.right, forward + steering))
     )
-    return ControlState(integral, left, right, now_us), Thrust(
+    return ControllerState(integral, left, right, now_us), Thrust(
         source_us=command.source_us,
         left=left,
         right=right,
@@ -79,31 +86,31 @@ def control(
     )
 
 
-def inhibits_of(heard: Heard, now_us: int, domain: int, config: ControllerConfig) -> tuple[Inhibit, ...]:
-    """Every reason to give no thrust now; those of the command itself come first."""
-    command, odometry = heard.command, heard.odometry
-    found: list[Inhibit] = []
+def find_inhibits(inputs: ControllerInputs, now_us: int, domain: int, config: ControllerConfig) -> tuple[Inhibit, ...]:
+    """Every reason to give no thrust now; those of the order itself come first."""
+    command, odometry = inputs.command, inputs.odometry
+    inhibits: list[Inhibit] = []
     if command is None:
-        found.append(Inhibit.NO_COMMAND)
+        inhibits.append(Inhibit.NO_COMMAND)
     else:
-        found += command.inhibits
+        inhibits += command.inhibits
         if command.domain != domain:
-            found.append(Inhibit.WRONG_DOMAIN)
-        if not 0.0 <= (now_us - heard.command_us) * 1e-6 <= config.command_max_receipt_s:
-            found.append(Inhibit.STALE_COMMAND)
+            inhibits.append(Inhibit.WRONG_DOMAIN)
+        if not 0.0 <= (now_us - inputs.command_us) * 1e-6 <= config.command_max_receipt_s:
+            inhibits.append(Inhibit.STALE_COMMAND)
         if not _is_valid(command) or (not command.enable and not command.inhibits):
-            found.append(Inhibit.COMMAND_INVALID)
+            inhibits.append(Inhibit.COMMAND_INVALID)
     if odometry is None:
-        found.append(Inhibit.NO_ODOMETRY)
+        inhibits.append(Inhibit.NO_ODOMETRY)
     else:
-        if not 0.0 <= (now_us - heard.odometry_us) * 1e-6 <= config.odometry_max_age_s:
-            found.append(Inhibit.STALE_ODOMETRY)
+        if not 0.0 <= (now_us - inputs.odometry_us) * 1e-6 <= config.odometry_max_age_s:
+            inhibits.append(Inhibit.STALE_ODOMETRY)
         if not odometry.healthy or not _is_finite(odometry):
-            found.append(Inhibit.UNHEALTHY_ODOMETRY)
-    return tuple(dict.fromkeys(found))
+            inhibits.append(Inhibit.UNHEALTHY_ODOMETRY)
+    return tuple(dict.fromkeys(inhibits))
 
 
-def _speed(
+def _forward_thrust(
     integral: float,
     command: NavCommand,
     odometry: Odometry,
@@ -113,27 +120,29 @@ def _speed(
     """Speed error [m/s], forward thrust in [-astern, max_forward], and the new integral."""
     ordered_mps = min(command.speed_mps, config.max_speed_mps)
     if odometry.stopped and ordered_mps < STANDSTILL_ORDER_MPS:
-        return 0.0, 0.0, 0.0  # L5: speed noise at rest must not turn the fans
+        return 0.0, 0.0, 0.0  # L5: the noise of the speed at rest shall not turn the fans
     error_mps = ordered_mps - (0.0 if odometry.stopped else odometry.surge_mps)
-    base = config.speed_kp * error_mps + _feed_forward(ordered_mps, config)
-    grown = clip(integral + config.speed_ki * error_mps * step_s, -config.max_integral, config.max_integral)
-    if not -config.astern <= base + grown <= config.max_forward and abs(grown) > abs(integral):
-        grown = integral  # saturated: winding up further would only overshoot later
-    return error_mps, clip(base + grown, 0.0 - config.astern, config.max_forward), grown
+    base = config.speed_kp * error_mps + _feed_forward_thrust(ordered_mps, config)
+    new_integral = clip(integral + config.speed_ki * error_mps * step_s, -config.max_integral, config.max_integral)
+    if not -config.astern <= base + new_integral <= config.max_forward and abs(new_integral) > abs(integral):
+        new_integral = integral  # saturated: a larger integral would only overshoot later
+    return error_mps, clip(base + new_integral, 0.0 - config.astern, config.max_forward), new_integral
 
 
-def _feed_forward(speed_mps: float, config: ControllerConfig) -> float:
+def _feed_forward_thrust(speed_mps: float, config: ControllerConfig) -> float:
+    """Normalised thrust of each fan that holds this speed: the hull's drag, or the paper's fixed gain (N3)."""
     if not config.drag_feed_forward:
         return config.speed_feed_forward * speed_mps
     drag_n = config.drag_linear * speed_mps + config.drag_quadratic * speed_mps * speed_mps
     return drag_n / (2.0 * config.force_per_unit_n)
 
 
-def _slew(last: float, wanted: float, reach: float) -> float:
-    return clip(wanted, last - reach, last + reach)
+def _limit_slew(last: float, wanted: float, max_change: float) -> float:
+    return clip(wanted, last - max_change, last + max_change)
 
 
 def _is_valid(command: NavCommand) -> bool:
+    """B11: heading, speed, frame, enable and inhibits fit together."""
     return (
         math.isfinite(command.heading_rad)
         and math.isfinite(command.speed_mps)

@@ -1,4 +1,4 @@
-"""Controller process: command and odometry in, thrust out."""
+"""Controller process: order and odometry in, thrust out."""
 
 import asyncio
 import contextlib
@@ -10,11 +10,11 @@ from paani.config import Config
 from paani.messages import Thrust
 from paani_services.controller.decide import DECIDER
 
-SILENCE_PERIODS = 1.5  # a command drives each output; the timer only fills silence
+SILENCE_PERIODS = 1.5  # without an order for so many periods, the controller steps by itself
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Answer each command at once, and go on at about `rate_hz` when none comes."""
+    """Answer each order at once, and go on at about `rate_hz` when none comes."""
     stepper = Stepper(bus, clock, config, DECIDER)
     command = stepper.inboxes[keys.COMMAND.name]
     silence_s = SILENCE_PERIODS / config.controller.rate_hz

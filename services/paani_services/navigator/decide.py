@@ -1,19 +1,19 @@
-"""The navigator as a decider: advisory, evidence, odometry, clock, arming and its own mission in; one order out."""
+"""The navigator as a decider: advisory, evidence, odometry, clock, arming and its own mission in, one order out."""
 
 from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani.messages import Mission, Route
-from paani_services.navigator.guidance.mission import route_alone
+from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 
 
-def decide(state: NavState, inputs: Inputs, now_us: int, config: Config) -> tuple[NavState, Outputs]:
+def decide(state: NavigatorState, inputs: Inputs, now_us: int, config: Config) -> tuple[NavigatorState, Outputs]:
     """One step; see `navigate`."""
     advisory, odometry = inputs[keys.ADVISORY.name], inputs[keys.ODOMETRY.name]
     clock, arming = inputs[keys.SIM_TIME.name], inputs[keys.ARMING.name]
-    heard = Heard(
+    navigator_inputs = NavigatorInputs(
         advisory=advisory.message,
         advisory_us=advisory.received_us,
         odometry=odometry.message,
@@ -25,24 +25,26 @@ def decide(state: NavState, inputs: Inputs, now_us: int, config: Config) -> tupl
         evidence=inputs[keys.EVIDENCE.name].message,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
-    state, order = navigate(state, heard, _mission(inputs), now_us, config.bus.domain, config.navigator, camera)
+    state, order = navigate(
+        state, navigator_inputs, _mission(inputs), now_us, config.bus.domain, config.navigator, camera
+    )
     return state, {keys.COMMAND.name: order}
 
 
 def _mission(inputs: Inputs) -> Mission | None:
-    """The mission, or the route alone; None without either."""
+    """The mission, or one made of the route alone; None without either."""
     for topic in (keys.MISSION, keys.ROUTE):
         message = inputs[topic.name].message if topic.name in inputs else None
         if isinstance(message, Mission):
             return message
         if isinstance(message, Route):
-            return route_alone(message)
+            return mission_of_route(message)
     return None
 
 
 DECIDER = Decider(
     service="navigator",
-    state=NavState,
+    state=NavigatorState,
     inputs=(keys.ADVISORY, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),

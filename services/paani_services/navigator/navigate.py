@@ -1,6 +1,7 @@
-"""From advice, mission and estimate to one order. Pure: no clock, no bus, no logging.
+"""The navigator's step: advice, mission and estimate to one order. Pure: no clock, no bus, no logging.
 
-Every gate that is shut is named in the order's `inhibits`; an order that moves has none.
+The advice is a veto: no mission, fence or planner moves the boat where it is STOP or NO_DATA. Everything that forbids
+motion is named in the order's `inhibits`; an order that moves the boat has none.
 """
 
 import math
@@ -23,28 +24,53 @@ from paani.messages import (
 from paani_services.navigator.avoidance.fence import bounded_speed, is_allowed
 from paani_services.navigator.avoidance.replanning import SAME_COURSE_RAD, Pilot, brakes, looked, steered
 from paani_services.navigator.avoidance.rollout import Wish
-from paani_services.navigator.guidance.ilos import Crab, learned, paused
-from paani_services.navigator.guidance.mission import Aim, Progress, Scene, aim, follow, words
-from paani_services.navigator.guidance.passed_obstacles import Guards, guarded_course, watch
-from paani_services.navigator.guidance.visual_turns import SIDE, TURNS, Turn, continuous_heading, latched
+from paani_services.navigator.guidance.ilos import IlosState, hold_integral, integrate
+from paani_services.navigator.guidance.mission_progress import (
+    LegSetpoint,
+    MissionInputs,
+    MissionProgress,
+    advance_mission,
+    compute_leg_setpoint,
+    describe_leg,
+)
+from paani_services.navigator.guidance.passed_obstacles import PassedObstacles, limit_course_rad, remember_obstacles
+from paani_services.navigator.guidance.visual_turns import (
+    TURN_DIRECTIONS,
+    TURN_SIDE,
+    VisualTurn,
+    constant_rate_heading_rad,
+    latch_heading,
+)
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
 
 
-class NavState(msgspec.Struct, frozen=True):
-    """What one call leaves for the next."""
+class NavigatorState(
+    msgspec.Struct,
+    frozen=True,
+    rename={
+        "ilos": "crab",
+        "passed_obstacles": "guards",
+        "planner_state": "pilot",
+        "clock_advanced_us": "advanced_us",
+    },
+):
+    """What one step leaves for the next. It is recorded under the field names given by `rename`.
 
-    progress: Progress = Progress()
-    crab: Crab = Crab()
-    turn: Turn | None = None
-    guards: Guards = Guards()
-    pilot: Pilot = Pilot()
+    `sim_us` is the newest simulated time, -1 before the first; `clock_advanced_us` is when it last moved forward.
+    """
+
+    progress: MissionProgress = MissionProgress()
+    ilos: IlosState = IlosState()
+    turn: VisualTurn | None = None
+    passed_obstacles: PassedObstacles = PassedObstacles()
+    planner_state: Pilot = Pilot()
     sim_us: int = -1
-    advanced_us: int | None = None
+    clock_advanced_us: int | None = None
 
 
-class Heard(msgspec.Struct, frozen=True):
-    """The newest message of each kind, and when it came [us]."""
+class NavigatorInputs(msgspec.Struct, frozen=True):
+    """The newest message of each kind, and when it was received [us]."""
 
     advisory: Advisory | None = None
     advisory_us: int = 0
@@ -58,145 +84,168 @@ class Heard(msgspec.Struct, frozen=True):
 
 
 def navigate(
-    state: NavState,
-    heard: Heard,
+    state: NavigatorState,
+    inputs: NavigatorInputs,
     mission: Mission | None,
     now_us: int,
     domain: int,
     config: NavigatorConfig,
     camera: Camera = UNCALIBRATED,
-) -> tuple[NavState, NavCommand]:
+) -> tuple[NavigatorState, NavCommand]:
     """One step. The order carries the advisory's `source_us` and the plant's newest stamp.
 
-    With a valid calibration the metric planner has the last word on heading and speed; it never overrides a gate.
+    With a valid calibration the metric planner chooses heading and speed; it never overrides an inhibit.
     """
-    state = _watch_clock(state, heard, now_us)
-    inhibits = _gates(state, heard, now_us, domain, config)
+    state = _note_clock_advance(state, inputs, now_us)
+    inhibits = _find_inhibits(state, inputs, now_us, domain, config)
     if mission is None:
         inhibits.append(Inhibit.NO_ROUTE)
-    state = _forget_turn(state, heard)
-    plans = config.planner.acts_on(camera.calibration)
-    if plans:
-        pilot = looked(state.pilot, heard.odometry, heard.evidence, config.planner)
-        state = msgspec.structs.replace(state, pilot=pilot)
-    odometry, advisory = heard.odometry, heard.advisory
+    state = _end_visual_turn(state, inputs)
+    is_planned = config.planner.acts_on(camera.calibration)
+    if is_planned:
+        planner_state = looked(state.planner_state, inputs.odometry, inputs.evidence, config.planner)
+        state = msgspec.structs.replace(state, planner_state=planner_state)
+    odometry, advisory = inputs.odometry, inputs.advisory
     if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
-        return state, _order(state, heard, now_us, inhibits)
+        return state, _build_command(state, inputs, now_us, inhibits)
 
     position_m = (odometry.x_m, odometry.y_m)
     direction = advisory.direction if advisory is not None else Direction.NO_DATA
     if advisory is not None and config.clear_m > 0.0:
-        state = msgspec.structs.replace(state, guards=watch(state.guards, advisory, odometry, config.clear_m))
-    # M1, M3: a turn by the picture keeps its waypoint. The planner steers for the route whatever is advised.
-    straight = not inhibits and (plans or direction is Direction.STRAIGHT)
-    scene = Scene(odometry, heard.arming, state.sim_us, free=not inhibits, straight=straight)
-    state = _pursue(state, mission, scene, config)
-    wanted = aim(state.progress, mission, state.crab, position_m, config)
-    if wanted.inhibit is not None:
-        inhibits.append(wanted.inhibit)
+        passed = remember_obstacles(state.passed_obstacles, advisory, odometry, config.clear_m)
+        state = msgspec.structs.replace(state, passed_obstacles=passed)
+    # M1, M3: a visual turn keeps its waypoint. The planner steers for the route whatever is advised.
+    is_straight = not inhibits and (is_planned or direction is Direction.STRAIGHT)
+    mission_inputs = MissionInputs(odometry, inputs.arming, state.sim_us, is_free=not inhibits, is_straight=is_straight)
+    state = _advance_mission(state, mission, mission_inputs, config)
+    setpoint = compute_leg_setpoint(state.progress, mission, state.ilos, position_m, config)
+    if setpoint.inhibit is not None:
+        inhibits.append(setpoint.inhibit)
     if not is_allowed(mission.fence, position_m) and not config.fence_return:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
-    leg = words(state.progress, mission)
+    leg = describe_leg(state.progress, mission)
+    cross_m = setpoint.cross_track_m
     if inhibits:
-        return _paused(state, now_us), _order(state, heard, now_us, inhibits, cross_m=wanted.cross_track_m, leg=leg)
-    speed_mps, heading_rad = wanted.speed_mps, odometry.yaw_rad
-    if direction in TURNS:
-        state = _paused(state, now_us)
+        return _hold_integral(state, now_us), _build_command(state, inputs, now_us, inhibits, cross_m=cross_m, leg=leg)
+    heading_rad, speed_mps = setpoint.course_rad, setpoint.speed_mps
+    if direction in TURN_DIRECTIONS:
+        state = _hold_integral(state, now_us)
         speed_mps *= config.turn_speed_frac
-    if plans:
-        # The planner weighs the advised side against what the map shows, and remembers where things are.
-        heading_rad = wanted.course_rad
-    elif direction in TURNS:
-        if config.latch_turns:
-            turn, capped = latched(state.turn, direction, odometry.yaw_rad, now_us, config)
-            state = msgspec.structs.replace(state, turn=turn)
-            heading_rad = turn.heading_rad
-            if capped:
+        if not is_planned:
+            state, heading_rad, is_capped = _steer_visual_turn(state, direction, odometry.yaw_rad, now_us, config)
+            if is_capped:
                 inhibits.append(Inhibit.TURN_CAPPED)
-        else:
-            heading_rad = continuous_heading(direction, odometry.yaw_rad, config)
-    else:
-        heading_rad = guarded_course(wanted.course_rad, state.guards)
-    if plans and not inhibits and speed_mps > 0.0:
-        wish = Wish(heading_rad, speed_mps, SIDE.get(direction, 0.0), turns=_only_looks(advisory))
-        pilot, plan = steered(state.pilot, odometry, wish, now_us, camera, config.planner, mission.fence)
-        state = msgspec.structs.replace(state, pilot=pilot)
+    elif not is_planned:
+        # The planner remembers where things are; without it the course keeps off what was passed.
+        heading_rad = limit_course_rad(setpoint.course_rad, state.passed_obstacles)
+    if is_planned and not inhibits and speed_mps > 0.0:
+        # The planner weighs the advised side against what the map shows.
+        wish = Wish(heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), turns=_is_turn_to_look(advisory))
+        planner_state, plan = steered(
+            state.planner_state, odometry, wish, now_us, camera, config.planner, mission.fence
+        )
+        state = msgspec.structs.replace(state, planner_state=planner_state)
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
-        if speed_mps <= 0.0 and not brakes(pilot, odometry, now_us, config.planner):
+        if speed_mps <= 0.0 and not brakes(planner_state, odometry, now_us, config.planner):
             inhibits.append(Inhibit.NO_FREE_PATH)
-    if direction not in TURNS:
-        on_course = abs(wrap_rad(heading_rad - wanted.course_rad)) <= SAME_COURSE_RAD
-        state = _learned(state, wanted, odometry, now_us, config, on_course=on_course)
+    if direction not in TURN_DIRECTIONS:
+        is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= SAME_COURSE_RAD
+        state = _integrate_cross_track(state, setpoint, odometry, now_us, config, is_on_course=is_on_course)
     bounded_mps = bounded_speed(mission.fence, odometry, heading_rad, speed_mps, config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
-    return state, _order(
-        state, heard, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=wanted.cross_track_m, leg=leg
+    return state, _build_command(
+        state, inputs, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=cross_m, leg=leg
     )
 
 
-def _pursue(state: NavState, mission: Mission, scene: Scene, config: NavigatorConfig) -> NavState:
-    """The mission's step; another leg learns anew what pushes the boat."""
-    progress = follow(state.progress, mission, scene, config)
-    crab = state.crab if progress.leg == state.progress.leg else Crab()
-    return msgspec.structs.replace(state, progress=progress, crab=crab)
+def _advance_mission(
+    state: NavigatorState, mission: Mission, inputs: MissionInputs, config: NavigatorConfig
+) -> NavigatorState:
+    """One step of the mission. The integral begins anew with another leg of it."""
+    progress = advance_mission(state.progress, mission, inputs, config)
+    ilos = state.ilos if progress.leg_index == state.progress.leg_index else IlosState()
+    return msgspec.structs.replace(state, progress=progress, ilos=ilos)
 
 
-def _only_looks(advisory: Advisory | None) -> bool:
-    """A turn is advised to a side that is blocked: to look there, and not to go."""
-    side = SIDE.get(advisory.direction, 0.0) if advisory is not None else 0.0
+def _steer_visual_turn(
+    state: NavigatorState, direction: Direction, yaw_rad: float, now_us: int, config: NavigatorConfig
+) -> tuple[NavigatorState, float, bool]:
+    """The state, the heading of the advised turn, and whether the limit of the whole turn forbids it."""
+    if not config.latch_turns:
+        return state, constant_rate_heading_rad(direction, yaw_rad, config), False
+    turn, is_capped = latch_heading(state.turn, direction, yaw_rad, now_us, config)
+    return msgspec.structs.replace(state, turn=turn), turn.heading_rad, is_capped
+
+
+def _is_turn_to_look(advisory: Advisory | None) -> bool:
+    """Whether a turn is advised towards a side that is blocked: to look there, not to go there."""
+    side = TURN_SIDE.get(advisory.direction, 0.0) if advisory is not None else 0.0
     return advisory is not None and ((side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked))
 
 
-def _learned(
-    state: NavState, wanted: Aim, odometry: Odometry, now_us: int, config: NavigatorConfig, *, on_course: bool
-) -> NavState:
-    if wanted.track is None or config.lookahead_m <= 0.0 or not on_course:
-        return _paused(state, now_us)
-    crab = learned(state.crab, wanted.track, wanted.target, wanted.cross_track_m, odometry, now_us, config)
-    return msgspec.structs.replace(state, crab=crab)
+def _integrate_cross_track(
+    state: NavigatorState,
+    setpoint: LegSetpoint,
+    odometry: Odometry,
+    now_us: int,
+    config: NavigatorConfig,
+    *,
+    is_on_course: bool,
+) -> NavigatorState:
+    """Step the integral while the boat is ordered along its path; hold it otherwise."""
+    if setpoint.path is None or config.lookahead_m <= 0.0 or not is_on_course:
+        return _hold_integral(state, now_us)
+    ilos = integrate(state.ilos, setpoint.path, setpoint.target, setpoint.cross_track_m, odometry, now_us, config)
+    return msgspec.structs.replace(state, ilos=ilos)
 
 
-def _paused(state: NavState, now_us: int) -> NavState:
-    return msgspec.structs.replace(state, crab=paused(state.crab, now_us))
+def _hold_integral(state: NavigatorState, now_us: int) -> NavigatorState:
+    return msgspec.structs.replace(state, ilos=hold_integral(state.ilos, now_us))
 
 
-def _watch_clock(state: NavState, heard: Heard, now_us: int) -> NavState:
+def _note_clock_advance(state: NavigatorState, inputs: NavigatorInputs, now_us: int) -> NavigatorState:
     """Note when simulated time last moved forward.
 
-    After a reset the boat may be anywhere: it joins the route anew, once time moves on again.
+    A time set back means that the simulation was reset and the boat may be anywhere, so it joins its route anew.
     """
-    if heard.clock is None or heard.clock.sim_us == state.sim_us:
+    if inputs.clock is None or inputs.clock.sim_us == state.sim_us:
         return state
-    sim_us = heard.clock.sim_us
+    sim_us = inputs.clock.sim_us
     if state.sim_us < 0:
         return msgspec.structs.replace(state, sim_us=sim_us)
     if sim_us < state.sim_us:
-        return NavState(progress=Progress(reached=state.progress.reached), sim_us=sim_us)
-    return msgspec.structs.replace(state, sim_us=sim_us, advanced_us=now_us)
+        return NavigatorState(
+            progress=MissionProgress(waypoints_reached=state.progress.waypoints_reached), sim_us=sim_us
+        )
+    return msgspec.structs.replace(state, sim_us=sim_us, clock_advanced_us=now_us)
 
 
-def _gates(state: NavState, heard: Heard, now_us: int, domain: int, config: NavigatorConfig) -> list[Inhibit]:
-    """Every gate that is shut (M8-M11)."""
+def _find_inhibits(
+    state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig
+) -> list[Inhibit]:
+    """Everything about the inputs that forbids motion (M8-M11)."""
 
     def is_old(stamp_us: int, limit_s: float) -> bool:
         return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
 
     found: list[Inhibit] = []
-    advisory, odometry, clock, arming = heard.advisory, heard.odometry, heard.clock, heard.arming
-    messages = (advisory, odometry, clock, arming, heard.evidence)
+    advisory, odometry, clock, arming = inputs.advisory, inputs.odometry, inputs.clock, inputs.arming
+    messages = (advisory, odometry, clock, arming, inputs.evidence)
     if any(message is not None and message.domain != domain for message in messages):
         found.append(Inhibit.WRONG_DOMAIN)
-    if arming is None or not arming.armed or arming.stopped or is_old(heard.arming_us, config.arming_max_age_s):
+    if arming is None or not arming.armed or arming.stopped or is_old(inputs.arming_us, config.arming_max_age_s):
         found.append(Inhibit.NOT_ARMED)
-    if clock is None or is_old(heard.clock_us, config.clock_max_age_s):
+    if clock is None or is_old(inputs.clock_us, config.clock_max_age_s):
         found.append(Inhibit.NO_CLOCK)
-    elif not clock.running or state.advanced_us is None or is_old(state.advanced_us, config.clock_max_age_s):
+    elif (
+        not clock.running or state.clock_advanced_us is None or is_old(state.clock_advanced_us, config.clock_max_age_s)
+    ):
         found.append(Inhibit.CLOCK_STOPPED)
     if odometry is None:
         found.append(Inhibit.NO_ODOMETRY)
     else:
-        if is_old(heard.odometry_us, config.odometry_max_age_s) or is_old(
+        if is_old(inputs.odometry_us, config.odometry_max_age_s) or is_old(
             odometry.source_us, config.odometry_max_age_s
         ):
             found.append(Inhibit.STALE_ODOMETRY)
@@ -206,7 +255,7 @@ def _gates(state: NavState, heard: Heard, now_us: int, domain: int, config: Navi
     if advisory is None:
         found.append(Inhibit.NO_ADVISORY)
     else:
-        if is_old(heard.advisory_us, config.advisory_max_receipt_s) or is_old(
+        if is_old(inputs.advisory_us, config.advisory_max_receipt_s) or is_old(
             advisory.source_us, config.advisory_max_age_s
         ):
             found.append(Inhibit.STALE_ADVISORY)
@@ -217,18 +266,18 @@ def _gates(state: NavState, heard: Heard, now_us: int, domain: int, config: Navi
     return found
 
 
-def _forget_turn(state: NavState, heard: Heard) -> NavState:
-    """Going straight ends a run of turns, and so does disarming; a STOP between two turns does not."""
-    straight = heard.advisory is not None and heard.advisory.direction is Direction.STRAIGHT
-    armed = heard.arming is not None and heard.arming.armed and not heard.arming.stopped
-    if state.turn is not None and (straight or not armed):
+def _end_visual_turn(state: NavigatorState, inputs: NavigatorInputs) -> NavigatorState:
+    """End the visual turn on STRAIGHT advice or when the boat is disarmed; a STOP between two turns does not end it."""
+    is_straight = inputs.advisory is not None and inputs.advisory.direction is Direction.STRAIGHT
+    is_armed = inputs.arming is not None and inputs.arming.armed and not inputs.arming.stopped
+    if state.turn is not None and (is_straight or not is_armed):
         return msgspec.structs.replace(state, turn=None)
     return state
 
 
-def _order(
-    state: NavState,
-    heard: Heard,
+def _build_command(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
     now_us: int,
     inhibits: list[Inhibit],
     heading_rad: float = 0.0,
@@ -237,20 +286,20 @@ def _order(
     cross_m: float = 0.0,
     leg: str = "",
 ) -> NavCommand:
-    advisory = heard.advisory
+    advisory = inputs.advisory
     enable = not inhibits
     return NavCommand(
         source_us=advisory.source_us if advisory is not None else now_us,
         enable=enable,
         heading_rad=heading_rad if enable else 0.0,
         speed_mps=speed_mps if enable else 0.0,
-        echo_us=heard.clock.stamp_us if heard.clock is not None else 0,
+        echo_us=inputs.clock.stamp_us if inputs.clock is not None else 0,
         inhibits=tuple(inhibits),
         direction=advisory.direction if advisory is not None else Direction.NO_DATA,
         waypoint_index=state.progress.target or 0,
-        waypoints_reached=state.progress.reached,
+        waypoints_reached=state.progress.waypoints_reached,
         cross_track_m=cross_m,
         advisory_sent_us=advisory.sent_us if advisory is not None else 0,
-        leg_index=state.progress.leg,
+        leg_index=state.progress.leg_index,
         leg=leg,
     )

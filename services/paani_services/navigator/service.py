@@ -1,4 +1,4 @@
-"""Navigator process: advisory, odometry, clock and arming in; one order out."""
+"""Navigator process: advisory, evidence, odometry, clock and arming in, one order out."""
 
 import asyncio
 import contextlib
@@ -13,15 +13,17 @@ from paani.clock import Clock
 from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.files.mission_file import first_route, load_task
-from paani_services.navigator.files.mission_journal import Logbook
+from paani_services.navigator.files.mission_file import load_route_and_mission, next_route
+from paani_services.navigator.files.mission_journal import MissionJournal
 
-EARLY_US = 5_000  # a wake-up this much before the period is over is on time
+EARLY_US = 5_000  # a step this much before the end of its period counts as on time: timers are not exact
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Order at `rate_hz`, and at once when the evidence, the advice or a gate changes."""
-    route, mission = await asyncio.to_thread(load_task, config.navigator, config.localization.origin_lat_lon_deg)
+    """Publish an order at `rate_hz`, and at once when the evidence, the advice or an inhibit changes."""
+    route, mission = await asyncio.to_thread(
+        load_route_and_mission, config.navigator, config.localization.origin_lat_lon_deg
+    )
     stepper = Stepper(bus, clock, config, DECIDER)
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
@@ -29,12 +31,12 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     sent_us = route_us = 0
     with bus.alive():
         async with asyncio.TaskGroup() as group:
-            logbook = None
+            journal = None
             if mission is not None:
-                logbook = Logbook(await asyncio.to_thread(runtime_dir, config.bus), mission)
-                progress = await logbook.restore(stepper.inboxes[keys.ARMING.name])
+                journal = MissionJournal(await asyncio.to_thread(runtime_dir, config.bus), mission)
+                progress = await journal.restore(stepper.inboxes[keys.ARMING.name])
                 stepper.state = msgspec.structs.replace(stepper.state, progress=progress)
-                group.create_task(logbook.keep())
+                group.create_task(journal.write_changes())
             for topic in (keys.ADVISORY, keys.ODOMETRY, keys.ARMING):
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
@@ -42,19 +44,19 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 if now_us - route_us >= 1e6 / keys.ROUTE.rate_hz:
                     if mission is not None:
                         stepper.publish_own(keys.MISSION, msgspec.structs.replace(mission, source_us=now_us))
-                        route = first_route(mission, stepper.state.progress.leg) or route
+                        route = next_route(mission, stepper.state.progress.leg_index) or route
                     if route is not None:
                         stepper.publish_own(keys.ROUTE, msgspec.structs.replace(route, source_us=now_us))
                     route_us = now_us
                 now_us, outputs = stepper.decide()
-                if logbook is not None:
-                    logbook.note(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
+                if journal is not None:
+                    journal.record(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
                 order = outputs[keys.COMMAND.name]
                 assert isinstance(order, m.NavCommand)
                 if now_us - sent_us >= period_s * 1e6 - EARLY_US or order.is_news_after(sent):
-                    said, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
-                    assert isinstance(said, m.NavCommand)
-                    sent = said
+                    published, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
+                    assert isinstance(published, m.NavCommand)
+                    sent = published
                     bus.note(", ".join(order.inhibits))
                 else:
                     stepper.conclude({})

@@ -20,18 +20,19 @@ from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
 from paani_services.navigator.avoidance.fence import trouble
 from paani_services.navigator.files.fence_file import load_fence
-from paani_services.navigator.files.line import Line, kept
-from paani_services.navigator.files.placing import LatLon
+from paani_services.navigator.files.line_simplification import simplify_line
+from paani_services.navigator.files.map_frame import LatLon
 from paani_services.navigator.files.route_file import (
+    encode_route,
+    in_own_metres,
     load_route,
-    on_own_map,
     points_m,
     read_route,
-    require_sailable,
-    route_bytes,
+    require_waypoint_count,
 )
+from paani_services.navigator.files.route_line import RouteLine
 
-EXPORT_FENCE = "paani_sim.worlds.export_fence"  # run as a module: services import no simulator
+EXPORT_FENCE = "paani_sim.worlds.export_fence"  # a process of its own, so that the other commands need no simulator
 
 
 def main(argv: list[str]) -> int:
@@ -48,26 +49,26 @@ def _convert(options: argparse.Namespace) -> None:
     if options.origin is not None and line.origin_deg is None:
         line = replace(line, origin_deg=options.origin)
     if options.thin is not None:
-        line = _thinned(line, options.thin, where)
+        line = _simplify_route(line, options.thin, where)
     if options.repeat:
         line = replace(line, repeat=True)
-    require_sailable(line, where)
-    data = route_bytes(line, options.target.suffix, str(options.target))
+    require_waypoint_count(line, where)
+    data = encode_route(line, options.target.suffix, str(options.target))
     write_whole(options.target, data)
-    sys.stdout.write(f"{options.target}: {len(line.spots)} waypoints\n")
+    sys.stdout.write(f"{options.target}: {len(line.points)} waypoints\n")
 
 
-def _thinned(line: Line, tolerance_m: float, where: str) -> Line:
-    keep = kept(points_m(on_own_map(line, where)), tolerance_m)
-    sys.stderr.write(f"{where}: {len(line.spots)} waypoints, {len(keep)} kept within {tolerance_m} m\n")
-    return replace(line, spots=tuple(line.spots[number] for number in keep))
+def _simplify_route(line: RouteLine, tolerance_m: float, where: str) -> RouteLine:
+    keep = simplify_line(points_m(in_own_metres(line, where)), tolerance_m)
+    sys.stderr.write(f"{where}: {len(line.points)} waypoints, {len(keep)} kept within {tolerance_m} m\n")
+    return replace(line, points=tuple(line.points[number] for number in keep))
 
 
 def _info(options: argparse.Namespace) -> None:
     where = str(options.source)
     line = read_route(options.source, where)
-    require_sailable(line, where)
-    line = on_own_map(line, where)
+    require_waypoint_count(line, where)
+    line = in_own_metres(line, where)
     points = points_m(line)
     ring = (*points, points[0]) if line.repeat else points
     lengths_m = [math.dist(one, other) for one, other in itertools.pairwise(ring)]
@@ -89,32 +90,32 @@ def _info(options: argparse.Namespace) -> None:
 def _check(options: argparse.Namespace) -> None:
     where = str(options.source)
     line = read_route(options.source, where)
-    map_deg = on_own_map(line, where).origin_deg
-    route = load_route(options.source, map_deg, "")
-    fences = [] if options.fence is None else [(str(options.fence), load_fence(options.fence, map_deg, ""))]
+    map_origin_deg = in_own_metres(line, where).origin_deg
+    route = load_route(options.source, map_origin_deg, "")
+    fences = [] if options.fence is None else [(str(options.fence), load_fence(options.fence, map_origin_deg, ""))]
     if options.world is not None:
-        fences.append((f"world {options.world}", _world_fence(options.world, map_deg)))
+        fences.append((f"world {options.world}", _world_fence(options.world, map_origin_deg)))
     margin_m = load_config().navigator.fence_margin_m
     for name, fence in fences:
         found = trouble(fence, route.waypoints, margin_m, repeat=route.repeat)
         if found is not None:
             raise UserError(f"{where}: waypoints[{found[0]}]: {found[1]} ({name})")
-    sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, good{_inside(fences)}\n")
+    sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, good{_inside_text(fences)}\n")
 
 
-def _inside(fences: list[tuple[str, tuple[FenceArea, ...]]]) -> str:
+def _inside_text(fences: list[tuple[str, tuple[FenceArea, ...]]]) -> str:
     return f", inside {' and '.join(name for name, _ in fences)}" if fences else ""
 
 
-def _world_fence(world: str, map_deg: LatLon | None) -> tuple[FenceArea, ...]:
-    """The world's water as a fence."""
+def _world_fence(world: str, map_origin_deg: LatLon | None) -> tuple[FenceArea, ...]:
+    """The world's water as a fence, as the simulator's own exporter writes it."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "fence.toml"
         command = [sys.executable, "-m", EXPORT_FENCE, world, str(path)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             raise UserError((done.stderr.strip().splitlines() or [f"--world {world}: no such world"])[-1])
-        return load_fence(path, map_deg, f"--world {world}")
+        return load_fence(path, map_origin_deg, f"--world {world}")
 
 
 def _lat_lon(lat_lon_deg: LatLon) -> str:

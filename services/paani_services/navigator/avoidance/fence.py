@@ -12,7 +12,7 @@ from paani import portable
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
 from paani.messages import FenceArea, Keep, Odometry, Waypoint
-from paani_services.navigator.guidance.path_progress import Point, over_ground_mps
+from paani_services.navigator.guidance.path_progress import Point, velocity_over_ground_mps
 
 DRIFTING_MPS = 0.1  # below it the course over ground is noise
 CREEP_MPS = 0.05  # a slower order would not move the boat
@@ -95,7 +95,7 @@ def bounded_speed(
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _speed_outside(fence, here, heading_rad, speed_mps, config)
-    east_mps, north_mps = over_ground_mps(odometry)
+    east_mps, north_mps = velocity_over_ground_mps(odometry)
     if math.hypot(east_mps, north_mps) > DRIFTING_MPS:
         stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
         if room_m(fence, here, stops_at) < math.inf:

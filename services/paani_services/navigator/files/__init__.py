@@ -1,1 +1,1 @@
-"""Files that a navigator reads and writes: routes, missions, fences, GPX, GeoJSON, the mission journal."""
+"""Files that the navigator reads and writes: routes, missions, fences, GPX, GeoJSON, the mission journal."""

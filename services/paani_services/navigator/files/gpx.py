@@ -1,6 +1,6 @@
-"""GPX 1.0 and 1.1 routes: the first kind of route, track and waypoints that the file has.
+"""GPX 1.0 and 1.1 files: the route of a file, else its track, else its waypoints.
 
-Needs gpxpy, of the extra `host`; the board reads TOML and GeoJSON without it.
+Needs gpxpy, which the extra `host` installs; the board reads TOML and GeoJSON without it.
 """
 
 from __future__ import annotations
@@ -11,33 +11,34 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from paani.errors import UserError
-from paani_services.navigator.files.line import MAX_POINTS, Line, clean_name
-from paani_services.navigator.files.placing import LatLon, Spot, one_line, read_bytes
+from paani_services.navigator.files.bounded_reading import one_line, read_bytes
+from paani_services.navigator.files.map_frame import FilePoint, LatLon
+from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine, clean_name
 
-REPEAT = "repeat"  # <type> of a route that is sailed again and again
-MAX_NAMESPACES = 100
-POINTS = ("rtept", "trkpt", "wpt")
+REPEAT = "repeat"  # <type> of a route whose last point leads back to the first
+MAX_NAMESPACES = 100  # declared in one file: the parser's work grows with the square of it
+POINT_ELEMENTS = ("rtept", "trkpt", "wpt")
 
 
-def read_gpx(path: Path, where: str) -> Line:
-    """A GPX file. Raises UserError naming file and element; entities are never expanded."""
-    gpxpy = _gpxpy(where)
-    text = _text(path, where)
+def read_gpx(path: Path, where: str) -> RouteLine:
+    """The route of a GPX file. Raises UserError naming file and element; entities are never expanded."""
+    gpxpy = _import_gpxpy(where)
+    text = _read_text(path, where)
     try:
         gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError, RecursionError) as error:
-        raise UserError(f"{where}: {_culprit(text) or one_line(error)}") from error
-    name, kind, element, points = _chosen(gpx, where)
-    spots = tuple(_spot(point, f"{where}: {element}[{number}]") for number, point in enumerate(points))
+        raise UserError(f"{where}: {_find_bad_point(text) or one_line(error)}") from error
+    name, kind, element, found = _select_points(gpx, where)
+    points = tuple(_point_of_element(point, f"{where}: {element}[{number}]") for number, point in enumerate(found))
     repeat = kind == REPEAT
-    if repeat and len(spots) > 2 and spots[0] == spots[-1]:
-        spots = spots[:-1]
-    return Line(clean_name(name or path.stem), spots, repeat)
+    if repeat and len(points) > 2 and points[0] == points[-1]:
+        points = points[:-1]
+    return RouteLine(clean_name(name or path.stem), points, repeat)
 
 
-def route_gpx(line: Line, lat_lon_deg: tuple[LatLon, ...]) -> str:
-    """A GPX file with one route. One that repeats says so in its <type> and ends where it begins."""
-    gpxpy = _gpxpy("GPX")
+def encode_gpx(line: RouteLine, lat_lon_deg: tuple[LatLon, ...]) -> str:
+    """A GPX file with this one route. A route that repeats says so in its <type> and ends where it begins."""
+    gpxpy = _import_gpxpy("GPX")
     gpx = gpxpy.gpx.GPX()
     gpx.creator = "paani"
     route = gpxpy.gpx.GPXRoute(name=line.name)
@@ -53,9 +54,9 @@ def route_gpx(line: Line, lat_lon_deg: tuple[LatLon, ...]) -> str:
     return text + "\n"
 
 
-def _gpxpy(where: str) -> ModuleType:
+def _import_gpxpy(where: str) -> ModuleType:
     try:
-        import gpxpy  # noqa: PLC0415  # the board does without
+        import gpxpy  # noqa: PLC0415  # not installed on the board
         import gpxpy.gpx  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise UserError(f"{where}: GPX needs gpxpy, of the extra 'host'; TOML and GeoJSON do not") from error
@@ -63,7 +64,7 @@ def _gpxpy(where: str) -> ModuleType:
     return module
 
 
-def _text(path: Path, where: str) -> str:
+def _read_text(path: Path, where: str) -> str:
     try:
         text = read_bytes(path, where).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -72,13 +73,13 @@ def _text(path: Path, where: str) -> str:
         raise UserError(f"{where}: has a document type, which GPX does not")
     if text.count("xmlns") > MAX_NAMESPACES:
         raise UserError(f"{where}: declares more than {MAX_NAMESPACES} namespaces")
-    if sum(text.count(f"<{name}") for name in POINTS) > MAX_POINTS:
+    if sum(text.count(f"<{name}") for name in POINT_ELEMENTS) > MAX_POINTS:
         raise UserError(f"{where}: more than {MAX_POINTS} points")
     return text
 
 
-def _chosen(gpx: Any, where: str) -> tuple[str | None, str | None, str, list[Any]]:
-    """Name, type, element and points of what is to be followed."""
+def _select_points(gpx: Any, where: str) -> tuple[str | None, str | None, str, list[Any]]:
+    """Name, type, element and points of the route, else of the track, else of the waypoints."""
     routes = [route for route in gpx.routes if route.points]
     tracks = [track for track in gpx.tracks if any(segment.points for segment in track.segments)]
     if len(routes) > 1 or (not routes and len(tracks) > 1):
@@ -94,21 +95,21 @@ def _chosen(gpx: Any, where: str) -> tuple[str | None, str | None, str, list[Any
     raise UserError(f"{where}: no rtept, trkpt or wpt")
 
 
-def _spot(point: Any, where: str) -> Spot:
+def _point_of_element(point: Any, where: str) -> FilePoint:
     if not -90.0 <= point.latitude <= 90.0:
         raise UserError(f"{where}: lat {point.latitude} is not in -90..90")
     if not -180.0 <= point.longitude <= 180.0:
         raise UserError(f"{where}: lon {point.longitude} is not in -180..180")
-    return Spot(latitude_deg=float(point.latitude), longitude_deg=float(point.longitude))
+    return FilePoint(latitude_deg=float(point.latitude), longitude_deg=float(point.longitude))
 
 
-def _culprit(text: str) -> str:
-    """The first point without two numbers; empty where it is something else."""
+def _find_bad_point(text: str) -> str:
+    """Names the first point whose latitude or longitude is no number; empty where the fault is another."""
     try:
         root = ET.fromstring(text)
     except (ET.ParseError, ValueError, RecursionError):
         return ""
-    counts = dict.fromkeys(POINTS, -1)
+    counts = dict.fromkeys(POINT_ELEMENTS, -1)
     for element in root.iter():
         name = str(element.tag).rpartition("}")[2]
         if name not in counts:

@@ -1,6 +1,7 @@
-"""How far a mission has come, on disk: a navigator that is restarted under way goes on with the leg it was in.
+"""Mission journal on disk: a navigator that is restarted under way goes on with the leg it was in.
 
-Only for the same mission under the same run of the operator's process: where either is new, the mission begins anew.
+The journal holds only for the same mission under the same run of the operator's process. Where either is another
+one, the mission begins anew.
 """
 
 from __future__ import annotations
@@ -15,64 +16,66 @@ import msgspec
 from paani.bus import Latest
 from paani.messages import Arming, Mission
 from paani.runtime import write_private
-from paani_services.navigator.guidance.mission import Progress
+from paani_services.navigator.guidance.mission_progress import MissionProgress
 
 LOG = logging.getLogger(__name__)
 FILE = "mission-progress.json"
 
 
-class Entry(msgspec.Struct, frozen=True):
-    """`operator_epoch` is that of the arming heard, `mission` the digest of its legs."""
+class JournalEntry(msgspec.Struct, frozen=True):
+    """`operator_epoch` is that of the newest arming received, `mission` the digest of its legs."""
 
     operator_epoch: int
     mission: str
-    progress: Progress
+    progress: MissionProgress
 
 
-class Logbook:
-    """Keeps the newest entry on disk; a disk that fails or stalls holds nobody up."""
+class MissionJournal:
+    """Keeps the newest progress on disk. A disk that fails or stalls delays no step of the navigator."""
 
     def __init__(self, folder: Path, mission: Mission) -> None:
-        self._path, self._mission = folder / FILE, digest(mission)
-        self._progress = Progress()
+        self._path, self._mission = folder / FILE, digest_mission(mission)
+        self._progress = MissionProgress()
         self._epoch = 0
         self._changed = asyncio.Event()
 
-    async def restore(self, arming: Latest[Arming]) -> Progress:
-        """What an earlier run of this process left. Where it left anything, waits until the operator is heard."""
-        entry = await asyncio.to_thread(read, self._path)
+    async def restore(self, arming: Latest[Arming]) -> MissionProgress:
+        """The progress that an earlier run of this process left; waits for the operator's arming if there is any."""
+        entry = await asyncio.to_thread(read_entry, self._path)
         if entry is not None and entry.mission == self._mission:
-            heard = await arming.next()
-            if heard.epoch == entry.operator_epoch:
+            newest = await arming.next()
+            if newest.epoch == entry.operator_epoch:
                 self._progress = entry.progress
         return self._progress
 
-    def note(self, progress: Progress, arming: Arming | None) -> None:
-        """The state after a step."""
+    def record(self, progress: MissionProgress, arming: Arming | None) -> None:
+        """Take the progress after a step; it is written later by `write_changes`."""
         if arming is not None and progress is not self._progress and progress != self._progress:
             self._progress, self._epoch = progress, arming.epoch
             self._changed.set()
 
-    async def keep(self) -> None:
-        """Write what changes, for ever."""
+    async def write_changes(self) -> None:
+        """Write each change to disk, for ever."""
         while True:
             await self._changed.wait()
             self._changed.clear()
-            entry = Entry(self._epoch, self._mission, self._progress)
+            entry = JournalEntry(self._epoch, self._mission, self._progress)
             try:
                 await asyncio.to_thread(write_private, self._path, msgspec.json.encode(entry).decode())
             except OSError as error:
-                LOG.warning("%s: %s; a restart would begin the mission anew", self._path, error.strerror)
+                LOG.warning(
+                    "%s: %s; if the navigator restarts now, the mission begins anew", self._path, error.strerror
+                )
 
 
-def digest(mission: Mission) -> str:
-    """Of the legs: another route, place or order is another mission."""
+def digest_mission(mission: Mission) -> str:
+    """Digest of the legs: another route, place or order is another mission."""
     return hashlib.sha256(msgspec.json.encode(mission.legs)).hexdigest()
 
 
-def read(path: Path) -> Entry | None:
-    """The entry; None where there is none, or none that can be read."""
+def read_entry(path: Path) -> JournalEntry | None:
+    """The entry on disk; None where there is none, or none that can be read."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Entry)
+        return msgspec.json.decode(path.read_bytes(), type=JournalEntry)
     except (OSError, msgspec.MsgspecError):
         return None

@@ -1,1 +1,1 @@
-"""Course and speed from missions and advice: path following, integral line of sight, visual turns."""
+"""Guidance: the desired course and speed from the mission (path following, integral line of sight) and the advice."""

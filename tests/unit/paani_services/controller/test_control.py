@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from paani.config import ControllerConfig, load_config
 from paani.messages import Direction, Inhibit, NavCommand, Odometry, Thrust
-from paani_services.controller.control import ControlState, Heard, control
+from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 
 NOW_US = 9_000_000
-REST = ControlState()
+REST = ControllerState()
 PAPER = load_config(profile="paper").controller
 PAANI = load_config().controller
 
@@ -39,11 +39,13 @@ def run(
     config: ControllerConfig,
     given_command: NavCommand | None,
     given_odometry: Odometry | None,
-    state: ControlState = REST,
+    state: ControllerState = REST,
     now_us: int = NOW_US,
     odometry_us: int = NOW_US,
-) -> tuple[ControlState, Thrust]:
-    return control(state, Heard(given_command, NOW_US, given_odometry, odometry_us), now_us, 43, config)
+) -> tuple[ControllerState, Thrust]:
+    return compute_thrust(
+        state, ControllerInputs(given_command, NOW_US, given_odometry, odometry_us), now_us, 43, config
+    )
 
 
 def settle(config: ControllerConfig, order: NavCommand, pose: Odometry, steps: int = 60) -> Thrust:
@@ -51,7 +53,7 @@ def settle(config: ControllerConfig, order: NavCommand, pose: Odometry, steps: i
     state, message = run(config, order, pose)
     for n in range(1, steps):
         now_us = NOW_US + n * 100_000
-        state, message = control(state, Heard(order, now_us, pose, now_us), now_us, 43, config)
+        state, message = compute_thrust(state, ControllerInputs(order, now_us, pose, now_us), now_us, 43, config)
     return message
 
 
@@ -87,17 +89,17 @@ def test_heading_error_goes_the_short_way_round() -> None:
 
 def test_n6_slew_limits_each_fan_both_ways() -> None:
     """N6: 0.15 per second; at 10 Hz 0.015 per step."""
-    start = ControlState(left=0.05, right=0.0, last_us=NOW_US - 100_000)
+    start = ControllerState(left=0.05, right=0.0, last_us=NOW_US - 100_000)
     _, thrust = run(PAPER, command(heading_rad=0.5), odometry(), start)
     assert (thrust.left, thrust.right) == pytest.approx((0.035, 0.015))
 
 
 def test_a_stop_is_never_slewed() -> None:
-    start = ControlState(left=0.08, right=0.08, integral=0.01, last_us=NOW_US - 100_000)
+    start = ControllerState(left=0.08, right=0.08, integral=0.01, last_us=NOW_US - 100_000)
     state, thrust = run(PAPER, command(enable=False, inhibits=(Inhibit.ADVISED_STOP,)), odometry(), start)
     assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)
     assert thrust.inhibits == (Inhibit.ADVISED_STOP,)
-    assert state == ControlState()
+    assert state == ControllerState()
 
 
 @pytest.mark.parametrize(
@@ -159,8 +161,8 @@ def test_integral_does_not_wind_up() -> None:
     state = REST
     for n in range(600):
         now_us = NOW_US + n * 100_000
-        held = Heard(command(speed_mps=0.6), now_us, odometry(surge_mps=0.0), now_us)
-        state, _ = control(state, held, now_us, 43, PAANI)
+        held = ControllerInputs(command(speed_mps=0.6), now_us, odometry(surge_mps=0.0), now_us)
+        state, _ = compute_thrust(state, held, now_us, 43, PAANI)
     assert state.left == PAANI.max_forward
     assert state.integral == 0.0
 
@@ -187,7 +189,7 @@ def test_thrust_is_bounded_and_in_the_paper_never_astern(
 ) -> None:
     """N7: whatever the inputs, both fans stay in range, in the paper never astern, and are slewed."""
     left, right = max(left, -profile.astern), max(right, -profile.astern)
-    start = ControlState(left=left, right=right, last_us=NOW_US - 100_000)
+    start = ControllerState(left=left, right=right, last_us=NOW_US - 100_000)
     pose = odometry(yaw_rad=yaw, surge_mps=surge, yaw_rate_radps=rate)
     _, thrust = run(profile, command(heading_rad=heading, speed_mps=speed), pose, start)
     assert PAPER.astern == 0.0
@@ -215,6 +217,6 @@ def test_a_boat_faster_than_ordered_brakes() -> None:
 
 def test_who_is_told_to_stop_is_not_driven_astern() -> None:
     """A stop is zero thrust at once, whatever the fans did and however fast the boat is."""
-    start = ControlState(integral=-0.03, left=-0.1, right=-0.1, last_us=NOW_US - 100_000)
+    start = ControllerState(integral=-0.03, left=-0.1, right=-0.1, last_us=NOW_US - 100_000)
     _, thrust = run(PAANI, command(enable=False, speed_mps=0.0), odometry(surge_mps=0.9), start)
     assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)

@@ -17,7 +17,7 @@ from paani.messages import (
     Reason,
     SimTime,
 )
-from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 
 STEP_S = 0.1
 TURN_RADPS, TURN_LAG_S, SPEED_LAG_S = 0.35, 1.5, 2.0
@@ -38,7 +38,7 @@ class DriftingBoat:
         self.mission, self.config, self.drift_mps = mission, config, drift_mps
         (self.x_m, self.y_m), self.yaw_rad, self.speed_mps = at_m, yaw_rad, 0.0
         self.direction, self.armed, self.stopped, self.epoch = Direction.STRAIGHT, True, False, 1
-        self.now_us, self.state = START_US, NavState()
+        self.now_us, self.state = START_US, NavigatorState()
         self.order: NavCommand | None = None
 
     @property
@@ -60,10 +60,10 @@ class DriftingBoat:
         assert self.order is not None
         return self.order
 
-    def _heard(self) -> Heard:
+    def _heard(self) -> NavigatorInputs:
         now_us, yaw_rad = self.now_us, self.yaw_rad
         east_mps, north_mps = self.drift_mps
-        return Heard(
+        return NavigatorInputs(
             advisory=Advisory(source_us=now_us, direction=self.direction, reason=Reason.CENTER_CLEAR),
             advisory_us=now_us,
             odometry=Odometry(

@@ -21,8 +21,8 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
-from paani_services.navigator.guidance.mission import Progress, route_alone
-from paani_services.navigator.navigate import Heard, NavState, navigate
+from paani_services.navigator.guidance.mission_progress import MissionProgress, mission_of_route
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 
 NOW_US = 20_000_000
 PAPER = load_config(profile="paper").navigator
@@ -33,15 +33,19 @@ SQUARE = Route(
     waypoints=tuple(Waypoint(x_m=x, y_m=y) for x, y in ((0, 0), (10, 0), (10, 10), (0, 10))),
 )
 HERE = Waypoint(x_m=3.0, y_m=0.0)
-RUNNING = NavState(progress=Progress(target=1, began=HERE), sim_us=1000, advanced_us=NOW_US - 50_000)
+RUNNING = NavigatorState(
+    progress=MissionProgress(target=1, leg_start=HERE), sim_us=1000, clock_advanced_us=NOW_US - 50_000
+)
 
 
-def at_waypoint(target: int, reached: int = 0) -> NavState:
-    return msgspec.structs.replace(RUNNING, progress=Progress(target=target, began=HERE, reached=reached))
+def at_waypoint(target: int, reached: int = 0) -> NavigatorState:
+    return msgspec.structs.replace(
+        RUNNING, progress=MissionProgress(target=target, leg_start=HERE, waypoints_reached=reached)
+    )
 
 
-def heard(now_us: int = NOW_US, /, **changes: object) -> Heard:
-    message = Heard(
+def heard(now_us: int = NOW_US, /, **changes: object) -> NavigatorInputs:
+    message = NavigatorInputs(
         advisory=advice(Direction.STRAIGHT, now_us),
         advisory_us=now_us,
         odometry=pose(3.0, 0.0, source_us=now_us),
@@ -63,15 +67,15 @@ def pose(x_m: float, y_m: float, yaw_rad: float = 0.0, source_us: int = NOW_US) 
 
 
 def run(
-    config: NavigatorConfig, given_heard: Heard, state: NavState = RUNNING, now_us: int = NOW_US
-) -> tuple[NavState, NavCommand]:
-    return navigate(state, given_heard, route_alone(SQUARE), now_us, 43, config)
+    config: NavigatorConfig, given_heard: NavigatorInputs, state: NavigatorState = RUNNING, now_us: int = NOW_US
+) -> tuple[NavigatorState, NavCommand]:
+    return navigate(state, given_heard, mission_of_route(SQUARE), now_us, 43, config)
 
 
 class Drill:
     """Repeats `navigate` at 10 Hz while the simulated clock runs."""
 
-    def __init__(self, config: NavigatorConfig, state: NavState = RUNNING) -> None:
+    def __init__(self, config: NavigatorConfig, state: NavigatorState = RUNNING) -> None:
         self.config, self.state, self.now_us = config, state, NOW_US
 
     def order(self, direction: Direction, at: Odometry, route: Route = SQUARE) -> NavCommand:
@@ -81,7 +85,7 @@ class Drill:
             advisory=advice(direction, self.now_us),
             odometry=msgspec.structs.replace(at, source_us=self.now_us),
         )
-        self.state, command = navigate(self.state, given_heard, route_alone(route), self.now_us, 43, self.config)
+        self.state, command = navigate(self.state, given_heard, mission_of_route(route), self.now_us, 43, self.config)
         return command
 
 
@@ -188,11 +192,11 @@ def test_an_occupied_side_is_kept_off_while_going_straight() -> None:
     occupied = msgspec.structs.replace(advice(Direction.STRAIGHT), right=LaneRisk(occupied=True))
     at = pose(3.0, 2.0)
     given_heard = heard(drill.now_us, advisory=occupied, odometry=at)
-    _, command = navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAANI)
+    _, command = navigate(RUNNING, given_heard, mission_of_route(SQUARE), drill.now_us, 43, PAANI)
     assert command.heading_rad == 0.0
     open_water = heard(drill.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
-    assert navigate(RUNNING, open_water, route_alone(SQUARE), drill.now_us, 43, PAANI)[1].heading_rad < 0.0
-    assert navigate(RUNNING, given_heard, route_alone(SQUARE), drill.now_us, 43, PAPER)[1].heading_rad < 0.0
+    assert navigate(RUNNING, open_water, mission_of_route(SQUARE), drill.now_us, 43, PAANI)[1].heading_rad < 0.0
+    assert navigate(RUNNING, given_heard, mission_of_route(SQUARE), drill.now_us, 43, PAPER)[1].heading_rad < 0.0
 
 
 def test_m2_acceptance_radius_and_m3_repeat() -> None:
@@ -227,7 +231,7 @@ def test_waypoint_left_abeam_counts_in_paani_only() -> None:
 def test_beyond_its_end_no_line_leads_the_boat_away() -> None:
     """Far past the last waypoint of an open route the boat turns back to it."""
     route = msgspec.structs.replace(SQUARE, waypoints=SQUARE.waypoints[:2], repeat=False)
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
     order = drill.order(Direction.STRAIGHT, pose(30.0, 0.0), route)
     assert (order.enable, order.waypoints_reached) == (True, 0)
     assert abs(order.heading_rad) == pytest.approx(math.pi)
@@ -235,7 +239,7 @@ def test_beyond_its_end_no_line_leads_the_boat_away() -> None:
 
 def test_joins_the_route_at_the_nearest_leg() -> None:
     """A navigator that restarts goes on where the boat is; nothing counts as reached."""
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=Progress()))
+    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
     order = drill.order(Direction.STRAIGHT, pose(6.0, 9.5))
     assert (order.waypoint_index, order.waypoints_reached) == (3, 0)
 
@@ -298,7 +302,7 @@ def test_no_route_no_motion() -> None:
 
 def test_m9_m11_clock_must_advance_and_a_reset_must_advance_again() -> None:
     """M9, M11: a paused clock stops the boat, and so does one that jumped back."""
-    state, now_us = NavState(), NOW_US
+    state, now_us = NavigatorState(), NOW_US
     enabled = []
     for sim_us in (100, 150, 150, 150, 150, 150, 200, 10, 60):
         clock = SimTime(source_us=now_us, sim_us=sim_us, stamp_us=1)

@@ -10,7 +10,7 @@ import pytest
 
 from paani.config import load_config
 from paani_services.navigator.files.fence_file import load_fence
-from paani_services.navigator.files.mission_file import load_task
+from paani_services.navigator.files.mission_file import load_route_and_mission
 from tests.places import ROOT
 
 README = ROOT / "services" / "paani_services" / "navigator" / "README.md"
@@ -34,7 +34,7 @@ def test_they_load_together(tmp_path: Path, fence: int) -> None:
     file = tmp_path / f"fence.{EXAMPLES[fence][0]}"
     file.write_text(EXAMPLES[fence][2])
     config = msgspec.structs.replace(load_config().navigator, mission=str(tmp_path / "survey.toml"), fence=str(file))
-    route, mission = load_task(config, ORIGIN)
+    route, mission = load_route_and_mission(config, ORIGIN)
     assert route is not None
     assert mission is not None
     assert len(mission.legs) == 4

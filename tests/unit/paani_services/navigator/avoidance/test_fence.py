@@ -23,7 +23,7 @@ from paani_services.navigator.avoidance.fence import (
     way_back_rad,
 )
 from paani_services.navigator.files.fence_file import load_fence
-from paani_services.navigator.guidance.mission import route_alone
+from paani_services.navigator.guidance.mission_progress import mission_of_route
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
 PAANI = load_config().navigator
@@ -142,7 +142,7 @@ def test_no_advice_carries_the_boat_over_the_edge(
     """Whatever is advised, the boat comes to rest inside; its route leads out on purpose."""
     if not is_allowed(FENCE, (x_m, y_m)):
         return
-    mission = msgspec.structs.replace(route_alone(straight_to((x_m, y_m), (80.0, 30.0))), fence=FENCE)
+    mission = msgspec.structs.replace(mission_of_route(straight_to((x_m, y_m), (80.0, 30.0))), fence=FENCE)
     boat = DriftingBoat(mission, PAANI, (x_m, y_m), math.radians(yaw_deg))
     for direction in (*advice, Direction.STRAIGHT):
         boat.direction = direction
@@ -151,7 +151,7 @@ def test_no_advice_carries_the_boat_over_the_edge(
 
 
 def test_the_boat_stops_before_the_edge_and_says_why() -> None:
-    mission = msgspec.structs.replace(route_alone(straight_to((5, 4), (80, 4))), fence=FENCE)
+    mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (80, 4))), fence=FENCE)
     boat = DriftingBoat(mission, PAANI, (5.0, 4.0))
     order = boat.settle(120.0)
     assert order.inhibits == (Inhibit.OUTSIDE_FENCE,)
@@ -160,7 +160,7 @@ def test_the_boat_stops_before_the_edge_and_says_why() -> None:
 
 
 def test_pushed_out_the_boat_stays_still_or_comes_back() -> None:
-    mission = msgspec.structs.replace(route_alone(straight_to((5, 4), (30, 4))), fence=FENCE)
+    mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (30, 4))), fence=FENCE)
     still = DriftingBoat(mission, PAANI, (44.0, 4.0))
     assert still.settle(60.0).inhibits == (Inhibit.OUTSIDE_FENCE,)
     assert still.x_m == 44.0

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from paani.cli import main as paani
 from paani.errors import UserError
 from paani.geometry import enu_from_geodetic
-from paani_services.navigator.files.line import MAX_POINTS, Line, kept
-from paani_services.navigator.files.placing import Spot
-from paani_services.navigator.files.route_file import geodetic, load_route, read_route, route_bytes
+from paani_services.navigator.files.line_simplification import simplify_line
+from paani_services.navigator.files.map_frame import FilePoint
+from paani_services.navigator.files.route_file import encode_route, lat_lon_of_points, load_route, read_route
+from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine
 
 pytestmark = pytest.mark.slow
 
@@ -44,10 +45,10 @@ def written(folder: Path, name: str, text: str | bytes) -> Path:
 
 names = st.text(max_size=60).map(lambda text: text.replace("\x00", "")).filter(lambda text: text.isprintable())
 routes = st.builds(
-    Line,
+    RouteLine,
     name=names.map(str.strip).filter(bool),
-    spots=st.lists(
-        st.builds(Spot, latitude_deg=st.floats(-0.02, 0.02), longitude_deg=st.floats(-0.02, 0.02)),
+    points=st.lists(
+        st.builds(FilePoint, latitude_deg=st.floats(-0.02, 0.02), longitude_deg=st.floats(-0.02, 0.02)),
         min_size=2,
         max_size=8,
     ).map(tuple),
@@ -60,40 +61,40 @@ routes = st.builds(
 )
 @settings(max_examples=60, deadline=None)
 def test_round_trips_within_a_centimetre(
-    tmp_path_factory: pytest.TempPathFactory, line: Line, centre: tuple[float, float], order: list[str]
+    tmp_path_factory: pytest.TempPathFactory, line: RouteLine, centre: tuple[float, float], order: list[str]
 ) -> None:
     """Through every format in any order: name, repetition and each point to less than 1 cm."""
     spots = tuple(
-        Spot(
+        FilePoint(
             latitude_deg=round(centre[0] + (spot.latitude_deg or 0.0), 9),
             longitude_deg=round(centre[1] + (spot.longitude_deg or 0.0), 9),
         )
-        for spot in line.spots
+        for spot in line.points
     )
     if any(one == other for one, other in itertools.pairwise((*spots, spots[0]))):
         return
-    before = Line(line.name, spots, line.repeat)
+    before = RouteLine(line.name, spots, line.repeat)
     folder, now = tmp_path_factory.mktemp("trip"), before
     for number, suffix in enumerate(order):
-        path = written(folder, f"{number}{suffix}", route_bytes(now, suffix, "test"))
+        path = written(folder, f"{number}{suffix}", encode_route(now, suffix, "test"))
         now = read_route(path, "test")
-    assert (now.name, now.repeat, len(now.spots)) == (before.name, before.repeat, len(before.spots))
-    for one, other in zip(geodetic(before, "test"), geodetic(now, "test"), strict=True):
+    assert (now.name, now.repeat, len(now.points)) == (before.name, before.repeat, len(before.points))
+    for one, other in zip(lat_lon_of_points(before, "test"), lat_lon_of_points(now, "test"), strict=True):
         assert math.hypot(*enu_from_geodetic(*one, *other)) < 0.01
 
 
 def test_gpx_route_before_track_before_waypoints(tmp_path: Path) -> None:
     whole = read_route(written(tmp_path, "a.gpx", GPX), "test")
-    assert (whole.name, len(whole.spots), whole.repeat) == ("bay", 3, False)
+    assert (whole.name, len(whole.points), whole.repeat) == ("bay", 3, False)
     track = read_route(written(tmp_path, "b.gpx", GPX.replace("rte>", "x>").replace("rtept", "xpt")), "test")
-    assert [spot.latitude_deg for spot in track.spots] == [47.1, 47.2]
+    assert [spot.latitude_deg for spot in track.points] == [47.1, 47.2]
 
 
 def test_geojson_with_heights_in_a_ring_beside_other_things(tmp_path: Path) -> None:
     point = '{"type": "Feature", "properties": null, "geometry": {"type": "Point", "coordinates": [9, 47]}}'
     text = f'{{"type": "FeatureCollection", "name": "x", "features": [{point}, {GEOJSON}]}}'
     line = read_route(written(tmp_path, "a.geojson", text), "test")
-    assert (line.name, line.repeat, len(line.spots)) == ("bay", True, 3)
+    assert (line.name, line.repeat, len(line.points)) == ("bay", True, 3)
 
 
 BILLION_LAUGHS = '<!DOCTYPE gpx [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><gpx><name>&b;</name></gpx>'
@@ -166,7 +167,7 @@ def test_a_recorded_track_is_thinned_on_request(tmp_path: Path, capsys: pytest.C
         load_route(path, (47.65, 9.48))
     assert paani(["route", "convert", str(path), str(out), "--thin", "0.5"]) == 0
     thin = read_route(out, "test")
-    assert 50 < len(thin.spots) < 1000
+    assert 50 < len(thin.points) < 1000
     assert "20000 waypoints" in capsys.readouterr().err
 
 
@@ -182,7 +183,7 @@ def test_more_points_than_any_route_has_are_refused_before_they_are_read(tmp_pat
 def test_thinning_moves_the_line_by_no_more_than_the_tolerance(
     points: list[tuple[float, float]], tolerance_m: float
 ) -> None:
-    keep = kept(tuple(points), tolerance_m)
+    keep = simplify_line(tuple(points), tolerance_m)
     assert keep[0] == 0
     assert keep[-1] == len(points) - 1
     for first, last in itertools.pairwise(keep):
@@ -197,7 +198,7 @@ def test_thinning_moves_the_line_by_no_more_than_the_tolerance(
 def test_a_line_that_cannot_be_thinned_is_bounded_work() -> None:
     """A zigzag that grows keeps every point; each is still compared with at most 250 others, a few times."""
     zigzag = tuple((float(number), (-1.0) ** number * (1.0 + 0.01 * number)) for number in range(5000))
-    assert len(kept(zigzag, 0.5)) == 5000
+    assert len(simplify_line(zigzag, 0.5)) == 5000
 
 
 def test_without_gpxpy_only_gpx_is_refused(
@@ -219,14 +220,15 @@ def test_metres_without_an_origin_need_one_to_become_latitudes(
     assert "origin: waypoints[0] in metres needs it" in capsys.readouterr().err
     assert not out.exists()
     assert paani(["route", "convert", str(path), str(out), "--origin", "47.65,9.48"]) == 0
-    assert geodetic(read_route(out, "test"), "test")[0] == (47.65, 9.48)
+    assert lat_lon_of_points(read_route(out, "test"), "test")[0] == (47.65, 9.48)
 
 
 def test_a_route_across_the_antimeridian_is_short(tmp_path: Path) -> None:
-    line = Line(
-        "fiji", (Spot(latitude_deg=-17.0, longitude_deg=179.9999), Spot(latitude_deg=-17.0, longitude_deg=-179.9999))
+    line = RouteLine(
+        "fiji",
+        (FilePoint(latitude_deg=-17.0, longitude_deg=179.9999), FilePoint(latitude_deg=-17.0, longitude_deg=-179.9999)),
     )
-    path = written(tmp_path, "a.geojson", route_bytes(line, ".geojson", "test"))
+    path = written(tmp_path, "a.geojson", encode_route(line, ".geojson", "test"))
     first, last = load_route(path, (-17.0, -179.9995)).waypoints
     assert last.x_m - first.x_m == pytest.approx(21.3, abs=0.1)
 

@@ -16,8 +16,8 @@ from paani.decider import Input
 from paani.errors import UserError
 from paani.messages import Direction, Inhibit, LegKind, Mission, MissionLeg, Route, Waypoint
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.files.mission_file import first_route, load_mission, load_task
-from paani_services.navigator.navigate import NavState
+from paani_services.navigator.files.mission_file import load_mission, load_route_and_mission, next_route
+from paani_services.navigator.navigate import NavigatorState
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
 PAANI = load_config().navigator
@@ -80,9 +80,9 @@ def test_m3_laps_of_a_route_that_repeats() -> None:
     """M3: round and round, here twice: as many waypoints as two laps have, then the next leg."""
     ship = boat(follow(*SQUARE, repeat=True, laps=2), STOP, at_m=(5.0, 0.0))
     ship.settle(1.0)
-    assert ship.state.progress.leg == 0
+    assert ship.state.progress.leg_index == 0
     until(ship, 1)
-    assert ship.state.progress.reached == 8
+    assert ship.state.progress.waypoints_reached == 8
     assert ship.settle(0.1).inhibits == (Inhibit.HOLDING,)
 
 
@@ -184,12 +184,12 @@ def test_the_state_survives_json_and_an_order_that_moves_has_no_inhibits(
             ship.x_m += 7.0
         else:
             ship.direction = Direction(event)
-        before = ship.state.progress.leg
+        before = ship.state.progress.leg_index
         for order in ship.run(0.5):
             assert order.enable == (not order.inhibits)
             assert before <= order.leg_index <= len(legs)
         data = msgspec.json.encode(ship.state)
-        assert msgspec.json.decode(data, type=NavState) == ship.state
+        assert msgspec.json.decode(data, type=NavigatorState) == ship.state
 
 
 def test_the_decider_follows_the_mission_before_the_route() -> None:
@@ -197,8 +197,10 @@ def test_the_decider_follows_the_mission_before_the_route() -> None:
     route = Route(source_us=0, name="r", waypoints=follow(*SQUARE).waypoints)
     mission = Mission(source_us=0, name="m", legs=(STOP,))
     inputs = {topic.name: Input() for topic in DECIDER.inputs} | {keys.ROUTE.name: Input(route)}
-    _, alone = DECIDER.decide(NavState(), inputs, 1_000_000, load_config())
-    _, given_both = DECIDER.decide(NavState(), inputs | {keys.MISSION.name: Input(mission)}, 1_000_000, load_config())
+    _, alone = DECIDER.decide(NavigatorState(), inputs, 1_000_000, load_config())
+    _, given_both = DECIDER.decide(
+        NavigatorState(), inputs | {keys.MISSION.name: Input(mission)}, 1_000_000, load_config()
+    )
     assert Inhibit.NO_ROUTE not in alone[keys.COMMAND.name].inhibits  # type: ignore[attr-defined]
     assert DECIDER.own == (keys.ROUTE, keys.MISSION)
     assert given_both.keys() == {keys.COMMAND.name}
@@ -244,34 +246,34 @@ def written(folder: Path, name: str, text: str) -> Path:
 def test_a_mission_file(tmp_path: Path) -> None:
     route, mission = written(tmp_path, "r.toml", ROUTE_TOML), written(tmp_path, "m.toml", MISSION_TOML)
     config = msgspec.structs.replace(PAANI, route=str(route), mission=str(mission))
-    shown, loaded = load_task(config, None)
+    shown, loaded = load_route_and_mission(config, None)
     assert loaded is not None
     there, station, home, stop = loaded.legs
     assert [(w.x_m, w.y_m) for w in there.waypoints] == [(20, 10), (20, 0), (0, 0)]
     assert (there.repeat, there.laps, there.speed_mps) == (True, 2, 0.4)
     assert (station.waypoints, station.radius_m, station.duration_s) == (at(20, 10), 3.0, 60.0)
     assert (home.kind, home.waypoints, stop.kind) == (LegKind.RETURN_HOME, at(-2, 1), LegKind.STOP)
-    assert shown == first_route(loaded)
-    assert first_route(loaded, 1) is None
+    assert shown == next_route(loaded)
+    assert next_route(loaded, 1) is None
 
 
 def test_the_route_alone_is_a_mission_of_one_leg_where_there_is_a_fence(tmp_path: Path) -> None:
     route = written(tmp_path, "r.toml", ROUTE_TOML)
     corners = "corners = [{x_m = -9, y_m = -9}, {x_m = 40, y_m = -9}, {x_m = 40, y_m = EAST}, {x_m = -9, y_m = EAST}]"
     fence = written(tmp_path, "f.toml", f'[[areas]]\nkeep = "in"\n{corners.replace("EAST", "40")}\n')
-    assert load_task(msgspec.structs.replace(PAANI, route=str(route)), None)[1] is None
-    _, mission = load_task(msgspec.structs.replace(PAANI, route=str(route), fence=str(fence)), None)
+    assert load_route_and_mission(msgspec.structs.replace(PAANI, route=str(route)), None)[1] is None
+    _, mission = load_route_and_mission(msgspec.structs.replace(PAANI, route=str(route), fence=str(fence)), None)
     assert mission is not None
     assert (len(mission.legs), mission.legs[0].laps, len(mission.fence)) == (1, 0, 1)
     low = written(tmp_path, "low.toml", f'[[areas]]\nkeep = "in"\n{corners.replace("EAST", "5")}\n')
     with pytest.raises(UserError, match=r"navigator\.route .*r\.toml: waypoints\[2\]: is outside the fence"):
-        load_task(msgspec.structs.replace(PAANI, route=str(route), fence=str(low)), None)
+        load_route_and_mission(msgspec.structs.replace(PAANI, route=str(route), fence=str(low)), None)
     mission_file = written(tmp_path, "m.toml", MISSION_TOML.replace("reverse = true", "reverse = false"))
     settings_ = msgspec.structs.replace(PAANI, route=str(route), fence=str(low), mission=str(mission_file))
     with pytest.raises(UserError, match=r"m\.toml: legs\[0\]\.waypoints\[2\]: is outside the fence"):
-        load_task(settings_, None)
+        load_route_and_mission(settings_, None)
     with pytest.raises(UserError, match=r"needs navigator\.route or navigator\.mission"):
-        load_task(msgspec.structs.replace(PAANI, fence=str(fence)), None)
+        load_route_and_mission(msgspec.structs.replace(PAANI, fence=str(fence)), None)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 
 from paani.config import NavigatorConfig, load_config
 from paani.messages import Odometry, Route, Waypoint
-from paani_services.navigator.guidance.ilos import Crab, learned, offset_m
-from paani_services.navigator.guidance.mission import route_alone
-from paani_services.navigator.guidance.path_progress import Track
+from paani_services.navigator.guidance.ilos import IlosState, integral_offset_m, integrate
+from paani_services.navigator.guidance.mission_progress import mission_of_route
+from paani_services.navigator.guidance.path_progress import WaypointPath
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
 PAANI = load_config().navigator
@@ -32,7 +32,7 @@ def heading(yaw_rad: float) -> Odometry:
 
 def off_line_m(config: NavigatorConfig, drift_mps: tuple[float, float], settle_s: float = 90.0) -> float:
     """Largest cross-track error over a minute after `settle_s`."""
-    boat = DriftingBoat(route_alone(STRAIGHT), config, drift_mps=drift_mps)
+    boat = DriftingBoat(mission_of_route(STRAIGHT), config, drift_mps=drift_mps)
     boat.settle(settle_s)
     return max(abs(boat.y_m) for _ in boat.run(60.0))
 
@@ -44,55 +44,57 @@ def test_a_steady_drift_leaves_no_cross_track_error(drift_mps: tuple[float, floa
 
 
 def test_without_drift_nothing_is_learned() -> None:
-    boat = DriftingBoat(route_alone(STRAIGHT), PAANI)
+    boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI)
     boat.settle(60.0)
-    assert boat.state.crab == Crab(at_us=boat.now_us)
+    assert boat.state.ilos == IlosState(updated_us=boat.now_us)
 
 
 def test_m4_the_paper_s_heuristic_learns_nothing() -> None:
     """M4: the plain bearing of the waypoint, whatever drifts the boat."""
-    boat = DriftingBoat(route_alone(STRAIGHT), PAPER, drift_mps=(0.0, 0.05))
+    boat = DriftingBoat(mission_of_route(STRAIGHT), PAPER, drift_mps=(0.0, 0.05))
     order = boat.settle(60.0)
     before_m = boat.y_m - 0.05 * 0.1 - boat.speed_mps * math.sin(boat.yaw_rad) * 0.1
     x_m = boat.x_m - boat.speed_mps * math.cos(boat.yaw_rad) * 0.1
     assert order.heading_rad == pytest.approx(math.atan2(-before_m, 400.0 - x_m), abs=1e-9)
-    assert boat.state.crab.north_m == 0.0
+    assert boat.state.ilos.north_m == 0.0
 
 
 def test_what_was_learned_holds_on_the_way_back() -> None:
     """What pushes comes from one side of the map: it turns its sign with the leg, and is no windup."""
-    boat = DriftingBoat(route_alone(route((0, 0), (60, 0), (60, 3), (0, 3))), PAANI, drift_mps=(0.0, 0.15))
+    boat = DriftingBoat(mission_of_route(route((0, 0), (60, 0), (60, 3), (0, 3))), PAANI, drift_mps=(0.0, 0.15))
     worst_m = 0.0
     for order in boat.run(260.0):
         if order.waypoint_index == 3 and boat.x_m < 45.0:
             worst_m = max(worst_m, abs(boat.y_m - 3.0))
-    assert boat.state.progress.reached >= 3
+    assert boat.state.progress.waypoints_reached >= 3
     assert worst_m < 0.4
 
 
 def test_the_crab_angle_is_bounded() -> None:
     """A drift that the boat cannot hold against does not wind up without end."""
-    boat = DriftingBoat(route_alone(STRAIGHT), PAANI, drift_mps=(0.0, 0.9))
+    boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, drift_mps=(0.0, 0.9))
     boat.settle(300.0)
     most_m = PAANI.lookahead_m * math.tan(math.radians(PAANI.max_crab_deg))
-    assert math.hypot(boat.state.crab.east_m, boat.state.crab.north_m) <= most_m + 1e-9
+    assert math.hypot(boat.state.ilos.east_m, boat.state.ilos.north_m) <= most_m + 1e-9
 
 
 def test_borhaug_s_integral_by_hand() -> None:
     """y = 2 m left, s = 1 m, L = 4 m, sigma = 0.25 m/s: s grows by 0.25 * 4 * 2 / (9 + 16) m each second."""
-    track = Track((Waypoint(x_m=0, y_m=0), Waypoint(x_m=0, y_m=50)))
-    crab = learned(Crab(east_m=-1.0, at_us=1_000_000), track, 1, 2.0, heading(0.5 * math.pi), 1_100_000, PAANI)
-    assert offset_m(crab, track, 1) == pytest.approx(1.0 + 0.1 * 0.25 * 4.0 * 2.0 / 25.0)
+    track = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=0, y_m=50)))
+    crab = integrate(
+        IlosState(east_m=-1.0, updated_us=1_000_000), track, 1, 2.0, heading(0.5 * math.pi), 1_100_000, PAANI
+    )
+    assert integral_offset_m(crab, track, 1) == pytest.approx(1.0 + 0.1 * 0.25 * 4.0 * 2.0 / 25.0)
 
 
 def test_a_gap_in_time_teaches_little() -> None:
-    track = Track((Waypoint(x_m=0, y_m=0), Waypoint(x_m=50, y_m=0)))
-    after_gap = learned(Crab(at_us=1), track, 1, 1.0, heading(0.0), 60_000_000, PAANI)
+    track = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=50, y_m=0)))
+    after_gap = integrate(IlosState(updated_us=1), track, 1, 1.0, heading(0.0), 60_000_000, PAANI)
     assert 0.0 < after_gap.north_m < 0.3 * 0.25
 
 
 @pytest.mark.parametrize("off_m", [2.0, 5.0, 10.0])
 def test_joining_the_line_teaches_nothing(off_m: float) -> None:
     """A distance that is on its way out is no drift: the boat joins from afar and crosses by no more than 0.2 m."""
-    boat = DriftingBoat(route_alone(STRAIGHT), PAANI, (0.0, off_m))
+    boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, (0.0, off_m))
     assert min(boat.y_m for _ in boat.run(120.0)) > -0.2

@@ -1,0 +1,39 @@
+"""Reading files that anybody may have written: bounded in size, and every fault is one line that names the file."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from paani.errors import UserError
+
+MAX_BYTES = 32 << 20  # a route of 100,000 points with names and times is smaller
+
+T = TypeVar("T")
+
+
+def read_bytes(path: Path, where: str) -> bytes:
+    """The whole file. Raises UserError where it cannot be read or is larger than `MAX_BYTES`."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise UserError(f"{where}: larger than {MAX_BYTES >> 20} MiB")
+        return path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{where}: {error.strerror}") from error
+
+
+def read_toml(path: Path, where: str, kind: type[T]) -> T:
+    """A TOML file as a value of this type. Raises UserError that names the field."""
+    data = read_bytes(path, where)
+    try:
+        return msgspec.convert(tomllib.loads(data.decode()), kind)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError, RecursionError) as error:
+        raise UserError(f"{where}: {one_line(error)}") from error
+
+
+def one_line(error: Exception) -> str:
+    """The error's text without line breaks."""
+    return " ".join(str(error).split()) or type(error).__name__
