@@ -1,1 +1,1 @@
-"""Evidence of one picture to an advised direction, with its reasons."""
+"""The advisor: from the evidence of one picture to an advised direction with its reasons."""

@@ -1,4 +1,4 @@
-"""The advisor's one entry: state and evidence in, state and advice out. Pure: no clock, no bus, no logging."""
+"""One step of the advisor: state and evidence in; state, advisory and tracks out. Pure."""
 
 import msgspec
 
@@ -16,18 +16,24 @@ from paani.messages import (
     UnusableCause,
 )
 from paani_services.advisor.counterfactual import counterfactual
-from paani_services.advisor.explanation import explain
+from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.policy import Decision, PolicyState, decide, side_block_risk
-from paani_services.advisor.risk import LANES, components, obstacles_of, water_of
-from paani_services.advisor.tracker import TrackerState, hear, is_sound, published, update
+from paani_services.advisor.risk import LANES, lane_components, lane_water, obstacles_from_tracks
+from paani_services.advisor.tracker import (
+    TrackerState,
+    is_valid_detection,
+    remember_attitude,
+    tracks_message,
+    update_tracks,
+)
 
-MAX_AGE_S = 1e6
-ONLY_NEW_EVIDENCE = Counterfactual(changed_by=ChangedBy.NEW_EVIDENCE)
-NOTHING_JUDGED = Decision(Direction.NO_DATA, Reason.NO_EVIDENCE, counterfactual=ONLY_NEW_EVIDENCE)
+MAX_AGE_S = 1e6  # bound of the advisory's `evidence_age_s`
+NEEDS_NEW_EVIDENCE = Counterfactual(changed_by=ChangedBy.NEW_EVIDENCE)
+NO_DECISION = Decision(Direction.NO_DATA, Reason.NO_EVIDENCE, counterfactual=NEEDS_NEW_EVIDENCE)
 
 
 class AdvisorState(msgspec.Struct, frozen=True):
-    """Everything between two calls. `evidence` is the last distinct frame that was digested."""
+    """What one call leaves for the next. `evidence` is the last distinct frame that was processed."""
 
     tracker: TrackerState = TrackerState()
     policy: PolicyState = PolicyState()
@@ -40,38 +46,36 @@ def advise(
 ) -> tuple[AdvisorState, Advisory, Tracks]:
     """Advise a direction; called for each new evidence and again to republish.
 
-    now_us: time on the clock that stamped `evidence.source_us`. A frame already digested, or one older than it in
-    the same epoch, counts as no frame: the last decision is given again, dated by its own evidence, and turns into
-    STOP once that is too old. Unusable, malformed or future evidence advises STOP, whatever else is known; NO_DATA
-    is for having had no evidence at all. Odometry tells how the boat turned between frames; it moves no risk down.
+    now_us: time on the clock that stamped `evidence.source_us`. A frame already processed, or an older one of the same
+    epoch, is no new frame: the last decision is given again with the stamp of its own evidence, and becomes STOP once
+    that is too old. Unusable, malformed or future evidence advises STOP, whatever else is known; NO_DATA means that
+    there has been no evidence at all. Odometry tells how the boat turned between frames; it lowers no risk.
     Never raises.
     """
-    state = msgspec.structs.replace(state, tracker=hear(state.tracker, odometry))
+    state = msgspec.structs.replace(state, tracker=remember_attitude(state.tracker, odometry))
     future = False
     if evidence is not None and _is_new(state, evidence):
         future = (now_us - evidence.source_us) * 1e-6 < -config.advisor.max_future_s
         if not future:
-            state = _digest(state, evidence, config)
+            state = _process_frame(state, evidence, config)
     known = evidence if future else state.evidence
     if known is None:
         advisory = Advisory(
             source_us=now_us,
             direction=Direction.NO_DATA,
             reason=Reason.NO_EVIDENCE,
-            counterfactual=ONLY_NEW_EVIDENCE,
+            counterfactual=NEEDS_NEW_EVIDENCE,
         )
         tracks = Tracks(source_us=now_us, frame_seq=0, frame_epoch=0)
     else:
-        decision = (
-            _stopped(NOTHING_JUDGED, Reason.FUTURE_EVIDENCE) if future else _fresh_decision(state, now_us, config)
-        )
-        tracks = published(state.tracker, known, config.advisor)
-        advisory = _advisory(decision, known, now_us, config)
-    return state, msgspec.structs.replace(advisory, explanation=explain(advisory, tracks.tracks)), tracks
+        decision = _stop_for(NO_DECISION, Reason.FUTURE_EVIDENCE) if future else _decision_at(state, now_us, config)
+        tracks = tracks_message(state.tracker, known, config.advisor)
+        advisory = _advisory_message(decision, known, now_us, config)
+    return state, msgspec.structs.replace(advisory, explanation=explain_advisory(advisory, tracks.tracks)), tracks
 
 
-def stale_at_us(state: AdvisorState, config: Config) -> int | None:
-    """When the evidence in hand becomes too old; None before there is any."""
+def evidence_expiry_us(state: AdvisorState, config: Config) -> int | None:
+    """The time at which the last evidence becomes too old; None before there is any."""
     if state.evidence is None:
         return None
     return state.evidence.source_us + round(config.advisor.evidence_max_age_s * 1e6) + 1
@@ -82,48 +86,48 @@ def _is_new(state: AdvisorState, evidence: Evidence) -> bool:
     return last is None or evidence.frame_epoch != last.frame_epoch or evidence.frame_seq > last.frame_seq
 
 
-def _digest(state: AdvisorState, evidence: Evidence, config: Config) -> AdvisorState:
-    """Take in one distinct frame."""
+def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> AdvisorState:
+    """Track and judge one distinct frame."""
     fits = is_well_formed(evidence)
-    tracker = update(state.tracker, evidence, config)
+    tracker = update_tracks(state.tracker, evidence, config)
     policy = state.policy
     if evidence.usable and fits:
-        water = {lane: water_of(evidence, lane, config) for lane in LANES}
-        obstacles = obstacles_of(tracker, config, evidence.width_px / max(1, evidence.height_px), water)
-        lanes = {lane: components(water[lane], obstacles, lane, config) for lane in LANES}
+        water = {lane: lane_water(evidence, lane, config) for lane in LANES}
+        obstacles = obstacles_from_tracks(tracker, config, evidence.width_px / max(1, evidence.height_px), water)
+        lanes = {lane: lane_components(water[lane], obstacles, lane, config) for lane in LANES}
         policy, decision = decide(state.policy, lanes, obstacles, config)
         why = counterfactual(state.policy, decision, water, obstacles, config)
         decision = msgspec.structs.replace(decision, counterfactual=why)
     else:
-        policy = msgspec.structs.replace(policy, clear_frames=0)  # no clear frame
-        decision = _stopped(NOTHING_JUDGED, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
+        policy = msgspec.structs.replace(policy, clear_frames=0)  # an unusable frame interrupts a run of clear ones
+        decision = _stop_for(NO_DECISION, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
     return AdvisorState(tracker, policy, evidence, decision)
 
 
 def is_well_formed(evidence: Evidence) -> bool:
-    """Every fraction is one and every box has an area. NaN fails each comparison."""
+    """Whether every fraction lies in [0, 1] and every box has an area. NaN fails each comparison."""
     lanes = (evidence.left, evidence.center, evidence.right)
     return all(
         0.0 <= value <= 1.0 for lane in lanes for value in (lane.non_water, lane.uncertainty, lane.clear_width)
-    ) and all(map(is_sound, evidence.detections))
+    ) and all(map(is_valid_detection, evidence.detections))
 
 
-def _fresh_decision(state: AdvisorState, now_us: int, config: Config) -> Decision:
+def _decision_at(state: AdvisorState, now_us: int, config: Config) -> Decision:
     assert state.evidence is not None
     assert state.decision is not None
     age_s = (now_us - state.evidence.source_us) * 1e-6
     if age_s > config.advisor.evidence_max_age_s:
-        return _stopped(state.decision, Reason.STALE_EVIDENCE)
+        return _stop_for(state.decision, Reason.STALE_EVIDENCE)
     if age_s < -config.advisor.max_future_s:
-        return _stopped(state.decision, Reason.FUTURE_EVIDENCE)
+        return _stop_for(state.decision, Reason.FUTURE_EVIDENCE)
     return state.decision
 
 
-def _stopped(decision: Decision, reason: Reason) -> Decision:
-    return msgspec.structs.replace(decision, direction=Direction.STOP, reason=reason, counterfactual=ONLY_NEW_EVIDENCE)
+def _stop_for(decision: Decision, reason: Reason) -> Decision:
+    return msgspec.structs.replace(decision, direction=Direction.STOP, reason=reason, counterfactual=NEEDS_NEW_EVIDENCE)
 
 
-def _advisory(decision: Decision, evidence: Evidence, now_us: int, config: Config) -> Advisory:
+def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, config: Config) -> Advisory:
     lanes = (decision.left, decision.center, decision.right)
     return Advisory(
         source_us=evidence.source_us,

@@ -1,4 +1,8 @@
-"""Which box goes with which of the picture before: by overlap, and by where the boat's turning put it. Pure."""
+"""Data association: which detection belongs to which track. Pure.
+
+Greedy matching by intersection over union, best pair first (G2). It is done twice where the boat's rotation is known:
+with the last box of each track, and with that box rotated to where it must be now.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,17 +10,20 @@ from typing import NamedTuple
 from paani.messages import BoxXyxy
 
 
-class Pairs(NamedTuple):
-    """Which track each detection goes with, by index; `doubtful` detections could have gone elsewhere too."""
+class Assignment(NamedTuple):
+    """The track of each detection, by index.
+
+    `ambiguous`: detections that overlap another track, or whose track overlaps another detection.
+    """
 
     track_of: dict[int, int]
-    doubtful: frozenset[int]
+    ambiguous: frozenset[int]
 
 
-def associate(tracks: Sequence[BoxXyxy | None], detections: Sequence[BoxXyxy], min_iou: float) -> Pairs:
-    """Greedy pairs, best overlap first (G2); a track that is None has no place.
+def assign_boxes(tracks: Sequence[BoxXyxy | None], detections: Sequence[BoxXyxy], min_iou: float) -> Assignment:
+    """Match detections to tracks greedily, largest overlap first (G2); a track that is None matches nothing.
 
-    Labels are not compared: one object may change its label from frame to frame.
+    Labels are not compared, because the detector may label one object differently from frame to frame.
     """
     candidates = sorted(
         (-overlap, t, d)
@@ -35,21 +42,21 @@ def associate(tracks: Sequence[BoxXyxy | None], detections: Sequence[BoxXyxy], m
     for _, t, d in candidates:
         of_track[t] += 1
         of_detection[d] += 1
-    return Pairs(track_of, frozenset(d for d, t in track_of.items() if of_track[t] + of_detection[d] > 2))
+    return Assignment(track_of, frozenset(d for d, t in track_of.items() if of_track[t] + of_detection[d] > 2))
 
 
-def kinship(seen: Pairs, expected: Pairs) -> Pairs:
-    """Whose identity each detection goes on with, given the pairs by last place and by place after the boat's turning.
+def merge_assignments(by_place: Assignment, by_prediction: Assignment) -> Assignment:
+    """Merge the matches by last box and by predicted box into one: the identity that each detection continues.
 
-    The turning decides. Where it explains nothing, a pair by last place keeps its identity, in doubt.
+    A match by predicted box wins. Where there is none, the match by last box keeps its identity and is ambiguous.
     """
-    taken = set(expected.track_of.values())
-    left = {d: t for d, t in seen.track_of.items() if d not in expected.track_of and t not in taken}
-    return Pairs(expected.track_of | left, expected.doubtful | left.keys())
+    taken = set(by_prediction.track_of.values())
+    left = {d: t for d, t in by_place.track_of.items() if d not in by_prediction.track_of and t not in taken}
+    return Assignment(by_prediction.track_of | left, by_prediction.ambiguous | left.keys())
 
 
 def iou(a: BoxXyxy, b: BoxXyxy) -> float:
-    """Intersection over union of two sound boxes."""
+    """Intersection over union of two valid boxes."""
     width = min(a[2], b[2]) - max(a[0], b[0])
     if width <= 0.0:
         return 0.0
@@ -61,5 +68,5 @@ def iou(a: BoxXyxy, b: BoxXyxy) -> float:
 
 
 def area(box: BoxXyxy) -> float:
-    """Of the picture."""
+    """Area of a box as a fraction of the picture."""
     return (box[2] - box[0]) * (box[3] - box[1])

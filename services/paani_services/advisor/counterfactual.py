@@ -21,22 +21,22 @@ from paani.arrays import F64, Bools
 from paani.config import Config, RiskConfig
 from paani.messages import ChangedBy, Counterfactual, Direction, Lane, LaneEvidence, Limit, Reason, Removal
 from paani_services.advisor.policy import (
-    OTHER,
+    OPPOSITE_SIDE,
     Decision,
+    PolicyInput,
     PolicyState,
-    Standing,
-    better_side,
     decide,
-    direct,
-    fills,
-    is_dry,
+    fills_lane,
+    held_side,
     is_vessel_ahead,
-    limit_of,
-    looks,
-    place_in_center,
-    side_held,
+    is_without_water,
+    lane_risk_limit,
+    may_search,
+    preferred_side,
+    reach_into_center,
+    select_direction,
 )
-from paani_services.advisor.risk import LANES, Obstacle, components, lane_span, overlap
+from paani_services.advisor.risk import LANES, Obstacle, lane_components, lane_span, overlap
 
 Factors = tuple[tuple[int | None, float], ...]  # of a product: the bit of a piece (None: it stays) and its factor
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
@@ -116,7 +116,7 @@ def direction_without(
 ) -> Direction:
     """What the policy decides on the same frame without these tracks and without the water of these lanes."""
     seen = tuple(o for o in obstacles if o.id not in track_ids)
-    parts = {lane: components(CLEAR_WATER if lane in lanes else water[lane], seen, lane, config) for lane in LANES}
+    parts = {lane: lane_components(CLEAR_WATER if lane in lanes else water[lane], seen, lane, config) for lane in LANES}
     patient = msgspec.structs.replace(state, clear_frames=config.advisor.policy.clear_frames)
     return decide(patient, parts, seen, config)[1].direction
 
@@ -143,22 +143,24 @@ def nearest_limit(
     policy = config.advisor.policy
     lanes = {"left": decision.left, "center": decision.center, "right": decision.right}
     risks = {lane: lanes[lane].risk for lane in LANES}
-    standing = msgspec.structs.replace(decision.standing, kept=None)
+    policy_input = msgspec.structs.replace(decision.policy_input, retained_turn=None)
     vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     found: list[tuple[float, Limit]] = []
     for lane in LANES:
         limit = lanes[lane].limit
         margin = risks[lane] - limit
-        if lanes[lane].occupied or is_dry(lanes[lane].non_water, policy) or (lane == "center" and vessel):
+        if lanes[lane].occupied or is_without_water(lanes[lane].non_water, policy) or (lane == "center" and vessel):
             continue
         across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
-        moved = msgspec.structs.replace(standing, better=better_side(state, across, config), **{lane: margin < 0.0})
-        if direct(moved) is not decision.direction:
+        moved = msgspec.structs.replace(
+            policy_input, preferred_side=preferred_side(state, across, config), **{f"{lane}_blocked": margin < 0.0}
+        )
+        if select_direction(moved) is not decision.direction:
             found.append((margin, LIMITS[lane]))
-    held, needed = side_held(state, config)
-    other_side = msgspec.structs.replace(standing, better=OTHER[standing.better])
-    if needed < math.inf and direct(other_side) is not decision.direction:
-        found.append((risks[held] - risks[OTHER[held]] - needed, Limit.SIDE_GAIN))
+    held, needed = held_side(state, config)
+    other_side = msgspec.structs.replace(policy_input, preferred_side=OPPOSITE_SIDE[policy_input.preferred_side])
+    if needed < math.inf and select_direction(other_side) is not decision.direction:
+        found.append((risks[held] - risks[OPPOSITE_SIDE[held]] - needed, Limit.SIDE_GAIN))
     if not found:
         return Limit.NONE, 0.0
     margin, nearest = min(found, key=lambda each: abs(each[0]))
@@ -174,7 +176,7 @@ class _Lane(NamedTuple):
     non_water: float
     uncertainty: float
     water: int | None
-    is_dry: bool
+    is_without_water: bool
     obstacles: Factors
     urgencies: Factors
     occupying: tuple[int | None, ...]
@@ -197,7 +199,7 @@ class _Scene(NamedTuple):
     places: dict[str, tuple[int | None, ...]]
     held: str
     needed: float
-    looks: bool
+    may_search: bool
     water_limit: float
     weights: RiskConfig
 
@@ -216,29 +218,29 @@ def _scene(
     for lane, before in zip(LANES, state.occupied_frames, strict=True):
         span = lane_span(lane, config.perception.corridors)
         inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
-        filling = [o for o in obstacles if fills(o, lane, config)]
+        filling = [o for o in obstacles if fills_lane(o, lane, config)]
         lasting = before + 1 >= policy.occupancy_frames
-        dry = is_dry(water[lane].non_water, policy)
+        dry = is_without_water(water[lane].non_water, policy)
         lanes[lane] = _Lane(
             non_water=water[lane].non_water,
             uncertainty=water[lane].uncertainty,
             water=wet.get(lane),
-            is_dry=dry,
+            is_without_water=dry,
             obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
             urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
-            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.danger),
-            limit=limit_of(lane, state, config),
+            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.is_danger),
+            limit=lane_risk_limit(lane, state, config),
         )
     middle = lane_span("center", config.perception.corridors)
-    places = [(place_in_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]
-    held, needed = side_held(state, config)
+    places = [(reach_into_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]
+    held, needed = held_side(state, config)
     return _Scene(
         lanes=lanes,
         vessels=tuple(bit.get(o.id) for o in obstacles if is_vessel_ahead(o, config)),
         places={name: tuple(i for place, i in places if place == name) for name in ("core", "left", "right")},
         held=held,
         needed=needed,
-        looks=looks(state, config),
+        may_search=may_search(state, config),
         water_limit=policy.center_block_risk,
         weights=config.advisor.risk,
     )
@@ -278,7 +280,7 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
         )
 
     risks = {name: risk(lane) for name, lane in scene.lanes.items()}
-    dry = {name: any_left((lane.water,) if lane.is_dry else ()) for name, lane in scene.lanes.items()}
+    dry = {name: any_left((lane.water,) if lane.is_without_water else ()) for name, lane in scene.lanes.items()}
     blocked = {
         name: (risks[name] >= lane.limit) | dry[name] | any_left(lane.occupying) for name, lane in scene.lanes.items()
     }
@@ -287,7 +289,7 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
     alone = scene.weights.non_water * center.non_water + scene.weights.uncertainty * center.uncertainty
     core, left, right = (any_left(scene.places[name]) for name in ("core", "left", "right"))
     edge = (left != right) & ~core & ~(wet & (alone >= scene.water_limit))
-    gain = risks[scene.held] - risks[OTHER[scene.held]]
+    gain = risks[scene.held] - risks[OPPOSITE_SIDE[scene.held]]
     changes = (gain > 0.0) & (gain >= scene.needed)
     codes: NDArray[np.int64] = (
         blocked["left"] * 1
@@ -295,7 +297,7 @@ def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
         + blocked["right"] * 4
         + (changes != (scene.held == "right")) * 8
         + np.where(edge, np.where(left, 16, 32), 0)
-        + (scene.looks & ~(dry["left"] & dry["center"] & dry["right"])) * 64
+        + (scene.may_search & ~(dry["left"] & dry["center"] & dry["right"])) * 64
     )
     return codes
 
@@ -304,14 +306,14 @@ CODES = 128
 
 
 def _direction_of(code: int) -> Direction:
-    return direct(
-        Standing(
-            left=bool(code & 1),
-            center=bool(code & 2),
-            right=bool(code & 4),
-            better="right" if code & 8 else "left",
-            incursion=SIDES[code >> 4 & 3],
-            looks=bool(code & 64),
+    return select_direction(
+        PolicyInput(
+            left_blocked=bool(code & 1),
+            center_blocked=bool(code & 2),
+            right_blocked=bool(code & 4),
+            preferred_side="right" if code & 8 else "left",
+            incursion_side=SIDES[code >> 4 & 3],
+            may_search=bool(code & 64),
         )
     )
 

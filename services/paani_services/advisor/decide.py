@@ -6,28 +6,28 @@ from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.shadow import TuningState, heed, report, try_beside, tuned
+from paani_services.advisor.shadow import TuningState, apply_request, shadow_report, step_shadow, tuned_config
 
 
 class DeciderState(msgspec.Struct, frozen=True):
-    """The memory of the policy in force, and what is tried beside it."""
+    """The state of the advisor in force, and of the tuning beside it."""
 
     active: AdvisorState = AdvisorState()
     tuning: TuningState = TuningState()
 
 
 def decide(state: DeciderState, inputs: Inputs, now_us: int, config: Config) -> tuple[DeciderState, Outputs]:
-    """One step; see `advise`. What is tried never reaches the advisory."""
+    """One step; see `advise`. The shadow never reaches the advisory."""
     evidence = inputs[keys.EVIDENCE.name].message
     request, arming = inputs[keys.TUNING.name].message, inputs[keys.ARMING.name]
-    tuning, before = heed(state.tuning, state.active, request, arming, now_us, config)
+    tuning, before = apply_request(state.tuning, state.active, request, arming, now_us, config)
     odometry = inputs[keys.ODOMETRY.name].message
-    after, advisory, tracks = advise(before, evidence, now_us, tuned(config, tuning.active), odometry)
-    tuning = try_beside(tuning, before, after, advisory, evidence, now_us, config, odometry)
+    after, advisory, tracks = advise(before, evidence, now_us, tuned_config(config, tuning.active), odometry)
+    tuning = step_shadow(tuning, before, after, advisory, evidence, now_us, config, odometry)
     return DeciderState(after, tuning), {
         keys.ADVISORY.name: advisory,
         keys.TRACKS.name: tracks,
-        keys.SHADOW.name: report(tuning, now_us, config),
+        keys.SHADOW.name: shadow_report(tuning, now_us, config),
     }
 
 

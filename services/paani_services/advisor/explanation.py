@@ -1,11 +1,11 @@
-"""Plain words for people, made last, from the numbers in the advisory itself (J12). Pure.
+"""The explanation of an advisory in plain words, made last, from the advisory's own numbers (J12). Pure.
 
 One sentence says what is advised and why, the next what would change it.
 """
 
 from paani.messages import Advisory, ChangedBy, Direction, Lane, LaneRisk, Reason, Removal, Track, UnusableCause
 
-MANOEUVRE = {
+MANOEUVRE_TEXT = {
     Direction.STRAIGHT: "Straight on",
     Direction.SLIGHT_LEFT: "Slightly left",
     Direction.SLIGHT_RIGHT: "Slightly right",
@@ -14,7 +14,7 @@ MANOEUVRE = {
     Direction.STOP: "Stop",
     Direction.NO_DATA: "No advice",
 }
-UNUSABLE = {
+UNUSABLE_TEXT = {
     UnusableCause.NONE: "gave no reason",
     UnusableCause.UNDECODABLE: "cannot be decoded",
     UnusableCause.WRONG_SIZE: "has the wrong size",
@@ -29,8 +29,8 @@ UNUSABLE = {
     UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",
 }
-NAMED_TRACKS = 3
-INSTEAD = {
+MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
+ALTERNATIVE_TEXT = {
     Direction.STRAIGHT: "go STRAIGHT",
     Direction.SLIGHT_LEFT: "turn SLIGHTLY LEFT",
     Direction.SLIGHT_RIGHT: "turn SLIGHTLY RIGHT",
@@ -40,22 +40,22 @@ INSTEAD = {
     Direction.NO_DATA: "give no advice",
 }
 LANE_NAMES = {Lane.LEFT: "left", Lane.CENTER: "centre", Lane.RIGHT: "right"}
-WATERS = {Lane.LEFT: "on the left", Lane.CENTER: "in the centre", Lane.RIGHT: "on the right"}
-MAX_LENGTH = 400  # of `Text`
+WATER_TEXT = {Lane.LEFT: "on the left", Lane.CENTER: "in the centre", Lane.RIGHT: "on the right"}
+MAX_LENGTH = 400  # characters, the limit of the message type `Text`
 
 
-def explain(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
-    """Say what is advised and why, and what would change it."""
-    why = f"{MANOEUVRE[advisory.direction]}: {_because(advisory, tracks)}."
-    both = f"{why} {_otherwise(advisory, tracks)}".rstrip()
+def explain_advisory(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+    """Say what is advised and why, and what would change it; the reason alone where both are too long."""
+    why = f"{MANOEUVRE_TEXT[advisory.direction]}: {_reason_text(advisory, tracks)}."
+    both = f"{why} {_counterfactual_text(advisory, tracks)}".rstrip()
     return both if len(both) <= MAX_LENGTH else why
 
 
-def _otherwise(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+def _counterfactual_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     found = advisory.counterfactual
     match found.changed_by:
         case ChangedBy.EVIDENCE if found.removals:
-            return _without(found.removals[0], advisory, tracks)
+            return _removal_text(found.removals[0], advisory, tracks)
         case ChangedBy.CLEAR_PICTURES:
             return "Nothing in the picture asks for it any more."
         case ChangedBy.NEW_EVIDENCE:
@@ -66,27 +66,27 @@ def _otherwise(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return ""
 
 
-def _without(removal: Removal, advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+def _removal_text(removal: Removal, advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     parts = []
     labels = {track.id: track.label for track in tracks}
     lanes = {Lane.LEFT: advisory.left, Lane.CENTER: advisory.center, Lane.RIGHT: advisory.right}
     if removal.track_ids:
         names = [
-            f"{labels.get(i, 'track')} #{i} ({_and([LANE_NAMES[at] for at in lanes if i in lanes[at].track_ids])})"
+            f"{labels.get(i, 'track')} #{i} ({_join_names([LANE_NAMES[n] for n in lanes if i in lanes[n].track_ids])})"
             for i in removal.track_ids
         ]
-        parts.append(f"without {_and(names)}")
+        parts.append(f"without {_join_names(names)}")
     if removal.water:
-        parts.append(f"with clear water {_and([WATERS[lane] for lane in removal.water])}")
+        parts.append(f"with clear water {_join_names([WATER_TEXT[lane] for lane in removal.water])}")
     condition = " and ".join(parts)
-    return f"{condition[0].upper()}{condition[1:]} it would {INSTEAD[removal.direction]}."
+    return f"{condition[0].upper()}{condition[1:]} it would {ALTERNATIVE_TEXT[removal.direction]}."
 
 
-def _and(names: list[str]) -> str:
+def _join_names(names: list[str]) -> str:
     return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
+def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     left, center, right = advisory.left, advisory.center, advisory.right
     names = _obstacles(center, tracks)
     by = f" by {names}" if names else ""
@@ -105,7 +105,7 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
         case Reason.FUTURE_EVIDENCE:
             return f"the picture is dated {-advisory.evidence_age_s:.1f} s in the future"
         case Reason.UNUSABLE_IMAGE:
-            return f"the picture {UNUSABLE[advisory.cause]}"
+            return f"the picture {UNUSABLE_TEXT[advisory.cause]}"
         case Reason.MALFORMED_EVIDENCE:
             return "the evidence is malformed"
         case Reason.CENTER_CLEAR:
@@ -133,15 +133,15 @@ def _because(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
 
 
 def _limit(lane: LaneRisk, nominal: float) -> float:
-    """The lane's own limit where that made the difference."""
+    """The lane's own limit where the lane is blocked by that one alone, else the nominal limit."""
     return lane.limit if lane.limit <= lane.risk < nominal else nominal
 
 
 def _obstacles(lane: LaneRisk, tracks: tuple[Track, ...]) -> str:
-    """`vessel #3 and pier #7`, or nothing."""
+    """The tracks in the lane, such as `vessel #3 and pier #7`; empty where there are none."""
     names = [f"{track.label} #{track.id}" for track in tracks if track.id in lane.track_ids]
     if not names:
         return ""
-    if len(names) > NAMED_TRACKS:
-        names = [*names[:NAMED_TRACKS], f"{len(names) - NAMED_TRACKS} more"]
-    return _and(names)
+    if len(names) > MAX_NAMED_TRACKS:
+        names = [*names[:MAX_NAMED_TRACKS], f"{len(names) - MAX_NAMED_TRACKS} more"]
+    return _join_names(names)

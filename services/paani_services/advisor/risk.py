@@ -1,4 +1,4 @@
-"""How bad each corridor is: the water's part, the obstacles' part, their sum R_j (J1-J4). Pure."""
+"""Risk R_j of each corridor of the picture: its water, its obstacles and their urgency, weighted (J1-J4). Pure."""
 
 import math
 from collections.abc import Iterable
@@ -9,31 +9,33 @@ from paani import portable
 from paani.config import CalibrationConfig, Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
-from paani_services.advisor.tracker import TrackerState, is_accepted, is_immediate_danger, presence, urgency_now
+from paani_services.advisor.tracker import TrackerState, current_urgency, is_accepted, is_immediate_danger, presence
 
 LANES = ("left", "center", "right")
-NEAR_FROM, NEAR_SPAN, TALL_SPAN = 0.30, 0.70, 0.50  # resolution 6
-NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # resolution 6
+NEAR_FROM, NEAR_SPAN = 0.30, 0.70  # of the picture: a bottom at 0.30 is far, at 1.0 as near as can be
+TALL_SPAN = 0.50  # of the picture: a box of half its height, or more, is as tall as counts
+NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # weights of nearness and height in the severity; the paper gives none
 
 
 class Obstacle(msgspec.Struct, frozen=True):
-    """An accepted track as the policy weighs it; `presence` falls from 1 while it is not seen.
+    """An accepted track as the policy weighs it; `presence` decays from 1 while it is not seen.
 
-    behind: the lanes that show clear water across more than it may take of them, so that it occupies none.
+    is_danger: it is low and large in the picture (G5). exempt_lanes: lanes it does not occupy, because the mask shows
+    clear water across most of them.
     """
 
     id: int
-    craft: bool
+    is_vessel: bool
     box: BoxXyxy
     severity: float
     urgency: float
     presence: float
-    danger: bool
-    behind: tuple[str, ...] = ()
+    is_danger: bool
+    exempt_lanes: tuple[str, ...] = ()
 
 
-class Components(msgspec.Struct, frozen=True):
-    """R_j of one corridor and what it is made of; `track_ids` overlap it (J13)."""
+class LaneComponents(msgspec.Struct, frozen=True):
+    """Risk R_j of one corridor and its components; `track_ids` are the obstacles that overlap it (J13)."""
 
     risk: float
     non_water: float
@@ -45,17 +47,17 @@ class Components(msgspec.Struct, frozen=True):
 
 
 def severity(confidence: float, box: BoxXyxy) -> float:
-    """Bounded severity of a box, from confidence, nearness (its bottom) and height (J1, resolution 6)."""
+    """Severity of a box in [0, 1], from confidence, nearness (its bottom edge) and height (J1)."""
     near = clip((box[3] - NEAR_FROM) / NEAR_SPAN, 0.0, 1.0)
     tall = clip((box[3] - box[1]) / TALL_SPAN, 0.0, 1.0)
     return clip(confidence * (NEAR_SHARE * near + TALL_SHARE * tall), 0.0, 1.0)
 
 
-def relevance(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weights: RiskConfig) -> float:
-    """How much a thing counts by how far its foot is off: 1 up to `near_m`, 0 from `far_m` on.
+def range_weight(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weights: RiskConfig) -> float:
+    """Weight of an obstacle by the range of its foot: 1 up to `near_m`, 0 from `far_m` on, linear between.
 
-    aspect: width of the picture over its height. 1 without a valid calibration, or where `far_m` is 0. The range is
-    that of level water seen from a boat at rest: a boat that pitches by a degree misjudges 10 m by a fifth.
+    aspect: width of the picture over its height. The weight is 1 without a valid calibration, and where `far_m` is 0.
+    The range is that on level water from a boat at rest: one degree of pitch is an error of a fifth at 10 m.
     """
     if not calibration.valid or weights.far_m == 0.0:
         return 1.0
@@ -70,26 +72,26 @@ def relevance(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weigh
 
 
 def shared_width(box: BoxXyxy, span: tuple[float, float]) -> float:
-    """Width that a box and an x range have in common, normalised to the picture."""
+    """Width that a box and a range of x share, as a fraction of the picture."""
     return max(0.0, min(box[2], span[1]) - max(box[0], span[0]))
 
 
 def overlap(box: BoxXyxy, span: tuple[float, float]) -> float:
-    """Fraction of the box's width inside the corridor (J2, resolution 7): two lanes may both count it."""
+    """Fraction of the box's width inside the corridor (J2); corridors overlap, so that two of them may count it."""
     shared = shared_width(box, span)
     return min(1.0, shared / (box[2] - box[0])) if shared > 0.0 else 0.0
 
 
-def either(values: Iterable[float]) -> float:
-    """E(a, b) = 1 - (1-a)(1-b), over any number of values in [0, 1] (J3)."""
+def noisy_or(values: Iterable[float]) -> float:
+    """Noisy-OR of values in [0, 1]: E(a, b) = 1 - (1-a)(1-b), over any number of them (J3)."""
     none = 1.0
     for value in values:
         none *= 1.0 - value
     return clip(1.0 - none, 0.0, 1.0)
 
 
-def total(non_water: float, obstacle: float, urgency: float, uncertainty: float, weights: RiskConfig) -> float:
-    """R = min(1, 0.55 N + 0.65 O + 0.20 M + 0.15 U) (J4)."""
+def corridor_risk(non_water: float, obstacle: float, urgency: float, uncertainty: float, weights: RiskConfig) -> float:
+    """Risk of a corridor: R = min(1, 0.55 N + 0.65 O + 0.20 M + 0.15 U) (J4)."""
     return min(
         1.0,
         weights.non_water * non_water
@@ -99,13 +101,13 @@ def total(non_water: float, obstacle: float, urgency: float, uncertainty: float,
     )
 
 
-def obstacles_of(
+def obstacles_from_tracks(
     state: TrackerState, config: Config, aspect: float, water: dict[str, LaneEvidence]
 ) -> tuple[Obstacle, ...]:
-    """Accepted tracks, confirmed or an immediate danger, that reach below the corridors' top.
+    """Obstacles: accepted tracks, confirmed or an immediate danger, that reach below the top of the corridors.
 
-    aspect: width of the picture over its height. water: of each lane. A quay that lies aslant fills a box whose lower
-    end it reaches on one side alone: where the metric planner acts it stands where the mask ends the water.
+    aspect: width of the picture over its height. water: of each lane. The box of a quay that runs obliquely reaches its
+    lower edge on one side only: where the metric planner acts, a quay occupies no lane that the mask shows clear.
     """
     settings = config.advisor.tracker
     open_lanes: tuple[str, ...] = ()
@@ -114,26 +116,26 @@ def obstacles_of(
         open_lanes = tuple(lane for lane in LANES if water[lane].clear_width > clear)
 
     def weight(box: BoxXyxy) -> float:
-        return relevance(box, aspect, config.calibration, config.advisor.risk)
+        return range_weight(box, aspect, config.calibration, config.advisor.risk)
 
     return tuple(
         Obstacle(
             id=track.id,
-            craft=track.label == "vessel",
+            is_vessel=track.label == "vessel",
             box=track.box,
             severity=severity(track.display_confidence, track.box) * weight(track.box),
-            urgency=urgency_now(track, state.at_us, settings) * weight(track.box),
+            urgency=current_urgency(track, state.at_us, settings) * weight(track.box),
             presence=presence(track, state.at_us, settings),
-            danger=is_immediate_danger(track.box, settings),
-            behind=open_lanes if track.label == "pier" else (),
+            is_danger=is_immediate_danger(track.box, settings),
+            exempt_lanes=open_lanes if track.label == "pier" else (),
         )
         for track in state.tracks
         if track.box[3] > config.perception.corridors.top and is_accepted(track, settings)
     )
 
 
-def water_of(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
-    """The mask's view of a corridor, or the default components where the mask may not count (F2, F3)."""
+def lane_water(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
+    """The water of a corridor by the mask, or the default components where the mask is not eligible (F2, F3)."""
     if evidence.navigation_eligible and evidence.segmentation is SegmentationSource.LEARNED:
         found: LaneEvidence = getattr(evidence, lane)
         return found
@@ -142,14 +144,14 @@ def water_of(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
     )
 
 
-def components(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> Components:
-    """Everything R_j of one corridor is made of."""
+def lane_components(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> LaneComponents:
+    """Risk R_j of one corridor with its components."""
     span = lane_span(lane, config.perception.corridors)
     inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
-    obstacle = either(o.severity * share * o.presence for o, share in inside)
-    urgency = either(o.urgency * share for o, share in inside)
-    return Components(
-        risk=total(water.non_water, obstacle, urgency, water.uncertainty, config.advisor.risk),
+    obstacle = noisy_or(o.severity * share * o.presence for o, share in inside)
+    urgency = noisy_or(o.urgency * share for o, share in inside)
+    return LaneComponents(
+        risk=corridor_risk(water.non_water, obstacle, urgency, water.uncertainty, config.advisor.risk),
         non_water=water.non_water,
         obstacle=obstacle,
         urgency=urgency,
@@ -160,6 +162,6 @@ def components(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, 
 
 
 def lane_span(lane: str, corridors: CorridorConfig) -> tuple[float, float]:
-    """Normalised x range of a corridor."""
+    """Range of x of a corridor, as fractions of the picture's width."""
     span: tuple[float, float] = getattr(corridors, lane)
     return span

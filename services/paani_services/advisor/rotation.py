@@ -1,6 +1,7 @@
-"""What the boat's own turning does to a picture: where a box goes, and what size it has as an angle. Pure.
+"""Ego-rotation compensation: where the boat's rotation moves a box, and its size as an angle. Pure.
 
-Identity and apparent motion alone use it: what a box weighs in a corridor never depends on it (I20).
+Pinhole model: rays through the corners of a box are rotated by the change of attitude between two pictures. Data
+association and apparent motion use it; the risk of a box never depends on it (I20).
 Body is x forward, y left, z up; positive pitch lowers the bow, positive roll lowers starboard.
 """
 
@@ -17,14 +18,14 @@ from paani.messages import BoxXyxy, Evidence, Odometry, RotationUse, TimeBase
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]  # by rows
-WIDEST_DEG = 170.0  # beyond it a flat picture is no pinhole's
-MIN_FORWARD = 0.05  # of a unit ray: what lies further aside is out of every picture
-MIN_SIDE = 1e-6
-ATTITUDES_KEPT = 16  # 1.6 s of steps at 10 Hz: longer than a picture is under way
+MAX_HFOV_DEG = 170.0  # a wider picture is no pinhole projection
+MIN_FORWARD = 0.05  # forward component of a unit ray; a ray with less is outside every picture
+MIN_SIDE = 1e-6  # of the picture, or radians; keeps logarithms finite
+MAX_ATTITUDES = 16  # 1.6 s of odometry at 10 Hz, longer than a picture takes to be processed
 
 
 class Lens(msgspec.Struct, frozen=True):
-    """A pinhole: focal lengths in picture widths and heights, and how far it looks down."""
+    """Pinhole camera: focal lengths in picture widths and heights, cosine and sine of its pitch downwards."""
 
     focal_x: float
     focal_y: float
@@ -33,7 +34,7 @@ class Lens(msgspec.Struct, frozen=True):
 
 
 class Attitude(msgspec.Struct, frozen=True):
-    """How the boat lay at one instant. Only attitudes of one `epoch` compare."""
+    """Attitude of the boat at one instant. Only attitudes of the same odometry `epoch` can be compared."""
 
     at_us: int
     epoch: int
@@ -43,24 +44,24 @@ class Attitude(msgspec.Struct, frozen=True):
     pitch_rad: float
 
 
-class View(NamedTuple):
-    """How one picture was taken, as far as known. `attitude` is known only where `lens` is."""
+class CameraView(NamedTuple):
+    """Lens and attitude that one picture was taken with, as far as known. `attitude` is known only where `lens` is."""
 
     use: RotationUse
     lens: Lens | None = None
     attitude: Attitude | None = None
 
 
-def lens_of(evidence: Evidence, config: Config) -> Lens | None:
-    """The camera's lens; None where its field of view is not known. Pixels are taken for square.
+def camera_lens(evidence: Evidence, config: Config) -> Lens | None:
+    """The lens of the camera that took the picture; None where its field of view is unknown. Pixels are square.
 
-    The simulator's camera is the eye; any other is what `calibration` says, a recording included.
+    A live simulated picture has the lens of `eye`; any other picture, recordings included, that of `calibration`.
     """
     if config.camera.source == "sim" and evidence.time_base is TimeBase.CAPTURE:
         hfov_deg, down_deg = config.eye.hfov_deg, config.eye.pitch_down_deg
     else:
         hfov_deg, down_deg = config.calibration.hfov_deg, config.calibration.pitch_down_deg
-    if not 0.0 < hfov_deg <= WIDEST_DEG or evidence.width_px < 1 or evidence.height_px < 1:
+    if not 0.0 < hfov_deg <= MAX_HFOV_DEG or evidence.width_px < 1 or evidence.height_px < 1:
         return None
     focal_x = 0.5 / portable.tan(0.5 * math.radians(hfov_deg))
     down_rad = math.radians(down_deg)
@@ -68,8 +69,8 @@ def lens_of(evidence: Evidence, config: Config) -> Lens | None:
     return Lens(focal_x, focal_y, portable.cos(down_rad), portable.sin(down_rad))
 
 
-def heard(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[Attitude, ...]:
-    """The attitudes, oldest first, with that of new, healthy odometry; another epoch begins again."""
+def append_attitude(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[Attitude, ...]:
+    """Append the attitude of new, healthy odometry, oldest first; odometry of another epoch replaces all."""
     if odometry is None or not odometry.healthy:
         return attitudes
     numbers = (odometry.yaw_rad, odometry.yaw_rate_radps, odometry.roll_rad, odometry.pitch_rad)
@@ -79,12 +80,12 @@ def heard(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[A
     if attitudes and attitudes[-1].epoch == new.epoch:
         if new.at_us <= attitudes[-1].at_us:
             return attitudes
-        return (*attitudes, new)[-ATTITUDES_KEPT:]
+        return (*attitudes, new)[-MAX_ATTITUDES:]
     return (new,)
 
 
 def attitude_at(attitudes: tuple[Attitude, ...], at_us: int, max_gap_s: float) -> Attitude | None:
-    """The attitude heard nearest to `at_us`, its yaw carried there at its rate; None if none is within `max_gap_s`."""
+    """The attitude nearest to `at_us`, its yaw extrapolated at its rate; None where none is within `max_gap_s`."""
     if not attitudes:
         return None
     nearest = min(attitudes, key=lambda a: abs(a.at_us - at_us))
@@ -94,24 +95,24 @@ def attitude_at(attitudes: tuple[Attitude, ...], at_us: int, max_gap_s: float) -
     return msgspec.structs.replace(nearest, at_us=at_us, yaw_rad=nearest.yaw_rad + nearest.yaw_rate_radps * ahead_s)
 
 
-def view_of(attitudes: tuple[Attitude, ...], evidence: Evidence, config: Config) -> View:
-    """Lens and attitude of a picture, as far as they are known and wanted."""
+def camera_view(attitudes: tuple[Attitude, ...], evidence: Evidence, config: Config) -> CameraView:
+    """Lens and attitude of a picture, as far as they are known and compensation is switched on."""
     motion = config.advisor.motion
     if not motion.compensate_rotation:
-        return View(RotationUse.OFF)
-    lens = lens_of(evidence, config)
+        return CameraView(RotationUse.OFF)
+    lens = camera_lens(evidence, config)
     if lens is None:
-        return View(RotationUse.UNKNOWN_LENS)
+        return CameraView(RotationUse.UNKNOWN_LENS)
     if evidence.time_base is not TimeBase.CAPTURE:
-        return View(RotationUse.RECORDING, lens)
+        return CameraView(RotationUse.RECORDING, lens)
     attitude = attitude_at(attitudes, evidence.source_us, motion.max_odometry_gap_s)
-    return View(RotationUse.NO_ODOMETRY if attitude is None else RotationUse.KNOWN, lens, attitude)
+    return CameraView(RotationUse.NO_ODOMETRY if attitude is None else RotationUse.KNOWN, lens, attitude)
 
 
-def expected(seen: Sequence[tuple[BoxXyxy, Attitude | None]], view: View) -> list[BoxXyxy | None]:
-    """Where the boat's rotation took boxes seen in these attitudes, cut to the picture; None for what left it.
+def predict_boxes(seen: Sequence[tuple[BoxXyxy, Attitude | None]], view: CameraView) -> list[BoxXyxy | None]:
+    """Predict where boxes seen from these attitudes are now, clipped to the picture; None for a box that left it.
 
-    A box is where it was when the rotation since is not known.
+    A box stays where it was where the rotation since then is not known.
     """
     lens, now = view.lens, view.attitude
     if lens is None or now is None:
@@ -124,13 +125,13 @@ def expected(seen: Sequence[tuple[BoxXyxy, Attitude | None]], view: View) -> lis
             places.append(box)
             continue
         if before not in turns:
-            turns[before] = _transposed_times(map_from_camera, _map_from_camera(before, lens))
-        places.append(_turned(box, turns[before], lens))
+            turns[before] = _relative_rotation(map_from_camera, _map_from_camera(before, lens))
+        places.append(_rotate_box(box, turns[before], lens))
     return places
 
 
-def log_size(box: BoxXyxy, lens: Lens | None) -> float:
-    """y = log sqrt(area) (I1); with a lens, of bearing times elevation [rad^2], which turning does not change."""
+def log_angular_size(box: BoxXyxy, lens: Lens | None) -> float:
+    """y = log sqrt(area) (I1); with a lens of bearing times elevation [rad^2], which rotation does not change."""
     if lens is None:
         return 0.5 * portable.log((box[2] - box[0]) * (box[3] - box[1]))
     x, y = 0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])
@@ -141,7 +142,7 @@ def log_size(box: BoxXyxy, lens: Lens | None) -> float:
 
 
 def _ray(x: float, y: float, lens: Lens) -> Vector:
-    """Direction of a normalised picture point in the body at rest; its length does not matter."""
+    """Direction of a normalised picture point in the level body frame, of any length."""
     up = (0.5 - y) / lens.focal_y
     return (
         lens.cos_down + lens.sin_down * up,
@@ -151,12 +152,12 @@ def _ray(x: float, y: float, lens: Lens) -> Vector:
 
 
 def _angle(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """From a to b, counter-clockwise [rad]."""
+    """Angle from a to b, counter-clockwise [rad]."""
     return portable.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
 
 
 def _map_from_camera(attitude: Attitude, lens: Lens) -> Matrix:
-    """The camera's axes (forward, left, up) as columns, in map axes: down, then roll, pitch and yaw."""
+    """Rotation from camera axes (forward, left, up) to map axes: camera pitch, then roll, pitch and yaw of the boat."""
     cy, sy = portable.cos(attitude.yaw_rad), portable.sin(attitude.yaw_rad)
     cp, sp = portable.cos(attitude.pitch_rad), portable.sin(attitude.pitch_rad)
     cr, sr = portable.cos(attitude.roll_rad), portable.sin(attitude.roll_rad)
@@ -170,7 +171,8 @@ def _map_from_camera(attitude: Attitude, lens: Lens) -> Matrix:
     return (east, north, up)
 
 
-def _transposed_times(a: Matrix, b: Matrix) -> Matrix:
+def _relative_rotation(a: Matrix, b: Matrix) -> Matrix:
+    """The product of the transpose of a and b: from the camera axes of b to those of a."""
     first, second, third = (
         (
             a[0][i] * b[0][0] + a[1][i] * b[1][0] + a[2][i] * b[2][0],
@@ -182,8 +184,8 @@ def _transposed_times(a: Matrix, b: Matrix) -> Matrix:
     return (first, second, third)
 
 
-def _turned(box: BoxXyxy, turn: Matrix, lens: Lens) -> BoxXyxy | None:
-    """The box around where its corners went, cut to the picture; None where a corner is no longer ahead."""
+def _rotate_box(box: BoxXyxy, turn: Matrix, lens: Lens) -> BoxXyxy | None:
+    """The box around the rotated corners, clipped to the picture; None where a corner is no longer ahead."""
     (a, b, c), (d, e, f), (g, h, i) = turn
     xs, ys = [], []
     for x in (box[0], box[2]):

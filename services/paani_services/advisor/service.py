@@ -8,12 +8,12 @@ from paani.bus import Bus, Stepper
 from paani.clock import Clock
 from paani.config import Config
 from paani.messages import Advisory
-from paani_services.advisor.advise import stale_at_us
+from paani_services.advisor.advise import evidence_expiry_us
 from paani_services.advisor.decide import DECIDER
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Advise on each new evidence at once, republish between, and stop the moment the evidence is too old."""
+    """Advise on each new evidence at once, republish in between, and advise STOP as soon as the evidence is too old."""
     stepper = Stepper(bus, clock, config, DECIDER)
     evidence = stepper.inboxes[keys.EVIDENCE.name]
     period_us = round(1e6 / config.advisor.rate_hz)
@@ -31,7 +31,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             if state.tuning.refused > refused:
                 bus.count_drop("refused_tuning")
             due_us = now_us + period_us
-            stale_us = stale_at_us(state.active, config)
+            stale_us = evidence_expiry_us(state.active, config)
             if stale_us is not None and now_us < stale_us:
                 due_us = min(due_us, stale_us)
             with contextlib.suppress(TimeoutError):

@@ -1,8 +1,8 @@
-"""Parameters tried beside those in force, and the two steps that put them there. Pure.
+"""Shadow tuning: proposed parameters run beside those in force, until an operator promotes them. Pure.
 
-The shadow sees the same evidence as the active policy and has its own memory; nothing it does reaches the advice.
-Parameters change only while the operator's fresh word is that the boat is not armed: to move by other rules takes an
-arming of its own. Nothing here outlives the process, so a restart is back at the configuration.
+The shadow is a second advisor with its own state that is given the same evidence; nothing it decides reaches the
+advisory. Parameters in force change only while a fresh arming message says that the boat is disarmed, so that moving by
+other rules takes an arming of its own. No parameters outlive the process: a restart returns to the configuration.
 """
 
 import functools
@@ -28,21 +28,21 @@ from paani.messages import (
 )
 from paani_services.advisor.advise import AdvisorState, advise
 
-RECENT = 8
-STILL = (Direction.STOP, Direction.NO_DATA)
+MAX_RECENT = 8  # disagreements that the report shows
+STANDING_DIRECTIONS = (Direction.STOP, Direction.NO_DATA)
 
 
-class Parameters(msgspec.Struct, frozen=True):
-    """The configuration with these changes; `proposal` is empty for the configuration itself."""
+class ParameterSet(msgspec.Struct, frozen=True):
+    """The configuration with some changes; `proposal` is empty for the configuration itself."""
 
     proposal: str = ""
     changes: tuple[Change, ...] = ()
 
 
-class Trial(msgspec.Struct, frozen=True):
-    """What is tried, the memory of its own that it judges with, and how it has differed so far."""
+class ShadowTrial(msgspec.Struct, frozen=True):
+    """One proposal under trial: its parameters, its own advisor state, and its disagreements so far."""
 
-    parameters: Parameters
+    parameters: ParameterSet
     since_us: int
     state: AdvisorState
     frames: int = 0
@@ -52,8 +52,8 @@ class Trial(msgspec.Struct, frozen=True):
     recent: tuple[Disagreement, ...] = ()
 
 
-class Answer(msgspec.Struct, frozen=True):
-    """The last request that was heeded, and what came of it."""
+class RequestResult(msgspec.Struct, frozen=True):
+    """The last request that was handled, and its refusal if it was refused."""
 
     epoch: int = 0
     request: int = 0
@@ -62,41 +62,41 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 class TuningState(msgspec.Struct, frozen=True):
-    """What is in force, what a rollback returns to, what is tried; `refused` counts since the start."""
+    """Parameters in force, those a rollback returns to, the proposal under trial; `refused` counts since the start."""
 
-    active: Parameters = Parameters()
-    previous: Parameters | None = None
-    trial: Trial | None = None
-    answer: Answer = Answer()
+    active: ParameterSet = ParameterSet()
+    previous: ParameterSet | None = None
+    trial: ShadowTrial | None = None
+    answer: RequestResult = RequestResult()
     refused: int = 0
 
 
-def tuned(config: Config, parameters: Parameters) -> Config:
-    """The configuration to judge by; unchanged where it contradicts the changes, as other settings in a replay may."""
+def tuned_config(config: Config, parameters: ParameterSet) -> Config:
+    """The configuration with the parameters applied; unchanged where both contradict, as in a replay with settings."""
     if not parameters.changes:
         return config
     judged = _advisor_config(config, parameters.changes)
     return config if judged is None else msgspec.structs.replace(config, advisor=judged)
 
 
-def heed(
+def apply_request(
     state: TuningState, memory: AdvisorState, request: Tuning | None, arming: Input, now_us: int, config: Config
 ) -> tuple[TuningState, AdvisorState]:
-    """Obey or refuse a request that is new; also the memory that the active policy goes on with.
+    """Obey or refuse a new request; also returns the state that the active advisor continues with.
 
-    A request is known by its epoch and number, so that its repeats do nothing. A promoted trial keeps its own memory.
+    A request is identified by its epoch and number, so that its repeats do nothing. A promoted trial keeps its state.
     """
     if request is None or request.act is TuningAct.NONE or _is_known(state.answer, request):
         return state, memory
-    refusal, path = _refusal(state, request, arming, now_us, config)
-    answer = Answer(request.epoch, request.request, refusal, path)
+    refusal, path = _check_request(state, request, arming, now_us, config)
+    answer = RequestResult(request.epoch, request.request, refusal, path)
     if refusal is not TuningRefusal.NONE:
         return msgspec.structs.replace(state, answer=answer, refused=state.refused + 1), memory
     state = msgspec.structs.replace(state, answer=answer)
     trial = state.trial
     if request.act is TuningAct.PROPOSE:
-        proposed = Parameters(request.proposal, _merged(state.active.changes, request.changes))
-        return msgspec.structs.replace(state, trial=Trial(proposed, now_us, memory)), memory
+        proposed = ParameterSet(request.proposal, _merge_changes(state.active.changes, request.changes))
+        return msgspec.structs.replace(state, trial=ShadowTrial(proposed, now_us, memory)), memory
     if trial is not None and trial.parameters.proposal == request.proposal:
         if request.act is TuningAct.ROLLBACK:
             return msgspec.structs.replace(state, trial=None), memory
@@ -106,7 +106,7 @@ def heed(
     return msgspec.structs.replace(state, active=state.previous, previous=None, trial=None), memory
 
 
-def try_beside(
+def step_shadow(
     state: TuningState,
     before: AdvisorState,
     after: AdvisorState,
@@ -116,24 +116,24 @@ def try_beside(
     config: Config,
     odometry: Odometry | None = None,
 ) -> TuningState:
-    """Let the trial judge the same evidence, and compare where the active policy took in a distinct frame.
+    """Run the proposal under trial on the same evidence, and compare it where the active advisor took a new frame.
 
-    before, after: the active policy's memory around its own step, which gave `advisory`.
+    before, after: the active advisor's state before and after its own step, which gave `advisory`.
     """
     trial = state.trial
     if trial is None:
         return state
-    memory, shadow, _ = advise(trial.state, evidence, now_us, tuned(config, trial.parameters), odometry)
+    memory, shadow, _ = advise(trial.state, evidence, now_us, tuned_config(config, trial.parameters), odometry)
     trial = msgspec.structs.replace(trial, state=memory)
-    if after.evidence is not None and _frame(after.evidence) != _frame(before.evidence):
-        trial = _compared(trial, advisory, shadow)
+    if after.evidence is not None and _frame_id(after.evidence) != _frame_id(before.evidence):
+        trial = _count_disagreement(trial, advisory, shadow)
     return msgspec.structs.replace(state, trial=trial)
 
 
-def report(state: TuningState, now_us: int, config: Config) -> Shadow:
-    """The state of affairs, for the bus."""
+def shadow_report(state: TuningState, now_us: int, config: Config) -> Shadow:
+    """The state of the tuning as a message."""
     trial, answer = state.trial, state.answer
-    said = Shadow(
+    message = Shadow(
         source_us=now_us,
         answered_epoch=answer.epoch,
         answered=answer.request,
@@ -146,9 +146,9 @@ def report(state: TuningState, now_us: int, config: Config) -> Shadow:
         frames_needed=config.advisor.tuning.min_frames,
     )
     if trial is None:
-        return said
+        return message
     return msgspec.structs.replace(
-        said,
+        message,
         proposal=trial.parameters.proposal,
         changes=trial.parameters.changes,
         proposed_us=trial.since_us,
@@ -161,26 +161,26 @@ def report(state: TuningState, now_us: int, config: Config) -> Shadow:
     )
 
 
-def _is_known(answer: Answer, request: Tuning) -> bool:
+def _is_known(answer: RequestResult, request: Tuning) -> bool:
     return (request.epoch, request.request) <= (answer.epoch, answer.request)
 
 
-def _refusal(
+def _check_request(
     state: TuningState, request: Tuning, arming: Input, now_us: int, config: Config
 ) -> tuple[TuningRefusal, str]:
-    """Why a request cannot be obeyed, with the setting at fault; NONE when it can."""
+    """Why a request is refused, with the setting at fault; NONE where it is obeyed."""
     if request.act is TuningAct.PROPOSE:
-        return _unfit(_merged(state.active.changes, request.changes), request, config)
+        return _check_proposal(_merge_changes(state.active.changes, request.changes), request, config)
     limits, trial = config.advisor.tuning, state.trial
-    tried = trial is not None and trial.parameters.proposal == request.proposal
-    undoes = request.act is TuningAct.ROLLBACK and state.previous is not None
-    in_force = undoes and state.active.proposal == request.proposal
+    is_trial = trial is not None and trial.parameters.proposal == request.proposal
+    is_undo = request.act is TuningAct.ROLLBACK and state.previous is not None
+    in_force = is_undo and state.active.proposal == request.proposal
     if (now_us - request.source_us) * 1e-6 > limits.max_request_age_s:
         return TuningRefusal.STALE_REQUEST, ""
-    if not (tried or in_force):
+    if not (is_trial or in_force):
         return TuningRefusal.NOT_CURRENT, ""
-    if request.act is TuningAct.ROLLBACK and tried:
-        return TuningRefusal.NONE, ""  # nothing in force changes
+    if request.act is TuningAct.ROLLBACK and is_trial:
+        return TuningRefusal.NONE, ""  # no parameter in force changes
     if trial is not None and request.act is TuningAct.PROMOTE:
         if not 0.0 <= (now_us - trial.since_us) * 1e-6 <= limits.max_proposal_age_s:
             return TuningRefusal.STALE_PROPOSAL, ""
@@ -191,7 +191,8 @@ def _refusal(
     return (TuningRefusal.ARMED if arming.message.armed else TuningRefusal.NONE), ""
 
 
-def _unfit(merged: tuple[Change, ...], request: Tuning, config: Config) -> tuple[TuningRefusal, str]:
+def _check_proposal(merged: tuple[Change, ...], request: Tuning, config: Config) -> tuple[TuningRefusal, str]:
+    """Why a proposal is refused, with the setting at fault; NONE where it can be tried."""
     if not request.changes or not request.proposal:
         return TuningRefusal.EMPTY, ""
     paths = [change.path for change in request.changes]
@@ -206,22 +207,22 @@ def _unfit(merged: tuple[Change, ...], request: Tuning, config: Config) -> tuple
     return TuningRefusal.INVALID_VALUE, next(alone, paths[0])
 
 
-def _merged(before: tuple[Change, ...], after: tuple[Change, ...]) -> tuple[Change, ...]:
-    """The later value of a setting replaces the earlier."""
+def _merge_changes(before: tuple[Change, ...], after: tuple[Change, ...]) -> tuple[Change, ...]:
+    """Merge two lists of changes, sorted by path; the later value of a setting replaces the earlier."""
     values = {change.path: change for change in (*before, *after)}
     return tuple(values[path] for path in sorted(values))
 
 
 @functools.lru_cache(maxsize=8)
 def _advisor_config(config: Config, changes: tuple[Change, ...]) -> AdvisorConfig | None:
-    """None where the changes are out of range or contradict the rest."""
+    """The advisor's settings with the changes; None where they are out of range or contradict the rest."""
     try:
         return with_settings(config, [f"{change.path}={change.value}" for change in changes]).advisor
     except UserError:
         return None
 
 
-def _compared(trial: Trial, active: Advisory, shadow: Advisory) -> Trial:
+def _count_disagreement(trial: ShadowTrial, active: Advisory, shadow: Advisory) -> ShadowTrial:
     trial = msgspec.structs.replace(trial, frames=trial.frames + 1)
     if active.direction is shadow.direction:
         return trial
@@ -234,15 +235,15 @@ def _compared(trial: Trial, active: Advisory, shadow: Advisory) -> Trial:
         shadow_direction=shadow.direction,
         shadow_reason=shadow.reason,
     )
-    active_still, shadow_still = active.direction in STILL, shadow.direction in STILL
+    active_still, shadow_still = active.direction in STANDING_DIRECTIONS, shadow.direction in STANDING_DIRECTIONS
     return msgspec.structs.replace(
         trial,
         differing=trial.differing + 1,
         moves_more=trial.moves_more + (active_still and not shadow_still),
         stops_more=trial.stops_more + (shadow_still and not active_still),
-        recent=(*trial.recent, differs)[-RECENT:],
+        recent=(*trial.recent, differs)[-MAX_RECENT:],
     )
 
 
-def _frame(evidence: Evidence | None) -> tuple[int, int] | None:
+def _frame_id(evidence: Evidence | None) -> tuple[int, int] | None:
     return None if evidence is None else (evidence.frame_epoch, evidence.frame_seq)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config
 from paani_services.advisor.policy import Decision, PolicyState, decide
-from paani_services.advisor.risk import LANES, Obstacle, components, severity
+from paani_services.advisor.risk import LANES, Obstacle, lane_components, severity
 
 SIZES = (0.02, 0.08, 0.15, 0.3, 0.6)
 
@@ -23,7 +23,7 @@ class Scene(msgspec.Struct, frozen=True):
     obstacles: tuple[Obstacle, ...]
 
     def decided(self, config: Config) -> Decision:
-        lanes = {lane: components(self.water[lane], self.obstacles, lane, config) for lane in LANES}
+        lanes = {lane: lane_components(self.water[lane], self.obstacles, lane, config) for lane in LANES}
         return decide(self.state, lanes, self.obstacles, config)[1]
 
 
@@ -42,7 +42,7 @@ def scene(seed: int, tracks: int) -> Scene:
             turn=rng.choice((None, *m.SIDE_OF)),
             clear_frames=rng.randrange(3),
             blocked=(rng.random() < 0.3, rng.random() < 0.3, rng.random() < 0.3),
-            shut_frames=random.Random(~seed).choice((0, 39, 40, 41)),
+            no_way_frames=random.Random(~seed).choice((0, 39, 40, 41)),
         ),
         water=water,
         obstacles=tuple(_obstacle(rng, number) for number in rng.sample(range(1, 100), tracks)),
@@ -56,12 +56,12 @@ def _obstacle(rng: random.Random, number: int) -> Obstacle:
     box = (x1, y1, x1 + width, y1 + height)
     return Obstacle(
         id=number,
-        craft=rng.random() < 0.4,
+        is_vessel=rng.random() < 0.4,
         box=box,
         severity=severity(rng.choice((0.41, 0.6, 0.9)), box),
         urgency=rng.choice((0.0, 0.0, 0.5, 1.0)),
         presence=rng.choice((1.0, 1.0, 0.7, 0.3)),
-        danger=box[3] >= 0.65 and width * height >= 0.02,
+        is_danger=box[3] >= 0.65 and width * height >= 0.02,
     )
 
 

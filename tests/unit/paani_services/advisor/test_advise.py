@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani_services.advisor.advise import AdvisorState, advise, stale_at_us
+from paani_services.advisor.advise import AdvisorState, advise, evidence_expiry_us
 from tests.unit.paani_services.advisor.advisor_evidence import (
     BUOY_AHEAD,
     CLEAR,
@@ -34,7 +34,7 @@ def at(evidence: m.Evidence, age_s: float, config: Any = PAANI) -> m.Advisory:
 
 
 def test_nothing_yet_is_no_data() -> None:
-    """J15, resolution 19."""
+    """J15: no evidence at all is NO_DATA, never STRAIGHT."""
     _, advisory, tracks = advise(AdvisorState(), None, T0_US, PAANI)
     assert (advisory.direction, advisory.reason) == (D.NO_DATA, R.NO_EVIDENCE)
     assert tracks.tracks == ()
@@ -84,7 +84,7 @@ def test_republishing_keeps_the_date_and_the_decision_then_stops() -> None:
         assert (again.source_us, again.frame_seq, again.direction) == (first.source_us, first.frame_seq, D.LEFT)
         assert again.center == first.center
         assert tracks_again == tracks
-    stale_us = stale_at_us(state, PAANI)
+    stale_us = evidence_expiry_us(state, PAANI)
     assert stale_us == T0_US + 600_001
     _, late, _ = advise(state, state.evidence, stale_us, PAANI)
     assert (late.direction, late.reason, late.source_us) == (D.STOP, R.STALE_EVIDENCE, T0_US)

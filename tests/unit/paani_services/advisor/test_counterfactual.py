@@ -13,9 +13,9 @@ from paani import messages as m
 from paani.config import Config, load_config
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.advisor.counterfactual import CLEAR_WATER, counterfactual, nearest_limit
-from paani_services.advisor.explanation import explain
+from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.policy import PolicyState, decide
-from paani_services.advisor.risk import LANES, components
+from paani_services.advisor.risk import LANES, lane_components
 from tests.unit.paani_services.advisor.advisor_evidence import (
     CALIBRATED,
     CLEAR,
@@ -109,7 +109,7 @@ def test_the_sets_are_exact_in_crowded_scenes(seed: int, tracks: int, size: int)
 def test_what_overlaps_no_corridor_is_left_out_without_loss(given_scene: Scene, number: int, x1: float) -> None:
     """A track beside every corridor changes no direction, alone or taken away with others."""
     beside = msgspec.structs.replace(
-        scene(1, 1).obstacles[0], id=number, box=(x1, 0.3, 0.03, 1.0), severity=1.0, presence=1.0, danger=True
+        scene(1, 1).obstacles[0], id=number, box=(x1, 0.3, 0.03, 1.0), severity=1.0, presence=1.0, is_danger=True
     )
     more = msgspec.structs.replace(given_scene, obstacles=(beside, *given_scene.obstacles))
     assert more.decided(PAANI) == given_scene.decided(PAANI)
@@ -127,7 +127,7 @@ def test_crossing_the_nearest_limit_changes_the_direction(given_scene: Scene, co
     if limit not in {m.Limit.CENTER_RISK, m.Limit.LEFT_RISK, m.Limit.RIGHT_RISK}:
         return
     name = limit.value.removesuffix("_risk")
-    parts = {each: components(given_scene.water[each], given_scene.obstacles, each, config) for each in LANES}
+    parts = {each: lane_components(given_scene.water[each], given_scene.obstacles, each, config) for each in LANES}
     moved = parts[name].risk - margin + (-1e-9 if margin >= 0.0 else 1e-9)
     parts[name] = msgspec.structs.replace(parts[name], risk=moved)
     patient = msgspec.structs.replace(given_scene.state, clear_frames=10_000)
@@ -274,6 +274,6 @@ def test_the_longest_explanation_fits_the_message() -> None:
         ),
     )  # fmt: skip
     for reason in R:
-        said = explain(msgspec.structs.replace(advisory, reason=reason), ())
+        said = explain_advisory(msgspec.structs.replace(advisory, reason=reason), ())
         assert len(said) <= 400
         assert said.endswith(".")

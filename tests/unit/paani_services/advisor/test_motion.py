@@ -14,9 +14,16 @@ from paani import messages as m
 from paani.config import Config, MotionConfig, load_config
 from paani.errors import UserError
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe, window_for
-from paani_services.advisor.rotation import ATTITUDES_KEPT
-from paani_services.advisor.tracker import PERIODS_KEPT
+from paani_services.advisor.motion import (
+    MotionHistory,
+    SizeMeasurement,
+    Window,
+    add_measurement,
+    estimate_motion,
+    motion_window,
+)
+from paani_services.advisor.rotation import MAX_ATTITUDES
+from paani_services.advisor.tracker import MAX_PERIODS
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing
 
 pytestmark = pytest.mark.slow
@@ -36,13 +43,13 @@ def growing(rate_per_s: float, n: int, period_s: float) -> list[m.Evidence]:
 
 
 def test_the_window_follows_the_period() -> None:
-    """Resolution 2: at least six periods of history and gaps of two and a half."""
+    """At least six frame periods of history, and gaps of two and a half."""
     config = MotionConfig()
-    assert window_for(0.2, config) == Window(3.0, 0.75)
-    assert window_for(1.0, config) == Window(6.0, 2.5)
-    assert window_for(2.0, config) == Window(12.0, 5.0)
+    assert motion_window(0.2, config) == Window(3.0, 0.75)
+    assert motion_window(1.0, config) == Window(6.0, 2.5)
+    assert motion_window(2.0, config) == Window(12.0, 5.0)
     paper = PAPER.advisor.motion
-    assert [window_for(period_s, paper) for period_s in (0.2, 2.0)] == [Window(1.5, 0.75)] * 2  # I5, I16
+    assert [motion_window(period_s, paper) for period_s in (0.2, 2.0)] == [Window(1.5, 0.75)] * 2  # I5, I16
 
 
 @pytest.mark.parametrize("rate_hz", [0.5, 1.0, 2.0, 4.0, 5.0, 10.0])
@@ -76,8 +83,8 @@ def test_h5_what_is_held_is_known_no_longer_than_the_gap() -> None:
     assert states[15:] == [(S.UNKNOWN, C.GAP)] * 3
 
 
-def test_i13_a_shape_is_believed_when_it_was_seen_twice() -> None:
-    """`paani` leaves one odd box out of the motion and begins again at the second; `paper` at the first."""
+def test_i13_a_new_shape_counts_from_its_second_sighting() -> None:
+    """`paani` leaves one box of another shape out and begins again at the second; `paper` at the first."""
     usual, odd = seeing(box(BUOY, square(0.1))), seeing(box(BUOY, square(0.1, 2.0)))
     _, _, tracks = play([*[usual] * 6, odd, usual, odd, odd])
     assert [frame.tracks[0].motion_cause for frame in tracks[5:]] == [C.NONE] * 4 + [C.SHAPE_CHANGE]
@@ -88,12 +95,12 @@ def test_i13_a_shape_is_believed_when_it_was_seen_twice() -> None:
 def test_a_cause_does_not_outlive_its_samples() -> None:
     """Once known again, an old reset no longer explains a later lack of samples."""
     config, window = MotionConfig(), Window(3.0, 0.75)
-    history = MotionHistory(reset=C.CLIPPED_BY_FRAME)
+    history = MotionHistory(reset_cause=C.CLIPPED_BY_FRAME)
     for i in range(5):
-        assert estimate(history, i * 200_000, window, config).cause is C.CLIPPED_BY_FRAME
-        history = observe(history, Sighting(i * 200_000, square(0.1), -2.0, 0.8, False), window, config)
-    assert history.reset is C.NONE
-    assert estimate(history, 800_000, window, config).cause is C.NONE
+        assert estimate_motion(history, i * 200_000, window, config).cause is C.CLIPPED_BY_FRAME
+        history = add_measurement(history, SizeMeasurement(i * 200_000, square(0.1), -2.0, 0.8, False), window, config)
+    assert history.reset_cause is C.NONE
+    assert estimate_motion(history, 800_000, window, config).cause is C.NONE
 
 
 def test_a_slope_needs_a_spread() -> None:
@@ -101,8 +108,8 @@ def test_a_slope_needs_a_spread() -> None:
         load_config(sets=["advisor.motion.min_samples=2"])
 
 
-SIGHTING = st.builds(
-    Sighting,
+MEASUREMENT = st.builds(
+    SizeMeasurement,
     st.integers(0, 20_000_000),
     st.tuples(st.floats(0.0, 0.45), st.floats(0.0, 0.45), st.floats(0.46, 1.0), st.floats(0.46, 1.0)),
     st.floats(-30.0, 1.0),
@@ -113,17 +120,19 @@ WINDOWS = st.builds(Window, st.floats(0.5, 20.0), st.floats(0.1, 6.0))
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.lists(SIGHTING, max_size=60), WINDOWS, st.booleans())
-def test_unknown_has_a_cause_and_only_unknown(sightings: list[Sighting], window: Window, in_order: bool) -> None:
+@given(st.lists(MEASUREMENT, max_size=60), WINDOWS, st.booleans())
+def test_unknown_has_a_cause_and_only_unknown(
+    measurements: list[SizeMeasurement], window: Window, in_order: bool
+) -> None:
     """Every `unknown` has its cause; at most 24 samples within the window; the confidence stays within its cap."""
     config, history = MotionConfig(), MotionHistory()
-    for sighting in sorted(sightings) if in_order else sightings:
-        history = observe(history, sighting, window, config)
-        found = estimate(history, sighting.at_us, window, config)
+    for measurement in sorted(measurements) if in_order else measurements:
+        history = add_measurement(history, measurement, window, config)
+        found = estimate_motion(history, measurement.at_us, window, config)
         assert (found.state is S.UNKNOWN) == (found.cause is not C.NONE)
         assert 0.0 <= found.confidence <= config.max_confidence
         assert len(history.samples) <= config.max_samples
-        assert len(history.odd) < config.shape_change_hits
+        assert len(history.outliers) < config.shape_change_hits
         if history.samples:
             assert history.samples[-1].at_us - history.samples[0].at_us <= window.history_s * 1e6 + 1
 
@@ -213,15 +222,15 @@ def moments(of_box: st.SearchStrategy[float], of_boat: st.SearchStrategy[float])
     return st.lists(st.tuples(frame, odometry), max_size=12)
 
 
-def hear(frames: list[tuple[m.Evidence, m.Odometry | None]], config: Config) -> AdvisorState:
+def advise_all(frames: list[tuple[m.Evidence, m.Odometry | None]], config: Config) -> AdvisorState:
     """The state after these frames, its bounds kept; what is said on the way survives the wire."""
     state = AdvisorState()
     for frame, odometry in frames:
         state, _, tracks = advise(state, frame, frame.source_us, config, odometry)
         assert msgspec.json.decode(msgspec.json.encode(tracks), type=m.Tracks) == tracks
         assert len(state.tracker.tracks) <= config.advisor.tracker.max_tracks
-        assert len(state.tracker.periods_s) <= PERIODS_KEPT
-        assert len(state.tracker.attitudes) <= ATTITUDES_KEPT
+        assert len(state.tracker.periods_s) <= MAX_PERIODS
+        assert len(state.tracker.attitudes) <= MAX_ATTITUDES
     return state
 
 
@@ -229,14 +238,14 @@ def hear(frames: list[tuple[m.Evidence, m.Odometry | None]], config: Config) -> 
 @given(moments(ANY, ANY), st.sampled_from([PAANI, PAPER]))
 def test_no_box_no_time_and_no_odometry_is_too_bad(frames: list[Any], config: Config) -> None:
     """NaN, inverted, empty and outlying boxes, time and epochs in any order: bounded, and no exception."""
-    hear(frames, config)
+    advise_all(frames, config)
 
 
 @settings(max_examples=60, deadline=None)
 @given(moments(UNIT, FINITE), st.sampled_from([PAANI, PAPER]))
 def test_a_state_survives_json_exactly(frames: list[Any], config: Config) -> None:
     """Whatever the wire lets through: the ledger's state is the state."""
-    state = hear(frames, config)
+    state = advise_all(frames, config)
     assert msgspec.json.decode(msgspec.json.encode(state), type=AdvisorState) == state
 
 

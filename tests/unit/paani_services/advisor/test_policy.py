@@ -71,13 +71,13 @@ def test_v14_a_side_below_its_limit_may_still_be_occupied() -> None:
     ],
 )
 def test_thresholds_and_sides(risks: tuple[float, float, float], direction: m.Direction, reason: m.Reason) -> None:
-    """J5, J8, resolutions 13 and 14."""
+    """J5, J8: equality blocks; the side of lower risk; starboard where both differ by less than a tie."""
     _, advice, _ = play([water(*risks)])
     assert (advice[0].direction, advice[0].reason) == (direction, reason)
 
 
 def test_a_tie_keeps_the_side_in_progress() -> None:
-    """Resolution 13: left by risk first, then alike: still left, and the reason says so."""
+    """Left by risk first, then both sides alike: still left, and the reason says so."""
     _, advice, _ = play([water(0.30, 0.50, 0.40), water(0.40, 0.50, 0.39)])
     assert (advice[1].direction, advice[1].reason) == (D.LEFT, R.TIE_KEPT_SIDE)
 
@@ -96,7 +96,7 @@ def test_a_tie_resumes_the_side_after_a_stop() -> None:
     ],
 )
 def test_j9_edge_is_slight_and_core_is_full(xyxy: m.BoxXyxy, direction: m.Direction, reason: m.Reason) -> None:
-    """J9, resolution 12."""
+    """J9: an obstacle in an edge of the centre corridor is a slight turn, one in its core a full turn."""
     evidence = msgspec.structs.replace(
         CLEAR, left=lane(0.25), center=lane(0.30), right=lane(0.20), detections=(box(PIER, xyxy, 0.9),)
     )
@@ -108,7 +108,7 @@ def test_j9_edge_is_slight_and_core_is_full(xyxy: m.BoxXyxy, direction: m.Direct
 
 
 def test_an_edge_incursion_never_turns_towards_it() -> None:
-    """J8, J9: the way away is barred, so it stops though the near side has a low score."""
+    """J8, J9: the far side is blocked, so it stops although the near side has a low risk."""
     evidence = msgspec.structs.replace(
         CLEAR, center=lane(0.30), right=lane(0.65), detections=(box(PIER, (0.30, 0.30, 0.40, 0.62), 0.9),)
     )
@@ -153,10 +153,9 @@ def test_j6_immediate_danger_occupies_at_once() -> None:
 def test_a_quay_occupies_no_lane_that_shows_water_across_more_than_half(
     label: m.Label, clear: float, calibrated: bool, occupied: bool
 ) -> None:
-    """One that lies aslant fills a box down to its near end, across lanes of open water: its box's foot is not there.
+    """The box of an oblique quay reaches down to its near end, across lanes of open water where its foot is not.
 
-    More cases in which the boat moves: it had stood 248 s before an open canal (canal-51), and 228 s with a quay ahead
-    that left most of the port corridor free (canal-31).
+    Without this rule the boat stops before an open canal.
     """
     quay = box(label, (0.31, 0.3, 1.0, 0.8))
     water = msgspec.structs.replace(lane(0.05), clear_width=clear)
@@ -171,13 +170,12 @@ HULLS = (box(VESSEL, (0.02, 0.3, 0.36, 0.6), 0.9), box(VESSEL, (0.64, 0.3, 0.98,
 
 
 @pytest.mark.parametrize(("hulls", "calibrated", "stops"), [((), False, True), ((), True, False), (HULLS, True, True)])
-def test_a_planned_way_in_is_looked_for_where_sides_are_crowded(
+def test_a_side_is_blocked_later_where_the_metric_planner_acts(
     hulls: tuple[m.Detection, ...], calibrated: bool, stops: bool
 ) -> None:
-    """Where the metric planner finds out whether there is room, a side is blocked at 0.75.
+    """Where the metric planner judges whether there is room, a side is blocked at 0.75.
 
-    More cases in which the boat moves: hulls along a harbour make 0.57 to 0.66 of both sides with open water before
-    them, and it had lain there for good (harbour-55, harbour-63).
+    Hulls moored along a harbour make risks of 0.57 to 0.66 on both sides with open water between them.
     """
     side = murky(0.63)
     evidence = msgspec.structs.replace(CLEAR, center=lane(0.6), left=side, right=side, detections=hulls)
@@ -187,57 +185,54 @@ def test_a_planned_way_in_is_looked_for_where_sides_are_crowded(
 
 
 FANS = msgspec.structs.replace(load_config(profile="fans"), calibration=CALIBRATED.calibration)
-DRY = water(0.55, 0.65, 0.70)
-SHUT_IN = msgspec.structs.replace(DRY, center=murky(0.6))
+NO_WATER = water(0.55, 0.65, 0.70)
+BLOCKED_ALL_ROUND = msgspec.structs.replace(NO_WATER, center=murky(0.6))
 
 
 @pytest.mark.parametrize(
-    ("config", "frame", "looks"),
+    ("config", "frame", "searches"),
     [
-        (CALIBRATED, SHUT_IN, True),
-        (CALIBRATED, DRY, False),  # no water anywhere: a covered lens may read so
-        (PAANI, SHUT_IN, False),  # no map of what stands beside the boat
-        (FANS, SHUT_IN, False),  # it cannot turn where it is
+        (CALIBRATED, BLOCKED_ALL_ROUND, True),
+        (CALIBRATED, NO_WATER, False),  # no water anywhere: a covered lens may read so
+        (PAANI, BLOCKED_ALL_ROUND, False),  # no map of what lies beside the boat
+        (FANS, BLOCKED_ALL_ROUND, False),  # it cannot turn on the spot
         (PAPER, water(0.6, 0.65, 0.65), False),  # J5
     ],
-    ids=["paani", "dry", "uncalibrated", "fans", "paper"],
+    ids=["paani", "no-water", "uncalibrated", "fans", "paper"],
 )
-def test_a_boat_that_is_shut_in_for_long_looks_for_a_way(config: Config, frame: m.Evidence, looks: bool) -> None:
-    """STOP for 40 frames, then a turn to the better side, and on to that, whatever the risks are, until a way is free.
+def test_after_forty_frames_without_a_free_side_the_boat_searches(
+    config: Config, frame: m.Evidence, searches: bool
+) -> None:
+    """STOP for 40 frames, then a turn to the better side, kept whatever the risks are until a side is free.
 
-    More cases in which the boat moves, though only round: before a hull it had lain for good with open water abeam
-    (harbour-73, lake-54). That it does not go ahead meanwhile is the navigator's.
+    It lets a boat before a hull find the open water abeam. The navigator sees to it that the boat only turns.
     """
     state, advice, _ = play([frame] * 60, config)
     assert [a.direction for a in advice[:40]] == [D.STOP] * 40
     assert {(a.direction, a.reason) for a in advice[40:]} == (
-        {(D.LEFT, R.NO_SIDE_FOR_LONG)} if looks else {(D.STOP, advice[0].reason)}
+        {(D.LEFT, R.NO_SIDE_FOR_LONG)} if searches else {(D.STOP, advice[0].reason)}
     )
     turned = msgspec.structs.replace(frame, left=frame.right, right=frame.left)
     state, after, _ = play([turned] * 3 + [CLEAR] * 3 + [frame], config, state=state, first_seq=60)
-    assert [a.direction for a in after[:3]] == [D.LEFT if looks else D.STOP] * 3
+    assert [a.direction for a in after[:3]] == [D.LEFT if searches else D.STOP] * 3
     assert after[5].direction is D.STRAIGHT
     assert after[6].direction is D.STOP  # anew
 
 
-def test_a_look_in_vain_is_followed_by_one_to_the_other_side() -> None:
-    """16 s to each side, however stuck what it sees is.
-
-    More cases in which the boat moves, though only round: it had lain before a wall for good, as it was advised to look
-    away from where its route led (canal-10).
-    """
-    state, advice, _ = play([SHUT_IN] * 360, CALIBRATED)
+def test_a_search_without_result_goes_on_to_the_other_side() -> None:
+    """16 s to each side, however little the picture changes."""
+    state, advice, _ = play([BLOCKED_ALL_ROUND] * 360, CALIBRATED)
     assert [a.direction for a in advice] == [D.STOP] * 40 + ([D.LEFT] * 80 + [D.RIGHT] * 80) * 2
     assert {a.reason for a in advice[40:]} == {R.NO_SIDE_FOR_LONG}
-    _, after, _ = play([CLEAR] * 3 + [SHUT_IN] * 40, CALIBRATED, state=state, first_seq=360)
+    _, after, _ = play([CLEAR] * 3 + [BLOCKED_ALL_ROUND] * 40, CALIBRATED, state=state, first_seq=360)
     assert {a.direction for a in after[3:]} == {D.STOP}  # anew
 
 
-def test_one_frame_without_water_is_no_way_to_look_for() -> None:
-    """However long it has looked: STOP, and it waits anew."""
-    state, advice, _ = play([SHUT_IN] * 45, CALIBRATED)
+def test_a_frame_without_water_ends_the_search() -> None:
+    """STOP however long it has searched, and it waits anew."""
+    state, advice, _ = play([BLOCKED_ALL_ROUND] * 45, CALIBRATED)
     assert advice[-1].reason is R.NO_SIDE_FOR_LONG
-    _, after, _ = play([DRY, *[SHUT_IN] * 39], CALIBRATED, state=state, first_seq=45)
+    _, after, _ = play([NO_WATER, *[BLOCKED_ALL_ROUND] * 39], CALIBRATED, state=state, first_seq=45)
     assert {a.direction for a in after} == {D.STOP}
 
 
@@ -284,13 +279,13 @@ def test_j10_an_unusable_frame_is_no_clear_frame() -> None:
     assert [a.direction for a in advice] == [D.LEFT, D.LEFT, D.STOP, D.LEFT, D.STRAIGHT]
 
 
-def test_j10_a_turn_is_not_kept_into_a_barred_side() -> None:
+def test_j10_a_turn_is_not_kept_into_a_blocked_side() -> None:
     _, advice, _ = play([water(0.05, 0.50, 0.30), water(0.65, 0.05, 0.05)])
     assert advice[1].direction is D.STRAIGHT
 
 
 def test_a_hidden_obstacle_fades_in_paani_and_stays_in_paper() -> None:
-    """G3, G11: held tracks stay listed; what they weigh while unseen is a setting."""
+    """G3, G11: held tracks stay listed; how fast their weight decays while unseen is a setting."""
     ahead = box(PIER, (0.40, 0.35, 0.60, 0.64), 0.9)
     frames = [seeing(ahead)] * 2 + [CLEAR] * 10
     _, fading, tracks = play(frames, PAANI)
@@ -303,8 +298,8 @@ def test_a_hidden_obstacle_fades_in_paani_and_stays_in_paper() -> None:
 @pytest.mark.parametrize("shown", [0.96, 1.0])
 def test_no_turn_into_a_lane_without_water(shown: float) -> None:
     """A beach from side to side, seen for certain, is a risk of 0.55 in each lane, and no side's limit is that low."""
-    dry = m.LaneEvidence(non_water=shown, uncertainty=0.0, clear_width=1.0 - shown)
-    beach = msgspec.structs.replace(CLEAR, left=dry, center=dry, right=dry)
+    land = m.LaneEvidence(non_water=shown, uncertainty=0.0, clear_width=1.0 - shown)
+    beach = msgspec.structs.replace(CLEAR, left=land, center=land, right=land)
     _, advice, _ = play([beach])
     assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SAFE_SIDE)
     _, advice, _ = play([msgspec.structs.replace(beach, left=lane(0.4))])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import CalibrationConfig, Config, EyeConfig, RiskConfig, calibration_of, load_config
 from paani.messages import BoxXyxy
-from paani_services.advisor.risk import either, overlap, relevance, severity, total
+from paani_services.advisor.risk import corridor_risk, noisy_or, overlap, range_weight, severity
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, box, play, seeing
 
 UNIT = st.floats(0.0, 1.0)
@@ -23,9 +23,9 @@ BOX = st.tuples(UNIT, UNIT, UNIT, UNIT).map(
 
 def test_j4_by_hand() -> None:
     """J4: 0.55*0.2 + 0.65*0.3 + 0.20*0.4 + 0.15*0.5 = 0.11 + 0.195 + 0.08 + 0.075 = 0.46."""
-    assert total(0.2, 0.3, 0.4, 0.5, RiskConfig()) == pytest.approx(0.46, abs=1e-12)
-    assert total(1.0, 1.0, 1.0, 1.0, RiskConfig()) == 1.0
-    assert total(0.0, 0.0, 0.0, 0.0, RiskConfig()) == 0.0
+    assert corridor_risk(0.2, 0.3, 0.4, 0.5, RiskConfig()) == pytest.approx(0.46, abs=1e-12)
+    assert corridor_risk(1.0, 1.0, 1.0, 1.0, RiskConfig()) == 1.0
+    assert corridor_risk(0.0, 0.0, 0.0, 0.0, RiskConfig()) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -62,13 +62,13 @@ def test_j2_overlap_is_the_share_of_the_box() -> None:
 
 def test_j3_combination() -> None:
     """J3: E(0.5, 0.4) = 1 - 0.5*0.6 = 0.7."""
-    assert either([0.5, 0.4]) == pytest.approx(0.7)
-    assert either([]) == 0.0
+    assert noisy_or([0.5, 0.4]) == pytest.approx(0.7)
+    assert noisy_or([]) == 0.0
 
 
 @given(st.lists(UNIT, max_size=8), UNIT)
 def test_combination_is_bounded_and_only_grows(values: list[float], more: float) -> None:
-    assert 0.0 <= either(values) <= either([*values, more]) + 1e-12 <= 1.0 + 1e-12
+    assert 0.0 <= noisy_or(values) <= noisy_or([*values, more]) + 1e-12 <= 1.0 + 1e-12
 
 
 def test_a_detection_reaches_only_the_lanes_it_overlaps() -> None:
@@ -125,13 +125,15 @@ def test_what_is_far_counts_less_and_only_where_the_camera_is_calibrated() -> No
     """A harbour's worth of moored boats on the horizon is no reason to stop; without a calibration it still is."""
     weights, known = RiskConfig(), calibration_of(EyeConfig())
     aspect = EyeConfig().width_px / EyeConfig().height_px
-    weigh = [relevance(box_at(range_m), aspect, known, weights) for range_m in (2.0, 5.0, 9.0, 12.0, 15.0, 19.0, 25.0)]
+    weigh = [
+        range_weight(box_at(range_m), aspect, known, weights) for range_m in (2.0, 5.0, 9.0, 12.0, 15.0, 19.0, 25.0)
+    ]
     assert weigh == sorted(weigh, reverse=True)
     assert weigh[:3] == [1.0, 1.0, 1.0]
     assert 0.0 < weigh[4] < 1.0
     assert weigh[-1] == 0.0
-    assert relevance(box_at(25.0), aspect, CalibrationConfig(), weights) == 1.0
-    assert relevance(box_at(25.0), aspect, known, RiskConfig(far_m=0.0)) == 1.0
+    assert range_weight(box_at(25.0), aspect, CalibrationConfig(), weights) == 1.0
+    assert range_weight(box_at(25.0), aspect, known, RiskConfig(far_m=0.0)) == 1.0
 
 
 def test_what_is_left_out_cannot_be_reached_before_the_next_advice() -> None:

@@ -18,15 +18,15 @@ from paani.geometry import wrap_rad
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.advisor.decide import DECIDER
 from paani_services.advisor.rotation import (
-    ATTITUDES_KEPT,
+    MAX_ATTITUDES,
     Attitude,
-    View,
+    CameraView,
+    append_attitude,
     attitude_at,
-    expected,
-    heard,
-    lens_of,
-    log_size,
-    view_of,
+    camera_lens,
+    camera_view,
+    log_angular_size,
+    predict_boxes,
 )
 from paani_services.advisor.tracker import is_accepted
 from paani_sim.eye.camera import BoatPose, Camera, project
@@ -34,7 +34,7 @@ from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, PAANI, PAP
 
 U = m.RotationUse
 OFF = load_config(sets=["advisor.motion.compensate_rotation=false"])
-LENS = lens_of(CLEAR, PAANI)
+LENS = camera_lens(CLEAR, PAANI)
 BUOY_M = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (0.0, 0.9)])
 
 
@@ -66,13 +66,13 @@ def test_the_eye_states_the_lens_of_simulated_pictures_alone() -> None:
         load_config(sets=["camera.source=webcam"]),
         load_config(sets=["camera.source=webcam", "calibration.hfov_deg=60"]),
     )
-    assert lens_of(recording, PAANI) is None
-    assert lens_of(CLEAR, webcam) is None
-    found = lens_of(CLEAR, known)
+    assert camera_lens(recording, PAANI) is None
+    assert camera_lens(CLEAR, webcam) is None
+    found = camera_lens(CLEAR, known)
     assert found is not None
     assert found.focal_x == pytest.approx(0.5 / math.tan(math.radians(30.0)))
-    assert lens_of(CLEAR, load_config(sets=["eye.hfov_deg=200"])) is None
-    assert lens_of(msgspec.structs.replace(CLEAR, height_px=0), PAANI) is None
+    assert camera_lens(CLEAR, load_config(sets=["eye.hfov_deg=200"])) is None
+    assert camera_lens(msgspec.structs.replace(CLEAR, height_px=0), PAANI) is None
 
 
 @pytest.mark.parametrize("yaw_rad", [-0.5, -0.25, 0.0, 0.25, 0.5])
@@ -82,18 +82,18 @@ def test_a_turn_does_not_change_the_size(yaw_rad: float, down_deg: float, off: f
 
     What is left is the box around things that seem to lean, in a camera that looks down.
     """
-    lens = lens_of(CLEAR, load_config(sets=[f"eye.pitch_down_deg={down_deg}"]))
+    lens = camera_lens(CLEAR, load_config(sets=[f"eye.pitch_down_deg={down_deg}"]))
     camera = Camera(down_deg=down_deg)
     ahead, aside = (seen_box(BoatPose(0.0, 0.0, yaw), (80.0, 0.0), 3.0, camera) for yaw in (0.0, yaw_rad))
-    assert log_size(aside, lens) == pytest.approx(log_size(ahead, lens), abs=off)
+    assert log_angular_size(aside, lens) == pytest.approx(log_angular_size(ahead, lens), abs=off)
     if abs(yaw_rad) == 0.5:
-        assert log_size(aside, None) > log_size(ahead, None) + 0.19
+        assert log_angular_size(aside, None) > log_angular_size(ahead, None) + 0.19
 
 
 def test_the_size_follows_the_range() -> None:
     """Half as far is twice the angle."""
     far, near = (seen_box(BoatPose(0.0, 0.0, 0.0), (x_m, 0.0)) for x_m in (16.55, 8.55))
-    assert log_size(near, LENS) - log_size(far, LENS) == pytest.approx(math.log(2.0), abs=0.03)
+    assert log_angular_size(near, LENS) - log_angular_size(far, LENS) == pytest.approx(math.log(2.0), abs=0.03)
 
 
 @settings(max_examples=100, deadline=None)
@@ -110,8 +110,8 @@ def test_turned_boxes_lie_where_the_camera_sees_them(
     at_m = (200.0 * math.cos(bearing), 200.0 * math.sin(bearing))
     then = seen_box(BoatPose(0.0, 0.0, 0.0, roll_rad=before_roll), at_m, 10.0)
     truth = seen_box(BoatPose(0.0, 0.0, yaw_rad, roll_rad=now_roll, pitch_rad=pitch_rad), at_m, 10.0)
-    view = View(U.KNOWN, LENS, attitude(yaw_rad, now_roll, pitch_rad))
-    (found,) = expected([(then, attitude(0.0, before_roll))], view)
+    view = CameraView(U.KNOWN, LENS, attitude(yaw_rad, now_roll, pitch_rad))
+    (found,) = predict_boxes([(then, attitude(0.0, before_roll))], view)
     if not all(0.02 < value < 0.98 for value in truth):
         return
     assert found is not None
@@ -119,23 +119,23 @@ def test_turned_boxes_lie_where_the_camera_sees_them(
 
 
 def test_what_turns_out_of_the_picture_has_no_place() -> None:
-    view = View(U.KNOWN, LENS, attitude(1.2))
+    view = CameraView(U.KNOWN, LENS, attitude(1.2))
     ahead, behind = ((0.4, 0.4, 0.5, 0.5), attitude()), ((0.4, 0.4, 0.5, 0.5), attitude(math.pi))
-    assert expected([ahead, behind], view) == [None, None]
+    assert predict_boxes([ahead, behind], view) == [None, None]
 
 
 def test_attitudes_of_different_epochs_do_not_compare() -> None:
-    view = View(U.KNOWN, LENS, attitude(0.3))
+    view = CameraView(U.KNOWN, LENS, attitude(0.3))
     seen = (0.4, 0.4, 0.5, 0.5)
-    assert expected([(seen, attitude(epoch=1)), (seen, None)], view) == [seen, seen]
-    assert expected([(seen, attitude())], View(U.NO_ODOMETRY, LENS)) == [seen]
+    assert predict_boxes([(seen, attitude(epoch=1)), (seen, None)], view) == [seen, seen]
+    assert predict_boxes([(seen, attitude())], CameraView(U.NO_ODOMETRY, LENS)) == [seen]
 
 
 def test_yaw_is_carried_to_the_capture_stamp() -> None:
     """The nearest odometry, at its rate; none within the limit is none."""
     attitudes: tuple[Attitude, ...] = ()
     for k in range(10):
-        attitudes = heard(attitudes, odometry(T0_US + k * 100_000, 0.05 * k, 0.5))
+        attitudes = append_attitude(attitudes, odometry(T0_US + k * 100_000, 0.05 * k, 0.5))
     found = attitude_at(attitudes, T0_US + 430_000, 0.3)
     assert found is not None
     assert found.at_us == T0_US + 430_000
@@ -147,8 +147,8 @@ def test_yaw_is_carried_to_the_capture_stamp() -> None:
     assert attitude_at((), T0_US, 0.3) is None
 
 
-def test_only_new_and_healthy_odometry_is_heard() -> None:
-    first = heard((), odometry(T0_US, 0.1))
+def test_only_new_and_healthy_odometry_is_kept() -> None:
+    first = append_attitude((), odometry(T0_US, 0.1))
     assert len(first) == 1
     for unfit in (
         None,
@@ -158,13 +158,13 @@ def test_only_new_and_healthy_odometry_is_heard() -> None:
         odometry(T0_US + 1, math.nan),
         odometry(T0_US + 1, 0.2, math.inf),
     ):
-        assert heard(first, unfit) is first
-    again = heard(first, odometry(T0_US - 5, 0.2, epoch=1))
+        assert append_attitude(first, unfit) is first
+    again = append_attitude(first, odometry(T0_US - 5, 0.2, epoch=1))
     assert [a.epoch for a in again] == [1]
     many: tuple[Attitude, ...] = first
     for k in range(100):
-        many = heard(many, odometry(T0_US + 1 + k, 0.1))
-    assert len(many) == ATTITUDES_KEPT
+        many = append_attitude(many, odometry(T0_US + 1 + k, 0.1))
+    assert len(many) == MAX_ATTITUDES
 
 
 @pytest.mark.parametrize(
@@ -185,12 +185,12 @@ def test_the_tracks_say_what_was_known_of_the_turning(
     frame = msgspec.structs.replace(CLEAR, time_base=time_base)
     _, _, tracks = advise(AdvisorState(), frame, T0_US, config, odometry(T0_US - round(age_s * 1e6), 0.0))
     assert tracks.rotation is use
-    state = heard((), odometry(T0_US - round(age_s * 1e6), 0.0))
-    assert (view_of(state, frame, config).attitude is not None) == (use is U.KNOWN)
+    state = append_attitude((), odometry(T0_US - round(age_s * 1e6), 0.0))
+    assert (camera_view(state, frame, config).attitude is not None) == (use is U.KNOWN)
 
 
-def test_the_decider_hears_odometry() -> None:
-    """What the ledger and a replay must know: odometry is an input of the step."""
+def test_odometry_is_an_input_of_the_decider() -> None:
+    """A replay gives the step the odometry that it was given."""
     assert keys.ODOMETRY in DECIDER.inputs
     heard_now = {topic.name: Input() for topic in DECIDER.inputs} | {keys.EVIDENCE.name: Input(CLEAR, T0_US)}
     for odometry_now, use in ((None, U.NO_ODOMETRY), (odometry(T0_US, 0.0), U.KNOWN)):

@@ -1,4 +1,4 @@
-"""What keeps the advice from dithering, and what must hold however the policy is tuned."""
+"""Hysteresis of the policy, and what must hold however the policy is tuned."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, load_config
 from paani.statistics.dithering import Dithering, dithering
-from paani_services.advisor.policy import OTHER, PolicyState, better_side, limit_of, side_held
-from paani_services.advisor.risk import LANES, components, severity
+from paani_services.advisor.policy import OPPOSITE_SIDE, PolicyState, held_side, lane_risk_limit, preferred_side
+from paani_services.advisor.risk import LANES, lane_components, severity
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, PAANI, PAPER, murky, play, water
 from tests.unit.paani_services.advisor.advisor_scenes import Scene, scene, scenes
 
@@ -29,7 +29,7 @@ MIRRORED = {
 
 
 def test_a_new_side_must_be_clearly_better() -> None:
-    """Resolution 13: `paper` follows every gain beyond a tie, `paani` a clear one."""
+    """`paper` follows every gain beyond a tie, `paani` a clear one."""
     frames = [water(0.30, 0.50, 0.40), water(0.40, 0.50, 0.30), water(0.50, 0.50, 0.34)]
     _, steady, _ = play(frames)
     _, abrupt, _ = play(frames, PAPER)
@@ -39,10 +39,10 @@ def test_a_new_side_must_be_clearly_better() -> None:
     assert [a.direction for a in abrupt] == [D.LEFT, D.RIGHT, D.RIGHT]
 
 
-def test_a_side_that_becomes_barred_is_left_at_once() -> None:
-    """J8: no margin holds a turn into a barred side."""
-    barred = msgspec.structs.replace(water(0.58, 0.50, 0.57), right=murky(0.57))
-    _, advice, _ = play([water(0.30, 0.50, 0.40), barred])
+def test_a_side_that_becomes_blocked_is_left_at_once() -> None:
+    """J8: no margin holds a turn into a blocked side."""
+    blocked = msgspec.structs.replace(water(0.58, 0.50, 0.57), right=murky(0.57))
+    _, advice, _ = play([water(0.30, 0.50, 0.40), blocked])
     assert [a.direction for a in advice] == [D.LEFT, D.RIGHT]
 
 
@@ -96,7 +96,7 @@ def test_one_more_obstacle_is_never_good_news(given_scene: Scene, seed: int, con
     """J3, J4: no risk falls, no lane comes free, no turn becomes STRAIGHT while the centre is blocked.
 
     A boat that stops keeps still, but for one case: an obstacle that reached in from one side, with the other side
-    barred, is no mere edge any more (J9), so that the near side may be taken if it is free.
+    blocked, is no mere edge any more (J9), so that the near side may be taken if it is free.
     """
     extra = msgspec.structs.replace(scene(seed, 1).obstacles[0], id=1000)
     more = msgspec.structs.replace(given_scene, obstacles=(*given_scene.obstacles, extra))
@@ -107,7 +107,7 @@ def test_one_more_obstacle_is_never_good_news(given_scene: Scene, seed: int, con
         assert 0.0 <= getattr(after, lane).risk <= 1.0
     if before.center.blocked:
         assert after.direction is not D.STRAIGHT
-    if before.direction is D.STOP and before.standing.incursion is None:
+    if before.direction is D.STOP and before.policy_input.incursion_side is None:
         assert after.direction is D.STOP
 
 
@@ -130,7 +130,7 @@ def mirrored(given_scene: Scene) -> Scene:
             turn=None if state.turn is None else MIRRORED[state.turn],
             clear_frames=state.clear_frames,
             blocked=state.blocked[::-1],
-            shut_frames=state.shut_frames,
+            no_way_frames=state.no_way_frames,
         ),
         water={
             "left": given_scene.water["right"], "center": given_scene.water["center"],
@@ -145,19 +145,21 @@ def mirrored(given_scene: Scene) -> Scene:
 
 @settings(max_examples=400, deadline=None)
 @given(scenes(6), CONFIGS)
-@example(scene(2465981, 2), CALIBRATED)  # shut in for long, and no side is the better one
+@example(scene(2465981, 2), CALIBRATED)  # no side was free for long, and both are alike
 def test_a_mirrored_scene_gives_mirrored_advice(given_scene: Scene, config: Config) -> None:
-    """Resolution 13: port and starboard differ in nothing but the tie that no side has been taken in."""
+    """Port and starboard differ in nothing but a tie without a turn in progress, which goes to starboard."""
     given_scene = off_grid(given_scene)
     decision, other = given_scene.decided(config), mirrored(given_scene).decided(config)
     risks = {lane: getattr(decision, lane).risk for lane in LANES}
-    held, needed = side_held(given_scene.state, config)
-    gain = risks[held] - risks[OTHER[held]]
-    near = [abs(risks[lane] - limit_of(lane, given_scene.state, config)) for lane in LANES]
+    held, needed = held_side(given_scene.state, config)
+    gain = risks[held] - risks[OPPOSITE_SIDE[held]]
+    near = [abs(risks[lane] - lane_risk_limit(lane, given_scene.state, config)) for lane in LANES]
     assume(min(*near, abs(gain - needed), abs(gain + needed)) > 1e-9)
     is_tie = given_scene.state.turn is None and -config.advisor.policy.tie < gain < needed
-    looks_in_tie = is_tie and decision.reason is other.reason is R.NO_SIDE_FOR_LONG and not decision.standing.incursion
-    if looks_in_tie or R.TIE_STARBOARD in {decision.reason, other.reason}:
+    searches_in_tie = (
+        is_tie and decision.reason is other.reason is R.NO_SIDE_FOR_LONG and not decision.policy_input.incursion_side
+    )
+    if searches_in_tie or R.TIE_STARBOARD in {decision.reason, other.reason}:
         assert decision.direction is other.direction is D.RIGHT
     else:
         assert other.direction is MIRRORED[decision.direction]
@@ -169,14 +171,14 @@ def test_the_side_taken_is_never_much_the_worse(
     left: float, right: float, turn: m.Direction | None, config: Config
 ) -> None:
     policy = config.advisor.policy
-    side = better_side(PolicyState(turn=turn), {"left": left, "right": right}, config)
+    side = preferred_side(PolicyState(turn=turn), {"left": left, "right": right}, config)
     risks = {"left": left, "right": right}
-    assert risks[side] - risks[OTHER[side]] <= max(policy.tie, policy.side_change_margin)
+    assert risks[side] - risks[OPPOSITE_SIDE[side]] <= max(policy.tie, policy.side_change_margin)
 
 
-def test_severity_of_every_scene_is_used() -> None:
+def test_the_scenes_cover_every_direction() -> None:
     """The scenes of these tests are scenes: some of each direction, with risks between none and all."""
     decided = [scene(seed, seed % 7).decided(PAANI) for seed in range(400)]
     assert {d.direction for d in decided} == set(D) - {D.NO_DATA}
     assert severity(1.0, (0.0, 0.5, 1.0, 1.0)) == 1.0
-    assert components(m.LaneEvidence(), (), "center", PAANI).risk == pytest.approx(0.70)
+    assert lane_components(m.LaneEvidence(), (), "center", PAANI).risk == pytest.approx(0.70)

@@ -9,8 +9,8 @@ import pytest
 
 from paani import messages as m
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.association import associate, iou
-from paani_services.advisor.motion import MotionHistory, Sighting, Window, estimate, observe
+from paani_services.advisor.association import assign_boxes, iou
+from paani_services.advisor.motion import MotionHistory, SizeMeasurement, Window, add_measurement, estimate_motion
 from paani_services.advisor.tracker import HAZARDS
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing
 
@@ -29,7 +29,7 @@ def growing(rate_per_s: float, n: int, period_s: float = 0.2, confidence: float 
 
 
 def test_g8_hazards_are_one_to_one() -> None:
-    """G8, resolution 22: four labels, four hazards, the label kept."""
+    """G8: four labels, four hazards, the label kept."""
     assert {label: HAZARDS[label].value for label in m.Label} == {
         m.Label.PERSON: "swimmer", m.Label.VESSEL: "craft", m.Label.PIER: "structure", m.Label.BUOY: "marker",
     }  # fmt: skip
@@ -38,10 +38,10 @@ def test_g8_hazards_are_one_to_one() -> None:
 def test_g2_greedy_overlap() -> None:
     """G2: the best pair first; below 0.25 no pair."""
     assert iou((0.0, 0.0, 0.2, 0.2), (0.1, 0.0, 0.3, 0.2)) == pytest.approx(1 / 3)
-    found = associate([(0.0, 0.0, 0.2, 0.2)], [(0.1, 0.0, 0.3, 0.2), (0.01, 0.0, 0.2, 0.2)], 0.25)
+    found = assign_boxes([(0.0, 0.0, 0.2, 0.2)], [(0.1, 0.0, 0.3, 0.2), (0.01, 0.0, 0.2, 0.2)], 0.25)
     assert found.track_of == {1: 0}
-    assert found.doubtful == {1}
-    assert associate([(0.0, 0.0, 0.2, 0.2)], [(0.13, 0.0, 0.33, 0.2)], 0.25).track_of == {}
+    assert found.ambiguous == {1}
+    assert assign_boxes([(0.0, 0.0, 0.2, 0.2)], [(0.13, 0.0, 0.33, 0.2)], 0.25).track_of == {}
 
 
 def test_g4_two_hits_confirm() -> None:
@@ -169,8 +169,10 @@ def test_i2_margin_by_hand() -> None:
     for i, y in enumerate((0.0, 0.1, 0.0, 0.1, 0.0)):
         half = 0.1 * math.exp(y)
         xyxy = (0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half)
-        history = observe(history, Sighting(i * 200_000, xyxy, y, 0.8, False), WINDOW, PAPER.advisor.motion)
-    found = estimate(history, 800_000, WINDOW, PAPER.advisor.motion)
+        history = add_measurement(
+            history, SizeMeasurement(i * 200_000, xyxy, y, 0.8, False), WINDOW, PAPER.advisor.motion
+        )
+    found = estimate_motion(history, 800_000, WINDOW, PAPER.advisor.motion)
     assert found.rate_per_s == pytest.approx(0.0, abs=1e-12)
     assert found.margin_per_s == pytest.approx(0.3)
     assert (found.state, found.cause) == (S.UNKNOWN, C.LOW_QUALITY)  # I7, I8: 0.8 * 5/8 * 1 * .04/.3 = 0.067
