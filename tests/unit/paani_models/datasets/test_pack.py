@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tarfile
 from pathlib import Path
 
 import cv2
@@ -16,6 +15,7 @@ from paani_models.datasets.sources import Sample, Source, choose, read_boxes, re
 from paani_models.detector.data import read_boxed
 from paani_models.segmenter.scores import read_truth as read_water
 from tests.unit.paani_models.datasets.public_sets import own_data, scene, write_picture
+from tests.unit.paani_models.datasets.unpacking import unpack
 
 pytestmark = pytest.mark.slow
 
@@ -25,12 +25,6 @@ NAMES = ["tbiseg_dasha", "mcoe_boats"]
 def packed(data: Path, out: Path, max_mb: float = 1.0) -> Path:
     pack(out, read_samples(data, choose(NAMES)), lambda source: data / source.folder, max_mb=max_mb)
     return out
-
-
-def unpacked(archive: Path, folder: Path) -> Path:
-    with tarfile.open(archive) as bundle:
-        bundle.extractall(folder, filter="data")
-    return folder
 
 
 def story(data: Path) -> list[tuple[str, str, bool, str]]:
@@ -43,14 +37,14 @@ def test_the_same_splits_once_unpacked(name: str, tmp_path: Path) -> None:
     data = own_data(tmp_path / "data")
     archive = packed(data, tmp_path / name)
     assert archive.stat().st_size <= 1_000_000
-    there = unpacked(archive, tmp_path / "there")
+    there = unpack(archive, tmp_path / "there")
     assert story(there) == story(data)
     assert {held_out for _, _, held_out, _ in story(there)} == {True, False}
 
 
 def test_pictures_shrink_and_masks_with_them(tmp_path: Path) -> None:
     data = own_data(tmp_path / "data")
-    there = unpacked(packed(data, tmp_path / "b.tar"), tmp_path / "there")
+    there = unpack(packed(data, tmp_path / "b.tar"), tmp_path / "there")
     for sample in read_samples(there, choose(NAMES)):
         picture = cv2.imread(str(sample.picture))
         if sample.mask:
@@ -108,13 +102,13 @@ def test_weights_and_a_start_travel_along(tmp_path: Path, capsys: pytest.Capture
     arguments = ["pack", "--data", str(data), "--sources", ",".join(NAMES), "--start", str(tmp_path / "best.pt")]
     assert main([*arguments, "--out", str(tmp_path / "b.tar")]) == 0
     assert "12 pictures, JPEG quality 95" in capsys.readouterr().out
-    there = unpacked(tmp_path / "b.tar", tmp_path / "there")
+    there = unpack(tmp_path / "b.tar", tmp_path / "there")
     assert (there / "_weights" / "start.bin").read_bytes() == bytes(range(256))
     assert (there / "_start" / "best.pt").read_bytes() == b"start"
 
 
 def test_terms_travel_along(tmp_path: Path) -> None:
-    there = unpacked(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
+    there = unpack(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
     text = (there / "mcoe_boats" / "manifest.json").read_text()
     assert all(word in text for word in ("someone/water", "abc", "CC0", "JPEG quality 95"))
 
@@ -160,7 +154,7 @@ def test_a_mask_only_neighbour_of_a_held_out_box_is_a_leak(tmp_path: Path) -> No
 
 
 def test_everything_that_training_reads_is_there(tmp_path: Path) -> None:
-    there = unpacked(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
+    there = unpack(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
     assert main(["prepare", "--data", str(there), "--sources", ",".join(NAMES)]) == 0
     for sample in read_samples(there, choose(NAMES)):
         assert len(read_boxed(sample).boxes) == (2 if sample.label else 0)
