@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -14,14 +17,36 @@ NAMELESS = {"utils", "helpers", "common", "misc", "base", "manager", "types"}
 MAX_LINES, MAX_SERVICE_LINES = 400, 150
 
 
+def ignored_patterns() -> list[str]:
+    """The patterns of .gitignore that are one name, applied at every depth."""
+    lines = (ROOT / ".gitignore").read_text(encoding="utf-8").split()
+    return [".git", *(line.strip("/") for line in lines if "/" not in line.strip("/"))]
+
+
+def walk_files(folder: Path, ignored: list[str]) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()):
+        if not any(fnmatch(path.name, pattern) for pattern in ignored):
+            yield from walk_files(path, ignored) if path.is_dir() else [path]
+
+
 def tracked(*suffixes: str) -> list[Path]:
-    listing = subprocess.run(
-        ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    return [ROOT / name for name in listing.stdout.splitlines() if name.endswith(suffixes) and (ROOT / name).exists()]
+    """The files that git knows or would add; in a copy without git, all that .gitignore does not name."""
+    listing = None
+    if shutil.which("git"):
+        command = ["git", "ls-files", "-co", "--exclude-standard"]
+        listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing is None or listing.returncode != 0:
+        paths = list(walk_files(ROOT, ignored_patterns()))
+    else:
+        paths = [ROOT / name for name in listing.stdout.splitlines()]
+    return [path for path in paths if path.name.endswith(suffixes) and path.exists()]
 
 
 SOURCES = tracked(".py", ".js")
+
+
+def test_a_copy_without_git_is_checked_as_well() -> None:
+    assert set(SOURCES) <= set(walk_files(ROOT, ignored_patterns()))
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
