@@ -9,9 +9,12 @@ comma  := ,
 PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
-DEBIAN_TEST := $(DEBIAN) chromium
+DEBIAN_TEST := $(DEBIAN) chromium libatomic1
+# What a Python that cannot make a virtual environment lacks; asked only before there is one.
+DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
 .PHONY: run test check lint docs setup setup-test system system-test lock clean
+.NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
@@ -31,12 +34,13 @@ lint:
 docs: $(VENV)/.stamp-host-docs ## build the documentation into runs/docs, strictly: a broken link fails
 	$(BIN)/python -m docs.build runs/docs
 
-setup: $(VENV)/.stamp-host system
-setup-test: $(VENV)/.stamp-$(subst $(comma),-,$(EXTRAS)) system-test
+setup: system $(VENV)/.stamp-host
+setup-test: system-test $(VENV)/.stamp-$(subst $(comma),-,$(EXTRAS))
 
 $(VENV)/bin/python:
+	@sh deploy/system-packages.sh $(DEBIAN_PYTHON)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "paani needs Python >= 3.11 (PYTHON=...)"; exit 2; }
-	@$(PYTHON) -m venv $(VENV) || { echo "cannot make $(VENV): install python3-venv"; exit 2; }
+	@$(PYTHON) -m venv $(VENV) || { rm -f $@; echo "cannot make $(VENV): install python3-venv"; exit 2; }
 
 $(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
 	$(BIN)/python -m pip install -q -c requirements.lock -e ".[$(subst -,$(comma),$*)]"
@@ -45,10 +49,10 @@ $(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
 	@touch $@
 
 system:
-	@sh deploy/system-packages.sh $(DEBIAN)
+	@sh deploy/system-packages.sh $(DEBIAN) $(DEBIAN_PYTHON)
 
 system-test:
-	@sh deploy/system-packages.sh $(DEBIAN_TEST)
+	@sh deploy/system-packages.sh $(DEBIAN_TEST) $(DEBIAN_PYTHON)
 
 lock: ## pin what the next installation takes
 	$(BIN)/uv pip compile -q --python-version 3.11 --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
