@@ -13,14 +13,19 @@ DEBIAN_TEST := $(DEBIAN) chromium libatomic1
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-.PHONY: run test check lint docs setup setup-test system system-test lock clean
+.PHONY: run test test-long check lint docs setup setup-test system system-test lock clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
 test: setup-test lint ## everything that CI runs
-	$(BIN)/python -m pytest -q tests
+	$(BIN)/python -m pytest -q tests -m "not long"
+
+test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
+	@mkdir -p runs
+	$(PAANI) trial --suite standard --report runs/trial-standard.html
+	$(BIN)/python -m pytest -q tests -m long || [ $$? -eq 5 ] # 5: no test is marked so
 
 check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests
 	$(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data and not slow"
