@@ -20,7 +20,7 @@ from paani_services.perception.gate import GateState, judge
 from paani_services.perception.preprocess import stretch, tables_for
 from paani_tools.faults.corpus import clean_pictures, listed_pictures, scenes, sources
 from paani_tools.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
-from paani_tools.faults.severity_curves import curves
+from paani_tools.faults.severity_curves import draw_severity_curves
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -88,7 +88,7 @@ def main(argv: list[str]) -> int:
     sys.stderr.write("\r" + " " * 40 + "\r")
     report = Report(totals(cells, clean), tuple(cells), clean, clean_figures("without_water", dry, eyes.judge))
     sys.stdout.write(table(report))
-    for path, text in ((options.json, _json(report)), (options.svg, curves(cells))):
+    for path, text in ((options.json, _json(report)), (options.svg, draw_severity_curves(cells))):
         if path is not None:
             write_whole(path, text.encode())
     return 0

@@ -1,57 +1,52 @@
-"""Curves of the gate as one SVG: a small panel for each fault, refused share and the segmenter's mIoU over severity."""
+"""What the picture's check and the segmenter make of each fault as one SVG: a small panel each, over severity.
+
+Each panel shows the share of pictures refused by the check, and the segmenter's mIoU (mean intersection over union).
+"""
 
 from collections.abc import Sequence
-from html import escape
 
 from paani.picture_faults import MUST_ACCEPT, MUST_REJECT
+from paani.statistics.charts import PALETTE, Axes, circle, drawing, element, polyline
 from paani_tools.faults.measure import CellFigures
 
 COLUMNS = 6
 PANEL_W, PANEL_H, LEFT, TOP, PLOT_W, PLOT_H = 170, 130, 30, 24, 124, 76
-REFUSED, MIOU, BAND = "#b3470b", "#005f73", "#e6eef0"
+MIOU, REFUSED, BAND, AXIS, NOTE = PALETTE[0], PALETTE[1], "#e6eef0", "#888", "#555"
 
 
-def curves(cells: Sequence[CellFigures]) -> str:
+def draw_severity_curves(cells: Sequence[CellFigures]) -> str:
     """The SVG text. Both curves share the axis 0 to 1; the band is where either verdict will do."""
     names = list(dict.fromkeys(cell.fault for cell in cells))
-    rows = -(-len(names) // COLUMNS)
-    width, height = COLUMNS * PANEL_W, rows * PANEL_H + 26
+    width, height = COLUMNS * PANEL_W, -(-len(names) // COLUMNS) * PANEL_H + 26
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
-        'font-family="sans-serif" font-size="11">',
-        f'<rect width="{width}" height="{height}" fill="#fff"/>',
-        f'<text x="{LEFT}" y="16" fill="{REFUSED}">refused by the gate</text>',
-        f'<text x="{LEFT + 130}" y="16" fill="{MIOU}">mIoU of the segmenter (dashed)</text>',
-        f'<text x="{LEFT + 330}" y="16" fill="#555">band: either verdict will do; severity 1 to 5</text>',
+        element("rect", width=width, height=height, fill="#fff"),
+        element("text", "refused by the gate", x=LEFT, y=16, fill=REFUSED),
+        element("text", "mIoU of the segmenter (dashed)", x=LEFT + 130, y=16, fill=MIOU),
+        element("text", "band: either verdict will do; severity 1 to 5", x=LEFT + 330, y=16, fill=NOTE),
     ]
     for index, name in enumerate(names):
         row, column = divmod(index, COLUMNS)
-        parts.append(_panel([c for c in cells if c.fault == name], column * PANEL_W, row * PANEL_H + 20))
-    return "\n".join((*parts, "</svg>\n"))
+        axes = Axes((1, 5), (0, 1), column * PANEL_W + LEFT, row * PANEL_H + 20 + TOP, PLOT_W, PLOT_H)
+        parts += _draw_panel([cell for cell in cells if cell.fault == name], axes)
+    return drawing(
+        width, height, "Faults of the picture, by severity", parts,
+        xmlns="http://www.w3.org/2000/svg", font_family="sans-serif", font_size=11,
+    ) + "\n"  # fmt: skip
 
 
-def _panel(cells: Sequence[CellFigures], x: float, y: float) -> str:
-    left, top = x + LEFT, y + TOP
-
-    def at(cell: CellFigures, value: float) -> str:
-        return f"{left + (cell.severity - 1) / 4 * PLOT_W:.1f},{top + (1 - value) * PLOT_H:.1f}"
-
-    def line(values: Sequence[float], colour: str, dash: str) -> str:
-        points = " ".join(at(cell, value) for cell, value in zip(cells, values, strict=True))
-        dots = "".join(
-            '<circle cx="{}" cy="{}" r="2.4" fill="{}"/>'.format(*at(cell, value).split(","), colour)
-            for cell, value in zip(cells, values, strict=True)
-        )
-        return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.6" {dash}/>{dots}'
-
-    band_top = top + (1 - MUST_ACCEPT) * PLOT_H
-    return (
-        f'<text x="{left}" y="{top - 6}">{escape(cells[0].fault.replace("_", " "))}</text>'
-        f'<rect x="{left}" y="{band_top:.1f}" width="{PLOT_W}" height="{(MUST_ACCEPT - MUST_REJECT) * PLOT_H:.1f}" '
-        f'fill="{BAND}"/>'
-        f'<path d="M{left} {top}V{top + PLOT_H}H{left + PLOT_W}" fill="none" stroke="#888"/>'
-        f'<text x="{left - 12}" y="{top + 4}" fill="#555">1</text>'
-        f'<text x="{left - 12}" y="{top + PLOT_H}" fill="#555">0</text>'
-        + line([cell.miou for cell in cells], MIOU, 'stroke-dasharray="4 3"')
-        + line([cell.rejected / max(1, cell.n) for cell in cells], REFUSED, "")
-    )
+def _draw_panel(cells: Sequence[CellFigures], axes: Axes) -> list[str]:
+    (left, bottom), (right, top) = axes.place(1, 0), axes.place(5, 1)
+    band_top, band_bottom = axes.place(1, MUST_ACCEPT)[1], axes.place(1, MUST_REJECT)[1]
+    miou = axes.place_all((cell.severity, cell.miou) for cell in cells)
+    refused = axes.place_all((cell.severity, cell.rejected / max(1, cell.n)) for cell in cells)
+    return [
+        element("text", cells[0].fault.replace("_", " "), x=left, y=top - 6),
+        element("rect", x=left, y=band_top, width=right - left, height=band_bottom - band_top, fill=BAND),
+        polyline([(left, top), (left, bottom), (right, bottom)], fill="none", stroke=AXIS),
+        element("text", "1", x=left - 12, y=top + 4, fill=NOTE),
+        element("text", "0", x=left - 12, y=bottom, fill=NOTE),
+        polyline(miou, fill="none", stroke=MIOU, stroke_width=1.6, stroke_dasharray="4 3"),
+        *(circle(point, 2.4, fill=MIOU) for point in miou),
+        polyline(refused, fill="none", stroke=REFUSED, stroke_width=1.6),
+        *(circle(point, 2.4, fill=REFUSED) for point in refused),
+    ]

@@ -15,7 +15,7 @@ import msgspec
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
 from paani.option_paths import output_file
-from paani.statistics.charts import lines
+from paani.statistics.charts import drawing, element, lines
 from paani.statistics.figure_table import Cell, Part
 from paani.statistics.measured import measured
 from paani.whole_file import write_whole
@@ -134,12 +134,13 @@ def plot(costs: list[Cost]) -> str:
         lines(by_actors, "actors in sight", "CPU s a simulated s", (0.0, float(max(ACTORS))), (0.0, top)),
         lines(by_size, "thousand pixels", "CPU s a simulated s", (0.0, most), (0.0, top)),
     ]
-    style = ".grid{stroke:#dde4e8}.tick,.label,.name{font:11px sans-serif;fill:#1c2b33}"
-    placed = "".join(f'<g transform="translate({440 * k} 0)">{chart}</g>' for k, chart in enumerate(charts))
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 880 270" width="880" height="270">'
-        f'<style>{style}</style><rect width="880" height="270" fill="#ffffff"/>{placed}</svg>\n'
-    )
+    parts = [
+        element("style", ".grid{stroke:#dde4e8}.tick,.label,.name{font:11px sans-serif;fill:#1c2b33}"),
+        element("rect", width=880, height=270, fill="#ffffff"),
+        *(f'<g transform="translate({440 * k} 0)">{chart}</g>' for k, chart in enumerate(charts)),
+    ]
+    title = "CPU time by actors and by picture size"
+    return drawing(880, 270, title, parts, xmlns="http://www.w3.org/2000/svg", width=880, height=270) + "\n"
 
 
 def timed(

@@ -1,4 +1,4 @@
-"""A scenario seen from above: shore, route, what stands and what moves, with a legend and a scale.."""
+"""A scenario seen from above: shore, route, what stands and what moves, with a legend and a scale."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from paani.arrays import F64, U8
+from paani.statistics.charts import Axes
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose
 
@@ -79,19 +80,24 @@ class _Sheet:
 
     def __init__(self, around_m: F64, width_px: int, height_px: int) -> None:
         low, high = around_m.min(axis=0) - MARGIN_M, around_m.max(axis=0) + MARGIN_M
-        self._per_m = float(min(width_px / (high - low)[0], height_px / (high - low)[1]))
-        self._middle_m = 0.5 * (low + high)
-        self._middle_px = np.array([0.5 * width_px, 0.5 * height_px])
+        self._px_per_m = float(min(width_px / (high - low)[0], height_px / (high - low)[1]))
+        middle_x_m, middle_y_m = (0.5 * (low + high)).tolist()
+        half_x_m, half_y_m = 0.5 * width_px / self._px_per_m, 0.5 * height_px / self._px_per_m
+        self._axes = Axes(
+            (middle_x_m - half_x_m, middle_x_m + half_x_m),
+            (middle_y_m - half_y_m, middle_y_m + half_y_m),
+            0.0, 0.0, width_px, height_px,
+        )  # fmt: skip
         self.picture: U8 = np.zeros((height_px, width_px, 3), np.uint8)
 
     def _px(self, points_m: F64) -> npt.NDArray[np.int32]:
         """In fractions of a pixel, as OpenCV takes them."""
-        px = (np.asarray(points_m) - self._middle_m) * [self._per_m, -self._per_m] + self._middle_px
+        px = np.array(self._axes.place_all(np.reshape(points_m, (-1, 2)).tolist())).reshape(np.shape(points_m))
         return np.asarray(np.round(np.clip(px, -3e4, 3e4) * (1 << SUB_BITS)), np.int32)
 
     def fill(self, polygon_m: F64, bgr: Bgr) -> None:
         """What would be smaller than a dot becomes one."""
-        if np.ptp(polygon_m, axis=0).max() * self._per_m < 2.0 * LEAST_PX:
+        if np.ptp(polygon_m, axis=0).max() * self._px_per_m < 2.0 * LEAST_PX:
             self.dot(polygon_m.mean(axis=0), bgr, LEAST_PX)
         else:
             cv2.fillPoly(self.picture, [self._px(polygon_m)], bgr, cv2.LINE_AA, SUB_BITS)
@@ -105,7 +111,7 @@ class _Sheet:
 
     def view(self, pose: Pose2, label: str) -> None:
         """A wedge where the camera looks, and its number."""
-        reach_m = 26.0 / self._per_m
+        reach_m = 26.0 / self._px_per_m
         rays = [pose.yaw_rad + turn for turn in (-0.6, 0.6)]
         ends = [(pose.x_m + reach_m * math.cos(ray), pose.y_m + reach_m * math.sin(ray)) for ray in rays]
         self.line(np.array([ends[0], pose[:2], ends[1]]), INK, closed=False, width_px=2)
@@ -115,8 +121,8 @@ class _Sheet:
     def scale(self) -> None:
         """A bar of a round length, about a sixth of the width, above north."""
         room_px = self.picture.shape[1] / 6.0
-        length_m = max((m for m in SCALES_M if m * self._per_m <= room_px), default=SCALES_M[0])
-        length_px, base = round(length_m * self._per_m), self.picture.shape[0] - 18
+        length_m = max((m for m in SCALES_M if m * self._px_per_m <= room_px), default=SCALES_M[0])
+        length_px, base = round(length_m * self._px_per_m), self.picture.shape[0] - 18
         cv2.line(self.picture, (18, base), (18 + length_px, base), INK, 3)
         _text(self.picture, f"{length_m:.0f} m", (18, base - 8), 0.5, 1)
         cv2.arrowedLine(self.picture, (32, base - 34), (32, base - 74), INK, 2, cv2.LINE_AA, 0, 0.3)
