@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from paani.config import PROFILES, Config, decode_config, load_config
 from paani.errors import UserError
+from paani.extras import missing_module
 from paani.process import run_service, services
 
 
@@ -23,11 +24,8 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     name, rest = arguments[0], arguments[1:]
     try:
-        if name in commands:
-            command = commands[name].load()
-            return int(command(rest))
-        if name in names:
-            return run_service(name, _service_config(name, rest))
+        if name in commands or name in names:
+            return _run(name, rest, commands)
         raise UserError(
             f"unknown command '{name}' (commands: {', '.join(sorted(commands))}; services: {', '.join(sorted(names))})"
         )
@@ -39,6 +37,17 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output went away
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
+    try:
+        if name in commands:
+            return int(commands[name].load()(rest))
+        return run_service(name, _service_config(name, rest))
+    except ModuleNotFoundError as error:
+        if (told := missing_module(name, error)) is None:
+            raise
+        raise told from error
 
 
 def usage(commands: list[str], names: list[str]) -> str:

@@ -19,7 +19,7 @@ from paani_tools.progress import Progress
 
 
 def main(argv: list[str]) -> int:
-    """Exit codes: 0 done, 2 user's mistake (one line on standard error)."""
+    """Exit codes: 0 done, 1 `info` of a cut or damaged recording, 2 user's mistake (one line on standard error)."""
     options = _parser().parse_args(argv)
     if options.what == "info":
         return _info(options.path, as_json=options.json)
@@ -35,7 +35,9 @@ def _info(path: Path, *, as_json: bool) -> int:
     with Progress("reading") as progress:
         info = info_of(log, Along(log, progress))
     sys.stdout.write(msgspec.json.encode(info).decode() + "\n" if as_json else text_of(info))
-    return 0
+    for problem in info.problems:
+        sys.stderr.write(f"paani: {problem}\n")
+    return 1 if info.problems else 0
 
 
 def _repair(path: Path) -> int:

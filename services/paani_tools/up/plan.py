@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import sys
 import tomllib
 from pathlib import Path
@@ -12,12 +13,16 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from paani.bus.routing import require_free
-from paani.config import Config, calibration_of
+from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
+from paani.extras import require_modules
 from paani.runtime import runtime_dir
+from paani_services.camera.picture_sources import recording
+from paani_services.navigator.files.mission_file import load_task
 
 EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
 EYE = "eye"
+NEEDED = {"plant": ("mujoco",), EYE: ("OpenGL",), "localization": ("filterpy",)}  # modules of extras, by service
 
 
 class Plan(NamedTuple):
@@ -42,8 +47,9 @@ async def make_plan(config: Config) -> Plan:
     With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse; with `sim` the
     calibration is the eye's, unless another is given as valid.
     """
+    require_modules("up", *(module for name in config.services for module in NEEDED.get(name, ())))
     require_free(config.bus.router)
-    await _require_source(config.camera.source)
+    await asyncio.to_thread(_require_source, config.camera)
     if config.dashboard.serve:
         await _require_free_page(config)
     course = await _course(config)
@@ -54,6 +60,7 @@ async def make_plan(config: Config) -> Plan:
         navigator = replace(navigator, fence=course.fence)
     if localization.origin_lat_lon_deg is None:
         localization = replace(localization, origin_lat_lon_deg=course.origin_lat_lon_deg)
+    await asyncio.to_thread(load_task, navigator, localization.origin_lat_lon_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
         calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
@@ -64,9 +71,15 @@ async def make_plan(config: Config) -> Plan:
     return Plan(config.services, config)
 
 
-async def _require_source(source: str) -> None:
-    if source != "sim" and not source.startswith("webcam") and not await asyncio.to_thread(Path(source).exists):
-        raise UserError(f"camera.source {source}: no such file or folder")
+def _require_source(camera: CameraConfig) -> None:
+    """Raises UserError for files without a picture; a webcam is opened by its service alone."""
+    if camera.source == "sim" or camera.source.startswith("webcam"):
+        return
+    with contextlib.closing(recording(Path(camera.source), camera)) as frames:
+        try:
+            next(iter(frames), None)
+        except UserError as error:
+            raise UserError(f"camera.source {error}") from error
 
 
 async def _require_free_page(config: Config) -> None:
@@ -74,7 +87,12 @@ async def _require_free_page(config: Config) -> None:
     try:
         server = await asyncio.get_running_loop().create_server(asyncio.Protocol, host, port)
     except OSError as error:
-        raise UserError(f"dashboard.port {port}: {error.strerror}") from error
+        if error.errno != errno.EADDRINUSE:
+            raise UserError(f"dashboard.port {port}: {error.strerror}") from error
+        raise UserError(
+            f"dashboard.port {port}: in use by another program, perhaps another `paani up`: stop that, or choose "
+            f"another port (--set dashboard.port={port + 1})"
+        ) from error
     server.close()
     await server.wait_closed()
 

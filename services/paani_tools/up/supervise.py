@@ -16,6 +16,7 @@ from paani.clock import MonotonicClock
 from paani.config import encode_config
 from paani.errors import UserError
 from paani_tools.up.backoff import Backoff
+from paani_tools.up.log_files import keep_bounded, open_log
 from paani_tools.up.plan import EYE, Plan
 from paani_tools.up.silence import ROUTER, Silence
 
@@ -137,9 +138,11 @@ class Supervisor:
         self._silence.heard(name, self._clock.now_us())
 
     async def watch(self) -> None:
-        """Kill what hangs; `keep_running` starts it again."""
+        """Kill what hangs, which `keep_running` starts again, and keep the logs bounded."""
         while True:
             await asyncio.sleep(WATCH_S)
+            for unit in self.units.values():
+                await asyncio.to_thread(keep_bounded, unit.log)
             for name in self._silence.hung(self._clock.now_us()):
                 self._say(f"{name} hangs: killing it")
                 self._silence.ended(name)
@@ -161,7 +164,7 @@ class Supervisor:
         await _ended([*self.units.values()], KILL_S)
 
     async def _launch(self, unit: Unit) -> None:
-        log = await asyncio.to_thread(unit.log.open, "ab" if unit.restarts else "wb")
+        log = await asyncio.to_thread(open_log, unit.log, afresh=not unit.restarts)
         unit.process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import socket
 
 import zenoh
@@ -49,4 +50,9 @@ def require_free(endpoint: str) -> None:
         try:
             probe.bind((host, int(port)))
         except (OSError, OverflowError) as error:
+            if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+                raise UserError(
+                    f"bus.router {endpoint}: in use by another program, perhaps another `paani up`: stop that, or "
+                    f"choose another port (--set bus.router={scheme}/{host}:{int(port) + 1})"
+                ) from error
             raise UserError(f"bus.router {endpoint}: {error}") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -84,7 +86,21 @@ def _with_path(message: str) -> str:
     """`... - at `$.advisor.x`` becomes `advisor.x: ...`; contradictions name their fields themselves."""
     text, _, path = message.partition(" - at ")
     path = path.strip("`").removeprefix("$").lstrip(".")
-    return f"{path}: {text}" if path else text
+    return (f"{path}: {text}" if path else text) + _suggestion(text, path)
+
+
+def _suggestion(text: str, path: str) -> str:
+    """The nearest name of the same section, for a field that is unknown there."""
+    unknown = re.search(r"unknown field `([^`]*)`", text)
+    if unknown is None:
+        return ""
+    section: type = Config
+    for part in filter(None, path.split(".")):
+        section = next(field.type for field in msgspec.structs.fields(section) if field.encode_name == part)
+    names = [field.encode_name for field in msgspec.structs.fields(section)]
+    near = difflib.get_close_matches(unknown[1], names, n=1)
+    where = f"{path}." if path else ""
+    return f" (did you mean {where}{near[0]}?)" if near else f" (have: {', '.join(names)})"
 
 
 def _read_toml(file: Path) -> dict[str, object]:

@@ -24,6 +24,9 @@ def test_later_layers_win(tmp_path: Path) -> None:
     ("setting", "line"),
     [
         ("advisor.policy.centre=1", "advisor.policy: Object contains unknown field `centre`"),
+        ("advisor.policy.center_blok_risk=1", "(did you mean advisor.policy.center_block_risk?)"),
+        ("advisr.lifetime_s=1", "Object contains unknown field `advisr` (did you mean advisor?)"),
+        ("boat.name=x", "Object contains unknown field `boat` (have: profile, bus, camera, "),
         ("camera.rate_hz=0", "camera.rate_hz: Expected `float` > 0.0"),
         ("camera.rate_hz=nan", "camera.rate_hz: Expected `float` > 0.0"),
         ("camera.rate_hz=fast", "camera.rate_hz: Expected `float`, got `str`"),

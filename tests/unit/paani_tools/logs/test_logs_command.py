@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import msgspec
@@ -57,13 +58,17 @@ def test_changes_of_direction_are_counted() -> None:
 
 def test_an_unfinished_file_is_told_and_mended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = unfinished(tmp_path, 60)
-    assert "unfinished" in told(capsys, "info", path)
+    assert main(["logs", "info", str(path)]) == 1
+    printed = capsys.readouterr()
+    assert "localization/odometry" in printed.out, "what can be read is told all the same"
+    assert re.fullmatch(rf"paani: {path.name}: unfinished .*repair.*\n", printed.err)
     assert "unfinished" in told(capsys, "list", tmp_path)
     assert "messages kept" in told(capsys, "repair", path)
     assert "nothing to repair" in told(capsys, "repair", path)
     (tmp_path / f"{NAME}.keep").touch()
     assert "finished, kept" in told(capsys, "list", tmp_path)
     assert open_log(path).problems == []
+    told(capsys, "info", path)
 
 
 def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

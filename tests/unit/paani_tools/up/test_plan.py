@@ -8,6 +8,7 @@ import socket
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -21,6 +22,7 @@ from paani_sim.worlds.load import load_scenario
 from paani_tools.up.command import up_sets
 from paani_tools.up.plan import make_plan
 from paani_tools.up.terminal import Display
+from tests.pictures import river
 
 pytestmark = pytest.mark.slow
 
@@ -55,14 +57,19 @@ async def test_the_simulator_s_camera_is_calibrated_and_no_other(private_sets: t
     assert plan.config.calibration.pitch_down_deg == 9.0
     own = ("calibration.hfov_deg=62", "calibration.height_m=0.8", "calibration.valid=true")
     assert (await make_plan(load_config(sets=(*private_sets, *own)))).config.calibration.hfov_deg == 62.0
+    cv2.imwrite(str(tmp_path / "river.png"), river())
     real = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
     assert not real.config.calibration.valid
 
 
-async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...]) -> None:
-    own = ("navigator.route=mine.toml", "localization.origin_lat_lon_deg=[10.0, 20.0]")
+async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...], tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'name = "mine"\nwaypoints = [{ x_m = 0.0, y_m = 0.0 }, { x_m = 9.0, y_m = 0.0 }]\n', encoding="utf-8"
+    )
+    own = (f"navigator.route={mine}", "localization.origin_lat_lon_deg=[10.0, 20.0]")
     plan = await make_plan(load_config(sets=(*private_sets, *own)))
-    assert plan.config.navigator.route == "mine.toml"
+    assert plan.config.navigator.route == str(mine)
     assert plan.config.localization.origin_lat_lon_deg == (10.0, 20.0)
 
 
@@ -76,7 +83,8 @@ async def test_p4_a_start_runs_no_survey_benchmark_or_recorder(private_sets: tup
 
 
 async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_path: Path) -> None:
-    """The plant and everything else still run; the last gate waits for no pulse of the eye."""
+    """The plant and everything else still run; the thrust adapter waits for no pulse of the eye."""
+    cv2.imwrite(str(tmp_path / "river.png"), river())
     plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
     assert set(keys.SERVICES) - set(plan.services) == {"eye", "recorder"}
     assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
@@ -84,11 +92,31 @@ async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_pat
         await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))
 
 
+@pytest.mark.parametrize(
+    ("field", "named"),
+    [("navigator.mission", "legs"), ("navigator.fence", "areas"), ("navigator.route", "waypoints")],
+)
+async def test_a_file_that_no_boat_can_follow_is_refused_before_anything_starts(
+    field: str, named: str, private_sets: tuple[str, ...], tmp_path: Path
+) -> None:
+    file = tmp_path / "file.toml"
+    file.write_text(f"{named} = 3\n", encoding="utf-8")
+    with pytest.raises(UserError, match=rf"{field} {file}: .*{named}"):
+        await make_plan(load_config(sets=(*private_sets, f"{field}={file}")))
+
+
+async def test_a_folder_without_pictures_is_refused_before_anything_starts(
+    private_sets: tuple[str, ...], tmp_path: Path
+) -> None:
+    with pytest.raises(UserError, match=rf"camera\.source {tmp_path}: holds no pictures"):
+        await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
+
+
 async def test_a_busy_page_port_is_no_mistake_without_the_page(config: Config, private_sets: tuple[str, ...]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", config.dashboard.port))
         taken.listen()
-        with pytest.raises(UserError, match=r"dashboard\.port"):
+        with pytest.raises(UserError, match=r"dashboard\.port .* in use .*--set dashboard\.port="):
             await make_plan(config)
         await make_plan(load_config(sets=(*private_sets, "dashboard.serve=false")))
 
