@@ -23,7 +23,7 @@ from paani_services.perception.corridors import Lanes, classify, summarise, wate
 from paani_services.perception.engine import Engine, engine_named
 from paani_services.perception.fallback import CONFIDENCE, colour_mask
 from paani_services.perception.fitness import load_fitness
-from paani_services.perception.gate import GateState, judge
+from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.picture_decoding import decoded
 from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_services.perception.sight import counted, followed_roll_rad, is_own_hull, level
@@ -62,7 +62,8 @@ class Perceiver:
         self._tables = [tables_for(engine.contract) for engine in engines]
         self._beside = ThreadPoolExecutor(1, "beside the gate") if config.concurrent else None
         self._detector_begins = config.concurrent and self._takes_longer(self._detector, self._segmenter)
-        self._gate, self._fitness = GateState(), load_fitness(config.gate, config.intra_op_threads)
+        self._quality = ImageQualityState()
+        self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
         self._begun: list[Future[Any]] = []
         self._counts: dict[tuple[int, ...], F32] = {}
 
@@ -132,7 +133,9 @@ class Perceiver:
     def _judge(self, bgr: U8 | None, header: PictureHeader, age_s: float) -> UnusableCause:
         if bgr is None:
             return UnusableCause.UNDECODABLE
-        self._gate, cause = judge(self._gate, bgr, header.frame_epoch, self._config.gate, self._fitness)
+        self._quality, cause = check_image_quality(
+            self._quality, bgr, header.frame_epoch, self._config.image_quality, self._fitness
+        )
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
 
     def _detect(self, bgr: U8) -> Detected:

@@ -16,7 +16,7 @@ from paani.whole_file import write_whole
 from paani_services.perception.corridors import classify
 from paani_services.perception.engine import engine_named
 from paani_services.perception.fitness import load_fitness
-from paani_services.perception.gate import GateState, judge
+from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.preprocess import stretch, tables_for
 from paani_tools.faults.corpus import clean_pictures, listed_pictures, scenes, sources
 from paani_tools.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
@@ -40,7 +40,7 @@ class Eyes:
         self._config = config
         self._segmenter = engine_named(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
         self._table = tables_for(self._segmenter.contract)
-        self._fitness = load_fitness(config.gate, config.intra_op_threads)
+        self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
 
     def segment(self, bgr: U8) -> U8:
         """Classes uint8 [64, 80]."""
@@ -49,7 +49,7 @@ class Eyes:
 
     def judge(self, bgr: U8) -> UnusableCause:
         """The gate's verdict, as on the first picture of a camera."""
-        return judge(GateState(), bgr, 0, self._config.gate, self._fitness)[1]
+        return check_image_quality(ImageQualityState(), bgr, 0, self._config.image_quality, self._fitness)[1]
 
 
 def main(argv: list[str]) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from paani.config import Config, decode_config
+from paani.config.loading import with_present_names
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.logs.reader import CONFIG_FILE, Log
@@ -82,7 +83,7 @@ def _config(log: Log, notes: list[str], *, force: bool) -> Config:
         if not force:
             raise UserError(f"{error} (of another version? --force leaves out what is unknown)") from error
     try:
-        tree = msgspec.json.decode(data, type=dict[str, Any])
+        tree = with_present_names(msgspec.json.decode(data, type=dict[str, Any]))
     except msgspec.MsgspecError as error:
         raise UserError(f"{log.path}: {CONFIG_FILE}: {error}") from error
     dropped = list(_drop_unknown(tree, Config, ""))

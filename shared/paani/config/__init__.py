@@ -8,7 +8,7 @@ from paani.config.perception import (
     CorridorConfig,
     DetectorConfig,
     EngineName,
-    GateConfig,
+    ImageQualityConfig,
     PerceptionConfig,
 )
 from paani.config.planner import CalibrationConfig, PlannerConfig, calibration_of
@@ -31,7 +31,7 @@ __all__ = [
     "DetectorConfig",
     "EngineName",
     "EyeConfig",
-    "GateConfig",
+    "ImageQualityConfig",
     "LocalizationConfig",
     "MotionConfig",
     "NavigatorConfig",

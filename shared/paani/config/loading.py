@@ -16,6 +16,8 @@ from paani.errors import UserError
 
 ENV_PREFIX = "PAANI_"
 NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
+# Earlier names of settings and sections, and their present ones: old files, `--set` paths and recordings still load.
+RENAMED_SETTINGS = {"perception.gate": "perception.image_quality"}
 
 
 def load_config(
@@ -32,10 +34,10 @@ def load_config(
     """
     layers: list[tuple[str, dict[str, object]]] = []
     if file is not None:
-        layers.append((str(file), _read_toml(file)))
-    layers.append(("environment", _from_environ(environ or {})))
+        layers.append((str(file), with_present_names(_read_toml(file))))
+    layers.append(("environment", with_present_names(_from_environ(environ or {}))))
     for text in sets:
-        layers.append((f"--set {text}", _from_set(text)))
+        layers.append((f"--set {text}", with_present_names(_from_set(text))))
 
     chosen = profile
     if chosen is None:
@@ -59,9 +61,9 @@ def encode_config(config: Config) -> bytes:
 
 
 def decode_config(data: bytes) -> Config:
-    """Inverse of `encode_config`. Raises UserError."""
+    """Inverse of `encode_config`, of an earlier version too. Raises UserError."""
     try:
-        return msgspec.json.decode(data, type=Config)
+        return msgspec.convert(with_present_names(msgspec.json.decode(data, type=dict[str, object])), Config)
     except msgspec.MsgspecError as error:
         raise UserError(f"configuration: {error}") from error
 
@@ -71,8 +73,24 @@ def with_settings(config: Config, sets: Iterable[str]) -> Config:
     tree: dict[str, object] = msgspec.to_builtins(config)
     texts = tuple(sets)
     for text in texts:
-        _merge(tree, _from_set(text))
+        _merge(tree, with_present_names(_from_set(text)))
     return _decode(tree, " ".join(texts))
+
+
+def with_present_names(settings: Mapping[str, object]) -> dict[str, object]:
+    """The same settings under their present names; where both names are set, the present one wins."""
+    tree: dict[str, object] = {}
+    _merge(tree, settings)
+    for earlier, present in RENAMED_SETTINGS.items():
+        *sections, name = earlier.split(".")
+        parent: object = tree
+        for section in sections:
+            parent = parent.get(section) if isinstance(parent, dict) else None
+        if isinstance(parent, dict) and name in parent:
+            moved = _nest(present.split("."), parent.pop(name))
+            _merge(moved, tree)
+            tree = moved
+    return tree
 
 
 def _decode(tree: dict[str, object], origin: str) -> Config:

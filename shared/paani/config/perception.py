@@ -15,7 +15,7 @@ EngineName = Literal["onnxruntime", "ncnn"]
 class CameraConfig(Section, frozen=True):
     """`source`: `sim`, `webcam`, `webcam:N`, or a picture, folder or video path.
 
-    A single picture is a camera that always shows the same: the gate calls it frozen.
+    A single picture is a camera that always shows the same: the image-quality check calls it frozen.
     """
 
     source: str = "sim"
@@ -28,12 +28,13 @@ class CameraConfig(Section, frozen=True):
     jpeg_quality: Size = 85  # of 100: small enough for a slow link, fine enough for the networks
 
 
-class GateConfig(Section, frozen=True):
-    """Usable-picture gate: a picture beyond any of these limits is not evidence. `enabled=false` is the paper (J19).
+class ImageQualityConfig(Section, frozen=True):
+    """Image-quality check: a picture beyond any of these limits is no evidence. `enabled=false` is the paper (J19).
 
     The limits lie between broken pictures and everything that real cameras deliver, fog, glare and night included.
-    `min_fitness` is what the gate's net must say at least, of 1; 0 leaves the net out. Below `sure_fitness` it looks
-    again, and does not speak for a picture whose lines may be of a wrong length.
+    `min_fitness` is the least answer of the fitness network with which a picture is usable; 0 leaves the network out.
+    With an answer below `sure_fitness` a picture is also checked upside down, and stays refused where its lines seem to
+    have a wrong length.
     """
 
     enabled: bool = True  # J19: the paper judges every picture
@@ -45,16 +46,16 @@ class GateConfig(Section, frozen=True):
     flat_range: NonNegative = 11.0  # 1st to 99th percentile
     flat_frac: Fraction = 0.95  # of tiles without texture
     flat_residual: Fraction = 0.15  # of the variation is not vertical stripes
-    noise_correlation: Fraction = 0.25  # of neighbours in the small picture
+    noise_correlation: Fraction = 0.25  # of neighbouring pixels of the thumbnail
     noise_sigma: NonNegative = 30.0  # of 255, standard deviation of the noise
     noise_fineness: NonNegative = 3.6  # fine over coarse edges
     blur_fineness: NonNegative = 0.25  # fine over coarse edges; less is out of focus
     cover_frac: Fraction = 0.50  # of tiles dark and without texture, beside a bright rest
     cover_rest_mean: NonNegative = 58.0  # of 255, beside what is covered; a darker rest means dusk, no covered lens
     cover_total_frac: Fraction = 0.95  # whatever the rest
-    skew: Fraction = 0.82  # lines of a wrong length, unless the net is sure; of 3,722 real pictures one has less
+    skew: Fraction = 0.82  # lines of a wrong length, unless the network is sure; of 3,722 real pictures one has less
     frozen_frames: Size = 3  # distinct frames that show the same: two periods of 0.2 s, and 0.1 s for the verdict
-    frozen_mad: NonNegative = 0.05  # mean absolute difference of the small pictures
+    frozen_mad: NonNegative = 0.05  # mean absolute difference of the thumbnails
     model: str = ""  # path of an ONNX file; empty: the shipped model
     min_fitness: Fraction = 0.37  # `paani models train gate` says how much each refuses and lets through
     sure_fitness: Fraction = 0.97
@@ -89,7 +90,7 @@ class PerceptionConfig(Section, frozen=True):
     """`ego_polygon`: corners of the own hull in the picture, normalised; what lies in it is no evidence.
 
     `engine` runs both nets; `ncnn` needs the files that `paani models convert` makes, and is chosen by
-    `paani models bench` on the machine itself. The gate's net always runs by onnxruntime.
+    `paani models bench` on the machine itself. The fitness network always runs by onnxruntime.
     """
 
     rate_hz: Positive = 5.0  # as often as the camera gives pictures
@@ -108,7 +109,7 @@ class PerceptionConfig(Section, frozen=True):
     max_roll_age_s: Positive = 0.3  # older odometry says nothing about the roll in the picture
     journal_max_mib: NonNegative = 8.0  # P2: of the observations kept on disk, half an hour at 5 Hz; 0: none
     corridors: CorridorConfig = CorridorConfig()
-    gate: GateConfig = GateConfig()
+    image_quality: ImageQualityConfig = ImageQualityConfig()
     detections: DetectorConfig = DetectorConfig()
 
     def __post_init__(self) -> None:

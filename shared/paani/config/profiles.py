@@ -12,7 +12,7 @@ PAPER: dict[str, object] = {
         "fallback_non_water": 0.5,  # F3, F4
         "fallback_uncertainty": 0.5,
         "follow_roll": False,  # E3: corridors are fixed in the picture
-        "gate": {"enabled": False},  # J19
+        "image_quality": {"enabled": False},  # J19
     },
     "advisor": {
         "evidence_max_age_s": 3.5,  # J16, M10: the advisory outlives its frame at 0.5 Hz

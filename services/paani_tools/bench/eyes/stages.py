@@ -16,7 +16,7 @@ from paani_services.perception.box_decoding import decode
 from paani_services.perception.corridors import classify, summarise
 from paani_services.perception.engine import OnnxEngine, engine_named
 from paani_services.perception.fitness import load_fitness
-from paani_services.perception.gate import GateState, judge
+from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.pipeline import Perceiver
 from paani_services.perception.preprocess import letterbox, stretch, tables_for
 from paani_tools.bench.eyes import paper_shaped
@@ -59,8 +59,12 @@ class Candidate(msgspec.Struct, frozen=True):
 
 def fit(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
     """Those that the gate lets through: the others would cost a pipeline nothing."""
-    fitness = load_fitness(config.gate, 1)
-    return [p for p in pictures if judge(GateState(), p, 0, config.gate, fitness)[1] is UnusableCause.NONE]
+    fitness = load_fitness(config.image_quality, 1)
+    return [
+        p
+        for p in pictures
+        if check_image_quality(ImageQualityState(), p, 0, config.image_quality, fitness)[1] is UnusableCause.NONE
+    ]
 
 
 def measured(
@@ -152,14 +156,14 @@ def _stages(config: PerceptionConfig) -> dict[str, Step]:
     table_d, table_s = tables_for(detector.contract), tables_for(segmenter.contract)
     (height, width), (rows_s, columns_s) = detector.contract.size_hw, segmenter.contract.size_hw
     grey = detector.contract.preprocessing.pad_grey
-    fitness = load_fitness(config.gate, 1)
+    fitness = load_fitness(config.image_quality, 1)
     blank = np.zeros((240, 320, 3), np.uint8)
     tensor, place = letterbox(blank, height, width, grey, table_d)
     stretched = stretch(blank, rows_s, columns_s, table_s)
     candidates, logits = detector.run(tensor), segmenter.run(stretched)
     mask, confidence = classify(logits, config.temperature)
     return {
-        "gate": lambda bgr: judge(GateState(), bgr, 0, config.gate, fitness),
+        "gate": lambda bgr: check_image_quality(ImageQualityState(), bgr, 0, config.image_quality, fitness),
         "letterbox": lambda bgr: letterbox(bgr, height, width, grey, table_d),
         "stretch": lambda bgr: stretch(bgr, rows_s, columns_s, table_s),
         "detector, 1 thread": lambda _: detector.run(tensor),

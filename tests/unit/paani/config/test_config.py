@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from paani.config import Config, EyeConfig, decode_config, encode_config, load_config
+from paani.config import Config, EyeConfig, decode_config, encode_config, load_config, with_settings
 from paani.errors import UserError
 
 
@@ -44,6 +44,24 @@ def test_a_bad_setting_is_one_line_that_names_it(setting: str, line: str) -> Non
     assert "\n" not in str(error.value)
 
 
+def test_settings_under_an_earlier_name_still_load(tmp_path: Path) -> None:
+    """In a file, the environment, a `--set` and the configuration inside a recording; the present name wins."""
+    file = tmp_path / "boat.toml"
+    file.write_text("[perception.gate]\nskew = 0.5\n")
+    loaded = load_config(
+        file=file, environ={"PAANI_PERCEPTION__GATE__BLUR_FINENESS": "0.3"}, sets=["perception.gate.enabled=false"]
+    ).perception.image_quality
+    assert (loaded.skew, loaded.blur_fineness, loaded.enabled) == (0.5, 0.3, False)
+    assert with_settings(Config(), ["perception.gate.skew=0.4"]).perception.image_quality.skew == 0.4
+    recorded = encode_config(load_config(sets=["perception.image_quality.skew=0.6"]))
+    assert decode_config(recorded.replace(b'"image_quality":', b'"gate":')).perception.image_quality.skew == 0.6
+    file.write_text("[perception.gate]\nskew = 0.5\nenabled = false\n[perception.image_quality]\nskew = 0.7\n")
+    both = load_config(file=file).perception.image_quality
+    assert (both.skew, both.enabled) == (0.7, False)
+    with pytest.raises(UserError, match=r"perception\.image_quality: Object contains unknown field `nothing`"):
+        load_config(sets=["perception.gate.nothing=1"])
+
+
 @pytest.mark.parametrize("content", ["[camera", "\x00", "camera = 3"])
 def test_a_bad_file_is_named(tmp_path: Path, content: str) -> None:
     file = tmp_path / "boat.toml"
@@ -76,7 +94,7 @@ def test_the_paper_profile_carries_the_papers_constants() -> None:
     boxes = c.perception.detections
     assert (boxes.confidence, boxes.nms_input, boxes.nms_iou, boxes.max_boxes) == (0.4, 256, 0.45, 24)
     assert (c.perception.rate_hz, c.perception.concurrent, c.perception.intra_op_threads) == (0.5, False, 2)
-    assert not c.perception.gate.enabled
+    assert not c.perception.image_quality.enabled
     assert (c.advisor.policy.center_block_risk, c.advisor.policy.side_block_risk) == (0.48, 0.58)
     assert (c.advisor.rate_hz, c.advisor.lifetime_s, c.perception.max_frame_age_s) == (5.0, 3.5, 0.8)
     navigator = c.navigator

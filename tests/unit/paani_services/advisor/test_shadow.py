@@ -261,7 +261,7 @@ def test_a_restart_is_back_at_the_configuration() -> None:
         ("advisor.evidence_max_age_s", "60", NO.NOT_TUNABLE),
         ("advisor.tuning.min_frames", "1", NO.NOT_TUNABLE),
         ("advisor.tracker.max_tracks", "9999", NO.NOT_TUNABLE),
-        ("perception.gate.enabled", "false", NO.NOT_TUNABLE),
+        ("perception.image_quality.enabled", "false", NO.NOT_TUNABLE),
         ("", "1", NO.NOT_TUNABLE),
         ("=", "=", NO.NOT_TUNABLE),
     ],

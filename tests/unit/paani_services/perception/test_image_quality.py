@@ -7,16 +7,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from paani.config import GateConfig, load_config
+from paani.config import ImageQualityConfig, load_config
 from paani.messages import UnusableCause
 from paani.picture_faults import spoilt
 from paani_services.perception.fitness import load_fitness
-from paani_services.perception.gate import GateState, judge
+from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from tests.pictures import PICTURES, noisy, river
 from tests.places import DATA
 
 C = UnusableCause
-ON = GateConfig()
+ON = ImageQualityConfig()
 FITNESS = load_fitness(ON, 1)
 
 
@@ -45,14 +45,14 @@ def test_what_no_camera_should_see(name: str, causes: set[UnusableCause], size_w
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_NEAREST)
     if name == "white_noise":
         picture = np.random.default_rng(2).integers(0, 256, (size_wh[1], size_wh[0], 3), np.uint8)
-    assert judge(GateState(), picture, 1, ON, FITNESS)[1] in causes
+    assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] in causes
     coded = cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])[1], cv2.IMREAD_COLOR)
-    assert judge(GateState(), np.asarray(coded, np.uint8), 1, ON, FITNESS)[1] in causes
+    assert check_image_quality(ImageQualityState(), np.asarray(coded, np.uint8), 1, ON, FITNESS)[1] in causes
 
 
 @pytest.mark.parametrize("name", ["river", "river_in_fog", "river_at_dusk", "river_in_light_noise"])
 def test_what_cameras_see(name: str) -> None:
-    assert judge(GateState(), PICTURES[name], 1, ON, FITNESS)[1] is C.NONE
+    assert check_image_quality(ImageQualityState(), PICTURES[name], 1, ON, FITNESS)[1] is C.NONE
 
 
 @pytest.mark.parametrize("name", ["river", "river_at_dusk"])
@@ -62,7 +62,7 @@ def test_lines_of_a_wrong_length(name: str, size_wh: tuple[int, int], sense: int
     """Each line begins 3/320 of the width further along than the one above, to either side."""
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_AREA)[:, ::sense]
     skewed, _ = spoilt("sheared", picture, np.zeros(size_wh[::-1], np.uint8), 5, np.random.default_rng(0))
-    assert judge(GateState(), np.ascontiguousarray(skewed[:, ::sense]), 1, ON)[1] is C.SKEWED
+    assert check_image_quality(ImageQualityState(), np.ascontiguousarray(skewed[:, ::sense]), 1, ON)[1] is C.SKEWED
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -70,7 +70,7 @@ def test_lines_of_a_wrong_length(name: str, size_wh: tuple[int, int], sense: int
 def test_a_camera_that_turns_as_it_exposes_has_no_lines_of_a_wrong_length(severity: int, seed: int) -> None:
     """Blurred aslant, lines are like those above them moved along; the segmenter still reaches 0.77 on these."""
     picture, _ = spoilt("motion_blur", river(), np.zeros((240, 320), np.uint8), severity, np.random.default_rng(seed))
-    assert judge(GateState(), picture, 1, ON, FITNESS)[1] is C.NONE
+    assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.NONE
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -79,12 +79,12 @@ def test_what_only_the_net_knows(seed: int) -> None:
     mask = np.zeros((240, 320), np.uint8)
     for name in ("shuffled", "drop_out", "drops", "false_colour"):
         picture, _ = spoilt(name, river(), mask, 5, np.random.default_rng(seed))
-        assert judge(GateState(), picture, 1, ON)[1] is C.NONE
-        assert judge(GateState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
+        assert check_image_quality(ImageQualityState(), picture, 1, ON)[1] is C.NONE
+        assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
 
 
 def test_a_net_that_says_no_number_refuses() -> None:
-    assert judge(GateState(), river(), 1, ON, lambda _: float("nan"))[1] is C.UNFIT
+    assert check_image_quality(ImageQualityState(), river(), 1, ON, lambda _: float("nan"))[1] is C.UNFIT
 
 
 @pytest.mark.parametrize(("upright", "on_its_head", "cause", "looks"), [
@@ -107,7 +107,7 @@ def test_a_picture_of_doubt_is_looked_at_upside_down(
         shown.append(picture)
         return upright if np.array_equal(picture, river()) else on_its_head
 
-    assert judge(GateState(), river(), 1, ON, fitness)[1] is cause
+    assert check_image_quality(ImageQualityState(), river(), 1, ON, fitness)[1] is cause
     assert len(shown) == looks
     assert np.array_equal(shown[-1], river()[:: -1 if looks == 2 else 1, :: -1 if looks == 2 else 1])
 
@@ -115,44 +115,44 @@ def test_a_picture_of_doubt_is_looked_at_upside_down(
 @pytest.mark.parametrize(("said", "cause"), [(0.98, C.NONE), (0.90, C.SKEWED), (0.05, C.SKEWED), (np.nan, C.SKEWED)])
 def test_the_net_speaks_for_lines_of_a_wrong_length_only_where_it_is_sure(said: float, cause: UnusableCause) -> None:
     skewed, _ = spoilt("sheared", river(), np.zeros((240, 320), np.uint8), 5, np.random.default_rng(0))
-    assert judge(GateState(), skewed, 1, ON, lambda _: said)[1] is cause
+    assert check_image_quality(ImageQualityState(), skewed, 1, ON, lambda _: said)[1] is cause
     high = msgspec.structs.replace(ON, min_fitness=0.99)
-    assert judge(GateState(), skewed, 1, high, lambda _: said)[1] is C.SKEWED
+    assert check_image_quality(ImageQualityState(), skewed, 1, high, lambda _: said)[1] is C.SKEWED
 
 
 def test_wrong_size() -> None:
-    assert judge(GateState(), river()[:100], 1, ON)[1] is C.WRONG_SIZE
-    assert judge(GateState(), river()[:, :150], 1, ON)[1] is C.WRONG_SIZE
+    assert check_image_quality(ImageQualityState(), river()[:100], 1, ON)[1] is C.WRONG_SIZE
+    assert check_image_quality(ImageQualityState(), river()[:, :150], 1, ON)[1] is C.WRONG_SIZE
 
 
 def test_a_camera_that_repeats_itself_is_frozen() -> None:
     """Three distinct frames that show the same; one new picture ends it; a new epoch begins again."""
-    state = GateState()
+    state = ImageQualityState()
     still = river()
     causes = []
     for _ in range(7):
-        state, cause = judge(state, still, 1, ON)
+        state, cause = check_image_quality(state, still, 1, ON)
         causes.append(cause)
     assert causes == [C.NONE] * 2 + [C.FROZEN] * 5
-    state, cause = judge(state, noisy(still, 3.0, seed=5), 1, ON)
+    state, cause = check_image_quality(state, noisy(still, 3.0, seed=5), 1, ON)
     assert cause is C.NONE
     for epoch in range(2, 12):
-        state, cause = judge(state, still, epoch, ON)
+        state, cause = check_image_quality(state, still, epoch, ON)
         assert cause is C.NONE
 
 
 def test_a_moored_camera_is_not_frozen() -> None:
     """Sensor noise of one level is enough."""
-    state = GateState()
+    state = ImageQualityState()
     for seed in range(20):
-        state, cause = judge(state, noisy(river(), 1.0, seed), 1, ON)
+        state, cause = check_image_quality(state, noisy(river(), 1.0, seed), 1, ON)
         assert cause is C.NONE
 
 
 def test_the_paper_has_no_gate() -> None:
     """J19: black is accepted in the `paper` profile."""
-    paper = load_config(profile="paper").perception.gate
-    assert judge(GateState(), PICTURES["black"], 1, paper)[1] is C.NONE
+    paper = load_config(profile="paper").perception.image_quality
+    assert check_image_quality(ImageQualityState(), PICTURES["black"], 1, paper)[1] is C.NONE
 
 
 @pytest.mark.data
@@ -166,7 +166,7 @@ def test_real_pictures_pass() -> None:
     refused = []
     for file in files:
         picture = cv2.imread(str(file))
-        cause = judge(GateState(), np.asarray(picture, np.uint8), 1, ON)[1]
+        cause = check_image_quality(ImageQualityState(), np.asarray(picture, np.uint8), 1, ON)[1]
         if cause not in {C.NONE, C.WRONG_SIZE}:
             refused.append((file.name, cause))
     assert len(files) > 1000
