@@ -50,7 +50,6 @@ $(VENV)/bin/python:
 $(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
 	$(BIN)/python -m pip install -q -c requirements.lock -e ".[$(subst -,$(comma),$*)]"
 	@mkdir -p runs
-	@mkdir -p runs
 	@touch $@
 
 system:

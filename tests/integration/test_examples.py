@@ -27,7 +27,7 @@ from tests.conftest import Spawn
 from tests.places import ROOT
 from tests.unit.paani_tools.replay.recorded_drive import drive, write_log
 
-FINISHES = ("look", "scenario", "route", "world", "logs", "explain", "faults", "topics", "models check")
+FINISHES = ("look", "scenario", "route", "world", "logs", "explain", "faults", "topics", "models check", "claims")
 NEEDS_A_BOAT = ("echo", "hz", "tune", "replay runs/drive --dashboard")
 TAKES_MINUTES = ("trial", "bench")
 README = (ROOT / "README.md").read_text(encoding="utf-8").partition("## What people do next")[2].partition("\n## ")[0]
@@ -41,6 +41,9 @@ MANUAL = [
     if line.startswith("paani ")
 ]
 OF_ANOTHER_PACKAGE = ("lookout",)
+
+
+RECORDED = drive(12.0)
 
 
 class ParsedError(Exception):
@@ -82,10 +85,13 @@ def require_loadable(options: argparse.Namespace) -> Config:
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder as the README's reader has it: the examples, and a drive that was recorded."""
+    """A folder as the reader has it: the examples, drives that were recorded, and files of the reader's own."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    (tmp_path / "runs" / "drive").mkdir(parents=True)
-    write_log(tmp_path / "runs" / "drive" / "20270101T000000Z-0.mcap", drive(12.0))
+    for folder in ("runs/drive", "runs/first", "runs/moored", "mine", "FOLDER"):
+        (tmp_path / folder).mkdir(parents=True)
+    for file in ("mine.toml", "mine/segmenter.onnx", "mount.toml", "clip.mp4", "runs/one.mcap", "PATH..."):
+        (tmp_path / file).touch()
+    write_log(tmp_path / "runs" / "drive" / "20270101T000000Z-0.mcap", RECORDED)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -117,7 +123,7 @@ def test_every_row_runs_as_written(checkout: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize("command", MANUAL)
-def test_a_command_of_the_manual_has_its_arguments_right(command: str) -> None:
+def test_a_command_of_the_manual_has_its_arguments_right(command: str, checkout: Path) -> None:
     if not is_one_of(command, OF_ANOTHER_PACKAGE):
         parsed(command)
 
