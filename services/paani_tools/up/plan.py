@@ -18,7 +18,7 @@ from paani.errors import UserError
 from paani.extras import require_modules
 from paani.runtime import runtime_dir
 from paani_services.camera.picture_sources import recording
-from paani_services.navigator.files.mission_file import load_task
+from paani_services.navigator.files.mission_file import load_route_and_mission
 
 EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
 EYE = "eye"
@@ -60,7 +60,7 @@ async def make_plan(config: Config) -> Plan:
         navigator = replace(navigator, fence=course.fence)
     if localization.origin_lat_lon_deg is None:
         localization = replace(localization, origin_lat_lon_deg=course.origin_lat_lon_deg)
-    await asyncio.to_thread(load_task, navigator, localization.origin_lat_lon_deg)
+    await asyncio.to_thread(load_route_and_mission, navigator, localization.origin_lat_lon_deg)
     config = replace(config, navigator=navigator, localization=localization)
     if config.camera.source == "sim":
         calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
