@@ -75,11 +75,10 @@ def _require_source(camera: CameraConfig) -> None:
     """Raises UserError for files without a picture; a webcam is opened by its service alone."""
     if camera.source == "sim" or camera.source.startswith("webcam"):
         return
-    with contextlib.closing(recording(Path(camera.source), camera)) as frames:
-        try:
-            next(iter(frames), None)
-        except UserError as error:
-            raise UserError(f"camera.source {error}") from error
+    try:
+        next(recording(Path(camera.source), camera), None)
+    except UserError as error:
+        raise UserError(f"camera.source {error}") from error
 
 
 async def _require_free_page(config: Config) -> None:
