@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from docs.build import HERE, build, gather
 from docs.links import problems_of
+from tests.places import ROOT
+
+FOLDERS = ("shared/", "services/", "sim_host/", "models/", "deploy/", "tests/", "examples/", "docs/")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,17 @@ def test_a_page_that_no_menu_leads_to_fails_the_build(gathered: Path) -> None:
         assert "lost.md: is not in the menu of zensical.toml" in build(gathered)
     finally:
         lost.unlink()
+
+
+def test_every_file_that_a_page_names_exists() -> None:
+    """Paths from the root of the checkout, and names of modules without their folder."""
+    modules = {path.name for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")}
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "examples" / "README.md"):
+        for name in re.findall(r"`([\w./-]+)`", page.read_text(encoding="utf-8")):
+            if name.startswith(FOLDERS):
+                assert (ROOT / name).exists(), f"{page.name}: {name}"
+            elif name.endswith(".py") and "/" not in name:
+                assert name in modules, f"{page.name}: {name}"
 
 
 def test_links_are_followed_by_file_and_anchor(tmp_path: Path) -> None:
