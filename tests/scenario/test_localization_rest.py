@@ -13,7 +13,7 @@ from paani.config import LocalizationConfig
 from paani.geometry import enu_from_geodetic
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.estimator import Estimator
-from paani_services.localization.nmea import fixes
+from paani_services.localization.nmea import fixes_from_sentences
 from tests.places import DATA
 from tests.unit.paani_services.localization.boat_ride import Ride, wandering
 
@@ -62,7 +62,7 @@ def test_l5_a_recorded_moored_boat_is_not_read_as_motion() -> None:
 
     The IMU is mounted askew by 0.3 degrees.
     """
-    shown = list(fixes((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
+    shown = list(fixes_from_sentences((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
     assert sum(fix.sog_mps > 0.05 for fix in shown) > 0.9 * len(shown)
     said = list(at_quay(shown, tilt_mps2=0.05))
     moving = [speed_mps(each) > 0.05 for each, _ in said]

@@ -1,1 +1,1 @@
-"""Pose and velocity estimated from GPS and IMU."""
+"""Localization: pose and velocity estimated from GPS and IMU by two extended Kalman filters."""

@@ -1,6 +1,6 @@
-"""NMEA 0183, the sentences by which a GPS tells where it is: GGA, RMC, GLL, VTG (IEC 61162-1). Pure.
+"""NMEA 0183 (IEC 61162-1): GPS fixes from the sentences GGA, RMC, GLL and VTG. Pure.
 
-A receiver's speed and course are clockwise from true north and in knots; ours are ENU and metres a second.
+A receiver gives courses clockwise from true north and speeds in knots; a fix has ENU courses and metres a second.
 """
 
 import math
@@ -14,18 +14,18 @@ from paani.geometry import wrap_rad
 from paani.messages import GpsFix
 
 MPS_PER_KNOT = 1852.0 / 3600.0
-RANGE_ERROR_M = (
-    5.0  # of one range of a single-frequency receiver, times HDOP (GPS SPS performance standard: 8 m at 95 %)
-)
-UNKNOWN_STD_M = 10.0  # without HDOP; more than `LocalizationConfig.max_position_std_m`, so no boat sails by it
-WORST_HDOP = 99.99  # how receivers write that they have none
+# Standard deviation of one range of a single-frequency receiver; times HDOP it is that of the position (the GPS SPS
+# performance standard has 8 m at 95 %).
+RANGE_ERROR_M = 5.0
+UNKNOWN_STD_M = 10.0  # of a position without HDOP; above `LocalizationConfig.max_position_std_m`, so never healthy
+WORST_HDOP = 99.99  # receivers write this for none
 DAY_S = 86_400.0
-_PLAIN = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?", re.ASCII)
-MAX_LENGTH = 120  # the standard allows 82; receivers write more
+_PLAIN_NUMBER = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?", re.ASCII)
+MAX_LENGTH = 120  # characters of a sentence: the standard allows 82, but receivers write more
 
 
-class Fields(msgspec.Struct, frozen=True, kw_only=True):
-    """What one sentence says; None where it says nothing. `day_s`: UTC seconds of the day."""
+class Sentence(msgspec.Struct, frozen=True, kw_only=True):
+    """One decoded sentence; None where it leaves a field empty. `day_s`: UTC seconds of the day."""
 
     kind: str
     day_s: float | None = None
@@ -37,30 +37,31 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True):
     hdop: float | None = None
 
 
-def parse(line: str) -> Fields | None:
-    """One sentence. None: none of ours, or not a sentence. Raises ValueError for a damaged one."""
+def parse_sentence(line: str) -> Sentence | None:
+    """Decode one sentence; None for another kind of sentence or none at all. Raises ValueError for a damaged one."""
     line = line.strip()
     if len(line) < 7 or line[0] != "$" or line[3:6] not in _READERS:
         return None
     body, star, checksum = line[1:].partition("*")
     if len(line) > MAX_LENGTH or not star or checksum.upper() != f"{_checksum(body):02X}":
         raise ValueError("length or checksum")
-    words = body.split(",")
-    if len(words) < _WORDS[line[3:6]]:
-        raise ValueError("too few words")
-    return _READERS[line[3:6]](words)
+    fields = body.split(",")
+    if len(fields) < _MIN_FIELDS[line[3:6]]:
+        raise ValueError("too few fields")
+    return _READERS[line[3:6]](fields)
 
 
-def fixes(lines: Iterable[str], drops: Counter[str]) -> Iterator[GpsFix]:
-    """A fix for each RMC, or, of a receiver without, for each GLL that follows a VTG; its spread from the last GGA.
+def fixes_from_sentences(lines: Iterable[str], drops: Counter[str]) -> Iterator[GpsFix]:
+    """A fix for each RMC or, from a receiver without RMC, for each GLL after a VTG; its HDOP is that of the last GGA.
 
-    `source_us` is UTC since the first day began: who hears a receiver live puts its own time there. Sentences damaged
-    or out of order are counted in `drops` and passed over. A position marked invalid gives a fix that says so.
+    `source_us` is UTC since the first day began; with a live receiver the caller replaces it by its own time.
+    Damaged sentences and those out of order are counted in `drops` and skipped. A position marked invalid gives a
+    fix that says so.
     """
-    std_m, course, has_rmc, last_s = UNKNOWN_STD_M, Fields(kind="VTG"), False, -1.0
+    std_m, course, has_rmc, last_s = UNKNOWN_STD_M, Sentence(kind="VTG"), False, -1.0
     for line in lines:
         try:
-            found = parse(line)
+            found = parse_sentence(line)
         except ValueError:
             drops["nmea_damaged"] += 1
             continue
@@ -72,68 +73,68 @@ def fixes(lines: Iterable[str], drops: Counter[str]) -> Iterator[GpsFix]:
             course = found
         elif found.kind == "RMC" or (not has_rmc and course.sog_mps is not None):
             has_rmc = has_rmc or found.kind == "RMC"
-            at_s = _after(found.day_s or 0.0, last_s)
+            at_s = _continuous_day_s(found.day_s or 0.0, last_s)
             if at_s is None:
                 drops["nmea_late"] += 1
                 continue
             yield _fix(found, found if found.kind == "RMC" else course, std_m, at_s)
-            last_s, course = at_s, Fields(kind="VTG")
+            last_s, course = at_s, Sentence(kind="VTG")
 
 
-def _after(day_s: float, last_s: float) -> float | None:
-    """The time of day counted from the first day; None if it is not after `last_s`."""
+def _continuous_day_s(day_s: float, last_s: float) -> float | None:
+    """The time of day counted on from the first day; None if it is not after `last_s`."""
     at_s = day_s + max(0.0, last_s) // DAY_S * DAY_S
     if at_s < last_s - 0.5 * DAY_S:
         at_s += DAY_S
     return at_s if at_s > last_s else None
 
 
-def _fix(place: Fields, course: Fields, std_m: float, at_s: float) -> GpsFix:
-    known = course.sog_mps is not None and course.cog_rad is not None  # a receiver at rest leaves the course empty
+def _fix(position: Sentence, course: Sentence, std_m: float, at_s: float) -> GpsFix:
+    has_speed = course.sog_mps is not None and course.cog_rad is not None  # at rest receivers leave the course empty
     return GpsFix(
         source_us=round(at_s * 1e6),
-        latitude_deg=place.latitude_deg or 0.0,
-        longitude_deg=place.longitude_deg or 0.0,
-        sog_mps=course.sog_mps or 0.0 if known else 0.0,
+        latitude_deg=position.latitude_deg or 0.0,
+        longitude_deg=position.longitude_deg or 0.0,
+        sog_mps=course.sog_mps or 0.0 if has_speed else 0.0,
         cog_rad=course.cog_rad or 0.0,
         position_std_m=std_m,
-        fix=bool(place.valid) and place.latitude_deg is not None and place.longitude_deg is not None,
+        fix=bool(position.valid) and position.latitude_deg is not None and position.longitude_deg is not None,
     )
 
 
-def _gga(words: list[str]) -> Fields:
-    valid = words[6] not in {"", "0"}
-    return Fields(kind="GGA", day_s=_day_s(words[1]), valid=valid, hdop=_number(words[8]) if valid else None)
+def _gga(fields: list[str]) -> Sentence:
+    valid = fields[6] not in {"", "0"}
+    return Sentence(kind="GGA", day_s=_day_s(fields[1]), valid=valid, hdop=_number(fields[8]) if valid else None)
 
 
-def _rmc(words: list[str]) -> Fields:
-    return Fields(
+def _rmc(fields: list[str]) -> Sentence:
+    return Sentence(
         kind="RMC",
-        day_s=_day_s(words[1]),
-        valid=words[2] == "A",
-        latitude_deg=_degrees(words[3], words[4], "NS", 90.0),
-        longitude_deg=_degrees(words[5], words[6], "EW", 180.0),
-        sog_mps=_speed_mps(words[7]),
-        cog_rad=_course_rad(words[8]),
+        day_s=_day_s(fields[1]),
+        valid=fields[2] == "A",
+        latitude_deg=_degrees(fields[3], fields[4], "NS", 90.0),
+        longitude_deg=_degrees(fields[5], fields[6], "EW", 180.0),
+        sog_mps=_speed_mps(fields[7]),
+        cog_rad=_course_rad(fields[8]),
     )
 
 
-def _gll(words: list[str]) -> Fields:
-    return Fields(
+def _gll(fields: list[str]) -> Sentence:
+    return Sentence(
         kind="GLL",
-        latitude_deg=_degrees(words[1], words[2], "NS", 90.0),
-        longitude_deg=_degrees(words[3], words[4], "EW", 180.0),
-        day_s=_day_s(words[5]),
-        valid=words[6] == "A",
+        latitude_deg=_degrees(fields[1], fields[2], "NS", 90.0),
+        longitude_deg=_degrees(fields[3], fields[4], "EW", 180.0),
+        day_s=_day_s(fields[5]),
+        valid=fields[6] == "A",
     )
 
 
-def _vtg(words: list[str]) -> Fields:
-    return Fields(kind="VTG", cog_rad=_course_rad(words[1]), sog_mps=_speed_mps(words[5]))
+def _vtg(fields: list[str]) -> Sentence:
+    return Sentence(kind="VTG", cog_rad=_course_rad(fields[1]), sog_mps=_speed_mps(fields[5]))
 
 
-_WORDS = {"GGA": 9, "RMC": 9, "GLL": 7, "VTG": 6}
-_READERS: dict[str, Callable[[list[str]], Fields]] = {"GGA": _gga, "RMC": _rmc, "GLL": _gll, "VTG": _vtg}
+_MIN_FIELDS = {"GGA": 9, "RMC": 9, "GLL": 7, "VTG": 6}
+_READERS: dict[str, Callable[[list[str]], Sentence]] = {"GGA": _gga, "RMC": _rmc, "GLL": _gll, "VTG": _vtg}
 
 
 def _checksum(body: str) -> int:
@@ -143,37 +144,37 @@ def _checksum(body: str) -> int:
     return found
 
 
-def _number(word: str) -> float | None:
-    """None for an empty word. Raises ValueError for one that is no plain, finite, positive number."""
-    if not word:
+def _number(field: str) -> float | None:
+    """The field as a number, None if empty. Raises ValueError for one that is no plain, finite, positive number."""
+    if not field:
         return None
-    if not _PLAIN.fullmatch(word):
-        raise ValueError(word)
-    return float(word)
+    if not _PLAIN_NUMBER.fullmatch(field):
+        raise ValueError(field)
+    return float(field)
 
 
-def _day_s(word: str) -> float | None:
-    """hhmmss.sss."""
-    if not word:
+def _day_s(field: str) -> float | None:
+    """Seconds of the day of a field hhmmss.sss, None if empty. Raises ValueError."""
+    if not field:
         return None
-    number = _number(word)
-    if number is None or len(word.partition(".")[0]) != 6:
-        raise ValueError(word)
-    hours, minutes, seconds = int(word[:2]), int(word[2:4]), float(word[4:])
+    number = _number(field)
+    if number is None or len(field.partition(".")[0]) != 6:
+        raise ValueError(field)
+    hours, minutes, seconds = int(field[:2]), int(field[2:4]), float(field[4:])
     if hours > 23 or minutes > 59 or seconds >= 61.0:
-        raise ValueError(word)
+        raise ValueError(field)
     return hours * 3600.0 + minutes * 60.0 + seconds
 
 
-def _degrees(word: str, side: str, sides: str, limit_deg: float) -> float | None:
-    """Degrees and minutes, dddmm.mmm, positive to the north and east."""
-    number = _number(word)
+def _degrees(field: str, side: str, sides: str, limit_deg: float) -> float | None:
+    """Degrees of a field dddmm.mmm (degrees and minutes), positive to the first of the two `sides`; None if empty."""
+    number = _number(field)
     if number is None:
         return None
     degrees, minutes = divmod(number, 100.0)
     found = degrees + minutes / 60.0
     if side not in sides or not side or minutes >= 60.0 or found > limit_deg:
-        raise ValueError(word)
+        raise ValueError(field)
     return found if side == sides[0] else -found
 
 
@@ -182,7 +183,7 @@ def _speed_mps(knots: str) -> float | None:
     return None if number is None else number * MPS_PER_KNOT
 
 
-def _course_rad(word: str) -> float | None:
-    """ENU, of a course clockwise from true north."""
-    number = _number(word)
+def _course_rad(field: str) -> float | None:
+    """ENU course of a field in degrees clockwise from true north."""
+    number = _number(field)
     return None if number is None else wrap_rad(math.radians(90.0 - number))

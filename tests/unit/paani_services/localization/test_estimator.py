@@ -8,7 +8,7 @@ import pytest
 
 from paani.config import LocalizationConfig
 from paani.geometry import geodetic_from_enu
-from paani_services.localization.calibration import UNCALIBRATED_STD_RADPS, gyro_bias
+from paani_services.localization.gyro_bias import UNCALIBRATED_STD_RADPS, estimate_gyro_bias
 from tests.unit.paani_services.localization.boat_ride import BIAS_RADPS, ORIGIN_DEG, Ride
 
 
@@ -118,10 +118,10 @@ def test_tilt_is_not_taken_for_acceleration(ride: Ride, roll_rad: float, pitch_r
 def test_calibration_refuses_a_boat_that_turns() -> None:
     boat = Ride()
     turning = [boat.sample(0.5, 0.1) for _ in range(200)]
-    assert gyro_bias(turning).radps == 0.0
-    assert gyro_bias(turning).std_radps == UNCALIBRATED_STD_RADPS
+    assert estimate_gyro_bias(turning).radps == 0.0
+    assert estimate_gyro_bias(turning).std_radps == UNCALIBRATED_STD_RADPS
     resting = [boat.sample(0.0, 0.0) for _ in range(200)]
-    assert gyro_bias(resting).radps == pytest.approx(BIAS_RADPS, abs=5e-4)
+    assert estimate_gyro_bias(resting).radps == pytest.approx(BIAS_RADPS, abs=5e-4)
 
 
 def test_a12_without_heading_there_is_no_health() -> None:

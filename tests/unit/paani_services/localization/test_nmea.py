@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.messages import GpsFix
-from paani_services.localization.nmea import UNKNOWN_STD_M, fixes
+from paani_services.localization.nmea import UNKNOWN_STD_M, fixes_from_sentences
 from tests.places import DATA
 
 LOGS = DATA / "logs"
@@ -26,7 +26,7 @@ RMC = sentence("GPRMC,123519,A,4807.038,N,01131.000,W,022.4,084.4,230394,003.1,W
 
 def all_fixes(*lines: str) -> tuple[list[GpsFix], Counter[str]]:
     drops = Counter[str]()
-    return list(fixes(lines, drops)), drops
+    return list(fixes_from_sentences(lines, drops)), drops
 
 
 def test_the_checksum_of_a_published_example() -> None:

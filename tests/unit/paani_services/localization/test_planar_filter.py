@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.messages import ImuSample
-from paani_services.localization.filter import OWN, PSI, PX, PY, SIZE, PlanarFilter, U, V
-from paani_services.localization.levelling import level
+from paani_services.localization.levelling import level_sample
+from paani_services.localization.planar_filter import LOCAL_STATES_N, PSI, PX, PY, SIZE, PlanarFilter, U, V
 
 pytestmark = pytest.mark.slow
 
 STD = np.array([1.0, 1.0, 0.1, 0.2, 0.1, 0.005, 0.8, 0.8, 0.05, 0.3, 0.3])
 
-OWN_STD = np.array([*STD[:OWN], *[0.0] * (SIZE - OWN)])
+LOCAL_STD = np.array([*STD[:LOCAL_STATES_N], *[0.0] * (SIZE - LOCAL_STATES_N)])
 
 
 def state(*first: float) -> np.ndarray:
@@ -57,22 +57,22 @@ def test_prediction_jacobian_matches_differences() -> None:
 
 def test_yaw_is_corrected_the_short_way_round() -> None:
     one = PlanarFilter(state(0.0, 0.0, math.pi - 0.05), STD)
-    assert one.correct_yaw(-math.pi + 0.05, 0.1, gate2=25.0).taken
+    assert one.correct_yaw(-math.pi + 0.05, 0.1, gate2=25.0).is_accepted
     assert abs(one.x[PSI]) == pytest.approx(math.pi, abs=0.01)
 
 
 def test_outlier_is_refused_and_changes_nothing() -> None:
     one = PlanarFilter(np.zeros(SIZE), STD)
     before = one.x.copy()
-    assert not one.correct_position(60.0, 0.0, 0.8, gate2=25.0).taken
+    assert not one.correct_position(60.0, 0.0, 0.8, gate2=25.0).is_accepted
     assert (one.x == before).all()
-    assert one.correct_position(2.0, 0.0, 0.8, gate2=25.0).taken
+    assert one.correct_position(2.0, 0.0, 0.8, gate2=25.0).is_accepted
     assert 0.0 < one.x[PX] < 2.0
 
 
 def test_velocity_correction_in_map_axes() -> None:
     """Heading north, moving north: surge, not sway."""
-    one = PlanarFilter(state(0.0, 0.0, math.pi / 2.0), OWN_STD)
+    one = PlanarFilter(state(0.0, 0.0, math.pi / 2.0), LOCAL_STD)
     for _ in range(50):
         one.correct_velocity(0.0, 0.4, 0.05, gate2=1e9)
     assert one.x[[U, V]] == pytest.approx([0.4, 0.0], abs=0.02)
@@ -81,13 +81,13 @@ def test_velocity_correction_in_map_axes() -> None:
 def test_the_receivers_slow_error_is_not_taken_for_motion() -> None:
     """A fix that wanders by its stated spread moves the boat at rest by far less."""
     rng, one = np.random.default_rng(3), PlanarFilter(state(), STD)
-    one.move_to(0.0, 0.0, 0.8, 0.05)
+    one.reset_position(0.0, 0.0, 0.8, 0.05)
     keep, error = math.exp(-0.2 / 60.0), 0.8 * rng.standard_normal(2)
     places = []
     for _ in range(1500):
         error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
         one.predict(0.0, 0.0, 0.0, 0.2, 0.8)
-        one.correct_velocity(0.0, 0.0, 0.03, math.inf, turns=False)
+        one.correct_velocity(0.0, 0.0, 0.03, math.inf, is_course_known=False)
         fix = error + 0.05 * rng.standard_normal(2)
         one.correct_position(float(fix[0]), float(fix[1]), 0.05, 25.0)
         places.append(one.x[[PX, PY]])
@@ -103,7 +103,7 @@ def test_position_errors_are_as_large_as_the_covariance_says() -> None:
         one = PlanarFilter(state(0.0, 0.0, 0.4, 0.6), std)
         truth = np.zeros(2)
         first = truth + error + 0.05 * rng.standard_normal(2)
-        one.move_to(float(first[0]), float(first[1]), 0.8, 0.05)
+        one.reset_position(float(first[0]), float(first[1]), 0.8, 0.05)
         for _ in range(300):
             truth = truth + 0.2 * 0.6 * np.array([math.cos(0.4), math.sin(0.4)])
             error = keep * error + 0.8 * math.sqrt(1.0 - keep**2) * rng.standard_normal(2)
@@ -122,9 +122,9 @@ def test_a_long_run_keeps_the_covariance_a_covariance() -> None:
     for step in range(3_000):
         one.predict(0.3 * math.sin(0.01 * step), 0.1, 0.05, 0.05, 0.8)
         one.correct_yaw(float(one.x[PSI]) + 0.02 * rng.standard_normal(), 0.02, 9.0)
-        one.correct_way(1.4)
+        one.correct_sideslip(1.4)
         if step % 4 == 0:
-            x_m, y_m, _ = one.expected_fix
+            x_m, y_m, _ = one.predicted_fix
             one.correct_position(x_m + 0.05 * rng.standard_normal(), y_m, 0.05, 25.0)
             one.correct_velocity(*one.velocity, 0.05, 25.0)
     assert (one.covariance == one.covariance.T).all()
@@ -139,7 +139,7 @@ def test_gravity_leaves_no_trace_on_level_axes(roll_rad: float, pitch_rad: float
     sin_roll, cos_roll, sin_pitch, cos_pitch = (
         math.sin(roll_rad), math.cos(roll_rad), math.sin(pitch_rad), math.cos(pitch_rad)
     )  # fmt: skip
-    felt = level(
+    felt = level_sample(
         ImuSample(
             source_us=0,
             gyro_x_radps=-turn_radps * sin_pitch,

@@ -1,4 +1,4 @@
-"""What of the sensors' messages may be used. Pure; every refusal is counted under its cause."""
+"""Checks of the sensors' messages before they reach the filters. Pure; every refusal is counted under its cause."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,20 +7,21 @@ import msgspec
 
 from paani.messages import GpsFix, ImuSample
 
-MAX_FUTURE_S = 0.1  # as `NavigatorConfig.max_future_s`
-MIN_POSITION_STD_M, MAX_POSITION_STD_M = 0.1, 1000.0  # no receiver is better; worse is no position
-MAX_SOG_MPS = 100.0
+MAX_FUTURE_S = 0.1  # a stamp further ahead of now is refused; as `NavigatorConfig.max_future_s`
+MIN_POSITION_STD_M = 0.1  # no receiver is better; a smaller claim is raised to this
+MAX_POSITION_STD_M = 1000.0  # a worse fix is no position
+MAX_SOG_MPS = 100.0  # faster than any boat
 MAX_ACCEL_MPS2, MAX_RATE_RADPS = 160.0, 35.0  # the widest ranges of small IMUs: 16 g, 2000 degrees a second
-MAX_ANGLE_RAD = 1e4  # some count their turns
+MAX_ANGLE_RAD = 1e4  # far more than a full circle, because some sensors count their turns
 
 
-def usable_samples(
+def select_usable_samples(
     samples: Sequence[ImuSample], last: ImuSample | None, now_us: int, drops: Counter[str]
 ) -> list[ImuSample]:
-    """The samples within an IMU's ranges, of the newest epoch, in order, later than `last`, not from the future."""
+    """The samples within an IMU's ranges, of the newest epoch, in order, later than `last` and not ahead of now."""
     if not samples:
         return []
-    epoch, kept = samples[-1].epoch, list[ImuSample]()
+    epoch, usable = samples[-1].epoch, list[ImuSample]()
     after_us = last.source_us if last is not None and last.epoch == epoch else -1
     for sample in samples:
         if not _is_possible_sample(sample):
@@ -30,13 +31,13 @@ def usable_samples(
         elif sample.epoch != epoch or sample.source_us <= after_us:
             drops["imu_late"] += 1
         else:
-            kept.append(sample)
+            usable.append(sample)
             after_us = sample.source_us
-    return kept
+    return usable
 
 
-def usable_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str]) -> GpsFix | None:
-    """The fix, its spread not below what a receiver can do; None if it must not be used."""
+def check_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str]) -> GpsFix | None:
+    """The fix, its standard deviation raised to what a receiver can do; None if it must not be used."""
     if not fix.fix:
         return None
     if not _is_possible_fix(fix):
@@ -51,7 +52,7 @@ def usable_fix(fix: GpsFix, last: GpsFix | None, now_us: int, drops: Counter[str
 
 
 def _is_possible_sample(sample: ImuSample) -> bool:
-    """Comparisons with what is not a number are false."""
+    """Whether every number is within an IMU's ranges; comparisons with NaN are false."""
     return (
         abs(sample.accel_x_mps2) <= MAX_ACCEL_MPS2
         and abs(sample.accel_y_mps2) <= MAX_ACCEL_MPS2
@@ -66,6 +67,7 @@ def _is_possible_sample(sample: ImuSample) -> bool:
 
 
 def _is_possible_fix(fix: GpsFix) -> bool:
+    """Whether every number is one that a receiver can give."""
     return (
         abs(fix.latitude_deg) <= 90.0
         and abs(fix.longitude_deg) <= 180.0
