@@ -119,7 +119,7 @@ def save_catalogue(catalogue: dict[str, Model], folder: Path) -> None:
 IGNORED_CLASS = "-"
 
 
-def described(file: Path, role: str) -> Model:
+def read_contract(file: Path, role: str) -> Model:
     """The contract of a user's model file: what a manifest beside it says of it, else that of the role's shipped model.
 
     A segmenter names the shipped one's classes in any order; a detector names any of them in any order, and "-" for
@@ -147,9 +147,9 @@ def described(file: Path, role: str) -> Model:
     return stated
 
 
-def chosen(role: str, path: str) -> tuple[Model, Path]:
+def choose_model(role: str, path: str) -> tuple[Model, Path]:
     """Contract and file of a user's model, or, without a path, of the role's shipped one, its checksum compared."""
-    return (described(Path(path), role), Path(path)) if path else (load_catalogue()[role], verified_path(role))
+    return (read_contract(Path(path), role), Path(path)) if path else (load_catalogue()[role], verified_path(role))
 
 
 def file_sha256(path: Path) -> str:

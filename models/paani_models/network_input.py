@@ -11,7 +11,7 @@ MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # D7
 STD = np.array([0.229, 0.224, 0.225], np.float32)
 SIZE_WH = (320, 256)  # C1, D5
 PAD_GREY = 114
-GATE_MIDDLE_WH, GATE_WH = (320, 240), (160, 120)
+IMAGE_QUALITY_MIDDLE_WH, IMAGE_QUALITY_WH = (320, 240), (160, 120)
 
 
 def segmenter_batch(pictures: U8) -> F32:
@@ -30,10 +30,10 @@ def segmenter_input(picture: U8) -> F32:
     return segmenter_batch(np.asarray(cv2.resize(picture, SIZE_WH), np.uint8)[None])
 
 
-def gate_input(picture: U8) -> F32:
+def image_quality_input(picture: U8) -> F32:
     """Any picture, averaged down in two steps as the board's gate does it -> [1,3,120,160]."""
-    middle = cv2.resize(picture, GATE_MIDDLE_WH, interpolation=cv2.INTER_AREA)
-    small = np.asarray(cv2.resize(middle, GATE_WH, interpolation=cv2.INTER_AREA), np.uint8)
+    middle = cv2.resize(picture, IMAGE_QUALITY_MIDDLE_WH, interpolation=cv2.INTER_AREA)
+    small = np.asarray(cv2.resize(middle, IMAGE_QUALITY_WH, interpolation=cv2.INTER_AREA), np.uint8)
     return detector_batch(small[None])
 
 
@@ -44,7 +44,7 @@ def letterbox_affine(source_wh: tuple[int, int], target_wh: tuple[int, int]) -> 
     return np.array([[scale, 0, x], [0, scale, y]], np.float32)
 
 
-def letterboxed(picture: U8) -> U8:
+def letterbox_picture(picture: U8) -> U8:
     """Any picture, resized bilinearly into the middle of a grey net-sized one."""
     height, width = picture.shape[:2]
     scale = min(SIZE_WH[0] / width, SIZE_WH[1] / height)
@@ -57,4 +57,4 @@ def letterboxed(picture: U8) -> U8:
 
 def detector_input(picture: U8) -> F32:
     """Any picture, letterboxed -> [1,3,256,320] in 0..1."""
-    return detector_batch(letterboxed(picture)[None])
+    return detector_batch(letterbox_picture(picture)[None])

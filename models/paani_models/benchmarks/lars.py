@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from paani.arrays import U8, Bools
 from paani.errors import UserError
-from paani_models.datasets.checked_files import decode_picture, read_bytes
+from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.sources import IGNORE
-from paani_models.segmenter.metrics import class_iou, confusion
+from paani_models.segmenter.metrics import class_iou, confusion_matrix
 
 OBSTACLE, WATER, SKY = 0, 1, 2
 COLOURS = ((247, 195, 37), (41, 167, 224), (90, 75, 164))  # RGB; what the benchmark's server reads
@@ -65,7 +65,7 @@ class Truth:
 
 
 @dataclass
-class Tally:
+class LarsTally:
     """Counts over a data set."""
 
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros((3, 3), np.int64))
@@ -79,7 +79,7 @@ class Tally:
         """Count one picture. predicted: LaRS classes, any size; resized to the truth's, nearest pixel."""
         height, width = truth.semantic.shape
         label = np.asarray(cv2.resize(predicted, (width, height), interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
-        self.counts += confusion(label, truth.semantic, 3)
+        self.counts += confusion_matrix(label, truth.semantic, 3)
         static, water = truth.panoptic[..., 0] == STATIC_OBSTACLE, truth.semantic == WATER
         obstacle = label == OBSTACLE
         ids = truth.panoptic.astype(np.int64) @ np.array([1, 256, 65536])
@@ -88,16 +88,16 @@ class Tally:
             if segment.category_id not in DYNAMIC:
                 continue
             mine = ids == segment.id
-            around = _dilated(mine, OBJECT_DILATION_PX)
+            around = _dilate(mine, OBJECT_DILATION_PX)
             dynamic |= around
             if (obstacle & ~static & around).sum() > MIN_COVERAGE * mine.sum():
                 self.found += 1
             else:
                 self.missed += 1
-        edge = _dilated(static, EDGE_DILATION_PX) & _dilated(water, EDGE_DILATION_PX) & (static | water) & ~dynamic
+        edge = _dilate(static, EDGE_DILATION_PX) & _dilate(water, EDGE_DILATION_PX) & (static | water) & ~dynamic
         self.edge += int(edge.sum())
         self.edge_right += int((edge & (label == truth.semantic)).sum())
-        alarms = (obstacle & _eroded(water, WATER_EROSION_PX)).astype(np.uint8)
+        alarms = (obstacle & _erode(water, WATER_EROSION_PX)).astype(np.uint8)
         self.alarms += cv2.connectedComponents(alarms, connectivity=8)[0] - 1
 
     def figures(self) -> dict[str, float]:
@@ -120,12 +120,12 @@ class Tally:
         }
 
 
-def from_ours(label: U8) -> U8:
+def to_lars_classes(label: U8) -> U8:
     """Our classes 0..2 -> LaRS's."""
     return _FROM_OURS[label]
 
 
-def coloured(label: U8) -> U8:
+def colour_label(label: U8) -> U8:
     """LaRS classes -> the RGB picture that the server reads, uint8 [H,W,3]."""
     return np.array(COLOURS, np.uint8)[label]
 
@@ -134,13 +134,13 @@ def write_prediction(folder: Path, name: str, label: U8) -> None:
     """Write `folder`/NAME.png in the server's colours. label: our classes."""
     path = folder / f"{name}.png"
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), cv2.cvtColor(coloured(from_ours(label)), cv2.COLOR_RGB2BGR)):
+    if not cv2.imwrite(str(path), cv2.cvtColor(colour_label(to_lars_classes(label)), cv2.COLOR_RGB2BGR)):
         raise UserError(f"{path}: cannot be written")
 
 
 def read_prediction(path: Path) -> U8:
     """A picture in the server's colours -> LaRS classes. Raises UserError naming one unreadable or of other colours."""
-    picture = decode_picture(read_bytes(path), path)
+    picture = decode_picture(read_whole_file(path), path)
     label = np.full(picture.shape[:2], IGNORE, np.uint8)
     for kind, colour in enumerate(COLOURS):
         label[(picture == colour).all(2)] = kind
@@ -177,15 +177,15 @@ def read_truth(root: Path, name: str, segments: dict[str, tuple[Segment, ...]]) 
     if name not in segments:
         raise UserError(f"{root / 'panoptic_annotations.json'}: does not annotate {name}")
     paths = [root / folder / f"{name}.png" for folder in ("semantic_masks", "panoptic_masks")]
-    semantic, panoptic = (decode_picture(read_bytes(path), path) for path in paths)
+    semantic, panoptic = (decode_picture(read_whole_file(path), path) for path in paths)
     if semantic.shape != panoptic.shape:
         raise UserError(f"{paths[1]}: another size than {paths[0].name} of semantic_masks")
     return Truth(semantic[..., 0], panoptic, segments[name])
 
 
-def _dilated(mask: Bools, side: int) -> Bools:
+def _dilate(mask: Bools, side: int) -> Bools:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)), np.bool_)
 
 
-def _eroded(mask: Bools, side: int) -> Bools:
+def _erode(mask: Bools, side: int) -> Bools:
     return np.asarray(cv2.erode(mask.astype(np.uint8), np.ones((side, side), np.uint8)), np.bool_)

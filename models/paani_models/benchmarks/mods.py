@@ -78,7 +78,7 @@ class _File(msgspec.Struct, frozen=True):
 
 
 @dataclass
-class Tally:
+class ModsTally:
     """Counts over a data set: water edge, and obstacles overall and in the danger zone (found, missed, alarms)."""
 
     frame_errors_px: list[float] = field(default_factory=list)
@@ -92,7 +92,7 @@ class Tally:
         """Count one picture. label: MODS classes, at the size of the annotation; zone: True in the danger zone."""
         obstacle = label == OBSTACLE
         land = land_mask(frame.water_edges, obstacle.shape)
-        self._edge(obstacle, np.where(_straddled(frame, land), 0, land.sum(0)))
+        self._edge(obstacle, np.where(_columns_under_objects(frame, land), 0, land.sum(0)))
         found = self._objects(obstacle, frame, zone)
         if exhaustive and frame.exhaustive:
             self._alarms(obstacle, frame, land, zone, found)
@@ -135,8 +135,8 @@ class Tally:
 
     def _objects(self, obstacle: Bools, frame: Frame, zone: Bools) -> list[Obstacle]:
         found = []
-        for each in _judged(frame):
-            spot = _box(each)
+        for each in _scored_obstacles(frame):
+            spot = _box_slices(each)
             hit = bool(obstacle[spot].sum() >= MIN_OVERLAP * each.area)
             column = 0 if hit else 1
             self.objects[0, column] += 1
@@ -151,7 +151,7 @@ class Tally:
         near = np.asarray(cv2.dilate(land.astype(np.uint8), kernel), np.bool_)
         for each in frame.obstacles:
             if each.type == "negative":
-                near[_box(each, reach)] = True
+                near[_box_slices(each, reach)] = True
         count, blobs, stats, _ = cv2.connectedComponentsWithStats((obstacle & ~near).astype(np.uint8), connectivity=8)
         for blob in range(1, count):
             x, y, width, height, area = (int(value) for value in stats[blob])
@@ -159,8 +159,8 @@ class Tally:
                 continue
             mask, widths = blobs == blob, []
             inside = False
-            for each in _judged(frame):
-                covered = int(mask[_box(each, reach)].sum())
+            for each in _scored_obstacles(frame):
+                covered = int(mask[_box_slices(each, reach)].sum())
                 if each in found and covered > MIN_OVERLAP * each.area:
                     widths.append(each.bbox[2])
                 inside |= covered > MIN_OVERLAP * area
@@ -213,7 +213,7 @@ def danger_zone(
     return mask.astype(np.bool_)
 
 
-def from_ours(label: U8) -> U8:
+def to_mods_classes(label: U8) -> U8:
     """Our classes 0..2 -> MODS's."""
     return _FROM_OURS[label]
 
@@ -235,11 +235,11 @@ def read_dataset(path: Path) -> Dataset:
         raise UserError(f"{path}: {error}") from error
 
 
-def _judged(frame: Frame) -> list[Obstacle]:
+def _scored_obstacles(frame: Frame) -> list[Obstacle]:
     return [each for each in frame.obstacles if each.type != "negative" and each.area >= MIN_AREA_PX]
 
 
-def _box(obstacle: Obstacle, margin: int = 0) -> tuple[slice, slice]:
+def _box_slices(obstacle: Obstacle, margin: int = 0) -> tuple[slice, slice]:
     x, y, width, height = (round(value) for value in obstacle.bbox)
     return (
         slice(max(0, y - margin), max(0, y + height + margin)),
@@ -247,13 +247,13 @@ def _box(obstacle: Obstacle, margin: int = 0) -> tuple[slice, slice]:
     )
 
 
-def _straddled(frame: Frame, land: Bools) -> Bools:
+def _columns_under_objects(frame: Frame, land: Bools) -> Bools:
     """Columns where an object stands across the water edge, which cannot be placed there."""
     columns = np.zeros(land.shape[1], np.bool_)
     for each in frame.obstacles:
-        patch = land[_box(each)]
+        patch = land[_box_slices(each)]
         if patch.any() and not patch.all():
-            columns[_box(each)[1]] = True
+            columns[_box_slices(each)[1]] = True
     return columns
 
 

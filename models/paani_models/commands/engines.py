@@ -15,12 +15,12 @@ from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.option_paths import output_file
 from paani.whole_file import write_whole
-from paani_models.catalogue import described, verified_path
-from paani_models.datasets.selection import Pictures
+from paani_models.catalogue import read_contract, verified_path
+from paani_models.datasets.selection import PictureSelection
 from paani_models.engines import benchmark as engine_bench
-from paani_models.engines.contract_check import MAX_DIFFERENCE, role_of
-from paani_models.engines.ncnn_runner import NOT_INSTALLED, converted, files_of, release
-from paani_models.engines.parity import inputs_for
+from paani_models.engines.contract_check import MAX_DIFFERENCE, infer_role
+from paani_models.engines.ncnn_runner import NOT_INSTALLED, ncnn_files, ncnn_version, verified_ncnn_files
+from paani_models.engines.parity import prepare_inputs
 
 ROLES = ("detector", "segmenter")
 
@@ -36,8 +36,8 @@ def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `paani models bench`."""
     parser.add_argument("--engine", choices=("all", *engine_bench.ENGINES), default="all")
-    parser.add_argument("--threads", type=_counts, default=(1, 2), metavar="N,N", help="default: 1,2")
-    parser.add_argument("--rounds", type=_count, default=30, metavar="N", help="runs of each (default: 30)")
+    parser.add_argument("--threads", type=_parse_thread_counts, default=(1, 2), metavar="N,N", help="default: 1,2")
+    parser.add_argument("--rounds", type=_parse_count, default=30, metavar="N", help="runs of each (default: 30)")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
 
 
@@ -47,16 +47,16 @@ def convert(arguments: argparse.Namespace) -> int:
         from paani_models.engines import ncnn_convert  # noqa: PLC0415 - onnx is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
-    if release() is None:
+    if ncnn_version() is None:
         raise UserError(NOT_INSTALLED)
     settings = ["perception.engine=ncnn"]
     for source in arguments.models or [verified_path(role) for role in ROLES]:
-        role = role_of(source, arguments.role)
+        role = infer_role(source, arguments.role)
         folder = arguments.out or source.parent
-        inputs = inputs_for(described(source, role), _held_out(arguments))
-        record = ncnn_convert.convert(source, role, folder, arguments.pnnx, inputs)
+        inputs = prepare_inputs(read_contract(source, role), _held_out_pictures(arguments))
+        record = ncnn_convert.convert_to_ncnn(source, role, folder, arguments.pnnx, inputs)
         sys.stdout.write(
-            f"{files_of(folder / source.name).param}: {role}, answers differ by at most {record.max_difference:.1e}, "
+            f"{ncnn_files(folder / source.name).param}: {role}, answers differ by at most {record.max_difference:.1e}, "
             f"{record.inputs} inputs\n"
         )
         if arguments.models or arguments.out:
@@ -67,73 +67,73 @@ def convert(arguments: argparse.Namespace) -> int:
 
 def bench(arguments: argparse.Namespace) -> int:
     """Measure, print, write. Raises UserError where an engine that was asked for by name cannot run."""
-    nets = engine_bench.nets_of(arguments.weights)
+    nets = engine_bench.load_networks(arguments.weights)
     engines = list(engine_bench.ENGINES) if arguments.engine == "all" else [arguments.engine]
     left_out = {}
-    if "ncnn" in engines and (reason := _why_not(nets)):
+    if "ncnn" in engines and (reason := _reason_against_ncnn(nets)):
         if arguments.engine == "ncnn":
             raise UserError(reason)
         engines.remove("ncnn")
         left_out["ncnn"] = reason
     agreements: tuple[engine_bench.Agreement, ...] = ()
     if "ncnn" in engines:
-        pictures = _held_out(arguments)
-        inputs = {role: inputs_for(net.contract, pictures) for role, net in nets.items()}
-        agreements = engine_bench.agreements_of(nets, inputs)
-    ready, load_before = engine_bench.cases(nets, engines, arguments.threads), os.getloadavg()[0]
+        pictures = _held_out_pictures(arguments)
+        inputs = {role: prepare_inputs(net.contract, pictures) for role, net in nets.items()}
+        agreements = engine_bench.measure_agreements(nets, inputs)
+    ready, load_before = engine_bench.prepare_cases(nets, engines, arguments.threads), os.getloadavg()[0]
     taken: dict[engine_bench.Case, list[float]] = {}
-    for turn, taken in engine_bench.measured(  # noqa: B007 - the last one is the result
+    for turn, taken in engine_bench.measure_rounds(  # noqa: B007 - the last one is the result
         ready, arguments.rounds, stopwatch_ms
     ):
         if sys.stderr.isatty():
             sys.stderr.write(f"\r{max(0, turn):4} of {arguments.rounds} rounds\r")
-    found = engine_bench.rows(taken)
+    found = engine_bench.summarise_times(taken)
     report = engine_bench.EngineReport(
         machine=f"{platform.machine()} {platform.system()}",
         cores=os.cpu_count() or 1,
         load_before=round(load_before, 2),
         load_after=round(os.getloadavg()[0], 2),
         rows=found,
-        costs=engine_bench.costs(nets),
+        costs=engine_bench.measure_costs(nets),
         agreements=agreements,
         left_out=left_out,
-        choice=engine_bench.choice(found, agreements, MAX_DIFFERENCE),
+        choice=engine_bench.choose_engine(found, agreements, MAX_DIFFERENCE),
     )
-    sys.stdout.write(engine_bench.text(report))
+    sys.stdout.write(engine_bench.format_report(report))
     if arguments.json:
         write_whole(arguments.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
     return 0
 
 
-def _why_not(nets: Mapping[str, engine_bench.Net]) -> str:
+def _reason_against_ncnn(nets: Mapping[str, engine_bench.NetworkFile]) -> str:
     """Why ncnn cannot be timed; empty where it can."""
-    if release() is None:
+    if ncnn_version() is None:
         return NOT_INSTALLED
     try:
         for net in nets.values():
-            converted(net.file)
+            verified_ncnn_files(net.file)
     except UserError as error:
         return str(error)
     return ""
 
 
-def _held_out(arguments: argparse.Namespace) -> list[Path]:
+def _held_out_pictures(arguments: argparse.Namespace) -> list[Path]:
     """Pictures of the held-out sequences, where there is a data folder."""
     if not arguments.data.is_dir():
         return []
     names = [name for name in arguments.sources.split(",") if name]
-    samples = Pictures(arguments.data, names, arguments.rendered).samples
+    samples = PictureSelection(arguments.data, names, arguments.rendered).samples
     return [sample.picture for sample in samples if sample.held_out]
 
 
-def _count(text: str) -> int:
+def _parse_count(text: str) -> int:
     value = int(text)
     if not 1 <= value <= 10_000:
         raise argparse.ArgumentTypeError(f"{text} is not from 1 to 10000")
     return value
 
 
-def _counts(text: str) -> tuple[int, ...]:
+def _parse_thread_counts(text: str) -> tuple[int, ...]:
     try:
         values = tuple(dict.fromkeys(int(part) for part in text.split(",")))
     except ValueError:

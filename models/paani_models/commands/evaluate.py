@@ -13,23 +13,23 @@ import msgspec
 from paani.errors import UserError
 from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_whole
-from paani_models.benchmarks import run as benchmarks
+from paani_models.benchmarks import score_networks as benchmarks
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import DETECTOR_CLASSES
-from paani_models.detector.scores import ScoredBoxes, false_alarms, score_boxes
-from paani_models.report import evaluate
+from paani_models.detector.scores import ScoredBoxes, count_false_alarms, score_boxes
+from paani_models.report import manifest_figures as evaluate
 from paani_models.report.estimates import (
     Evaluation,
-    Measured,
-    alarm_estimates,
-    box_confusion,
-    box_curves,
-    box_estimates,
-    mask_confusions,
-    mask_estimates,
+    MeasuredModel,
+    draw_box_curves,
+    estimate_boxes,
+    estimate_false_alarms,
+    estimate_masks,
+    tabulate_box_confusion,
+    tabulate_mask_confusions,
 )
-from paani_models.report.records import gate_figures, read_faults
+from paani_models.report.records import image_quality_figures, read_faults
 from paani_models.segmenter.scores import ScoredMask, score_masks
 
 
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoredPair:
     """Everything measured on labelled pictures, picture by picture."""
 
     evaluation: Evaluation
@@ -63,22 +63,22 @@ class Scored:
     boxes: list[ScoredBoxes]
 
 
-def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
+def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Exit 0, or raise UserError."""
     catalogue = load_catalogue(arguments.weights)
     if arguments.faults:
-        _report("gate", gate_figures(read_faults(arguments.faults)), arguments)
+        _print_and_record("gate", image_quality_figures(read_faults(arguments.faults)), arguments)
         return 0
     for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
         if net not in catalogue or not is_scored(catalogue[net].classes):
             raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
-        _report(net, measure(net, arguments.weights, pictures), arguments)
+        _print_and_record(net, measure_network(net, arguments.weights, pictures), arguments)
     if arguments.json:
-        write(arguments.json, score(arguments.weights, pictures).evaluation)
+        write_evaluation(arguments.json, score_pair(arguments.weights, pictures).evaluation)
     return 0
 
 
-def _report(net: str, figures: list[Figure], arguments: argparse.Namespace) -> None:
+def _print_and_record(net: str, figures: list[Figure], arguments: argparse.Namespace) -> None:
     for figure in figures:
         sys.stdout.write(msgspec.json.encode(figure).decode() + "\n")
     if arguments.record:
@@ -93,14 +93,14 @@ def run_benchmark(arguments: argparse.Namespace) -> int:
     """Print one JSON object per benchmark. Exit 0, or raise UserError."""
     segmenter_net = verified_path("segmenter", arguments.weights)
     if arguments.lars:
-        _print(benchmarks.score_lars(segmenter_net, arguments.lars, arguments.predictions))
+        _print_rounded(benchmarks.score_lars(segmenter_net, arguments.lars, arguments.predictions))
     if arguments.mods:
         detector_net = verified_path("detector", arguments.weights)
-        _print(benchmarks.score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
+        _print_rounded(benchmarks.score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
     return 0
 
 
-def _print(figures: dict[str, float]) -> None:
+def _print_rounded(figures: dict[str, float]) -> None:
     rounded = {name: round(value, 3) if math.isfinite(value) else None for name, value in figures.items()}
     sys.stdout.write(msgspec.json.encode(rounded).decode() + "\n")
 
@@ -110,36 +110,40 @@ def is_scored(classes: tuple[str, ...]) -> bool:
     return "water" in classes or classes == DETECTOR_CLASSES
 
 
-def measure(net: str, weights: Path, pictures: Pictures) -> list[Figure]:
+def measure_network(net: str, weights: Path, pictures: PictureSelection) -> list[Figure]:
     """The manifest's figures of one net."""
     path = verified_path(net, weights)
     if "water" in load_catalogue(weights)[net].classes:
-        return evaluate.segmenter_figures(path, pictures.segmented(held_out=True))
+        return evaluate.measure_segmenter(path, pictures.segmented_samples(held_out=True))
     return [
-        *evaluate.detector_figures(path, pictures.boxed(held_out=True)),
-        *evaluate.false_alarm_figures(path, pictures.segmented(held_out=True)),
+        *evaluate.measure_detector(path, pictures.boxed_samples(held_out=True)),
+        *evaluate.measure_false_alarms(path, pictures.segmented_samples(held_out=True)),
     ]
 
 
-def score(weights: Path, pictures: Pictures) -> Scored:
+def score_pair(weights: Path, pictures: PictureSelection) -> ScoredPair:
     """The shipped pair, picture by picture. Raises UserError where nothing is held out."""
-    segmented, boxed = pictures.segmented(held_out=True), pictures.boxed(held_out=True)
+    segmented, boxed = pictures.segmented_samples(held_out=True), pictures.boxed_samples(held_out=True)
     if not segmented and not boxed:
         raise UserError("sources: nothing is held out")
     catalogue = load_catalogue(weights)
     masks = score_masks(verified_path("segmenter", weights), segmented) if segmented else []
     boxes = score_boxes(verified_path("detector", weights), boxed) if boxed else []
     rivers = [sample for sample in segmented if sample.source.empty_of]
-    alarms = alarm_estimates(rivers, false_alarms(verified_path("detector", weights), rivers)) if rivers else ()
-    evaluation = Evaluation(
-        models=tuple(Measured(name=n, sha256=catalogue[n].sha256) for n in ("segmenter", "detector") if n in catalogue),
-        estimates=(*mask_estimates(masks), *box_estimates(boxes), *alarms),
-        curves=box_curves(boxes),
-        confusions=(*mask_confusions(masks), *([box_confusion(boxes)] if boxes else [])),
+    alarms = (
+        estimate_false_alarms(rivers, count_false_alarms(verified_path("detector", weights), rivers)) if rivers else ()
     )
-    return Scored(evaluation, masks, boxes)
+    evaluation = Evaluation(
+        models=tuple(
+            MeasuredModel(name=n, sha256=catalogue[n].sha256) for n in ("segmenter", "detector") if n in catalogue
+        ),
+        estimates=(*estimate_masks(masks), *estimate_boxes(boxes), *alarms),
+        curves=draw_box_curves(boxes),
+        confusions=(*tabulate_mask_confusions(masks), *([tabulate_box_confusion(boxes)] if boxes else [])),
+    )
+    return ScoredPair(evaluation, masks, boxes)
 
 
-def write(path: Path, evaluation: Evaluation) -> None:
+def write_evaluation(path: Path, evaluation: Evaluation) -> None:
     """Written beside, then renamed. Raises UserError naming a file that cannot be written."""
     write_whole(path, msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")

@@ -14,13 +14,13 @@ from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
+from paani_models.commands import prepare as data_command
 from paani_models.commands import report as report_command
-from paani_models.datasets import command as data_command
-from paani_models.datasets.selection import Pictures
-from paani_models.datasets.sources import without_water
+from paani_models.datasets.selection import PictureSelection
+from paani_models.datasets.sources import list_pictures_without_water
 from paani_models.engines import contract_check
-from paani_models.report import evaluate
-from paani_models.report.model_card import card
+from paani_models.report import manifest_figures as evaluate
+from paani_models.report.model_card import render_model_card
 
 DATA_VARIABLE = "PAANI_DATA"
 NETS = ("segmenter", "detector")
@@ -40,7 +40,7 @@ def main(argv: list[str]) -> int:
         if arguments.command == "check":
             return _check_file(arguments) if arguments.model else _check(arguments.weights)
         if arguments.command == "card":
-            sys.stdout.write(card(load_catalogue(arguments.weights)))
+            sys.stdout.write(render_model_card(load_catalogue(arguments.weights)))
             return 0
         if arguments.command == "prepare":
             if arguments.set != "own":
@@ -141,11 +141,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _held_out(pictures: Pictures, dry: bool) -> int:
+def _held_out(pictures: PictureSelection, dry: bool) -> int:
     """dry: also pictures that show no water and belong to no source."""
     if dry:
-        trained = {sample.picture for sample in pictures.never_held_out()}
-        listed = {pictures.data / name for name in without_water()}
+        trained = {sample.picture for sample in pictures.training_samples()}
+        listed = {pictures.data / name for name in list_pictures_without_water()}
         held = {picture for picture in listed - trained if picture.is_file()}
     else:
         held = {sample.picture for sample in pictures.samples if sample.held_out and not sample.without_water}
@@ -162,17 +162,17 @@ def _check(weights: Path) -> int:
 
 def _check_file(arguments: argparse.Namespace) -> int:
     """0 where the model can be used, 1 where it cannot."""
-    role = contract_check.role_of(arguments.model, arguments.role)
-    findings = contract_check.inspected(arguments.model, role)
+    role = contract_check.infer_role(arguments.model, arguments.role)
+    findings = contract_check.inspect_model(arguments.model, role)
     for finding in findings:
         sys.stdout.write(f"{finding.level:8} {finding.text}\n")
     usable = all(finding.level != "error" for finding in findings)
     if usable and arguments.score:
         pictures = _pictures(arguments)
         if role == "segmenter":
-            figures = evaluate.segmenter_figures(arguments.model, pictures.segmented(held_out=True))
+            figures = evaluate.measure_segmenter(arguments.model, pictures.segmented_samples(held_out=True))
         else:
-            figures = evaluate.detector_figures(arguments.model, pictures.boxed(held_out=True))
+            figures = evaluate.measure_detector(arguments.model, pictures.boxed_samples(held_out=True))
         for figure in figures:
             sys.stdout.write(f"{'score':8} {figure.metric} on {figure.source}: {figure.value:.3f} (n {figure.n})\n")
     use = f"paani up --set perception.{role}={arguments.model}"
@@ -180,9 +180,9 @@ def _check_file(arguments: argparse.Namespace) -> int:
     return 0 if usable else 1
 
 
-def _pictures(arguments: argparse.Namespace) -> Pictures:
+def _pictures(arguments: argparse.Namespace) -> PictureSelection:
     names = [name for name in arguments.sources.split(",") if name]
-    return Pictures(arguments.data, names, arguments.rendered)
+    return PictureSelection(arguments.data, names, arguments.rendered)
 
 
 def _variant(weights: Path, out: Path) -> int:
@@ -206,14 +206,14 @@ def _quantise(arguments: argparse.Namespace) -> int:
 
 def _needs_torch(arguments: argparse.Namespace) -> int:
     try:
-        from paani_models.recipes import recipes as pipeline  # noqa: PLC0415 - PyTorch is not on the board
+        from paani_models.recipes import train_and_export as pipeline  # noqa: PLC0415 - PyTorch is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
     if arguments.command == "export" and arguments.untrained:
-        return pipeline.export_untrained_net(arguments.net, arguments.weights)
+        return pipeline.export_untrained_network(arguments.net, arguments.weights)
     pictures = _pictures(arguments)
     if arguments.command == "train":
-        plan = pipeline.Plan(
+        plan = pipeline.TrainingOptions(
             folder=arguments.folder,
             start=arguments.start,
             teacher=arguments.teacher,
@@ -223,7 +223,7 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
             peak_rate=arguments.peak_rate,
             unchecked=arguments.unchecked,
         )
-        pipeline.train(arguments.net, pictures, plan, arguments.threads)
+        pipeline.train_network(arguments.net, pictures, plan, arguments.threads)
     else:
-        pipeline.export_net(arguments.net, arguments.checkpoint, arguments.weights, pictures)
+        pipeline.export_checkpoint(arguments.net, arguments.checkpoint, arguments.weights, pictures)
     return 0

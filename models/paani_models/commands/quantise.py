@@ -9,44 +9,44 @@ import msgspec
 
 from paani.errors import UserError
 from paani_models.catalogue import file_sha256, verified_path
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.network_input import detector_input, segmenter_input
 from paani_models.quantisation import acceptance as precision_gate
-from paani_models.quantisation.acceptance import PrecisionRecord
-from paani_models.quantisation.calibration_pictures import calibration_samples, fingerprint
-from paani_models.quantisation.quantise import RECIPES, quantise
+from paani_models.quantisation.acceptance import QuantisationRecord
+from paani_models.quantisation.calibration_pictures import choose_calibration_samples, hash_sample_names
+from paani_models.quantisation.quantise import RECIPES, quantise_network
 
 
-def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
+def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Write <net>-<recipe>.onnx and .json into --out. 0 where the gate accepts, 1 where it rejects."""
     net, recipe = arguments.net, RECIPES[arguments.recipe][arguments.net]
     source = arguments.model or verified_path(net)
     is_segmenter = net == "segmenter"
     labelled = [s for s in pictures.samples if (s.mask if is_segmenter else s.label)]
-    held_out = pictures.segmented(held_out=True) if is_segmenter else pictures.boxed(held_out=True)
+    held_out = pictures.segmented_samples(held_out=True) if is_segmenter else pictures.boxed_samples(held_out=True)
     if not held_out:
         raise UserError("sources: no held-out picture to judge on")
-    chosen = calibration_samples(labelled, arguments.calibrate, spread=recipe.spread)
+    chosen = choose_calibration_samples(labelled, arguments.calibrate, spread=recipe.spread)
     prepare = segmenter_input if is_segmenter else detector_input
     inputs = [prepare(read_picture(sample.picture)) for sample in chosen]
     target = arguments.out / f"{net}-{recipe.name}.onnx"
-    quantise(source, target, recipe, inputs)
-    score = precision_gate.segmenter_score if is_segmenter else precision_gate.detector_score
+    quantise_network(source, target, recipe, inputs)
+    score = precision_gate.score_segmenter if is_segmenter else precision_gate.score_detector
     (float_score, float_figures), (int8_score, figures) = score(source, held_out), score(target, held_out)
-    best = None if is_segmenter else precision_gate.best_score(target, inputs)
-    float_best = None if is_segmenter else precision_gate.best_score(source, inputs)
-    timing = precision_gate.timing(source, target, inputs[0])
+    best = None if is_segmenter else precision_gate.largest_score(target, inputs)
+    float_best = None if is_segmenter else precision_gate.largest_score(source, inputs)
+    timing = precision_gate.time_networks(source, target, inputs[0])
     metric = "mIoU" if is_segmenter else "AP50"
-    verdict = precision_gate.verdict(
+    verdict = precision_gate.decide_acceptance(
         100.0 * (float_score - int8_score),
         timing.ratio,
         for_size=arguments.for_size,
         metric=metric,
-        best_score=best,
-        float_best_score=float_best,
+        largest_score=best,
+        float_largest_score=float_best,
     )
-    record = PrecisionRecord(
+    record = QuantisationRecord(
         net=net,
         recipe=recipe.name,
         file=target.name,
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
         size_bytes=target.stat().st_size,
         float_size_bytes=source.stat().st_size,
         calibration_pictures=len(chosen),
-        calibration_sha256=fingerprint(chosen),
+        calibration_sha256=hash_sample_names(chosen),
         metric=metric,
         score=round(int8_score, 4),
         float_score=round(float_score, 4),
@@ -65,18 +65,18 @@ def run(arguments: argparse.Namespace, pictures: Pictures) -> int:
         float_best_score=float_best,
         timing=timing,
         threads=precision_gate.THREADS,
-        machine=precision_gate.machine(),
+        machine=precision_gate.describe_machine(),
         for_size=arguments.for_size,
         verdict=verdict,
     )
     beside = target.with_suffix(".json.partial")
     beside.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
     beside.replace(target.with_suffix(".json"))
-    sys.stdout.write(_text(record))
+    sys.stdout.write(_format_record(record))
     return 0 if verdict.accepted else 1
 
 
-def _text(record: PrecisionRecord) -> str:
+def _format_record(record: QuantisationRecord) -> str:
     word = "accepted" if record.verdict.accepted else "rejected"
     lines = [
         f"{record.file}: {record.size_bytes} bytes (FP32 {record.float_size_bytes}), "

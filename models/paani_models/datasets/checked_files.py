@@ -30,7 +30,7 @@ class Box:
     height: float
 
 
-def read_bytes(path: Path) -> bytes:
+def read_whole_file(path: Path) -> bytes:
     """Raises UserError naming a file that is missing, empty or cut short (JPEG and PNG)."""
     try:
         data = path.read_bytes()
@@ -44,14 +44,14 @@ def read_bytes(path: Path) -> bytes:
     return data
 
 
-def sha256(data: bytes) -> str:
+def sha256_hex(data: bytes) -> str:
     """Hexadecimal."""
     return hashlib.sha256(data).hexdigest()
 
 
 def decode_picture(data: bytes, path: Path) -> U8:
     """RGB uint8 [H,W,3]. Raises UserError naming what is no picture, or one too small to show anything."""
-    picture = _decoded(data, cv2.IMREAD_COLOR)
+    picture = _decode(data, cv2.IMREAD_COLOR)
     if picture is None:
         raise UserError(f"{path}: not a readable picture")
     if min(picture.shape[:2]) < MIN_SIDE_PX:
@@ -65,7 +65,7 @@ def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, i
     Raises UserError naming a file that is no picture, has colours or more than 8 bits, another size than `wh`, or a
     code outside `codes`.
     """
-    mask = _decoded(data, cv2.IMREAD_UNCHANGED)
+    mask = _decode(data, cv2.IMREAD_UNCHANGED)
     if mask is None:
         raise UserError(f"{path}: not a readable mask")
     if mask.ndim == 3 and (mask == mask[..., :1]).all():
@@ -80,7 +80,7 @@ def decode_mask(data: bytes, path: Path, codes: frozenset[int], wh: tuple[int, i
     return np.asarray(mask, np.uint8)
 
 
-def _decoded(data: bytes, flags: int) -> NDArray[np.generic] | None:
+def _decode(data: bytes, flags: int) -> NDArray[np.generic] | None:
     try:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error:  # larger than the decoder's own limit
@@ -99,11 +99,11 @@ def read_yolo(path: Path, kinds: int) -> tuple[Box, ...]:
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: {error}") from error
     return tuple(
-        _row(line, f"{path}:{number}", kinds) for number, line in enumerate(text.splitlines(), 1) if line.strip()
+        _parse_row(line, f"{path}:{number}", kinds) for number, line in enumerate(text.splitlines(), 1) if line.strip()
     )
 
 
-def _row(line: str, place: str, kinds: int) -> Box:
+def _parse_row(line: str, place: str, kinds: int) -> Box:
     try:
         kind, cx, cy, width, height = (float(field) for field in line.split())
     except ValueError as error:
@@ -124,7 +124,7 @@ def _row(line: str, place: str, kinds: int) -> Box:
     return Box(int(kind), float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
 
 
-def refuse(mistakes: list[str]) -> None:
+def raise_first_mistake(mistakes: list[str]) -> None:
     """Raise UserError with the first mistake and how many more there are; nothing where there is none."""
     if mistakes:
         more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import Box, decode_picture, read_bytes, refuse, sha256
-from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint, refuse_leaks
-from paani_models.datasets.manifest import MANIFEST, Entry, SourceManifest, Split, encode
+from paani_models.datasets.checked_files import Box, decode_picture, raise_first_mistake, read_whole_file, sha256_hex
+from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture, refuse_leaks
+from paani_models.datasets.manifest import MANIFEST, Entry, SourceManifest, Split, encode_manifest
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
 
 @contextmanager
-def written_beside(out: Path) -> Iterator[Path]:
+def new_folder(out: Path) -> Iterator[Path]:
     """A new folder beside `out`, renamed to it at the end, removed where anything goes wrong or is interrupted.
 
     Raises UserError where `out` exists or cannot be made.
@@ -71,7 +71,7 @@ class Intake:
     ) -> None:
         """Take one picture with its boxes (our classes) or its mask (file codes). A bad picture is a mistake."""
         try:
-            data = read_bytes(path)
+            data = read_whole_file(path)
             picture = decode_picture(data, path)
         except UserError as error:
             self.mistakes.append(str(error))
@@ -81,7 +81,7 @@ class Intake:
             file=f"images/{path.name}",
             seq=sequence,
             split=split,
-            sha256=sha256(data),
+            sha256=sha256_hex(data),
             wh=(picture.shape[1], picture.shape[0]),
             mask=f"masks/{path.stem}.png" if mask is not None else "",
             label=f"labels/{path.stem}.txt" if boxes is not None else "",
@@ -90,13 +90,13 @@ class Intake:
         link_or_copy(path, self.out / entry.file)
         if boxes is not None:
             (self.out / "labels").mkdir(exist_ok=True)
-            (self.out / entry.label).write_text(label_text(boxes), encoding="ascii")
+            (self.out / entry.label).write_text(format_labels(boxes), encoding="ascii")
         if mask is not None:
             (self.out / "masks").mkdir(exist_ok=True)
             cv2.imwrite(str(self.out / entry.mask), mask)
         self.entries.append(entry)
         self.prints.append(
-            fingerprint(
+            fingerprint_picture(
                 picture,
                 source=self.source,
                 identity=path.stem,
@@ -112,15 +112,15 @@ class Intake:
 
         Returns it and the leaks that were let pass. Raises UserError for mistakes so far; and for leaks, if strict.
         """
-        refuse(self.mistakes)
+        raise_first_mistake(self.mistakes)
         leaks = find_leaks(self.prints)
         if strict:
             refuse_leaks(leaks)
         manifest = msgspec.structs.replace(terms, items=tuple(self.entries))
-        (self.out / MANIFEST).write_bytes(encode(manifest))
+        (self.out / MANIFEST).write_bytes(encode_manifest(manifest))
         return manifest, leaks
 
 
-def label_text(boxes: Sequence[Box]) -> str:
+def format_labels(boxes: Sequence[Box]) -> str:
     """YOLO rows."""
     return "".join(f"{b.kind} {b.cx:.6f} {b.cy:.6f} {b.width:.6f} {b.height:.6f}\n" for b in boxes)

@@ -12,8 +12,8 @@ import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import decode_picture, read_bytes, refuse, sha256
-from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint
+from paani_models.datasets.checked_files import decode_picture, raise_first_mistake, read_whole_file, sha256_hex
+from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture
 from paani_models.datasets.manifest import Entry, MaskKind, SourceManifest, load_manifest
 from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED, Sample, Source, read_boxes, read_mask
 
@@ -21,7 +21,7 @@ FolderOf = Callable[[Source], Path]
 
 
 @dataclass(frozen=True)
-class Seen:
+class ReadSample:
     """One sample as it was read."""
 
     sample: Sample
@@ -36,35 +36,35 @@ class _Terms(msgspec.Struct, frozen=True):
     origin: str = ""
 
 
-def read_everything(samples: Sequence[Sample], folder_of: FolderOf) -> list[Seen]:
+def read_all_samples(samples: Sequence[Sample], folder_of: FolderOf) -> list[ReadSample]:
     """Decode every picture, mask and label once.
 
     Raises UserError naming the first bad file and counting the others: missing, truncated or unreadable pictures and
     masks, a mask of another size than its picture, a bad box (R8), a picture of a prepared public set whose
     checksum is no longer that of its manifest.
     """
-    seen: list[Seen] = []
+    seen: list[ReadSample] = []
     mistakes: list[str] = []
     prepared = {s.source: folder_of(s.source) for s in samples if s.source.splits}
     sums = {folder / e.file: e.sha256 for folder in prepared.values() for e in load_manifest(folder).items}
     for sample in tqdm(samples, "reading", unit="picture", mininterval=2.0):
         try:
-            item = _read(sample, folder_of(sample.source))
+            item = _read_sample(sample, folder_of(sample.source))
             if sums.get(sample.picture, item.entry.sha256) != item.entry.sha256:
                 raise UserError(f"{sample.picture}: differs from its manifest")
             seen.append(item)
         except UserError as error:
             mistakes.append(str(error))
-    refuse(mistakes)
+    raise_first_mistake(mistakes)
     return seen
 
 
-def segmenter_leaks(seen: Sequence[Seen]) -> list[Leak]:
+def find_segmenter_leaks(seen: Sequence[ReadSample]) -> list[Leak]:
     """Between the pictures whose masks the segmenter learns and those that it is scored on."""
     return find_leaks([item.print for item in seen if item.sample.mask])
 
 
-def detector_leaks(seen: Sequence[Seen]) -> list[Leak]:
+def find_detector_leaks(seen: Sequence[ReadSample]) -> list[Leak]:
     """Between the pictures that the detector learns, masks alone included, and those whose boxes score it.
 
     A picture that is held out for its boxes counts as held out, whatever its mask is used for.
@@ -75,11 +75,11 @@ def detector_leaks(seen: Sequence[Seen]) -> list[Leak]:
     return find_leaks([*learnt, *boxed])
 
 
-def manifests(seen: Sequence[Seen], folder_of: FolderOf) -> tuple[SourceManifest, ...]:
+def build_manifests(seen: Sequence[ReadSample], folder_of: FolderOf) -> tuple[SourceManifest, ...]:
     """One per source, in the order of the samples."""
     found = []
     for source in dict.fromkeys(item.sample.source for item in seen):
-        terms = terms_of(folder_of(source), source)
+        terms = read_terms(folder_of(source), source)
         mask: MaskKind = "none" if not source.masks else "three_class"
         found.append(
             SourceManifest(
@@ -96,7 +96,7 @@ def manifests(seen: Sequence[Seen], folder_of: FolderOf) -> tuple[SourceManifest
     return tuple(found)
 
 
-def terms_of(folder: Path, source: Source) -> _Terms:
+def read_terms(folder: Path, source: Source) -> _Terms:
     """What a folder's manifest states of its origin. Raises UserError naming one that is missing or malformed."""
     path = folder / "manifest.json"
     try:
@@ -108,7 +108,7 @@ def terms_of(folder: Path, source: Source) -> _Terms:
     )
 
 
-def counts_by_side(seen: Sequence[Seen]) -> str:
+def format_counts(seen: Sequence[ReadSample]) -> str:
     """One line per source and side: pictures, masks and boxes per class."""
     rows: dict[tuple[str, str], Counter[str]] = {}
     for item in seen:
@@ -123,36 +123,36 @@ def counts_by_side(seen: Sequence[Seen]) -> str:
     )
 
 
-def prepare(samples: Sequence[Sample], folder_of: FolderOf, manifest: Path | None = None) -> None:
+def check_own_pictures(samples: Sequence[Sample], folder_of: FolderOf, manifest: Path | None = None) -> None:
     """Read everything, print the counts, write the manifests as one file if wanted.
 
     Raises UserError for whatever `read_everything` refuses, and where a held-out picture leaks into training, naming
     both pictures of each pair.
     """
-    seen = read_everything(samples, folder_of)
-    sys.stdout.write(counts_by_side(seen))
+    seen = read_all_samples(samples, folder_of)
+    sys.stdout.write(format_counts(seen))
     if manifest is not None:
         beside = manifest.with_name(manifest.name + ".partial")
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(manifests(seen, folder_of)), indent=1) + b"\n")
+        beside.write_bytes(msgspec.json.format(msgspec.json.encode(build_manifests(seen, folder_of)), indent=1) + b"\n")
         beside.replace(manifest)
-    leaks = {str(leak): net for net, found in _leaks(seen).items() for leak in found}
+    leaks = {str(leak): net for net, found in _find_leaks_by_network(seen).items() for leak in found}
     for text, net in leaks.items():
         sys.stderr.write(f"{net}: {text}\n")
     if leaks:
         raise UserError(f"splits leak: {len(leaks)} pairs of a training and a held-out picture, named above")
 
 
-def _leaks(seen: Sequence[Seen]) -> dict[str, list[Leak]]:
-    return {"detector": detector_leaks(seen), "segmenter": segmenter_leaks(seen)}
+def _find_leaks_by_network(seen: Sequence[ReadSample]) -> dict[str, list[Leak]]:
+    return {"detector": find_detector_leaks(seen), "segmenter": find_segmenter_leaks(seen)}
 
 
-def _read(sample: Sample, folder: Path) -> Seen:
-    data = read_bytes(sample.picture)
+def _read_sample(sample: Sample, folder: Path) -> ReadSample:
+    data = read_whole_file(sample.picture)
     picture = decode_picture(data, sample.picture)
     height, width = picture.shape[:2]
     boxes = [0] * len(DETECTOR_CLASSES)
     if sample.mask is not None:
-        read_bytes(sample.mask)
+        read_whole_file(sample.mask)
         mask = read_mask(sample.mask)
         if mask.shape != (height, width):
             raise UserError(f"{sample.mask}: {mask.shape[1]}x{mask.shape[0]}, its picture is {width}x{height}")
@@ -163,13 +163,13 @@ def _read(sample: Sample, folder: Path) -> Seen:
         file=str(sample.picture.relative_to(folder)),
         seq=sample.sequence,
         split="val" if sample.held_out else "train",
-        sha256=sha256(data),
+        sha256=sha256_hex(data),
         wh=(width, height),
         mask=str(sample.mask.relative_to(folder)) if sample.mask else "",
         label=f"{sample.label.parent.name}/{sample.label.name}" if sample.label else "",
         boxes=(boxes[0], boxes[1], boxes[2], boxes[3]),
     )
-    seen = fingerprint(
+    seen = fingerprint_picture(
         picture,
         source=str(folder),
         identity=str(sample.picture),
@@ -178,4 +178,4 @@ def _read(sample: Sample, folder: Path) -> Seen:
         place=str(sample.picture),
         sha256=entry.sha256,
     )
-    return Seen(sample, entry, seen)
+    return ReadSample(sample, entry, seen)

@@ -17,8 +17,8 @@ Cause = Literal["id", "sequence", "file", "view"]
 
 # Measured on 3,616 pictures of 13 sources: of each picture's re-encoded, scaled, blurred, brightened or cropped copy
 # 97.9 % are found, and of 5.5 million pairs from different sources none is.
-NEAR_BITS = 8
-NEAR_CORRELATION = 0.90
+MAX_HASH_DISTANCE = 8
+MIN_CORRELATION = 0.90
 
 _HASH_SIDE, _THUMBNAIL_SIDE = 8, 32
 
@@ -55,7 +55,7 @@ class Leak:
         return f"{self.first.place} ({self.first.split}) and {self.second.place} ({self.second.split}) share {shared}"
 
 
-def fingerprint(
+def fingerprint_picture(
     picture: NDArray[np.uint8], *, source: str, identity: str, sequence: str, split: str, place: str, sha256: str
 ) -> Fingerprint:
     """Of a picture RGB or grey, any size. `place` is how a message names it."""
@@ -63,28 +63,28 @@ def fingerprint(
     small = cv2.resize(grey, (_THUMBNAIL_SIDE, _THUMBNAIL_SIDE), interpolation=cv2.INTER_AREA).astype(np.float32)
     centred = (small - small.mean()).ravel()
     thumbnail = centred / max(float(np.linalg.norm(centred)), 1e-6)
-    return Fingerprint(source, identity, sequence, split, place, sha256, view_bits(small), thumbnail)
+    return Fingerprint(source, identity, sequence, split, place, sha256, perceptual_hash(small), thumbnail)
 
 
-def view_bits(small: NDArray[np.float32]) -> int:
+def perceptual_hash(small: NDArray[np.float32]) -> int:
     """63 low frequencies of a grey 32x32 picture against their median, as a 64-bit number."""
     low = cv2.dct(small)[:_HASH_SIDE, :_HASH_SIDE].ravel()[1:]
     return int.from_bytes(np.packbits(np.append(low > np.median(low), False)).tobytes(), "big")
 
 
-def distance(first: int, second: int) -> int:
+def hash_distance(first: int, second: int) -> int:
     """Differing bits."""
     return (first ^ second).bit_count()
 
 
-def find_leaks(pictures: Sequence[Fingerprint], near_bits: int = NEAR_BITS) -> list[Leak]:
+def find_leaks(pictures: Sequence[Fingerprint], near_bits: int = MAX_HASH_DISTANCE) -> list[Leak]:
     """Every leak between any two splits, the certain causes first; a pair is named once.
 
     A view leaks where its hash differs in at most `near_bits` and its thumbnail correlates by NEAR_CORRELATION:
     a bow that fills half of every frame alone does not reach that.
     """
     found: dict[tuple[str, str], Leak] = {}
-    for leak in (*_shared(pictures), *_views(pictures, near_bits)):
+    for leak in (*_find_shared_values(pictures), *_find_shared_views(pictures, near_bits)):
         found.setdefault((leak.first.place, leak.second.place), leak)
     return list(found.values())
 
@@ -96,7 +96,7 @@ def refuse_leaks(leaks: Sequence[Leak]) -> None:
         raise UserError(f"splits leak: {leaks[0]}{more}")
 
 
-def _shared(pictures: Sequence[Fingerprint]) -> list[Leak]:
+def _find_shared_values(pictures: Sequence[Fingerprint]) -> list[Leak]:
     leaks = []
     causes: tuple[tuple[Cause, str], ...] = (("id", "identity"), ("file", "sha256"), ("sequence", "sequence"))
     for cause, field in causes:
@@ -114,7 +114,7 @@ def _shared(pictures: Sequence[Fingerprint]) -> list[Leak]:
     return leaks
 
 
-def _views(pictures: Sequence[Fingerprint], near_bits: int) -> list[Leak]:
+def _find_shared_views(pictures: Sequence[Fingerprint], near_bits: int) -> list[Leak]:
     leaks = []
     sides = {split: [p for p in pictures if p.split == split] for split in dict.fromkeys(p.split for p in pictures)}
     for ours, theirs in combinations(sides.values(), 2):
@@ -122,6 +122,6 @@ def _views(pictures: Sequence[Fingerprint], near_bits: int) -> list[Leak]:
         thumbnails = np.stack([p.thumbnail for p in theirs])
         for picture in ours:
             near = np.flatnonzero(np.bitwise_count(bits ^ np.uint64(picture.bits)) <= near_bits)
-            alike = near[thumbnails[near] @ picture.thumbnail >= NEAR_CORRELATION]
+            alike = near[thumbnails[near] @ picture.thumbnail >= MIN_CORRELATION]
             leaks += [Leak("view", picture, theirs[index]) for index in alike]
     return leaks

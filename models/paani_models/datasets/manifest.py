@@ -76,7 +76,7 @@ def load_manifest(folder: Path) -> SourceManifest:
     return manifest
 
 
-def encode(value: msgspec.Struct | tuple[msgspec.Struct, ...]) -> bytes:
+def encode_manifest(value: msgspec.Struct | tuple[msgspec.Struct, ...]) -> bytes:
     """Deterministic, readable JSON."""
     return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
 
@@ -92,7 +92,7 @@ def count_boxes(manifest: SourceManifest) -> tuple[BoxCounts, ...]:
     return tuple(rows)
 
 
-def counts_table(rows: tuple[BoxCounts, ...]) -> str:
+def format_counts_table(rows: tuple[BoxCounts, ...]) -> str:
     """Aligned text: split, images, person, vessel, pier, buoy."""
     lines = [f"{'split':6} {'images':>7} " + " ".join(f"{name:>7}" for name in DETECTOR_CLASSES)]
     lines += [f"{r.split:6} {r.images:7,} {r.person:7,} {r.vessel:7,} {r.pier:7,} {r.buoy:7,}" for r in rows]

@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import decode_mask, decode_picture, read_bytes, refuse, sha256
-from paani_models.datasets.intake import Intake, written_beside
-from paani_models.datasets.leaks import Fingerprint, Leak, distance, find_leaks, fingerprint
+from paani_models.datasets.checked_files import (
+    decode_mask,
+    decode_picture,
+    raise_first_mistake,
+    read_whole_file,
+    sha256_hex,
+)
+from paani_models.datasets.intake import Intake, new_folder
+from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture, hash_distance
 from paani_models.datasets.manifest import SourceManifest, Split
 from paani_models.datasets.sources import IGNORE
 
@@ -52,11 +58,11 @@ def split_by_image(names: Sequence[str], seed: int = SEED) -> dict[str, Split]:
     return {name: "val" if name in held_out else "train" for name in sorted(names)}
 
 
-def sequences(pictures: Sequence[Fingerprint]) -> dict[str, str]:
+def group_sequences(pictures: Sequence[Fingerprint]) -> dict[str, str]:
     """Identity -> sequence: neighbours in name order, cut where the picture changes; runs that meet again are one."""
     cut: list[Fingerprint] = []
     for seen in sorted(pictures, key=lambda picture: picture.identity):
-        new = not cut or distance(cut[-1].bits, seen.bits) > SEQUENCE_BITS
+        new = not cut or hash_distance(cut[-1].bits, seen.bits) > SEQUENCE_BITS
         cut.append(replace(seen, split=f"from_{seen.identity}" if new else cut[-1].split))
     joined = {seen.split: seen.split for seen in cut}
     for leak in find_leaks(cut):
@@ -79,44 +85,46 @@ def split_by_sequence(sequence_of: Mapping[str, str], seed: int = SEED) -> dict[
     return {name: "val" if name in held_out else "train" for name in sorted(sequence_of)}
 
 
-def file_codes(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def to_file_codes(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Official codes -> ours on disc: unknown becomes ignored; reading maps 0, 1, 2 to obstacle, water, sky (R10)."""
     return np.where(mask == UNKNOWN, IGNORE, mask).astype(np.uint8)
 
 
-def prepare(root: Path, out: Path, *, by: SplitBy = "sequence", seed: int = SEED) -> tuple[SourceManifest, list[Leak]]:
+def prepare_mastr1325(
+    root: Path, out: Path, *, by: SplitBy = "sequence", seed: int = SEED
+) -> tuple[SourceManifest, list[Leak]]:
     """Write the new folder `out`: images/, masks/ and manifest.json; return the manifest and the leaks let pass.
 
     by "image" is the paper's split and lets views leak, and tells how many; by "sequence" refuses them. Raises
     UserError, leaving nothing behind, for a folder that is missing or empty, a picture or mask without its partner or
     that cannot be read or has another size than 512x384, and an unknown mask class.
     """
-    images, masks = (_folder(root, kind) for kind in ("images", "masks"))
+    images, masks = (_find_folder(root, kind) for kind in ("images", "masks"))
     names = sorted(path.stem for path in images.glob("*.jpg"))
     if not names:
         raise UserError(f"{images}: holds no .jpg picture")
     mistakes = [f"{masks / name}m.png: no such mask" for name in names if not (masks / f"{name}m.png").is_file()]
     orphans = sorted({path.stem for path in masks.glob("*.png")} - {f"{name}m" for name in names})
-    refuse(mistakes + [f"{masks / orphan}.png: has no picture" for orphan in orphans])
+    raise_first_mistake(mistakes + [f"{masks / orphan}.png: has no picture" for orphan in orphans])
     read: dict[str, NDArray[np.uint8]] = {}
     prints: list[Fingerprint] = []
     for name in tqdm(names, "pictures", unit="picture", mininterval=2.0):
         try:
-            read[name], seen = _read(images / f"{name}.jpg", masks / f"{name}m.png")
+            read[name], seen = _read_pair(images / f"{name}.jpg", masks / f"{name}m.png")
             prints.append(seen)
         except UserError as error:
             mistakes.append(str(error))
-    refuse(mistakes)
-    sequence_of = sequences(prints) if by == "sequence" else dict.fromkeys(names, "")
+    raise_first_mistake(mistakes)
+    sequence_of = group_sequences(prints) if by == "sequence" else dict.fromkeys(names, "")
     split_of = split_by_sequence(sequence_of, seed) if by == "sequence" else split_by_image(names, seed)
-    with written_beside(out) as beside:
+    with new_folder(out) as beside:
         intake = Intake(beside, TERMS.source)
         for name in names:
             intake.add(
                 images / f"{name}.jpg",
                 split=split_of[name],
                 sequence=sequence_of[name],
-                mask=file_codes(read[name]),
+                mask=to_file_codes(read[name]),
             )
         terms = SourceManifest(
             source=TERMS.source,
@@ -129,20 +137,20 @@ def prepare(root: Path, out: Path, *, by: SplitBy = "sequence", seed: int = SEED
         return intake.close(terms, strict=by == "sequence")
 
 
-def _folder(root: Path, kind: str) -> Path:
+def _find_folder(root: Path, kind: str) -> Path:
     for folder in (root / f"MaSTr1325_{kind}_512x384", root / kind):
         if folder.is_dir():
             return folder
     raise UserError(f"{root / f'MaSTr1325_{kind}_512x384'}: no such folder, nor {root / kind}")
 
 
-def _read(picture: Path, mask: Path) -> tuple[NDArray[np.uint8], Fingerprint]:
-    data = read_bytes(picture)
+def _read_pair(picture: Path, mask: Path) -> tuple[NDArray[np.uint8], Fingerprint]:
+    data = read_whole_file(picture)
     rgb = decode_picture(data, picture)
     if (rgb.shape[1], rgb.shape[0]) != SIZE_WH:
         raise UserError(f"{picture}: {rgb.shape[1]}x{rgb.shape[0]}, not {SIZE_WH[0]}x{SIZE_WH[1]}")
-    codes = decode_mask(read_bytes(mask), mask, CODES, SIZE_WH)
-    seen = fingerprint(
-        rgb, source="", identity=picture.stem, sequence="", split="", place=str(picture), sha256=sha256(data)
+    codes = decode_mask(read_whole_file(mask), mask, CODES, SIZE_WH)
+    seen = fingerprint_picture(
+        rgb, source="", identity=picture.stem, sequence="", split="", place=str(picture), sha256=sha256_hex(data)
     )
     return codes, seen

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import decode_picture, read_bytes
-from paani_models.datasets.inventory import FolderOf, terms_of
+from paani_models.datasets.checked_files import decode_picture, read_whole_file
+from paani_models.datasets.inventory import FolderOf, read_terms
 from paani_models.datasets.manifest import MANIFEST
 from paani_models.datasets.sources import Sample, Source
 from paani_models.network_input import SIZE_WH
@@ -54,12 +54,12 @@ class PackedSource(msgspec.Struct, frozen=True, kw_only=True):
     items: tuple[PackedItem, ...]
 
 
-class _Listed(msgspec.Struct, frozen=True):
+class _SourceItems(msgspec.Struct, frozen=True):
     items: tuple[PackedItem, ...]
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedBundle:
     """What was written."""
 
     size_bytes: int
@@ -67,7 +67,7 @@ class Packed:
     quality: int
 
 
-def pack(
+def pack_bundle(
     out: Path,
     samples: Sequence[Sample],
     folder_of: FolderOf,
@@ -75,7 +75,7 @@ def pack(
     max_mb: float,
     weights: Sequence[Path] = (),
     start: Sequence[Path] = (),
-) -> Packed:
+) -> PackedBundle:
     """Write `out`, a tar, gzipped where its name says so: pictures with all of their masks and labels, and weights.
 
     Pictures shrink, aspect kept, until they just cover the nets' input, and share the best JPEG quality that fits.
@@ -84,8 +84,8 @@ def pack(
     folders = {source.folder: folder_of(source) for source in dict.fromkeys(s.source for s in samples)}
     pictures = {s.picture: s.source for s in samples}
     other = dict(_other_files(pictures, folders, samples))
-    other |= {f"{WEIGHTS_FOLDER}/{path.name}": read_bytes(path) for path in weights}
-    other |= {f"{START_FOLDER}/{path.name}": read_bytes(path) for path in start}
+    other |= {f"{WEIGHTS_FOLDER}/{path.name}": read_whole_file(path) for path in weights}
+    other |= {f"{START_FOLDER}/{path.name}": read_whole_file(path) for path in start}
     names = {
         f"{source.folder}/{picture.relative_to(folders[source.folder])}": picture
         for picture, source in sorted(pictures.items())
@@ -94,49 +94,52 @@ def pack(
         raise UserError("sources: no picture to pack")
     compress = out.suffix in COMPRESSED
     budget = int(max_mb * MEGABYTE)
-    fixed = len(_archive(other, compress)) + len(names) * (_PACKED_ENTRY if compress else _PLAIN_ENTRY)
+    fixed = len(_build_tar(other, compress)) + len(names) * (_PACKED_ENTRY if compress else _PLAIN_ENTRY)
     if fixed >= budget:
         raise UserError(f"{out}: masks, labels and weights alone take {fixed / MEGABYTE:.1f} MB")
     first = _likely_quality(list(names.values()), budget - fixed)
     for quality in (each for each in QUALITIES if each <= first):
         bar = tqdm(names.items(), f"JPEG {quality}", unit="picture", mininterval=2.0)
-        encoded = {name: _jpeg(_shrunk(path), quality) for name, path in bar}
-        listed = {f"{folder}/{MANIFEST}": _manifest(root, folder, samples, quality) for folder, root in folders.items()}
-        archive = _archive({**other, **listed, **encoded}, compress)
+        encoded = {name: _encode_jpeg(_read_shrunk(path), quality) for name, path in bar}
+        listed = {
+            f"{folder}/{MANIFEST}": _encode_packed_manifest(root, folder, samples, quality)
+            for folder, root in folders.items()
+        }
+        archive = _build_tar({**other, **listed, **encoded}, compress)
         if len(archive) <= budget:
             _write(out, archive)
-            return Packed(len(archive), len(encoded), quality)
+            return PackedBundle(len(archive), len(encoded), quality)
     raise UserError(f"{out}: {len(names)} pictures do not fit into {max_mb:g} MB; choose fewer sources")
 
 
-def covering(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def shrink_to_cover(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Shrink, aspect kept, until the picture just covers the nets' input; never enlarge."""
-    wh = covering_wh((picture.shape[1], picture.shape[0]))
+    wh = cover_size_wh((picture.shape[1], picture.shape[0]))
     if wh == (picture.shape[1], picture.shape[0]):
         return picture
     return np.asarray(cv2.resize(picture, wh, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def covering_wh(wh: tuple[int, int]) -> tuple[int, int]:
+def cover_size_wh(wh: tuple[int, int]) -> tuple[int, int]:
     """The size to which `covering` brings a picture."""
     scale = min(1.0, max(SIZE_WH[0] / wh[0], SIZE_WH[1] / wh[1]))
     return round(wh[0] * scale), round(wh[1] * scale)
 
 
-def _shrunk(path: Path) -> NDArray[np.uint8]:
-    return covering(decode_picture(read_bytes(path), path))
+def _read_shrunk(path: Path) -> NDArray[np.uint8]:
+    return shrink_to_cover(decode_picture(read_whole_file(path), path))
 
 
-def _jpeg(picture: NDArray[np.uint8], quality: int) -> bytes:
+def _encode_jpeg(picture: NDArray[np.uint8], quality: int) -> bytes:
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1, cv2.IMWRITE_JPEG_PROGRESSIVE, 1]
     return bytes(cv2.imencode(".jpg", bgr, options)[1].tobytes())
 
 
 def _likely_quality(paths: Sequence[Path], budget: int) -> int:
-    sampled = [_shrunk(path) for path in paths[::SAMPLED_EVERY]]
+    sampled = [_read_shrunk(path) for path in paths[::SAMPLED_EVERY]]
     for quality in QUALITIES:
-        size = sum(len(_jpeg(picture, quality)) for picture in sampled)
+        size = sum(len(_encode_jpeg(picture, quality)) for picture in sampled)
         if size * len(paths) <= budget * len(sampled):
             return quality
     return QUALITIES[-1]
@@ -158,28 +161,28 @@ def _other_files(
             if path.suffix == ".txt":
                 yield name, path.read_bytes()
             else:
-                yield name, _small_mask(path)
+                yield name, _shrink_mask(path)
     missing = next((path for path in wanted if path and not path.is_file()), None)
     if missing is not None:
         raise UserError(f"{missing}: no such file")
 
 
-def _small_mask(path: Path) -> bytes:
-    mask = cv2.imdecode(np.frombuffer(read_bytes(path), np.uint8), cv2.IMREAD_GRAYSCALE)
+def _shrink_mask(path: Path) -> bytes:
+    mask = cv2.imdecode(np.frombuffer(read_whole_file(path), np.uint8), cv2.IMREAD_GRAYSCALE)
     if mask is None:
         raise UserError(f"{path}: not a readable mask")
-    wh = covering_wh((mask.shape[1], mask.shape[0]))
+    wh = cover_size_wh((mask.shape[1], mask.shape[0]))
     if wh != (mask.shape[1], mask.shape[0]):
         mask = cv2.resize(mask, wh, interpolation=cv2.INTER_NEAREST)
     return bytes(cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())
 
 
-def _manifest(root: Path, folder: str, samples: Sequence[Sample], quality: int) -> bytes:
+def _encode_packed_manifest(root: Path, folder: str, samples: Sequence[Sample], quality: int) -> bytes:
     """In the source's order, so that runs of pictures without a sequence are cut at the same places."""
     source = next(sample.source for sample in samples if sample.source.folder == folder)
-    terms = terms_of(root, source)
+    terms = read_terms(root, source)
     try:
-        listed = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_Listed).items
+        listed = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_SourceItems).items
     except (OSError, msgspec.MsgspecError) as error:
         raise UserError(f"{root / MANIFEST}: {error}") from error
     packed = PackedSource(
@@ -192,7 +195,7 @@ def _manifest(root: Path, folder: str, samples: Sequence[Sample], quality: int) 
     return msgspec.json.encode(packed)
 
 
-def _archive(files: dict[str, bytes], compress: bool) -> bytes:
+def _build_tar(files: dict[str, bytes], compress: bool) -> bytes:
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as bundle:
         for name, data in sorted(files.items()):

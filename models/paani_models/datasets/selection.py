@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models.datasets.sources import RENDERED, Sample, Source, choose, read_samples
+from paani_models.datasets.sources import RENDERED, Sample, Source, choose_sources, read_samples
 
 
-class Pictures:
+class PictureSelection:
     """The chosen sources below a data folder, and a folder of rendered pictures: as given, or that of a bundle."""
 
     def __init__(self, data: Path, names: list[str], rendered: Path | None) -> None:
@@ -16,18 +16,18 @@ class Pictures:
             raise UserError(f"{data}: no such folder; set PAANI_DATA or --data")
         packed = data / RENDERED
         self.data, self.rendered = data, rendered or (packed if (packed / "manifest.json").is_file() else None)
-        self.sources: tuple[Source, ...] = choose(names)
+        self.sources: tuple[Source, ...] = choose_sources(names)
         self.samples = read_samples(data, self.sources, self.rendered)
 
-    def folder(self, source: Source) -> Path:
+    def source_folder(self, source: Source) -> Path:
         """Where a source lies."""
         return self.rendered if source.name == RENDERED and self.rendered else self.data / source.folder
 
-    def segmented(self, held_out: bool) -> list[Sample]:
+    def segmented_samples(self, held_out: bool) -> list[Sample]:
         """Samples with a mask."""
         return [s for s in self.samples if s.mask and s.held_out == held_out]
 
-    def boxed(self, held_out: bool) -> list[Sample]:
+    def boxed_samples(self, held_out: bool) -> list[Sample]:
         """Samples with boxes; for training also those whose mask tells where nothing floats.
 
         A picture that is held out for its boxes is not trained on for its mask.
@@ -37,12 +37,12 @@ class Pictures:
         kept = {s.picture for s in self.samples if s.held_out and s.label}
         return [s for s in self.samples if not s.held_out and s.picture not in kept]
 
-    def never_held_out(self) -> list[Sample]:
+    def training_samples(self) -> list[Sample]:
         """Every picture that no source holds out, once."""
         kept = {s.picture for s in self.samples if s.held_out}
         return list({s.picture: s for s in self.samples if s.picture not in kept}.values())
 
-    def unsegmented(self) -> list[Sample]:
+    def unsegmented_samples(self) -> list[Sample]:
         """Training samples of the sources that have boxes and no masks, each picture once."""
         masked = {s.picture for s in self.samples if s.mask}
         return [s for s in self.samples if not s.source.masks and not s.held_out and s.picture not in masked]

@@ -172,12 +172,12 @@ class _Manifest(msgspec.Struct):
     items: list[_Item]
 
 
-def class_mask(coded: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def decode_mask_classes(coded: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Mask in file codes, any shape -> segmenter classes water 0, obstacle 1, sky 2, 255 ignored (R10)."""
     return _MASK_CODES[coded]
 
 
-def choose(names: Sequence[str]) -> tuple[Source, ...]:
+def choose_sources(names: Sequence[str]) -> tuple[Source, ...]:
     """The sources of the given names; SOURCES where none is given. Raises UserError for a name that does not exist."""
     known = {source.name: source for source in (*SOURCES, *PREPARED_SOURCES)}
     for name in names:
@@ -206,7 +206,7 @@ def read_samples(data: Path, sources: Iterable[Source], rendered: Path | None = 
 
 
 @cache
-def without_water() -> frozenset[str]:
+def list_pictures_without_water() -> frozenset[str]:
     """Pictures that show no water, as looked at: paths below the data folder, of sources and of other folders."""
     return frozenset(WITHOUT_WATER.read_text().split())
 
@@ -237,7 +237,7 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
                 continue
             label = None
         held_out = item.split != "train" if source.splits else is_held_out(source, sequence)
-        dry = f"{source.folder}/{item.file}" in without_water()
+        dry = f"{source.folder}/{item.file}" in list_pictures_without_water()
         samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label, dry))
     return samples
 
@@ -284,7 +284,7 @@ def read_mask(path: Path) -> NDArray[np.uint8]:
     coded = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if coded is None:
         raise UserError(f"{path}: not a readable mask")
-    return class_mask(np.asarray(coded, np.uint8))
+    return decode_mask_classes(np.asarray(coded, np.uint8))
 
 
 def read_pair(sample: Sample) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

@@ -16,8 +16,8 @@ import numpy as np
 from tqdm import tqdm
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import Box, read_yolo, refuse
-from paani_models.datasets.intake import Intake, written_beside
+from paani_models.datasets.checked_files import Box, raise_first_mistake, read_yolo
+from paani_models.datasets.intake import Intake, new_folder
 from paani_models.datasets.leaks import Leak
 from paani_models.datasets.manifest import SPLITS, SourceManifest, Split
 from paani_models.datasets.sources import DETECTOR_CLASSES
@@ -85,12 +85,12 @@ def select_train(boxes: Mapping[str, Sequence[Box]], limit: int = TRAIN_IMAGES, 
     return tuple(sorted(chosen))
 
 
-def mapped(boxes: Sequence[Box]) -> tuple[Box, ...]:
+def map_classes(boxes: Sequence[Box]) -> tuple[Box, ...]:
     """WaterScenes classes -> ours; every box is kept (R3, R4)."""
     return tuple(Box(DETECTOR_CLASSES.index(OUR_CLASS[b.kind]), b.cx, b.cy, b.width, b.height) for b in boxes)
 
 
-def prepare(
+def prepare_waterscenes(
     root: Path,
     out: Path,
     *,
@@ -123,12 +123,12 @@ def prepare(
     for label in sorted(labels.glob("*.txt")):
         if not (images / f"{label.stem}.jpg").exists():
             mistakes.append(f"{label}: has no picture {label.stem}.jpg")
-    refuse(mistakes)
+    raise_first_mistake(mistakes)
     chosen = dict(lists)
     chosen["train"] = select_train({identity: boxes[identity] for identity in lists["train"]}, train_images, seed)
-    with written_beside(out) as beside:
+    with new_folder(out) as beside:
         intake = Intake(beside, TERMS.source)
         places = [(split, identity) for split in SPLITS for identity in chosen[split]]
         for split, identity in tqdm(places, "pictures", unit="picture", mininterval=2.0):
-            intake.add(images / f"{identity}.jpg", split=split, boxes=mapped(boxes[identity]))
+            intake.add(images / f"{identity}.jpg", split=split, boxes=map_classes(boxes[identity]))
         return intake.close(TERMS, strict=strict)

@@ -1,4 +1,4 @@
-"""Training pictures of the detector: letterbox, mosaic, and the map of where each class may be judged."""
+"""Training pictures of the detector: letterbox, mosaic, and the map of where each class may be exhaustive_mask."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from paani.arrays import F32
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, Source, read_boxes, read_mask, read_picture
 from paani_models.network_input import PAD_GREY, letterbox_affine
-from paani_models.training.augment import GLARE_FRAC, Rng, degrade, glare, jitter_colour
+from paani_models.training.augment import GLARE_FRAC, Rng, add_glare, degrade_picture, jitter_colour
 
 LONG_SIDE_PX = 480
 CELL_PX = 8  # the finest stride of the detector
@@ -31,16 +31,16 @@ class BoxedPicture:
     source: str
     picture: NDArray[np.uint8]
     boxes: NDArray[np.float32]
-    judged: NDArray[np.uint8]
+    exhaustive_mask: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Example:
+class TrainingExample:
     """Net-sized: RGB [H,W,3], boxes float32 [n,5] (class, corners in pixels), judged bool [4, H/8, W/8]."""
 
     picture: NDArray[np.uint8]
     boxes: NDArray[np.float32]
-    judged: NDArray[np.bool_]
+    exhaustive_mask: NDArray[np.bool_]
 
 
 def read_boxed(sample: Sample) -> BoxedPicture:
@@ -62,11 +62,13 @@ def read_boxed(sample: Sample) -> BoxedPicture:
         sample.source.name,
         rgb,
         np.zeros((0, 5), np.float32),
-        judged_by_mask(sample.source, read_mask(sample.mask), rgb),
+        exhaustive_mask_from_classes(sample.source, read_mask(sample.mask), rgb),
     )
 
 
-def judged_by_mask(source: Source, mask: NDArray[np.uint8], picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def exhaustive_mask_from_classes(
+    source: Source, mask: NDArray[np.uint8], picture: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
     """Where a picture without boxes is known to show nothing of a class: uint8 [4,H,W] of the picture's size.
 
     Nothing floats in water or sky, a little inside their edge; nor on the own hull; nor anywhere, of `source.empty_of`.
@@ -83,7 +85,7 @@ def judged_by_mask(source: Source, mask: NDArray[np.uint8], picture: NDArray[np.
     )
 
 
-def read_all(samples: list[Sample]) -> list[BoxedPicture]:
+def read_boxed_pictures(samples: list[Sample]) -> list[BoxedPicture]:
     """Decode once and keep: 2,500 pictures take about 1 GB."""
     return [read_boxed(sample) for sample in tqdm(samples, desc="decoding", unit="picture", mininterval=2.0)]
 
@@ -97,14 +99,14 @@ def _pseudo_persons(sample: Sample) -> NDArray[np.float32]:
     return read_boxes(path)[np.array(scores) >= PSEUDO_PERSON_MIN_SCORE]
 
 
-def plain(item: BoxedPicture, target_wh: tuple[int, int]) -> Example:
+def letterbox_example(item: BoxedPicture, target_wh: tuple[int, int]) -> TrainingExample:
     """As the runtime sees it."""
     height, width = item.picture.shape[:2]
-    return place(item, letterbox_affine((width, height), target_wh), target_wh)
+    return warp_example(item, letterbox_affine((width, height), target_wh), target_wh)
 
 
-def place(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> Example:
-    """Warp picture, boxes and judged map; what lies outside the picture is grey and judged empty.
+def warp_example(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> TrainingExample:
+    """Warp picture, boxes and exhaustive_mask map; what lies outside the picture is grey and judged empty.
 
     A box that is left too small or too hidden is dropped, and its class is not judged where it was.
     """
@@ -112,12 +114,12 @@ def place(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> Exampl
     picture = cv2.warpAffine(item.picture, affine, target_wh, flags=cv2.INTER_AREA, borderValue=(PAD_GREY,) * 3).astype(
         np.uint8, copy=False
     )
-    judged = np.ones((len(DETECTOR_CLASSES), target_wh[1], target_wh[0]), np.uint8)
-    full = item.judged if item.judged.ndim == 3 else None
+    exhaustive_mask = np.ones((len(DETECTOR_CLASSES), target_wh[1], target_wh[0]), np.uint8)
+    full = item.exhaustive_mask if item.exhaustive_mask.ndim == 3 else None
     for kind in range(len(DETECTOR_CLASSES)):
-        if full is not None or item.judged[kind] == 0:
+        if full is not None or item.exhaustive_mask[kind] == 0:
             source = full[kind] if full is not None else np.zeros((height, width), np.uint8)
-            judged[kind] = cv2.warpAffine(source, affine, target_wh, flags=cv2.INTER_NEAREST, borderValue=(1,))
+            exhaustive_mask[kind] = cv2.warpAffine(source, affine, target_wh, flags=cv2.INTER_NEAREST, borderValue=(1,))
     kept = []
     for kind, *corners in item.boxes:
         ends = np.array(corners).reshape(2, 2) * (width, height) @ affine[:, :2].T + affine[:, 2]
@@ -130,17 +132,17 @@ def place(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> Exampl
             kept.append((kind, *inner_low, *inner_high))
         else:
             (x1, y1), (x2, y2) = np.floor(inner_low).astype(int), np.ceil(inner_high).astype(int)
-            judged[int(kind), y1:y2, x1:x2] = 0
-    return Example(picture, np.array(kept, np.float32).reshape(-1, 5), _cells(judged))
+            exhaustive_mask[int(kind), y1:y2, x1:x2] = 0
+    return TrainingExample(picture, np.array(kept, np.float32).reshape(-1, 5), _reduce_to_cells(exhaustive_mask))
 
 
-def _cells(judged: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    kinds, height, width = judged.shape
-    blocks = judged.reshape(kinds, height // CELL_PX, CELL_PX, width // CELL_PX, CELL_PX)
+def _reduce_to_cells(exhaustive_mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    kinds, height, width = exhaustive_mask.shape
+    blocks = exhaustive_mask.reshape(kinds, height // CELL_PX, CELL_PX, width // CELL_PX, CELL_PX)
     return np.asarray(blocks.min((2, 4)), np.bool_)
 
 
-def random_placement(
+def random_letterbox_affine(
     rng: Rng, source_wh: tuple[int, int], target_wh: tuple[int, int], zoom: tuple[float, float]
 ) -> F32:
     """Letterbox, then flip, zoom with a little aspect jitter, and a shift that keeps most of the picture."""
@@ -156,7 +158,7 @@ def random_placement(
     return np.array([[x_scale, 0, x_low], [0, scale / stretch, low[1]]], np.float32)
 
 
-def close_up(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> F32 | None:
+def close_up_affine(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> F32 | None:
     """Zoom in on one small object, so that its shorter side gets CLOSE_UP_PX pixels; None where none is small."""
     source = np.array(item.picture.shape[1::-1], np.float64)
     fit = float((target_wh / source).min())
@@ -176,30 +178,30 @@ def close_up(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> F32 | 
     return np.array([[scale, 0, low[0]], [0, scale, low[1]]], np.float32)
 
 
-def augmented(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> Example:
+def augment_example(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> TrainingExample:
     """One training example: of one picture, or a two by two mosaic of four."""
     if len(items) == 4:
         example = _mosaic(rng, items, target_wh)
     else:
         height, width = items[0].picture.shape[:2]
-        affine = close_up(rng, items[0], target_wh) if rng.random() < SMALL_FRAC else None
+        affine = close_up_affine(rng, items[0], target_wh) if rng.random() < SMALL_FRAC else None
         if affine is None:
-            affine = random_placement(rng, (width, height), target_wh, (0.6, 1.8))
-        example = place(items[0], affine, target_wh)
+            affine = random_letterbox_affine(rng, (width, height), target_wh, (0.6, 1.8))
+        example = warp_example(items[0], affine, target_wh)
     picture = example.picture
     if rng.random() < 0.8:
         picture = jitter_colour(rng, picture)
     if rng.random() < GLARE_FRAC * 0.5:
-        picture = glare(rng, picture)
-    return Example(degrade(rng, picture), example.boxes, example.judged)
+        picture = add_glare(rng, picture)
+    return TrainingExample(degrade_picture(rng, picture), example.boxes, example.exhaustive_mask)
 
 
-def _mosaic(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> Example:
+def _mosaic(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> TrainingExample:
     width, height = target_wh
     split_x = int(rng.integers(3, width // CELL_PX - 2)) * CELL_PX
     split_y = int(rng.integers(3, height // CELL_PX - 2)) * CELL_PX
     picture = np.full((height, width, 3), PAD_GREY, np.uint8)
-    judged = np.ones((len(DETECTOR_CLASSES), height // CELL_PX, width // CELL_PX), np.bool_)
+    exhaustive_mask = np.ones((len(DETECTOR_CLASSES), height // CELL_PX, width // CELL_PX), np.bool_)
     boxes = []
     corners = (
         (0, 0, split_x, split_y),
@@ -209,9 +211,9 @@ def _mosaic(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> 
     )
     for item, (x1, y1, x2, y2) in zip(items, corners, strict=True):
         size = (x2 - x1, y2 - y1)
-        affine = random_placement(rng, (item.picture.shape[1], item.picture.shape[0]), size, (1.0, 2.2))
-        part = place(item, affine, size)
+        affine = random_letterbox_affine(rng, (item.picture.shape[1], item.picture.shape[0]), size, (1.0, 2.2))
+        part = warp_example(item, affine, size)
         picture[y1:y2, x1:x2] = part.picture
-        judged[:, y1 // CELL_PX : y2 // CELL_PX, x1 // CELL_PX : x2 // CELL_PX] = part.judged
+        exhaustive_mask[:, y1 // CELL_PX : y2 // CELL_PX, x1 // CELL_PX : x2 // CELL_PX] = part.exhaustive_mask
         boxes.append(part.boxes + np.array([0, x1, y1, x1, y1], np.float32))
-    return Example(picture, np.vstack(boxes), judged)
+    return TrainingExample(picture, np.vstack(boxes), exhaustive_mask)

@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from paani_models.detector.shipped_shape import STRIDES, candidate_grid
+from paani_models.detector.shipped_network import STRIDES, candidate_grid
 
-CENTRE_REACH = 1.5  # in strides: how near a box centre a candidate must be to be its natural choice
+CENTRE_RADIUS_STRIDES = 1.5  # in strides: how near a box centre a candidate must be to be its natural choice
 IOU_COST = 3.0
 FAR_COST = 1e5
 TOP_K = 10
@@ -53,7 +53,9 @@ def log_scores(logits: Tensor) -> tuple[Tensor, Tensor]:
 
 
 @torch.no_grad()
-def assign(boxes: Tensor, log_p: Tensor, truth: Tensor, centres: Tensor, strides: Tensor) -> tuple[Tensor, Tensor]:
+def assign_simota(
+    boxes: Tensor, log_p: Tensor, truth: Tensor, centres: Tensor, strides: Tensor
+) -> tuple[Tensor, Tensor]:
     """SimOTA: which object each candidate answers for.
 
     boxes: [A,4] predicted corners. log_p: [A,C]. truth: [n,5], n >= 1. centres [A,2] and strides [A] of the candidates.
@@ -62,7 +64,7 @@ def assign(boxes: Tensor, log_p: Tensor, truth: Tensor, centres: Tensor, strides
     target = truth[:, 1:]
     inside = ((centres[None] > target[:, None, :2]) & (centres[None] < target[:, None, 2:])).all(2)
     middle = (target[:, :2] + target[:, 2:]) / 2
-    near = ((centres[None] - middle[:, None]).abs() < CENTRE_REACH * strides[None, :, None]).all(2)
+    near = ((centres[None] - middle[:, None]).abs() < CENTRE_RADIUS_STRIDES * strides[None, :, None]).all(2)
     possible = (inside | near).any(0).nonzero().squeeze(1)
     owner = torch.full((len(centres),), -1, dtype=torch.int64, device=boxes.device)
     quality = torch.zeros(len(centres), device=boxes.device)
@@ -83,15 +85,15 @@ def assign(boxes: Tensor, log_p: Tensor, truth: Tensor, centres: Tensor, strides
     return owner, quality
 
 
-def judged_candidates(judged: Tensor) -> Tensor:
+def exhaustive_candidates(exhaustive_mask: Tensor) -> Tensor:
     """Stride-8 map bool [N,C,h,w] -> bool [N,A,C]: a coarser candidate is judged where all cells under it are."""
-    unknown = (~judged).float()
+    unknown = (~exhaustive_mask).float()
     levels = [F.max_pool2d(unknown, stride // STRIDES[0]).flatten(2) for stride in STRIDES]
     return torch.cat(levels, 2).transpose(1, 2) < 0.5
 
 
 def detector_loss(
-    boxes: Tensor, logits: Tensor, truths: list[Tensor], judged: Tensor, size_hw: tuple[int, int]
+    boxes: Tensor, logits: Tensor, truths: list[Tensor], exhaustive_mask: Tensor, size_hw: tuple[int, int]
 ) -> tuple[Tensor, Tensor]:
     """Box loss and score loss, each divided by the number of assigned candidates.
 
@@ -102,13 +104,13 @@ def detector_loss(
     corners = box_corners(boxes)
     log_p, log_not_p = log_scores(logits)
     target = torch.zeros_like(log_p)
-    weight = judged_candidates(judged).to(log_p.dtype)
+    weight = exhaustive_candidates(exhaustive_mask).to(log_p.dtype)
     box_loss = boxes.sum() * 0.0
     assigned = 0
     for index, truth in enumerate(truths):
         if len(truth) == 0:
             continue
-        owner, quality = assign(corners[index], log_p[index], truth, centres, strides)
+        owner, quality = assign_simota(corners[index], log_p[index], truth, centres, strides)
         own = (owner >= 0).nonzero().squeeze(1)
         objects = truth[owner[own]]
         target[index, own, objects[:, 0].long()] = quality[own].sqrt()

@@ -21,7 +21,7 @@ NEAR_SIDE_PX = 16.0  # an object whose shorter side is at least this counts as n
 
 
 @dataclass(frozen=True)
-class Found:
+class Detections:
     """What was found in one picture: corner boxes [n,4], scores [n], class ids [n]."""
 
     boxes: F32
@@ -30,7 +30,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Judged:
+class ClassMatches:
     """One class in one picture: what was found, best first, and which of it hits.
 
     hits: [10, n], by IOU_STEPS. near_found and near: true boxes of NEAR_SIDE_PX and more, found at CONFIDENCE and all.
@@ -43,7 +43,7 @@ class Judged:
     near: int
 
 
-def decode(output: F32, confidence: float, limit: int = MAX_BOXES) -> Found:
+def decode_boxes(output: F32, confidence: float, limit: int = MAX_BOXES) -> Detections:
     """One picture's net output [8,A] -> boxes in input pixels: finite, best class, class-agnostic NMS."""
     output = output[:, np.isfinite(output).all(0)]
     best = output[4:].argmax(0)
@@ -55,14 +55,14 @@ def decode(output: F32, confidence: float, limit: int = MAX_BOXES) -> Found:
     rows = np.hstack([corner, size]).astype(float)
     kept = np.asarray(cv2.dnn.NMSBoxes(rows.tolist(), score[keep].tolist(), confidence, NMS_IOU), np.int64)[:limit]
     boxes = np.hstack([corner, corner + size])[kept].reshape(-1, 4)
-    return Found(
+    return Detections(
         boxes.astype(np.float32),
         score[keep][kept].astype(np.float32),
         best[keep][kept].astype(np.int64),
     )
 
 
-def overlaps(a: F32, b: F32) -> F64:
+def iou_matrix(a: F32, b: F32) -> F64:
     """IoU matrix [len(a), len(b)] of corner boxes; 0 where both are empty."""
     first, second = a.astype(np.float64), b.astype(np.float64)
     low = np.maximum(first[:, None, :2], second[None, :, :2])
@@ -73,12 +73,12 @@ def overlaps(a: F32, b: F32) -> F64:
     return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
 
 
-def match(boxes: F32, scores: F32, truth: F32, threshold: float) -> Bools:
+def match_boxes(boxes: F32, scores: F32, truth: F32, threshold: float) -> Bools:
     """Whether each box, best score first, hits a truth box not hit before; in the order of `boxes`."""
-    return _match(overlaps(boxes, truth), scores, threshold)
+    return _match_greedily(iou_matrix(boxes, truth), scores, threshold)
 
 
-def _match(table: F64, scores: F32, threshold: float) -> Bools:
+def _match_greedily(table: F64, scores: F32, threshold: float) -> Bools:
     hits = np.zeros(len(table), np.bool_)
     if table.size == 0:
         return hits
@@ -107,7 +107,7 @@ def average_precision(scores: F32, hits: Bools, positives: int) -> float:
     return float(np.where(places < len(envelope), np.append(envelope, 0.0)[places], 0.0).mean())
 
 
-def judge(found: Found, truth: F32, kind: int) -> Judged:
+def match_class(found: Detections, truth: F32, kind: int) -> ClassMatches:
     """One class of one picture. truth: [n,5], class and corners."""
     mine = found.classes == kind
     boxes, scores = found.boxes[mine], found.scores[mine]
@@ -115,28 +115,28 @@ def judge(found: Found, truth: F32, kind: int) -> Judged:
     boxes, scores = boxes[order], scores[order]
     real = truth[truth[:, 0] == kind, 1:]
     near = real[(real[:, 2:] - real[:, :2]).min(1, initial=np.inf) >= NEAR_SIDE_PX]
-    table, sure = overlaps(boxes, real), scores > CONFIDENCE
-    return Judged(
+    table, sure = iou_matrix(boxes, real), scores > CONFIDENCE
+    return ClassMatches(
         scores,
-        np.stack([_match(table, scores, step) for step in IOU_STEPS]),
+        np.stack([_match_greedily(table, scores, step) for step in IOU_STEPS]),
         len(real),
-        int(match(boxes[sure], scores[sure], near, 0.5).sum()),
+        int(match_boxes(boxes[sure], scores[sure], near, 0.5).sum()),
         len(near),
     )
 
 
-def ap50(judged: Sequence[Judged]) -> float:
+def ap50(judged: Sequence[ClassMatches]) -> float:
     """AP at IoU 0.5 of one class over pictures."""
-    scores, hits, positives = _joined(judged)
+    scores, hits, positives = _join_matches(judged)
     return average_precision(scores, hits[0], positives)
 
 
-def summary(judged: Sequence[Judged]) -> dict[str, float]:
+def summarise_class(judged: Sequence[ClassMatches]) -> dict[str, float]:
     """AP50, AP50:95, recall and precision at CONFIDENCE of one class over pictures that annotate it.
 
     `n` counts the true boxes. A figure without a case is NaN.
     """
-    scores, hits, positives = _joined(judged)
+    scores, hits, positives = _join_matches(judged)
     curves = [average_precision(scores, step, positives) for step in hits]
     sure = scores > CONFIDENCE
     right = int((hits[0] & sure).sum())
@@ -151,20 +151,20 @@ def summary(judged: Sequence[Judged]) -> dict[str, float]:
     }
 
 
-def class_figures(found: list[Found], truths: list[F32], kind: int) -> dict[str, float]:
+def class_figures(found: list[Detections], truths: list[F32], kind: int) -> dict[str, float]:
     """`summary` of one class. truths: per picture float32 [n,5], class and corners."""
-    return summary([judge(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
+    return summarise_class([match_class(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
 
 
-def curve50(judged: Sequence[Judged]) -> tuple[F64, F64]:
+def precision_recall_50(judged: Sequence[ClassMatches]) -> tuple[F64, F64]:
     """Precision and recall at IoU 0.5 after each box over all pictures, best score first; empty without a positive."""
-    scores, hits, positives = _joined(judged)
+    scores, hits, positives = _join_matches(judged)
     if positives == 0:
         return np.zeros(0), np.zeros(0)
     return precision_recall(scores, hits[0], positives)
 
 
-def _joined(judged: Sequence[Judged]) -> tuple[F32, Bools, int]:
+def _join_matches(judged: Sequence[ClassMatches]) -> tuple[F32, Bools, int]:
     if not judged:
         return np.zeros(0, np.float32), np.zeros((len(IOU_STEPS), 0), np.bool_), 0
     scores = np.concatenate([j.scores for j in judged])

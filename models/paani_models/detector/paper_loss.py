@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from paani_models.detector.loss import iou, judged_candidates
-from paani_models.detector.paper_shape import BINS, STRIDES
-from paani_models.detector.shipped_shape import candidate_grid
+from paani_models.detector.loss import exhaustive_candidates, iou
+from paani_models.detector.paper_network import BINS, STRIDES
+from paani_models.detector.shipped_network import candidate_grid
 
 TOP_K = 10
 SCORE_POWER, IOU_POWER = 0.5, 6.0
@@ -35,7 +35,7 @@ def complete_iou(a: Tensor, b: Tensor) -> Tensor:
 
 
 @torch.no_grad()
-def assign(boxes: Tensor, scores: Tensor, truth: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
+def assign_task_aligned(boxes: Tensor, scores: Tensor, truth: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
     """Which object each candidate answers for, and the score that it should reach.
 
     boxes: [A,4] predicted corners. scores: [A,C] in 0..1. truth: [n,5], n >= 1. centres: [A,2] in pixels.
@@ -72,21 +72,21 @@ def bins_loss(bins: Tensor, distance: Tensor) -> Tensor:
 
 
 def task_aligned_loss(
-    boxes: Tensor, bins: Tensor, logits: Tensor, truths: list[Tensor], judged: Tensor, size_hw: tuple[int, int]
+    boxes: Tensor, bins: Tensor, logits: Tensor, truths: list[Tensor], exhaustive_mask: Tensor, size_hw: tuple[int, int]
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Box, score and distribution loss, each over the sum of the target scores and with its gain.
 
-    boxes, bins, logits as `Yolo11n.raw` gives them. judged: bool [N,C,H/8,W/8].
+    boxes, bins, logits as `Yolo11n.raw` gives them. exhaustive_mask: bool [N,C,H/8,W/8].
     """
     centres, strides = (t.to(boxes.device) for t in candidate_grid(*size_hw))
     scores = logits.detach().sigmoid()
     target = torch.zeros_like(logits)
-    weight = judged_candidates(judged).to(logits.dtype)
+    weight = exhaustive_candidates(exhaustive_mask).to(logits.dtype)
     box_loss = bin_loss = boxes.sum() * 0.0
     for index, truth in enumerate(truths):
         if len(truth) == 0:
             continue
-        owner, wanted = assign(boxes[index].detach(), scores[index], truth, centres)
+        owner, wanted = assign_task_aligned(boxes[index].detach(), scores[index], truth, centres)
         own = (owner >= 0).nonzero().squeeze(1)
         objects, share = truth[owner[own]], wanted[own]
         target[index, own, objects[:, 0].long()] = share.to(target.dtype)

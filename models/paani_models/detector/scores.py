@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, read_picture
-from paani_models.detector.data import plain, read_boxed
-from paani_models.detector.metrics import CONFIDENCE, Found, Judged, decode, judge, overlaps
-from paani_models.engines.onnx_runner import open_net
+from paani_models.detector.data import letterbox_example, read_boxed
+from paani_models.detector.metrics import CONFIDENCE, ClassMatches, Detections, decode_boxes, iou_matrix, match_class
+from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import SIZE_WH, detector_input
 
 SCORED_CONFIDENCE = 0.01  # a curve needs what lies below the board's threshold too
 SCORED_BOXES = 100
-NOTHING = len(DETECTOR_CLASSES)  # last row and column of the confusion matrix
+BACKGROUND = len(DETECTOR_CLASSES)  # last row and column of the confusion matrix
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class ScoredBoxes:
     """One picture, in input pixels. truth: float32 [n,5], class and corners."""
 
     sample: Sample
-    found: Found
+    detections: Detections
     truth: NDArray[np.float32]
 
-    def judged(self, kind: int) -> Judged:
+    def class_matches(self, kind: int) -> ClassMatches:
         """One class of it."""
-        return judge(self.found, self.truth, kind)
+        return match_class(self.detections, self.truth, kind)
 
     @property
     def mistakes(self) -> int:
@@ -42,27 +42,31 @@ class ScoredBoxes:
 
 def score_boxes(net: Path, samples: Sequence[Sample]) -> list[ScoredBoxes]:
     """Run the net over samples with boxes. Raises UserError naming a file that cannot be read."""
-    run = open_net(net)
+    run = open_network(net)
     scored = []
     for sample in tqdm(samples, "detector", unit="picture", mininterval=2.0):
         item = read_boxed(sample)
         output = run(detector_input(item.picture))[0]
-        scored.append(ScoredBoxes(sample, decode(output, SCORED_CONFIDENCE, SCORED_BOXES), plain(item, SIZE_WH).boxes))
+        scored.append(
+            ScoredBoxes(
+                sample, decode_boxes(output, SCORED_CONFIDENCE, SCORED_BOXES), letterbox_example(item, SIZE_WH).boxes
+            )
+        )
     return scored
 
 
-def false_alarms(net: Path, samples: Sequence[Sample]) -> list[int]:
+def count_false_alarms(net: Path, samples: Sequence[Sample]) -> list[int]:
     """Per picture, boxes above CONFIDENCE of classes that its source does not show."""
-    run = open_net(net)
+    run = open_network(net)
     alarms = []
     for sample in tqdm(samples, "false alarms", unit="picture", mininterval=2.0):
-        found = decode(run(detector_input(read_picture(sample.picture)))[0], CONFIDENCE)
+        found = decode_boxes(run(detector_input(read_picture(sample.picture)))[0], CONFIDENCE)
         absent = [DETECTOR_CLASSES.index(kind) for kind in sample.source.empty_of]
         alarms.append(int(np.isin(found.classes, absent).sum()))
     return alarms
 
 
-def annotating(scored: Sequence[ScoredBoxes], kind: int) -> list[ScoredBoxes]:
+def select_annotated(scored: Sequence[ScoredBoxes], kind: int) -> list[ScoredBoxes]:
     """Pictures whose source boxes every instance of a class."""
     return [item for item in scored if DETECTOR_CLASSES[kind] in item.sample.source.annotated]
 
@@ -73,21 +77,21 @@ def confusion_counts(scored: Sequence[ScoredBoxes]) -> NDArray[np.int64]:
     Best score first, each box takes the free object that it overlaps most. Classes that a source does not annotate
     are left out of its pictures.
     """
-    table = np.zeros((NOTHING + 1, NOTHING + 1), np.int64)
+    table = np.zeros((BACKGROUND + 1, BACKGROUND + 1), np.int64)
     for item in scored:
         judged = [DETECTOR_CLASSES.index(kind) for kind in item.sample.source.annotated]
-        sure = item.found.scores > CONFIDENCE
-        boxes, kinds = item.found.boxes[sure], item.found.classes[sure]
-        shared = overlaps(boxes, item.truth[:, 1:])
+        sure = item.detections.scores > CONFIDENCE
+        boxes, kinds = item.detections.boxes[sure], item.detections.classes[sure]
+        shared = iou_matrix(boxes, item.truth[:, 1:])
         free = np.ones(len(item.truth), np.bool_)
-        for index in np.argsort(-item.found.scores[sure], kind="stable"):
+        for index in np.argsort(-item.detections.scores[sure], kind="stable"):
             row = np.where(free, shared[index], 0.0)
             hit = int(row.argmax()) if len(row) and row.max() >= 0.5 else -1
             if hit >= 0:
                 free[hit] = False
-            true = int(item.truth[hit, 0]) if hit >= 0 else NOTHING
-            if true in judged or (true == NOTHING and kinds[index] in judged):
+            true = int(item.truth[hit, 0]) if hit >= 0 else BACKGROUND
+            if true in judged or (true == BACKGROUND and kinds[index] in judged):
                 table[true, kinds[index]] += 1
         for kind in item.truth[free, 0].astype(int):
-            table[kind, NOTHING] += int(kind in judged)
+            table[kind, BACKGROUND] += int(kind in judged)
     return table

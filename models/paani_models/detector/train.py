@@ -13,16 +13,23 @@ from torch import Tensor
 from tqdm import tqdm
 
 from paani_models.datasets.sources import DETECTOR_CLASSES, SOURCES
-from paani_models.detector.data import BoxedPicture, Example, augmented, plain
+from paani_models.detector.data import BoxedPicture, TrainingExample, augment_example, letterbox_example
 from paani_models.detector.loss import detector_loss
-from paani_models.detector.metrics import Found, class_figures, decode
-from paani_models.detector.shipped_shape import Detector
+from paani_models.detector.metrics import Detections, class_figures, decode_boxes
+from paani_models.detector.shipped_network import Detector
 from paani_models.network_input import SIZE_WH, detector_batch
-from paani_models.training.augment import null_picture
-from paani_models.training.loop import Prefetch, Progress, append_record, device, learning_rate, to_device
+from paani_models.training.augment import draw_null_picture
+from paani_models.training.training_state import (
+    Prefetch,
+    TrainingState,
+    append_record,
+    learning_rate,
+    to_device,
+    training_device,
+)
 
 # Pictures drawn per epoch and source; a source not named here is drawn once each.
-DRAWS = {
+DRAWS_PER_EPOCH = {
     "hsu_shore_tiles": 420,
     "uon_robotx": 150,
     "tunai_sooke": 60,
@@ -44,7 +51,7 @@ Batch = tuple[Tensor, list[Tensor], Tensor]
 
 
 @dataclass(frozen=True)
-class Recipe:
+class DetectorRecipe:
     """Everything that decides a detector training besides the pictures."""
 
     epochs: int = 18
@@ -57,7 +64,7 @@ class Recipe:
     seed: int = 42  # S4
 
 
-def draw_epoch(pictures: list[BoxedPicture], recipe: Recipe, epoch: int) -> list[int]:
+def draw_epoch(pictures: list[BoxedPicture], recipe: DetectorRecipe, epoch: int) -> list[int]:
     """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
     rng = np.random.default_rng((recipe.seed, epoch))
     places: dict[str, list[int]] = defaultdict(list)
@@ -65,7 +72,7 @@ def draw_epoch(pictures: list[BoxedPicture], recipe: Recipe, epoch: int) -> list
         places[item.source].append(index)
     drawn: list[int] = [-1] * NULL_DRAWS
     for name, indices in sorted(places.items()):
-        whole, rest = divmod(DRAWS.get(name, len(indices)), len(indices))
+        whole, rest = divmod(DRAWS_PER_EPOCH.get(name, len(indices)), len(indices))
         drawn.extend(indices * whole)
         drawn.extend(int(i) for i in rng.choice(indices, rest, replace=False))
     return [int(i) for i in rng.permutation(drawn)]
@@ -77,7 +84,7 @@ class DetectorTraining:
     def __init__(
         self,
         model: Detector,
-        recipe: Recipe,
+        recipe: DetectorRecipe,
         folder: Path,
         train: list[BoxedPicture],
         held_out: list[BoxedPicture],
@@ -85,7 +92,7 @@ class DetectorTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model = model
-        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay)
+        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
@@ -114,7 +121,7 @@ class DetectorTraining:
         title = f"epoch {epoch + 1}/{recipe.epochs}"
         for pictures, truths, judged in tqdm(Prefetch[Batch]()(make, steps), title, steps, mininterval=5.0):
             boxes, logits = self.model.raw(to_device(pictures))
-            known = [truth.to(device()) for truth in truths]
+            known = [truth.to(training_device()) for truth in truths]
             box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
             rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps)
             progress.update(box_loss + score_loss, rate, clip_norm=10.0)
@@ -130,32 +137,34 @@ class DetectorTraining:
         return (
             torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
             [torch.from_numpy(e.boxes) for e in examples],
-            torch.from_numpy(np.stack([e.judged for e in examples])),
+            torch.from_numpy(np.stack([e.exhaustive_mask for e in examples])),
         )
 
-    def _example(self, rng: np.random.Generator, order: list[int], slot: int, epoch: int) -> Example:
+    def _example(self, rng: np.random.Generator, order: list[int], slot: int, epoch: int) -> TrainingExample:
         if order[slot] < 0:
             cells = (len(DETECTOR_CLASSES), SIZE_WH[1] // 8, SIZE_WH[0] // 8)
-            return Example(null_picture(rng, SIZE_WH), np.zeros((0, 5), np.float32), np.ones(cells, np.bool_))
+            return TrainingExample(
+                draw_null_picture(rng, SIZE_WH), np.zeros((0, 5), np.float32), np.ones(cells, np.bool_)
+            )
         chosen = [order[slot]]
         late = epoch >= self.recipe.epochs - self.recipe.plain_epochs
         if not late and rng.random() < self.recipe.mosaic_frac:
             chosen += [max(0, order[int(i)]) for i in rng.integers(len(order), size=3)]
-        return augmented(rng, [self.train[i] for i in chosen], SIZE_WH)
+        return augment_example(rng, [self.train[i] for i in chosen], SIZE_WH)
 
 
 @torch.no_grad()
 def figures_by_class(model: torch.nn.Module, pictures: list[BoxedPicture]) -> dict[str, dict[str, float]]:
     """Class name -> figures of `class_figures`, on letterboxed pictures of the sources that annotate the class."""
     annotated = {source.name: source.annotated for source in SOURCES}
-    found: list[Found] = []
+    found: list[Detections] = []
     truths: list[NDArray[np.float32]] = []
     names: list[str] = []
-    labelled = [item for item in pictures if annotated[item.source] and item.judged.ndim == 1]
+    labelled = [item for item in pictures if annotated[item.source] and item.exhaustive_mask.ndim == 1]
     for start in range(0, len(labelled), 16):
-        chunk = [plain(item, SIZE_WH) for item in labelled[start : start + 16]]
+        chunk = [letterbox_example(item, SIZE_WH) for item in labelled[start : start + 16]]
         outputs = model(to_device(torch.from_numpy(detector_batch(np.stack([e.picture for e in chunk]))))).cpu().numpy()
-        found.extend(decode(output, confidence=0.01, limit=100) for output in outputs)
+        found.extend(decode_boxes(output, confidence=0.01, limit=100) for output in outputs)
         truths.extend(e.boxes for e in chunk)
         names.extend(item.source for item in labelled[start : start + 16])
     figures = {}

@@ -11,11 +11,11 @@ import numpy as np
 
 from paani.statistics.order_statistics import median, nearest_rank
 from paani_models.catalogue import Model, load_catalogue, verified_path
-from paani_models.engines.contract_check import drawn_inputs
-from paani_models.engines.multiply_adds import multiply_adds
-from paani_models.engines.ncnn_runner import Run, converted, files_of, open_ncnn
-from paani_models.engines.onnx_runner import open_net
-from paani_models.engines.parity import Inputs, parity
+from paani_models.engines.contract_check import synthetic_inputs
+from paani_models.engines.multiply_adds import count_multiply_adds
+from paani_models.engines.ncnn_runner import Run, ncnn_files, open_ncnn, verified_ncnn_files
+from paani_models.engines.onnx_runner import open_network
+from paani_models.engines.parity import Inputs, measure_difference
 
 ENGINES = ("onnxruntime", "ncnn")
 PAPER_MULTIPLY_ADDS = {"detector": 631_000_000, "segmenter": 357_000_000}  # counted: its two shapes at 256x320
@@ -23,7 +23,7 @@ SCENE = "a river"
 WARM_ROUNDS = 3
 
 
-class Net(NamedTuple):
+class NetworkFile(NamedTuple):
     """A model file and its contract."""
 
     contract: Model
@@ -38,7 +38,7 @@ class Case(NamedTuple):
     threads: int
 
 
-class Timed(msgspec.Struct, frozen=True):
+class TimingRow(msgspec.Struct, frozen=True):
     """Least, median and 95th percentile (nearest rank) of `n` runs of one net, [ms]."""
 
     engine: str
@@ -82,36 +82,40 @@ class EngineReport(msgspec.Struct, frozen=True):
     cores: int
     load_before: float
     load_after: float
-    rows: tuple[Timed, ...]
+    rows: tuple[TimingRow, ...]
     costs: tuple[NetCost, ...]
     agreements: tuple[Agreement, ...]
     left_out: dict[str, str]
     choice: Choice
 
 
-def nets_of(weights: Path) -> dict[str, Net]:
+def load_networks(weights: Path) -> dict[str, NetworkFile]:
     """Both nets of a weights folder. Raises UserError naming a file that is missing or corrupt."""
-    return {role: Net(load_catalogue(weights)[role], verified_path(role, weights)) for role in PAPER_MULTIPLY_ADDS}
+    return {
+        role: NetworkFile(load_catalogue(weights)[role], verified_path(role, weights)) for role in PAPER_MULTIPLY_ADDS
+    }
 
 
-def cases(nets: Mapping[str, Net], engines: Sequence[str], threads: Sequence[int]) -> dict[Case, Callable[[], object]]:
+def prepare_cases(
+    nets: Mapping[str, NetworkFile], engines: Sequence[str], threads: Sequence[int]
+) -> dict[Case, Callable[[], object]]:
     """Each net ready to run on a drawn scene. Raises UserError for an engine or a file that cannot be used."""
     return {
-        Case(engine, role, count): _ready(net, open_ncnn(converted(net.file), count))
+        Case(engine, role, count): _bind_input(net, open_ncnn(verified_ncnn_files(net.file), count))
         if engine == "ncnn"
-        else _ready(net, open_net(net.file, count))
+        else _bind_input(net, open_network(net.file, count))
         for role, net in nets.items()
         for count in threads
         for engine in engines
     }
 
 
-def _ready(net: Net, run: Run) -> Callable[[], object]:
-    scene = np.asarray(drawn_inputs(net.contract)[SCENE], np.float32)
+def _bind_input(net: NetworkFile, run: Run) -> Callable[[], object]:
+    scene = np.asarray(synthetic_inputs(net.contract)[SCENE], np.float32)
     return lambda: run(scene)
 
 
-def measured(
+def measure_rounds(
     ready: Mapping[Case, Callable[[], object]], rounds: int, stopwatch_ms: Callable[[], float]
 ) -> Iterator[tuple[int, dict[Case, list[float]]]]:
     """Run all cases in turn; yields the round and all times so far, [ms]. A few rounds warm up."""
@@ -125,16 +129,16 @@ def measured(
         yield turn + 1, taken
 
 
-def rows(taken: Mapping[Case, list[float]]) -> tuple[Timed, ...]:
+def summarise_times(taken: Mapping[Case, list[float]]) -> tuple[TimingRow, ...]:
     """In the order of the cases."""
     return tuple(
-        Timed(*case, round(min(t), 3), round(median(t), 3), round(nearest_rank(t, 95), 3), len(t))
+        TimingRow(*case, round(min(t), 3), round(median(t), 3), round(nearest_rank(t, 95), 3), len(t))
         for case, t in taken.items()
         if t
     )
 
 
-def choice(found: Sequence[Timed], agreements: Sequence[Agreement], max_difference: float) -> Choice:
+def choose_engine(found: Sequence[TimingRow], agreements: Sequence[Agreement], max_difference: float) -> Choice:
     """The engine whose fastest number of threads runs the pair in the least time, by medians.
 
     ncnn only where it answers as onnxruntime does, and ran every net that onnxruntime ran; onnxruntime where they draw.
@@ -155,26 +159,32 @@ def choice(found: Sequence[Timed], agreements: Sequence[Agreement], max_differen
     return Choice(ours, f"the pair takes {best[ours]:.1f} ms, by {other} {best[other]:.1f} ms: medians")
 
 
-def costs(nets: Mapping[str, Net]) -> tuple[NetCost, ...]:
+def measure_costs(nets: Mapping[str, NetworkFile]) -> tuple[NetCost, ...]:
     """Sizes of the files that are there, and the work of one run."""
     found = []
     for role, net in nets.items():
-        files = files_of(net.file)
+        files = ncnn_files(net.file)
         there = files.param.is_file() and files.bin.is_file()
         size = files.param.stat().st_size + files.bin.stat().st_size if there else None
-        found.append(NetCost(role, net.file.stat().st_size, size, multiply_adds(net.file), PAPER_MULTIPLY_ADDS[role]))
+        found.append(
+            NetCost(role, net.file.stat().st_size, size, count_multiply_adds(net.file), PAPER_MULTIPLY_ADDS[role])
+        )
     return tuple(found)
 
 
-def agreements_of(nets: Mapping[str, Net], inputs: Mapping[str, Inputs]) -> tuple[Agreement, ...]:
+def measure_agreements(nets: Mapping[str, NetworkFile], inputs: Mapping[str, Inputs]) -> tuple[Agreement, ...]:
     """One per net. Raises UserError for an engine or a file that cannot be used."""
     return tuple(
-        Agreement(role, parity(net.file, converted(net.file), role, net.contract, inputs[role]), len(inputs[role]))
+        Agreement(
+            role,
+            measure_difference(net.file, verified_ncnn_files(net.file), role, net.contract, inputs[role]),
+            len(inputs[role]),
+        )
         for role, net in nets.items()
     )
 
 
-def text(report: EngineReport) -> str:
+def format_report(report: EngineReport) -> str:
     """Two tables, and what follows from them."""
     lines = [
         f"{'engine':12} {'net':10} {'threads':>7} {'least [ms]':>11} {'median [ms]':>12} {'p95 [ms]':>10} {'n':>5}"

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from paani.arrays import F32
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
-from paani_models.catalogue import Model, described
-from paani_models.engines.onnx_runner import Session, open_session, run_net
+from paani_models.catalogue import Model, read_contract
+from paani_models.engines.onnx_runner import Session, open_session, run_network
 
 MAX_DIFFERENCE = 1e-3  # T2
-RUNS = 15
-MAX_WATER_IN_NOTHING = 0.05
+TIMED_RUNS = 15
+MAX_WATER_FRAC_IN_NULL = 0.05
 _QUANTISED = b"QuantizeLinear"
-_KINDS = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
+_ONNX_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -31,7 +31,7 @@ class Finding(msgspec.Struct, frozen=True):
     text: str
 
 
-def role_of(path: Path, asked: str | None) -> str:
+def infer_role(path: Path, asked: str | None) -> str:
     """ "segmenter" or "detector" by what comes out. Raises UserError where that cannot be told."""
     if asked is not None:
         return asked
@@ -41,21 +41,26 @@ def role_of(path: Path, asked: str | None) -> str:
     raise UserError(f"{path}: output {list(shape)} is neither [1, 3, H, W] nor [1, 4 + classes, N]; say --role")
 
 
-def inspected(path: Path, role: str) -> list[Finding]:
+def inspect_model(path: Path, role: str) -> list[Finding]:
     """Every finding, in the order of the checks. Raises UserError for a file that is no ONNX model."""
-    contract = described(path, role)
+    contract = read_contract(path, role)
     session = open_session(path, 1)
-    findings = list(_shapes(session, contract, role))
+    findings = list(_check_shapes(session, contract, role))
     if any(finding.level == "error" for finding in findings):
         return findings
-    inputs = drawn_inputs(contract)
-    outputs = {name: run_net(session, tensor) for name, tensor in inputs.items()}
+    inputs = synthetic_inputs(contract)
+    outputs = {name: run_network(session, tensor) for name, tensor in inputs.items()}
     broken = [name for name, output in outputs.items() if not np.isfinite(output).all()]
     if broken:
         return [*findings, Finding("error", f"output is not finite on a picture of {', '.join(broken)}")]
-    findings += _segmenter_ranges(outputs, contract) if role == "segmenter" else _detector_ranges(outputs, contract)
+    findings += (
+        _check_segmenter_scores(outputs, contract) if role == "segmenter" else _check_detector_output(outputs, contract)
+    )
     plain = open_session(path, 1, optimised=False)
-    worst = max(difference(outputs[name], run_net(plain, tensor), role, contract) for name, tensor in inputs.items())
+    worst = max(
+        largest_output_difference(outputs[name], run_network(plain, tensor), role, contract)
+        for name, tensor in inputs.items()
+    )
     if _QUANTISED in path.read_bytes():
         note = "8-bit steps are rounded elsewhere in the plain graph; `paani models quantise` judges by score"
         findings.append(Finding("warning", f"optimised and plain graph differ by {worst:.1e}: {note}"))
@@ -65,14 +70,14 @@ def inspected(path: Path, role: str) -> list[Finding]:
         findings.append(Finding(level, text))
     scene = inputs["a river"]
     took_ms = []
-    for _ in range(RUNS):
+    for _ in range(TIMED_RUNS):
         start_ms = stopwatch_ms()
-        run_net(session, scene)
+        run_network(session, scene)
         took_ms.append(stopwatch_ms() - start_ms)
     return [*findings, Finding("ok", f"one run takes {statistics.median(took_ms):.1f} ms on one thread here")]
 
 
-def _shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
+def _check_shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
     for what, ends, wanted in (
         ("input", session.get_inputs(), contract.input),
         ("output", session.get_outputs(), contract.output),
@@ -83,8 +88,8 @@ def _shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
         shape, kind = tuple(ends[0].shape), ends[0].type
         if any(not isinstance(side, int) for side in shape):
             yield Finding("error", f"{what} {list(shape)} is not static: export with fixed sizes and batch 1")
-        elif kind != _KINDS[wanted.dtype]:
-            yield Finding("error", f"{what} is {kind}, the contract has {_KINDS[wanted.dtype]}")
+        elif kind != _ONNX_TYPES[wanted.dtype]:
+            yield Finding("error", f"{what} is {kind}, the contract has {_ONNX_TYPES[wanted.dtype]}")
         elif shape != wanted.shape:
             hint = "a manifest.json beside the file may state another size" if what == "input" else _classes_hint(role)
             yield Finding("error", f"{what} is {list(shape)}, the contract has {list(wanted.shape)}; {hint}")
@@ -97,7 +102,7 @@ def _classes_hint(role: str) -> str:
     return "a manifest.json beside the file states its classes" if role == "detector" else "three classes are needed"
 
 
-def _segmenter_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
+def _check_segmenter_scores(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
     scene = outputs["a river"][0]
     if scene.min() >= 0.0 and np.allclose(scene.sum(axis=0), 1.0, atol=1e-3):
         yield Finding("error", "output sums to one: export the scores before the softmax")
@@ -106,15 +111,15 @@ def _segmenter_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Find
     water = contract.classes.index("water")
     for name in ("black", "white", "noise"):
         share = float((outputs[name][0].argmax(axis=0) == water).mean())
-        level = "ok" if share <= MAX_WATER_IN_NOTHING else "warning"
-        yield Finding(level, f"{share:.0%} of a {name} picture is called water" + _gate_note(level))
+        level = "ok" if share <= MAX_WATER_FRAC_IN_NULL else "warning"
+        yield Finding(level, f"{share:.0%} of a {name} picture is called water" + _image_quality_note(level))
 
 
-def _gate_note(level: str) -> str:
+def _image_quality_note(level: str) -> str:
     return "" if level == "ok" else ": only the gate then stands between this picture and motion"
 
 
-def _detector_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
+def _check_detector_output(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
     scores = np.concatenate([output[0, 4:].ravel() for output in outputs.values()])
     boxes = np.concatenate([output[0, :4] for output in outputs.values()], axis=1)
     if scores.min() < -1e-6 or scores.max() > 1.0 + 1e-6:
@@ -130,7 +135,7 @@ def _detector_ranges(outputs: dict[str, F32], contract: Model) -> Iterator[Findi
         yield Finding("ok", "boxes are centre, width and height in input pixels")
 
 
-def difference(one: F32, other: F32, role: str, contract: Model) -> float:
+def largest_output_difference(one: F32, other: F32, role: str, contract: Model) -> float:
     """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
     apart = np.abs(one - other)
     if role == "detector":
@@ -139,7 +144,7 @@ def difference(one: F32, other: F32, role: str, contract: Model) -> float:
     return float(apart.max())
 
 
-def drawn_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
+def synthetic_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
     """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
     height, width = contract.size_hw
     rng = np.random.default_rng(0)
@@ -153,10 +158,10 @@ def drawn_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
         "noise": rng.integers(0, 256, river.shape).astype(np.uint8),
         "a river": river,
     }
-    return {name: as_input(picture, contract) for name, picture in drawn.items()}
+    return {name: to_network_input(picture, contract) for name, picture in drawn.items()}
 
 
-def as_input(picture: NDArray[np.uint8], contract: Model) -> F32 | NDArray[np.uint8]:
+def to_network_input(picture: NDArray[np.uint8], contract: Model) -> F32 | NDArray[np.uint8]:
     """A net-sized RGB picture [H,W,3] as the net takes it."""
     if contract.input.dtype == "uint8":
         return picture[None]

@@ -22,58 +22,58 @@ class _Field(NamedTuple):
     content: memoryview
 
 
-def before_resize(model: bytes) -> bytes | None:
+def drop_last_resize(model: bytes) -> bytes | None:
     """The net that answers what its last step would have resized; None where the last step is no such resize.
 
     That is one to the nearest or linear, which leaves the middles of the cells where they are; one that keeps the
     corners in place does not. Bytes that are no ONNX model have no such step.
     """
     try:
-        return _without_resize(model)
+        return _drop_last_resize(model)
     except ValueError:
         return None
 
 
-def _without_resize(model: bytes) -> bytes | None:
-    outer = list(_fields(memoryview(model)))
-    graph = [field for part in outer if part.number == _GRAPH for field in _fields(part.content)]
-    answers = [_first(field.content, _NAME) for field in graph if field.number == _OUTPUT]
-    last = next((f for f in graph if f.number == _NODE and _first(f.content, _GIVES) in answers), None)
-    if len(answers) != 1 or last is None or not _only_resizes(last.content):
+def _drop_last_resize(model: bytes) -> bytes | None:
+    outer = list(_read_fields(memoryview(model)))
+    graph = [field for part in outer if part.number == _GRAPH for field in _read_fields(part.content)]
+    answers = [_first_content(field.content, _NAME) for field in graph if field.number == _OUTPUT]
+    last = next((f for f in graph if f.number == _NODE and _first_content(f.content, _GIVES) in answers), None)
+    if len(answers) != 1 or last is None or not _is_plain_resize(last.content):
         return None
-    answer = _coded(_NAME, _first(last.content, _TAKES)) + _FLOAT32
+    answer = _encode_field(_NAME, _first_content(last.content, _TAKES)) + _FLOAT32
     kept = [field.whole for field in graph if field is not last and field.number != _OUTPUT]
     rest = [part.whole for part in outer if part.number != _GRAPH]
-    return b"".join((*rest, _coded(_GRAPH, b"".join((*kept, _coded(_OUTPUT, answer))))))
+    return b"".join((*rest, _encode_field(_GRAPH, b"".join((*kept, _encode_field(_OUTPUT, answer))))))
 
 
-def _only_resizes(node: memoryview) -> bool:
-    if _first(node, _KIND) != b"Resize":
+def _is_plain_resize(node: memoryview) -> bool:
+    if _first_content(node, _KIND) != b"Resize":
         return False
     settings = {
-        _first(field.content, _NAME): _first(field.content, _TEXT)
-        for field in _fields(node)
+        _first_content(field.content, _NAME): _first_content(field.content, _TEXT)
+        for field in _read_fields(node)
         if field.number == _ATTRIBUTE
     }
     moved = settings.get(b"coordinate_transformation_mode") in {b"align_corners", b"tf_crop_and_resize"}
     return settings.get(b"mode", b"nearest") in {b"nearest", b"linear"} and not moved
 
 
-def _first(message: memoryview, number: int) -> bytes:
+def _first_content(message: memoryview, number: int) -> bytes:
     """The content of the first field of that number; empty where there is none."""
-    return next((bytes(field.content) for field in _fields(message) if field.number == number), b"")
+    return next((bytes(field.content) for field in _read_fields(message) if field.number == number), b"")
 
 
-def _fields(message: memoryview) -> Iterator[_Field]:
+def _read_fields(message: memoryview) -> Iterator[_Field]:
     end = 0
     while end < len(message):
         start = end
-        key, begin = _varint(message, start)
+        key, begin = _read_varint(message, start)
         kind = key & 7
         if kind == _VARINT:
-            _, end = _varint(message, begin)
+            _, end = _read_varint(message, begin)
         elif kind == _LENGTH_FIRST:
-            size, begin = _varint(message, begin)
+            size, begin = _read_varint(message, begin)
             end = begin + size
         elif kind in {_EIGHT_BYTES, _FOUR_BYTES}:
             end = begin + (8 if kind == _EIGHT_BYTES else 4)
@@ -84,7 +84,7 @@ def _fields(message: memoryview) -> Iterator[_Field]:
         yield _Field(key >> 3, message[start:end], message[begin:end])
 
 
-def _varint(message: memoryview, at: int) -> tuple[int, int]:
+def _read_varint(message: memoryview, at: int) -> tuple[int, int]:
     """A number in groups of seven bits, lowest first, and where it ends."""
     value = shift = 0
     while at < len(message):
@@ -95,11 +95,11 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
     raise ValueError("ends within a number")
 
 
-def _coded(number: int, content: bytes) -> bytes:
-    return _number(number << 3 | _LENGTH_FIRST) + _number(len(content)) + content
+def _encode_field(number: int, content: bytes) -> bytes:
+    return _encode_varint(number << 3 | _LENGTH_FIRST) + _encode_varint(len(content)) + content
 
 
-def _number(value: int) -> bytes:
+def _encode_varint(value: int) -> bytes:
     groups = []
     while value > 0x7F:
         groups.append(value & 0x7F | 0x80)

@@ -8,7 +8,7 @@ from pathlib import Path
 from paani.errors import UserError
 
 
-def multiply_adds(path: Path) -> int | None:
+def count_multiply_adds(path: Path) -> int | None:
     """Multiply-adds of one run of the convolutions and dense layers, which are all but a few per cent of the work.
 
     None where the onnx package is not installed, or a shape is not static. Raises UserError naming a file that is not

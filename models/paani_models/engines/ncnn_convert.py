@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 from onnx import helper, numpy_helper
 
 from paani.errors import UserError
-from paani_models.catalogue import MANIFEST, Model, described, file_sha256, load_catalogue, save_catalogue
+from paani_models.catalogue import MANIFEST, Model, file_sha256, load_catalogue, read_contract, save_catalogue
 from paani_models.engines.contract_check import MAX_DIFFERENCE
-from paani_models.engines.ncnn_runner import Conversion, NcnnFiles, files_of
-from paani_models.engines.parity import Inputs, parity
+from paani_models.engines.ncnn_runner import Conversion, NcnnFiles, ncnn_files
+from paani_models.engines.parity import Inputs, measure_difference
 
 PNNX_LIMIT_S = 600.0
-NO_PNNX = (
+PNNX_NOT_FOUND = (
     "no pnnx to be run: `pip install --no-deps pnnx` into an environment of its own, "
     "and give the program in its site-packages/pnnx with --pnnx"
 )
 
 
-def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Inputs) -> Conversion:
+def convert_to_ncnn(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Inputs) -> Conversion:
     """Write the ncnn files of a float32 model into `folder`, the model and its manifest entry too if it is elsewhere.
 
     inputs: the pictures on which both must agree to MAX_DIFFERENCE; else nothing is written. Raises UserError naming
@@ -35,13 +35,13 @@ def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: In
     """
     program = shutil.which(str(pnnx) if pnnx else "pnnx")
     if program is None:
-        raise UserError(f"--pnnx {pnnx}: no such program" if pnnx else NO_PNNX)
-    contract = described(source, role)
+        raise UserError(f"--pnnx {pnnx}: no such program" if pnnx else PNNX_NOT_FOUND)
+    contract = read_contract(source, role)
     if contract.input.dtype != "float32":
         raise UserError(f"{source}: takes {contract.input.dtype}; ncnn gets the float32 model that it was made from")
     with tempfile.TemporaryDirectory() as scratch:
         made = _run_pnnx(program, source, contract, Path(scratch))
-        diff = parity(source, made, role, contract, inputs)
+        diff = measure_difference(source, made, role, contract, inputs)
         if not diff <= MAX_DIFFERENCE:
             raise UserError(f"{source}: ncnn's answers differ by {diff:.1e} (at most {MAX_DIFFERENCE:.0e})")
         record = Conversion(
@@ -53,27 +53,27 @@ def convert(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: In
         )
         made.record.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
         try:
-            _deliver(source, msgspec.structs.replace(contract, name=role, file=source.name), made, folder)
+            _install_files(source, msgspec.structs.replace(contract, name=role, file=source.name), made, folder)
         except OSError as error:
             raise UserError(f"{folder}: {error.strerror}") from error
     return record
 
 
-def _deliver(source: Path, entry: Model, made: NcnnFiles, folder: Path) -> None:
+def _install_files(source: Path, entry: Model, made: NcnnFiles, folder: Path) -> None:
     """The record last: without it the files are not used."""
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / source.name
-    wanted = files_of(target)
+    wanted = ncnn_files(target)
     if target.resolve() != source.resolve():
-        _place(source, target)
+        _copy_whole(source, target)
         known = load_catalogue(folder) if (folder / MANIFEST).exists() else {}
         entry = msgspec.structs.replace(entry, sha256=file_sha256(target), size_bytes=target.stat().st_size)
         save_catalogue({**known, entry.name: entry}, folder)
     for have, place in ((made.param, wanted.param), (made.bin, wanted.bin), (made.record, wanted.record)):
-        _place(have, place)
+        _copy_whole(have, place)
 
 
-def _place(have: Path, place: Path) -> None:
+def _copy_whole(have: Path, place: Path) -> None:
     beside = place.with_name(f"{place.name}.partial")
     shutil.copyfile(have, beside)
     beside.replace(place)
@@ -86,7 +86,7 @@ def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> Ncn
     except Exception as error:
         raise UserError(f"{source}: not a readable ONNX file ({type(error).__name__})") from error
     net = scratch / "net.onnx"
-    onnx.save(join_corners(model), str(net))
+    onnx.save(replace_strided_slices(model), str(net))
     shape = ",".join(str(side) for side in contract.input.shape)
     command = [program, str(net), f"inputshape=[{shape}]", "fp16=0"]
     try:
@@ -95,23 +95,23 @@ def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> Ncn
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise UserError(f"{program}: {error}") from error
-    made = files_of(net)
+    made = ncnn_files(net)
     if done.returncode != 0 or not (made.param.is_file() and made.bin.is_file()):
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         raise UserError(f"{program}: failed on {source.name}: {said[-1].strip() if said else 'without a word'}")
-    unknown = foreign_layers(made.param.read_text(encoding="utf-8"))
+    unknown = find_untranslated_layers(made.param.read_text(encoding="utf-8"))
     if unknown:
         raise UserError(f"{source}: ncnn has no {', '.join(unknown)}")
     return made
 
 
-def foreign_layers(param: str) -> list[str]:
+def find_untranslated_layers(param: str) -> list[str]:
     """Kinds of layers that pnnx could not translate: it leaves them under their dotted names."""
     kinds = [line.split()[0] for line in param.splitlines()[2:] if line.strip()]
     return sorted({kind for kind in kinds if "." in kind})
 
 
-def join_corners(model: onnx.ModelProto) -> onnx.ModelProto:
+def replace_strided_slices(model: onnx.ModelProto) -> onnx.ModelProto:
     """The same net with every "each second row and column, side by side" as one convolution: ncnn slices without steps.
 
     Exact: each weight is 0 or 1. Changes and returns the model.
@@ -131,7 +131,7 @@ def join_corners(model: onnx.ModelProto) -> onnx.ModelProto:
     for place, node in enumerate(graph.node):
         if node.op_type != "Concat" or helper.get_node_attr_value(node, "axis") != 1:
             continue
-        corners = [_corner(name, producers, constants) for name in node.input]
+        corners = [_read_strided_slice(name, producers, constants) for name in node.input]
         if None in corners or len({corner[0] for corner in corners if corner}) != 1:
             continue
         taken, count = corners[0][0], channels[corners[0][0]]  # type: ignore[index]
@@ -144,11 +144,11 @@ def join_corners(model: onnx.ModelProto) -> onnx.ModelProto:
         joined = helper.make_node("Conv", [taken, name], [node.output[0]], kernel_shape=[2, 2], strides=[2, 2])
         graph.node.remove(node)
         graph.node.insert(place, joined)
-    _drop_unread(graph)
+    _drop_unused_nodes(graph)
     return model
 
 
-def _corner(
+def _read_strided_slice(
     name: str, producers: Mapping[str, onnx.NodeProto], constants: Mapping[str, NDArray[np.generic]]
 ) -> tuple[str, int, int] | None:
     """Of which tensor each second row and column is this, and from which row and column on; None if it is no such."""
@@ -165,7 +165,7 @@ def _corner(
     return (name, starts[2], starts[3]) if set(starts) == {2, 3} else None
 
 
-def _drop_unread(graph: onnx.GraphProto) -> None:
+def _drop_unused_nodes(graph: onnx.GraphProto) -> None:
     wanted = {value.name for value in graph.output}
     for node in reversed(list(graph.node)):
         if wanted.isdisjoint(node.output):

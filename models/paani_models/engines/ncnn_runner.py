@@ -18,9 +18,15 @@ from paani_models.catalogue import Record, file_sha256
 
 Run = Callable[[F32], F32]
 INPUT, OUTPUT = "in0", "out0"
-_CUBIC, _CORNERS_STAY = "0=3", "6=1"  # settings of ncnn's Interp
+_CUBIC, _ALIGN_CORNERS = "0=3", "6=1"  # settings of ncnn's Interp
 NOT_INSTALLED = "ncnn is not installed; install the extra paani[ncnn]"
-_SMALL = ("use_fp16_packed", "use_fp16_storage", "use_fp16_arithmetic", "use_bf16_packed", "use_bf16_storage")
+_HALF_PRECISION_OPTIONS = (
+    "use_fp16_packed",
+    "use_fp16_storage",
+    "use_fp16_arithmetic",
+    "use_bf16_packed",
+    "use_bf16_storage",
+)
 
 
 class Conversion(Record, frozen=True):
@@ -44,17 +50,17 @@ class NcnnFiles(msgspec.Struct, frozen=True):
     record: Path
 
 
-def files_of(model: Path) -> NcnnFiles:
+def ncnn_files(model: Path) -> NcnnFiles:
     """The names beside a model file."""
     return NcnnFiles(*(model.with_suffix(f".ncnn.{ending}") for ending in ("param", "bin", "json")))
 
 
-def converted(model: Path) -> NcnnFiles:
+def verified_ncnn_files(model: Path) -> NcnnFiles:
     """The files beside a model, checksums just compared: ncnn itself dies of some that are damaged.
 
     Raises UserError naming the file that is missing, corrupt or made from another model, and the command that makes it.
     """
-    files, remedy = files_of(model), f"make it with: paani models convert {model}"
+    files, remedy = ncnn_files(model), f"make it with: paani models convert {model}"
     for path in (files.param, files.bin, files.record):
         if not path.is_file():
             raise UserError(f"{path}: missing; {remedy}")
@@ -70,7 +76,7 @@ def converted(model: Path) -> NcnnFiles:
     return files
 
 
-def release() -> str | None:
+def ncnn_version() -> str | None:
     """The version of ncnn; None where it is not installed."""
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read once by its thread pool, which else waits busily
     try:
@@ -80,11 +86,11 @@ def release() -> str | None:
     return str(ncnn.__version__)
 
 
-def resized(files: NcnnFiles) -> str | None:
+def blob_before_resize(files: NcnnFiles) -> str | None:
     """Name of what the last step resizes, as `last_resize` has it, into the output; None where it is no such step."""
     for words in map(str.split, files.param.read_text(encoding="utf-8", errors="replace").splitlines()):
         if words[:1] == ["Interp"] and words[2:4] == ["1", "1"] and words[5] == OUTPUT:
-            return None if {_CUBIC, _CORNERS_STAY} & set(words) else words[4]
+            return None if {_CUBIC, _ALIGN_CORNERS} & set(words) else words[4]
     return None
 
 
@@ -93,17 +99,17 @@ def open_ncnn(files: NcnnFiles, threads: int, output: str = OUTPUT) -> Run:
 
     Raises UserError where ncnn is not installed, or naming a file that it does not read.
     """
-    if release() is None:
+    if ncnn_version() is None:
         raise UserError(NOT_INSTALLED)
     import ncnn  # noqa: PLC0415 - an extra
 
     net = ncnn.Net()
-    for option in _SMALL:  # half precision moves logits by more than 1e-3
+    for option in _HALF_PRECISION_OPTIONS:  # half precision moves logits by more than 1e-3
         setattr(net.opt, option, False)
     net.opt.use_vulkan_compute = False
     net.opt.num_threads = threads
     if net.load_param(str(files.param)) != 0:
-        raise UserError(f"{files.param}: not a net that ncnn {release()} can run")
+        raise UserError(f"{files.param}: not a net that ncnn {ncnn_version()} can run")
     if net.load_model(str(files.bin)) != 0:
         raise UserError(f"{files.bin}: not the weights of {files.param.name}")
 

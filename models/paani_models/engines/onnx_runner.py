@@ -16,10 +16,10 @@ from paani.errors import UserError
 Session = Any  # onnxruntime is untyped
 
 
-def open_net(path: Path, threads: int = 2) -> Callable[[F32], F32]:
+def open_network(path: Path, threads: int = 2) -> Callable[[F32], F32]:
     """A function from input [1,3,H,W] to the first output. Raises UserError naming a file that cannot be loaded."""
     session = open_session(path, threads)
-    return lambda x: run_net(session, x)
+    return lambda x: run_network(session, x)
 
 
 def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Session:
@@ -37,6 +37,6 @@ def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Ses
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
 
 
-def run_net(session: Session, x: F32 | NDArray[np.uint8]) -> F32:
+def run_network(session: Session, x: F32 | NDArray[np.uint8]) -> F32:
     """The first output for one input."""
     return np.asarray(session.run(None, {session.get_inputs()[0].name: x})[0], np.float32)

@@ -17,19 +17,19 @@ from onnx import TensorProto, helper, numpy_helper
 
 from paani.errors import UserError
 from paani_models.catalogue import Model, Tensor, file_sha256, load_catalogue, save_catalogue
-from paani_models.engines.last_resize import before_resize
+from paani_models.engines.last_resize import drop_last_resize
 
 
 def write_variant(name: str, contract: Model, net: Path, folder: Path) -> Model:
     """Write `folder`/<file> and its manifest entry, both by renaming. Raises UserError naming a file that is no net."""
     try:
         whole = net.read_bytes()
-        cells = before_resize(whole)
+        cells = drop_last_resize(whole)
         model = onnx.load_from_string(cells or whole)
     except Exception as error:
         raise UserError(f"{net}: not a readable ONNX file ({type(error).__name__})") from error
-    _take_bytes(model, contract)
-    output = _stated(model, contract.output.shape[:2]) if cells else contract.output
+    _accept_bytes(model, contract)
+    output = _declare_cell_output(model, contract.output.shape[:2]) if cells else contract.output
     onnx.checker.check_model(model, full_check=True)
     folder.mkdir(parents=True, exist_ok=True)
     beside = folder / f"{contract.file}.partial"
@@ -50,7 +50,7 @@ def write_variant(name: str, contract: Model, net: Path, folder: Path) -> Model:
     return entry
 
 
-def _take_bytes(model: onnx.ModelProto, contract: Model) -> None:
+def _accept_bytes(model: onnx.ModelProto, contract: Model) -> None:
     """RGB bytes [1,H,W,3] -> what the net took."""
     graph = model.graph
     taken = graph.input[0].name
@@ -77,7 +77,7 @@ def _per_channel(name: str, values: NDArray[np.float32]) -> onnx.TensorProto:
     return numpy_helper.from_array(np.ascontiguousarray(values.reshape(1, -1, 1, 1), np.float32), name)
 
 
-def _stated(model: onnx.ModelProto, batch_and_classes: tuple[int, ...]) -> Tensor:
+def _declare_cell_output(model: onnx.ModelProto, batch_and_classes: tuple[int, ...]) -> Tensor:
     """The answer once per cell, its shape written into the file."""
     graph = model.graph
     cells = onnx.shape_inference.infer_shapes(model).graph.output[0]

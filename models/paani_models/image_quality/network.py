@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter, load_imagenet
+from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
 FRONT_STAGES, FRONT_CHANNELS = 4, 64  # of MobileNetV2, down to stride 16
@@ -16,7 +16,7 @@ ROWS, COLUMNS = 3, 5  # of the last map, after pooling
 FROZEN_STAGES = 2  # as in the segmenter: general, and the dearest to train
 
 
-class Gate(nn.Module):
+class ImageQualityNetwork(nn.Module):
     """RGB / 255 [N,3,120,160] -> fitness [N,1] in 0..1.
 
     The last map keeps its place in the picture: sky belongs above water, so a picture upside down is not fit.
@@ -24,7 +24,7 @@ class Gate(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        whole = ImageNetSegmenter()
+        whole = ShippedSegmenter()
         self.front = nn.Sequential(whole.stem, *list(whole.stages)[:FRONT_STAGES])
         self.mix = nn.Sequential(
             nn.Conv2d(FRONT_CHANNELS, MIXED_CHANNELS, 1), nn.ReLU(), nn.AvgPool2d((3, 2), stride=2)
@@ -46,10 +46,10 @@ class Gate(nn.Module):
         return torch.sigmoid(self.logit(x))
 
 
-def start_from_imagenet(gate: Gate, path: Path) -> None:
+def start_from_imagenet(gate: ImageQualityNetwork, path: Path) -> None:
     """Fill the front and freeze its first stages. Raises UserError where the file does not fit."""
-    whole = ImageNetSegmenter()
-    load_imagenet(whole, path)
+    whole = ShippedSegmenter()
+    load_imagenet_encoder(whole, path)
     for own, given in zip(gate.front, (whole.stem, *whole.stages), strict=False):
         own.load_state_dict(given.state_dict())
     for frozen in list(gate.front)[: 1 + FROZEN_STAGES]:

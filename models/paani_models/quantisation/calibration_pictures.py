@@ -9,10 +9,10 @@ from pathlib import Path
 from paani.errors import UserError
 from paani_models.datasets.sources import RENDERED, Sample
 
-PICTURES = 200  # T4
+CALIBRATION_PICTURES = 200  # T4
 
 
-def calibration_samples(samples: Sequence[Sample], listed: Path | None, *, spread: bool) -> list[Sample]:
+def choose_calibration_samples(samples: Sequence[Sample], listed: Path | None, *, spread: bool) -> list[Sample]:
     """At most PICTURES photographs of the training side, sorted by path; or those that a file lists, one path a line.
 
     samples: of both sides. spread: taken evenly from the sorted ones; else the first.
@@ -22,10 +22,10 @@ def calibration_samples(samples: Sequence[Sample], listed: Path | None, *, sprea
     if listed is None:
         chosen = [sample for sample in photographs if not sample.held_out]
         chosen = list({sample.picture: sample for sample in chosen}.values())
-        step = max(1, len(chosen) // PICTURES) if spread else 1
-        chosen = chosen[::step][:PICTURES]
+        step = max(1, len(chosen) // CALIBRATION_PICTURES) if spread else 1
+        chosen = chosen[::step][:CALIBRATION_PICTURES]
     else:
-        chosen = _listed(listed, samples)
+        chosen = _read_listed_samples(listed, samples)
     if not chosen:
         raise UserError("calibration: no training picture")
     refuse_held_out(chosen, samples)
@@ -41,13 +41,13 @@ def refuse_held_out(chosen: Sequence[Sample], samples: Sequence[Sample]) -> None
             raise UserError(f"{sample.picture}: is held out; a net calibrated on it cannot be judged on it")
 
 
-def fingerprint(chosen: Sequence[Sample]) -> str:
+def hash_sample_names(chosen: Sequence[Sample]) -> str:
     """Hexadecimal SHA-256 of the pictures' names, for the record."""
     names = "\n".join(f"{sample.source.name}/{sample.picture.name}" for sample in chosen)
     return hashlib.sha256(names.encode()).hexdigest()
 
 
-def _listed(path: Path, samples: Sequence[Sample]) -> list[Sample]:
+def _read_listed_samples(path: Path, samples: Sequence[Sample]) -> list[Sample]:
     known = {str(sample.picture.resolve()): sample for sample in samples}
     try:
         lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]

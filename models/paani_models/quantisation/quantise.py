@@ -13,11 +13,11 @@ from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, Q
 
 from paani.arrays import F32
 from paani.errors import UserError
-from paani_models.quantisation.equalise import equalise
+from paani_models.quantisation.equalisation import equalise_layers
 
 
 @dataclass(frozen=True)
-class Recipe:
+class QuantisationRecipe:
     """How a net becomes INT8: QDQ, MinMax, signed weights of 8 bits.
 
     operators: kinds of steps that are quantised, () for all that can be. float_decoding: what turns the last
@@ -37,8 +37,8 @@ class Recipe:
     spread: bool = False
 
 
-PAPER = Recipe("paper")  # T4
-_EQUALISED = Recipe(
+PAPER = QuantisationRecipe("paper")  # T4
+_EQUALISED = QuantisationRecipe(
     "equalised", equalised=True, per_channel=True, unsigned_activations=True, float_decoding=True, spread=True
 )
 RECIPES = {
@@ -56,7 +56,7 @@ RECIPES = {
 }
 
 
-class _Inputs(CalibrationDataReader):
+class _CalibrationInputs(CalibrationDataReader):
     def __init__(self, name: str, inputs: Sequence[F32]) -> None:
         self._next: Iterator[dict[str, F32]] = iter([{name: x} for x in inputs])
 
@@ -64,7 +64,7 @@ class _Inputs(CalibrationDataReader):
         return next(self._next, None)
 
 
-def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[F32]) -> None:
+def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs: Sequence[F32]) -> None:
     """Write `target`, beside and then by renaming.
 
     inputs: calibration inputs as the net gets them, [1,3,H,W] each. Raises UserError naming a file that is no ONNX net.
@@ -74,12 +74,12 @@ def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[F32]) -> 
     except Exception as error:
         raise UserError(f"{net}: not a readable ONNX file ({type(error).__name__})") from error
     if recipe.equalised:
-        equalise(model)
+        equalise_layers(model)
     model = onnx.shape_inference.infer_shapes(model)
     target.parent.mkdir(parents=True, exist_ok=True)
     float_net, beside = target.with_suffix(".float.partial"), target.with_suffix(".partial")
     onnx.save(model, str(float_net))
-    options: dict[str, Any] = {"nodes_to_exclude": kept_float(model, recipe)}
+    options: dict[str, Any] = {"nodes_to_exclude": find_float_steps(model, recipe)}
     if recipe.operators:
         options["op_types_to_quantize"] = list(recipe.operators)
     logging.getLogger().setLevel(logging.ERROR)  # it recommends a pre-processing that export has done already
@@ -87,7 +87,7 @@ def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[F32]) -> 
         quantize_static(
             str(float_net),
             str(beside),
-            _Inputs(model.graph.input[0].name, inputs),
+            _CalibrationInputs(model.graph.input[0].name, inputs),
             quant_format=QuantFormat.QDQ,
             calibrate_method=CalibrationMethod.MinMax,
             activation_type=QuantType.QUInt8 if recipe.unsigned_activations else QuantType.QInt8,
@@ -95,14 +95,14 @@ def quantise(net: Path, target: Path, recipe: Recipe, inputs: Sequence[F32]) -> 
             per_channel=recipe.per_channel,
             **options,
         )
-        _drop_unused(beside)
+        _drop_unused_constants(beside)
         beside.replace(target)
     finally:
         for left in (float_net, beside):
             left.unlink(missing_ok=True)
 
 
-def _drop_unused(path: Path) -> None:
+def _drop_unused_constants(path: Path) -> None:
     """Constants that only float steps used would each be announced at every start."""
     model = onnx.load(str(path))
     used = {name for node in model.graph.node for name in node.input}
@@ -112,9 +112,9 @@ def _drop_unused(path: Path) -> None:
     onnx.save(model, str(path))
 
 
-def kept_float(model: onnx.ModelProto, recipe: Recipe) -> list[str]:
+def find_float_steps(model: onnx.ModelProto, recipe: QuantisationRecipe) -> list[str]:
     """Names of the steps that a recipe leaves in float. model: with its shapes inferred."""
-    kept = decoding(model) if recipe.float_decoding else []
+    kept = find_decoding_steps(model) if recipe.float_decoding else []
     weights = {tensor.name: tensor.dims for tensor in model.graph.initializer}
     rows = {
         value.name: value.type.tensor_type.shape.dim[2].dim_value
@@ -130,7 +130,7 @@ def kept_float(model: onnx.ModelProto, recipe: Recipe) -> list[str]:
     return kept
 
 
-def decoding(model: onnx.ModelProto) -> list[str]:
+def find_decoding_steps(model: onnx.ModelProto) -> list[str]:
     """Names of the steps between the last convolutions and the outputs, those convolutions included.
 
     A convolution that reads a softmax computes an expected distance, and is part of the decoding.

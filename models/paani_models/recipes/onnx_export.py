@@ -24,19 +24,19 @@ from paani_models.catalogue import (
     save_catalogue,
 )
 from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
-from paani_models.detector import shipped_shape as detector
-from paani_models.detector.paper_shape import FUSED_PARAMETERS, Yolo11n
-from paani_models.detector.shipped_shape import Detector
-from paani_models.engines.onnx_runner import open_net
+from paani_models.detector import shipped_network as detector
+from paani_models.detector.paper_network import FUSED_PARAMETERS, Yolo11n
+from paani_models.detector.shipped_network import Detector
+from paani_models.engines.onnx_runner import open_network
 from paani_models.image_quality import network as gate
-from paani_models.image_quality.network import Gate
-from paani_models.segmenter import paper_shape as segmenter
-from paani_models.segmenter.paper_shape import Segmenter, parameter_count
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter
-from paani_models.training.loop import load_average, load_checkpoint
+from paani_models.image_quality.network import ImageQualityNetwork
+from paani_models.segmenter import paper_network as segmenter
+from paani_models.segmenter.paper_network import PaperSegmenter, parameter_count
+from paani_models.segmenter.shipped_network import ShippedSegmenter
+from paani_models.training.training_state import load_averaged_weights, load_checkpoint
 
 OPSET = 17  # T1
-TOLERANCE = 1e-3  # T2
+MAX_EXPORT_DIFFERENCE = 1e-3  # T2
 
 _UNCHANGED: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -100,19 +100,19 @@ CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
 )
 
 
-def network(name: str) -> nn.Module:
+def build_network(name: str) -> nn.Module:
     """An untrained net of a contract."""
     nets = {
-        "segmenter": ImageNetSegmenter,
-        "paper-segmenter": Segmenter,
+        "segmenter": ShippedSegmenter,
+        "paper-segmenter": PaperSegmenter,
         "detector": Detector,
         "yolo11n": Yolo11n,
-        "gate": Gate,
+        "gate": ImageQualityNetwork,
     }
     return nets[name]()
 
 
-def export(
+def export_network(
     name: str,
     checkpoint: Path,
     folder: Path,
@@ -124,9 +124,9 @@ def export(
     inputs: real pictures, already preprocessed, [1,3,256,320] each, for the comparison. Figures are left empty.
     Raises UserError where the checkpoint does not fit or the outputs differ by more than TOLERANCE.
     """
-    net = network(name)
-    load_average(net, checkpoint)
-    return _placed(name, net, folder, inputs, origins, load_checkpoint(checkpoint)["recipe"]["seed"])
+    net = build_network(name)
+    load_averaged_weights(net, checkpoint)
+    return _export_and_place(name, net, folder, inputs, origins, load_checkpoint(checkpoint)["recipe"]["seed"])
 
 
 def export_untrained(name: str, folder: Path) -> Model:
@@ -135,16 +135,16 @@ def export_untrained(name: str, folder: Path) -> Model:
     torch.manual_seed(seed)
     shape = CONTRACTS[name].input.shape
     noise = np.random.default_rng(seed).random(shape, dtype=np.float32)
-    net = network(name).train()
+    net = build_network(name).train()
     for module in net.modules():
         if isinstance(module, nn.BatchNorm2d):
             module.momentum = 1.0
     with torch.no_grad():
         net(torch.from_numpy(noise))  # without statistics the numbers shrink from step to step until they slow it down
-    return _placed(name, net.eval(), folder, [noise], (), seed)
+    return _export_and_place(name, net.eval(), folder, [noise], (), seed)
 
 
-def _placed(
+def _export_and_place(
     name: str,
     net: nn.Module,
     folder: Path,
@@ -156,10 +156,10 @@ def _placed(
     folder.mkdir(parents=True, exist_ok=True)
     beside = folder / f"{contract.file}.partial"
     write_onnx(net, contract, beside)
-    difference = largest_difference(net, beside, inputs)
-    if not difference <= TOLERANCE:
+    difference = largest_export_difference(net, beside, inputs)
+    if not difference <= MAX_EXPORT_DIFFERENCE:
         beside.unlink()
-        raise UserError(f"{name}: the exported net differs by {difference:.2e}, more than {TOLERANCE:.0e}")
+        raise UserError(f"{name}: the exported net differs by {difference:.2e}, more than {MAX_EXPORT_DIFFERENCE:.0e}")
     model = msgspec.structs.replace(
         contract,
         sha256=file_sha256(beside),
@@ -193,13 +193,13 @@ def write_onnx(net: nn.Module, contract: Model, path: Path) -> None:
 
 
 @torch.no_grad()
-def largest_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.float32]]) -> float:
+def largest_export_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.float32]]) -> float:
     """Largest absolute difference between the PyTorch net and the ONNX file over the inputs.
 
     The detector's box rows are compared as fractions of the input's size: in pixels, the exponential that makes a
     side of 300 px turns single-precision rounding of either engine into some 1e-3.
     """
-    run = open_net(path)
+    run = open_network(path)
     worst = 0.0
     for x in inputs:
         difference = np.abs(net(torch.from_numpy(x)).numpy() - run(x))
@@ -210,19 +210,19 @@ def largest_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.f
     return worst
 
 
-class _Stated(msgspec.Struct):
+class _DeclaredTerms(msgspec.Struct):
     repo: str = ""
     commit: str = ""
     licence: str = "not stated"
 
 
-def origin(folder: Path, source: Source) -> Origin:
+def read_origin(folder: Path, source: Source) -> Origin:
     """Read a source's provenance from its manifest; rendered pictures are the project's own."""
     if source.name == RENDERED:
         return Origin(source.name, "paani_sim", "", "Apache-2.0")
     path = folder / "manifest.json"
     try:
-        stated = msgspec.json.decode(path.read_bytes(), type=_Stated)
+        stated = msgspec.json.decode(path.read_bytes(), type=_DeclaredTerms)
     except (OSError, msgspec.MsgspecError) as error:
         raise UserError(f"{path}: {error}") from error
     return Origin(source.name, stated.repo, stated.commit, stated.licence)

@@ -25,11 +25,11 @@ def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
     pictures: float32 [N,3,H,W] as the net gets them, whose statistics the normalisations take.
     Raises UserError where the file is no export of this net.
     """
-    stored = _convolutions(path)
-    convs = _in_running_order(model, pictures[:1])
+    stored = _read_convolutions(path)
+    convs = _order_by_execution(model, pictures[:1])
     if len(stored) != len(convs):
         raise UserError(f"{path}: {len(stored)} convolutions, expected {len(convs)}")
-    norms = _norm_behind(model)
+    norms = _find_following_norms(model)
     biases: dict[nn.Conv2d, Tensor] = {}
     for index, (conv, (weight, bias)) in enumerate(zip(convs, stored, strict=True)):
         if weight.shape != conv.weight.shape:
@@ -38,14 +38,14 @@ def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
             )
         conv.weight.data = weight
         if conv in norms:
-            _pass_through(norms[conv], bias)
+            _set_identity(norms[conv], bias)
             biases[conv] = bias
         elif conv.bias is not None:
             conv.bias.data = bias
     _take_statistics(model, {conv: norms[conv] for conv in biases}, biases, pictures)
 
 
-def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
+def _read_convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     try:
         graph = onnx.load(str(path)).graph
     except Exception as error:
@@ -62,7 +62,7 @@ def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
 
 
 @torch.no_grad()
-def _in_running_order(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
+def _order_by_execution(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
     order: list[nn.Conv2d] = []
     handles: list[RemovableHandle] = [
         module.register_forward_hook(lambda conv, _inputs, _output: order.append(conv))
@@ -75,7 +75,7 @@ def _in_running_order(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
     return order
 
 
-def _norm_behind(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
+def _find_following_norms(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
     """Which normalisation follows which convolution; both stand side by side in a `Sequential`."""
     found = {}
     for block in model.modules():
@@ -86,11 +86,11 @@ def _norm_behind(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
     return found
 
 
-def _pass_through(norm: nn.BatchNorm2d, bias: Tensor) -> None:
-    _set(norm, torch.zeros_like(bias), torch.ones_like(bias), bias)
+def _set_identity(norm: nn.BatchNorm2d, bias: Tensor) -> None:
+    _set_statistics(norm, torch.zeros_like(bias), torch.ones_like(bias), bias)
 
 
-def _set(norm: nn.BatchNorm2d, mean: Tensor, variance: Tensor, bias: Tensor) -> None:
+def _set_statistics(norm: nn.BatchNorm2d, mean: Tensor, variance: Tensor, bias: Tensor) -> None:
     assert norm.running_mean is not None
     assert norm.running_var is not None
     norm.running_mean.copy_(mean)
@@ -114,4 +114,4 @@ def _take_statistics(
     for handle in handles:
         handle.remove()
     for conv, norm in norms.items():
-        _set(norm, *seen[conv], biases[conv])
+        _set_statistics(norm, *seen[conv], biases[conv])

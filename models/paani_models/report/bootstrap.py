@@ -17,13 +17,13 @@ COVERED_PERCENT = 95.0
 Item = TypeVar("Item")
 
 
-def draws(sequences: int, replicates: int = REPLICATES, seed: int = SEED) -> NDArray[np.int64]:
+def draw_sequence_counts(sequences: int, replicates: int = REPLICATES, seed: int = SEED) -> NDArray[np.int64]:
     """How often each sequence is drawn, int64 [replicates, sequences]; every row sums to `sequences`."""
     rng = np.random.default_rng(seed)
     return rng.multinomial(sequences, np.full(sequences, 1 / sequences), replicates)
 
 
-def interval(values: NDArray[np.float64]) -> tuple[float, float]:
+def percentile_interval(values: NDArray[np.float64]) -> tuple[float, float]:
     """Nearest-rank 2.5 and 97.5 percentiles of the replicates that have a value; NaN, NaN where none has."""
     known = values[np.isfinite(values)]
     if len(known) == 0:
@@ -32,25 +32,25 @@ def interval(values: NDArray[np.float64]) -> tuple[float, float]:
     return nearest_rank(known.tolist(), tail), nearest_rank(known.tolist(), 100.0 - tail)
 
 
-def of_sums(
+def interval_of_sums(
     sums: NDArray[np.int64], measure: Callable[[NDArray[np.int64]], float], replicates: int = REPLICATES
 ) -> tuple[float, float]:
     """The interval of a figure of added counts. sums: counts of each sequence, [sequences, ...]."""
     if len(sums) < 2:
         return float("nan"), float("nan")
-    weights = draws(len(sums), replicates)
+    weights = draw_sequence_counts(len(sums), replicates)
     totals = np.tensordot(weights, sums, 1)
-    return interval(np.array([measure(total) for total in totals], np.float64))
+    return percentile_interval(np.array([measure(total) for total in totals], np.float64))
 
 
-def of_items(
+def interval_of_items(
     sequences: Sequence[list[Item]], measure: Callable[[list[Item]], float], replicates: int = REPLICATES
 ) -> tuple[float, float]:
     """The interval of a figure of many items. sequences: the items of each sequence."""
     if len(sequences) < 2:
         return float("nan"), float("nan")
     values = []
-    for row in draws(len(sequences), replicates):
+    for row in draw_sequence_counts(len(sequences), replicates):
         drawn = [item for times, items in zip(row, sequences, strict=True) for item in items * int(times)]
         values.append(measure(drawn))
-    return interval(np.array(values, np.float64))
+    return percentile_interval(np.array(values, np.float64))

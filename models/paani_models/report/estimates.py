@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, Source
-from paani_models.detector.metrics import RECALL_STEPS, Judged, ap50, curve50, summary
-from paani_models.detector.scores import ScoredBoxes, annotating, confusion_counts
-from paani_models.report.bootstrap import of_items, of_sums
+from paani_models.detector.metrics import RECALL_STEPS, ClassMatches, ap50, precision_recall_50, summarise_class
+from paani_models.detector.scores import ScoredBoxes, confusion_counts, select_annotated
+from paani_models.report.bootstrap import interval_of_items, interval_of_sums
 from paani_models.report.evidence import Evidence
-from paani_models.segmenter.scores import ScoredMask, added, mask_measures
+from paani_models.segmenter.scores import ScoredMask, mask_measures, sum_counts
 
 Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 
@@ -61,7 +61,7 @@ class Confusion(Record, frozen=True, kw_only=True):
     counts: tuple[tuple[int, ...], ...]
 
 
-class Measured(Record, frozen=True, kw_only=True):
+class MeasuredModel(Record, frozen=True, kw_only=True):
     """The file that was measured."""
 
     name: str
@@ -72,21 +72,21 @@ class Evaluation(Record, frozen=True, kw_only=True):
     """Models on held-out sequences of labelled pictures, and on nothing else (U7)."""
 
     evidence: Evidence = Evidence.LABELLED
-    models: tuple[Measured, ...] = ()
+    models: tuple[MeasuredModel, ...] = ()
     estimates: tuple[Estimate, ...] = ()
     curves: tuple[Curve, ...] = ()
     confusions: tuple[Confusion, ...] = ()
 
 
-def mask_estimates(scored: Sequence[ScoredMask]) -> tuple[Estimate, ...]:
+def estimate_masks(scored: Sequence[ScoredMask]) -> tuple[Estimate, ...]:
     """IoU, their mean and edge F1 per source with intervals, then per sequence."""
     estimates = []
     for source in _sources(scored):
         chosen = [item for item in scored if item.sample.source == source]
         groups = _by_sequence(chosen)
-        sums = np.stack([added(items) for items in groups.values()])
+        sums = np.stack([sum_counts(items) for items in groups.values()])
         for metric, measure in mask_measures(source).items():
-            low, high = of_sums(sums, measure)
+            low, high = interval_of_sums(sums, measure)
             value = measure(sums.sum(0))
             estimates.append(_estimate(metric, source.name, value, len(chosen), low, high, len(groups)))
             for (sequence, items), row in zip(groups.items(), sums, strict=True):
@@ -94,18 +94,18 @@ def mask_estimates(scored: Sequence[ScoredMask]) -> tuple[Estimate, ...]:
     return tuple(e for e in estimates if math.isfinite(e.value))
 
 
-def box_estimates(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
+def estimate_boxes(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
     """AP50 with interval, AP50:95, recall and precision per class and source, and of all sources; then per sequence."""
     estimates: list[Estimate] = []
     for kind, label in enumerate(DETECTOR_CLASSES):
-        chosen = annotating(scored, kind)
-        judged = {id(item): item.judged(kind) for item in chosen}
+        chosen = select_annotated(scored, kind)
+        judged = {id(item): item.class_matches(kind) for item in chosen}
         for name in [*(source.name for source in _sources(chosen)), *(["all"] if chosen else [])]:
             mine = [item for item in chosen if name in (item.sample.source.name, "all")]
             groups = [[judged[id(item)] for item in items] for items in _by_sequence(mine).values()]
-            row = summary([each for group in groups for each in group])
+            row = summarise_class([each for group in groups for each in group])
             n = int(row.pop("n"))
-            low, high = of_items(groups, _ap50, AP_REPLICATES) if n else (math.nan, math.nan)
+            low, high = interval_of_items(groups, _ap50, AP_REPLICATES) if n else (math.nan, math.nan)
             for metric, value in row.items():
                 ends = (low, high) if metric == "ap50" else (math.nan, math.nan)
                 estimates.append(_estimate(f"{label}_{metric}", name, value, n, *ends, len(groups)))
@@ -118,7 +118,7 @@ def box_estimates(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
     return tuple(e for e in estimates if math.isfinite(e.value))
 
 
-def alarm_estimates(samples: Sequence[Sample], alarms: Sequence[int]) -> tuple[Estimate, ...]:
+def estimate_false_alarms(samples: Sequence[Sample], alarms: Sequence[int]) -> tuple[Estimate, ...]:
     """Boxes per picture of classes that a source does not show, with interval, then per sequence."""
     estimates = []
     for source in dict.fromkeys(sample.source for sample in samples):
@@ -127,7 +127,7 @@ def alarm_estimates(samples: Sequence[Sample], alarms: Sequence[int]) -> tuple[E
             if sample.source == source:
                 groups.setdefault(f"{source.name}/{sample.sequence}", []).append(count)
         sums = np.array([(sum(counts), len(counts)) for counts in groups.values()], np.int64)
-        low, high = of_sums(sums, _rate)
+        low, high = interval_of_sums(sums, _rate)
         n = int(sums[:, 1].sum())
         estimates.append(_estimate(ALARMS, source.name, _rate(sums.sum(0)), n, low, high, len(groups)))
         for sequence, row in zip(groups, sums, strict=True):
@@ -139,21 +139,21 @@ def _rate(sums: NDArray[np.int64]) -> float:
     return float(sums[0] / sums[1])
 
 
-def box_curves(scored: Sequence[ScoredBoxes]) -> tuple[Curve, ...]:
+def draw_box_curves(scored: Sequence[ScoredBoxes]) -> tuple[Curve, ...]:
     """One curve per class over all sources that annotate it."""
     curves = []
     for kind, label in enumerate(DETECTOR_CLASSES):
-        judged = [item.judged(kind) for item in annotating(scored, kind)]
+        judged = [item.class_matches(kind) for item in select_annotated(scored, kind)]
         n = sum(j.positives for j in judged)
         if n == 0:
             continue
-        precision, recall = curve50(judged)
+        precision, recall = precision_recall_50(judged)
         best = [float(precision[recall >= step].max(initial=0.0)) for step in RECALL_STEPS]
         curves.append(Curve(label=label, source="all", precision=tuple(round(p, 4) for p in best), n=n))
     return tuple(curves)
 
 
-def mask_confusions(scored: Sequence[ScoredMask]) -> tuple[Confusion, ...]:
+def tabulate_mask_confusions(scored: Sequence[ScoredMask]) -> tuple[Confusion, ...]:
     """Pixels, one table per source."""
     tables = []
     for source in _sources(scored):
@@ -162,7 +162,7 @@ def mask_confusions(scored: Sequence[ScoredMask]) -> tuple[Confusion, ...]:
     return tuple(tables)
 
 
-def box_confusion(scored: Sequence[ScoredBoxes]) -> Confusion:
+def tabulate_box_confusion(scored: Sequence[ScoredBoxes]) -> Confusion:
     """Boxes of all sources; the last class is nothing."""
     return _confusion("all", (*DETECTOR_CLASSES, "nothing"), confusion_counts(scored))
 
@@ -171,7 +171,7 @@ def _confusion(source: str, classes: tuple[str, ...], counts: NDArray[np.int64])
     return Confusion(source=source, classes=classes, counts=tuple(tuple(int(n) for n in row) for row in counts))
 
 
-def _ap50(judged: list[Judged]) -> float:
+def _ap50(judged: list[ClassMatches]) -> float:
     return ap50(judged)
 
 

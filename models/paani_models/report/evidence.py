@@ -46,7 +46,7 @@ class Findings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     findings: tuple[Finding, ...]
 
 
-def pooled(findings: Sequence[Finding]) -> float:
+def pool_findings(findings: Sequence[Finding]) -> float:
     """Mean weighted by n of one metric. Raises ValueError for none, two metrics or two classes of evidence."""
     kinds = {(finding.evidence, finding.metric) for finding in findings}
     if len(kinds) != 1:
@@ -55,7 +55,7 @@ def pooled(findings: Sequence[Finding]) -> float:
     return sum(finding.value * finding.n for finding in findings) / total
 
 
-def sections(findings: Iterable[Finding]) -> dict[Evidence, tuple[Finding, ...]]:
+def group_by_evidence(findings: Iterable[Finding]) -> dict[Evidence, tuple[Finding, ...]]:
     """All four classes in order, empty where nothing was measured."""
     every = tuple(findings)
     return {kind: tuple(f for f in every if f.evidence is kind) for kind in Evidence}

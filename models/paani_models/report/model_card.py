@@ -48,16 +48,20 @@ _BOX_METRICS = {
 }
 
 
-def card(catalogue: Mapping[str, Model]) -> str:
+def render_model_card(catalogue: Mapping[str, Model]) -> str:
     """Markdown text; the same for the same manifest."""
     models = [catalogue[name] for name in sorted(catalogue)]
-    parts = [_INTRODUCTION, _models(models), "## Figures\n\nHeld-out sequences; n counts pictures, or true boxes.\n"]
-    parts += [_figures(model) for model in models if model.figures]
-    parts += [_LIMITS, _origins(models)]
+    parts = [
+        _INTRODUCTION,
+        _render_models(models),
+        "## Figures\n\nHeld-out sequences; n counts pictures, or true boxes.\n",
+    ]
+    parts += [_render_figures(model) for model in models if model.figures]
+    parts += [_LIMITS, _render_origins(models)]
     return "\n".join(parts)
 
 
-def _models(models: Sequence[Model]) -> str:
+def _render_models(models: Sequence[Model]) -> str:
     rows = [
         (
             model.name,
@@ -72,12 +76,12 @@ def _models(models: Sequence[Model]) -> str:
     ]
     terms = "".join(f"* {model.name}, {model.licence}.\n" for model in models)
     head = ("model", "shape", "parameters", "bytes", "input", "classes", "SHA-256")
-    return f"## Models\n\n{_table(head, rows)}\nTerms of use:\n\n{terms}"
+    return f"## Models\n\n{_render_table(head, rows)}\nTerms of use:\n\n{terms}"
 
 
-def _figures(model: Model) -> str:
+def _render_figures(model: Model) -> str:
     if model.classes == DETECTOR_CLASSES:
-        return f"### {model.name}\n\n{_boxes(model.figures)}"
+        return f"### {model.name}\n\n{_render_box_figures(model.figures)}"
     metrics = list(dict.fromkeys(figure.metric for figure in model.figures))
     rows = []
     for source in dict.fromkeys(figure.source for figure in model.figures):
@@ -85,10 +89,10 @@ def _figures(model: Model) -> str:
         n = next(iter(mine.values())).n
         cells = [f"{mine[metric].value:.3f}" if metric in mine else "" for metric in metrics]
         rows.append((source, str(n), *cells))
-    return f"### {model.name}\n\n{_table(('source', 'n', *metrics), rows)}"
+    return f"### {model.name}\n\n{_render_table(('source', 'n', *metrics), rows)}"
 
 
-def _boxes(figures: Sequence[Figure]) -> str:
+def _render_box_figures(figures: Sequence[Figure]) -> str:
     rows, others = [], []
     for kind in DETECTOR_CLASSES:
         mine = [figure for figure in figures if figure.metric.startswith(f"{kind}_")]
@@ -99,20 +103,20 @@ def _boxes(figures: Sequence[Figure]) -> str:
     for figure in figures:
         if not figure.metric.startswith(DETECTOR_CLASSES):
             others.append((figure.metric, figure.source, f"{figure.value:.3f}", str(figure.n)))
-    table = _table(("class", "source", "n", *_BOX_METRICS.values()), rows)
-    return table + ("\n" + _table(("other figure", "source", "value", "n"), others) if others else "")
+    table = _render_table(("class", "source", "n", *_BOX_METRICS.values()), rows)
+    return table + ("\n" + _render_table(("other figure", "source", "value", "n"), others) if others else "")
 
 
-def _origins(models: Sequence[Model]) -> str:
+def _render_origins(models: Sequence[Model]) -> str:
     users: dict[tuple[str, str, str, str], list[str]] = {}
     for model in models:
         for origin in model.origins:
             key = (origin.name, origin.repository, origin.commit[:12], origin.licence)
             users.setdefault(key, []).append(model.name)
     rows = [(*key, ", ".join(names)) for key, names in users.items()]
-    return _table(("source", "repository", "commit", "terms as stated or believed", "learnt by"), rows)
+    return _render_table(("source", "repository", "commit", "terms as stated or believed", "learnt by"), rows)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _render_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)

@@ -17,12 +17,12 @@ from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
 from paani_models.detector.metrics import CONFIDENCE
 from paani_models.detector.scores import ScoredBoxes
-from paani_models.network_input import letterboxed
-from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, ScoredMask, read_truth, restrict
+from paani_models.network_input import letterbox_picture
+from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, ScoredMask, merge_undrawn_sky, read_truth
 
 Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
 
-SHOWN = 8
+MAX_PICTURES = 8
 PICTURES = "pictures"
 _WATER_RGB, _OBSTACLE_RGB, _SKY_RGB, _WRONG_RGB = (0, 114, 178), (230, 159, 0), (204, 121, 167), (220, 0, 0)
 _TRUE_RGB, _FOUND_RGB = (0, 200, 120), (255, 140, 0)
@@ -30,65 +30,69 @@ _WIDTH_PX = 560
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnPicture:
     """A file beside the page and what stands under it."""
 
     file: str
     caption: str
 
 
-def draw_masks(folder: Path, scored: Sequence[ScoredMask], segment: Callable[[U8, tuple[int, ...]], U8]) -> list[Drawn]:
+def draw_masks(
+    folder: Path, scored: Sequence[ScoredMask], segment: Callable[[U8, tuple[int, ...]], U8]
+) -> list[DrawnPicture]:
     """Tinted by class, pixels that differ from the truth in red. Writes into `folder`/pictures."""
     drawn = []
     for index, item in enumerate(scored):
         picture, truth = read_picture(item.sample.picture), read_truth(item.sample)
         picture = np.asarray(cv2.resize(picture, (truth.shape[1], truth.shape[0])), np.uint8)
-        label = restrict(segment(picture, truth.shape), item.sample.source)
+        label = merge_undrawn_sky(segment(picture, truth.shape), item.sample.source)
         tint = np.zeros_like(picture)
         for kind, colour in ((WATER, _WATER_RGB), (OBSTACLE, _OBSTACLE_RGB), (SKY, _SKY_RGB)):
             tint[label == kind] = colour
         shown = cv2.addWeighted(picture, 0.65, tint, 0.35, 0)
         wrong = (label != truth) & (truth != IGNORE)
         shown[wrong] = (0.4 * shown[wrong] + 0.6 * np.array(_WRONG_RGB)).astype(np.uint8)
-        caption = f"{item.sample.source.name}, {item.sample.picture.name}: {item.share_right:.3f}"
-        drawn.append(_save(folder, f"mask_{index:02}_{item.sample.picture.stem}", shown, caption))
+        caption = f"{item.sample.source.name}, {item.sample.picture.name}: {item.mean_iou:.3f}"
+        drawn.append(_save_picture(folder, f"mask_{index:02}_{item.sample.picture.stem}", shown, caption))
     return drawn
 
 
-def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[Drawn]:
+def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture]:
     """As the net sees them: true boxes thin green, found boxes thick orange with class and score."""
     drawn = []
     for index, item in enumerate(scored):
-        shown = np.repeat(np.repeat(letterboxed(read_picture(item.sample.picture)), 2, 0), 2, 1)
+        shown = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)
         for kind, *corners in item.truth:
-            _rectangle(shown, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
-        sure = item.found.scores > CONFIDENCE
+            _draw_rectangle(shown, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
+        sure = item.detections.scores > CONFIDENCE
         for box, score, kind in zip(
-            item.found.boxes[sure], item.found.scores[sure], item.found.classes[sure], strict=True
+            item.detections.boxes[sure], item.detections.scores[sure], item.detections.classes[sure], strict=True
         ):
-            _rectangle(shown, box, _FOUND_RGB, 2, f"{DETECTOR_CLASSES[int(kind)]} {score:.2f}", below=False)
+            _draw_rectangle(shown, box, _FOUND_RGB, 2, f"{DETECTOR_CLASSES[int(kind)]} {score:.2f}", below=False)
         mistakes = f"{item.mistakes} mistake{'' if item.mistakes == 1 else 's'}"
         caption = f"{item.sample.source.name}, {item.sample.picture.name}: {mistakes}"
-        drawn.append(_save(folder, f"boxes_{index:02}_{item.sample.picture.stem}", shown, caption))
+        drawn.append(_save_picture(folder, f"boxes_{index:02}_{item.sample.picture.stem}", shown, caption))
     return drawn
 
 
-def ends_of_masks(scored: Sequence[ScoredMask]) -> tuple[list[ScoredMask], list[ScoredMask]]:
+def choose_extreme_masks(scored: Sequence[ScoredMask]) -> tuple[list[ScoredMask], list[ScoredMask]]:
     """The worst and the best photographs, no more than two of a sequence; rendered pictures where there is no other."""
     scored = _photographs(scored)
-    ordered = sorted(scored, key=lambda item: (item.share_right, str(item.sample.picture)))
-    return _varied(ordered), _varied(ordered[::-1])
+    ordered = sorted(scored, key=lambda item: (item.mean_iou, str(item.sample.picture)))
+    return _limit_per_sequence(ordered), _limit_per_sequence(ordered[::-1])
 
 
-def ends_of_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxes], list[ScoredBoxes]]:
+def choose_extreme_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxes], list[ScoredBoxes]]:
     """Most mistakes first; and without mistakes, most objects first; otherwise as `ends_of_masks`."""
     scored = _photographs(scored)
     ordered = sorted(scored, key=lambda item: (-item.mistakes, str(item.sample.picture)))
     right = [item for item in scored if item.mistakes == 0]
-    return _varied(ordered), _varied(sorted(right, key=lambda item: (-len(item.truth), str(item.sample.picture))))
+    return _limit_per_sequence(ordered), _limit_per_sequence(
+        sorted(right, key=lambda item: (-len(item.truth), str(item.sample.picture)))
+    )
 
 
-def gallery(drawn: Sequence[Drawn]) -> str:
+def render_gallery(drawn: Sequence[DrawnPicture]) -> str:
     """HTML figures."""
     return (
         '<div class="gallery">'
@@ -106,18 +110,18 @@ def _photographs(scored: Sequence[Scored]) -> Sequence[Scored]:
     return [item for item in scored if item.sample.source.name != RENDERED] or scored
 
 
-def _varied(ordered: Sequence[Scored]) -> list[Scored]:
+def _limit_per_sequence(ordered: Sequence[Scored]) -> list[Scored]:
     counts: dict[tuple[str, str], int] = {}
     kept: list[Scored] = []
     for item in ordered:
         key = (item.sample.source.name, item.sample.sequence)
         counts[key] = counts.get(key, 0) + 1
-        if counts[key] <= 2 and len(kept) < SHOWN:
+        if counts[key] <= 2 and len(kept) < MAX_PICTURES:
             kept.append(item)
     return kept
 
 
-def _rectangle(
+def _draw_rectangle(
     picture: U8, box: NDArray[np.float32], colour: tuple[int, int, int], width: int, text: str, *, below: bool
 ) -> None:
     x1, y1, x2, y2 = (round(2 * float(value)) for value in box)
@@ -127,11 +131,11 @@ def _rectangle(
     cv2.putText(picture, text, spot, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 1, cv2.LINE_AA)
 
 
-def _save(folder: Path, stem: str, rgb: U8, caption: str) -> Drawn:
+def _save_picture(folder: Path, stem: str, rgb: U8, caption: str) -> DrawnPicture:
     scale = _WIDTH_PX / rgb.shape[1]
     shown = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     name = f"{PICTURES}/{stem}.jpg"
     (folder / PICTURES).mkdir(exist_ok=True)
     if not cv2.imwrite(str(folder / name), cv2.cvtColor(shown, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 85]):
         raise UserError(f"{folder / name}: cannot be written")
-    return Drawn(name, caption)
+    return DrawnPicture(name, caption)

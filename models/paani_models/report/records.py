@@ -63,7 +63,7 @@ def read_faults(path: Path) -> FaultReport:
         raise UserError(f"{path}: {error}") from error
 
 
-def gate_figures(report: FaultReport) -> list[Figure]:
+def image_quality_figures(report: FaultReport) -> list[Figure]:
     """The manifest's figures of the gate; n counts pictures."""
     figures = [
         Figure("clean_refused_frac", source.source, round(source.rejected / source.n, 4), source.n)
@@ -83,7 +83,7 @@ def gate_figures(report: FaultReport) -> list[Figure]:
     return figures
 
 
-def read_record(folder: Path) -> list[dict[str, float]]:
+def read_training_record(folder: Path) -> list[dict[str, float]]:
     """Numbers per epoch of a run folder. Raises UserError naming a folder without a record, or a malformed line."""
     path = next((folder / name for name in RECORDS if (folder / name).is_file()), None)
     if path is None:
@@ -94,22 +94,22 @@ def read_record(folder: Path) -> list[dict[str, float]]:
             row = msgspec.json.decode(line, type=dict[str, object])
         except msgspec.MsgspecError as error:
             raise UserError(f"{path}:{number}: {error}") from error
-        rows.append(_numbers(row))
+        rows.append(_flatten_numbers(row))
     return rows
 
 
-def _numbers(row: dict[str, object], prefix: str = "") -> dict[str, float]:
+def _flatten_numbers(row: dict[str, object], prefix: str = "") -> dict[str, float]:
     """Flat: a number in an object is named `object number`."""
     found: dict[str, float] = {}
     for name, value in row.items():
         if isinstance(value, dict):
-            found |= _numbers(value, f"{prefix}{name} ")
+            found |= _flatten_numbers(value, f"{prefix}{name} ")
         elif isinstance(value, int | float) and not isinstance(value, bool):
             found[f"{prefix}{name}"] = float(value)
     return found
 
 
-def training_charts(rows: Sequence[dict[str, float]]) -> str:
+def render_training_charts(rows: Sequence[dict[str, float]]) -> str:
     """Losses on one chart, figures between 0 and 1 on another; of the figures of a class, its AP50."""
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name != "epoch"]
     series: dict[str, Points] = {
@@ -128,7 +128,7 @@ def training_charts(rows: Sequence[dict[str, float]]) -> str:
     return "".join(charts)
 
 
-def fault_charts(report: FaultReport) -> str:
+def render_fault_charts(report: FaultReport) -> str:
     """Per fault: share refused by the gate, and the segmenter's mean IoU, over severity."""
     charts = []
     for fault in dict.fromkeys(cell.fault for cell in report.cells):

@@ -28,53 +28,53 @@ MASK_METRICS = ("iou_water", "iou_obstacle", "iou_sky", "miou", "edge_f1")
 BOX_METRICS = ("ap50", "ap50_95", "recall_at_0.40", "recall_16px_at_0.40", "precision_at_0.40")
 
 
-def mask_table(estimates: Sequence[Estimate]) -> str:
+def render_mask_table(estimates: Sequence[Estimate]) -> str:
     """Sources down, metrics across, each with its interval."""
     head = "".join(f"<th>{TITLES[metric]}</th>" for metric in MASK_METRICS)
     rows = []
-    for name in _sources(estimates):
+    for name in _list_sources(estimates):
         mine = {e.metric: e for e in estimates if e.source == name and not e.sequence}
         first = next(iter(mine.values()))
-        cells = "".join(f"<td>{_cell(mine.get(metric))}</td>" for metric in MASK_METRICS)
+        cells = "".join(f"<td>{_render_cell(mine.get(metric))}</td>" for metric in MASK_METRICS)
         rows.append(f"<tr><th>{escape(name)}</th><td>{first.n}</td><td>{first.sequences}</td>{cells}</tr>")
-    return as_table(f"<th>source</th><th>pictures</th><th>sequences</th>{head}", rows)
+    return render_table(f"<th>source</th><th>pictures</th><th>sequences</th>{head}", rows)
 
 
-def box_table(estimates: Sequence[Estimate], kind: str) -> str:
+def render_box_table(estimates: Sequence[Estimate], kind: str) -> str:
     """Of one class: sources down, metrics across."""
     mine = [e for e in estimates if e.metric.startswith(f"{kind}_") and not e.sequence]
     head = "".join(f"<th>{TITLES[metric]}</th>" for metric in BOX_METRICS)
     rows = []
-    for name in _sources(mine):
+    for name in _list_sources(mine):
         found = {e.metric.removeprefix(f"{kind}_"): e for e in mine if e.source == name}
         first = next(iter(found.values()))
-        cells = "".join(f"<td>{_cell(found.get(metric))}</td>" for metric in BOX_METRICS)
+        cells = "".join(f"<td>{_render_cell(found.get(metric))}</td>" for metric in BOX_METRICS)
         total = ' class="total"' if name == "all" else ""
         rows.append(f"<tr{total}><th>{escape(name)}</th><td>{first.n}</td><td>{first.sequences}</td>{cells}</tr>")
-    return as_table(f"<th>source</th><th>boxes</th><th>sequences</th>{head}", rows)
+    return render_table(f"<th>source</th><th>boxes</th><th>sequences</th>{head}", rows)
 
 
-def sequence_table(estimates: Sequence[Estimate], metric: str) -> str:
+def render_sequence_table(estimates: Sequence[Estimate], metric: str) -> str:
     """One metric of every sequence, the worst first."""
     mine = sorted((e for e in estimates if e.metric == metric and e.sequence), key=lambda e: (e.value, e.source))
     rows = [
-        f"<tr><th>{escape(e.source)}</th><td>{escape(e.sequence)}</td><td>{e.n}</td><td>{_cell(e)}</td></tr>"
+        f"<tr><th>{escape(e.source)}</th><td>{escape(e.sequence)}</td><td>{e.n}</td><td>{_render_cell(e)}</td></tr>"
         for e in mine
     ]
-    return as_table("<th>source</th><th>sequence</th><th>n</th><th>value</th>", rows)
+    return render_table("<th>source</th><th>sequence</th><th>n</th><th>value</th>", rows)
 
 
-def rate_table(estimates: Sequence[Estimate]) -> str:
+def render_rate_table(estimates: Sequence[Estimate]) -> str:
     """One rate per source with its interval."""
     rows = [
-        f"<tr><th>{escape(e.source)}</th><td>{e.n}</td><td>{e.sequences}</td><td>{_cell(e)}</td></tr>"
+        f"<tr><th>{escape(e.source)}</th><td>{e.n}</td><td>{e.sequences}</td><td>{_render_cell(e)}</td></tr>"
         for e in estimates
         if not e.sequence
     ]
-    return as_table("<th>source</th><th>pictures</th><th>sequences</th><th>per picture</th>", rows)
+    return render_table("<th>source</th><th>pictures</th><th>sequences</th><th>per picture</th>", rows)
 
 
-def confusion_table(confusion: Confusion) -> str:
+def render_confusion_table(confusion: Confusion) -> str:
     """Shares of each row, the count in the tooltip; rows are the truth."""
     head = "".join(f"<th>{escape(name)}</th>" for name in confusion.classes)
     rows = []
@@ -87,20 +87,20 @@ def confusion_table(confusion: Confusion) -> str:
             for count in counts
         )
         rows.append(f"<tr><th>{escape(name)}</th>{cells}<td>{total:,}</td></tr>")
-    return as_table(f"<th>{escape(confusion.source)}: truth \\ found</th>{head}<th>n</th>", rows)
+    return render_table(f"<th>{escape(confusion.source)}: truth \\ found</th>{head}<th>n</th>", rows)
 
 
-def findings_table(findings: Sequence[Finding]) -> str:
+def render_findings_table(findings: Sequence[Finding]) -> str:
     """One row per finding."""
     rows = [
         f"<tr><th>{escape(f.metric)}</th><td>{escape(f.source)}</td><td>{f.value:g}</td>"
         f"<td>{f.n} {escape(f.of)}</td></tr>"
         for f in findings
     ]
-    return as_table("<th>metric</th><th>source</th><th>value</th><th>n</th>", rows)
+    return render_table("<th>metric</th><th>source</th><th>value</th><th>n</th>", rows)
 
 
-def _cell(estimate: Estimate | None) -> str:
+def _render_cell(estimate: Estimate | None) -> str:
     if estimate is None:
         return ""
     ends = (
@@ -111,11 +111,11 @@ def _cell(estimate: Estimate | None) -> str:
     return f"{estimate.value:.3f}{bar(estimate.value, estimate.low, estimate.high)}{ends}"
 
 
-def _sources(estimates: Sequence[Estimate]) -> list[str]:
+def _list_sources(estimates: Sequence[Estimate]) -> list[str]:
     names = list(dict.fromkeys(e.source for e in estimates if not e.sequence))
     return [name for name in names if name != "all"] + (["all"] if "all" in names else [])
 
 
-def as_table(head: str, rows: Sequence[str]) -> str:
+def render_table(head: str, rows: Sequence[str]) -> str:
     """Head cells and rows, each HTML text; scrolls sideways where it is too wide."""
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'

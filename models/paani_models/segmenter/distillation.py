@@ -6,48 +6,50 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from paani_models.segmenter.paper_shape import TAP_CHANNELS, Segmenter
-from paani_models.segmenter.shipped_shape import TAP_CHANNELS as TEACHER_CHANNELS
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter
-from paani_models.training.loop import device
+from paani_models.segmenter.paper_network import TAP_CHANNELS, PaperSegmenter
+from paani_models.segmenter.shipped_network import TAP_CHANNELS as TEACHER_CHANNELS
+from paani_models.segmenter.shipped_network import ShippedSegmenter
+from paani_models.training.training_state import training_device
 
-ANSWER_GAIN, FEATURE_GAIN = 1.0, 0.5
+LOGIT_GAIN, FEATURE_GAIN = 1.0, 0.5
 FIRST_TAP = 1  # strides 8, 16, 32; at stride 4 both nets see edges anyway
 
 
 class Distillation(nn.Module):
     """Loss between a frozen teacher and a segmenter; its adapters are trained along and then thrown away."""
 
-    def __init__(self, teacher: ImageNetSegmenter) -> None:
+    def __init__(self, teacher: ShippedSegmenter) -> None:
         super().__init__()
         self.adapters = nn.ModuleList(
             nn.Sequential(nn.Conv2d(ours, theirs, 1, bias=False), nn.BatchNorm2d(theirs, affine=False))
             for ours, theirs in zip(TAP_CHANNELS[FIRST_TAP:], TEACHER_CHANNELS[FIRST_TAP:], strict=True)
         )
         teacher.eval().requires_grad_(False)
-        self.teacher = [teacher.to(device())]  # in a list: the teacher is no part of this module's state
+        self.teacher = [teacher.to(training_device())]  # in a list: the teacher is no part of this module's state
 
-    def forward(self, pictures: Tensor, student: Segmenter) -> tuple[Tensor, Tensor]:
+    def forward(self, pictures: Tensor, student: PaperSegmenter) -> tuple[Tensor, Tensor]:
         """Logits of the student for the pictures [N,3,H,W], and how far it is from the teacher (a scalar)."""
         with torch.no_grad():
             taught = self.teacher[0].taps(pictures)
             answer = self.teacher[0].decode(taught, pictures)
         taps = student.taps(pictures)
         logits = student.decode(taps)
-        loss = ANSWER_GAIN * answer_distance(logits, answer)
+        loss = LOGIT_GAIN * kl_divergence(logits, answer)
         for adapter, ours, theirs in zip(self.adapters, taps[FIRST_TAP:], taught[FIRST_TAP:], strict=True):
-            goal = F.interpolate(standardised(theirs), size=ours.shape[2:], mode="bilinear", align_corners=False)
+            goal = F.interpolate(
+                standardise_channels(theirs), size=ours.shape[2:], mode="bilinear", align_corners=False
+            )
             loss = loss + FEATURE_GAIN / len(self.adapters) * F.mse_loss(adapter(ours), goal)
         return logits, loss
 
 
-def answer_distance(logits: Tensor, answer: Tensor) -> Tensor:
+def kl_divergence(logits: Tensor, answer: Tensor) -> Tensor:
     """Kullback-Leibler divergence from the teacher's class shares, mean over pixels."""
     ours, theirs = (torch.log_softmax(x, 1) for x in (logits, answer))
     return F.kl_div(ours, theirs, reduction="none", log_target=True).sum(1).mean()
 
 
-def standardised(features: Tensor) -> Tensor:
+def standardise_channels(features: Tensor) -> Tensor:
     """Zero mean and unit variance per channel over the batch."""
     mean = features.mean((0, 2, 3), keepdim=True)
     deviation = features.std((0, 2, 3), keepdim=True)

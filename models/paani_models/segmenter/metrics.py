@@ -12,7 +12,7 @@ from paani_models.datasets.sources import IGNORE
 EDGE_TOLERANCE_PX = 2  # U4
 
 
-def confusion(predicted: U8, truth: U8, classes: int) -> I64:
+def confusion_matrix(predicted: U8, truth: U8, classes: int) -> I64:
     """Counts int64 [classes, classes], rows truth, columns prediction; pixels of truth 255 are left out."""
     valid = truth != IGNORE
     joint = truth[valid].astype(np.int64) * classes + predicted[valid]
@@ -26,7 +26,7 @@ def class_iou(counts: I64) -> NDArray[np.float64]:
     return np.asarray(np.divide(hits, union, out=np.full(len(hits), np.nan), where=union > 0), np.float64)
 
 
-def boundary(mask: U8) -> NDArray[np.bool_]:
+def boundary_pixels(mask: U8) -> NDArray[np.bool_]:
     """Pixels with a four-neighbour of another class, neither of them ignored."""
     edge = np.zeros(mask.shape, np.bool_)
     for first, second in (
@@ -39,29 +39,29 @@ def boundary(mask: U8) -> NDArray[np.bool_]:
     return edge
 
 
-def edge_counts(predicted: U8, truth: U8) -> tuple[int, int, int, int]:
+def count_edge_matches(predicted: U8, truth: U8) -> tuple[int, int, int, int]:
     """(predicted edge pixels matched, predicted edge pixels, true edge pixels matched, true edge pixels).
 
     Matched means within EDGE_TOLERANCE_PX, Euclidean. Predicted edges on ignored truth are not judged.
     """
-    ours = boundary(predicted) & (truth != IGNORE)
-    theirs = boundary(truth)
+    ours = boundary_pixels(predicted) & (truth != IGNORE)
+    theirs = boundary_pixels(truth)
     return (
-        int((ours & _near(theirs)).sum()),
+        int((ours & _dilate_by_tolerance(theirs)).sum()),
         int(ours.sum()),
-        int((theirs & _near(ours)).sum()),
+        int((theirs & _dilate_by_tolerance(ours)).sum()),
         int(theirs.sum()),
     )
 
 
-def _near(edge: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _dilate_by_tolerance(edge: NDArray[np.bool_]) -> NDArray[np.bool_]:
     reach = 2 * EDGE_TOLERANCE_PX + 1
     offsets = np.arange(reach) - EDGE_TOLERANCE_PX
     disc = (offsets[:, None] ** 2 + offsets[None] ** 2 <= EDGE_TOLERANCE_PX**2).astype(np.uint8)
     return np.asarray(cv2.dilate(edge.astype(np.uint8), disc), np.bool_)
 
 
-def f1(matched_predicted: int, predicted: int, matched_true: int, true: int) -> float:
+def f1_score(matched_predicted: int, predicted: int, matched_true: int, true: int) -> float:
     """Harmonic mean of precision and recall; 0 where nothing matches."""
     precision = matched_predicted / predicted if predicted else 0.0
     recall = matched_true / true if true else 0.0

@@ -14,21 +14,21 @@ from tqdm import tqdm
 from paani_models.datasets.sources import IGNORE, Sample, read_boxes
 from paani_models.network_input import SIZE_WH, segmenter_batch
 from paani_models.segmenter.train import UNSEGMENTED, CachedPicture
-from paani_models.training.loop import device, to_device
+from paani_models.training.training_state import to_device, training_device
 
-SURE = 0.9
+MIN_PROBABILITY = 0.9
 OBSTACLE = 1
-BOX_CORE = 0.3  # half side of the part of a box, as a share of its sides, that is surely the boxed thing
+BOX_CORE_HALF_FRAC = 0.3  # half side of the part of a box, as a share of its sides, that is surely the boxed thing
 
 
 @torch.no_grad()
-def pseudo_labelled(net: nn.Module, pictures: list[CachedPicture], samples: list[Sample]) -> list[CachedPicture]:
+def pseudo_label_pictures(net: nn.Module, pictures: list[CachedPicture], samples: list[Sample]) -> list[CachedPicture]:
     """The same pictures in the same order, those of UNSEGMENTED with masks of the net's sure answers.
 
     pictures[i] was made of samples[i]. Each is shown as it is and mirrored. In the core of a box nothing but obstacle
     is taken for sure.
     """
-    net.eval().to(device())
+    net.eval().to(training_device())
     labelled = []
     for item, sample in zip(tqdm(pictures, "labelling", unit="picture", mininterval=2.0), samples, strict=True):
         if item.source != UNSEGMENTED:
@@ -38,24 +38,24 @@ def pseudo_labelled(net: nn.Module, pictures: list[CachedPicture], samples: list
         both = torch.from_numpy(segmenter_batch(np.stack([shown, shown[:, ::-1]])))
         share = torch.softmax(net(to_device(both)), 1)
         mean = ((share[0] + share[1].flip(-1)) / 2).cpu().numpy()
-        mask = np.where(mean.max(0) >= SURE, mean.argmax(0), IGNORE).astype(np.uint8)
+        mask = np.where(mean.max(0) >= MIN_PROBABILITY, mean.argmax(0), IGNORE).astype(np.uint8)
         height, width = item.mask.shape
         mask = np.asarray(cv2.resize(mask, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
         if sample.label is not None:
-            mask = without_box_cores(mask, read_boxes(sample.label))
+            mask = ignore_box_cores(mask, read_boxes(sample.label))
         labelled.append(replace(item, mask=mask))
     return labelled
 
 
-def without_box_cores(mask: NDArray[np.uint8], boxes: NDArray[np.float32]) -> NDArray[np.uint8]:
+def ignore_box_cores(mask: NDArray[np.uint8], boxes: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Ignore water and sky in the middle of boxes [n,5] (class, corners, normalised)."""
     height, width = mask.shape
     cleaned = mask.copy()
     for _, x1, y1, x2, y2 in boxes:
         x, y, w, h = (x1 + x2) / 2 * width, (y1 + y2) / 2 * height, (x2 - x1) * width, (y2 - y1) * height
         core = cleaned[
-            max(0, int(y - BOX_CORE * h)) : int(y + BOX_CORE * h) + 1,
-            max(0, int(x - BOX_CORE * w)) : int(x + BOX_CORE * w) + 1,
+            max(0, int(y - BOX_CORE_HALF_FRAC * h)) : int(y + BOX_CORE_HALF_FRAC * h) + 1,
+            max(0, int(x - BOX_CORE_HALF_FRAC * w)) : int(x + BOX_CORE_HALF_FRAC * w) + 1,
         ]
         core[core != OBSTACLE] = IGNORE
     return cleaned

@@ -13,10 +13,10 @@ from tqdm import tqdm
 
 from paani.arrays import F32, I64, U8
 from paani.errors import UserError
-from paani_models.catalogue import described
+from paani_models.catalogue import read_contract
 from paani_models.datasets.sources import SEGMENTER_CLASSES, WATER_MASKS, Sample, Source, read_mask, read_picture
-from paani_models.engines.onnx_runner import open_net
-from paani_models.segmenter.metrics import class_iou, confusion, edge_counts, f1
+from paani_models.engines.onnx_runner import open_network
+from paani_models.segmenter.metrics import class_iou, confusion_matrix, count_edge_matches, f1_score
 
 WATER, OBSTACLE, SKY = (SEGMENTER_CLASSES.index(kind) for kind in ("water", "obstacle", "sky"))
 
@@ -30,7 +30,7 @@ class ScoredMask:
     edges: I64
 
     @property
-    def share_right(self) -> float:
+    def mean_iou(self) -> float:
         """Mean IoU over what is scored and occurs; 1 where nothing does."""
         iou = class_iou(self.counts)[[SEGMENTER_CLASSES.index(kind) for kind in scored_classes(self.sample.source)]]
         return float(np.nanmean(iou)) if np.isfinite(iou).any() else 1.0
@@ -38,34 +38,34 @@ class ScoredMask:
 
 def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
     """Run the net over samples with masks. Raises UserError naming a file that cannot be read."""
-    segment = segmenter(net)
+    segment = open_segmenter(net)
     scored = []
     for sample in tqdm(samples, "segmenter", unit="picture", mininterval=2.0):
         truth = read_truth(sample)
-        label = restrict(segment(read_picture(sample.picture), truth.shape), sample.source)
-        counts = confusion(label, truth, len(SEGMENTER_CLASSES))
-        scored.append(ScoredMask(sample, counts, np.array(edge_counts(label, truth), np.int64)))
+        label = merge_undrawn_sky(segment(read_picture(sample.picture), truth.shape), sample.source)
+        counts = confusion_matrix(label, truth, len(SEGMENTER_CLASSES))
+        scored.append(ScoredMask(sample, counts, np.array(count_edge_matches(label, truth), np.int64)))
     return scored
 
 
-def segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], U8]:
+def open_segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], U8]:
     """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W].
 
     Size, preprocessing and order of classes are those of the net's contract.
     """
-    run, contract = open_net(net), described(net, "segmenter")
+    run, contract = open_network(net), read_contract(net, "segmenter")
     size_wh = contract.input.shape[:1:-1]
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
     rows = [contract.classes.index(name) for name in SEGMENTER_CLASSES]
 
     def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> U8:
         scaled = (cv2.resize(picture, size_wh).astype(np.float32) / 255.0 - mean) / std
-        return as_label(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
+        return label_from_logits(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
 
     return segment
 
 
-def as_label(logits: F32, shape: tuple[int, ...]) -> U8:
+def label_from_logits(logits: F32, shape: tuple[int, ...]) -> U8:
     """Logits [1,3,h,w] -> the best class, nearest pixel, uint8 [H,W]."""
     label = logits[0].argmax(0).astype(np.uint8)
     return np.asarray(cv2.resize(label, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
@@ -79,7 +79,7 @@ def read_truth(sample: Sample) -> U8:
     return read_mask(drawn)
 
 
-def restrict(label: U8, source: Source) -> U8:
+def merge_undrawn_sky(label: U8, source: Source) -> U8:
     """Sky counts as obstacle where people told only water from the rest."""
     return np.minimum(label, OBSTACLE) if source.water_only else label
 
@@ -99,11 +99,11 @@ def mask_measures(source: Source) -> dict[str, Callable[[I64], float]]:
     if not source.water_only:
         measures["miou"] = lambda sums: float(np.nanmean(class_iou(sums[:9].reshape(3, 3))))
     if not source.soft_edges:
-        measures["edge_f1"] = lambda sums: f1(*(int(count) for count in sums[9:]))
+        measures["edge_f1"] = lambda sums: f1_score(*(int(count) for count in sums[9:]))
     return measures
 
 
-def added(scored: Sequence[ScoredMask]) -> I64:
+def sum_counts(scored: Sequence[ScoredMask]) -> I64:
     """Counts of many pictures, int64 [13]."""
     rows = [np.concatenate([item.counts.ravel(), item.edges]) for item in scored]
     return np.sum(rows, axis=0, dtype=np.int64) if rows else np.zeros(13, np.int64)

@@ -16,27 +16,35 @@ from tqdm import tqdm
 from paani_models.datasets.sources import IGNORE, RENDERED, SEGMENTER_CLASSES, Sample, read_mask, read_picture
 from paani_models.network_input import segmenter_batch
 from paani_models.segmenter.distillation import Distillation
-from paani_models.segmenter.metrics import class_iou, confusion
-from paani_models.segmenter.paper_shape import segmenter_loss
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter
+from paani_models.segmenter.metrics import class_iou, confusion_matrix
+from paani_models.segmenter.paper_network import segmenter_loss
+from paani_models.segmenter.shipped_network import ShippedSegmenter
 from paani_models.training.augment import (
     CONCRETE_FRAC,
     LAND_FRAC,
-    concrete,
-    land_crop,
-    obstacle_patch,
-    segmenter_null,
-    segmenter_sample,
+    augment_segmenter_pair,
+    crop_land,
+    crop_obstacle,
+    draw_concrete,
+    draw_null_pair,
 )
-from paani_models.training.loop import Prefetch, Progress, Stage, append_record, learning_rate, stage_of, to_device
+from paani_models.training.training_state import (
+    Prefetch,
+    Stage,
+    TrainingState,
+    append_record,
+    learning_rate,
+    stage_at_epoch,
+    to_device,
+)
 
 CACHE_WH = (384, 288)
 NULL_FRAC = 0.12
-PASTE_FRAC = 0.9  # tries; about one donor in four has a patch to give
+PASTE_ATTEMPT_FRAC = 0.9  # tries; about one donor in four has a patch to give
 UNSEGMENTED = "unsegmented"  # pictures of all sources without masks: only a teacher says what they show
 
 # Pictures drawn per epoch and source: sources with three human classes weigh more than their number.
-DRAWS = {
+DRAWS_PER_EPOCH = {
     "tbiseg_usvinland": 340,
     "tbiseg_tampere": 170,
     "tbiseg_dasha": 130,
@@ -48,7 +56,7 @@ DRAWS = {
 
 
 @dataclass(frozen=True)
-class Recipe:
+class SegmenterRecipe:
     """Everything that decides a segmenter training besides the pictures."""
 
     stages: tuple[Stage, ...] = (Stage(18, 128, 160), Stage(8, 256, 320))
@@ -67,7 +75,7 @@ class Recipe:
 
 
 # S6, S7: 50 epochs at full size, batches of 16, AdamW at 3e-4 with a cosine down to nothing.
-PAPER_RECIPE = Recipe(stages=(Stage(50, 256, 320),), peak_rate=3e-4, warmup_steps=0, final_frac=0.0)
+PAPER_RECIPE = SegmenterRecipe(stages=(Stage(50, 256, 320),), peak_rate=3e-4, warmup_steps=0, final_frac=0.0)
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,7 @@ class CachedPicture:
     mask: NDArray[np.uint8]
 
 
-def cache(samples: list[Sample]) -> list[CachedPicture]:
+def cache_pictures(samples: list[Sample]) -> list[CachedPicture]:
     """Decode once, keep small: 3,000 pictures take about 1.5 GB. A picture without a mask is ignored everywhere."""
     cached = []
     for sample in tqdm(samples, desc="decoding", unit="picture", mininterval=2.0):
@@ -92,21 +100,23 @@ def cache(samples: list[Sample]) -> list[CachedPicture]:
     return cached
 
 
-def draw_epoch(pictures: list[CachedPicture], recipe: Recipe, epoch: int) -> list[int]:
+def draw_epoch(pictures: list[CachedPicture], recipe: SegmenterRecipe, epoch: int) -> list[int]:
     """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
     rng = np.random.default_rng((recipe.seed, epoch))
     drawn: list[int] = []
     for name in sorted({p.source for p in pictures} - {RENDERED}):
-        drawn.extend(_draw(rng, [i for i, p in enumerate(pictures) if p.source == name], DRAWS.get(name, 100)))
+        drawn.extend(
+            _draw_evenly(rng, [i for i, p in enumerate(pictures) if p.source == name], DRAWS_PER_EPOCH.get(name, 100))
+        )
     rendered = [i for i, p in enumerate(pictures) if p.source == RENDERED]
     if rendered:
         real = len(drawn) or len(rendered)
-        drawn.extend(_draw(rng, rendered, round(real * recipe.rendered_frac / (1 - recipe.rendered_frac))))
+        drawn.extend(_draw_evenly(rng, rendered, round(real * recipe.rendered_frac / (1 - recipe.rendered_frac))))
     drawn.extend([-1] * round(len(drawn) * NULL_FRAC / (1 - NULL_FRAC)))
     return [int(i) for i in rng.permutation(drawn)]
 
 
-def _draw(rng: np.random.Generator, indices: list[int], count: int) -> list[int]:
+def _draw_evenly(rng: np.random.Generator, indices: list[int], count: int) -> list[int]:
     whole, rest = divmod(count, len(indices))
     return indices * whole + [int(i) for i in rng.choice(indices, rest, replace=False)]
 
@@ -117,7 +127,7 @@ class SegmenterTraining:
     def __init__(
         self,
         model: nn.Module,
-        recipe: Recipe,
+        recipe: SegmenterRecipe,
         folder: Path,
         train: list[CachedPicture],
         held_out: list[CachedPicture],
@@ -126,8 +136,8 @@ class SegmenterTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model, self.distillation = model, distillation
-        gentle = model.encoder() if isinstance(model, ImageNetSegmenter) else None
-        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
+        gentle = model.encoder() if isinstance(model, ShippedSegmenter) else None
+        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
@@ -142,7 +152,7 @@ class SegmenterTraining:
 
     def _train_epoch(self) -> float:
         recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
-        stage = stage_of(recipe.stages, epoch)
+        stage = stage_at_epoch(recipe.stages, epoch)
         order = draw_epoch(self.train, recipe, epoch)
         steps = len(order) // recipe.batch
         total = steps * recipe.epochs
@@ -172,22 +182,22 @@ class SegmenterTraining:
         for slot, index in enumerate(chosen):
             rng = np.random.default_rng((self.recipe.seed, *place, slot))
             if index < 0:
-                pairs.append(segmenter_null(rng, size))
+                pairs.append(draw_null_pair(rng, size))
             else:
                 item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
-                shown = land_crop(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
+                shown = crop_land(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
                 picture, mask = shown or (item.picture, item.mask)
-                wanted = rng.random() < PASTE_FRAC
-                patch = obstacle_patch(rng, donor.picture, donor.mask) if wanted else None
-                patch = concrete(rng) if rng.random() < CONCRETE_FRAC else patch
-                pairs.append(segmenter_sample(rng, picture, mask, size, patch))
+                wanted = rng.random() < PASTE_ATTEMPT_FRAC
+                patch = crop_obstacle(rng, donor.picture, donor.mask) if wanted else None
+                patch = draw_concrete(rng) if rng.random() < CONCRETE_FRAC else patch
+                pairs.append(augment_segmenter_pair(rng, picture, mask, size, patch))
         pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
         return pictures, torch.from_numpy(np.stack([mask for _, mask in pairs]).astype(np.int64))
 
     @torch.no_grad()
     def validate(self) -> dict[str, float]:
         """IoU of the averaged weights on the held-out pictures at the current input size."""
-        stage = stage_of(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
+        stage = stage_at_epoch(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
         size = (stage.width_px, stage.height_px)
         counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
         for start in range(0, len(self.held_out), 16):
@@ -197,7 +207,7 @@ class SegmenterTraining:
             labels = logits.argmax(1).cpu().numpy().astype(np.uint8)
             for item, label in zip(chunk, labels, strict=True):
                 truth = np.asarray(cv2.resize(item.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-                counts += confusion(label, truth, len(SEGMENTER_CLASSES))
+                counts += confusion_matrix(label, truth, len(SEGMENTER_CLASSES))
         iou = class_iou(counts)
         return {"miou": round(float(np.nanmean(iou)), 4)} | {
             name: round(float(value), 4) for name, value in zip(SEGMENTER_CLASSES, iou, strict=True)

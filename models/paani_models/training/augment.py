@@ -79,7 +79,7 @@ def jitter_colour(rng: Rng, picture: U8) -> U8:
     return np.asarray(cv2.cvtColor(cv2.merge(planes), cv2.COLOR_HSV2RGB), np.uint8)
 
 
-def glare(rng: Rng, picture: U8) -> U8:
+def add_glare(rng: Rng, picture: U8) -> U8:
     """Sun on the water: a soft bright blob, and glitter of small strokes in the lower half (S8, S12)."""
     height, width = picture.shape[:2]
     light = np.zeros((height, width), np.float32)
@@ -111,7 +111,7 @@ def glare(rng: Rng, picture: U8) -> U8:
     return np.clip(lit, 0, 255).astype(np.uint8)
 
 
-def mirror_water(rng: Rng, picture: U8, mask: U8) -> U8:
+def mirror_banks_in_water(rng: Rng, picture: U8, mask: U8) -> U8:
     """Calm water: what stands above its far edge is mirrored in it, rippled, stretched and dimmed."""
     height, width = mask.shape
     water = mask == WATER
@@ -126,7 +126,7 @@ def mirror_water(rng: Rng, picture: U8, mask: U8) -> U8:
     return np.clip(picture * (1 - share) + mirrored * rng.uniform(0.65, 1.0) * share, 0, 255).astype(np.uint8)
 
 
-def degrade(rng: Rng, picture: U8) -> U8:
+def degrade_picture(rng: Rng, picture: U8) -> U8:
     """Lens and sensor: blur, haze, noise, JPEG blocks; each sometimes."""
     if rng.random() < 0.15:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.4, 1.8)).astype(np.uint8, copy=False)
@@ -148,7 +148,7 @@ def add_noise(rng: Rng, picture: U8, sigma: float) -> U8:
     return np.clip(picture + noise * sigma, 0, 255).astype(np.uint8)
 
 
-def cut_out(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8]:
+def cover_rectangle(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8]:
     """Cover one rectangle with a flat colour; what is covered is not judged."""
     height, width = mask.shape
     h, w = int(rng.integers(height // 16, height // 4)), int(rng.integers(width // 16, width // 4))
@@ -159,7 +159,7 @@ def cut_out(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8]:
     return picture, mask
 
 
-def land_crop(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8] | None:
+def crop_land(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8] | None:
     """A part of the picture without any water, at least 60 % obstacle; None where eight tries find none.
 
     What a boat against a bank sees: land down to the bottom of the picture.
@@ -178,7 +178,7 @@ def land_crop(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8] | None:
     return None
 
 
-def obstacle_patch(rng: Rng, picture: U8, mask: U8) -> U8 | None:
+def crop_obstacle(rng: Rng, picture: U8, mask: U8) -> U8 | None:
     """Find a rectangle that is all obstacle, give or take a twentieth; None where six tries find none."""
     height, width = mask.shape
     for _ in range(6):
@@ -189,7 +189,7 @@ def obstacle_patch(rng: Rng, picture: U8, mask: U8) -> U8 | None:
     return None
 
 
-def concrete(rng: Rng) -> U8:
+def draw_concrete(rng: Rng) -> U8:
     """A smooth wall: one grey, stained in streaks that run down, sometimes with joints and a wet foot."""
     height, width = 120, 240
     wall = np.full((height, width, 3), rng.uniform(50, 215), np.float32) + rng.normal(0, 6, 3).astype(np.float32)
@@ -234,7 +234,7 @@ def paste_obstacle(rng: Rng, picture: U8, mask: U8, patch: U8) -> tuple[U8, U8]:
     )
 
 
-def null_picture(rng: Rng, target_wh: tuple[int, int]) -> U8:
+def draw_null_picture(rng: Rng, target_wh: tuple[int, int]) -> U8:
     """A picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, each with sensor noise."""
     width, height = target_wh
     kind = int(rng.integers(7))
@@ -271,7 +271,7 @@ def null_picture(rng: Rng, target_wh: tuple[int, int]) -> U8:
     return add_noise(rng, np.clip(flat, 0, 255).astype(np.uint8), rng.uniform(0, 8))
 
 
-def segmenter_sample(
+def augment_segmenter_pair(
     rng: Rng, picture: U8, mask: U8, target_wh: tuple[int, int], patch: U8 | None = None
 ) -> tuple[U8, U8]:
     """Make one training pair of the target size; a patch of obstacle, if given, is pasted in."""
@@ -280,17 +280,17 @@ def segmenter_sample(
     if patch is not None:
         picture, mask = paste_obstacle(rng, picture, mask, patch)
     if rng.random() < MIRROR_FRAC:
-        picture = mirror_water(rng, picture, mask)
+        picture = mirror_banks_in_water(rng, picture, mask)
     if rng.random() < 0.8:
         picture = jitter_colour(rng, picture)
     if rng.random() < GLARE_FRAC:
-        picture = glare(rng, picture)
-    picture = degrade(rng, picture)
+        picture = add_glare(rng, picture)
+    picture = degrade_picture(rng, picture)
     if rng.random() < 0.2:
-        picture, mask = cut_out(rng, picture, mask)
+        picture, mask = cover_rectangle(rng, picture, mask)
     return picture, mask
 
 
-def segmenter_null(rng: Rng, target_wh: tuple[int, int]) -> tuple[U8, U8]:
+def draw_null_pair(rng: Rng, target_wh: tuple[int, int]) -> tuple[U8, U8]:
     """A picture that shows nothing is all obstacle, so an unusable picture can never read as open water."""
-    return null_picture(rng, target_wh), np.full((target_wh[1], target_wh[0]), OBSTACLE, np.uint8)
+    return draw_null_picture(rng, target_wh), np.full((target_wh[1], target_wh[0]), OBSTACLE, np.uint8)

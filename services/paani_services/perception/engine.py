@@ -8,8 +8,8 @@ import numpy as np
 from paani.arrays import F32, U8
 from paani.config import EngineName
 from paani.errors import UserError
-from paani_models.catalogue import Model, chosen, file_sha256
-from paani_models.engines.last_resize import before_resize
+from paani_models.catalogue import Model, choose_model, file_sha256
+from paani_models.engines.last_resize import drop_last_resize
 from paani_services.perception.corridors import cells_only
 from paani_services.perception.ncnn_engine import NcnnEngine
 
@@ -70,7 +70,7 @@ class OnnxEngine:
         check_onnxruntime(_installed())
         import onnxruntime as ort  # noqa: PLC0415 - a release that is refused would end the process here
 
-        contract, file = chosen(role, path)
+        contract, file = choose_model(role, path)
         checksum = file_sha256(file)
         options = ort.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
@@ -89,7 +89,7 @@ class OnnxEngine:
             if found != [(wanted.shape, ORT_TYPES[wanted.dtype])]:
                 raise UserError(f"{file}: {role} must have {wanted.dtype} {list(wanted.shape)}, found {found}")
         cells = None if whole or role != "segmenter" else cells_only(contract.output.shape)
-        if cells and (model := before_resize(file.read_bytes())):
+        if cells and (model := drop_last_resize(file.read_bytes())):
             del session  # its memory serves the other
             session = opened(model)
             if _ends(session)[1][0][0] != cells:

@@ -6,8 +6,8 @@ import numpy as np
 
 from paani.arrays import F32, U8
 from paani.errors import UserError
-from paani_models.catalogue import Model, chosen, file_sha256
-from paani_models.engines.ncnn_runner import Run, converted, open_ncnn, resized
+from paani_models.catalogue import Model, choose_model, file_sha256
+from paani_models.engines.ncnn_runner import Run, blob_before_resize, open_ncnn, verified_ncnn_files
 from paani_services.perception.corridors import cells_only
 
 
@@ -21,16 +21,16 @@ class NcnnEngine:
     @classmethod
     def load(cls, role: str, path: str, threads: int) -> Self:
         """As any engine; also raises UserError where the converted files are missing or not those of this model."""
-        contract, file = chosen(role, path)
+        contract, file = choose_model(role, path)
         if contract.input.dtype != "float32":
             raise UserError(f"{file}: takes {contract.input.dtype}; ncnn runs float32 models alone")
-        files = converted(file)
+        files = verified_ncnn_files(file)
         run = open_ncnn(files, threads)
         shape = run(np.zeros(contract.input.shape, np.float32)).shape
         if shape != contract.output.shape:
             raise UserError(f"{files.param}: {role} must give {list(contract.output.shape)}, found {list(shape)}")
         cells = cells_only(shape) if role == "segmenter" else None
-        if cells and (name := resized(files)):
+        if cells and (name := blob_before_resize(files)):
             short = open_ncnn(files, threads, name)
             run = short if short(np.zeros(contract.input.shape, np.float32)).shape == cells else run
         return cls(run, contract, f"{role} {file_sha256(file)[:12]} ncnn")

@@ -18,21 +18,21 @@ from paani_services.perception.engine import engine_named
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.preprocess import stretch, tables_for
-from paani_tools.faults.corpus import clean_pictures, listed_pictures, scenes, sources
-from paani_tools.faults.measure import CellFigures, CleanFigures, Totals, cell_figures, clean_figures, totals
+from paani_tools.faults.corpus import find_source_folders, read_clean_pictures, read_listed_pictures, read_scenes
+from paani_tools.faults.measure import CleanFigures, LevelFigures, Totals, measure_clean, measure_levels, sum_up
 from paani_tools.faults.severity_curves import draw_severity_curves
 
 
-class Report(msgspec.Struct, frozen=True):
+class FaultReport(msgspec.Struct, frozen=True):
     """What `--json` writes. without_water: pictures of which every one must be refused, none where not asked for."""
 
     totals: Totals
-    cells: tuple[CellFigures, ...]
+    cells: tuple[LevelFigures, ...]
     clean: tuple[CleanFigures, ...]
     without_water: CleanFigures
 
 
-class Eyes:
+class PictureModels:
     """The segmenter and the gate, each on one picture alone."""
 
     def __init__(self, config: PerceptionConfig) -> None:
@@ -68,33 +68,33 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--svg", type=output_file("--svg"), metavar="FILE", help="the curves")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
-    eyes = Eyes(config_from(options).perception)
-    folders = sources(options.data)
-    only = _listed("--pictures", options.pictures) if options.pictures else None
-    named = _listed("--without-water", options.without_water) if options.without_water else frozenset()
-    spoiled = [scene for folder in folders for scene in scenes(folder, options.scenes, only)]
-    dry = listed_pictures(options.data, named)
+    models = PictureModels(config_from(options).perception)
+    folders = find_source_folders(options.data)
+    only = _read_list("--pictures", options.pictures) if options.pictures else None
+    named = _read_list("--without-water", options.without_water) if options.without_water else frozenset()
+    spoiled = [scene for folder in folders for scene in read_scenes(folder, options.scenes, only)]
+    dry = read_listed_pictures(options.data, named)
     if not spoiled:
         raise UserError(f"{options.data}: no picture with a mask of three classes")
     clean = tuple(
-        clean_figures(folder.name, pictures, eyes.judge)
+        measure_clean(folder.name, pictures, models.judge)
         for folder in folders
-        if (pictures := clean_pictures(folder, options.clean, only))
+        if (pictures := read_clean_pictures(folder, options.clean, only))
     )
     cells = []
-    for cell in cell_figures(spoiled, eyes.segment, eyes.judge):
+    for cell in measure_levels(spoiled, models.segment, models.judge):
         cells.append(cell)
         sys.stderr.write(f"\r{len(cells):4} cells  {cell.fault:20}")
     sys.stderr.write("\r" + " " * 40 + "\r")
-    report = Report(totals(cells, clean), tuple(cells), clean, clean_figures("without_water", dry, eyes.judge))
-    sys.stdout.write(table(report))
-    for path, text in ((options.json, _json(report)), (options.svg, draw_severity_curves(cells))):
+    report = FaultReport(sum_up(cells, clean), tuple(cells), clean, measure_clean("without_water", dry, models.judge))
+    sys.stdout.write(format_table(report))
+    for path, text in ((options.json, _encode_report(report)), (options.svg, draw_severity_curves(cells))):
         if path is not None:
             write_whole(path, text.encode())
     return 0
 
 
-def table(report: Report) -> str:
+def format_table(report: FaultReport) -> str:
     """The report as text."""
     lines = ["fault            severity    n   mIoU  refused  must"]
     lines += [
@@ -113,12 +113,12 @@ def table(report: Report) -> str:
     return "\n".join(lines)
 
 
-def _listed(option: str, path: Path) -> frozenset[str]:
+def _read_list(option: str, path: Path) -> frozenset[str]:
     try:
         return frozenset(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{option} {path}: {error}") from error
 
 
-def _json(report: Report) -> str:
+def _encode_report(report: FaultReport) -> str:
     return msgspec.json.format(msgspec.json.encode(report), indent=1).decode() + "\n"

@@ -37,7 +37,7 @@ class _Manifest(msgspec.Struct):
     items: list[_Item]
 
 
-def sources(folder: Path) -> list[Path]:
+def find_source_folders(folder: Path) -> list[Path]:
     """Sub-folders that hold annotated pictures. Raises UserError when there is none."""
     found = [path.parent for path in sorted(folder.glob("*/manifest.json"))]
     if not found:
@@ -45,18 +45,18 @@ def sources(folder: Path) -> list[Path]:
     return found
 
 
-def clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[U8]:
+def read_clean_pictures(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[U8]:
     """Pictures of a source as they are, evenly spread over it. only: paths below the data folder; None: all."""
     paths = sorted(
         path
         for path in (source / "images").glob("*")
-        if path.suffix.lower() in SUFFIXES and (only is None or _name(source, path) in only)
+        if path.suffix.lower() in SUFFIXES and (only is None or _relative_name(source, path) in only)
     )
-    read = (cv2.imread(str(path), cv2.IMREAD_COLOR) for path in spread(paths, at_most))
+    read = (cv2.imread(str(path), cv2.IMREAD_COLOR) for path in spread_evenly(paths, at_most))
     return [np.asarray(picture, np.uint8) for picture in read if picture is not None]
 
 
-def listed_pictures(folder: Path, names: frozenset[str]) -> list[U8]:
+def read_listed_pictures(folder: Path, names: frozenset[str]) -> list[U8]:
     """The pictures of these paths below a folder. Raises UserError naming the first that is none."""
     found = []
     for name in sorted(names):
@@ -67,7 +67,7 @@ def listed_pictures(folder: Path, names: frozenset[str]) -> list[U8]:
     return found
 
 
-def scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Scene]:
+def read_scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> list[Scene]:
     """Pictures with masks of all three classes, evenly spread; none where the source has no such masks."""
     manifest = source / "manifest.json"
     try:
@@ -79,7 +79,7 @@ def scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> li
         return []
     found = []
     items = [item for item in items if only is None or f"{source.name}/{item.file}" in only]
-    for item in spread(sorted(items, key=lambda i: i.file), at_most):
+    for item in spread_evenly(sorted(items, key=lambda i: i.file), at_most):
         picture = cv2.imread(str(source / item.file), cv2.IMREAD_COLOR)
         mask = cv2.imread(str(folders[0] / f"{Path(item.file).stem}.png"), cv2.IMREAD_GRAYSCALE)
         if picture is None or mask is None:
@@ -90,12 +90,12 @@ def scenes(source: Path, at_most: int, only: frozenset[str] | None = None) -> li
     return found
 
 
-def spread(items: list[T], at_most: int) -> list[T]:
+def spread_evenly(items: list[T], at_most: int) -> list[T]:
     """At most so many, at even distances."""
     if len(items) <= at_most:
         return items
     return [items[round(i * (len(items) - 1) / max(1, at_most - 1))] for i in range(at_most)]
 
 
-def _name(source: Path, path: Path) -> str:
+def _relative_name(source: Path, path: Path) -> str:
     return path.relative_to(source.parent).as_posix()

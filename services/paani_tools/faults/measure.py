@@ -17,7 +17,7 @@ Segment = Callable[[U8], U8]
 Judge = Callable[[U8], UnusableCause]
 
 
-class CellFigures(msgspec.Struct, frozen=True):
+class LevelFigures(msgspec.Struct, frozen=True):
     """One fault in one severity over n pictures. `miou`: of the segmenter, against what the spoilt picture shows."""
 
     fault: str
@@ -49,7 +49,7 @@ class Totals(msgspec.Struct, frozen=True):
     clean_reject_frac: float
 
 
-def cell_figures(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Iterator[CellFigures]:
+def measure_levels(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Iterator[LevelFigures]:
     """Every cell in turn; the last is views without water.
 
     segment: BGR uint8 [H, W, 3] to classes uint8 [h, w]. judge: one picture, as the first of a new camera.
@@ -60,21 +60,21 @@ def cell_figures(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Ite
             for index, scene in enumerate(scenes):
                 rng = np.random.default_rng([zlib.crc32(name.encode()), severity, index])
                 picture, mask = spoilt(name, scene.picture, scene.mask, severity, rng)
-                counts += joint(segment(picture), mask)
+                counts += count_classes(segment(picture), mask)
                 rejected += judge(picture) is not UnusableCause.NONE
-            yield CellFigures(name, severity, len(scenes), mean_iou(counts), rejected)
+            yield LevelFigures(name, severity, len(scenes), mean_iou(counts), rejected)
     dry = [view for scene in scenes if (view := above_water(scene.picture, scene.mask)) is not None]
-    yield CellFigures(DRY, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
+    yield LevelFigures(DRY, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
 
 
-def clean_figures(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFigures:
+def measure_clean(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFigures:
     """Pictures that nothing was done to."""
     causes = [judge(picture) for picture in pictures]
     refused = sorted(str(cause) for cause in causes if cause is not UnusableCause.NONE)
     return CleanFigures(source, len(causes), len(refused), tuple(dict.fromkeys(refused)))
 
 
-def totals(cells: Sequence[CellFigures], clean: Sequence[CleanFigures]) -> Totals:
+def sum_up(cells: Sequence[LevelFigures], clean: Sequence[CleanFigures]) -> Totals:
     """The three shares that the gate is held to."""
 
     def share(wrong: int, n: int) -> float:
@@ -89,7 +89,7 @@ def totals(cells: Sequence[CellFigures], clean: Sequence[CleanFigures]) -> Total
     )
 
 
-def joint(predicted: U8, truth: U8) -> NDArray[np.int64]:
+def count_classes(predicted: U8, truth: U8) -> NDArray[np.int64]:
     """Counts [3, 3], rows truth, columns prediction, where the truth is known; the truth is taken to its grid."""
     truth = np.asarray(cv2.resize(truth, predicted.shape[::-1], interpolation=cv2.INTER_NEAREST), np.uint8)
     known = truth < 3

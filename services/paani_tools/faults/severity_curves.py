@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 from paani.picture_faults import MUST_ACCEPT, MUST_REJECT
 from paani.statistics.charts import PALETTE, Axes, circle, drawing, element, polyline
-from paani_tools.faults.measure import CellFigures
+from paani_tools.faults.measure import LevelFigures
 
 COLUMNS = 6
 PANEL_W, PANEL_H, LEFT, TOP, PLOT_W, PLOT_H = 170, 130, 30, 24, 124, 76
 MIOU, REFUSED, BAND, AXIS, NOTE = PALETTE[0], PALETTE[1], "#e6eef0", "#888", "#555"
 
 
-def draw_severity_curves(cells: Sequence[CellFigures]) -> str:
+def draw_severity_curves(cells: Sequence[LevelFigures]) -> str:
     """The SVG text. Both curves share the axis 0 to 1; the band is where either verdict will do."""
     names = list(dict.fromkeys(cell.fault for cell in cells))
     width, height = COLUMNS * PANEL_W, -(-len(names) // COLUMNS) * PANEL_H + 26
@@ -34,7 +34,7 @@ def draw_severity_curves(cells: Sequence[CellFigures]) -> str:
     ) + "\n"  # fmt: skip
 
 
-def _draw_panel(cells: Sequence[CellFigures], axes: Axes) -> list[str]:
+def _draw_panel(cells: Sequence[LevelFigures], axes: Axes) -> list[str]:
     (left, bottom), (right, top) = axes.place(1, 0), axes.place(5, 1)
     band_top, band_bottom = axes.place(1, MUST_ACCEPT)[1], axes.place(1, MUST_REJECT)[1]
     miou = axes.place_all((cell.severity, cell.miou) for cell in cells)

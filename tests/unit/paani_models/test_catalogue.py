@@ -9,9 +9,9 @@ import pytest
 from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.commands.models import main
-from paani_models.engines.onnx_runner import open_net
+from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import detector_input, segmenter_input
-from paani_models.training.augment import null_picture
+from paani_models.training.augment import draw_null_picture
 
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
@@ -112,11 +112,13 @@ def nothing(kind: str) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["black", "noisy black", "white", "grey", "noisy grey", "noise", "brown lens cap"])
 def test_nothing_to_see_is_never_water_v15(kind: str) -> None:
     """The paper's own failure: a black picture read as open water."""
-    label = open_net(verified_path("segmenter"), threads=1)(segmenter_input(nothing(kind)))[0].argmax(0)
+    label = open_network(verified_path("segmenter"), threads=1)(segmenter_input(nothing(kind)))[0].argmax(0)
     assert (label == WATER).mean() < 0.02
 
 
 def test_null_pictures_hold_no_object_above_the_boards_threshold_c6() -> None:
-    run = open_net(verified_path("detector"), threads=1)
-    top = max(run(detector_input(null_picture(np.random.default_rng(s), (320, 256))))[0, 4:].max() for s in range(20))
+    run = open_network(verified_path("detector"), threads=1)
+    top = max(
+        run(detector_input(draw_null_picture(np.random.default_rng(s), (320, 256))))[0, 4:].max() for s in range(20)
+    )
     assert top < 0.40

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import msgspec
 
-from paani_models.engines.multiply_adds import multiply_adds
+from paani_models.engines.multiply_adds import count_multiply_adds
 
 
 class Work(msgspec.Struct, frozen=True):
@@ -19,6 +19,6 @@ class Work(msgspec.Struct, frozen=True):
 def work(name: str, files: Iterable[Path]) -> Work:
     """Of all the files together."""
     paths = list(files)
-    counts = [multiply_adds(path) for path in paths]
+    counts = [count_multiply_adds(path) for path in paths]
     total = None if None in counts else sum(count for count in counts if count is not None)
     return Work(name, sum(path.stat().st_size for path in paths), total)

@@ -15,14 +15,14 @@ from paani_models.benchmarks.lars import (
     OBSTACLE,
     SKY,
     WATER,
+    LarsTally,
     Segment,
-    Tally,
     Truth,
-    from_ours,
     read_names,
     read_prediction,
     read_segments,
     read_truth,
+    to_lars_classes,
     write_prediction,
 )
 from tests.unit.paani_models.datasets.public_sets import write_picture
@@ -44,7 +44,7 @@ def truth() -> Truth:
 
 
 def figures(predicted: np.ndarray) -> dict[str, float]:
-    tally = Tally()
+    tally = LarsTally()
     tally.add(predicted, truth())
     return tally.figures()
 
@@ -102,7 +102,7 @@ def test_static_obstacles_hit_no_object() -> None:
     here.semantic[BOAT], here.semantic[spot] = WATER, OBSTACLE
     predicted = np.full((HEIGHT, WIDTH), WATER, np.uint8)
     predicted[:SHORE] = OBSTACLE
-    tally = Tally()
+    tally = LarsTally()
     tally.add(predicted, here)
     assert (tally.found, tally.missed) == (0, 1)
 
@@ -110,7 +110,7 @@ def test_static_obstacles_hit_no_object() -> None:
 def test_ignored_pixels_do_not_count() -> None:
     here = truth()
     here.semantic[BOAT] = 255
-    tally = Tally()
+    tally = LarsTally()
     tally.add(np.where(here.semantic == 255, WATER, here.semantic).astype(np.uint8), here)
     assert tally.figures()["miou"] == 100
 
@@ -121,7 +121,7 @@ def test_predictions_are_resized_to_the_truth() -> None:
 
 
 def test_totals_are_over_pixels_not_over_pictures() -> None:
-    tally = Tally()
+    tally = LarsTally()
     wrong = np.full((HEIGHT, WIDTH), SKY, np.uint8)
     tally.add(truth().semantic, truth())
     tally.add(wrong, truth())
@@ -130,10 +130,10 @@ def test_totals_are_over_pixels_not_over_pictures() -> None:
 
 
 def test_our_classes_become_theirs_and_colours(tmp_path: Path) -> None:
-    assert from_ours(np.array([0, 1, 2], np.uint8)).tolist() == [WATER, OBSTACLE, SKY]
+    assert to_lars_classes(np.array([0, 1, 2], np.uint8)).tolist() == [WATER, OBSTACLE, SKY]
     ours = np.repeat(np.array([[0, 1, 2]], np.uint8), 16, 0).repeat(8, 1)
     write_prediction(tmp_path / "out", "a", ours)
-    assert np.array_equal(read_prediction(tmp_path / "out" / "a.png"), from_ours(ours))
+    assert np.array_equal(read_prediction(tmp_path / "out" / "a.png"), to_lars_classes(ours))
     assert COLOURS == ((247, 195, 37), (41, 167, 224), (90, 75, 164))
 
 

@@ -17,23 +17,23 @@ from paani_models.benchmarks.mods import (
     WATER,
     Dataset,
     Frame,
+    ModsTally,
     Obstacle,
     Sequence,
-    Tally,
     WaterEdge,
     danger_zone,
-    from_ours,
     land_mask,
     read_dataset,
+    to_mods_classes,
     write_prediction,
 )
-from paani_models.benchmarks.mods_tracks import (
+from paani_models.benchmarks.mods_detection import (
     Detection,
     Results,
     as_detections,
+    build_results,
     challenge_score,
     f_score,
-    results,
     write_results,
 )
 
@@ -50,7 +50,7 @@ def mask(edge: int = EDGE) -> np.ndarray:
 
 
 def figures(label: np.ndarray, *obstacles: Obstacle, zone: np.ndarray = NOWHERE) -> dict[str, float]:
-    tally = Tally()
+    tally = ModsTally()
     tally.add(label, Frame(id=0, image_file_name="a.jpg", obstacles=obstacles, water_edges=(SHORE,)), zone)
     return tally.figures()
 
@@ -113,7 +113,7 @@ def test_a_blob_much_wider_than_its_object_holds_alarms() -> None:
     """80 px wide on a boat of 20: 60 / 22 is 2.7 widths beside it, of which one is let pass."""
     label = mask()
     label[70:80, 60:140] = OBSTACLE
-    tally = Tally()
+    tally = ModsTally()
     tally.add(label, Frame(id=0, image_file_name="a", obstacles=(BOAT,), water_edges=(SHORE,)), NOWHERE)
     assert tally.objects[0].tolist() == [1, 0, 1]
 
@@ -129,7 +129,7 @@ def test_a_frame_that_is_not_fully_annotated_has_no_alarms() -> None:
     label = mask()
     label[100:110, 20:30] = OBSTACLE
     frame = Frame(id=0, image_file_name="a", water_edges=(SHORE,), exhaustive=0)
-    tally = Tally()
+    tally = ModsTally()
     tally.add(label, frame, NOWHERE)
     tally.add(label, msgspec.structs.replace(frame, exhaustive=1), NOWHERE, exhaustive=False)
     assert tally.objects.sum() == 0
@@ -162,7 +162,7 @@ def test_the_danger_zone_by_hand() -> None:
 
 
 def test_masks_are_written_as_the_benchmark_reads_them(tmp_path: Path) -> None:
-    assert from_ours(np.array([0, 1, 2], np.uint8)).tolist() == [WATER, OBSTACLE, SKY]
+    assert to_mods_classes(np.array([0, 1, 2], np.uint8)).tolist() == [WATER, OBSTACLE, SKY]
     write_prediction(tmp_path, "paani", "kope100", "00006790L.jpg", np.array([[WATER, OBSTACLE, SKY]], np.uint8))
     written = cv2.imread(str(tmp_path / "paani" / "kope100" / "00006790L.png"))
     assert written is not None
@@ -187,7 +187,7 @@ def test_the_detection_file_names_every_frame(tmp_path: Path) -> None:
         )
     }
     path = tmp_path / "tracks.json"
-    write_results(path, results("paani", DATASET, found))
+    write_results(path, build_results("paani", DATASET, found))
     written = msgspec.json.decode(path.read_bytes())["dataset"]
     assert (written["name"], written["num_seq"]) == ("paani", 1)
     first, second = written["sequences"][0]["frames"]

@@ -13,7 +13,13 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 from paani.errors import UserError
-from paani_models.datasets.checked_files import decode_mask, decode_picture, read_bytes, read_yolo, refuse
+from paani_models.datasets.checked_files import (
+    decode_mask,
+    decode_picture,
+    raise_first_mistake,
+    read_whole_file,
+    read_yolo,
+)
 from tests.unit.paani_models.datasets.public_sets import scene
 
 NAMED = Path("river.png")
@@ -62,15 +68,15 @@ def test_a_truncated_file_is_never_read(cut: int) -> None:
             data = bytes(cv2.imencode(suffix, scene(2))[1].tobytes())
             patch.setattr(Path, "read_bytes", lambda _, data=data: data[:-cut])
             with pytest.raises(UserError, match="cut short"):
-                read_bytes(NAMED)
+                read_whole_file(NAMED)
 
 
 def test_missing_and_empty_files_are_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"nothing\.jpg: No such file"):
-        read_bytes(tmp_path / "nothing.jpg")
+        read_whole_file(tmp_path / "nothing.jpg")
     (tmp_path / "empty.jpg").touch()
     with pytest.raises(UserError, match=r"empty\.jpg: empty"):
-        read_bytes(tmp_path / "empty.jpg")
+        read_whole_file(tmp_path / "empty.jpg")
 
 
 @given(
@@ -106,7 +112,7 @@ def test_labels_that_are_no_text_are_named(tmp_path: Path) -> None:
 
 
 def test_the_first_mistake_is_named_and_the_rest_counted() -> None:
-    refuse([])
+    raise_first_mistake([])
     for mistakes, told in ((["a"], "a"), (["a", "b", "c"], r"a \(and 2 more\)")):
         with pytest.raises(UserError, match=f"^{told}$"):
-            refuse(mistakes)
+            raise_first_mistake(mistakes)

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from paani.errors import UserError
 from paani_models.commands.models import data_folder
-from paani_models.datasets.leaks import Fingerprint, distance, find_leaks, fingerprint, refuse_leaks
+from paani_models.datasets.leaks import Fingerprint, find_leaks, fingerprint_picture, hash_distance, refuse_leaks
 from paani_models.datasets.sources import SOURCES, read_picture, read_samples
 from tests.unit.paani_models.datasets.public_sets import scene
 
 
 def printed(picture: NDArray[np.uint8], name: str, split: str, sequence: str = "", sha: str = "") -> Fingerprint:
-    return fingerprint(
+    return fingerprint_picture(
         picture, source="river", identity=name, sequence=sequence, split=split, place=f"{name}.jpg", sha256=sha or name
     )
 
@@ -111,4 +111,4 @@ def test_on_real_pictures_copies_are_found_and_strangers_are_not() -> None:
 
 
 def test_distance_counts_bits() -> None:
-    assert distance(0b1011, 0b0010) == 2
+    assert hash_distance(0b1011, 0b0010) == 2

@@ -10,8 +10,14 @@ import pytest
 
 from paani.errors import UserError
 from paani_models.datasets.manifest import load_manifest
-from paani_models.datasets.mastr1325 import VAL_FRAC, file_codes, prepare, split_by_image, split_by_sequence
-from paani_models.datasets.sources import class_mask, read_mask
+from paani_models.datasets.mastr1325 import (
+    VAL_FRAC,
+    prepare_mastr1325,
+    split_by_image,
+    split_by_sequence,
+    to_file_codes,
+)
+from paani_models.datasets.sources import decode_mask_classes, read_mask
 from tests.unit.paani_models.datasets.public_sets import mastr1325, scene, write_picture
 
 NAMES = [f"{number:04}" for number in range(1, 1326)]
@@ -27,11 +33,11 @@ def test_the_papers_split_sizes_r9() -> None:
 
 def test_official_codes_become_ours_r10() -> None:
     official = np.array([0, 1, 2, 4, 255], np.uint8)
-    assert class_mask(file_codes(official)).tolist() == [1, 0, 2, 255, 255]
+    assert decode_mask_classes(to_file_codes(official)).tolist() == [1, 0, 2, 255, 255]
 
 
 def test_a_miniature_keeps_its_masks_r10(tmp_path: Path) -> None:
-    manifest, _ = prepare(mastr1325(tmp_path / "raw"), tmp_path / "out")
+    manifest, _ = prepare_mastr1325(mastr1325(tmp_path / "raw"), tmp_path / "out")
     assert load_manifest(tmp_path / "out") == manifest
     assert len(manifest.items) == 10
     mask = read_mask(tmp_path / "out" / manifest.items[0].mask)
@@ -39,7 +45,7 @@ def test_a_miniature_keeps_its_masks_r10(tmp_path: Path) -> None:
 
 
 def test_whole_sequences_stay_together(tmp_path: Path) -> None:
-    manifest, leaks = prepare(mastr1325(tmp_path / "raw", (6, 6, 6, 6, 6, 6)), tmp_path / "out")
+    manifest, leaks = prepare_mastr1325(mastr1325(tmp_path / "raw", (6, 6, 6, 6, 6, 6)), tmp_path / "out")
     sides: dict[str, set[str]] = {}
     for item in manifest.items:
         sides.setdefault(item.seq, set()).add(item.split)
@@ -53,14 +59,14 @@ def test_a_place_seen_again_is_one_sequence(tmp_path: Path) -> None:
     raw = mastr1325(tmp_path / "raw", (3, 3))
     write_picture(raw / "MaSTr1325_images_512x384" / "0007.jpg", scene(100, (512, 384)))
     write_picture(raw / "MaSTr1325_masks_512x384" / "0007m.png", np.zeros((384, 512), np.uint8))
-    manifest, _ = prepare(raw, tmp_path / "out")
+    manifest, _ = prepare_mastr1325(raw, tmp_path / "out")
     assert manifest.items[6].seq == manifest.items[0].seq != manifest.items[3].seq
 
 
 def test_the_image_split_lets_neighbours_leak_r11(tmp_path: Path) -> None:
     """Ten still scenes of four frames: single frames are held out, so nearly each has its twin in training."""
     raw = mastr1325(tmp_path / "raw", (4,) * 10)
-    _, leaks = prepare(raw, tmp_path / "out", by="image")
+    _, leaks = prepare_mastr1325(raw, tmp_path / "out", by="image")
     assert len({leak.second.identity if leak.second.split == "val" else leak.first.identity for leak in leaks}) == 6
 
 
@@ -119,7 +125,7 @@ def test_what_is_wrong_is_named_and_nothing_is_half_written(name: str, tmp_path:
     raw = mastr1325(tmp_path / "raw", (2,))
     spoil(raw)
     with pytest.raises(UserError, match=message):
-        prepare(raw, tmp_path / "out")
+        prepare_mastr1325(raw, tmp_path / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["raw"]
 
 
@@ -127,5 +133,5 @@ def test_a_grey_mask_stored_in_three_channels_is_read(tmp_path: Path) -> None:
     raw = mastr1325(tmp_path / "raw")
     path = raw / "MaSTr1325_masks_512x384" / "0001m.png"
     write_picture(path, np.asarray(cv2.cvtColor(cv2.imread(str(path), 0), cv2.COLOR_GRAY2BGR), np.uint8))
-    manifest, _ = prepare(raw, tmp_path / "out")
+    manifest, _ = prepare_mastr1325(raw, tmp_path / "out")
     assert read_mask(tmp_path / "out" / manifest.items[0].mask)[300, 0] == 0

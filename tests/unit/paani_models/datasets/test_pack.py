@@ -9,9 +9,9 @@ import pytest
 
 from paani.errors import UserError
 from paani_models.commands.models import main
-from paani_models.datasets.inventory import detector_leaks, read_everything, segmenter_leaks
-from paani_models.datasets.pack import QUALITIES, covering_wh, pack
-from paani_models.datasets.sources import Sample, Source, choose, read_boxes, read_mask, read_samples
+from paani_models.datasets.inventory import find_detector_leaks, find_segmenter_leaks, read_all_samples
+from paani_models.datasets.pack import QUALITIES, cover_size_wh, pack_bundle
+from paani_models.datasets.sources import Sample, Source, choose_sources, read_boxes, read_mask, read_samples
 from paani_models.detector.data import read_boxed
 from paani_models.segmenter.scores import read_truth as read_water
 from tests.unit.paani_models.datasets.public_sets import own_data, scene, write_picture
@@ -23,12 +23,12 @@ NAMES = ["tbiseg_dasha", "mcoe_boats"]
 
 
 def packed(data: Path, out: Path, max_mb: float = 1.0) -> Path:
-    pack(out, read_samples(data, choose(NAMES)), lambda source: data / source.folder, max_mb=max_mb)
+    pack_bundle(out, read_samples(data, choose_sources(NAMES)), lambda source: data / source.folder, max_mb=max_mb)
     return out
 
 
 def story(data: Path) -> list[tuple[str, str, bool, str]]:
-    samples = read_samples(data, choose(NAMES))
+    samples = read_samples(data, choose_sources(NAMES))
     return [(s.source.name, s.sequence, s.held_out, str(s.picture.relative_to(data))) for s in samples]
 
 
@@ -45,7 +45,7 @@ def test_the_same_splits_once_unpacked(name: str, tmp_path: Path) -> None:
 def test_pictures_shrink_and_masks_with_them(tmp_path: Path) -> None:
     data = own_data(tmp_path / "data")
     there = unpack(packed(data, tmp_path / "b.tar"), tmp_path / "there")
-    for sample in read_samples(there, choose(NAMES)):
+    for sample in read_samples(there, choose_sources(NAMES)):
         picture = cv2.imread(str(sample.picture))
         if sample.mask:
             assert picture is not None
@@ -63,7 +63,7 @@ def test_pictures_shrink_and_masks_with_them(tmp_path: Path) -> None:
     [((640, 512), (320, 256)), ((1920, 1080), (455, 256)), ((480, 640), (320, 427)), ((300, 200), (300, 200))],
 )
 def test_a_picture_still_covers_the_input(wh: tuple[int, int], expected: tuple[int, int]) -> None:
-    assert covering_wh(wh) == expected
+    assert cover_size_wh(wh) == expected
 
 
 def test_the_same_bytes_twice(tmp_path: Path) -> None:
@@ -76,10 +76,10 @@ def test_the_same_bytes_twice(tmp_path: Path) -> None:
 
 def test_the_quality_is_the_best_that_fits(tmp_path: Path) -> None:
     data = own_data(tmp_path / "data")
-    samples = read_samples(data, choose(NAMES))
+    samples = read_samples(data, choose_sources(NAMES))
 
     def at(max_mb: float) -> tuple[int, int]:
-        done = pack(tmp_path / "b.tar", samples, lambda s: data / s.folder, max_mb=max_mb)
+        done = pack_bundle(tmp_path / "b.tar", samples, lambda s: data / s.folder, max_mb=max_mb)
         assert done.size_bytes == (tmp_path / "b.tar").stat().st_size <= max_mb * 1e6
         return done.quality, done.size_bytes
 
@@ -147,15 +147,15 @@ def test_a_mask_only_neighbour_of_a_held_out_box_is_a_leak(tmp_path: Path) -> No
     for kind in ("masks", "masks3"):
         write_picture(data / "tbiseg_dasha" / kind / "DJI_0001_0.png", scene(1, (360, 300))[..., 0] * 0)
     held = Source("mcoe_boats", "mcoe_boats", labels="labels", annotated=frozenset({"vessel"}), held_out=("cluster5",))
-    samples: list[Sample] = read_samples(data, [*choose(["tbiseg_dasha"]), held])
-    seen = read_everything(samples, lambda source: data / source.folder)
-    assert [leak.cause for leak in detector_leaks(seen)] == ["file"]
-    assert segmenter_leaks(seen) == []
+    samples: list[Sample] = read_samples(data, [*choose_sources(["tbiseg_dasha"]), held])
+    seen = read_all_samples(samples, lambda source: data / source.folder)
+    assert [leak.cause for leak in find_detector_leaks(seen)] == ["file"]
+    assert find_segmenter_leaks(seen) == []
 
 
 def test_everything_that_training_reads_is_there(tmp_path: Path) -> None:
     there = unpack(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
     assert main(["prepare", "--data", str(there), "--sources", ",".join(NAMES)]) == 0
-    for sample in read_samples(there, choose(NAMES)):
+    for sample in read_samples(there, choose_sources(NAMES)):
         assert len(read_boxed(sample).boxes) == (2 if sample.label else 0)
         assert read_water(sample).shape == (256, 410) if sample.mask else sample.label

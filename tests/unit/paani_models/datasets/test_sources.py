@@ -7,19 +7,19 @@ import pytest
 
 from paani.errors import UserError
 from paani_models.commands.models import data_folder, main
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import (
     ANNOTATIONS,
     DETECTOR_CLASSES,
     SOURCES,
     WITHOUT_WATER,
     Source,
-    choose,
-    class_mask,
+    choose_sources,
+    decode_mask_classes,
     is_held_out,
+    list_pictures_without_water,
     read_boxes,
     read_samples,
-    without_water,
 )
 
 
@@ -30,7 +30,7 @@ def write_source(folder: Path, files: dict[str, str]) -> None:
 
 
 def test_mask_codes_r10() -> None:
-    assert class_mask(np.array([0, 1, 2, 3, 4, 255], np.uint8)).tolist() == [1, 0, 2, 255, 255, 255]
+    assert decode_mask_classes(np.array([0, 1, 2, 3, 4, 255], np.uint8)).tolist() == [1, 0, 2, 255, 255, 255]
 
 
 def test_boxes_are_corners_clipped_to_the_picture(tmp_path: Path) -> None:
@@ -76,9 +76,9 @@ def test_about_one_sequence_in_eight_is_held_out_by_name() -> None:
 
 def test_unknown_source_and_missing_manifest_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="'nowhere'"):
-        choose(["nowhere"])
+        choose_sources(["nowhere"])
     with pytest.raises(UserError, match=r"tbiseg_dasha.manifest\.json"):
-        read_samples(tmp_path, choose(["tbiseg_dasha"]))
+        read_samples(tmp_path, choose_sources(["tbiseg_dasha"]))
 
 
 @pytest.mark.data
@@ -94,7 +94,7 @@ def test_no_picture_is_on_both_sides_r8() -> None:
 def test_pictures_without_water_are_listed_once_in_order() -> None:
     listed = WITHOUT_WATER.read_text().splitlines()
     assert listed == sorted(set(listed))
-    assert without_water() == set(listed)
+    assert list_pictures_without_water() == set(listed)
 
 
 @pytest.mark.data
@@ -102,14 +102,14 @@ def test_pictures_without_water_are_listed_once_in_order() -> None:
 def test_pictures_without_water_exist_and_those_held_out_are_no_clean_pictures(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert all((data_folder() / name).is_file() for name in without_water())
+    assert all((data_folder() / name).is_file() for name in list_pictures_without_water())
     assert main(["held-out", "--without-water"]) == 0
     dry = set(capsys.readouterr().out.split())
     assert main(["held-out"]) == 0
     others = set(capsys.readouterr().out.split())
-    assert dry <= without_water()
-    assert not others & without_water()
-    trained = {s.picture for s in Pictures(data_folder(), [], None).never_held_out()}
+    assert dry <= list_pictures_without_water()
+    assert not others & list_pictures_without_water()
+    trained = {s.picture for s in PictureSelection(data_folder(), [], None).training_samples()}
     assert len(dry) >= 15
     assert not {data_folder() / name for name in dry} & trained
     assert len([s for s in read_samples(data_folder(), SOURCES) if s.without_water and s.picture in trained]) >= 45
@@ -125,9 +125,9 @@ def test_every_drawn_box_is_a_pier_inside_its_picture() -> None:
 @pytest.mark.data
 @pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
 def test_drawn_boxes_belong_to_pictures_and_a_held_out_place_is_not_trained_on() -> None:
-    pictures = Pictures(data_folder(), [], None)
+    pictures = PictureSelection(data_folder(), [], None)
     labels = {s.label for s in pictures.samples if s.source.drawn}
     assert labels == set(ANNOTATIONS.glob("*/*.txt"))
-    held_out = {s.picture for s in pictures.boxed(held_out=True) if s.source.drawn}
+    held_out = {s.picture for s in pictures.boxed_samples(held_out=True) if s.source.drawn}
     assert 8 <= len(held_out) <= 20
-    assert not held_out & {s.picture for s in pictures.boxed(held_out=False)}
+    assert not held_out & {s.picture for s in pictures.boxed_samples(held_out=False)}

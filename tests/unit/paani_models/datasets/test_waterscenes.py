@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from paani.errors import UserError
 from paani_models.commands.models import main
 from paani_models.datasets.checked_files import Box
-from paani_models.datasets.manifest import BoxCounts, count_boxes, counts_table, load_manifest
-from paani_models.datasets.sources import DETECTOR_CLASSES, choose, read_boxes, read_samples
+from paani_models.datasets.manifest import BoxCounts, count_boxes, format_counts_table, load_manifest
+from paani_models.datasets.sources import DETECTOR_CLASSES, choose_sources, read_boxes, read_samples
 from paani_models.datasets.waterscenes import (
     BOAT,
     BUOY,
@@ -24,8 +24,8 @@ from paani_models.datasets.waterscenes import (
     SHIP,
     TRAIN_IMAGES,
     VESSEL,
-    mapped,
-    prepare,
+    map_classes,
+    prepare_waterscenes,
     read_lists,
     select_train,
 )
@@ -39,7 +39,7 @@ def of(kind: int) -> Box:
 
 
 def test_the_seven_classes_map_to_four_r4() -> None:
-    kinds = [box.kind for box in mapped([of(k) for k in (PIER, BUOY, SAILOR, SHIP, BOAT, VESSEL, KAYAK)])]
+    kinds = [box.kind for box in map_classes([of(k) for k in (PIER, BUOY, SAILOR, SHIP, BOAT, VESSEL, KAYAK)])]
     assert [DETECTOR_CLASSES[k] for k in kinds] == ["pier", "buoy", "person", "vessel", "vessel", "vessel", "vessel"]
 
 
@@ -64,7 +64,7 @@ def test_lists_of_the_official_sizes_give_the_papers_pictures_r1(tmp_path: Path)
 
 def test_a_miniature_is_counted_by_split_r1_r3_r5_r6_r7(tmp_path: Path) -> None:
     """Of six training pictures four are kept: the three rare ones and one of the others, with all of their boxes."""
-    manifest, leaks = prepare(waterscenes(tmp_path / "raw"), tmp_path / "out", train_images=4)
+    manifest, leaks = prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "out", train_images=4)
     assert load_manifest(tmp_path / "out") == manifest
     assert leaks == []
     train, val, test = count_boxes(manifest)
@@ -78,9 +78,9 @@ def test_a_miniature_is_counted_by_split_r1_r3_r5_r6_r7(tmp_path: Path) -> None:
 
 
 def test_a_prepared_set_is_trained_on_by_name_and_watched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    manifest, _ = prepare(waterscenes(tmp_path / "raw"), tmp_path / "waterscenes", train_images=4)
+    manifest, _ = prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "waterscenes", train_images=4)
     sides = {
-        name: [sample.held_out for sample in read_samples(tmp_path, choose([name]))]
+        name: [sample.held_out for sample in read_samples(tmp_path, choose_sources([name]))]
         for name in ("waterscenes", "waterscenes_test")
     }
     assert sides == {"waterscenes": [False] * 4 + [True], "waterscenes_test": [True]}
@@ -92,7 +92,7 @@ def test_a_prepared_set_is_trained_on_by_name_and_watched(tmp_path: Path, capsys
 
 
 def test_the_counts_print_as_the_papers_table_r5() -> None:
-    table = counts_table((BoxCounts("train", 10_000, 5_594, 9_484, 28_301, 11_538),))
+    table = format_counts_table((BoxCounts("train", 10_000, 5_594, 9_484, 28_301, 11_538),))
     assert table.split() == [
         "split",
         "images",
@@ -112,7 +112,7 @@ def test_the_counts_print_as_the_papers_table_r5() -> None:
 def test_the_same_seed_prepares_the_same_bytes_r2(tmp_path: Path) -> None:
     raw = waterscenes(tmp_path / "raw")
     for name in ("one", "two"):
-        prepare(raw, tmp_path / name, train_images=4)
+        prepare_waterscenes(raw, tmp_path / name, train_images=4)
     one, two = (sorted(p for p in (tmp_path / n).rglob("*") if p.is_file()) for n in ("one", "two"))
     assert [p.read_bytes() for p in one] == [p.read_bytes() for p in two]
 
@@ -210,7 +210,7 @@ def test_what_is_wrong_is_named_and_nothing_is_half_written_r8(name: str, tmp_pa
     raw = waterscenes(tmp_path / "raw")
     spoil(raw)
     with pytest.raises(UserError, match=message) as refusal:
-        prepare(raw, tmp_path / "out")
+        prepare_waterscenes(raw, tmp_path / "out")
     assert "\n" not in str(refusal.value)
     assert [path.name for path in tmp_path.iterdir()] == ["raw"]
 
@@ -220,13 +220,13 @@ def test_several_mistakes_are_counted_r8(tmp_path: Path) -> None:
     for identity in ("000001", "000004"):
         (raw / "detection" / "yolo" / f"{identity}.txt").write_text("9 .5 .5 .1 .1\n")
     with pytest.raises(UserError, match=r"000001\.txt:1: unknown class 9 \(and 1 more\)"):
-        prepare(raw, tmp_path / "out")
+        prepare_waterscenes(raw, tmp_path / "out")
 
 
 def test_a_missing_label_can_be_declared_empty(tmp_path: Path) -> None:
     raw = waterscenes(tmp_path / "raw")
     _no_label(raw)
-    manifest, _ = prepare(raw, tmp_path / "out", missing_is_empty=True)
+    manifest, _ = prepare_waterscenes(raw, tmp_path / "out", missing_is_empty=True)
     assert {item.file: sum(item.boxes) for item in manifest.items}["images/000006.jpg"] == 0
 
 
@@ -235,14 +235,14 @@ def test_a_view_on_both_sides_is_told_or_refused(tmp_path: Path) -> None:
     raw = waterscenes(tmp_path / "raw")
     twin = np.clip(scene(1).astype(int) + 6, 0, 255).astype(np.uint8)
     write_picture(raw / "image" / "000007.jpg", twin)
-    _, leaks = prepare(raw, tmp_path / "out")
+    _, leaks = prepare_waterscenes(raw, tmp_path / "out")
     assert [(leak.cause, leak.first.identity, leak.second.identity) for leak in leaks] == [("view", "000001", "000007")]
     with pytest.raises(UserError, match=r"000001\.jpg \(train\) and .*000007\.jpg \(val\)"):
-        prepare(raw, tmp_path / "strict", strict=True)
+        prepare_waterscenes(raw, tmp_path / "strict", strict=True)
     assert not (tmp_path / "strict").exists()
 
 
 def test_an_existing_folder_is_never_written_into(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with pytest.raises(UserError, match="already exists"):
-        prepare(waterscenes(tmp_path / "raw"), tmp_path / "out")
+        prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "out")

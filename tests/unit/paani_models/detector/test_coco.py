@@ -8,7 +8,7 @@ from faster_coco_eval import COCO, COCOeval_faster
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paani_models.detector.metrics import Found, class_figures
+from paani_models.detector.metrics import Detections, class_figures
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +20,7 @@ def random_boxes(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.hstack([low, low + rng.uniform(2, SIDE * 0.3, (n, 2))]).astype(np.float32)
 
 
-def random_case(seed: int, pictures: int) -> tuple[list[Found], list[np.ndarray]]:
+def random_case(seed: int, pictures: int) -> tuple[list[Detections], list[np.ndarray]]:
     """Truth of two classes; of what is found, some boxes are true ones moved a little, and some are anywhere."""
     rng = np.random.default_rng(seed)
     found, truths = [], []
@@ -31,13 +31,13 @@ def random_case(seed: int, pictures: int) -> tuple[list[Found], list[np.ndarray]
         ordered = np.sort(moved.reshape(-1, 2, 2), 1).reshape(-1, 4)
         boxes = np.vstack([ordered, random_boxes(rng, 3)]).astype(np.float32)
         scores = (rng.permutation(len(boxes) * 100)[: len(boxes)] / 1000).astype(np.float32)
-        found.append(Found(boxes, scores, rng.integers(0, 2, len(boxes))))
+        found.append(Detections(boxes, scores, rng.integers(0, 2, len(boxes))))
         kinds = rng.integers(0, 2, len(truth)).astype(np.float32)
         truths.append(np.hstack([kinds[:, None], truth]))
     return found, truths
 
 
-def coco(found: list[Found], truths: list[np.ndarray], kind: int) -> tuple[float, float]:
+def coco(found: list[Detections], truths: list[np.ndarray], kind: int) -> tuple[float, float]:
     """AP50:95 and AP50 by the other evaluator; -1 without a true box."""
 
     def rows(boxes: np.ndarray) -> list[list[float]]:
@@ -87,6 +87,6 @@ def test_a_box_exactly_at_the_threshold_hits_u2() -> None:
     truth = [np.array([[0, 0, 0, 10, 10]], np.float32)]
     for height, expected in ((5, 0.1), (8, 0.7)):
         box = np.array([[0, 0, 10, height]], np.float32)
-        found = [Found(box, np.array([0.9], np.float32), np.array([0]))]
+        found = [Detections(box, np.array([0.9], np.float32), np.array([0]))]
         assert class_figures(found, truth, 0)["ap50_95"] == pytest.approx(expected)
         assert coco(found, truth, 0)[0] == pytest.approx(expected)

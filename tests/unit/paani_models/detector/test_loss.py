@@ -7,14 +7,14 @@ torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 from torch import Tensor  # noqa: E402
 
 from paani_models.detector.loss import (  # noqa: E402
-    assign,
+    assign_simota,
     box_corners,
     detector_loss,
+    exhaustive_candidates,
     generalised_iou,
     iou,
-    judged_candidates,
 )
-from paani_models.detector.shipped_shape import candidate_grid  # noqa: E402
+from paani_models.detector.shipped_network import candidate_grid  # noqa: E402
 
 pytestmark = pytest.mark.train
 
@@ -48,7 +48,7 @@ def test_the_cell_that_fits_the_object_answers_for_it() -> None:
     boxes = box_corners(as_cells())
     centres, strides = candidate_grid(*SIZE_HW)
     truth = torch.tensor([[VESSEL, 24.0, 24.0, 32.0, 32.0]])
-    owner, quality = assign(boxes, torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
+    owner, quality = assign_simota(boxes, torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
     assert owner.tolist().count(0) == 1
     assert int(quality.argmax()) == 3 * 8 + 3
     assert float(quality.max()) == pytest.approx(1.0)
@@ -57,7 +57,7 @@ def test_the_cell_that_fits_the_object_answers_for_it() -> None:
 def test_overlapping_objects_each_keep_candidates_of_their_own() -> None:
     centres, strides = candidate_grid(*SIZE_HW)
     truth = torch.tensor([[VESSEL, 8.0, 8.0, 40.0, 40.0], [BUOY, 24.0, 24.0, 56.0, 56.0]])
-    owner, _ = assign(box_corners(as_cells()), torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
+    owner, _ = assign_simota(box_corners(as_cells()), torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
     assert {0, 1} <= set(owner.tolist())
 
 
@@ -74,7 +74,7 @@ def test_background_is_punished_only_for_judged_classes() -> None:
 def test_a_coarse_candidate_is_judged_only_where_every_cell_under_it_is() -> None:
     judged = torch.ones(1, 4, *CELLS, dtype=torch.bool)
     judged[0, BUOY, 0, 0] = False
-    table = judged_candidates(judged)[0]
+    table = exhaustive_candidates(judged)[0]
     assert not table[0, BUOY]
     assert table[1, BUOY]
     assert not table[64, BUOY]

@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from paani_models.detector.metrics import Found, average_precision, class_figures, decode, match, overlaps
-from paani_models.segmenter.metrics import boundary, class_iou, confusion, edge_counts, f1
+from paani_models.detector.metrics import (
+    Detections,
+    average_precision,
+    class_figures,
+    decode_boxes,
+    iou_matrix,
+    match_boxes,
+)
+from paani_models.segmenter.metrics import boundary_pixels, class_iou, confusion_matrix, count_edge_matches, f1_score
 
 BOX = np.array([[0, 0, 10, 10]], np.float32)
 
@@ -12,7 +19,7 @@ BOX = np.array([[0, 0, 10, 10]], np.float32)
 def test_iou_ignores_255_u3() -> None:
     truth = np.array([[0, 0, 1, 255]], np.uint8)
     predicted = np.array([[0, 1, 1, 0]], np.uint8)
-    iou = class_iou(confusion(predicted, truth, 3))
+    iou = class_iou(confusion_matrix(predicted, truth, 3))
     assert iou[:2] == pytest.approx([1 / 2, 1 / 2])
     assert np.isnan(iou[2])
 
@@ -22,12 +29,12 @@ def test_boundary_is_four_connected_u4() -> None:
     mask[2, 2] = 1
     expected = np.zeros((5, 5), bool)
     expected[2, 1:4] = expected[1:4, 2] = True
-    assert np.array_equal(boundary(mask), expected)
+    assert np.array_equal(boundary_pixels(mask), expected)
 
 
 def test_ignored_pixels_make_no_boundary_u4() -> None:
     mask = np.array([[0, 0, 255, 1, 1]], np.uint8)
-    assert not boundary(mask).any()
+    assert not boundary_pixels(mask).any()
 
 
 @pytest.mark.parametrize(("shift", "expected"), [(0, 1.0), (2, 1.0), (3, 0.5), (6, 0.0)])
@@ -36,7 +43,7 @@ def test_edge_f1_tolerates_two_pixels_u4(shift: int, expected: float) -> None:
     truth, predicted = np.zeros((8, 32), np.uint8), np.zeros((8, 32), np.uint8)
     truth[:, 12:] = 1
     predicted[:, 12 + shift :] = 1
-    assert f1(*edge_counts(predicted, truth)) == pytest.approx(expected)
+    assert f1_score(*count_edge_matches(predicted, truth)) == pytest.approx(expected)
 
 
 def test_average_precision_by_hand_u1() -> None:
@@ -53,7 +60,7 @@ def test_average_precision_of_half_the_objects_u1() -> None:
 
 def test_ap50_95_averages_the_iou_steps_u2() -> None:
     """IoU 0.8 passes the seven thresholds 0.50 .. 0.80."""
-    found = Found(np.array([[0, 0, 10, 8]], np.float32), np.array([0.9], np.float32), np.array([1]))
+    found = Detections(np.array([[0, 0, 10, 8]], np.float32), np.array([0.9], np.float32), np.array([1]))
     truth = np.array([[1, 0, 0, 10, 10]], np.float32)
     figures = class_figures([found], [truth], kind=1)
     assert figures["ap50"] == pytest.approx(1.0)
@@ -63,11 +70,11 @@ def test_ap50_95_averages_the_iou_steps_u2() -> None:
 
 def test_a_second_box_on_the_same_object_is_a_false_alarm() -> None:
     twice = np.vstack([BOX, BOX])
-    assert match(twice, np.array([0.5, 0.9], np.float32), BOX, 0.5).tolist() == [False, True]
+    assert match_boxes(twice, np.array([0.5, 0.9], np.float32), BOX, 0.5).tolist() == [False, True]
 
 
 def test_overlap_by_hand() -> None:
-    assert overlaps(BOX, np.array([[5, 0, 15, 10]], np.float32))[0, 0] == pytest.approx(1 / 3)
+    assert iou_matrix(BOX, np.array([[5, 0, 15, 10]], np.float32))[0, 0] == pytest.approx(1 / 3)
 
 
 def candidates(*rows: tuple[float, ...]) -> np.ndarray:
@@ -80,28 +87,28 @@ def test_decode_drops_what_is_not_finite_c5_and_not_above_the_threshold_c6() -> 
         (np.nan, 50, 20, 20, 0, 0.9, 0, 0),
         (150, 50, 20, 20, 0.4, 0, 0, 0),
     )
-    found = decode(output, confidence=0.40)
+    found = decode_boxes(output, confidence=0.40)
     np.testing.assert_allclose(found.boxes, [[40, 40, 60, 60]])
     assert found.classes.tolist() == [1]
 
 
 def test_decode_suppresses_across_classes_c8_and_keeps_24_c9() -> None:
     pile = candidates((50, 50, 20, 20, 0, 0.9, 0, 0), (51, 50, 20, 20, 0, 0, 0, 0.8))
-    assert decode(pile, 0.40).classes.tolist() == [1]
+    assert decode_boxes(pile, 0.40).classes.tolist() == [1]
     row = candidates(*((10 * i, 50, 5, 5, 0.9, 0, 0, 0) for i in range(40)))
-    assert len(decode(row, 0.40).boxes) == 24
+    assert len(decode_boxes(row, 0.40).boxes) == 24
 
 
 def test_near_objects_are_counted_apart() -> None:
     """One object of 10 px is missed, one of 20 px is found: recall 1/2, near recall 1."""
-    found = Found(np.array([[100, 100, 120, 120]], np.float32), np.array([0.9], np.float32), np.array([0]))
+    found = Detections(np.array([[100, 100, 120, 120]], np.float32), np.array([0.9], np.float32), np.array([0]))
     truth = np.array([[0, 0, 0, 10, 10], [0, 100, 100, 120, 120]], np.float32)
     figures = class_figures([found], [truth], kind=0)
     assert (figures["recall_at_0.40"], figures["recall_16px_at_0.40"]) == (0.5, 1.0)
 
 
 def test_a_class_without_a_case_has_no_figure() -> None:
-    nothing = Found(np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64))
+    nothing = Detections(np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64))
     figures = class_figures([nothing], [np.zeros((0, 5), np.float32)], kind=0)
     assert figures.pop("n") == 0
     assert all(np.isnan(value) for value in figures.values())

@@ -17,26 +17,26 @@ from paani_models.engines.benchmark import (
     Agreement,
     Case,
     EngineReport,
-    Timed,
-    choice,
-    measured,
-    rows,
+    TimingRow,
+    choose_engine,
+    measure_rounds,
+    summarise_times,
 )
 from paani_models.engines.contract_check import MAX_DIFFERENCE
 
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[dev]")
 pytest.importorskip("ncnn", reason="needs the extra paani[ncnn]")
 
-from paani_models.engines.multiply_adds import multiply_adds  # noqa: E402
-from tests.unit.paani_models.engines.ncnn_nets import CONVOLUTION, NO_BOXES, packed, place, small_segmenter  # noqa: E402
+from paani_models.engines.multiply_adds import count_multiply_adds  # noqa: E402
+from tests.unit.paani_models.engines.ncnn_networks import CONVOLUTION, NO_BOXES, packed, place, small_segmenter  # noqa: E402
 
 
 def test_multiply_adds_by_hand(tmp_path: Path) -> None:
-    assert multiply_adds(small_segmenter(tmp_path / "own.onnx")) == 3 * 256 * 320 * 3
+    assert count_multiply_adds(small_segmenter(tmp_path / "own.onnx")) == 3 * 256 * 320 * 3
 
 
 def test_a_frame_costs_less_than_half_of_the_papers_pair() -> None:
-    total = sum(multiply_adds(verified_path(role)) or 1e9 for role in PAPER_MULTIPLY_ADDS)
+    total = sum(count_multiply_adds(verified_path(role)) or 1e9 for role in PAPER_MULTIPLY_ADDS)
     assert total < 0.5 * sum(PAPER_MULTIPLY_ADDS.values())
 
 
@@ -45,16 +45,16 @@ def test_multiply_adds_need_a_readable_static_net(tmp_path: Path) -> None:
     for value in (*model.graph.input, *model.graph.output):
         value.type.tensor_type.shape.dim[2].dim_param = "rows"
     onnx.save(model, str(tmp_path / "own.onnx"))
-    assert multiply_adds(tmp_path / "own.onnx") is None
+    assert count_multiply_adds(tmp_path / "own.onnx") is None
     (tmp_path / "own.onnx").write_bytes(b"no net")
     with pytest.raises(UserError, match=r"own\.onnx"):
-        multiply_adds(tmp_path / "own.onnx")
+        count_multiply_adds(tmp_path / "own.onnx")
 
 
-def timed(**pair_ms: float) -> list[Timed]:
+def timed(**pair_ms: float) -> list[TimingRow]:
     """`ncnn_2=40`: both nets by ncnn with two threads, half of it each."""
     return [
-        Timed(engine, net, int(threads), took / 2, took / 2, took, 9)
+        TimingRow(engine, net, int(threads), took / 2, took / 2, took, 9)
         for name, took in pair_ms.items()
         for engine, threads in [name.split("_")]
         for net in ("detector", "segmenter")
@@ -77,26 +77,26 @@ def timed(**pair_ms: float) -> list[Timed]:
 def test_the_faster_engine_is_chosen_where_it_answers_alike(
     pair_ms: dict[str, float], differ: float, engine: str
 ) -> None:
-    assert choice(timed(**pair_ms), [Agreement("detector", differ, 4)], MAX_DIFFERENCE).engine == engine
+    assert choose_engine(timed(**pair_ms), [Agreement("detector", differ, 4)], MAX_DIFFERENCE).engine == engine
 
 
 def test_an_engine_that_ran_one_net_alone_is_not_chosen() -> None:
     found = [row for row in timed(onnxruntime_1=30.0, ncnn_1=10.0) if (row.engine, row.net) != ("ncnn", "detector")]
-    assert choice(found, [], MAX_DIFFERENCE).engine == "onnxruntime"
+    assert choose_engine(found, [], MAX_DIFFERENCE).engine == "onnxruntime"
 
 
 def test_cases_take_turns() -> None:
     order: list[str] = []
     ready = {name: lambda name=name: order.append(name) for name in ("one", "other")}
-    *_, (turn, taken) = measured(ready, 4, count(0.0, 1.5).__next__)  # type: ignore[arg-type]
+    *_, (turn, taken) = measure_rounds(ready, 4, count(0.0, 1.5).__next__)  # type: ignore[arg-type]
     assert turn == 4
     assert order == ["one", "other"] * 7
     assert list(taken.values()) == [[1.5] * 4] * 2
 
 
 def test_rows_are_least_median_and_p95() -> None:
-    assert rows({Case("ncnn", "detector", 2): [4.0, 1.0, 3.0, 2.0]}) == (
-        Timed("ncnn", "detector", 2, 1.0, 2.5, 4.0, 4),
+    assert summarise_times({Case("ncnn", "detector", 2): [4.0, 1.0, 3.0, 2.0]}) == (
+        TimingRow("ncnn", "detector", 2, 1.0, 2.5, 4.0, 4),
     )
 
 

@@ -11,7 +11,7 @@ import pytest
 from onnx import TensorProto, external_data_helper, helper, numpy_helper
 
 from paani_models.catalogue import verified_path
-from paani_models.engines.last_resize import before_resize
+from paani_models.engines.last_resize import drop_last_resize
 from paani_services.perception.corridors import classify
 from paani_services.perception.engine import OnnxEngine
 
@@ -51,7 +51,7 @@ def picture() -> np.ndarray:
 @pytest.mark.parametrize(("mode", "place"), [("nearest", ASYMMETRIC), ("linear", HALF_PIXEL), ("nearest", HALF_PIXEL)])
 def test_what_the_last_step_would_have_resized(mode: str, place: str) -> None:
     whole = ends_with(4, mode=mode, place=place)
-    cut = before_resize(whole)
+    cut = drop_last_resize(whole)
     assert cut is not None
     expected = picture().reshape(1, 3, 64, 4, 80, 4).mean((3, 5))
     np.testing.assert_allclose(answer(cut, picture()), expected, atol=1e-6)
@@ -67,16 +67,16 @@ def test_what_the_last_step_would_have_resized(mode: str, place: str) -> None:
     ids=["corners stay", "cubic", "a step behind it"],
 )
 def test_other_last_steps_stay(whole: bytes) -> None:
-    assert before_resize(whole) is None
+    assert drop_last_resize(whole) is None
 
 
 def test_the_detector_has_none() -> None:
-    assert before_resize(verified_path("detector").read_bytes()) is None
+    assert drop_last_resize(verified_path("detector").read_bytes()) is None
 
 
 @pytest.mark.parametrize("model", [b"", b"\x08\x07torn", b"\x3a\xff", b"\x3a\x7f", b"\x80", ends_with(4)[:-9]])
 def test_bytes_that_are_no_model_have_none(model: bytes) -> None:
-    assert before_resize(model) is None
+    assert drop_last_resize(model) is None
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani_models.catalogue import file_sha256, load_catalogue, save_catalogue, verified_path
 from paani_models.commands.models import data_folder, main
-from paani_models.engines.contract_check import MAX_DIFFERENCE, drawn_inputs
-from paani_models.engines.ncnn_runner import converted, files_of, open_ncnn
-from paani_models.engines.onnx_runner import open_net
+from paani_models.engines.contract_check import MAX_DIFFERENCE, synthetic_inputs
+from paani_models.engines.ncnn_runner import ncnn_files, open_ncnn, verified_ncnn_files
+from paani_models.engines.onnx_runner import open_network
 from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_named
 from paani_services.perception.ncnn_engine import NcnnEngine
 from paani_services.perception.pipeline import Perceiver
@@ -27,9 +27,9 @@ from tests.pictures import river
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[dev]")
 pytest.importorskip("ncnn", reason="needs the extra paani[ncnn]")
 
-from paani_models.engines.ncnn_convert import convert, join_corners  # noqa: E402
-from paani_models.engines.parity import inputs_for, parity  # noqa: E402
-from tests.unit.paani_models.engines.ncnn_nets import (  # noqa: E402
+from paani_models.engines.ncnn_convert import convert_to_ncnn, replace_strided_slices  # noqa: E402
+from paani_models.engines.parity import measure_difference, prepare_inputs  # noqa: E402
+from tests.unit.paani_models.engines.ncnn_networks import (  # noqa: E402
     CONVOLUTION,
     NO_BOXES,
     RESIZED,
@@ -60,7 +60,7 @@ def test_both_engines_answer_alike(segmenter: Path) -> None:
     assert isinstance(one, OnnxEngine)
     assert isinstance(other, NcnnEngine)
     assert one.contract == other.contract
-    for x in drawn_inputs(one.contract).values():
+    for x in synthetic_inputs(one.contract).values():
         np.testing.assert_allclose(other.run(x), one.run(x), atol=MAX_DIFFERENCE)
     assert other.info() == f"{one.info()} ncnn"
 
@@ -84,8 +84,8 @@ def test_a_picture_is_perceived_by_ncnn(segmenter: Path, detector: Path) -> None
 def test_of_a_net_that_ends_with_a_resize_the_cells_are_read(tmp_path: Path) -> None:
     model = place(small_segmenter(tmp_path / "own.onnx"), RESIZED, packed())
     x = np.random.default_rng(2).standard_normal(SHAPE).astype(np.float32)
-    cells, whole = NcnnEngine.load("segmenter", str(model), 1).run(x), open_ncnn(files_of(model), 1)(x)
-    np.testing.assert_allclose(cells, open_net(model, 1)(x)[:, :, ::4, ::4], atol=MAX_DIFFERENCE)
+    cells, whole = NcnnEngine.load("segmenter", str(model), 1).run(x), open_ncnn(ncnn_files(model), 1)(x)
+    np.testing.assert_allclose(cells, open_network(model, 1)(x)[:, :, ::4, ::4], atol=MAX_DIFFERENCE)
     assert (cells.shape, whole.shape) == ((1, 3, 64, 80), tuple(SHAPE))
     corners_stay = place(model, RESIZED.replace("6=0", "6=1"), packed())
     assert NcnnEngine.load("segmenter", str(corners_stay), 1).run(x).shape == tuple(SHAPE)
@@ -94,10 +94,10 @@ def test_of_a_net_that_ends_with_a_resize_the_cells_are_read(tmp_path: Path) -> 
 @needs_pnnx
 def test_both_engines_read_the_same_cells_of_the_shipped_net(tmp_path: Path) -> None:
     contract = load_catalogue()["segmenter"]
-    convert(verified_path("segmenter"), "segmenter", tmp_path, None, inputs_for(contract, []))
+    convert_to_ncnn(verified_path("segmenter"), "segmenter", tmp_path, None, prepare_inputs(contract, []))
     own = NcnnEngine.load("segmenter", str(tmp_path / contract.file), 1)
     shipped = OnnxEngine.load("segmenter", "", 1)
-    for x in drawn_inputs(contract).values():
+    for x in synthetic_inputs(contract).values():
         cells = shipped.run(x)
         assert cells.shape == (1, 3, 64, 80)
         np.testing.assert_allclose(own.run(x), cells, atol=MAX_DIFFERENCE)
@@ -219,12 +219,12 @@ def test_without_pnnx_it_is_told_how_to_get_it(
 
 @pytest.mark.parametrize("name", ["detector", "segmenter"])
 def test_the_joined_corners_are_the_same_net(tmp_path: Path, name: str) -> None:
-    model = join_corners(onnx.load(str(verified_path(name))))
+    model = replace_strided_slices(onnx.load(str(verified_path(name))))
     onnx.checker.check_model(model, full_check=True)
     onnx.save(model, str(tmp_path / "joined.onnx"))
     contract = load_catalogue()[name]
-    plain, joined = open_net(verified_path(name), 1), open_net(tmp_path / "joined.onnx", 1)
-    for x in inputs_for(contract, []).values():
+    plain, joined = open_network(verified_path(name), 1), open_network(tmp_path / "joined.onnx", 1)
+    for x in prepare_inputs(contract, []).values():
         np.testing.assert_array_equal(joined(x), plain(x))
     assert not [node.name for node in model.graph.node if node.op_type == "Slice" and "input" in node.input]
 
@@ -233,9 +233,9 @@ def test_the_joined_corners_are_the_same_net(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", ["detector", "segmenter"])
 def test_the_shipped_nets_convert(tmp_path: Path, name: str) -> None:
     contract = load_catalogue()[name]
-    record = convert(verified_path(name), name, tmp_path, None, inputs_for(contract, []))
+    record = convert_to_ncnn(verified_path(name), name, tmp_path, None, prepare_inputs(contract, []))
     assert 0.0 < record.max_difference <= MAX_DIFFERENCE
-    assert converted(tmp_path / contract.file).bin.stat().st_size < 1.05 * contract.size_bytes
+    assert verified_ncnn_files(tmp_path / contract.file).bin.stat().st_size < 1.05 * contract.size_bytes
 
 
 @needs_pnnx
@@ -245,14 +245,14 @@ def test_the_shipped_nets_convert(tmp_path: Path, name: str) -> None:
 def test_both_engines_agree_on_real_pictures(tmp_path: Path, name: str) -> None:
     contract = load_catalogue()[name]
     pictures = sorted(path for path in data_folder().rglob("*.jpg") if os.access(path, os.R_OK))
-    inputs = inputs_for(contract, pictures)
-    assert len(inputs) > len(drawn_inputs(contract))
-    convert(verified_path(name), name, tmp_path, None, inputs)
+    inputs = prepare_inputs(contract, pictures)
+    assert len(inputs) > len(synthetic_inputs(contract))
+    convert_to_ncnn(verified_path(name), name, tmp_path, None, inputs)
     model = tmp_path / contract.file
-    assert parity(model, files_of(model), name, contract, inputs) <= MAX_DIFFERENCE
+    assert measure_difference(model, ncnn_files(model), name, contract, inputs) <= MAX_DIFFERENCE
 
 
 def test_open_ncnn_runs_with_more_threads(segmenter: Path) -> None:
     x = np.ones(SHAPE, np.float32)
-    one, two = (open_ncnn(files_of(segmenter), threads)(x) for threads in (1, 2))
+    one, two = (open_ncnn(ncnn_files(segmenter), threads)(x) for threads in (1, 2))
     np.testing.assert_allclose(one, two, atol=1e-6)

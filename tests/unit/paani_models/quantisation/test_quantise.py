@@ -22,12 +22,16 @@ from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import verified_path  # noqa: E402
 from paani_models.commands.models import data_folder, main  # noqa: E402
 from paani_models.datasets.sources import Sample, Source  # noqa: E402
-from paani_models.engines.onnx_runner import open_net  # noqa: E402
+from paani_models.engines.onnx_runner import open_network  # noqa: E402
 from paani_models.network_input import detector_input, segmenter_input  # noqa: E402
-from paani_models.quantisation.acceptance import PrecisionRecord, best_score, timing, verdict  # noqa: E402
-from paani_models.quantisation.calibration_pictures import PICTURES, calibration_samples, fingerprint  # noqa: E402
-from paani_models.quantisation.equalise import equalise  # noqa: E402
-from paani_models.quantisation.quantise import PAPER, RECIPES, decoding, quantise  # noqa: E402
+from paani_models.quantisation.acceptance import QuantisationRecord, decide_acceptance, largest_score, time_networks  # noqa: E402
+from paani_models.quantisation.calibration_pictures import (  # noqa: E402
+    CALIBRATION_PICTURES,
+    choose_calibration_samples,
+    hash_sample_names,
+)
+from paani_models.quantisation.equalisation import equalise_layers  # noqa: E402
+from paani_models.quantisation.quantise import PAPER, RECIPES, find_decoding_steps, quantise_network  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
 from tests.pictures import PICTURES as DRAWN  # noqa: E402
 from tests.pictures import river  # noqa: E402
@@ -103,7 +107,7 @@ def inputs(count: int) -> list[F32]:
 
 def error(net: Path, truth: Path) -> float:
     """Mean difference, as a share of the truth's deviation."""
-    one, other = open_net(net, 1), open_net(truth, 1)
+    one, other = open_network(net, 1), open_network(truth, 1)
     pairs = [(one(x), other(x)) for x in inputs(4)]
     return float(np.mean([np.abs(a - b).mean() / b.std() for a, b in pairs]))
 
@@ -113,7 +117,7 @@ def test_equalisation_changes_no_answer_and_evens_the_channels(tmp_path: Path) -
     small_net(tmp_path / "net.onnx", spread=16.0)
     assert error(tmp_path / "net.onnx", tmp_path / "even.onnx") < 1e-5
     model = onnx.load(str(tmp_path / "net.onnx"))
-    assert equalise(model) == 3
+    assert equalise_layers(model) == 3
     onnx.save(model, str(tmp_path / "equal.onnx"))
     assert error(tmp_path / "equal.onnx", tmp_path / "even.onnx") < 1e-5
     widths = {}
@@ -132,7 +136,7 @@ def test_equalisation_leaves_what_a_factor_cannot_pass(tmp_path: Path) -> None:
         if node.op_type == "Relu":
             node.op_type = "Sigmoid"
     before = [t.SerializeToString() for t in model.graph.initializer]
-    assert equalise(model) == 0
+    assert equalise_layers(model) == 0
     assert [t.SerializeToString() for t in model.graph.initializer] == before
 
 
@@ -140,12 +144,12 @@ def test_the_papers_recipe_breaks_uneven_channels_and_equalisation_mends_them_t4
     """The mechanism behind the paper's collapse: the same function, the same recipe, other scales inside."""
     small_net(tmp_path / "even.onnx")
     small_net(tmp_path / "net.onnx", spread=16.0)
-    quantise(tmp_path / "even.onnx", tmp_path / "even8.onnx", PAPER, inputs(8))
-    quantise(tmp_path / "net.onnx", tmp_path / "paper8.onnx", PAPER, inputs(8))
+    quantise_network(tmp_path / "even.onnx", tmp_path / "even8.onnx", PAPER, inputs(8))
+    quantise_network(tmp_path / "net.onnx", tmp_path / "paper8.onnx", PAPER, inputs(8))
     model = onnx.load(str(tmp_path / "net.onnx"))
-    equalise(model)
+    equalise_layers(model)
     onnx.save(model, str(tmp_path / "equal.onnx"))
-    quantise(tmp_path / "equal.onnx", tmp_path / "equal8.onnx", PAPER, inputs(8))
+    quantise_network(tmp_path / "equal.onnx", tmp_path / "equal8.onnx", PAPER, inputs(8))
     even, paper, equal = (
         error(tmp_path / f"{name}8.onnx", tmp_path / "even.onnx") for name in ("even", "paper", "equal")
     )
@@ -155,9 +159,9 @@ def test_the_papers_recipe_breaks_uneven_channels_and_equalisation_mends_them_t4
 
 
 def test_the_papers_recipe_is_signed_per_tensor_qdq_t4(tmp_path: Path) -> None:
-    assert PICTURES == 200
+    assert CALIBRATION_PICTURES == 200
     small_net(tmp_path / "net.onnx")
-    quantise(tmp_path / "net.onnx", tmp_path / "net8.onnx", RECIPES["paper"]["segmenter"], inputs(4))
+    quantise_network(tmp_path / "net.onnx", tmp_path / "net8.onnx", RECIPES["paper"]["segmenter"], inputs(4))
     model = onnx.load(str(tmp_path / "net8.onnx"))
     stored = {t.name: t for t in model.graph.initializer}
     steps = [node for node in model.graph.node if node.op_type in ("QuantizeLinear", "DequantizeLinear")]
@@ -170,22 +174,22 @@ def test_the_papers_recipe_is_signed_per_tensor_qdq_t4(tmp_path: Path) -> None:
 def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -> None:
     """Boxes up to 320 and scores up to 1 share one step, of more than 1: scores are 0, or no scores."""
     net, shown = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
-    quantise(net, tmp_path / "detector.onnx", RECIPES["paper"]["detector"], shown)
-    blind, seeing = best_score(tmp_path / "detector.onnx", shown), best_score(net, shown)
+    quantise_network(net, tmp_path / "detector.onnx", RECIPES["paper"]["detector"], shown)
+    blind, seeing = largest_score(tmp_path / "detector.onnx", shown), largest_score(net, shown)
     assert blind == 0.0 or blind > 1.0
     assert 0.0 < seeing < 1.0
-    said = verdict(0.0, 0.5, for_size=True, best_score=blind, float_best_score=seeing)
+    said = decide_acceptance(0.0, 0.5, for_size=True, largest_score=blind, float_largest_score=seeing)
     assert not said.accepted
     assert said.reason.startswith("blind: best score")
 
 
 def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
     net, shown = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
-    quantise(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], shown)
-    assert best_score(tmp_path / "detector.onnx", shown) > 0.5 * best_score(net, shown)
+    quantise_network(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], shown)
+    assert largest_score(tmp_path / "detector.onnx", shown) > 0.5 * largest_score(net, shown)
     quantised = onnx.load(str(tmp_path / "detector.onnx"))
     fed = {name: node for node in quantised.graph.node for name in node.output}
-    for output in [node for node in quantised.graph.node if node.name in decoding(onnx.load(str(net)))]:
+    for output in [node for node in quantised.graph.node if node.name in find_decoding_steps(onnx.load(str(net)))]:
         assert all(fed[name].op_type != "DequantizeLinear" for name in output.input[1:] if name in fed)
 
 
@@ -193,7 +197,7 @@ def test_a_quantised_segmenter_is_checked_and_perceives(tmp_path: Path, capsys: 
     """It takes and gives floats like any other, so the check lets it pass and perception runs it."""
     shown = [segmenter_input(picture[..., ::-1]) for picture in DRAWN.values()]
     own = tmp_path / "segmenter.onnx"
-    quantise(verified_path("segmenter"), own, RECIPES["equalised"]["segmenter"], shown)
+    quantise_network(verified_path("segmenter"), own, RECIPES["equalised"]["segmenter"], shown)
     assert main(["check", str(own)]) == 0
     assert "8-bit steps are rounded elsewhere" in capsys.readouterr().out
     header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
@@ -206,13 +210,13 @@ def test_a_quantised_segmenter_is_checked_and_perceives(tmp_path: Path, capsys: 
 
 def test_decoding_reaches_past_the_expected_distance_to_the_last_convolutions(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
-    from paani_models.detector.paper_shape import Yolo11n  # noqa: PLC0415
+    from paani_models.detector.paper_network import Yolo11n  # noqa: PLC0415
     from paani_models.recipes.onnx_export import CONTRACTS, write_onnx  # noqa: PLC0415
 
     torch.manual_seed(0)
     write_onnx(Yolo11n(), CONTRACTS["yolo11n"], tmp_path / "net.onnx")
     model = onnx.load(str(tmp_path / "net.onnx"))
-    kept = [node for node in model.graph.node if node.name in decoding(model) and node.op_type == "Conv"]
+    kept = [node for node in model.graph.node if node.name in find_decoding_steps(model) and node.op_type == "Conv"]
     weights = {t.name: t.dims for t in model.graph.initializer}
     assert sorted(tuple(weights[node.input[1]])[:2] for node in kept if "bins" not in node.input[1]) == sorted(
         [(64, 64)] * 3 + [(4, 64)] * 3
@@ -237,7 +241,7 @@ def test_decoding_reaches_past_the_expected_distance_to_the_last_convolutions(tm
 def test_the_gate_decides_by_rule_and_says_why_t5(
     loss: float, ratio: float, for_size: bool, accepted: bool, word: str
 ) -> None:
-    said = verdict(loss, ratio, for_size=for_size)
+    said = decide_acceptance(loss, ratio, for_size=for_size)
     assert said.accepted is accepted
     assert word in said.reason
     assert said.rule
@@ -245,16 +249,16 @@ def test_the_gate_decides_by_rule_and_says_why_t5(
 
 @pytest.mark.parametrize(("best", "word"), [(0.0, "0.000 where FP32 gives 0.900"), (1.65, "1.650 is no probability")])
 def test_a_blind_net_is_rejected_whatever_its_other_figures(best: float, word: str) -> None:
-    said = verdict(0.0, 0.5, for_size=True, best_score=best, float_best_score=0.9)
+    said = decide_acceptance(0.0, 0.5, for_size=True, largest_score=best, float_largest_score=0.9)
     assert not said.accepted
     assert word in said.reason
-    assert verdict(0.0, 0.5, for_size=False, best_score=0.85, float_best_score=0.9).accepted
+    assert decide_acceptance(0.0, 0.5, for_size=False, largest_score=0.85, float_largest_score=0.9).accepted
 
 
 def test_timing_runs_both_in_turn(tmp_path: Path) -> None:
     small_net(tmp_path / "net.onnx")
     ticks = iter(range(10_000))
-    taken = timing(tmp_path / "net.onnx", tmp_path / "net.onnx", inputs(1)[0], lambda: float(next(ticks)), 1)
+    taken = time_networks(tmp_path / "net.onnx", tmp_path / "net.onnx", inputs(1)[0], lambda: float(next(ticks)), 1)
     assert (taken.float_ms, taken.int8_ms, taken.ratio) == (1.0, 1.0, 1.0)
 
 
@@ -264,15 +268,15 @@ def sample(name: str, sequence: str, held_out: bool, source: str = "river") -> S
 
 def test_calibration_takes_200_sorted_training_pictures_t4() -> None:
     samples = [sample(f"{n:04}.jpg", "a", False) for n in reversed(range(500))] + [sample("0000a.jpg", "b", True)]
-    first = calibration_samples(samples, None, spread=False)
+    first = choose_calibration_samples(samples, None, spread=False)
     assert [s.picture.name for s in first] == [f"{n:04}.jpg" for n in range(200)]
-    spread = calibration_samples(samples, None, spread=True)
+    spread = choose_calibration_samples(samples, None, spread=True)
     assert len(spread) == 200
     assert spread[-1].picture.name > "0390"
-    assert fingerprint(first) != fingerprint(spread)
+    assert hash_sample_names(first) != hash_sample_names(spread)
     drawn = [sample("0.jpg", "a", False, "rendered")]
     with pytest.raises(UserError, match="no training picture"):
-        calibration_samples(drawn, None, spread=False)
+        choose_calibration_samples(drawn, None, spread=False)
 
 
 @pytest.mark.parametrize("leaked", [sample("v.jpg", "b", True), sample("w.jpg", "b", False)])
@@ -282,10 +286,10 @@ def test_a_candidate_calibrated_on_validation_pictures_is_refused_t6(tmp_path: P
     listed = tmp_path / "list.txt"
     listed.write_text(f"/pictures/t.jpg\n{leaked.picture}\n")
     with pytest.raises(UserError, match=rf"{leaked.picture.name}: is held out"):
-        calibration_samples(samples, listed, spread=False)
+        choose_calibration_samples(samples, listed, spread=False)
     listed.write_text("/pictures/t.jpg\n/pictures/unknown.jpg\n")
     with pytest.raises(UserError, match=r"unknown\.jpg: not a picture of the chosen sources"):
-        calibration_samples(samples, listed, spread=False)
+        choose_calibration_samples(samples, listed, spread=False)
 
 
 @pytest.mark.data
@@ -298,7 +302,7 @@ def test_quantise_command_writes_net_record_and_verdict_t5_t6(
     words = ["quantise", "segmenter", "--sources", "mastr1325", "--out", str(tmp_path)]
     assert main([*words, "--recipe", "paper"]) == 1
     assert "rejected: loses" in capsys.readouterr().out
-    record = msgspec.json.decode((tmp_path / "segmenter-paper.json").read_bytes(), type=PrecisionRecord)
+    record = msgspec.json.decode((tmp_path / "segmenter-paper.json").read_bytes(), type=QuantisationRecord)
     assert record.float_score - record.score > 0.05
     assert not record.verdict.accepted
     assert record.size_bytes < 0.4 * record.float_size_bytes

@@ -12,12 +12,12 @@ from torch import Tensor, nn  # noqa: E402
 
 from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import WEIGHTS  # noqa: E402
-from paani_models.detector.shipped_shape import Detector  # noqa: E402
-from paani_models.engines.onnx_runner import open_net  # noqa: E402
+from paani_models.detector.shipped_network import Detector  # noqa: E402
+from paani_models.engines.onnx_runner import open_network  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, write_onnx  # noqa: E402
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
-from paani_models.segmenter.paper_shape import Segmenter  # noqa: E402
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter  # noqa: E402
+from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
+from paani_models.segmenter.shipped_network import ShippedSegmenter  # noqa: E402
 
 pytestmark = pytest.mark.train
 
@@ -41,7 +41,7 @@ def trained(net: nn.Module) -> nn.Module:
     return net
 
 
-@pytest.mark.parametrize("make", [Segmenter, ImageNetSegmenter], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", [PaperSegmenter, ShippedSegmenter], ids=lambda make: make.__name__)
 def test_a_loaded_export_answers_like_the_file(make: type[nn.Module], tmp_path: Path) -> None:
     torch.manual_seed(0)
     path = tmp_path / "net.onnx"
@@ -50,7 +50,7 @@ def test_a_loaded_export_answers_like_the_file(make: type[nn.Module], tmp_path: 
     load_exported(loaded, path, pictures(2))
     x = pictures(1)
     with torch.no_grad():
-        difference = np.abs(loaded.eval()(x).numpy() - open_net(path)(x.numpy())).max()
+        difference = np.abs(loaded.eval()(x).numpy() - open_network(path)(x.numpy())).max()
     assert difference < 1e-4
 
 
@@ -58,8 +58,8 @@ def test_batch_statistics_start_close_to_the_stored_ones(tmp_path: Path) -> None
     """In training the net normalises by the batch; on the pictures of the statistics that changes nothing."""
     torch.manual_seed(0)
     path = tmp_path / "net.onnx"
-    write_onnx(trained(Segmenter()), CONTRACTS["segmenter"], path)
-    loaded, x = Segmenter(), pictures(3)
+    write_onnx(trained(PaperSegmenter()), CONTRACTS["segmenter"], path)
+    loaded, x = PaperSegmenter(), pictures(3)
     load_exported(loaded, path, x)
     with torch.no_grad():
         settled = loaded.eval()(x)
@@ -72,17 +72,17 @@ def test_the_shipped_detector_loads_exactly() -> None:
     load_exported(loaded, WEIGHTS / "detector.onnx", x)
     with torch.no_grad():
         ours = loaded.eval()(x).numpy()
-    theirs = open_net(WEIGHTS / "detector.onnx")(x.numpy())
+    theirs = open_network(WEIGHTS / "detector.onnx")(x.numpy())
     np.testing.assert_allclose(ours[:, 4:], theirs[:, 4:], atol=1e-4)
     np.testing.assert_allclose(ours[:, :4], theirs[:, :4], atol=1e-2)
 
 
 def test_another_net_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"detector\.onnx: \d+ convolutions, expected"):
-        load_exported(Segmenter(), WEIGHTS / "detector.onnx", pictures(1))
+        load_exported(PaperSegmenter(), WEIGHTS / "detector.onnx", pictures(1))
     (tmp_path / "torn.onnx").write_bytes(b"\x08\x07torn")
     with pytest.raises(UserError, match=r"torn\.onnx: not a readable ONNX file"):
-        load_exported(Segmenter(), tmp_path / "torn.onnx", pictures(1))
+        load_exported(PaperSegmenter(), tmp_path / "torn.onnx", pictures(1))
     bare = onnx.load(str(WEIGHTS / "detector.onnx"))
     next(node for node in bare.graph.node if node.op_type == "Conv").input.pop()
     onnx.save(bare, str(tmp_path / "bare.onnx"))

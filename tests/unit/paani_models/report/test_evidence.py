@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from paani.errors import UserError
-from paani_models.report.evidence import Evidence, Finding, Findings, pooled, read_findings, sections
+from paani_models.report.evidence import Evidence, Finding, Findings, group_by_evidence, pool_findings, read_findings
 
 
 def finding(kind: Evidence, metric: str = "miou", value: float = 0.5, n: int = 10) -> Finding:
@@ -15,22 +15,22 @@ def finding(kind: Evidence, metric: str = "miou", value: float = 0.5, n: int = 1
 
 def test_there_are_four_classes_u7() -> None:
     assert list(Evidence) == ["labelled_models", "offline_scenarios", "generated_trajectories", "board_logs"]
-    split = sections([finding(Evidence.BOARD), finding(Evidence.LABELLED)])
+    split = group_by_evidence([finding(Evidence.BOARD), finding(Evidence.LABELLED)])
     assert [len(found) for found in split.values()] == [1, 0, 0, 1]
 
 
 @pytest.mark.parametrize("other", [kind for kind in Evidence if kind is not Evidence.LABELLED])
 def test_two_classes_are_never_pooled_u7(other: Evidence) -> None:
     with pytest.raises(ValueError, match="cannot pool"):
-        pooled([finding(Evidence.LABELLED), finding(other)])
+        pool_findings([finding(Evidence.LABELLED), finding(other)])
 
 
 def test_one_class_pools_by_count() -> None:
-    assert pooled([finding(Evidence.BOARD, value=1.0, n=1), finding(Evidence.BOARD, value=0.0, n=3)]) == 0.25
+    assert pool_findings([finding(Evidence.BOARD, value=1.0, n=1), finding(Evidence.BOARD, value=0.0, n=3)]) == 0.25
     with pytest.raises(ValueError, match="cannot pool"):
-        pooled([finding(Evidence.BOARD), finding(Evidence.BOARD, metric="other")])
+        pool_findings([finding(Evidence.BOARD), finding(Evidence.BOARD, metric="other")])
     with pytest.raises(ValueError, match="cannot pool"):
-        pooled([])
+        pool_findings([])
 
 
 def test_a_file_holds_the_class_that_it_declares_u7(tmp_path: Path) -> None:

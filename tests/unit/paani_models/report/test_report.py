@@ -14,29 +14,35 @@ import pytest
 from paani.errors import UserError
 from paani.statistics.charts import bar, lines
 from paani_models.commands.models import main
-from paani_models.datasets.sources import Sample, Source, choose
-from paani_models.detector.metrics import Found
+from paani_models.datasets.sources import Sample, Source, choose_sources
+from paani_models.detector.metrics import Detections
 from paani_models.detector.scores import ScoredBoxes, confusion_counts
 from paani_models.report.estimates import (
     Evaluation,
-    alarm_estimates,
-    box_confusion,
-    box_curves,
-    box_estimates,
-    mask_confusions,
-    mask_estimates,
+    draw_box_curves,
+    estimate_boxes,
+    estimate_false_alarms,
+    estimate_masks,
+    tabulate_box_confusion,
+    tabulate_mask_confusions,
 )
 from paani_models.report.evidence import Evidence, Finding, Findings
-from paani_models.report.page import Content, page
-from paani_models.report.records import FaultCell, FaultReport, read_faults, read_record, training_charts
-from paani_models.report.tried import read_tried
+from paani_models.report.experiments import read_experiments
+from paani_models.report.page import PageContent, page
+from paani_models.report.records import (
+    FaultCell,
+    FaultReport,
+    read_faults,
+    read_training_record,
+    render_training_charts,
+)
 from paani_models.segmenter.scores import ScoredMask
 from tests.unit.paani_models.datasets.public_sets import own_data
 
 pytestmark = pytest.mark.slow
 
 RIVER = Source("river", "river", masks="masks", labels="labels", annotated=frozenset({"person", "vessel"}))
-(DASHA,) = choose(["tbiseg_dasha"])
+(DASHA,) = choose_sources(["tbiseg_dasha"])
 
 
 def sample(sequence: str, source: Source = RIVER) -> Sample:
@@ -52,16 +58,16 @@ def boxes(sequence: str, *, found: int, true: int = 1) -> ScoredBoxes:
     """One true box of class `true` in the corner; one found there of class `found`, and nothing else."""
     box = np.array([[0, 0, 20, 20]], np.float32)
     truth = np.hstack([np.array([[true]], np.float32), box])
-    return ScoredBoxes(sample(sequence), Found(box, np.array([0.9], np.float32), np.array([found])), truth)
+    return ScoredBoxes(sample(sequence), Detections(box, np.array([0.9], np.float32), np.array([found])), truth)
 
 
 def evaluation() -> Evaluation:
     masks = [mask("a", 90, 10), mask("b", 50, 50), mask("c", 99, 1, DASHA)]
     scored = [boxes("a", found=1), boxes("b", found=0), boxes("b", found=1)]
     return Evaluation(
-        estimates=(*mask_estimates(masks), *box_estimates(scored)),
-        curves=box_curves(scored),
-        confusions=(*mask_confusions(masks), box_confusion(scored)),
+        estimates=(*estimate_masks(masks), *estimate_boxes(scored)),
+        curves=draw_box_curves(scored),
+        confusions=(*tabulate_mask_confusions(masks), tabulate_box_confusion(scored)),
     )
 
 
@@ -87,10 +93,10 @@ def test_boxes_are_estimated_per_class_u1() -> None:
 
 def test_false_alarms_are_a_rate_per_picture() -> None:
     samples = [sample("a", DASHA), sample("a", DASHA), sample("b", DASHA), sample("b", DASHA)]
-    whole, first, second = alarm_estimates(samples, [0, 1, 3, 4])
+    whole, first, second = estimate_false_alarms(samples, [0, 1, 3, 4])
     assert (whole.value, whole.low, whole.high, whole.n) == (2.0, 0.5, 3.5, 4)
     assert (first.value, second.value) == (0.5, 3.5)
-    assert "per picture on rivers" in page(Content(Evaluation(estimates=(whole, first, second))))
+    assert "per picture on rivers" in page(PageContent(Evaluation(estimates=(whole, first, second))))
 
 
 def test_a_curve_ends_at_the_reached_recall_u1() -> None:
@@ -103,7 +109,8 @@ def test_a_curve_ends_at_the_reached_recall_u1() -> None:
 def test_box_confusion_by_hand() -> None:
     """A vessel found, a vessel called person, a buoy found where buoys are not annotated, an object missed."""
     missed = replace(
-        boxes("c", found=1), found=Found(np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, int))
+        boxes("c", found=1),
+        detections=Detections(np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, int)),
     )
     stray = boxes("d", found=3, true=1)
     stray = replace(stray, truth=np.zeros((0, 5), np.float32))
@@ -121,7 +128,7 @@ def finding(kind: Evidence) -> Finding:
 
 def test_four_sections_that_do_not_mix_u7() -> None:
     kinds = [Evidence.SCENARIOS, Evidence.TRAJECTORIES, Evidence.BOARD]
-    text = page(Content(evaluation(), findings=[finding(kind) for kind in reversed(kinds)]))
+    text = page(PageContent(evaluation(), findings=[finding(kind) for kind in reversed(kinds)]))
     parts = re.findall(r'<section id="(\w+)">(.*?)</section>', text, re.DOTALL)
     assert [name for name, _ in parts] == list(Evidence)
     for kind in kinds:
@@ -132,16 +139,16 @@ def test_four_sections_that_do_not_mix_u7() -> None:
 
 def test_an_evaluation_of_another_class_is_refused_u7() -> None:
     with pytest.raises(ValueError, match="board_logs"):
-        page(Content(msgspec.structs.replace(evaluation(), evidence=Evidence.BOARD)))
+        page(PageContent(msgspec.structs.replace(evaluation(), evidence=Evidence.BOARD)))
 
 
 def test_what_was_not_given_is_said() -> None:
-    assert page(Content(evaluation())).count("Nothing was given for this class.") == 3
+    assert page(PageContent(evaluation())).count("Nothing was given for this class.") == 3
 
 
 def test_the_page_asks_no_other_host_and_escapes_names() -> None:
     odd = Finding(evidence=Evidence.BOARD, metric="<script>", source="a&b", value=1, n=1)
-    text = page(Content(evaluation(), findings=[odd], runs={"<run>": [{"epoch": 1.0, "loss": 2.0}]}))
+    text = page(PageContent(evaluation(), findings=[odd], runs={"<run>": [{"epoch": 1.0, "loss": 2.0}]}))
     assert "//" not in text.replace("</", "")
     assert "<script>" not in text
     assert "<run>" not in text
@@ -160,28 +167,28 @@ def test_charts_are_well_formed() -> None:
 
 def test_training_records_become_curves(tmp_path: Path) -> None:
     (tmp_path / "epochs.jsonl").write_text('{"epoch":1,"loss":2,"miou":0.5,"person":{"ap50":0.1,"n":9}}\n')
-    rows = read_record(tmp_path)
+    rows = read_training_record(tmp_path)
     assert rows == [{"epoch": 1.0, "loss": 2.0, "miou": 0.5, "person ap50": 0.1, "person n": 9.0}]
-    charts = training_charts(rows)
+    charts = render_training_charts(rows)
     assert charts.count("<svg") == 2
     assert "person ap50" in charts
     assert "person n" not in charts
-    assert training_charts([]) == ""
+    assert render_training_charts([]) == ""
 
 
 def test_bad_records_are_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"holds neither epochs\.jsonl"):
-        read_record(tmp_path)
+        read_training_record(tmp_path)
     (tmp_path / "epochs.jsonl").write_text('{"epoch":1}\n{\n')
     with pytest.raises(UserError, match=r"epochs\.jsonl:2"):
-        read_record(tmp_path)
+        read_training_record(tmp_path)
     with pytest.raises(UserError, match=r"faults\.json"):
         read_faults(tmp_path / "faults.json")
 
 
 def test_faults_are_drawn() -> None:
     cells = tuple(FaultCell("heavy_blur", severity, 10, severity, 0.5) for severity in range(1, 6))
-    text = page(Content(evaluation(), faults=FaultReport(cells)))
+    text = page(PageContent(evaluation(), faults=FaultReport(cells)))
     assert "heavy blur" in text
     assert "Below 0.60" in text
 
@@ -214,7 +221,7 @@ def test_a_whole_report_of_a_miniature(data: Path, tmp_path: Path) -> None:
     assert {e.source for e in written.estimates} == {"tbiseg_dasha", "mcoe_boats", "all"}
     assert [m.name for m in written.models] == ["segmenter", "detector"]
     assert all(text.count(title) for title in ("what was tried", "where its mistakes lie", "what limits it"))
-    measured = [row for row in read_tried(out) if not row.asked and row.sha256 == written.models[0].sha256]
+    measured = [row for row in read_experiments(out) if not row.asked and row.sha256 == written.models[0].sha256]
     assert [figure.n for row in measured for figure in row.figures] == [4]
 
 

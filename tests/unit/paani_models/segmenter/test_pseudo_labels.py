@@ -10,7 +10,7 @@ from pathlib import Path  # noqa: E402
 from torch import Tensor, nn  # noqa: E402
 
 from paani_models.datasets.sources import IGNORE, Sample, Source  # noqa: E402
-from paani_models.segmenter.pseudo_labels import pseudo_labelled, without_box_cores  # noqa: E402
+from paani_models.segmenter.pseudo_labels import ignore_box_cores, pseudo_label_pictures  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, UNSEGMENTED, CachedPicture  # noqa: E402
 
 pytestmark = pytest.mark.train
@@ -33,7 +33,7 @@ def test_only_sure_answers_become_labels_and_people_stay_right() -> None:
     drawn = CachedPicture("river", picture, np.full((height, width), 1, np.uint8))
     bare = CachedPicture(UNSEGMENTED, picture, np.full((height, width), IGNORE, np.uint8))
     samples = [Sample(Source("s", "s"), "", False, Path("a.jpg"), None, None)] * 2
-    kept, made = pseudo_labelled(SureBelow(), [drawn, bare], samples)
+    kept, made = pseudo_label_pictures(SureBelow(), [drawn, bare], samples)
     assert kept is drawn
     assert (made.mask[: height // 2 - 2] == 2).all()
     assert (made.mask[height // 2 + 2 :, : width // 2 - 4] == 0).all()
@@ -43,7 +43,7 @@ def test_only_sure_answers_become_labels_and_people_stay_right() -> None:
 def test_the_core_of_a_box_is_never_water() -> None:
     mask = np.zeros((100, 100), np.uint8)
     mask[50:] = 1
-    cleaned = without_box_cores(mask, np.array([[1, 0.2, 0.2, 0.8, 0.8]], np.float32))
+    cleaned = ignore_box_cores(mask, np.array([[1, 0.2, 0.2, 0.8, 0.8]], np.float32))
     assert (cleaned[33:50, 33:67] == IGNORE).all()
     assert (cleaned[50:] == 1).all()
     assert (cleaned[:30] == 0).all()

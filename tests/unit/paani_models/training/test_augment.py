@@ -9,12 +9,12 @@ import pytest
 from paani_models.datasets.sources import NO_CRAFT, Source
 from paani_models.detector.data import (
     BoxedPicture,
-    augmented,
-    close_up,
-    judged_by_mask,
-    place,
-    plain,
-    random_placement,
+    augment_example,
+    close_up_affine,
+    exhaustive_mask_from_classes,
+    letterbox_example,
+    random_letterbox_affine,
+    warp_example,
 )
 from paani_models.network_input import letterbox_affine
 from paani_models.training import augment
@@ -34,10 +34,10 @@ def scene() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     "function",
     [
-        augment.glare,
+        augment.add_glare,
         augment.jitter_colour,
-        augment.degrade,
-        lambda rng, _: augment.null_picture(rng, SIZE_WH),
+        augment.degrade_picture,
+        lambda rng, _: augment.draw_null_picture(rng, SIZE_WH),
     ],
     ids=["glare", "jitter", "degrade", "null"],
 )
@@ -53,7 +53,7 @@ def test_the_same_seed_gives_the_same_bytes_s12(function: Callable[..., np.ndarr
 def test_glare_leaves_its_input_alone_and_brightens_the_dark_s8() -> None:
     picture = scene()[0]
     before = picture.copy()
-    lit = [augment.glare(np.random.default_rng(s), picture) for s in range(20)]
+    lit = [augment.add_glare(np.random.default_rng(s), picture) for s in range(20)]
     assert np.array_equal(picture, before)
     dark = picture[..., 0] == 30
     assert all((out[dark] >= 30).all() for out in lit)
@@ -80,7 +80,7 @@ def test_mask_follows_the_picture() -> None:
 def test_null_pictures_are_all_obstacle_and_of_many_kinds() -> None:
     pictures = []
     for seed in range(60):
-        picture, mask = augment.segmenter_null(np.random.default_rng(seed), SIZE_WH)
+        picture, mask = augment.draw_null_pair(np.random.default_rng(seed), SIZE_WH)
         assert (mask == OBSTACLE_CLASS).all()
         pictures.append(picture)
     means = [p.mean() for p in pictures]
@@ -103,7 +103,9 @@ def test_letterbox_is_centred_c3() -> None:
 def test_boxes_follow_the_picture() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        example = place(boxed((1, 1, 1, 1)), random_placement(rng, (384, 288), SIZE_WH, (0.6, 1.2)), SIZE_WH)
+        example = warp_example(
+            boxed((1, 1, 1, 1)), random_letterbox_affine(rng, (384, 288), SIZE_WH, (0.6, 1.2)), SIZE_WH
+        )
         bright = np.argwhere(example.picture[..., 0] > 170)
         if len(example.boxes) == 0:
             continue
@@ -112,25 +114,25 @@ def test_boxes_follow_the_picture() -> None:
 
 
 def test_the_border_is_judged_and_the_unannotated_picture_is_not() -> None:
-    example = plain(boxed((0, 1, 0, 1)), SIZE_WH)
-    assert example.judged[1].all()
-    assert example.judged[0, 0].all()
-    assert not example.judged[0, 4:28].any()
+    example = letterbox_example(boxed((0, 1, 0, 1)), SIZE_WH)
+    assert example.exhaustive_mask[1].all()
+    assert example.exhaustive_mask[0, 0].all()
+    assert not example.exhaustive_mask[0, 4:28].any()
 
 
 def test_a_box_cut_off_by_the_frame_is_neither_object_nor_background() -> None:
     affine = np.array([[1.0, 0, -245.0], [0, 1.0, 0]], np.float32)
-    example = place(boxed((1, 1, 1, 1)), affine, SIZE_WH)
+    example = warp_example(boxed((1, 1, 1, 1)), affine, SIZE_WH)
     assert len(example.boxes) == 0
-    assert not example.judged[1, 13:22, 0].any()
-    assert example.judged[1, 13:22, 4:].all()
+    assert not example.exhaustive_mask[1, 13:22, 0].any()
+    assert example.exhaustive_mask[1, 13:22, 4:].all()
 
 
 def test_mosaic_keeps_each_pictures_own_judgement() -> None:
-    example = augmented(np.random.default_rng(3), [boxed((0, 1, 0, 0)), *[boxed((1, 1, 1, 1))] * 3], SIZE_WH)
-    assert example.judged[1].any()
-    assert not example.judged[0].all()
-    assert example.judged[0].any()
+    example = augment_example(np.random.default_rng(3), [boxed((0, 1, 0, 0)), *[boxed((1, 1, 1, 1))] * 3], SIZE_WH)
+    assert example.exhaustive_mask[1].any()
+    assert not example.exhaustive_mask[0].all()
+    assert example.exhaustive_mask[0].any()
 
 
 def river_with_bow() -> np.ndarray:
@@ -143,7 +145,7 @@ def river_with_bow() -> np.ndarray:
 
 def test_a_mask_tells_where_nothing_floats() -> None:
     mask = river_with_bow()
-    judged = judged_by_mask(Source("river", "river"), mask, np.zeros((*mask.shape, 3), np.uint8))
+    judged = exhaustive_mask_from_classes(Source("river", "river"), mask, np.zeros((*mask.shape, 3), np.uint8))
     assert judged[:, 150, 20].all()
     assert judged[:, 20, 20].all()
     assert not judged[:, 90, 20].any()
@@ -154,10 +156,10 @@ def test_a_mask_tells_where_nothing_floats() -> None:
 def test_a_source_without_craft_and_an_own_hull_are_judged() -> None:
     mask = river_with_bow()
     picture = np.zeros((*mask.shape, 3), np.uint8)
-    judged = judged_by_mask(Source("river", "river", empty_of=NO_CRAFT), mask, picture)
+    judged = exhaustive_mask_from_classes(Source("river", "river", empty_of=NO_CRAFT), mask, picture)
     assert judged[[1, 3]].all()
     assert not judged[[0, 2], 90, 20].any()
-    judged = judged_by_mask(Source("river", "river", own_hull=True), mask, picture)
+    judged = exhaustive_mask_from_classes(Source("river", "river", own_hull=True), mask, picture)
     assert judged[:, 230, 160].all()
     assert not judged[:, 90, 20].any()
 
@@ -178,7 +180,7 @@ def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
 
 
 def test_concrete_is_smooth_grey_and_its_own_every_time() -> None:
-    walls = [augment.concrete(np.random.default_rng(seed)) for seed in range(12)]
+    walls = [augment.draw_concrete(np.random.default_rng(seed)) for seed in range(12)]
     assert len({wall.tobytes() for wall in walls}) == 12
     assert all(np.abs(wall.astype(int) - wall.mean(2, keepdims=True)).mean() < 16 for wall in walls)
 
@@ -188,11 +190,11 @@ def test_patches_are_cut_from_obstacle_only() -> None:
     mask = np.zeros((288, 384), np.uint8)
     mask[:200] = OBSTACLE_CLASS
     picture[:200] = 9
-    patches = [augment.obstacle_patch(np.random.default_rng(seed), picture, mask) for seed in range(20)]
+    patches = [augment.crop_obstacle(np.random.default_rng(seed), picture, mask) for seed in range(20)]
     found = [patch for patch in patches if patch is not None]
     assert len(found) >= 10
     assert all((patch == 9).mean() >= 0.95 for patch in found)
-    assert augment.obstacle_patch(np.random.default_rng(0), picture, np.zeros_like(mask)) is None
+    assert augment.crop_obstacle(np.random.default_rng(0), picture, np.zeros_like(mask)) is None
 
 
 def test_mirrored_water_changes_water_only() -> None:
@@ -201,11 +203,11 @@ def test_mirrored_water_changes_water_only() -> None:
     picture[:48] = (220, 30, 30)
     mask = np.full((96, 128), 1, np.uint8)
     mask[48:] = 0
-    mirrored = augment.mirror_water(np.random.default_rng(0), picture, mask)
+    mirrored = augment.mirror_banks_in_water(np.random.default_rng(0), picture, mask)
     assert np.array_equal(mirrored[:48], picture[:48])
     assert mirrored[50:, :, 0].mean() > 60
     dry = np.full((96, 128), 1, np.uint8)
-    assert np.array_equal(augment.mirror_water(np.random.default_rng(0), picture, dry), picture)
+    assert np.array_equal(augment.mirror_banks_in_water(np.random.default_rng(0), picture, dry), picture)
 
 
 def test_a_close_up_gives_a_small_object_its_pixels_and_keeps_it_in_view() -> None:
@@ -216,9 +218,9 @@ def test_a_close_up_gives_a_small_object_its_pixels_and_keeps_it_in_view() -> No
         np.ones(4, np.uint8),
     )
     for seed in range(30):
-        affine = close_up(np.random.default_rng(seed), item, (320, 256))
+        affine = close_up_affine(np.random.default_rng(seed), item, (320, 256))
         assert affine is not None
-        kept = {int(row[0]): row for row in place(item, affine, (320, 256)).boxes}
+        kept = {int(row[0]): row for row in warp_example(item, affine, (320, 256)).boxes}
         assert 0 in kept
         assert 4.9 <= min(kept[0][3] - kept[0][1], kept[0][4] - kept[0][2]) <= 24.1
-    assert close_up(np.random.default_rng(0), replace(item, boxes=item.boxes[1:]), (320, 256)) is None
+    assert close_up_affine(np.random.default_rng(0), replace(item, boxes=item.boxes[1:]), (320, 256)) is None

@@ -6,14 +6,14 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from paani_models.training.loop import Progress, load_checkpoint  # noqa: E402
+from paani_models.training.training_state import TrainingState, load_checkpoint  # noqa: E402
 
 pytestmark = pytest.mark.train
 
 
-def finished(folder: Path, scores: list[float]) -> Progress:
+def finished(folder: Path, scores: list[float]) -> TrainingState:
     """A run whose only weight counts the epochs."""
-    progress = Progress(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
+    progress = TrainingState(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
     for epoch, score in enumerate(scores, 1):
         progress.average.model.weight.data.fill_(epoch)
         progress.finish_epoch(folder, {}, score)
@@ -30,7 +30,7 @@ def test_best_is_the_epoch_with_the_highest_validation_score_s9(tmp_path: Path, 
 
 def test_a_resumed_run_still_knows_its_best_s9(tmp_path: Path) -> None:
     finished(tmp_path, [0.2, 0.9, 0.5])
-    resumed = Progress(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
+    resumed = TrainingState(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0)
     resumed.resume(tmp_path, {})
     resumed.finish_epoch(tmp_path, {}, 0.6)
     assert load_checkpoint(tmp_path / "best.pt")["epoch"] == 2

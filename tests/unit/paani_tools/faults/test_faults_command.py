@@ -14,7 +14,7 @@ from paani.cli import main
 from paani.messages import UnusableCause
 from paani.picture_faults import FAULTS, MOVES
 from paani_tools.faults.corpus import Scene
-from paani_tools.faults.measure import CellFigures, CleanFigures, cell_figures, joint, mean_iou, totals
+from paani_tools.faults.measure import CleanFigures, LevelFigures, count_classes, mean_iou, measure_levels, sum_up
 from tests.pictures import noisy, river
 
 pytestmark = pytest.mark.slow
@@ -87,12 +87,12 @@ def test_mistakes_are_named(corpus: Path, what: str, capsys: pytest.CaptureFixtu
 
 def test_totals_are_shares_of_settled_cells() -> None:
     cells = (
-        CellFigures("rain", 1, 10, 0.9, 1),  # must be accepted, one refused
-        CellFigures("rain", 3, 10, 0.7, 7),  # either
-        CellFigures("rain", 5, 10, 0.4, 8),  # must be refused, two let through
-        CellFigures("above_water", 5, 10, 0.0, 10),
+        LevelFigures("rain", 1, 10, 0.9, 1),  # must be accepted, one refused
+        LevelFigures("rain", 3, 10, 0.7, 7),  # either
+        LevelFigures("rain", 5, 10, 0.4, 8),  # must be refused, two let through
+        LevelFigures("above_water", 5, 10, 0.0, 10),
     )
-    found = totals(cells, (CleanFigures("a", 40, 1), CleanFigures("b", 60, 0)))
+    found = sum_up(cells, (CleanFigures("a", 40, 1), CleanFigures("b", 60, 0)))
     assert (found.false_accept_frac, found.false_reject_frac, found.clean_reject_frac) == (0.1, 0.1, 0.01)
 
 
@@ -101,7 +101,7 @@ def test_a_perfect_segmenter_and_a_deaf_gate() -> None:
     mask = np.zeros((240, 320), np.uint8)
     mask[:100] = 2
     scene = Scene("a", "s", river(), mask)
-    answers = iter(cell_figures([scene], lambda bgr: mask[2::4, 2::4], lambda bgr: UnusableCause.NONE))
+    answers = iter(measure_levels([scene], lambda bgr: mask[2::4, 2::4], lambda bgr: UnusableCause.NONE))
     first = next(answers)
     assert (first.fault, first.miou, first.rejected, first.verdict) == ("black", 1.0, 0, "accept")
 
@@ -109,4 +109,4 @@ def test_a_perfect_segmenter_and_a_deaf_gate() -> None:
 def test_mean_iou_by_hand() -> None:
     truth = np.array([[0, 0, 1, 255]], np.uint8)
     predicted = np.array([[0, 1, 1, 2]], np.uint8)
-    assert mean_iou(joint(predicted, truth)) == pytest.approx((1 / 2 + 1 / 2) / 2)
+    assert mean_iou(count_classes(predicted, truth)) == pytest.approx((1 / 2 + 1 / 2) / 2)

@@ -13,8 +13,8 @@ import pytest
 from paani.errors import UserError
 from paani_models.benchmarks.lars import read_prediction
 from paani_models.benchmarks.mods import Obstacle
-from paani_models.benchmarks.mods_tracks import Results
-from paani_models.benchmarks.run import boxes_in_picture, outside, read_calibration, true_rows
+from paani_models.benchmarks.mods_detection import Results
+from paani_models.benchmarks.score_networks import annotated_rows, boxes_in_picture, drop_ignored, read_calibration
 from paani_models.commands.models import main
 from tests.pictures import river
 from tests.unit.paani_models.datasets.public_sets import write_picture
@@ -123,9 +123,9 @@ def test_boxes_mostly_in_the_ignored_part_are_left_out() -> None:
     ignored = np.zeros((100, 100), bool)
     ignored[:50] = True
     rows = np.array([[0, 10, 40, 20, 60], [0, 10, 39, 20, 59], [0, 10, 10, 20, 20]], np.float32)
-    assert outside(rows, ignored).tolist() == [rows[0].tolist()]
+    assert drop_ignored(rows, ignored).tolist() == [rows[0].tolist()]
 
 
 def test_annotated_types_are_the_files() -> None:
     kinds = [Obstacle(kind, (1, 2, 3, 4), 12) for kind in ("ship", "person", "other", "negative")]
-    assert true_rows(kinds).tolist() == [[0, 1, 2, 4, 6], [1, 1, 2, 4, 6], [2, 1, 2, 4, 6]]
+    assert annotated_rows(kinds).tolist() == [[0, 1, 2, 4, 6], [1, 1, 2, 4, 6], [2, 1, 2, 4, 6]]

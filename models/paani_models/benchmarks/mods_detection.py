@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani_models.benchmarks.mods import Dataset
-from paani_models.detector.metrics import match
+from paani_models.detector.metrics import match_boxes
 
 MIN_IOU = 0.3
 TYPE_OF = {"vessel": 0, "person": 1, "pier": 2, "buoy": 2}  # ship, person, other
@@ -64,7 +64,7 @@ def as_detections(classes: list[str], corners: NDArray[np.float32]) -> tuple[Det
     return tuple(found)
 
 
-def results(name: str, dataset: Dataset, found: Mapping[tuple[int, int], tuple[Detection, ...]]) -> Results:
+def build_results(name: str, dataset: Dataset, found: Mapping[tuple[int, int], tuple[Detection, ...]]) -> Results:
     """The file's content for every annotated frame. found: by sequence id and frame id; absent means none."""
     sequences = tuple(
         SequenceResult(
@@ -96,7 +96,7 @@ def f_score(pairs: list[tuple[NDArray[np.float32], NDArray[np.float32]]], *, by_
         for kind in kinds:
             mine, real = (rows if kind is None else rows[rows[:, 0] == kind] for rows in (ours, theirs))
             scores = np.ones(len(mine), np.float32)
-            found_right += int(match(mine[:, 1:], scores, real[:, 1:], MIN_IOU).sum())
+            found_right += int(match_boxes(mine[:, 1:], scores, real[:, 1:], MIN_IOU).sum())
         found += len(ours)
         true += len(theirs)
     return 2 * found_right / (found + true) if found + true else 1.0

@@ -1,7 +1,7 @@
 """Do FP32 and INT8 nets say on the board's processor what they say here? Under emulation: answers, not speed.
 
     tests/bench/aarch64_root.sh runs/aarch64
-    .venv/bin/python tests/bench/aarch64_nets.py runs/aarch64 segmenter runs/int8/segmenter-equalised.onnx
+    .venv/bin/python tests/bench/aarch64_networks.py runs/aarch64 segmenter runs/int8/segmenter-equalised.onnx
 
 Prints one JSON object: the score (mIoU, AP50) of both nets here and there on the same held-out pictures, and how far
 the answers lie apart.
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from paani.arrays import F32
 from paani_models.catalogue import verified_path
 from paani_models.commands.models import data_folder
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_picture
-from paani_models.detector.data import plain, read_boxed
-from paani_models.detector.metrics import ap50, decode, judge
-from paani_models.engines.onnx_runner import open_net
+from paani_models.detector.data import letterbox_example, read_boxed
+from paani_models.detector.metrics import ap50, decode_boxes, match_class
+from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
-from paani_models.segmenter.metrics import class_iou, confusion
-from paani_models.segmenter.scores import as_label, read_truth, restrict, scored_classes
+from paani_models.segmenter.metrics import class_iou, confusion_matrix
+from paani_models.segmenter.scores import label_from_logits, merge_undrawn_sky, read_truth, scored_classes
 
 TIME_LIMIT_S = 900
 WORKER = """
@@ -51,16 +51,16 @@ def main() -> int:
     parser.add_argument("int8", type=Path)
     parser.add_argument("--pictures", type=int, default=40)
     options = parser.parse_args()
-    pictures = Pictures(data_folder(), [], None)
+    pictures = PictureSelection(data_folder(), [], None)
     segmenting = options.net == "segmenter"
-    held_out = pictures.segmented(held_out=True) if segmenting else pictures.boxed(held_out=True)
+    held_out = pictures.segmented_samples(held_out=True) if segmenting else pictures.boxed_samples(held_out=True)
     samples = held_out[:: max(1, len(held_out) // options.pictures)][: options.pictures]
     prepare = segmenter_input if segmenting else detector_input
     inputs = np.concatenate([prepare(read_picture(sample.picture)) for sample in samples])
     score = _miou if segmenting else _ap50
     result: dict[str, float] = {"pictures": len(samples)}
     for kind, net in (("fp32", verified_path(options.net)), ("int8", options.int8)):
-        run = open_net(net, 1)
+        run = open_network(net, 1)
         here = np.concatenate([run(x[None]) for x in inputs])
         there = _emulated(options.root, net, inputs)
         if segmenting:
@@ -88,20 +88,24 @@ def _miou(outputs: F32, samples: list[Sample]) -> float:
     kinds = {sample.source.name: scored_classes(sample.source) for sample in samples}
     for output, sample in zip(outputs, samples, strict=True):
         truth = read_truth(sample)
-        label = restrict(as_label(output[None], truth.shape), sample.source)
-        counts[sample.source.name] = counts.get(sample.source.name, 0) + confusion(label, truth, len(SEGMENTER_CLASSES))
+        label = merge_undrawn_sky(label_from_logits(output[None], truth.shape), sample.source)
+        counts[sample.source.name] = counts.get(sample.source.name, 0) + confusion_matrix(
+            label, truth, len(SEGMENTER_CLASSES)
+        )
     ious = [class_iou(counts[name])[[SEGMENTER_CLASSES.index(k) for k in kinds[name]]] for name in counts]
     return float(np.mean([np.nanmean(iou) for iou in ious]))
 
 
 def _ap50(outputs: F32, samples: list[Sample]) -> float:
     """AP50 averaged over the classes that occur."""
-    found = [decode(output, 0.01, 100) for output in outputs]
-    truths = [plain(read_boxed(sample), SIZE_WH).boxes for sample in samples]
+    found = [decode_boxes(output, 0.01, 100) for output in outputs]
+    truths = [letterbox_example(read_boxed(sample), SIZE_WH).boxes for sample in samples]
     values = []
     for kind, name in enumerate(DETECTOR_CLASSES):
         judged = [
-            judge(f, t, kind) for f, t, s in zip(found, truths, samples, strict=True) if name in s.source.annotated
+            match_class(f, t, kind)
+            for f, t, s in zip(found, truths, samples, strict=True)
+            if name in s.source.annotated
         ]
         values.append(ap50(judged) if judged else float("nan"))
     return float(np.nanmean(values))

@@ -1,7 +1,7 @@
 """A detector of YOLO11n's published shape: 2,582,932 parameters once batch norm is folded (C12).
 
 Written from the architecture's description, with no code or weights of its authors. Same contract as
-`paani_models.detector.shipped_shape`: RGB 0..1 float32 [N,3,H,W] (H, W multiples of 32) -> float32 [N,8,A], rows
+`paani_models.detector.shipped_network`: RGB 0..1 float32 [N,3,H,W] (H, W multiples of 32) -> float32 [N,8,A], rows
 cx, cy, w, h in input pixels, then the scores of person, vessel, pier, buoy in 0..1; candidates over strides 8, 16,
 32, row by row.
 """
@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from paani_models.datasets.sources import DETECTOR_CLASSES
-from paani_models.detector.shipped_shape import cell_corners
+from paani_models.detector.shipped_network import cell_corners
 
 STRIDES = (8, 16, 32)
 FUSED_PARAMETERS = 2_582_932  # C12
@@ -41,7 +41,7 @@ class Conv(nn.Module):
         return cast(Tensor, y if self.linear else F.silu(y))
 
 
-class Residual(nn.Module):
+class ResidualBlock(nn.Module):
     """Two 3x3 convolutions beside the identity."""
 
     def __init__(self, channels: int, inner: int) -> None:
@@ -52,28 +52,28 @@ class Residual(nn.Module):
         return x + cast(Tensor, self.layers(x))
 
 
-class Partial(nn.Module):
+class NestedCspBlock(nn.Module):
     """Half of the channels through two residuals, half past them."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
         half = channels // 2
         self.through, self.past = Conv(channels, half), Conv(channels, half)
-        self.blocks = nn.Sequential(Residual(half, half), Residual(half, half))
+        self.blocks = nn.Sequential(ResidualBlock(half, half), ResidualBlock(half, half))
         self.join = Conv(channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:
         return cast(Tensor, self.join(torch.cat([self.blocks(self.through(x)), self.past(x)], 1)))
 
 
-class Split(nn.Module):
+class CspBlock(nn.Module):
     """Two halves, one of them also through a block; all three joined. `deep`: the block is itself partial."""
 
     def __init__(self, cin: int, cout: int, deep: bool, inner_frac: float = 0.5) -> None:
         super().__init__()
         self.inner = inner = int(cout * inner_frac)
         self.open = Conv(cin, 2 * inner)
-        self.block = Partial(inner) if deep else Residual(inner, inner // 2)
+        self.block = NestedCspBlock(inner) if deep else ResidualBlock(inner, inner // 2)
         self.join = Conv(3 * inner, cout)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -81,7 +81,7 @@ class Split(nn.Module):
         return cast(Tensor, self.join(torch.cat([kept, last, self.block(last)], 1)))
 
 
-class Pooling(nn.Module):
+class PyramidPooling(nn.Module):
     """Spatial pyramid pooling: one 5x5 maximum after another, all kept."""
 
     def __init__(self, channels: int) -> None:
@@ -114,7 +114,7 @@ class Attention(nn.Module):
         return cast(Tensor, self.project_out(seen + self.place(value.reshape(count, channels, height, width))))
 
 
-class SplitAttention(nn.Module):
+class PartialAttention(nn.Module):
     """Half of the channels past, half through attention and a small dense net."""
 
     def __init__(self, channels: int) -> None:
@@ -154,13 +154,15 @@ class Yolo11n(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), Split(32, 64, False, 0.25))
-        self.to8 = nn.Sequential(Conv(64, 64, 3, 2), Split(64, 128, False, 0.25))
-        self.to16 = nn.Sequential(Conv(128, 128, 3, 2), Split(128, 128, True))
-        self.to32 = nn.Sequential(Conv(128, 256, 3, 2), Split(256, 256, True), Pooling(256), SplitAttention(256))
-        self.up16, self.up8 = Split(384, 128, False), Split(256, 64, False)
-        self.down16, self.out16 = Conv(64, 64, 3, 2), Split(192, 128, False)
-        self.down32, self.out32 = Conv(128, 128, 3, 2), Split(384, 256, True)
+        self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), CspBlock(32, 64, False, 0.25))
+        self.to8 = nn.Sequential(Conv(64, 64, 3, 2), CspBlock(64, 128, False, 0.25))
+        self.to16 = nn.Sequential(Conv(128, 128, 3, 2), CspBlock(128, 128, True))
+        self.to32 = nn.Sequential(
+            Conv(128, 256, 3, 2), CspBlock(256, 256, True), PyramidPooling(256), PartialAttention(256)
+        )
+        self.up16, self.up8 = CspBlock(384, 128, False), CspBlock(256, 64, False)
+        self.down16, self.out16 = Conv(64, 64, 3, 2), CspBlock(192, 128, False)
+        self.down32, self.out32 = Conv(128, 128, 3, 2), CspBlock(384, 256, True)
         self.heads = nn.ModuleList(Head(channels) for channels in (64, 128, 256))
         # The expected distance is a fixed convolution in the paper's count of parameters.
         self.bins = nn.Parameter(torch.arange(BINS, dtype=torch.float32).view(1, BINS, 1, 1), requires_grad=False)
@@ -197,7 +199,7 @@ class Yolo11n(nn.Module):
         return torch.cat([(low + high) / 2, high - low, torch.sigmoid(kinds)], 2).transpose(1, 2)
 
 
-def fused(net: Yolo11n) -> Yolo11n:
+def fuse_batch_norm(net: Yolo11n) -> Yolo11n:
     """A copy that computes the same with every batch norm folded into its convolution; for counting and running."""
     net = deepcopy(net).eval()
     for module in net.modules():

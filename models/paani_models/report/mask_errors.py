@@ -12,17 +12,17 @@ from tqdm import tqdm
 
 from paani.arrays import I64, U8
 from paani_models.datasets.sources import IGNORE, SEGMENTER_CLASSES, Sample, Source, read_picture
-from paani_models.segmenter.metrics import boundary, class_iou, confusion, edge_counts, f1
-from paani_models.segmenter.scores import WATER, as_label, read_truth, restrict
+from paani_models.segmenter.metrics import boundary_pixels, class_iou, confusion_matrix, count_edge_matches, f1_score
+from paani_models.segmenter.scores import WATER, label_from_logits, merge_undrawn_sky, read_truth
 
-REACHES_PX = (2, 4, 8)
+EDGE_DISTANCES_PX = (2, 4, 8)
 TENTHS = 10
 CELLS_HW = (64, 80)  # the shipped segmenter scores cells of 4x4 pixels of its 256x320 input, and interpolates
 _UNDECIDED = len(SEGMENTER_CLASSES)
 
 
 @dataclass(frozen=True)
-class MaskLimits:
+class MaskErrors:
     """Added over pictures of one source, in pixels of its masks.
 
     counts, edges: as `confusion` and `edge_counts` give them, an undecided band between two classes split along its
@@ -47,46 +47,46 @@ class MaskLimits:
         return int(self.counts.sum() - np.trace(self.counts))
 
 
-def mask_limits(
+def analyse_mask_errors(
     samples: Sequence[Sample], segment: Callable[[NDArray[np.uint8], tuple[int, ...]], U8]
-) -> list[MaskLimits]:
+) -> list[MaskErrors]:
     """One per source. Raises UserError naming a file that cannot be read."""
     found: dict[Source, list[I64]] = {}
     for sample in tqdm(samples, "mistakes", unit="picture", mininterval=2.0):
         truth = read_truth(sample)
-        label = restrict(segment(read_picture(sample.picture), truth.shape), sample.source)
-        row = np.concatenate([part.ravel() for part in mistakes(label, truth)])
+        label = merge_undrawn_sky(segment(read_picture(sample.picture), truth.shape), sample.source)
+        row = np.concatenate([part.ravel() for part in count_mask_errors(label, truth)])
         found.setdefault(sample.source, []).append(row)
-    parts = np.cumsum([9, 4, 9, 4, len(REACHES_PX), TENTHS, TENTHS])
+    parts = np.cumsum([9, 4, 9, 4, len(EDGE_DISTANCES_PX), TENTHS, TENTHS])
     limits = []
     for source, rows in found.items():
         counts, edges, best_counts, best_edges, *rest = np.split(np.sum(rows, axis=0), parts)
         square = counts.reshape(3, 3), edges, best_counts.reshape(3, 3), best_edges
-        limits.append(MaskLimits(source, len(rows), *square, *rest))
+        limits.append(MaskErrors(source, len(rows), *square, *rest))
     return limits
 
 
-def mistakes(label: U8, truth: U8) -> tuple[I64, ...]:
+def count_mask_errors(label: U8, truth: U8) -> tuple[I64, ...]:
     """The counts of one picture, in the order of MaskLimits."""
-    decided = filled(truth)
-    best = gridded(decided)
+    decided = fill_undecided(truth)
+    best = round_to_cells(decided)
     wrong = (label != truth) & (truth != IGNORE)
-    edge = boundary(np.where(truth == IGNORE, np.uint8(_UNDECIDED), truth))
+    edge = boundary_pixels(np.where(truth == IGNORE, np.uint8(_UNDECIDED), truth))
     distance_px = cv2.distanceTransform((~edge).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     classes = len(SEGMENTER_CLASSES)
     return (
-        confusion(label, truth, classes),
-        np.array(edge_counts(label, decided), np.int64),
-        confusion(best, truth, classes),
-        np.array(edge_counts(best, decided), np.int64),
-        np.array([(wrong & (distance_px <= reach)).sum() for reach in REACHES_PX], np.int64),
-        by_tenth(wrong & (label == WATER)),
-        by_tenth(wrong & (truth == WATER)),
-        by_tenth(truth != IGNORE),
+        confusion_matrix(label, truth, classes),
+        np.array(count_edge_matches(label, decided), np.int64),
+        confusion_matrix(best, truth, classes),
+        np.array(count_edge_matches(best, decided), np.int64),
+        np.array([(wrong & (distance_px <= reach)).sum() for reach in EDGE_DISTANCES_PX], np.int64),
+        count_by_tenth(wrong & (label == WATER)),
+        count_by_tenth(wrong & (truth == WATER)),
+        count_by_tenth(truth != IGNORE),
     )
 
 
-def filled(truth: U8) -> U8:
+def fill_undecided(truth: U8) -> U8:
     """Undecided pixels take the class of the nearest decided one; a mask without any stays as it is."""
     undecided = truth == IGNORE
     if undecided.all() or not undecided.any():
@@ -99,17 +99,17 @@ def filled(truth: U8) -> U8:
     return np.asarray(kinds[nearest], np.uint8)
 
 
-def gridded(truth: U8) -> U8:
+def round_to_cells(truth: U8) -> U8:
     """Each of CELLS_HW takes the class that fills most of it: what a net with so many answers could say at best."""
     size_wh = CELLS_HW[::-1]
     shares = [
         cv2.resize((truth == kind).astype(np.float32), size_wh, interpolation=cv2.INTER_AREA)
         for kind in range(len(SEGMENTER_CLASSES))
     ]
-    return as_label(np.stack(shares)[None], truth.shape)
+    return label_from_logits(np.stack(shares)[None], truth.shape)
 
 
-def by_tenth(flags: NDArray[np.bool_]) -> I64:
+def count_by_tenth(flags: NDArray[np.bool_]) -> I64:
     """Set pixels per tenth of the height, int64 [10], top first."""
     return np.array([part.sum() for part in np.array_split(flags, TENTHS)], np.int64)
 
@@ -126,4 +126,4 @@ def mean_iou(counts: I64) -> float:
 
 def edge_f1(edges: I64) -> float:
     """F1 of counts as `edge_counts` gives them."""
-    return f1(*(int(count) for count in edges))
+    return f1_score(*(int(count) for count in edges))

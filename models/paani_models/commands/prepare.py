@@ -8,9 +8,9 @@ from pathlib import Path
 
 from paani.errors import UserError
 from paani_models.datasets import inventory, mastr1325, waterscenes
-from paani_models.datasets.manifest import count_boxes, counts_table
-from paani_models.datasets.pack import WEIGHTS_FOLDER, pack
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.manifest import count_boxes, format_counts_table
+from paani_models.datasets.pack import WEIGHTS_FOLDER, pack_bundle
+from paani_models.datasets.selection import PictureSelection
 
 SETS = ("own", "waterscenes", "mastr1325")
 
@@ -33,9 +33,9 @@ def add_pack_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--start", type=Path, action="append", default=[], help="checkpoint to add, repeatable")
 
 
-def prepare_own(pictures: Pictures, manifest: Path | None) -> int:
+def prepare_own(pictures: PictureSelection, manifest: Path | None) -> int:
     """Exit 0, or raise UserError."""
-    inventory.prepare(pictures.samples, pictures.folder, manifest)
+    inventory.check_own_pictures(pictures.samples, pictures.source_folder, manifest)
     return 0
 
 
@@ -44,23 +44,23 @@ def prepare_public(arguments: argparse.Namespace) -> int:
     if arguments.raw is None or arguments.out is None:
         raise UserError(f"prepare {arguments.set}: needs --raw and --out")
     if arguments.set == "waterscenes":
-        manifest, leaks = waterscenes.prepare(
+        manifest, leaks = waterscenes.prepare_waterscenes(
             arguments.raw, arguments.out, missing_is_empty=arguments.missing_is_empty, strict=arguments.strict
         )
     else:
-        manifest, leaks = mastr1325.prepare(arguments.raw, arguments.out, by=arguments.by)
-    sys.stdout.write(counts_table(count_boxes(manifest)))
+        manifest, leaks = mastr1325.prepare_mastr1325(arguments.raw, arguments.out, by=arguments.by)
+    sys.stdout.write(format_counts_table(count_boxes(manifest)))
     if leaks:
         sys.stdout.write(f"{len(leaks)} pairs of different splits share a view, the first: {leaks[0]}\n")
     return 0
 
 
-def make_bundle(arguments: argparse.Namespace, pictures: Pictures) -> int:
+def make_bundle(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Exit 0, or raise UserError."""
-    packed = pack(
+    packed = pack_bundle(
         arguments.out,
         pictures.samples,
-        pictures.folder,
+        pictures.source_folder,
         max_mb=arguments.max_mb,
         weights=sorted((pictures.data / WEIGHTS_FOLDER).glob("*")),
         start=arguments.start,

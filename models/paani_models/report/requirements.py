@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from paani_models.report.box_limits import FATES, BoxLimits
-from paani_models.report.mask_limits import REACHES_PX, MaskLimits, edge_f1, mean_iou, water_iou
-from paani_models.report.records import FaultReport, gate_figures
+from paani_models.report.box_errors import OUTCOMES, BoxErrors
+from paani_models.report.mask_errors import EDGE_DISTANCES_PX, MaskErrors, edge_f1, mean_iou, water_iou
+from paani_models.report.records import FaultReport, image_quality_figures
 
 PHOTOGRAPHS = "photographs"  # every real source that boxes the class, pooled
-FAR_PX = REACHES_PX[-1]
+FAR_PX = EDGE_DISTANCES_PX[-1]
 SMALL_PX, NEAR_PX = 8.0, 16.0
 
 _MASK_FIGURES = {"iou_water": water_iou, "miou": mean_iou}
 
 
 @dataclass(frozen=True)
-class Bar:
+class Requirement:
     """What a figure should be at least, or at most, on held-out sequences of real pictures."""
 
     net: str
@@ -26,61 +26,61 @@ class Bar:
     bound: float
     at_most: bool = False
 
-    def is_kept(self, value: float) -> bool:
+    def is_met_by(self, value: float) -> bool:
         """Whether a figure of this value is good enough."""
         return value <= self.bound if self.at_most else value >= self.bound
 
 
-BARS = (
-    Bar("segmenter", "iou_water", "tbiseg_usvinland", 0.97),
-    Bar("segmenter", "iou_water", "tbiseg_dasha", 0.97),
-    Bar("segmenter", "miou", "mastr1325", 0.95),
-    Bar("segmenter", "edge_f1", "mastr1325", 0.88),
-    Bar("detector", "vessel_ap50", PHOTOGRAPHS, 0.75),
-    Bar("detector", "buoy_ap50", PHOTOGRAPHS, 0.60),
-    Bar("detector", "person_ap50", PHOTOGRAPHS, 0.50),
-    Bar("gate", "unfit_accepted_frac", "spoilt", 0.005, at_most=True),
-    Bar("gate", "fit_refused_frac", "spoilt", 0.01, at_most=True),
-    Bar("gate", "clean_refused_frac", "all", 0.002, at_most=True),
+REQUIREMENTS = (
+    Requirement("segmenter", "iou_water", "tbiseg_usvinland", 0.97),
+    Requirement("segmenter", "iou_water", "tbiseg_dasha", 0.97),
+    Requirement("segmenter", "miou", "mastr1325", 0.95),
+    Requirement("segmenter", "edge_f1", "mastr1325", 0.88),
+    Requirement("detector", "vessel_ap50", PHOTOGRAPHS, 0.75),
+    Requirement("detector", "buoy_ap50", PHOTOGRAPHS, 0.60),
+    Requirement("detector", "person_ap50", PHOTOGRAPHS, 0.50),
+    Requirement("gate", "unfit_accepted_frac", "spoilt", 0.005, at_most=True),
+    Requirement("gate", "fit_refused_frac", "spoilt", 0.01, at_most=True),
+    Requirement("gate", "clean_refused_frac", "all", 0.002, at_most=True),
 )
 _WORST_CELLS = 5
 
 
 @dataclass(frozen=True)
-class Reached:
+class RequirementResult:
     """One bar and what was measured; n counts pictures, or true boxes. limit: the reason, empty where it is met."""
 
-    bar: Bar
+    requirement: Requirement
     value: float
     n: int
     limit: str
 
     @property
-    def met(self) -> bool:
+    def is_met(self) -> bool:
         """Whether the figure keeps its bar."""
-        return self.bar.is_kept(self.value)
+        return self.requirement.is_met_by(self.value)
 
 
-def reached(
-    masks: Sequence[MaskLimits], boxes: Sequence[BoxLimits], faults: FaultReport | None = None
-) -> list[Reached]:
+def compare_with_requirements(
+    masks: Sequence[MaskErrors], boxes: Sequence[BoxErrors], faults: FaultReport | None = None
+) -> list[RequirementResult]:
     """Every bar whose measurement is at hand."""
-    of_gate = {(figure.metric, figure.source): figure for figure in gate_figures(faults)} if faults else {}
+    of_gate = {(figure.metric, figure.source): figure for figure in image_quality_figures(faults)} if faults else {}
     by_source = {limits.source.name: limits for limits in masks}
     by_kind = {f"{limits.kind}_ap50": limits for limits in boxes}
     found = []
-    for bar in BARS:
+    for bar in REQUIREMENTS:
         if bar.net == "segmenter" and bar.source in by_source:
-            found.append(_of_masks(bar, by_source[bar.source]))
+            found.append(_compare_masks(bar, by_source[bar.source]))
         elif bar.net == "detector" and bar.metric in by_kind:
-            found.append(_of_boxes(bar, by_kind[bar.metric]))
+            found.append(_compare_boxes(bar, by_kind[bar.metric]))
         elif bar.net == "gate" and faults and (figure := of_gate.get((bar.metric, bar.source))):
-            limit = "" if bar.is_kept(figure.value) else _wrong_verdicts(bar, faults)
-            found.append(Reached(bar, figure.value, figure.n, limit))
+            limit = "" if bar.is_met_by(figure.value) else _describe_wrong_verdicts(bar, faults)
+            found.append(RequirementResult(bar, figure.value, figure.n, limit))
     return found
 
 
-def _wrong_verdicts(bar: Bar, faults: FaultReport) -> str:
+def _describe_wrong_verdicts(bar: Requirement, faults: FaultReport) -> str:
     """Where the gate is wrong most often."""
     if bar.source == "all":
         wrong = [(source.rejected, source.n, source.source) for source in faults.clean]
@@ -99,17 +99,19 @@ def _wrong_verdicts(bar: Bar, faults: FaultReport) -> str:
     return f"Wrong most often: {'; '.join(f'{count} of {n} in {name}' for count, n, name in worst)}."
 
 
-def _of_masks(bar: Bar, limits: MaskLimits) -> Reached:
+def _compare_masks(bar: Requirement, limits: MaskErrors) -> RequirementResult:
     if bar.metric == "edge_f1":
         value, best = edge_f1(limits.edges), edge_f1(limits.best_edges)
     else:
         value, best = (_MASK_FIGURES[bar.metric](counts) for counts in (limits.counts, limits.best_counts))
-    if bar.is_kept(value):
-        return Reached(bar, value, limits.n, "")
-    return Reached(bar, value, limits.n, f"{_mistakes(limits)} The best answer of the net's cells reaches {best:.3f}.")
+    if bar.is_met_by(value):
+        return RequirementResult(bar, value, limits.n, "")
+    return RequirementResult(
+        bar, value, limits.n, f"{_describe_mask_errors(limits)} The best answer of the net's cells reaches {best:.3f}."
+    )
 
 
-def _mistakes(limits: MaskLimits) -> str:
+def _describe_mask_errors(limits: MaskErrors) -> str:
     if limits.wrong == 0:
         return "No pixel is wrong."
     wrong = limits.wrong
@@ -121,13 +123,13 @@ def _mistakes(limits: MaskLimits) -> str:
     )
 
 
-def _of_boxes(bar: Bar, limits: BoxLimits) -> Reached:
-    if bar.is_kept(limits.ap50):
-        return Reached(bar, limits.ap50, limits.n, "")
-    small, smalls = limits.found_between(0.0, SMALL_PX)
-    near, nears = limits.found_between(NEAR_PX, float("inf"))
-    fates = ", ".join(f"{count} {fate}" for fate, count in zip(FATES[1:], limits.fates[1:], strict=True))
-    return Reached(
+def _compare_boxes(bar: Requirement, limits: BoxErrors) -> RequirementResult:
+    if bar.is_met_by(limits.ap50):
+        return RequirementResult(bar, limits.ap50, limits.n, "")
+    small, smalls = limits.count_found_between(0.0, SMALL_PX)
+    near, nears = limits.count_found_between(NEAR_PX, float("inf"))
+    fates = ", ".join(f"{count} {fate}" for fate, count in zip(OUTCOMES[1:], limits.outcomes[1:], strict=True))
+    return RequirementResult(
         bar,
         limits.ap50,
         limits.n,

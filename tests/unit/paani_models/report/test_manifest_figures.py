@@ -4,8 +4,13 @@ import pytest
 
 from paani_models.catalogue import Figure, load_catalogue, verified_path
 from paani_models.commands.models import data_folder
-from paani_models.datasets.sources import Sample, choose, read_samples
-from paani_models.report.evaluate import detector_figures, false_alarm_figures, null_figure, segmenter_figures
+from paani_models.datasets.sources import Sample, choose_sources, read_samples
+from paani_models.report.manifest_figures import (
+    measure_detector,
+    measure_false_alarms,
+    measure_null_pictures,
+    measure_segmenter,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -19,13 +24,13 @@ def recorded(net: str, source: str) -> dict[str, Figure]:
 
 
 def held_out(*names: str) -> list[Sample]:
-    return [sample for sample in read_samples(data_folder(), choose(names)) if sample.held_out]
+    return [sample for sample in read_samples(data_folder(), choose_sources(names)) if sample.held_out]
 
 
 @pytest.mark.data
 @needs_data
 def test_segmenter_figures_are_reproduced_t3_u3_u4() -> None:
-    measured = {f.metric: f for f in segmenter_figures(verified_path("segmenter"), held_out("mastr1325")) if f.n == 24}
+    measured = {f.metric: f for f in measure_segmenter(verified_path("segmenter"), held_out("mastr1325")) if f.n == 24}
     expected = recorded("segmenter", "mastr1325")
     assert set(measured) == {"iou_water", "iou_obstacle", "iou_sky", "miou"} == set(expected)
     for metric, figure in measured.items():
@@ -35,7 +40,7 @@ def test_segmenter_figures_are_reproduced_t3_u3_u4() -> None:
 @pytest.mark.data
 @needs_data
 def test_detector_figures_are_reproduced_u1_u2() -> None:
-    measured = detector_figures(verified_path("detector"), held_out("tunai_sooke"))
+    measured = measure_detector(verified_path("detector"), held_out("tunai_sooke"))
     expected = recorded("detector", "tunai_sooke")
     for figure in measured:
         if figure.source == "tunai_sooke":
@@ -48,19 +53,19 @@ def test_detector_figures_are_reproduced_u1_u2() -> None:
 def test_water_is_water_on_rivers_never_seen_in_training() -> None:
     """USVInland, six held-out sequences; Tampere, one."""
     for name in ("tbiseg_usvinland", "tbiseg_tampere"):
-        measured = {f.metric: f.value for f in segmenter_figures(verified_path("segmenter"), held_out(name))}
+        measured = {f.metric: f.value for f in measure_segmenter(verified_path("segmenter"), held_out(name))}
         assert measured["iou_water"] >= 0.93
 
 
 @pytest.mark.data
 @needs_data
 def test_rivers_without_craft_raise_few_alarms() -> None:
-    (figure,) = false_alarm_figures(verified_path("detector"), held_out("tbiseg_usvinland")[::4])
+    (figure,) = measure_false_alarms(verified_path("detector"), held_out("tbiseg_usvinland")[::4])
     assert figure.value <= 0.3
 
 
 def test_nothing_reads_as_water_v15() -> None:
-    figure = null_figure(verified_path("segmenter"))
+    figure = measure_null_pictures(verified_path("segmenter"))
     assert figure.value <= 0.05
     assert figure.n == 200
 

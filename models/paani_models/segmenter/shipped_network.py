@@ -29,7 +29,7 @@ _STAGES = (
 _TAPS = (1, 2, 4, 5)  # stages at strides 4, 8, 16, 32
 TAP_CHANNELS = (24, 32, 96, 160)
 _FROZEN_STAGES = 2  # the first stages are general and the dearest to train
-ENCODER_SCALE = 11 / 16  # of the input's sides: as fast as the net of `paani_models.segmenter.paper_shape`
+ENCODER_SCALE = 11 / 16  # of the input's sides: as fast as the net of `paani_models.segmenter.paper_network`
 DECODER_CHANNELS = 48
 DETAIL_CHANNELS = 16
 
@@ -97,11 +97,11 @@ def _conv_norm(cin: int, cout: int, kernel: int, stride: int = 1, groups: int = 
     )
 
 
-def _refine(channels: int) -> nn.Sequential:
+def _refinement(channels: int) -> nn.Sequential:
     return nn.Sequential(_conv_norm(channels, channels, 3, groups=channels), _conv_norm(channels, channels, 1))
 
 
-class ImageNetSegmenter(nn.Module):
+class ShippedSegmenter(nn.Module):
     """RGB normalised as in `paani_models.catalogue`, float32 [N,3,H,W] (H, W multiples of 32) -> logits [N,3,H,W].
 
     The encoder sees a smaller picture; a thin branch at full size keeps the edges. Logits are interpolated between the
@@ -123,20 +123,20 @@ class ImageNetSegmenter(nn.Module):
         self.project = nn.Conv2d(TAP_CHANNELS[-1], width, 1)
         self.scene = nn.Conv2d(TAP_CHANNELS[-1], width, 1)
         self.laterals = nn.ModuleList(nn.Conv2d(c, width, 1) for c in TAP_CHANNELS[-2::-1])
-        self.refines = nn.ModuleList(_refine(width) for _ in TAP_CHANNELS[:-1])
+        self.refines = nn.ModuleList(_refinement(width) for _ in TAP_CHANNELS[:-1])
         self.detail = nn.Sequential(
             _conv_norm(3, DETAIL_CHANNELS // 2, 3, 2),
             _conv_norm(DETAIL_CHANNELS // 2, DETAIL_CHANNELS, 3, 2),
             nn.Conv2d(DETAIL_CHANNELS, width, 1),
         )
-        self.finish = _refine(width)
+        self.finish = _refinement(width)
         self.head = nn.Conv2d(width, len(SEGMENTER_CLASSES), 3, padding=1)
         self.register_buffer("scale", 2.0 * torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
         self.register_buffer("shift", 2.0 * torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1) - 1.0)
 
     def taps(self, x: Tensor) -> list[Tensor]:
         """Encoder outputs at strides 4, 8, 16, 32 of the encoder's own size (TAP_CHANNELS)."""
-        height, width = _size(x)
+        height, width = _static_size(x)
         size = (int(height * ENCODER_SCALE), int(width * ENCODER_SCALE))
         x = F.interpolate(x, size=size, mode="bilinear", align_corners=False)
         x = self.stem(x * cast(Tensor, self.scale) + cast(Tensor, self.shift))
@@ -152,9 +152,9 @@ class ImageNetSegmenter(nn.Module):
         *shallow, deepest = taps
         y = self.project(deepest) + F.relu(self.scene(deepest.mean((2, 3), keepdim=True)))
         for lateral, refine, tap in zip(self.laterals, self.refines, reversed(shallow), strict=True):
-            y = refine(F.interpolate(y, size=_size(tap), mode="nearest") + lateral(tap))
+            y = refine(F.interpolate(y, size=_static_size(tap), mode="nearest") + lateral(tap))
         detail = self.detail(x)
-        y = self.finish(F.interpolate(y, size=_size(detail), mode="bilinear", align_corners=False) + detail)
+        y = self.finish(F.interpolate(y, size=_static_size(detail), mode="bilinear", align_corners=False) + detail)
         return F.interpolate(self.head(y), scale_factor=4.0, mode="bilinear", align_corners=False)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -165,12 +165,12 @@ class ImageNetSegmenter(nn.Module):
         return nn.ModuleList([self.stem, self.stages])
 
 
-def _size(x: Tensor) -> tuple[int, int]:
+def _static_size(x: Tensor) -> tuple[int, int]:
     """Height and width as plain numbers, so that the exported graph is static."""
     return int(x.shape[2]), int(x.shape[3])
 
 
-def load_imagenet(model: ImageNetSegmenter, path: Path) -> None:
+def load_imagenet_encoder(model: ShippedSegmenter, path: Path) -> None:
     """Fill the encoder and freeze its first stages. Raises UserError where the file does not fit."""
     try:
         weights = np.load(path)

@@ -44,7 +44,7 @@ class Conv(nn.Module):
         return F.silu(self.conv(x))
 
 
-def separable(cin: int, cout: int, stride: int = 1) -> nn.Sequential:
+def separable_conv(cin: int, cout: int, stride: int = 1) -> nn.Sequential:
     """Depthwise 3x3, then pointwise."""
     return nn.Sequential(Conv(cin, cin, 3, stride, groups=cin), Conv(cin, cout))
 
@@ -55,7 +55,7 @@ class Bottleneck(nn.Module):
     def __init__(self, channels: int, residual: bool) -> None:
         super().__init__()
         self.reduce = Conv(channels, channels)
-        self.expand = separable(channels, channels)
+        self.expand = separable_conv(channels, channels)
         self.residual = residual
 
     def forward(self, x: Tensor) -> Tensor:
@@ -63,7 +63,7 @@ class Bottleneck(nn.Module):
         return x + y if self.residual else y
 
 
-class SplitLayer(nn.Module):
+class CspLayer(nn.Module):
     """Cross-stage partial layer: half of the channels through `depth` bottlenecks, half past them."""
 
     def __init__(self, cin: int, cout: int, depth: int, residual: bool) -> None:
@@ -101,9 +101,9 @@ class Head(nn.Module):
         super().__init__()
         width = HEAD_CHANNELS
         self.stem = Conv(cin, width)
-        self.class_tower = nn.Sequential(separable(width, width), separable(width, width))
+        self.class_tower = nn.Sequential(separable_conv(width, width), separable_conv(width, width))
         self.class_out = nn.Conv2d(width, len(DETECTOR_CLASSES), 1)
-        self.box_tower = nn.Sequential(separable(width, width), separable(width, width))
+        self.box_tower = nn.Sequential(separable_conv(width, width), separable_conv(width, width))
         self.box_out = nn.Conv2d(width, 4, 1)
         self.object_out = nn.Conv2d(width, 1, 1)
 
@@ -120,18 +120,20 @@ class Detector(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.stem = Conv(12, 16, 3)
-        self.dark2 = nn.Sequential(separable(16, 32, 2), SplitLayer(32, 32, 1, residual=True))
-        self.dark3 = nn.Sequential(separable(32, 64, 2), SplitLayer(64, 64, 3, residual=True))
-        self.dark4 = nn.Sequential(separable(64, 128, 2), SplitLayer(128, 128, 3, residual=True))
-        self.dark5 = nn.Sequential(separable(128, 256, 2), PyramidPooling(256), SplitLayer(256, 256, 1, residual=False))
+        self.dark2 = nn.Sequential(separable_conv(16, 32, 2), CspLayer(32, 32, 1, residual=True))
+        self.dark3 = nn.Sequential(separable_conv(32, 64, 2), CspLayer(64, 64, 3, residual=True))
+        self.dark4 = nn.Sequential(separable_conv(64, 128, 2), CspLayer(128, 128, 3, residual=True))
+        self.dark5 = nn.Sequential(
+            separable_conv(128, 256, 2), PyramidPooling(256), CspLayer(256, 256, 1, residual=False)
+        )
         self.narrow5 = Conv(256, 128)
-        self.merge4 = SplitLayer(256, 128, 1, residual=False)
+        self.merge4 = CspLayer(256, 128, 1, residual=False)
         self.narrow4 = Conv(128, 64)
-        self.merge3 = SplitLayer(128, 64, 1, residual=False)
-        self.down3 = separable(64, 64, 2)
-        self.out4 = SplitLayer(128, 128, 1, residual=False)
-        self.down4 = separable(128, 128, 2)
-        self.out5 = SplitLayer(256, 256, 1, residual=False)
+        self.merge3 = CspLayer(128, 64, 1, residual=False)
+        self.down3 = separable_conv(64, 64, 2)
+        self.out4 = CspLayer(128, 128, 1, residual=False)
+        self.down4 = separable_conv(128, 128, 2)
+        self.out5 = CspLayer(256, 256, 1, residual=False)
         self.heads = nn.ModuleList(Head(channels) for channels in (64, 128, 256))
 
     def features(self, x: Tensor) -> list[Tensor]:
@@ -172,7 +174,7 @@ def cell_corners(rows: int, columns: int, device: torch.device) -> Tensor:
     return torch.stack([x, y], 2).reshape(-1, 2).float()
 
 
-def load_yolox(model: Detector, path: Path) -> None:
+def load_yolox_weights(model: Detector, path: Path) -> None:
     """Start from a YOLOX-nano ONNX file of 80 COCO classes, whose input is BGR 0..255.
 
     Its colour order and range go into the first convolution, so that the input here is RGB 0..1.

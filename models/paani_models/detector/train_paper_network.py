@@ -11,19 +11,26 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from paani_models.detector.data import BoxedPicture, Example
-from paani_models.detector.paper_data import Augmentation, paper_example
+from paani_models.detector.data import BoxedPicture, TrainingExample
+from paani_models.detector.paper_data import Augmentation, augment_paper_example
 from paani_models.detector.paper_loss import task_aligned_loss
-from paani_models.detector.paper_shape import Yolo11n
+from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.train import figures_by_class
 from paani_models.network_input import detector_batch
-from paani_models.training.loop import Prefetch, Progress, append_record, device, learning_rate, to_device
+from paani_models.training.training_state import (
+    Prefetch,
+    TrainingState,
+    append_record,
+    learning_rate,
+    to_device,
+    training_device,
+)
 
 Batch = tuple[Tensor, list[Tensor], Tensor]
 
 
 @dataclass(frozen=True)
-class Recipe:
+class Yolo11nRecipe:
     """Everything that decides a training besides the pictures. The figures are the paper's."""
 
     epochs: int = 60  # S2
@@ -52,14 +59,19 @@ class Yolo11nTraining:
     """One training run in `folder`: `run()` goes on from its last finished epoch."""
 
     def __init__(
-        self, model: Yolo11n, recipe: Recipe, folder: Path, train: list[BoxedPicture], held_out: list[BoxedPicture]
+        self,
+        model: Yolo11n,
+        recipe: Yolo11nRecipe,
+        folder: Path,
+        train: list[BoxedPicture],
+        held_out: list[BoxedPicture],
     ) -> None:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model = model
-        self.progress = Progress(model, recipe.peak_rate, recipe.weight_decay)
+        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
         self.progress.optimiser = torch.optim.AdamW(
-            _groups(model, recipe), recipe.peak_rate, betas=(recipe.momentum, 0.999)
+            _parameter_groups(model, recipe), recipe.peak_rate, betas=(recipe.momentum, 0.999)
         )
 
     def run(self, until: int | None = None) -> None:
@@ -97,9 +109,9 @@ class Yolo11nTraining:
         losses = []
         batches = Prefetch[Batch](recipe.workers, 2 * recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
         for index, (pictures, truths, judged) in enumerate(tqdm(batches, f"epoch {epoch + 1}/{recipe.epochs}", steps)):
-            with torch.autocast(device().type, torch.bfloat16, enabled=device().type == "cuda"):  # S4
+            with torch.autocast(training_device().type, torch.bfloat16, enabled=training_device().type == "cuda"):  # S4
                 boxes, bins, logits = self.model.raw(to_device(pictures))
-            known = [truth.to(device()) for truth in truths]
+            known = [truth.to(training_device()) for truth in truths]
             size = (recipe.side_px, recipe.side_px)
             parts = task_aligned_loss(boxes.float(), bins.float(), logits.float(), known, to_device(judged), size)
             self._update(sum(parts), index == steps - 1, steps * recipe.epochs, warmup_steps)
@@ -132,20 +144,20 @@ class Yolo11nTraining:
         return (
             torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
             [torch.from_numpy(e.boxes) for e in examples],
-            torch.from_numpy(np.stack([e.judged for e in examples])),
+            torch.from_numpy(np.stack([e.exhaustive_mask for e in examples])),
         )
 
-    def _example(self, rng: np.random.Generator, order: list[int], slot: int) -> Example:
+    def _example(self, rng: np.random.Generator, order: list[int], slot: int) -> TrainingExample:
         recipe = self.recipe
         chosen = [order[slot % len(order)]]
         late = self.progress.epoch >= recipe.epochs - recipe.plain_epochs
         if not late and rng.random() < recipe.augmentation.mosaic_frac:
             chosen += [order[int(i)] for i in rng.integers(len(order), size=3)]
         pictures = [self.train[i] for i in chosen]
-        return paper_example(rng, pictures, (recipe.side_px, recipe.side_px), recipe.augmentation)
+        return augment_paper_example(rng, pictures, (recipe.side_px, recipe.side_px), recipe.augmentation)
 
 
-def _groups(model: Yolo11n, recipe: Recipe) -> list[dict[str, object]]:
+def _parameter_groups(model: Yolo11n, recipe: Yolo11nRecipe) -> list[dict[str, object]]:
     """Weights, which decay; normalisation scales and biases, which do not; biases warm up from above (S3)."""
     kinds: dict[str, list[nn.Parameter]] = {"weight": [], "scale": [], "bias": []}
     for name, parameter in model.named_parameters():

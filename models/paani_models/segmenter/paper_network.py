@@ -37,7 +37,7 @@ _BLOCKS = (
 )
 
 
-def _divisible(channels: float, divisor: int = 8) -> int:
+def _round_to_multiple(channels: float, divisor: int = 8) -> int:
     rounded = max(divisor, int(channels + divisor / 2) // divisor * divisor)
     return rounded + divisor if rounded < 0.9 * channels else rounded
 
@@ -95,7 +95,7 @@ class InvertedResidual(nn.Module):
             layers.append(_conv_norm(cin, expanded, 1, activation=activation()))
         layers.append(_conv_norm(expanded, expanded, kernel, stride, expanded, activation()))
         if squeeze:
-            layers.append(SqueezeExcite(expanded, _divisible(expanded / 4)))
+            layers.append(SqueezeExcite(expanded, _round_to_multiple(expanded / 4)))
         layers.append(_conv_norm(expanded, cout, 1))
         self.block = nn.Sequential(*layers)
         self.residual = stride == 1 and cin == cout
@@ -105,7 +105,7 @@ class InvertedResidual(nn.Module):
         return x + y if self.residual else y
 
 
-class Segmenter(nn.Module):
+class PaperSegmenter(nn.Module):
     """RGB normalised as in `paani_models.catalogue`, float32 [N,3,H,W] (H, W multiples of 32) -> logits [N,3,H,W]."""
 
     def __init__(self) -> None:

@@ -16,13 +16,13 @@ from tqdm import tqdm
 
 from paani.arrays import F32, Bools
 from paani.errors import UserError
-from paani_models.benchmarks import lars, mods, mods_tracks
-from paani_models.datasets.checked_files import decode_picture, read_bytes
+from paani_models.benchmarks import lars, mods, mods_detection
+from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.sources import DETECTOR_CLASSES
-from paani_models.detector.metrics import CONFIDENCE, decode
-from paani_models.engines.onnx_runner import open_net
+from paani_models.detector.metrics import CONFIDENCE, decode_boxes
+from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import SIZE_WH, detector_input, letterbox_affine
-from paani_models.segmenter.scores import segmenter
+from paani_models.segmenter.scores import open_segmenter
 
 METHOD = "paani"
 
@@ -32,13 +32,13 @@ def score_lars(net: Path, root: Path, predictions: Path | None = None) -> dict[s
 
     Raises UserError naming whatever of the layout is missing or unreadable.
     """
-    names, segments, segment = lars.read_names(root), lars.read_segments(root), segmenter(net)
-    tally = lars.Tally()
+    names, segments, segment = lars.read_names(root), lars.read_segments(root), open_segmenter(net)
+    tally = lars.LarsTally()
     for name in tqdm(names, "LaRS", unit="picture", mininterval=2.0):
         path = root / "images" / f"{name}.jpg"
         truth = lars.read_truth(root, name, segments)
-        label = segment(decode_picture(read_bytes(path), path), truth.semantic.shape)
-        tally.add(lars.from_ours(label), truth)
+        label = segment(decode_picture(read_whole_file(path), path), truth.semantic.shape)
+        tally.add(lars.to_lars_classes(label), truth)
         if predictions is not None:
             lars.write_prediction(predictions, name, label)
     return tally.figures()
@@ -52,57 +52,59 @@ def score_mods(
     predictions: folder for the masks and the detection file. Raises UserError as `score_lars`.
     """
     dataset = mods.read_dataset(root / "mods.json")
-    segment, detect = segmenter(segmenter_net), open_net(detector_net)
-    tally = mods.Tally()
+    segment, detect = open_segmenter(segmenter_net), open_network(detector_net)
+    tally = mods.ModsTally()
     above: list[tuple[F32, F32]] = []
     near: list[tuple[F32, F32]] = []
-    found: dict[tuple[int, int], tuple[mods_tracks.Detection, ...]] = {}
+    found: dict[tuple[int, int], tuple[mods_detection.Detection, ...]] = {}
     for sequence in dataset.sequences:
         name = Path(sequence.path.strip("/")).parts[0]
         camera, distortion = read_calibration(root, name)
         for frame in tqdm(sequence.frames, name, unit="picture", mininterval=2.0):
             path = root / "sequences" / sequence.path.strip("/") / frame.image_file_name
-            picture = decode_picture(read_bytes(path), path)
+            picture = decode_picture(read_whole_file(path), path)
             size_wh = (picture.shape[1], picture.shape[0])
             zone = mods.danger_zone(frame.roll, frame.pitch, camera, distortion, size_wh)
             label = segment(picture, picture.shape)
             complete = bool(sequence.exhaustive and frame.exhaustive)
-            tally.add(mods.from_ours(label), frame, zone, exhaustive=complete)
+            tally.add(mods.to_mods_classes(label), frame, zone, exhaustive=complete)
             rows = boxes_in_picture(detect(detector_input(picture))[0], size_wh)
             kinds = [DETECTOR_CLASSES[int(kind)] for kind in rows[:, 0]]
-            found[sequence.id, frame.id] = mods_tracks.as_detections(kinds, rows[:, 1:])
-            rows[:, 0] = [mods_tracks.TYPE_OF[kind] for kind in kinds]
+            found[sequence.id, frame.id] = mods_detection.as_detections(kinds, rows[:, 1:])
+            rows[:, 0] = [mods_detection.TYPE_OF[kind] for kind in kinds]
             land = mods.land_mask(frame.water_edges, picture.shape)
-            true = true_rows(frame.obstacles)
+            true = annotated_rows(frame.obstacles)
             if complete:
-                above.append((outside(rows, land), outside(true, land)))
-            near.append((outside(rows, ~zone), outside(true, ~zone)))
+                above.append((drop_ignored(rows, land), drop_ignored(true, land)))
+            near.append((drop_ignored(rows, ~zone), drop_ignored(true, ~zone)))
             if predictions is not None:
-                mods.write_prediction(predictions, METHOD, name, frame.image_file_name, mods.from_ours(label))
+                mods.write_prediction(predictions, METHOD, name, frame.image_file_name, mods.to_mods_classes(label))
     if predictions is not None:
-        mods_tracks.write_results(predictions / "detections.json", mods_tracks.results(METHOD, dataset, found))
-    by_class = mods_tracks.f_score(above, by_class=True)
-    agnostic = mods_tracks.f_score(above, by_class=False)
-    in_zone = mods_tracks.f_score(near, by_class=False)
+        mods_detection.write_results(
+            predictions / "detections.json", mods_detection.build_results(METHOD, dataset, found)
+        )
+    by_class = mods_detection.f_score(above, by_class=True)
+    agnostic = mods_detection.f_score(above, by_class=False)
+    in_zone = mods_detection.f_score(near, by_class=False)
     return {
         **tally.figures(),
         "f_by_class": by_class,
         "f_agnostic": agnostic,
         "f_zone": in_zone,
-        "score": mods_tracks.challenge_score(by_class, agnostic, in_zone),
+        "score": mods_detection.challenge_score(by_class, agnostic, in_zone),
     }
 
 
 def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> F32:
     """Net output [8,A] -> class and corners in picture pixels [n,5], above the board's threshold."""
-    boxes = decode(output, CONFIDENCE)
+    boxes = decode_boxes(output, CONFIDENCE)
     affine = letterbox_affine(size_wh, SIZE_WH)
     corners = (boxes.boxes.reshape(-1, 2, 2) - affine[:, 2]) / (affine[0, 0], affine[1, 1])
     inside = np.clip(corners, 0, size_wh).reshape(-1, 4)
     return np.hstack([boxes.classes[:, None], inside]).astype(np.float32)
 
 
-def true_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
+def annotated_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
     """Type and corners [n,5] of what is annotated; regions that are not judged are left out."""
     types = {"ship": 0, "person": 1}
     rows = [
@@ -113,7 +115,7 @@ def true_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
     return np.array(rows, np.float32).reshape(-1, 5)
 
 
-def outside(rows: F32, ignored: Bools) -> F32:
+def drop_ignored(rows: F32, ignored: Bools) -> F32:
     """Rows of which no more than half lies in the ignored part of the picture."""
     kept = []
     for row in rows:

@@ -9,13 +9,13 @@ import msgspec
 
 from paani.errors import UserError
 from paani_models.catalogue import Figure, Model, Record
-from paani_models.report.bars import Reached
+from paani_models.report.requirements import RequirementResult
 
-TRIED = "tried.json"
-PRESENT = "these weights"
+EXPERIMENTS = "experiments.json"
+PRESENT_WEIGHTS = "these weights"
 
 
-class Tried(Record, frozen=True):
+class Experiment(Record, frozen=True):
     """One recipe in words, and what it reached on held-out sequences of real pictures.
 
     sha256: of the file that was measured. asked: in what way, where otherwise than the board does it.
@@ -33,15 +33,15 @@ class Tried(Record, frozen=True):
 
 
 class _Record(Record, frozen=True):
-    tried: tuple[Tried, ...]
+    tried: tuple[Experiment, ...]
 
 
-def read_tried(weights: Path) -> tuple[Tried, ...]:
+def read_experiments(weights: Path) -> tuple[Experiment, ...]:
     """The record of a weights folder, oldest first, empty where there is none.
 
     Raises UserError naming a malformed one.
     """
-    path = weights / TRIED
+    path = weights / EXPERIMENTS
     if not path.is_file():
         return ()
     try:
@@ -50,24 +50,26 @@ def read_tried(weights: Path) -> tuple[Tried, ...]:
         raise UserError(f"{path}: {error}") from error
 
 
-def with_present(tried: Sequence[Tried], catalogue: dict[str, Model], reached: Sequence[Reached]) -> tuple[Tried, ...]:
+def with_present_weights(
+    tried: Sequence[Experiment], catalogue: dict[str, Model], reached: Sequence[RequirementResult]
+) -> tuple[Experiment, ...]:
     """The record with the present weights as measured now, in their place, or as the last where it lacks them."""
     rows = list(tried)
-    for net in dict.fromkeys(each.bar.net for each in reached):
+    for net in dict.fromkeys(each.requirement.net for each in reached):
         figures = tuple(
-            Figure(each.bar.metric, each.bar.source, round(each.value, 4), each.n)
+            Figure(each.requirement.metric, each.requirement.source, round(each.value, 4), each.n)
             for each in reached
-            if each.bar.net == net
+            if each.requirement.net == net
         )
         sha256 = catalogue[net].sha256
         place = next((i for i, row in enumerate(rows) if row.sha256 == sha256 and not row.asked), None)
         if place is None:
-            rows.append(Tried(net, sha256, PRESENT, figures))
+            rows.append(Experiment(net, sha256, PRESENT_WEIGHTS, figures))
         else:
             rows[place] = msgspec.structs.replace(rows[place], figures=figures)
     return tuple(rows)
 
 
-def encoded(tried: Sequence[Tried]) -> bytes:
+def encode_experiments(tried: Sequence[Experiment]) -> bytes:
     """The record as it stands beside a manifest."""
     return msgspec.json.format(msgspec.json.encode(_Record(tuple(tried))), indent=1) + b"\n"

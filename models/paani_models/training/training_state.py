@@ -19,7 +19,7 @@ from paani.errors import UserError
 
 Batch = TypeVar("Batch")
 
-GENTLE_GAIN = 0.3
+PRETRAINED_RATE_FACTOR = 0.3
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Stage:
     width_px: int
 
 
-def stage_of(stages: tuple[Stage, ...], epoch: int) -> Stage:
+def stage_at_epoch(stages: tuple[Stage, ...], epoch: int) -> Stage:
     """The stage that a zero-based epoch falls into."""
     for stage in stages:
         if epoch < stage.epochs:
@@ -105,7 +105,7 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
     return state
 
 
-class Progress:
+class TrainingState:
     """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (S11).
 
     extra: parameters that are trained along with the model and are not part of it.
@@ -118,18 +118,21 @@ class Progress:
         peak_rate: float,
         weight_decay: float,
         extra: nn.Module | None = None,
-        gentle: nn.Module | None = None,
+        pretrained: nn.Module | None = None,
     ) -> None:
-        self.model = model.to(device())
+        self.model = model.to(training_device())
         for parameter in self.model.parameters():
             if parameter.dim() == 4:
                 parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
         self.average = AveragedWeights(self.model)
-        self.extra = extra.to(device()) if extra is not None else nn.Module()
+        self.extra = extra.to(training_device()) if extra is not None else nn.Module()
         trained = [p for net in (self.model, self.extra) for p in net.parameters() if p.requires_grad]
-        slow = {id(p) for p in gentle.parameters()} if gentle is not None else set()
+        slow = {id(p) for p in pretrained.parameters()} if pretrained is not None else set()
         groups = [
-            {"params": [p for p in trained if (id(p) in slow) == gently], "gain": GENTLE_GAIN if gently else 1.0}
+            {
+                "params": [p for p in trained if (id(p) in slow) == gently],
+                "gain": PRETRAINED_RATE_FACTOR if gently else 1.0,
+            }
             for gently in (False, True)
         ]
         self.optimiser = torch.optim.AdamW([g for g in groups if g["params"]], peak_rate, weight_decay=weight_decay)
@@ -139,7 +142,7 @@ class Progress:
 
     def start_from(self, checkpoint: Path) -> None:
         """Take the averaged weights of another run. Raises UserError where they do not fit."""
-        load_average(self.model, checkpoint)
+        load_averaged_weights(self.model, checkpoint)
         self.average_from_model()
 
     def average_from_model(self) -> None:
@@ -196,7 +199,7 @@ class Progress:
         self.epoch, self.step, self.best = state["epoch"], state["step"], state["best"]
 
 
-def load_average(model: nn.Module, checkpoint: Path) -> None:
+def load_averaged_weights(model: nn.Module, checkpoint: Path) -> None:
     """Fill a net with a checkpoint's averaged weights. Raises UserError naming a checkpoint that does not fit."""
     try:
         model.load_state_dict(load_checkpoint(checkpoint)["average"])
@@ -210,7 +213,7 @@ def append_record(path: Path, record: Mapping[str, object]) -> None:
         file.write(msgspec.json.encode(record) + b"\n")
 
 
-def device() -> torch.device:
+def training_device() -> torch.device:
     """The accelerator if there is one."""
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
@@ -218,5 +221,5 @@ def device() -> torch.device:
 def to_device(tensor: Tensor) -> Tensor:
     """On the training device; four-dimensional tensors channels-last, which is 1.3 times faster on a CPU."""
     if tensor.dim() == 4:
-        return tensor.to(device(), memory_format=torch.channels_last)
-    return tensor.to(device())
+        return tensor.to(training_device(), memory_format=torch.channels_last)
+    return tensor.to(training_device())

@@ -12,37 +12,37 @@ import torch
 
 from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, verified_path
-from paani_models.datasets.selection import Pictures
+from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.detector import data as detector_data
 from paani_models.detector import train as train_detector
-from paani_models.detector import train_paper_shape as train_yolo11n
-from paani_models.detector.paper_shape import Yolo11n
-from paani_models.detector.shipped_shape import Detector, load_yolox
+from paani_models.detector import train_paper_network as train_yolo11n
+from paani_models.detector.paper_network import Yolo11n
+from paani_models.detector.shipped_network import Detector, load_yolox_weights
 from paani_models.detector.train import DetectorTraining
-from paani_models.detector.train_paper_shape import Yolo11nTraining
+from paani_models.detector.train_paper_network import Yolo11nTraining
 from paani_models.image_quality import train as train_gate
-from paani_models.image_quality.train import GateTraining
-from paani_models.network_input import SIZE_WH, detector_input, gate_input, segmenter_batch, segmenter_input
+from paani_models.image_quality.train import ImageQualityTraining
+from paani_models.network_input import SIZE_WH, detector_input, image_quality_input, segmenter_batch, segmenter_input
 from paani_models.recipes import onnx_export as export
 from paani_models.recipes.warm_start import load_exported
 from paani_models.segmenter import train as train_segmenter
 from paani_models.segmenter.distillation import Distillation
-from paani_models.segmenter.paper_shape import Segmenter
-from paani_models.segmenter.pseudo_labels import pseudo_labelled
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter, load_imagenet
+from paani_models.segmenter.paper_network import PaperSegmenter
+from paani_models.segmenter.pseudo_labels import pseudo_label_pictures
+from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 from paani_models.segmenter.train import SegmenterTraining
-from paani_models.training.loop import Stage, load_average
+from paani_models.training.training_state import Stage, load_averaged_weights
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
 COMPARED_PICTURES = 8
 
-IMAGENET_RECIPE = train_segmenter.Recipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
+IMAGENET_RECIPE = train_segmenter.SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingOptions:
     """What the command line says about one training."""
 
     folder: Path
@@ -55,7 +55,7 @@ class Plan:
     unchecked: bool = False
 
 
-def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
+def train_network(net: str, pictures: PictureSelection, plan: TrainingOptions, threads: int) -> None:
     """Train a net into `plan.folder`, from its last finished epoch if there is one."""
     torch.set_num_threads(threads)
     if net == "detector":
@@ -63,7 +63,7 @@ def train(net: str, pictures: Pictures, plan: Plan, threads: int) -> None:
     elif net == "yolo11n":
         _train_yolo11n(pictures, plan)
     elif net == "gate":
-        _train_gate(pictures, plan)
+        _train_image_quality(pictures, plan)
     else:
         _train_segmenter(net, pictures, plan)
 
@@ -82,7 +82,7 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
     return tuple(parsed)
 
 
-def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
+def _train_segmenter(net: str, pictures: PictureSelection, plan: TrainingOptions) -> None:
     recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.PAPER_RECIPE
     recipe = replace(
         recipe,
@@ -90,23 +90,23 @@ def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
         peak_rate=plan.peak_rate or recipe.peak_rate,
     )
     torch.manual_seed(recipe.seed)
-    model: ImageNetSegmenter | Segmenter = Segmenter()
+    model: ShippedSegmenter | PaperSegmenter = PaperSegmenter()
     if net == "segmenter":
-        model = ImageNetSegmenter()
-        load_imagenet(model, pictures.data / IMAGENET_FILE)
-    samples, distillation = pictures.segmented(held_out=False), None
+        model = ShippedSegmenter()
+        load_imagenet_encoder(model, pictures.data / IMAGENET_FILE)
+    samples, distillation = pictures.segmented_samples(held_out=False), None
     if plan.teacher is not None:
-        teacher = ImageNetSegmenter()
-        load_average(teacher, plan.teacher)
+        teacher = ShippedSegmenter()
+        load_averaged_weights(teacher, plan.teacher)
         distillation = Distillation(teacher)
     if plan.teacher is not None or plan.labels_from is not None:
-        samples += pictures.unsegmented()
-    held_out = train_segmenter.cache(pictures.segmented(held_out=True))
-    cached = train_segmenter.cache(samples)
+        samples += pictures.unsegmented_samples()
+    held_out = train_segmenter.cache_pictures(pictures.segmented_samples(held_out=True))
+    cached = train_segmenter.cache_pictures(samples)
     if plan.labels_from is not None:
-        labeller = ImageNetSegmenter()
-        load_average(labeller, plan.labels_from)
-        cached = pseudo_labelled(labeller, cached, samples)
+        labeller = ShippedSegmenter()
+        load_averaged_weights(labeller, plan.labels_from)
+        cached = pseudo_label_pictures(labeller, cached, samples)
     training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
     if plan.start is not None and plan.start.suffix == ".onnx":
         shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
@@ -117,46 +117,48 @@ def _train_segmenter(net: str, pictures: Pictures, plan: Plan) -> None:
     training.run()
 
 
-def _train_detector(pictures: Pictures, plan: Plan) -> None:
-    recipe = train_detector.Recipe()
+def _train_detector(pictures: PictureSelection, plan: TrainingOptions) -> None:
+    recipe = train_detector.DetectorRecipe()
     recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
     torch.manual_seed(recipe.seed)
     model = Detector()
     if plan.start is None:
-        load_yolox(model, pictures.data / COCO_FILE)
+        load_yolox_weights(model, pictures.data / COCO_FILE)
     elif plan.start.suffix == ".onnx":
         load_exported(model, plan.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
     else:
-        load_average(model, plan.start)
-    cached = detector_data.read_all(pictures.boxed(held_out=False))
-    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+        load_averaged_weights(model, plan.start)
+    cached = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=False))
+    held_out = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=True))
     DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
 
 
-def _train_yolo11n(pictures: Pictures, plan: Plan) -> None:
-    recipe = train_yolo11n.Recipe()
+def _train_yolo11n(pictures: PictureSelection, plan: TrainingOptions) -> None:
+    recipe = train_yolo11n.Yolo11nRecipe()
     recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
     torch.manual_seed(recipe.seed)
     model = Yolo11n()
     if plan.start is not None:
-        load_average(model, plan.start)
-    cached = detector_data.read_all(pictures.boxed(held_out=False))
-    held_out = detector_data.read_all(pictures.boxed(held_out=True))
+        load_averaged_weights(model, plan.start)
+    cached = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=False))
+    held_out = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=True))
     Yolo11nTraining(model, recipe, plan.folder, cached, held_out).run()
 
 
-def _train_gate(pictures: Pictures, plan: Plan) -> None:
+def _train_image_quality(pictures: PictureSelection, plan: TrainingOptions) -> None:
     """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
-    recipe = train_gate.Recipe(checked=not plan.unchecked)
+    recipe = train_gate.ImageQualityRecipe(checked=not plan.unchecked)
     recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
-    never = {sample.picture: sample for sample in pictures.never_held_out()}
-    masked = {sample.picture: sample for sample in pictures.segmented(held_out=False) if sample.picture in never}
+    never = {sample.picture: sample for sample in pictures.training_samples()}
+    masked = {
+        sample.picture: sample for sample in pictures.segmented_samples(held_out=False) if sample.picture in never
+    }
     samples = list({**never, **masked}.values())
     segmenter = plan.start or verified_path("segmenter")
-    GateTraining(plan.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
+    ImageQualityTraining(plan.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
 
 
-def export_untrained_net(net: str, weights: Path) -> int:
+def export_untrained_network(net: str, weights: Path) -> int:
     """Write the ONNX file and its manifest entry. Raises UserError rather than write among the shipped weights."""
     if weights.resolve() == WEIGHTS.resolve():
         raise UserError("--untrained: name a folder with --weights; the shipped nets stay")
@@ -165,17 +167,23 @@ def export_untrained_net(net: str, weights: Path) -> int:
     return 0
 
 
-def export_net(net: str, checkpoint: Path, weights: Path, pictures: Pictures) -> None:
+def export_checkpoint(net: str, checkpoint: Path, weights: Path, pictures: PictureSelection) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
-    chosen = pictures.boxed(held_out=True) if net in ("detector", "yolo11n") else pictures.segmented(held_out=True)
+    chosen = (
+        pictures.boxed_samples(held_out=True)
+        if net in ("detector", "yolo11n")
+        else pictures.segmented_samples(held_out=True)
+    )
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepared = {"detector": detector_input, "yolo11n": detector_input, "gate": gate_input}.get(net, segmenter_input)
+    prepared = {"detector": detector_input, "yolo11n": detector_input, "gate": image_quality_input}.get(
+        net, segmenter_input
+    )
     inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")
     used = {sample.source.name for sample in pictures.samples}
-    origins = tuple(export.origin(pictures.folder(s), s) for s in pictures.sources if s.name in used)
-    model = export.export(net, checkpoint, weights, inputs, origins)
+    origins = tuple(export.read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
+    model = export.export_network(net, checkpoint, weights, inputs, origins)
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )

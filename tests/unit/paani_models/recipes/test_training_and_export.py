@@ -13,31 +13,31 @@ from paani.errors import UserError  # noqa: E402
 from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as train_detector  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
-from paani_models.detector.shipped_shape import Detector  # noqa: E402
-from paani_models.recipes.onnx_export import CONTRACTS, largest_difference, network, write_onnx  # noqa: E402
-from paani_models.recipes.recipes import parse_stages  # noqa: E402
+from paani_models.detector.shipped_network import Detector  # noqa: E402
+from paani_models.recipes.onnx_export import CONTRACTS, build_network, largest_export_difference, write_onnx  # noqa: E402
+from paani_models.recipes.train_and_export import parse_stages  # noqa: E402
 from paani_models.segmenter import train as train_segmenter  # noqa: E402
-from paani_models.segmenter.paper_shape import Segmenter  # noqa: E402
+from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
-from paani_models.training.loop import (  # noqa: E402
+from paani_models.training.training_state import (  # noqa: E402
     AveragedWeights,
     Prefetch,
-    Progress,
     Stage,
+    TrainingState,
     learning_rate,
     load_checkpoint,
-    stage_of,
+    stage_at_epoch,
 )
 
 pytestmark = pytest.mark.train
 
-SMALL = train_segmenter.Recipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
+SMALL = train_segmenter.SegmenterRecipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
 
 
 @pytest.fixture
 def river(monkeypatch: pytest.MonkeyPatch) -> list[CachedPicture]:
     """Six striped pictures: sky above bank above water."""
-    monkeypatch.setitem(train_segmenter.DRAWS, "river", 7)
+    monkeypatch.setitem(train_segmenter.DRAWS_PER_EPOCH, "river", 7)
     rng = np.random.default_rng(0)
     pictures = []
     for _ in range(6):
@@ -51,7 +51,7 @@ def river(monkeypatch: pytest.MonkeyPatch) -> list[CachedPicture]:
 
 def segmenter_run(folder: Path, pictures: list[CachedPicture]) -> SegmenterTraining:
     torch.manual_seed(SMALL.seed)
-    return SegmenterTraining(Segmenter(), SMALL, folder, pictures, pictures[:2])
+    return SegmenterTraining(PaperSegmenter(), SMALL, folder, pictures, pictures[:2])
 
 
 @pytest.mark.train
@@ -78,7 +78,7 @@ def test_records_hold_loss_and_iou_per_class_s10(tmp_path: Path, river: list[Cac
 @pytest.mark.train
 def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPicture]) -> None:
     segmenter_run(tmp_path, river).run(until=1)
-    other = SegmenterTraining(Segmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
+    other = SegmenterTraining(PaperSegmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
     with pytest.raises(UserError, match=r"last\.pt: was made with another recipe"):
         other.run()
 
@@ -90,7 +90,7 @@ def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.Monk
     picture[100:150, 100:200] = (200, 30, 30)
     box = np.array([[1, 100 / 320, 100 / 256, 200 / 320, 150 / 256]], np.float32)
     item = BoxedPicture("mcoe_boats", picture, box, np.array([0, 1, 0, 1], np.uint8))
-    recipe = train_detector.Recipe(epochs=2, batch=4, warmup_steps=1)
+    recipe = train_detector.DetectorRecipe(epochs=2, batch=4, warmup_steps=1)
     torch.manual_seed(0)
     run = train_detector.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item])
     run.run()
@@ -131,15 +131,15 @@ def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
     assert (recipe.peak_rate, recipe.weight_decay) == (3e-4, 1e-4)
     rates = [learning_rate(recipe.peak_rate, s, 500, recipe.warmup_steps, recipe.final_frac) for s in (0, 250, 500)]
     assert rates == pytest.approx([3e-4, 1.5e-4, 0.0], abs=1e-12)
-    progress = Progress(Segmenter(), recipe.peak_rate, recipe.weight_decay)
+    progress = TrainingState(PaperSegmenter(), recipe.peak_rate, recipe.weight_decay)
     assert isinstance(progress.optimiser, torch.optim.AdamW)
 
 
 def test_stage_of() -> None:
     stages = (Stage(2, 64, 64), Stage(1, 128, 128))
-    assert [stage_of(stages, epoch).height_px for epoch in range(3)] == [64, 64, 128]
+    assert [stage_at_epoch(stages, epoch).height_px for epoch in range(3)] == [64, 64, 128]
     with pytest.raises(IndexError):
-        stage_of(stages, 3)
+        stage_at_epoch(stages, 3)
 
 
 @pytest.mark.parametrize("text", ["4x128", "4x128x161", "axbxc", "4x128x160x1"])
@@ -177,23 +177,23 @@ def test_an_unreadable_checkpoint_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", CONTRACTS)
 def test_export_equals_the_net_on_pictures_t2(tmp_path: Path, name: str) -> None:
     torch.manual_seed(1)
-    net = network(name)
+    net = build_network(name)
     write_onnx(net, CONTRACTS[name], tmp_path / "net.onnx")
     rng = np.random.default_rng(0)
     inputs = [rng.random(CONTRACTS[name].input.shape, dtype=np.float32) for _ in range(2)]
-    assert largest_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+    assert largest_export_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
 
 
 def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> None:
-    write_onnx(Segmenter(), CONTRACTS["paper-segmenter"], tmp_path / "net.onnx")
+    write_onnx(PaperSegmenter(), CONTRACTS["paper-segmenter"], tmp_path / "net.onnx")
     assert (tmp_path / "net.onnx").stat().st_size == pytest.approx(4_344_661, rel=0.015)
 
 
 def test_export_notices_other_weights(tmp_path: Path) -> None:
     torch.manual_seed(1)
-    write_onnx(Segmenter(), CONTRACTS["segmenter"], tmp_path / "net.onnx")
+    write_onnx(PaperSegmenter(), CONTRACTS["segmenter"], tmp_path / "net.onnx")
     inputs = [np.random.default_rng(0).random((1, 3, 256, 320), dtype=np.float32)]
-    assert largest_difference(Segmenter().eval(), tmp_path / "net.onnx", inputs) > 1e-3
+    assert largest_export_difference(PaperSegmenter().eval(), tmp_path / "net.onnx", inputs) > 1e-3
 
 
 def test_a_missing_data_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

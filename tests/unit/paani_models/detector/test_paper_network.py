@@ -17,13 +17,13 @@ from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import load_catalogue  # noqa: E402
 from paani_models.detector import train as train_detector  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
-from paani_models.detector.paper_data import Augmentation, jitter_hsv, paper_example  # noqa: E402
-from paani_models.detector.paper_loss import assign, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
-from paani_models.detector.paper_shape import FUSED_PARAMETERS, Head, Yolo11n, fused  # noqa: E402
-from paani_models.detector.shipped_shape import candidate_grid  # noqa: E402
-from paani_models.detector.train_paper_shape import Recipe, Yolo11nTraining  # noqa: E402
-from paani_models.recipes.onnx_export import CONTRACTS, export_untrained, largest_difference, write_onnx  # noqa: E402
-from paani_models.training.loop import load_checkpoint  # noqa: E402
+from paani_models.detector.paper_data import Augmentation, augment_paper_example, jitter_hsv  # noqa: E402
+from paani_models.detector.paper_loss import assign_task_aligned, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
+from paani_models.detector.paper_network import FUSED_PARAMETERS, Head, Yolo11n, fuse_batch_norm  # noqa: E402
+from paani_models.detector.shipped_network import candidate_grid  # noqa: E402
+from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining  # noqa: E402
+from paani_models.recipes.onnx_export import CONTRACTS, export_untrained, largest_export_difference, write_onnx  # noqa: E402
+from paani_models.training.training_state import load_checkpoint  # noqa: E402
 from paani_services.perception.box_decoding import decode  # noqa: E402
 from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
@@ -59,7 +59,7 @@ def with_statistics() -> Yolo11n:
 
 def test_fused_parameters_c12() -> None:
     net = with_statistics()
-    folded = fused(net)
+    folded = fuse_batch_norm(net)
     assert sum(p.numel() for p in folded.parameters()) == 2_582_932 == FUSED_PARAMETERS
     x = torch.rand(1, 3, 256, 320)
     with torch.no_grad():
@@ -97,7 +97,7 @@ def test_export_is_opset_17_of_the_papers_size_and_equals_the_net_t1_t2_c13(tmp_
     assert [o.version for o in graph.opset_import if not o.domain] == [17]
     assert [d.dim_value for d in graph.graph.output[0].type.tensor_type.shape.dim] == [1, 8, 1680]
     inputs = [np.random.default_rng(0).random((1, 3, 256, 320), dtype=np.float32)]
-    assert largest_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+    assert largest_export_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
 
 
 def test_complete_iou_by_hand() -> None:
@@ -123,7 +123,7 @@ def test_assignment_takes_the_aligned_candidates_inside_the_object() -> None:
     truth = torch.tensor([[1.0, 8.0, 8.0, 40.0, 40.0], [0.0, 50.0, 50.0, 53.0, 53.0]])
     boxes = truth[:1, 1:].repeat(len(centres), 1)
     scores = torch.full((len(centres), 4), 0.1)
-    owner, wanted = assign(boxes, scores, truth, centres)
+    owner, wanted = assign_task_aligned(boxes, scores, truth, centres)
     mine = centres[owner == 0]
     assert len(mine) == 10
     assert ((mine > 8) & (mine < 40)).all()
@@ -147,7 +147,7 @@ def test_only_judged_classes_are_punished_on_background() -> None:
 
 
 def test_the_recipe_is_the_papers_s2_s3_s4_s5() -> None:
-    recipe = Recipe()
+    recipe = Yolo11nRecipe()
     assert (recipe.epochs, recipe.batch, recipe.workers, recipe.side_px) == (60, 32, 4, 320)
     assert (recipe.peak_rate, recipe.weight_decay, recipe.warmup_epochs) == (0.001, 0.0005, 3.0)
     assert (recipe.momentum, recipe.warmup_momentum, recipe.warmup_bias_rate) == (0.937, 0.8, 0.1)
@@ -165,9 +165,9 @@ def test_boxes_stay_on_their_blocks_through_the_augmentation_s5(count: int) -> N
     seen = 0
     for seed in range(12):
         items = [picture(kind, 10 * seed + kind) for kind in range(count)]
-        example = paper_example(np.random.default_rng(seed), items, (320, 320), plain)
+        example = augment_paper_example(np.random.default_rng(seed), items, (320, 320), plain)
         assert example.picture.shape == (320, 320, 3)
-        assert example.judged.shape == (4, 40, 40)
+        assert example.exhaustive_mask.shape == (4, 40, 40)
         for kind, x1, y1, x2, y2 in example.boxes.round().astype(int):
             inside = np.median(example.picture[y1:y2, x1:x2].reshape(-1, 3), 0)
             assert np.abs(inside - COLOURS[kind]).max() <= 6
@@ -187,7 +187,7 @@ def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
     """Four pictures, learnt by heart. The normalisations follow quickly, as a long training would let them."""
     torch.manual_seed(0)
     items = [picture(kind, kind) for kind in range(4)]
-    recipe = Recipe(
+    recipe = Yolo11nRecipe(
         epochs=epochs,
         batch=4,
         workers=1,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from paani_models.catalogue import file_sha256
-from paani_models.engines.ncnn_runner import Conversion, files_of
+from paani_models.engines.ncnn_runner import Conversion, ncnn_files
 
 SHAPE = [1, 3, 256, 320]
 WEIGHTS_3X3 = np.array([[0.5, -1.0, 0.25], [-0.5, 1.0, 0.0], [0.0, 0.125, -1.0]], np.float32)
@@ -69,7 +69,7 @@ def small_segmenter(path: Path) -> Path:
 
 def place(model: Path, param: str, weights: bytes) -> Path:
     """Converted files beside a model, with the record that belongs to them."""
-    files = files_of(model)
+    files = ncnn_files(model)
     files.param.write_text(param)
     files.bin.write_bytes(weights)
     record = Conversion(file_sha256(model), file_sha256(files.param), file_sha256(files.bin), 0.0, 4)

@@ -8,19 +8,19 @@ torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 from torch import Tensor, nn  # noqa: E402
 
 from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES  # noqa: E402
-from paani_models.detector import shipped_shape as detector  # noqa: E402
-from paani_models.segmenter import paper_shape as segmenter  # noqa: E402
-from paani_models.segmenter.shipped_shape import ImageNetSegmenter  # noqa: E402
+from paani_models.detector import shipped_network as detector  # noqa: E402
+from paani_models.segmenter import paper_network as segmenter  # noqa: E402
+from paani_models.segmenter.shipped_network import ShippedSegmenter  # noqa: E402
 
 pytestmark = pytest.mark.train
 
 
 def test_segmenter_parameters_d9() -> None:
-    assert segmenter.parameter_count(segmenter.Segmenter()) == 1_082_467
+    assert segmenter.parameter_count(segmenter.PaperSegmenter()) == 1_082_467
 
 
 def test_segmenter_taps_d1() -> None:
-    taps = segmenter.Segmenter().eval().taps(torch.zeros(1, 3, 256, 320))
+    taps = segmenter.PaperSegmenter().eval().taps(torch.zeros(1, 3, 256, 320))
     assert [tuple(t.shape[1:]) for t in taps] == [
         (16, 64, 80),
         (24, 32, 40),
@@ -30,7 +30,7 @@ def test_segmenter_taps_d1() -> None:
 
 
 def test_segmenter_decoder_d2_d3_d4() -> None:
-    net = segmenter.Segmenter()
+    net = segmenter.PaperSegmenter()
     assert net.project.kernel_size == (1, 1)
     assert net.project.out_channels == 64
     assert len(net.refines) == len(net.laterals) == 3
@@ -39,7 +39,7 @@ def test_segmenter_decoder_d2_d3_d4() -> None:
 
 def test_segmenter_output_is_piecewise_constant_over_four_pixels_d4_d5() -> None:
     torch.manual_seed(0)
-    logits = segmenter.Segmenter().eval()(torch.rand(1, 3, 256, 320)).detach()
+    logits = segmenter.PaperSegmenter().eval()(torch.rand(1, 3, 256, 320)).detach()
     assert tuple(logits.shape) == (1, 3, 256, 320)
     cells = logits[:, :, ::4, ::4]
     assert torch.equal(cells.repeat_interleave(4, 2).repeat_interleave(4, 3), logits)
@@ -125,14 +125,14 @@ def multiply_adds(net: nn.Module) -> int:
 
 
 def test_the_shipped_segmenter_costs_less_than_the_papers() -> None:
-    assert multiply_adds(segmenter.Segmenter()) == pytest.approx(357e6, rel=0.01)
-    assert multiply_adds(ImageNetSegmenter()) < 0.75 * multiply_adds(segmenter.Segmenter())
+    assert multiply_adds(segmenter.PaperSegmenter()) == pytest.approx(357e6, rel=0.01)
+    assert multiply_adds(ShippedSegmenter()) < 0.75 * multiply_adds(segmenter.PaperSegmenter())
 
 
 def test_the_shipped_segmenter_is_bilinear_between_the_middles_of_its_cells() -> None:
     """Pixel p of a row lies (p - 1.5) / 4 cells from the first middle; outside the middles nothing changes."""
     torch.manual_seed(0)
-    net, heads = ImageNetSegmenter().eval(), []
+    net, heads = ShippedSegmenter().eval(), []
     net.head.register_forward_hook(lambda _head, _inputs, output: heads.append(output))
     with torch.no_grad():
         logits = net(torch.rand(1, 3, 256, 320))

@@ -10,22 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.statistics.charts import Points, lines
-from paani_models.report.bars import PHOTOGRAPHS, Bar, Reached
-from paani_models.report.box_limits import FATES, SCORE_STEPS, BoxLimits
-from paani_models.report.mask_limits import REACHES_PX, TENTHS, MaskLimits, edge_f1, water_iou
-from paani_models.report.tables import TITLES, as_table
-from paani_models.report.tried import Tried
+from paani_models.report.box_errors import OUTCOMES, SCORE_STEPS, BoxErrors
+from paani_models.report.experiments import Experiment
+from paani_models.report.mask_errors import EDGE_DISTANCES_PX, TENTHS, MaskErrors, edge_f1, water_iou
+from paani_models.report.requirements import PHOTOGRAPHS, Requirement, RequirementResult
+from paani_models.report.tables import TITLES, render_table
 
-WHOLE = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a figure's name need not tell
+POOLED_SOURCES = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a figure's name need not tell
 _TICKS = 4  # a chart's axis has this many steps, so that each trial stands on a whole number
 
 
-def bars_section(found: Sequence[Reached], tried: Sequence[Tried]) -> str:
+def render_requirements(found: Sequence[RequirementResult], tried: Sequence[Experiment]) -> str:
     """What is to be reached, what is, why not; then how each figure moved from recipe to recipe."""
     rows = [
-        f'<tr class="{"met" if each.met else "missed"}"><th>{escape(_name(each.bar))}</th><td>{each.n}</td>'
-        f"<td>{_bound(each.bar)}</td><td>{each.value:.{_places(each.bar)}f}</td>"
-        f'<td>{"met" if each.met else "missed"}</td><td class="text">{escape(each.limit)}</td></tr>'
+        f'<tr class="{"met" if each.is_met else "missed"}"><th>{escape(_requirement_name(each.requirement))}</th>'
+        f"<td>{each.n}</td>"
+        f"<td>{_format_bound(each.requirement)}</td><td>{each.value:.{_decimals(each.requirement)}f}</td>"
+        f'<td>{"met" if each.is_met else "missed"}</td><td class="text">{escape(each.limit)}</td></tr>'
         for each in found
     ]
     head = '<th>figure</th><th>n</th><th>bar</th><th>reached</th><th></th><th class="text">what limits it</th>'
@@ -33,20 +34,20 @@ def bars_section(found: Sequence[Reached], tried: Sequence[Tried]) -> str:
         "<h3>Figures and their bars</h3>",
         "<p>Real pictures of held-out sequences only. What was tried before stands as it was recorded, where it was "
         "measured on as many pictures or boxes as now.</p>",
-        as_table(head, rows),
+        render_table(head, rows),
     ]
-    for net in dict.fromkeys(each.bar.net for each in found):
-        now = [each for each in found if each.bar.net == net]
+    for net in dict.fromkeys(each.requirement.net for each in found):
+        now = [each for each in found if each.requirement.net == net]
         mine = [row for row in tried if row.net == net]
-        charts = "".join(f"<figure>{_tried_chart(each, mine)}</figure>" for each in now)
+        charts = "".join(f"<figure>{_experiments_chart(each, mine)}</figure>" for each in now)
         parts.append(f'<h3>{net.capitalize()}: what was tried</h3><div class="side">{charts}</div>')
-        parts.append(_tried_table(now, mine))
+        parts.append(_experiments_table(now, mine))
     return "".join(parts)
 
 
-def mask_limits_section(limits: Sequence[MaskLimits]) -> str:
+def render_mask_errors(limits: Sequence[MaskErrors]) -> str:
     """Where mistakes lie, and the best that the net's cells allow."""
-    near = "".join(f"<th>within {reach} px</th>" for reach in REACHES_PX)
+    near = "".join(f"<th>within {reach} px</th>" for reach in EDGE_DISTANCES_PX)
     head = (
         "<th>source</th><th>pictures</th><th>wrong</th><th>taken for water</th><th>water missed</th>"
         f"{near}<th>water IoU</th><th>best of cells</th><th>edge F1</th><th>best of cells</th>"
@@ -74,36 +75,36 @@ def mask_limits_section(limits: Sequence[MaskLimits]) -> str:
         "<h3>Segmenter: where its mistakes lie</h3><p>Shares of the wrong pixels: by kind, and by distance from a "
         "true edge, in pixels of the mask. Best of cells: the truth itself, rounded to one answer per 4x4 pixels of "
         "the input. Undecided bands count as edges, and are split along their middle for edge F1.</p>"
-        f'{as_table(head, rows)}<div class="side">{charts}</div>'
+        f'{render_table(head, rows)}<div class="side">{charts}</div>'
     )
 
 
-def box_limits_section(limits: Sequence[BoxLimits]) -> str:
+def render_box_errors(limits: Sequence[BoxErrors]) -> str:
     """Heights, fates and scores of each class."""
     parts = ["<h3>Detector: what limits it</h3><p>Photographs only; heights in pixels of the input, 320x256.</p>"]
     for each in limits:
         rows = [
-            f"<tr><th>{_range(row.low, row.high)}</th><td>{row.n}</td><td>{row.found / row.n:.3f}</td>"
+            f"<tr><th>{_format_height_range(row.low, row.high)}</th><td>{row.n}</td><td>{row.found / row.n:.3f}</td>"
             f"<td>{row.ap50:.3f}</td></tr>"
             for row in each.rows
             if row.n
         ]
         fates = [
             f"<tr><th>{fate}</th><td>{count}</td><td>{count / each.n:.0%}</td></tr>"
-            for fate, count in zip(FATES, each.fates, strict=True)
+            for fate, count in zip(OUTCOMES, each.outcomes, strict=True)
         ]
         parts.append(
             f'<h4>{each.kind}: AP50 {each.ap50:.3f} of {each.n}</h4><div class="side">'
-            + as_table("<th>height, px</th><th>n</th><th>recall at 0.40</th><th>AP50</th>", rows)
-            + as_table("<th>true objects</th><th>n</th><th>share</th>", fates)
+            + render_table("<th>height, px</th><th>n</th><th>recall at 0.40</th><th>AP50</th>", rows)
+            + render_table("<th>true objects</th><th>n</th><th>share</th>", fates)
             + _score_chart(each)
             + "</div>"
         )
     return "".join(parts)
 
 
-def _tried_chart(now: Reached, tried: Sequence[Tried]) -> str:
-    bar = now.bar
+def _experiments_chart(now: RequirementResult, tried: Sequence[Experiment]) -> str:
+    bar = now.requirement
     values = [row.value(bar.metric, bar.source, now.n) for row in tried]
     points: Points = [(number, value) for number, value in enumerate(values, 1) if value is not None]
     asked = {number for number, row in enumerate(tried, 1) if row.asked}
@@ -115,21 +116,21 @@ def _tried_chart(now: Reached, tried: Sequence[Tried]) -> str:
         "weights": [point for point in points if point[0] not in asked],
         "asked otherwise": [point for point in points if point[0] in asked],
     }
-    return lines(series, "recipe", _name(bar), (1.0, last), ends)
+    return lines(series, "recipe", _requirement_name(bar), (1.0, last), ends)
 
 
-def _tried_table(now: Sequence[Reached], tried: Sequence[Tried]) -> str:
-    head = "".join(f"<th>{escape(_name(each.bar))}</th>" for each in now)
+def _experiments_table(now: Sequence[RequirementResult], tried: Sequence[Experiment]) -> str:
+    head = "".join(f"<th>{escape(_requirement_name(each.requirement))}</th>" for each in now)
     rows = []
     for number, row in enumerate(tried, 1):
-        values = [row.value(each.bar.metric, each.bar.source, each.n) for each in now]
+        values = [row.value(each.requirement.metric, each.requirement.source, each.n) for each in now]
         cells = "".join(
-            "<td></td>" if value is None else f"<td>{value:.{_places(each.bar)}f}</td>"
+            "<td></td>" if value is None else f"<td>{value:.{_decimals(each.requirement)}f}</td>"
             for each, value in zip(now, values, strict=True)
         )
         recipe = escape(f"{row.recipe}; {row.asked}" if row.asked else row.recipe)
         rows.append(f'<tr><th>{number}</th><td class="text">{recipe} <code>{row.sha256[:8]}</code></td>{cells}</tr>')
-    return as_table(f'<th></th><th class="text">recipe</th>{head}', rows)
+    return render_table(f'<th></th><th class="text">recipe</th>{head}', rows)
 
 
 def _height_chart(shares: Mapping[str, NDArray[np.float64]], title: str) -> str:
@@ -143,7 +144,7 @@ def _height_chart(shares: Mapping[str, NDArray[np.float64]], title: str) -> str:
     return lines(series, "height in the picture, 0 at the top", y_label, (0.0, 1.0), (0.0, top))
 
 
-def _score_chart(limits: BoxLimits) -> str:
+def _score_chart(limits: BoxErrors) -> str:
     first = int(1 + 0.1 // SCORE_STEPS[1])  # below 0.1 the wrong ones are legion
     middles = (SCORE_STEPS[:-1] + SCORE_STEPS[1:])[first:] / 2
     counts = {"right": limits.right[first:], "wrong": limits.wrong[first:]}
@@ -154,19 +155,19 @@ def _score_chart(limits: BoxLimits) -> str:
     return lines(series, "score", f"{limits.kind} boxes", (0.0, 1.0), (0.0, top))
 
 
-def _name(bar: Bar) -> str:
+def _requirement_name(bar: Requirement) -> str:
     metric = TITLES.get(bar.metric) or bar.metric.replace("_ap50", " AP50")
-    return metric if bar.source in WHOLE else f"{metric}, {bar.source}"
+    return metric if bar.source in POOLED_SOURCES else f"{metric}, {bar.source}"
 
 
-def _bound(bar: Bar) -> str:
-    return f"{'at most ' if bar.at_most else ''}{bar.bound:.{_places(bar)}f}"
+def _format_bound(bar: Requirement) -> str:
+    return f"{'at most ' if bar.at_most else ''}{bar.bound:.{_decimals(bar)}f}"
 
 
-def _places(bar: Bar) -> int:
+def _decimals(bar: Requirement) -> int:
     """Decimals of what stands near 0 and of what stands near 1."""
     return 4 if bar.at_most else 3
 
 
-def _range(low: float, high: float) -> str:
+def _format_height_range(low: float, high: float) -> str:
     return f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more"
