@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
-    """Write the page, evaluation.json, experiments.json and pictures/; return 0. Mistakes raise UserError before that."""
+    """Write page, evaluation.json, experiments.json and pictures/. Returns 0; raises UserError before it measures."""
     out: Path = arguments.out.resolve()
     repository = next((folder for folder in (out, *out.parents) if (folder / ".git").exists()), None)
     if repository is not None:

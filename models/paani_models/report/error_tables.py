@@ -107,7 +107,7 @@ def _experiments_chart(now: RequirementResult, tried: Sequence[Experiment]) -> s
     bar = now.requirement
     values = [row.value(bar.metric, bar.source, now.n) for row in tried]
     points: Points = [(number, value) for number, value in enumerate(values, 1) if value is not None]
-    asked = {number for number, row in enumerate(tried, 1) if row.asked}
+    asked = {number for number, row in enumerate(tried, 1) if row.inference}
     last = 1.0 + _TICKS * math.ceil(max(1, len(tried) - 1) / _TICKS)
     heights = [bar.bound, *(value for _, value in points)]
     ends = (0.0, math.ceil(max(heights) * 50) / 50) if bar.at_most else (math.floor(min(heights) * 5) / 5, 1.0)
@@ -128,7 +128,7 @@ def _experiments_table(now: Sequence[RequirementResult], tried: Sequence[Experim
             "<td></td>" if value is None else f"<td>{value:.{_decimals(each.requirement)}f}</td>"
             for each, value in zip(now, values, strict=True)
         )
-        recipe = escape(f"{row.recipe}; {row.asked}" if row.asked else row.recipe)
+        recipe = escape(f"{row.recipe}; {row.inference}" if row.inference else row.recipe)
         rows.append(f'<tr><th>{number}</th><td class="text">{recipe} <code>{row.sha256[:8]}</code></td>{cells}</tr>')
     return render_table(f'<th></th><th class="text">recipe</th>{head}', rows)
 

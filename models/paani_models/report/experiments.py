@@ -25,7 +25,7 @@ class Experiment(Record, frozen=True):
     sha256: str
     recipe: str
     figures: tuple[Figure, ...]
-    asked: str = ""
+    inference: str = ""
 
     def value(self, metric: str, source: str, n: int) -> float | None:
         """One of its figures; None where it has none of that name, or one of other pictures than n of them."""
@@ -33,7 +33,7 @@ class Experiment(Record, frozen=True):
 
 
 class _Record(Record, frozen=True):
-    tried: tuple[Experiment, ...]
+    experiments: tuple[Experiment, ...]
 
 
 def read_experiments(weights: Path) -> tuple[Experiment, ...]:
@@ -45,24 +45,24 @@ def read_experiments(weights: Path) -> tuple[Experiment, ...]:
     if not path.is_file():
         return ()
     try:
-        return msgspec.json.decode(path.read_bytes(), type=_Record).tried
+        return msgspec.json.decode(path.read_bytes(), type=_Record).experiments
     except (OSError, msgspec.MsgspecError) as error:
         raise UserError(f"{path}: {error}") from error
 
 
 def with_present_weights(
-    tried: Sequence[Experiment], catalogue: dict[str, Model], reached: Sequence[RequirementResult]
+    experiments: Sequence[Experiment], catalogue: dict[str, Model], results: Sequence[RequirementResult]
 ) -> tuple[Experiment, ...]:
     """The record with the present weights as measured now, in their place, or as the last where it lacks them."""
-    rows = list(tried)
-    for net in dict.fromkeys(each.requirement.net for each in reached):
+    rows = list(experiments)
+    for net in dict.fromkeys(each.requirement.net for each in results):
         figures = tuple(
             Figure(each.requirement.metric, each.requirement.source, round(each.value, 4), each.n)
-            for each in reached
+            for each in results
             if each.requirement.net == net
         )
         sha256 = catalogue[net].sha256
-        place = next((i for i, row in enumerate(rows) if row.sha256 == sha256 and not row.asked), None)
+        place = next((i for i, row in enumerate(rows) if row.sha256 == sha256 and not row.inference), None)
         if place is None:
             rows.append(Experiment(net, sha256, PRESENT_WEIGHTS, figures))
         else:
@@ -70,6 +70,6 @@ def with_present_weights(
     return tuple(rows)
 
 
-def encode_experiments(tried: Sequence[Experiment]) -> bytes:
+def encode_experiments(experiments: Sequence[Experiment]) -> bytes:
     """The record as it stands beside a manifest."""
-    return msgspec.json.format(msgspec.json.encode(_Record(tuple(tried))), indent=1) + b"\n"
+    return msgspec.json.format(msgspec.json.encode(_Record(tuple(experiments))), indent=1) + b"\n"

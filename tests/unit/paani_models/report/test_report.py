@@ -221,7 +221,7 @@ def test_a_whole_report_of_a_miniature(data: Path, tmp_path: Path) -> None:
     assert {e.source for e in written.estimates} == {"tbiseg_dasha", "mcoe_boats", "all"}
     assert [m.name for m in written.models] == ["segmenter", "detector"]
     assert all(text.count(title) for title in ("what was tried", "where its mistakes lie", "what limits it"))
-    measured = [row for row in read_experiments(out) if not row.asked and row.sha256 == written.models[0].sha256]
+    measured = [row for row in read_experiments(out) if not row.inference and row.sha256 == written.models[0].sha256]
     assert [figure.n for row in measured for figure in row.figures] == [4]
 
 

@@ -193,7 +193,7 @@ def test_the_present_weights_take_their_place_in_the_record(tmp_path: Path) -> N
     catalogue = load_catalogue()
     found = [RequirementResult(REQUIREMENTS[1], 0.9, 3, "walls")]
     present = Experiment("segmenter", catalogue["segmenter"].sha256, "averaged", ())
-    mirrored = msgspec.structs.replace(present, asked="mirrored too")
+    mirrored = msgspec.structs.replace(present, inference="mirrored too")
     old = Experiment("segmenter", "0" * 64, "smaller", ())
     rows = with_present_weights([old, present, mirrored], catalogue, found)
     assert [row.value("iou_water", "tbiseg_dasha", 3) for row in rows] == [None, 0.9, None]
@@ -209,8 +209,8 @@ def test_the_present_weights_take_their_place_in_the_record(tmp_path: Path) -> N
 
 
 def test_a_malformed_record_is_named(tmp_path: Path) -> None:
-    (tmp_path / "experiments.json").write_text('{"tried":[{"net":"segmenter"}]}')
-    with pytest.raises(UserError, match=r"tried\.json: .*sha256"):
+    (tmp_path / "experiments.json").write_text('{"experiments":[{"net":"segmenter"}]}')
+    with pytest.raises(UserError, match=r"experiments\.json: .*sha256"):
         read_experiments(tmp_path)
 
 
@@ -221,7 +221,7 @@ def test_the_shipped_record_states_every_bar_of_the_shipped_weights() -> None:
         mine = [row for row in shipped if row.net == bar.net]
         assert len(mine) >= 3
         assert all(figure.n > 0 for row in mine for figure in row.figures)
-        (present,) = [row for row in mine if row.sha256 == catalogue[bar.net].sha256 and not row.asked]
+        (present,) = [row for row in mine if row.sha256 == catalogue[bar.net].sha256 and not row.inference]
         assert (bar.metric, bar.source) in {(figure.metric, figure.source) for figure in present.figures}
         assert present.recipe != PRESENT_WEIGHTS
 
