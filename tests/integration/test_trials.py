@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from paani_sim.trials.cases import Case, scenario_of
 from paani_sim.trials.drive import Drive
-from paani_sim.trials.drive_recorder import Recorder
-from paani_sim.trials.fingerprint import Maker
-from paani_sim.trials.ground_truth_evidence import OracleEyes
-from paani_sim.trials.one import config_for, run_case
+from paani_sim.trials.drive_recorder import DriveRecorder
+from paani_sim.trials.fingerprint import FingerprintReader
+from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.suite import Record, encoded, look, result_path
+from paani_sim.trials.run_suite import StoredResult, encode_stored_result, find_stored_results, result_path
+from paani_sim.trials.run_trial import load_case_config, run_trial
+from paani_sim.trials.trial_cases import TrialCase, build_scenario
 from paani_sim.worlds import Task
 from paani_tools.replay import command as replay
 
@@ -50,11 +50,11 @@ def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
     )
     assert first.returncode == 0, first.stderr
     assert json.loads(figures.read_bytes())["policies"]["oracle"]["completed"] == 2
-    case, maker = Case(str(tmp_path / "short.toml"), 2, Policy.ORACLE), Maker(())
-    result, _ = run_case(case)
+    case, reader = TrialCase(str(tmp_path / "short.toml"), 2, Policy.ORACLE), FingerprintReader(())
+    result, _ = run_trial(case)
     file = result_path(tmp_path / "run", case)
-    assert file.read_bytes() == encoded(Record(made_with=maker.of(case), result=result))
-    assert look(tmp_path / "run", [case], maker).wanted == ()
+    assert file.read_bytes() == encode_stored_result(StoredResult(fingerprint=reader.fingerprint(case), result=result))
+    assert find_stored_results(tmp_path / "run", [case], reader).missing == ()
     second = subprocess.run(words(tmp_path), capture_output=True, text=True, check=False)
     assert "4 of 4 drives are there already" in second.stderr
     assert second.stdout == first.stdout
@@ -97,13 +97,15 @@ def test_nobody_drives_on_for_a_run_that_was_killed(tmp_path: Path) -> None:
 
 def test_a_recorded_drive_is_decided_again_to_the_byte(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The recording is one of the live topics: every decision in it comes out the same."""
-    case = Case("lake", 1, Policy.ORACLE)
-    scenario = dataclasses.replace(scenario_of(case), task=Task(distance_m=2.0, time_limit_s=30.0))
-    config, file = config_for(case), tmp_path / "drive.mcap"
-    with Recorder(file, config) as recorder:
-        drive = Drive(scenario, config, OracleEyes(scenario.world, (), config), tap=recorder.tap)
+    case = TrialCase("lake", 1, Policy.ORACLE)
+    scenario = dataclasses.replace(build_scenario(case), task=Task(distance_m=2.0, time_limit_s=30.0))
+    config, file = load_case_config(case), tmp_path / "drive.mcap"
+    with DriveRecorder(file, config) as recorder:
+        drive = Drive(
+            scenario, config, GroundTruthEvidenceSource(scenario.world, (), config), tap=recorder.record_message
+        )
         drive.run()
         drive.close()
-    assert drive.along.best_m > 2.0
+    assert drive.progress.best_progress_m > 2.0
     assert replay.main([str(file), "--check"]) == 0
     assert "0 differ" in capsys.readouterr().out

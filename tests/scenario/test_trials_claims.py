@@ -10,11 +10,11 @@ import pytest
 
 from paani_sim import vessels
 from paani_sim.trials import command
-from paani_sim.trials.cases import Case, scenario_of
-from paani_sim.trials.one import config_for, run_case
+from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import TrialResult
-from paani_sim.trials.states import Why
+from paani_sim.trials.run_trial import load_case_config, run_trial
+from paani_sim.trials.trial_cases import TrialCase, build_scenario
 from paani_sim.worlds import WORLDS
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -43,7 +43,7 @@ OCCLUSION = '[[actors]]\nlook = "can"\nat_m = [11.0, 0.3]\n'  # hidden by the on
 def driven(folder: Path, text: str, policy: Policy, *sets: str) -> TrialResult:
     file = folder / "given.toml"
     file.write_text(text)
-    return run_case(Case(str(file), 5, policy), sets)[0]
+    return run_trial(TrialCase(str(file), 5, policy), sets)[0]
 
 
 @pytest.mark.gl
@@ -51,7 +51,7 @@ def test_w14_a_whole_lap_by_camera_round_what_lies_on_it(tmp_path: Path) -> None
     """W14, W6: rendered pictures and the nets alone lead a boat once round; who does not look runs into the buoy."""
     seeing, blind = (driven(tmp_path, LAP, policy, "profile=paani") for policy in (Policy.PAANI, Policy.BLIND))
     assert blind.collisions > 0
-    assert (seeing.why, seeing.collisions) == (Why.COMPLETED, 0)
+    assert (seeing.why, seeing.collisions) == (DriveOutcome.COMPLETED, 0)
     assert seeing.progress_m >= seeing.goal_m > 45.0
     assert seeing.frames > 250
     assert {encounter.what for encounter in seeing.encounters} == {"actor_0", "actor_1"}
@@ -70,7 +70,7 @@ def test_w4_what_lies_ahead_is_not_touched_in_any_condition(tmp_path: Path, cond
 
 def test_w4_the_suite_has_these_conditions() -> None:
     """Low light, low sun, rain and fog, among the first six seeds of one world."""
-    lights = [scenario_of(Case("lake", seed, Policy.PAANI)).world.light for seed in range(1, 7)]
+    lights = [build_scenario(TrialCase("lake", seed, Policy.PAANI)).world.light for seed in range(1, 7)]
     assert any(light.sky == "dusk" for light in lights)
     assert any(light.sun_elevation_rad < 0.3 for light in lights)
     assert any(light.rain_mmph > 1.0 for light in lights)
@@ -82,7 +82,7 @@ def test_w6_a_failure_that_passes_does_not_end_the_task(tmp_path: Path, fault: s
     """W6: the boat stops or not, touches nothing, and arrives all the same."""
     failing = f'[[faults]]\nkind = "{fault}"\nstart_s = 8.0\nduration_s = 5.0\n'
     result = driven(tmp_path, AHEAD + failing, Policy.ORACLE)
-    assert (result.why, result.collisions) == (Why.COMPLETED, 0)
+    assert (result.why, result.collisions) == (DriveOutcome.COMPLETED, 0)
     if fault != "gps_outage":
         assert sum(stop.seconds for stop in result.stops) > 3.0
 
@@ -90,9 +90,9 @@ def test_w6_a_failure_that_passes_does_not_end_the_task(tmp_path: Path, fault: s
 def test_w7_policies_differ_in_nothing_but_themselves(tmp_path: Path) -> None:
     """W7: the same water, things, weather, faults and seed for every policy; one setting is one ablation."""
     for world in WORLDS:
-        assert len({pickle.dumps(scenario_of(Case(world, 7, policy, "gps_jump"))) for policy in Policy}) == 1
-    case = Case("lake", 7, Policy.ORACLE)
-    assert config_for(case, ["navigator.planner.use=true"]) == config_for(case)
+        assert len({pickle.dumps(build_scenario(TrialCase(world, 7, policy, "gps_jump"))) for policy in Policy}) == 1
+    case = TrialCase("lake", 7, Policy.ORACLE)
+    assert load_case_config(case, ["navigator.planner.use=true"]) == load_case_config(case)
     whole = driven(tmp_path, AHEAD, Policy.ORACLE)
     without = driven(tmp_path, AHEAD, Policy.ORACLE, "navigator.planner.use=false")
     assert whole != without
@@ -104,7 +104,7 @@ def test_w12_other_waters_ask_for_other_files_alone(world: str, tmp_path: Path) 
     """W12: canal, harbour and lake are driven by the same processes; what differs is a scenario in a file."""
     text = f'seed = 2\n[world]\nkind = "{world}"\nactors = false\n[task]\ndistance_m = 12.0\ntime_limit_s = 60.0\n'
     result = driven(tmp_path, text, Policy.ORACLE)
-    assert (result.why, result.collisions) == (Why.COMPLETED, 0)
+    assert (result.why, result.collisions) == (DriveOutcome.COMPLETED, 0)
 
 
 def test_w12_other_rules_are_settings(tmp_path: Path) -> None:

@@ -14,12 +14,12 @@ from paani_sim.eye.labels import WATER_CODE
 from paani_sim.eye.mounted import camera_of, pose_of
 from paani_sim.eye.renderer import Eye
 from paani_sim.trials.drive import Drive
-from paani_sim.trials.ground_truth_evidence import OracleEyes, levelled, water_edge
-from paani_sim.trials.one import eyes_of
-from paani_sim.trials.policies import Policy, config_of, time_scale
+from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
+from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource, find_water_edge, level_mask
+from paani_sim.trials.policies import Policy, load_policy_config, time_limit_factor
 from paani_sim.trials.result import TrialResult
-from paani_sim.trials.scoring import score
-from paani_sim.trials.states import Phase, Why
+from paani_sim.trials.run_trial import open_evidence_source
+from paani_sim.trials.scoring import score_drive
 from paani_sim.worlds import Fault, FaultKind, Scenario, Task, load_world
 
 Launch = Callable[..., Drive]
@@ -38,8 +38,8 @@ def launch() -> Iterator[Launch]:
     opened: list[Drive] = []
 
     def make(given: Scenario, policy: Policy, config: Config | None = None) -> Drive:
-        config = config or config_of(policy)
-        opened.append(Drive(given, config, eyes_of(policy, given, config)))
+        config = config or load_policy_config(policy)
+        opened.append(Drive(given, config, open_evidence_source(policy, given, config)))
         return opened[-1]
 
     yield make
@@ -49,7 +49,7 @@ def launch() -> Iterator[Launch]:
 
 def result_of(drive: Drive, policy: Policy) -> TrialResult:
     drive.run()
-    return score(drive, policy)
+    return score_drive(drive, policy)
 
 
 def test_the_same_drive_twice_is_the_same_to_the_byte(launch: Launch) -> None:
@@ -66,14 +66,14 @@ def test_ready_running_finished(launch: Launch) -> None:
     """Disarmed until the boat could go; done when the task's distance is."""
     drive = launch(scenario(4.0, alone=True), Policy.ORACLE)
     seen = [drive.phase]
-    while drive.phase is not Phase.FINISHED:
+    while drive.phase is not DrivePhase.FINISHED:
         drive.step()
         if drive.phase is not seen[-1]:
             seen.append(drive.phase)
-        assert drive.phase is not Phase.READY or drive.applied.left_n == 0.0
-    assert seen == [Phase.READY, Phase.RUNNING, Phase.FINISHED]
-    result = score(drive, Policy.ORACLE)
-    assert (result.why, result.completed) == (Why.COMPLETED, True)
+        assert drive.phase is not DrivePhase.READY or drive.applied.left_n == 0.0
+    assert seen == [DrivePhase.READY, DrivePhase.RUNNING, DrivePhase.FINISHED]
+    result = score_drive(drive, Policy.ORACLE)
+    assert (result.why, result.completed) == (DriveOutcome.COMPLETED, True)
     assert 4.0 <= result.progress_m < 4.3
     assert result.collisions == 0
     assert result.latency.p50_s == pytest.approx(0.1, abs=0.011)
@@ -82,7 +82,7 @@ def test_ready_running_finished(launch: Launch) -> None:
 
 def test_time_is_up(launch: Launch) -> None:
     result = result_of(launch(scenario(50.0, 3.0), Policy.BLIND), Policy.BLIND)
-    assert (result.why, result.completed) == (Why.TIME_LIMIT, False)
+    assert (result.why, result.completed) == (DriveOutcome.TIME_LIMIT, False)
     assert result.seconds == pytest.approx(3.0)
     assert result.latency.samples == 0
 
@@ -90,24 +90,24 @@ def test_time_is_up(launch: Launch) -> None:
 def test_two_minutes_without_progress_are_the_end(launch: Launch) -> None:
     given = scenario(50.0, 200.0, Fault(FaultKind.LINK_LOSS, 4.0, 200.0), alone=True)
     result = result_of(launch(given, Policy.BLIND), Policy.BLIND)
-    assert (result.why, result.completed) == (Why.STALLED, False)
+    assert (result.why, result.completed) == (DriveOutcome.STALLED, False)
     assert 120.0 <= result.seconds < 130.0
 
 
 def test_slower_policies_have_longer() -> None:
     """The paper cruises at 0.15 m/s (M7), a quarter of the default."""
-    assert time_scale(config_of(Policy.PAPER)) == pytest.approx(4.0)
-    assert time_scale(config_of(Policy.PAANI)) == 1.0
+    assert time_limit_factor(load_policy_config(Policy.PAPER)) == pytest.approx(4.0)
+    assert time_limit_factor(load_policy_config(Policy.PAANI)) == 1.0
 
 
 def test_diverging_integration_is_a_failure(launch: Launch, tmp_path: Path) -> None:
     """A vessel whose drag no step of 10 ms can follow: the trial ends, and not as a success."""
     file = tmp_path / "stiff.toml"
     file.write_text(VESSEL.read_text().replace("surge_linear = 4.0", "surge_linear = 9e8"))
-    drive = launch(scenario(4.0), Policy.BLIND, config_of(Policy.BLIND, [f'plant.vessel="{file}"']))
+    drive = launch(scenario(4.0), Policy.BLIND, load_policy_config(Policy.BLIND, [f'plant.vessel="{file}"']))
     drive.plant.place(*drive.plant.position_m, 0.3)
     result = result_of(drive, Policy.BLIND)
-    assert (result.why, result.completed) == (Why.DIVERGED, False)
+    assert (result.why, result.completed) == (DriveOutcome.DIVERGED, False)
     assert "not finite" in result.error
 
 
@@ -144,7 +144,7 @@ def test_nothing_crosses_a_lost_link(launch: Launch) -> None:
     """No thrust, no pulse: the last gate applies zero within its half second, and goes on when the link is back."""
     drive = launch(scenario(60.0, 12.0, Fault(FaultKind.LINK_LOSS, 6.0, 2.0), alone=True), Policy.ORACLE)
     forces: dict[float, float] = {}
-    while drive.phase is not Phase.FINISHED:
+    while drive.phase is not DrivePhase.FINISHED:
         drive.step()
         forces[round(drive.plant.sim_us * 1e-6, 2)] = drive.applied.left_n
     assert forces[5.9] > 0.0
@@ -155,14 +155,14 @@ def test_nothing_crosses_a_lost_link(launch: Launch) -> None:
 @pytest.mark.parametrize("down_deg", [6.0, 0.0])
 def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float) -> None:
     """Things that face the boat, by label; nothing that the shore hides or the boat has passed; level cameras too."""
-    world, config = load_world("river"), config_of(Policy.ORACLE, [f"eye.pitch_down_deg={down_deg}"])
-    eyes = OracleEyes(world, (), config)
+    world, config = load_world("river"), load_policy_config(Policy.ORACLE, [f"eye.pitch_down_deg={down_deg}"])
+    evidence_source = GroundTruthEvidenceSource(world, (), config)
     start = world.start
     truth = m.TruePose(
         source_us=0, sim_us=0, x_m=start.x_m, y_m=start.y_m, z_m=0.177, roll_rad=0.0, pitch_rad=0.0,
         yaw_rad=start.yaw_rad, surge_mps=0.0, sway_mps=0.0, yaw_rate_radps=0.0,
     )  # fmt: skip
-    seen = eyes.see(truth)
+    seen = evidence_source.compute_visible_scene(truth)
     assert {label for label, _ in seen.boxes} >= {m.Label.BUOY}
     assert seen.water[-1].all()
     assert not seen.water[:20].any()
@@ -173,8 +173,8 @@ def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float)
 @pytest.mark.parametrize("name", ["river", "lake"])
 def test_oracle_water_is_the_rendered_water(name: str) -> None:
     """Mask against the label picture along the route: 0.95 of intersection over union on average."""
-    world, config = load_world(name), config_of(Policy.ORACLE)
-    oracle, camera = OracleEyes(world, (), config), Eye(world, camera_of(config.eye))
+    world, config = load_world(name), load_policy_config(Policy.ORACLE)
+    oracle, camera = GroundTruthEvidenceSource(world, (), config), Eye(world, camera_of(config.eye))
     found = []
     for k in range(0, len(world.route_m), 12):
         here, there = world.route_m[k], world.route_m[(k + 1) % len(world.route_m)]
@@ -186,7 +186,7 @@ def test_oracle_water_is_the_rendered_water(name: str) -> None:
         rows = ((np.arange(64) + 0.5) / 64 * drawn.shape[0]).astype(int)
         columns = ((np.arange(80) + 0.5) / 80 * drawn.shape[1]).astype(int)
         water = drawn[rows[:, None], columns[None, :]]
-        seen = oracle.see(truth).water
+        seen = oracle.compute_visible_scene(truth).water
         found.append((water & seen).sum() / max(1, (water | seen).sum()))
     camera.close()
     assert np.mean(found) > 0.95
@@ -198,7 +198,7 @@ def test_water_edge_of_each_column() -> None:
     water[2:, 0] = True
     water[1, 0] = False
     water[:, 1] = True
-    assert water_edge(water) == (0.5, 0.0, 1.0)
+    assert find_water_edge(water) == (0.5, 0.0, 1.0)
 
 
 def test_levelled_turns_as_the_picture_does() -> None:
@@ -206,5 +206,5 @@ def test_levelled_turns_as_the_picture_does() -> None:
     x = ((np.arange(80) + 0.5) / 80 - 0.5) * 4.0 / 3.0
     y = (np.arange(64) + 0.5) / 64 - 0.5
     tilted = y[:, None] > -np.tan(0.1) * x[None, :]
-    flat = levelled(tilted, -0.1, 4.0 / 3.0) | levelled(tilted, 0.1, 4.0 / 3.0)
+    flat = level_mask(tilted, -0.1, 4.0 / 3.0) | level_mask(tilted, 0.1, 4.0 / 3.0)
     assert flat[36:60, 20:60].all()

@@ -24,15 +24,15 @@ from paani_sim.plant.reference_model import oracle
 from paani_sim.plant.step_cost import physics
 from paani_sim.studies.estimation_table import estimation
 from paani_sim.trials.drive import Drive
-from paani_sim.trials.one import eyes_of
-from paani_sim.trials.policies import Policy, config_of
-from paani_sim.trials.suite import ONE_THREAD
+from paani_sim.trials.policies import Policy, load_policy_config
+from paani_sim.trials.run_suite import THREAD_COUNT_VARIABLES
+from paani_sim.trials.run_trial import open_evidence_source
 from paani_sim.worlds import Actor, Scenario, Task, load_world
 
-WARM_S, RUN_S, COST_S = 3.0, 30.0, 8.0
+WARM_UP_S, RUN_S, COST_S = 3.0, 30.0, 8.0
 ACTORS = (0, 4, 8, 16)
 SIZES_PX = ((160, 120), (320, 240), (640, 480))
-PLAIN = 2, (320, 240)  # what the other is while one of them varies
+DEFAULT_CASE = 2, (320, 240)  # what the other is while one of them varies
 
 
 class Cost(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,11 +50,12 @@ def main(argv: list[str]) -> int:
     costs: list[Cost] = []
 
     def cost() -> Part:
-        costs.extend(measured_costs())
-        return cost_part(costs)
+        costs.extend(measure_costs())
+        return tabulate_costs(costs)
 
     parts: dict[str, Callable[[], Part]] = {
-        "physics": physics, "eye": eye, "lockstep": lockstep, "cost": cost, "oracle": oracle, "estimation": estimation
+        "physics": physics, "eye": eye, "lockstep": measure_lockstep,
+        "cost": cost, "oracle": oracle, "estimation": estimation,
     }  # fmt: skip
     parser = argparse.ArgumentParser(prog="paani bench water", description="How fast the simulator is, and how true.")
     parser.add_argument("--only", nargs="+", choices=tuple(parts), metavar="PART", help=f"of {', '.join(parts)}")
@@ -70,17 +71,17 @@ def main(argv: list[str]) -> int:
     if options.json:
         write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
     if options.svg:
-        write_whole(options.svg, plot(costs).encode(), "--svg")
+        write_whole(options.svg, plot_costs(costs).encode(), "--svg")
     return 0
 
 
-def lockstep() -> Part:
+def measure_lockstep() -> Part:
     """Whole drives: one with both cores to itself, and two side by side with one each."""
     rows: list[tuple[Cell, ...]] = []
     for policy in (Policy.PAANI, Policy.ORACLE, Policy.BLIND, Policy.PAPER):
-        simulated_s, wall_s, cpu_s = timed(policy, 2, PLAIN[1], RUN_S, threads=True)
+        simulated_s, wall_s, cpu_s = time_drive(policy, 2, DEFAULT_CASE[1], RUN_S, threads=True)
         rows.append((policy.value, 1, simulated_s / wall_s, cpu_s / simulated_s))
-        rows.append((policy.value, 2, _side_by_side(policy), None))
+        rows.append((policy.value, 2, _measure_parallel_speed(policy), None))
     return Part(
         name="lockstep",
         columns=("policy", "drives at once", "x real time, together", "CPU s a simulated s"),
@@ -89,20 +90,20 @@ def lockstep() -> Part:
     )
 
 
-def measured_costs() -> list[Cost]:
+def measure_costs() -> list[Cost]:
     """One core: more actors at the usual picture, and other pictures with the usual actors."""
-    wanted = [(policy, count, PLAIN[1]) for policy in (Policy.PAANI, Policy.ORACLE) for count in ACTORS]
-    wanted += [(Policy.PAANI, PLAIN[0], size) for size in SIZES_PX]
+    cases = [(policy, count, DEFAULT_CASE[1]) for policy in (Policy.PAANI, Policy.ORACLE) for count in ACTORS]
+    cases += [(Policy.PAANI, DEFAULT_CASE[0], size) for size in SIZES_PX]
     found = []
-    for policy, count, size in wanted:
-        simulated_s, _, cpu_s = timed(policy, count, size, COST_S, threads=False)
+    for policy, count, size in cases:
+        simulated_s, _, cpu_s = time_drive(policy, count, size, COST_S, threads=False)
         found.append(
             Cost(policy=policy, actors=count, width_px=size[0], height_px=size[1], cpu_s=round(cpu_s / simulated_s, 4))
         )
     return found
 
 
-def cost_part(costs: list[Cost]) -> Part:
+def tabulate_costs(costs: list[Cost]) -> Part:
     """As a table."""
     return Part(
         name="cost",
@@ -112,9 +113,9 @@ def cost_part(costs: list[Cost]) -> Part:
     )
 
 
-def plot(costs: list[Cost]) -> str:
+def plot_costs(costs: list[Cost]) -> str:
     """Two charts side by side as one SVG."""
-    usual = [c for c in costs if (c.width_px, c.height_px) == PLAIN[1]]
+    usual = [c for c in costs if (c.width_px, c.height_px) == DEFAULT_CASE[1]]
     by_actors = {
         policy.value: [(float(c.actors), c.cpu_s) for c in usual if c.policy is policy and c.actors in ACTORS]
         for policy in (Policy.PAANI, Policy.ORACLE)
@@ -124,7 +125,7 @@ def plot(costs: list[Cost]) -> str:
             {
                 (c.width_px * c.height_px * 1e-3, c.cpu_s)
                 for c in costs
-                if c.policy is Policy.PAANI and c.actors == PLAIN[0]
+                if c.policy is Policy.PAANI and c.actors == DEFAULT_CASE[0]
             }
         )
     }
@@ -143,49 +144,49 @@ def plot(costs: list[Cost]) -> str:
     return drawing(880, 270, title, parts, xmlns="http://www.w3.org/2000/svg", width=880, height=270) + "\n"
 
 
-def timed(
+def time_drive(
     policy: Policy, actors: int, size_wh: tuple[int, int], seconds: float, *, threads: bool
 ) -> tuple[float, float, float]:
     """Simulated, wall and CPU seconds of a drive under way, after a warm-up."""
     sets = (f"eye.width_px={size_wh[0]}", f"eye.height_px={size_wh[1]}")
-    config, scenario = config_of(policy, sets, threads=threads), _scenario(actors)
-    drive = Drive(scenario, config, eyes_of(policy, scenario, config))
+    config, scenario = load_policy_config(policy, sets, threads=threads), _build_scenario(actors)
+    drive = Drive(scenario, config, open_evidence_source(policy, scenario, config))
     try:
-        _advance(drive, WARM_S)
+        _advance_drive(drive, WARM_UP_S)
         wall_ms, cpu_s, from_us = stopwatch_ms(), process_cpu_s(), drive.plant.sim_us
-        _advance(drive, WARM_S + seconds)
+        _advance_drive(drive, WARM_UP_S + seconds)
         simulated_s = (drive.plant.sim_us - from_us) * 1e-6
         return simulated_s, (stopwatch_ms() - wall_ms) * 1e-3, process_cpu_s() - cpu_s
     finally:
         drive.close()
 
 
-def _side_by_side(policy: Policy) -> float:
+def _measure_parallel_speed(policy: Policy) -> float:
     """How many times faster than real time two drives in processes of their own are together."""
-    for name in ONE_THREAD:
+    for name in THREAD_COUNT_VARIABLES:
         os.environ[name] = "1"
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
-        futures = [executor.submit(_alone, policy) for _ in range(2)]
+        futures = [executor.submit(_time_single_drive, policy) for _ in range(2)]
         return sum(simulated_s / wall_s for simulated_s, wall_s, _ in (future.result() for future in futures))
 
 
-def _alone(policy: Policy) -> tuple[float, float, float]:
+def _time_single_drive(policy: Policy) -> tuple[float, float, float]:
     cv2.setNumThreads(1)
-    return timed(policy, *PLAIN, RUN_S, threads=False)
+    return time_drive(policy, *DEFAULT_CASE, RUN_S, threads=False)
 
 
-def _advance(drive: Drive, until_s: float) -> None:
+def _advance_drive(drive: Drive, until_s: float) -> None:
     while drive.plant.sim_us < until_s * 1e6:
         drive.step()
 
 
-def _scenario(actors: int) -> Scenario:
+def _build_scenario(actors: int) -> Scenario:
     """The river with so many boats on the path of its first one, all near the start."""
     world = load_world("river")
     lead = world.actors[0]
-    fleet = tuple(_following(lead, number) for number in range(actors))
+    fleet = tuple(_place_behind(lead, number) for number in range(actors))
     return Scenario("bench", dataclasses.replace(world, actors=fleet), task=Task(0.0, 1e4))
 
 
-def _following(lead: Actor, number: int) -> Actor:
+def _place_behind(lead: Actor, number: int) -> Actor:
     return dataclasses.replace(lead, id=f"boat_{number}", start_m=lead.start_m + 9.0 * number, speed_mps=0.4)

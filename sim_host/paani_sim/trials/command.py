@@ -14,14 +14,14 @@ from tqdm import tqdm
 from paani.errors import UserError
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
-from paani_sim.trials.cases import SUITES, Case, cases_of, read_case
-from paani_sim.trials.fingerprint import Maker
-from paani_sim.trials.one import config_for, run_case
-from paani_sim.trials.policies import Policy, config_of
+from paani_sim.trials.drive_states import DriveOutcome
+from paani_sim.trials.fingerprint import FingerprintReader
+from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
-from paani_sim.trials.states import Why
-from paani_sim.trials.suite import Failure, drive_all, look
-from paani_sim.trials.suite_summary import summarise, table
+from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases
+from paani_sim.trials.run_trial import load_case_config, run_trial
+from paani_sim.trials.suite_summary import format_summary, summarise_suite
+from paani_sim.trials.trial_cases import SUITES, TrialCase, list_cases, parse_case
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.load import load_scenario
 
@@ -30,47 +30,49 @@ def main(argv: list[str]) -> int:
     """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake, 130 Ctrl-C."""
     options = _parser().parse_args(argv)
     if options.one:
-        return _one(options)
+        return _run_one(options)
     if options.record:
         raise UserError("--record needs --one")
-    return _suite(options)
+    return _run_suite(options)
 
 
-def _suite(options: argparse.Namespace) -> int:
-    cases = _cases(options)
+def _run_suite(options: argparse.Namespace) -> int:
+    cases = _list_suite_cases(options)
     out: Path = options.out or Path("runs") / f"trial-{options.suite}"
-    maker = Maker(options.sets)
+    reader = FingerprintReader(options.sets)
     for policy in options.policy:
-        config_of(policy, options.sets)
-    kept = look(out, cases, maker)
+        load_policy_config(policy, options.sets)
+    kept = find_stored_results(out, cases, reader)
     if kept.results:
         sys.stderr.write(f"{out}: {len(kept.results)} of {len(cases)} drives are there already\n")
     for why, count in kept.outdated.items():
         sys.stderr.write(f"{out}: {count} drives were made with {why}, and are driven again\n")
-    results, failures, code = dict(kept.results), list[Failure](), 0
+    results, failures, code = dict(kept.results), list[FailedDrive](), 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # or the processes that drive would go on without it
     try:
         with tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar:
-            for case, result in drive_all(out, kept.wanted, maker, options.sets, options.jobs) if kept.wanted else ():
+            for case, result in (
+                run_cases(out, kept.missing, reader, options.sets, options.jobs) if kept.missing else ()
+            ):
                 if isinstance(result, TrialResult):
                     results[case] = result
                 else:
                     failures.append(result)
-                touched = sum(r.collisions > 0 for c, r in results.items() if c.policy is Policy.PAANI)
-                bar.set_postfix_str(f"paani touched something in {touched}", refresh=False)
+                drives_with_contact = sum(r.collisions > 0 for c, r in results.items() if c.policy is Policy.PAANI)
+                bar.set_postfix_str(f"paani touched something in {drives_with_contact}", refresh=False)
                 bar.update()
     except KeyboardInterrupt:
-        results, code = dict(look(out, cases, maker).results), 130
+        results, code = dict(find_stored_results(out, cases, reader).results), 130
         sys.stderr.write(f"\n{out}: {len(results)} of {len(cases)} drives done; the same command goes on\n")
     for failure in failures:
-        sys.stderr.write(f"{failure.case.name}: {failure.why}\n")
-    diverged = [case for case in sorted(results) if results[case].why is Why.DIVERGED]
+        sys.stderr.write(f"{failure.case.name}: {failure.reason}\n")
+    diverged = [case for case in sorted(results) if results[case].why is DriveOutcome.DIVERGED]
     for case in diverged:
         sys.stderr.write(f"{case.name}: {results[case].error}\n")
     if not results:
         return code or 1
-    summary = summarise(options.suite, results)
-    sys.stdout.write(table(summary))
+    summary = summarise_suite(options.suite, results)
+    sys.stdout.write(format_summary(summary))
     if options.json:
         write_whole(options.json, msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n", "--json")
     if options.report and not code:
@@ -80,16 +82,16 @@ def _suite(options: argparse.Namespace) -> int:
     return code or int(bool(failures or diverged))
 
 
-def _one(options: argparse.Namespace) -> int:
+def _run_one(options: argparse.Namespace) -> int:
     """One drive in this process, its result printed."""
-    case = read_case(options.one)
+    case = parse_case(options.one)
     if options.record:
-        from paani_sim.trials.drive_recorder import Recorder  # noqa: PLC0415
+        from paani_sim.trials.drive_recorder import DriveRecorder  # noqa: PLC0415
 
-        with Recorder(options.record, config_for(case, options.sets)) as recorder:
-            result, effort = run_case(case, options.sets, threads=True, tap=recorder.tap)
+        with DriveRecorder(options.record, load_case_config(case, options.sets)) as recorder:
+            result, effort = run_trial(case, options.sets, threads=True, tap=recorder.record_message)
     else:
-        result, effort = run_case(case, options.sets, threads=True)
+        result, effort = run_trial(case, options.sets, threads=True)
     data = msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n"
     if options.json:
         write_whole(options.json, data, "--json")
@@ -100,17 +102,17 @@ def _one(options: argparse.Namespace) -> int:
         f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "
         f"{effort.simulated_s / effort.wall_s:.1f} x real time\n"
     )
-    return 1 if result.why is Why.DIVERGED else 0
+    return 1 if result.why is DriveOutcome.DIVERGED else 0
 
 
-def _cases(options: argparse.Namespace) -> list[Case]:
+def _list_suite_cases(options: argparse.Namespace) -> list[TrialCase]:
     worlds = options.scenario or options.worlds or list(WORLDS)
     for world in worlds:
         if options.scenario:
             load_scenario(world)
         elif world not in WORLDS:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
-    return cases_of(SUITES[options.suite], worlds, options.policy, options.seeds)
+    return list_cases(SUITES[options.suite], worlds, options.policy, options.seeds)
 
 
 def _parser() -> argparse.ArgumentParser:

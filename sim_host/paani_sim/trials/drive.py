@@ -17,25 +17,30 @@ from paani_sim.plant.adapter import Applied, ThrustAdapter
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
 from paani_sim.trials.autonomy_stack import AutonomyStack
-from paani_sim.trials.evidence_source import Eyes, Sight
+from paani_sim.trials.drive_history import DriveHistory
+from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
+from paani_sim.trials.evidence_source import EvidenceFrame, EvidenceSource
 from paani_sim.trials.lockstep_bus import START_US, LockstepBus, MessageTap, PlantClock
-from paani_sim.trials.policies import look_hz, time_scale
-from paani_sim.trials.route_progress import Along
-from paani_sim.trials.states import Phase, Why
-from paani_sim.trials.track import Track
+from paani_sim.trials.policies import processed_frame_rate_hz, time_limit_factor
+from paani_sim.trials.route_progress import RouteProgress
 from paani_sim.worlds import Scenario
 from paani_sim.worlds.faults import is_linked
 
 PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`paani bench chain`), about 100 ms
-READY_LIMIT_S = 20.0
+MAX_READY_S = 20.0
 MIN_READY_S = 2.0
-STALL_S, STALL_M = 120.0, 0.5  # who gets no further in that time neither waits for what passes nor goes round a barge
+STALL_TIME_S, STALL_PROGRESS_M = (
+    120.0,
+    0.5,
+)  # who gets no further in that time neither waits for what passes nor goes round a barge
 ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
-END_M = 4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
-BELIEVED_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS
+ROUTE_END_TOLERANCE_M = (
+    4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
+)
+REPORTED_END_TOLERANCE_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS
 
 
-def mission_of(scenario: Scenario) -> m.Mission:
+def build_mission(scenario: Scenario) -> m.Mission:
     """Follow the world's route, once or without end, within the scenario's fence."""
     world = scenario.world
     leg = m.MissionLeg(
@@ -54,7 +59,7 @@ class Drive:
         self,
         scenario: Scenario,
         config: Config,
-        eyes: Eyes | None,
+        evidence_source: EvidenceSource | None,
         *,
         tap: MessageTap | None = None,
         perception_latency_s: float = PERCEPTION_LATENCY_S,
@@ -62,45 +67,49 @@ class Drive:
         """eyes None: nobody looks, the advice is always to go straight on."""
         world = scenario.world
         self.scenario, self.config = scenario, config
-        self._eyes = eyes
+        self._evidence_source = evidence_source
         self.plant = Plant.of(scenario, config.plant)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
         self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self._clock = PlantClock(self.plant)
         self._bus = LockstepBus(self._clock, config.bus.domain, tap)
-        self.autonomy = AutonomyStack(config, mission_of(scenario), self._bus, self._clock, blind=eyes is None)
+        self.autonomy = AutonomyStack(
+            config, build_mission(scenario), self._bus, self._clock, blind=evidence_source is None
+        )
         self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
         self.applied: Applied = self.adapter.decide(START_US)
-        self.along = Along(world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m))
-        self.goal_m = self._goal_m()
-        self.limit_s = scenario.task.time_limit_s * time_scale(config)
-        self.track = Track()
-        self.phase, self.why, self.error = Phase.READY, Why.NONE, ""
-        self.running_us = 0  # when the boat was armed
-        self._gained_s, self._gained_m = 0.0, 0.0  # when and where progress was last made
+        self.progress = RouteProgress(
+            world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m)
+        )
+        self.goal_m = self._compute_goal_m()
+        self.time_limit_s = scenario.task.time_limit_s * time_limit_factor(config)
+        self.history = DriveHistory()
+        self.phase, self.outcome, self.error = DrivePhase.READY, DriveOutcome.NONE, ""
+        self.armed_us = 0  # when the boat was armed
+        self._last_progress_s, self._last_progress_m = 0.0, 0.0  # when and where progress was last made
         rate = 1.0 / config.plant.step_s
         sensors = config.plant.sensors
-        self._every = {
+        self._steps_between = {
             what: max(1, round(rate / hz))
             for what, hz in {
                 "imu": sensors.imu_rate_hz,
                 "gps": sensors.gps_rate_hz,
                 "estimate": config.localization.rate_hz,
                 "report": config.plant.publish_rate_hz,
-                "look": look_hz(config),
+                "look": processed_frame_rate_hz(config),
                 "arming": ARMING_HZ,
                 "pulse": PULSE_HZ,
                 "sample": SAMPLE_HZ,
             }.items()
         }
-        self._late_us = round(perception_latency_s * 1e6)
-        self._samples: list[m.ImuSample] = []
-        self._fix: m.GpsFix | None = None
+        self._evidence_delay_us = round(perception_latency_s * 1e6)
+        self._imu_samples: list[m.ImuSample] = []
+        self._gps_fix: m.GpsFix | None = None
         self._odometry: m.Odometry | None = None
-        self._coming: list[tuple[int, m.Evidence]] = []
+        self._pending_evidence: list[tuple[int, m.Evidence]] = []
         self.frames = 0
-        self._in_force: m.Thrust | None = None
-        self._since_us = START_US
+        self._command_in_force: m.Thrust | None = None
+        self._in_force_since_us = START_US
 
     @property
     def now_us(self) -> int:
@@ -110,11 +119,11 @@ class Drive:
     @property
     def elapsed_s(self) -> float:
         """Simulated time since the boat was armed."""
-        return (self.now_us - self.running_us) * 1e-6 if self.running_us else 0.0
+        return (self.now_us - self.armed_us) * 1e-6 if self.armed_us else 0.0
 
     def run(self) -> None:
         """To the end."""
-        while self.phase is not Phase.FINISHED:
+        while self.phase is not DrivePhase.FINISHED:
             self.step()
 
     def step(self) -> None:
@@ -124,57 +133,61 @@ class Drive:
             self.plant.step(self.applied.left_n, self.applied.right_n)
         except PlantDiverged as error:
             self.error = str(error)
-            self._finish(Why.DIVERGED)
+            self._finish(DriveOutcome.DIVERGED)
             return
         now_us = self.now_us
         linked = is_linked(self.scenario.faults, self.plant.sim_us * 1e-6)
-        self._measure(now_us)
-        self._estimate(now_us, linked=linked)
-        self._look(now_us, linked=linked)
-        self._supervise(now_us, linked=linked)
+        self._publish_measurements(now_us)
+        self._update_estimate(now_us, linked=linked)
+        self._update_evidence(now_us, linked=linked)
+        self._publish_arming_and_pulses(now_us, linked=linked)
         thrust = self.autonomy.step()
         if thrust is not None and linked:
             self.adapter.offer(thrust, now_us)
-        self._report(now_us)
-        self._advance(now_us)
+        self._record_thrust_and_truth(now_us)
+        self._update_phase(now_us)
 
     def close(self) -> None:
         """Release the plant and the eyes."""
         self.plant.close()
-        if self._eyes is not None:
-            self._eyes.close()
+        if self._evidence_source is not None:
+            self._evidence_source.close()
 
-    def _goal_m(self) -> float:
-        length_m = self.along.length_m
-        rest_m = length_m if self.scenario.world.route_closed else length_m - self.along.start_arc_m - END_M
+    def _compute_goal_m(self) -> float:
+        length_m = self.progress.length_m
+        rest_m = (
+            length_m
+            if self.scenario.world.route_closed
+            else length_m - self.progress.start_arc_m - ROUTE_END_TOLERANCE_M
+        )
         return min(self.scenario.task.distance_m or rest_m, rest_m)
 
     def _is_due(self, what: str) -> bool:
-        return self.plant.steps % self._every[what] == 0
+        return self.plant.steps % self._steps_between[what] == 0
 
-    def _measure(self, now_us: int) -> None:
+    def _publish_measurements(self, now_us: int) -> None:
         if self._is_due("imu"):
-            self._samples.append(self._bus.put(keys.IMU, imu_message(self.plant, now_us)))
+            self._imu_samples.append(self._bus.put(keys.IMU, imu_message(self.plant, now_us)))
         if self._is_due("gps"):
-            self._fix = self._bus.put(keys.GPS, gps_message(self.plant, now_us))
+            self._gps_fix = self._bus.put(keys.GPS, gps_message(self.plant, now_us))
 
-    def _estimate(self, now_us: int, *, linked: bool) -> None:
+    def _update_estimate(self, now_us: int, *, linked: bool) -> None:
         if not self._is_due("estimate"):
             return
-        local, odometry = self._estimator.step(self._samples, self._fix, now_us)
-        self._samples, self._fix = [], None
+        local, odometry = self._estimator.step(self._imu_samples, self._gps_fix, now_us)
+        self._imu_samples, self._gps_fix = [], None
         if self._bus.tap is not None:
             self._bus.put(keys.LOCAL_ODOMETRY, local)
         self._odometry = self._bus.put(keys.ODOMETRY, odometry)
         if linked:
             self.autonomy.deliver(keys.ODOMETRY, self._odometry)
 
-    def _look(self, now_us: int, *, linked: bool) -> None:
-        if self._coming and now_us >= self._coming[0][0]:
-            evidence = self._bus.put(keys.EVIDENCE, self._coming.pop(0)[1])
-            self.track.evidence(evidence, now_us)
+    def _update_evidence(self, now_us: int, *, linked: bool) -> None:
+        if self._pending_evidence and now_us >= self._pending_evidence[0][0]:
+            evidence = self._bus.put(keys.EVIDENCE, self._pending_evidence.pop(0)[1])
+            self.history.record_evidence(evidence, now_us)
             self.autonomy.deliver(keys.EVIDENCE, evidence)
-        if self._eyes is None or not linked or not self._is_due("look"):
+        if self._evidence_source is None or not linked or not self._is_due("look"):
             return
         header = m.PictureHeader(
             source_us=now_us,
@@ -184,28 +197,28 @@ class Drive:
             height_px=self.config.eye.height_px,
         )
         roll_rad = self._odometry.roll_rad if self._odometry is not None else 0.0
-        sight = self._eyes.look(pose_message(self.plant, now_us), header, roll_rad)
-        if sight is None:
+        frame = self._evidence_source.observe(pose_message(self.plant, now_us), header, roll_rad)
+        if frame is None:
             return
         self.frames += 1
-        self._coming.append((now_us + self._late_us, sight.evidence))
+        self._pending_evidence.append((now_us + self._evidence_delay_us, frame.evidence))
         if self._bus.tap is not None:
-            self._show(sight, header)
+            self._record_images(frame, header)
 
-    def _show(self, sight: Sight, header: m.PictureHeader) -> None:
+    def _record_images(self, frame: EvidenceFrame, header: m.PictureHeader) -> None:
         """Picture and mask, for the recording."""
-        if sight.bgr is not None:
+        if frame.bgr is not None:
             quality = [cv2.IMWRITE_JPEG_QUALITY, self.config.camera.jpeg_quality]
-            self._bus.put(keys.PICTURE, header, cv2.imencode(".jpg", sight.bgr, quality)[1].tobytes())
-        if sight.mask is not None:
-            height, width = sight.mask.shape
-            named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
-            self._bus.put(keys.MASK, named, cv2.imencode(".png", sight.mask)[1].tobytes())
+            self._bus.put(keys.PICTURE, header, cv2.imencode(".jpg", frame.bgr, quality)[1].tobytes())
+        if frame.mask is not None:
+            height, width = frame.mask.shape
+            mask_header = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
+            self._bus.put(keys.MASK, mask_header, cv2.imencode(".png", frame.mask)[1].tobytes())
 
-    def _supervise(self, now_us: int, *, linked: bool) -> None:
+    def _publish_arming_and_pulses(self, now_us: int, *, linked: bool) -> None:
         """The operator's word, the pulses, and the plant's clock."""
         if self._is_due("arming"):
-            arming = m.Arming(source_us=now_us, armed=self.phase is Phase.RUNNING)
+            arming = m.Arming(source_us=now_us, armed=self.phase is DrivePhase.RUNNING)
             arming = self._bus.put(keys.ARMING, arming)
             self.adapter.hear_arming(arming, now_us)
             if linked:
@@ -220,37 +233,39 @@ class Drive:
             if linked:
                 self.autonomy.deliver(keys.SIM_TIME, clock)
 
-    def _report(self, now_us: int) -> None:
+    def _record_thrust_and_truth(self, now_us: int) -> None:
         """What the last gate does, and truth."""
         in_force = self.adapter.command if self.applied.zero_cause is m.ZeroCause.NONE else None
-        if in_force is not self._in_force:
-            self._in_force, self._since_us = in_force, now_us
-        self.track.thrust(self.applied, in_force, now_us)
+        if in_force is not self._command_in_force:
+            self._command_in_force, self._in_force_since_us = in_force, now_us
+        self.history.record_thrust(self.applied, in_force, now_us)
         if self._bus.tap is not None and self._is_due("report"):
             self._bus.put(keys.TRUE_POSE, pose_message(self.plant, now_us))
-            applied = applied_message(self.adapter, self.applied, now_us, self._since_us)
+            applied = applied_message(self.adapter, self.applied, now_us, self._in_force_since_us)
             self._bus.put(keys.THRUST_APPLIED, applied)
 
-    def _advance(self, now_us: int) -> None:
+    def _update_phase(self, now_us: int) -> None:
         """The state machine, and the samples that are scored."""
         if self._is_due("sample"):
-            self.along.update(self.plant.position_m)
-            if self.phase is Phase.RUNNING:
-                self.track.sample(self.plant, self.along, self.autonomy, self.applied)
-        if self.phase is Phase.READY:
+            self.progress.update(self.plant.position_m)
+            if self.phase is DrivePhase.RUNNING:
+                self.history.record_sample(self.plant, self.progress, self.autonomy, self.applied)
+        if self.phase is DrivePhase.READY:
             waited_s = self.plant.sim_us * 1e-6
             if waited_s >= MIN_READY_S and self._is_ready():
-                self.phase, self.running_us = Phase.RUNNING, now_us
-            elif waited_s >= READY_LIMIT_S:
-                self._finish(Why.NOT_READY)
-        elif self.along.best_m >= self.goal_m - (BELIEVED_M if self._is_finished() else 0.0):
-            self._finish(Why.COMPLETED)
-        elif self.elapsed_s >= self.limit_s:
-            self._finish(Why.TIME_LIMIT)
-        elif self.along.best_m >= self._gained_m + STALL_M:
-            self._gained_s, self._gained_m = self.elapsed_s, self.along.best_m
-        elif self.elapsed_s >= self._gained_s + STALL_S:
-            self._finish(Why.STALLED)
+                self.phase, self.armed_us = DrivePhase.RUNNING, now_us
+            elif waited_s >= MAX_READY_S:
+                self._finish(DriveOutcome.NOT_READY)
+        elif self.progress.best_progress_m >= self.goal_m - (
+            REPORTED_END_TOLERANCE_M if self._is_route_finished() else 0.0
+        ):
+            self._finish(DriveOutcome.COMPLETED)
+        elif self.elapsed_s >= self.time_limit_s:
+            self._finish(DriveOutcome.TIME_LIMIT)
+        elif self.progress.best_progress_m >= self._last_progress_m + STALL_PROGRESS_M:
+            self._last_progress_s, self._last_progress_m = self.elapsed_s, self.progress.best_progress_m
+        elif self.elapsed_s >= self._last_progress_s + STALL_TIME_S:
+            self._finish(DriveOutcome.STALLED)
 
     def _is_ready(self) -> bool:
         """Nothing but the operator's word is missing, or what the eyes advise."""
@@ -258,11 +273,11 @@ class Drive:
         waiting = {m.Inhibit.NOT_ARMED, m.Inhibit.ADVISED_STOP}
         return command is not None and bool(command.inhibits) and waiting.issuperset(command.inhibits)
 
-    def _is_finished(self) -> bool:
+    def _is_route_finished(self) -> bool:
         """The navigator says that the route has no more waypoints."""
         command = self.autonomy.command
         done = {m.Inhibit.ROUTE_FINISHED, m.Inhibit.MISSION_DONE}
         return command is not None and not done.isdisjoint(command.inhibits)
 
-    def _finish(self, why: Why) -> None:
-        self.phase, self.why = Phase.FINISHED, why
+    def _finish(self, outcome: DriveOutcome) -> None:
+        self.phase, self.outcome = DrivePhase.FINISHED, outcome

@@ -21,7 +21,7 @@ from paani_sim.trials.lockstep_bus import START_US
 PACKAGES = ("paani", "numpy", "onnxruntime", "msgspec", "mujoco", "opencv-python-headless")
 
 
-class Recorder:
+class DriveRecorder:
     """`tap` takes every message of one drive. The file is whole or not there."""
 
     def __init__(self, path: Path, config: Config) -> None:
@@ -36,7 +36,7 @@ class Recorder:
         except OSError as error:
             raise UserError(f"--record {path}: {error.strerror}") from error
 
-    def tap(self, topic: keys.Topic[Any], message: m.Message, now_us: int, data: bytes = b"") -> None:
+    def record_message(self, topic: keys.Topic[Any], message: m.Message, now_us: int, data: bytes = b"") -> None:
         """See `MessageTap`."""
         head = Head(message.source_us, message.seq, message.epoch, message.sent_us)
         encoded = self._encoder.encode(message)
@@ -45,7 +45,7 @@ class Recorder:
         else:
             self._log.write(topic, now_us, head, encoded, b"")
 
-    def __enter__(self) -> Recorder:
+    def __enter__(self) -> DriveRecorder:
         return self
 
     def __exit__(

@@ -15,10 +15,10 @@ from paani_sim.eye.mounted import open_eye, pose_of
 from paani_sim.worlds import Fault, World
 
 
-class Eyes(Protocol):
+class EvidenceSource(Protocol):
     """Looks once per frame. Not for two threads."""
 
-    def look(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> Sight | None:
+    def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
         """Evidence at this pose and time; None where no picture came. roll_rad: as the boat believes it to be."""
         ...
 
@@ -28,7 +28,7 @@ class Eyes(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class EvidenceFrame:
     """`bgr` uint8 [H, W, 3] and `mask` uint8 [64, 80] where there are any."""
 
     evidence: m.Evidence
@@ -36,29 +36,29 @@ class Sight:
     mask: U8 | None = None
 
 
-class CameraEyes:
+class CameraEvidenceSource:
     """Renders, breaks the picture where a fault says so, and perceives it. Raises UserError where OpenGL is missing."""
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
         self._faults = CameraFaults(faults)
-        self._perceiver = perceiver_of(config.perception, _no_time)
-        self._eye = open_eye(world, config.eye)
+        self._perceiver = perceiver_of(config.perception, _frozen_stopwatch_ms)
+        self._renderer = open_eye(world, config.eye)
 
-    def look(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> Sight | None:
+    def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
         """See `Eyes`."""
         t_s = truth.sim_us * 1e-6
-        bgr = self._faults.apply(self._eye.render(pose_of(truth), t_s, truth.actors_along_m).bgr, t_s)
+        bgr = self._faults.apply(self._renderer.render(pose_of(truth), t_s, truth.actors_along_m).bgr, t_s)
         if bgr is None:
             return None
         evidence, mask = self._perceiver.perceive(bgr, header, 0.0, roll_rad)
-        return Sight(evidence, bgr, mask)
+        return EvidenceFrame(evidence, bgr, mask)
 
     def close(self) -> None:
         """See `Eyes`."""
         self._perceiver.close()
-        self._eye.close()
+        self._renderer.close()
 
 
-def _no_time() -> float:
+def _frozen_stopwatch_ms() -> float:
     """Evidence says how long its steps took; equal drives are equal, so in a drive they take none."""
     return 0.0

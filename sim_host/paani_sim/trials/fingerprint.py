@@ -10,16 +10,16 @@ from pathlib import Path
 import msgspec
 
 from paani.config import encode_config
-from paani_sim.trials.cases import Case
-from paani_sim.trials.policies import config_of
+from paani_sim.trials.policies import load_policy_config
+from paani_sim.trials.trial_cases import TrialCase
 
-TOML = ".toml"
-PACKAGES = ("paani", "paani_services", "paani_sim")
-DRIVING = (".py", TOML)
-MODELS = "paani_models"
+SCENARIO_SUFFIX = ".toml"
+CODE_PACKAGES = ("paani", "paani_services", "paani_sim")
+CODE_SUFFIXES = (".py", SCENARIO_SUFFIX)
+MODELS_PACKAGE = "paani_models"
 
 
-class MadeWith(msgspec.Struct, frozen=True, kw_only=True):
+class Fingerprint(msgspec.Struct, frozen=True, kw_only=True):
     """Checksums."""
 
     code: str
@@ -27,40 +27,40 @@ class MadeWith(msgspec.Struct, frozen=True, kw_only=True):
     settings: str
     scenario: str
 
-    def differs(self, other: MadeWith) -> list[str]:
+    def list_differences(self, other: Fingerprint) -> list[str]:
         """The names of what is not the same."""
         return [name for name in self.__struct_fields__ if getattr(self, name) != getattr(other, name)]
 
 
-class Maker:
+class FingerprintReader:
     """Looks at the code and the models once."""
 
     def __init__(self, sets: Iterable[str]) -> None:
         """Raises UserError for a setting."""
         self._sets = tuple(sets)
-        self._code = _sum(file for package in PACKAGES for file in _files(package, DRIVING))
-        self._models = _sum(_files(MODELS, (".onnx", ".json", ".py")))
+        self._code = _checksum_files(file for package in CODE_PACKAGES for file in _list_files(package, CODE_SUFFIXES))
+        self._models = _checksum_files(_list_files(MODELS_PACKAGE, (".onnx", ".json", ".py")))
         self._settings: dict[str, str] = {}
 
-    def of(self, case: Case) -> MadeWith:
+    def fingerprint(self, case: TrialCase) -> Fingerprint:
         """For one drive. Raises UserError for a setting."""
         if case.policy not in self._settings:
-            self._settings[case.policy] = _short(encode_config(config_of(case.policy, self._sets)))
-        return MadeWith(
+            self._settings[case.policy] = _checksum(encode_config(load_policy_config(case.policy, self._sets)))
+        return Fingerprint(
             code=self._code,
             models=self._models,
             settings=self._settings[case.policy],
-            scenario=_sum([Path(case.world)]) if case.world.endswith(TOML) else case.place,
+            scenario=_checksum_files([Path(case.world)]) if case.world.endswith(SCENARIO_SUFFIX) else case.place,
         )
 
 
-def _files(package: str, endings: tuple[str, ...]) -> list[Path]:
+def _list_files(package: str, endings: tuple[str, ...]) -> list[Path]:
     spec = find_spec(package)
     folders = list(spec.submodule_search_locations or ()) if spec is not None else []
     return sorted(file for folder in folders for file in Path(folder).rglob("*") if file.suffix in endings)
 
 
-def _sum(files: Iterable[Path]) -> str:
+def _checksum_files(files: Iterable[Path]) -> str:
     digest = hashlib.sha256()
     for file in files:
         if file.is_file():
@@ -68,5 +68,5 @@ def _sum(files: Iterable[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
-def _short(data: bytes) -> str:
+def _checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]

@@ -17,34 +17,39 @@ from paani.arrays import F64, Bools
 from paani.config import Config, CorridorConfig
 from paani_sim.eye.camera import look_from, view_projection
 from paani_sim.eye.mounted import camera_of, pose_of
-from paani_sim.trials.evidence_source import Sight
-from paani_sim.trials.outlines import heights_of, silhouettes
+from paani_sim.trials.evidence_source import EvidenceFrame
+from paani_sim.trials.silhouettes import height_span_m, project_silhouettes
 from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_at, along_at
 from paani_sim.worlds.faults import active
 from paani_sim.worlds.footprint import placed, shape_of
 
-ROWS, COLUMNS = 64, 80  # of the mask, as the segmenter's
-FAR_M = 90.0  # farther things are smaller than a box can be
+MASK_ROWS, MASK_COLUMNS = 64, 80  # of the mask, as the segmenter's
+MAX_RANGE_M = 90.0  # farther things are smaller than a box can be
 MIN_SIDE_PX = 4.0  # of a box
-MIN_SHOWN = 0.3  # of a silhouette, for a box
-BANK_M = 3.0  # what stands no farther behind the shore is seen
+MIN_VISIBLE_FRAC = 0.3  # of a silhouette, for a box
+VISIBLE_BEHIND_SHORE_M = 3.0  # what stands no farther behind the shore is seen
 CONFIDENCE = 0.95
-LABELS = {Kind.PERSON: m.Label.PERSON, Kind.VESSEL: m.Label.VESSEL, Kind.PIER: m.Label.PIER, Kind.BUOY: m.Label.BUOY}
-CAUSES = {
+LABEL_OF_KIND = {
+    Kind.PERSON: m.Label.PERSON,
+    Kind.VESSEL: m.Label.VESSEL,
+    Kind.PIER: m.Label.PIER,
+    Kind.BUOY: m.Label.BUOY,
+}
+CAUSE_OF_FAULT = {
     FaultKind.CAMERA_BLACK: m.UnusableCause.BLACK,
     FaultKind.CAMERA_FROZEN: m.UnusableCause.FROZEN,
     FaultKind.CAMERA_BLURRED: m.UnusableCause.BLURRED,
 }
 
 
-class Seen(NamedTuple):
+class VisibleScene(NamedTuple):
     """`water` `(64, 80)`: which cells show water. `boxes`: label and normalised corners."""
 
     water: Bools
     boxes: tuple[tuple[m.Label, m.BoxXyxy], ...]
 
 
-class OracleEyes:
+class GroundTruthEvidenceSource:
     """Looks at a world without drawing it."""
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
@@ -52,19 +57,19 @@ class OracleEyes:
         self._camera = camera_of(config.eye)
         self._things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
         self._shapes = [shape_of(thing) for thing in self._things]
-        self._heights_m = np.array([heights_of(thing) for thing in self._things]).reshape(-1, 2)
+        self._heights_m = np.array([height_span_m(thing) for thing in self._things]).reshape(-1, 2)
         self._still_m = [placed(s, o.pose) for s, o in zip(self._shapes, world.obstacles, strict=False)]
         self._shore_m = world.shore_m
         self._shore_legs = np.roll(world.shore_m, -1, axis=0) - world.shore_m
         self._shore_reach_m = np.hypot(self._shore_legs[:, 0], self._shore_legs[:, 1])
-        self._lanes = _Lanes(config.perception.corridors)
+        self._corridor_weights = _CorridorWeights(config.perception.corridors)
 
-    def look(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> Sight | None:
+    def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
         """See `Eyes`."""
         t_s = truth.sim_us * 1e-6
         if active(self._faults, FaultKind.CAMERA_DROPPED, t_s):
             return None
-        cause = next((cause for kind, cause in CAUSES.items() if active(self._faults, kind, t_s)), None)
+        cause = next((cause for kind, cause in CAUSE_OF_FAULT.items() if active(self._faults, kind, t_s)), None)
         evidence = m.Evidence(
             source_us=header.source_us,
             frame_seq=header.frame_seq,
@@ -76,35 +81,41 @@ class OracleEyes:
             models="truth",
         )
         if cause is None:
-            evidence = self._evidence(evidence, self.see(truth), roll_rad)
-        return Sight(evidence)
+            evidence = self._fill_evidence(evidence, self.compute_visible_scene(truth), roll_rad)
+        return EvidenceFrame(evidence)
 
     def close(self) -> None:
         """See `Eyes`."""
 
-    def see(self, truth: m.TruePose) -> Seen:
+    def compute_visible_scene(self, truth: m.TruePose) -> VisibleScene:
         """What would be in the picture."""
         pose, t_s = pose_of(truth), truth.sim_us * 1e-6
-        position, turn = look_from(pose, self._camera)
+        camera_m, map_from_camera = look_from(pose, self._camera)
         clip_from_map = view_projection(pose, self._camera)
-        ranges_m, ways = self._shore_ranges_m(position, turn)
-        ends = np.column_stack([position[:2] + ranges_m[:, None] * ways, np.zeros(COLUMNS), np.ones(COLUMNS)])
+        ranges_m, directions = self._shore_ranges_m(camera_m, map_from_camera)
+        ends = np.column_stack(
+            [camera_m[:2] + ranges_m[:, None] * directions, np.zeros(MASK_COLUMNS), np.ones(MASK_COLUMNS)]
+        )
         clip = ends @ clip_from_map.T
         shore_down = 0.5 - 0.5 * clip[:, 1] / np.maximum(clip[:, 3], 1e-6)
-        water = (np.arange(ROWS)[:, None] + 0.5) / ROWS > shore_down[None, :]
-        near, away_m = self._near(position, turn, ranges_m, self._outlines(truth, t_s))
-        covered = np.zeros((ROWS, COLUMNS), np.uint8)
+        water = (np.arange(MASK_ROWS)[:, None] + 0.5) / MASK_ROWS > shore_down[None, :]
+        near, distances_m = self._find_candidates(
+            camera_m, map_from_camera, ranges_m, self._update_outlines(truth, t_s)
+        )
+        covered = np.zeros((MASK_ROWS, MASK_COLUMNS), np.uint8)
         boxes = []
-        order = sorted(near, key=lambda i: away_m[i])
+        order = sorted(near, key=lambda i: distances_m[i])
         outlines = self._outlines_m[order] if order else np.empty((0, 8, 2))
-        for number, points in zip(order, silhouettes(outlines, self._heights_m[order], clip_from_map), strict=True):
-            box = self._paint(points, covered)
+        for number, points in zip(
+            order, project_silhouettes(outlines, self._heights_m[order], clip_from_map), strict=True
+        ):
+            box = self._rasterise_silhouette(points, covered)
             kind = self._things[number].kind
-            if box is not None and kind in LABELS:
-                boxes.append((LABELS[kind], box))
-        return Seen(water & (covered == 0), tuple(boxes))
+            if box is not None and kind in LABEL_OF_KIND:
+                boxes.append((LABEL_OF_KIND[kind], box))
+        return VisibleScene(water & (covered == 0), tuple(boxes))
 
-    def _outlines(self, truth: m.TruePose, t_s: float) -> F64:
+    def _update_outlines(self, truth: m.TruePose, t_s: float) -> F64:
         alongs = truth.actors_along_m or tuple(along_at(actor, t_s) for actor in self._world.actors)
         moving = [
             placed(shape, actor_at(actor, along_m))
@@ -116,70 +127,76 @@ class OracleEyes:
         middles_m: F64 = self._outlines_m.mean(axis=1)
         return middles_m
 
-    def _near(self, position: F64, turn: F64, ranges_m: F64, middles_m: F64) -> tuple[list[int], F64]:
+    def _find_candidates(
+        self, camera_m: F64, map_from_camera: F64, ranges_m: F64, middles_m: F64
+    ) -> tuple[list[int], F64]:
         """Things ahead, near enough, and not behind the shore; and how far each one's nearest corner is."""
-        rel = middles_m - position[:2]
-        corners = self._outlines_m - position[:2]
-        away_m = np.hypot(corners[..., 0], corners[..., 1]).min(axis=1) if len(rel) else np.empty(0)
-        ahead = -turn[:2, 2]
+        rel = middles_m - camera_m[:2]
+        corners = self._outlines_m - camera_m[:2]
+        distances_m = np.hypot(corners[..., 0], corners[..., 1]).min(axis=1) if len(rel) else np.empty(0)
+        ahead = -map_from_camera[:2, 2]
         depth = corners @ ahead
-        side = rel @ turn[:2, 0]
+        side = rel @ map_from_camera[:2, 0]
         focal = self._camera.focal_px
         with np.errstate(divide="ignore", invalid="ignore"):
             across = 0.5 + (focal * side / np.maximum(rel @ ahead, 1e-3)) / self._camera.width_px
-        column = np.clip(np.nan_to_num(across) * COLUMNS, 0, COLUMNS - 1).astype(int)
-        shown = (depth.max(axis=1) > 0.2) & (away_m < FAR_M) & (away_m < ranges_m[column] + BANK_M)
-        return np.flatnonzero(shown).tolist(), away_m
+        column = np.clip(np.nan_to_num(across) * MASK_COLUMNS, 0, MASK_COLUMNS - 1).astype(int)
+        is_visible = (
+            (depth.max(axis=1) > 0.2)
+            & (distances_m < MAX_RANGE_M)
+            & (distances_m < ranges_m[column] + VISIBLE_BEHIND_SHORE_M)
+        )
+        return np.flatnonzero(is_visible).tolist(), distances_m
 
-    def _shore_ranges_m(self, position: F64, turn: F64) -> tuple[F64, F64]:
+    def _shore_ranges_m(self, camera_m: F64, map_from_camera: F64) -> tuple[F64, F64]:
         """For each column, how far the shore is along the water, and which way that is."""
-        across = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * self._camera.width_px / self._camera.focal_px
-        ways = across[:, None] * turn[:2, 0] - turn[:2, 2]
-        ways = ways / np.hypot(ways[:, 0], ways[:, 1])[:, None]
-        rel = self._shore_m - position[:2]
-        near = np.hypot(rel[:, 0], rel[:, 1]) - self._shore_reach_m < FAR_M
+        across = ((np.arange(MASK_COLUMNS) + 0.5) / MASK_COLUMNS - 0.5) * self._camera.width_px / self._camera.focal_px
+        directions = across[:, None] * map_from_camera[:2, 0] - map_from_camera[:2, 2]
+        directions = directions / np.hypot(directions[:, 0], directions[:, 1])[:, None]
+        rel = self._shore_m - camera_m[:2]
+        near = np.hypot(rel[:, 0], rel[:, 1]) - self._shore_reach_m < MAX_RANGE_M
         start, leg = rel[near], self._shore_legs[near]
-        cross = ways[:, :1] * leg[:, 1] - ways[:, 1:] * leg[:, 0]
+        cross = directions[:, :1] * leg[:, 1] - directions[:, 1:] * leg[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             range_m = (start[:, 0] * leg[:, 1] - start[:, 1] * leg[:, 0]) / cross
-            part = (start[:, 0] * ways[:, 1:] - start[:, 1] * ways[:, :1]) / cross
+            part = (start[:, 0] * directions[:, 1:] - start[:, 1] * directions[:, :1]) / cross
         hit = (range_m > 0.0) & (part >= 0.0) & (part <= 1.0)
-        nearest = np.where(hit, range_m, 4.0 * FAR_M).min(axis=1, initial=4.0 * FAR_M)
-        return nearest, ways
+        nearest = np.where(hit, range_m, 4.0 * MAX_RANGE_M).min(axis=1, initial=4.0 * MAX_RANGE_M)
+        return nearest, directions
 
-    def _paint(self, points: F64, covered: NDArray[np.uint8]) -> m.BoxXyxy | None:
+    def _rasterise_silhouette(self, points: F64, covered: NDArray[np.uint8]) -> m.BoxXyxy | None:
         """Cover its cells; its box where enough of it is to be seen."""
         if not len(points):
             return None
         low, high = np.clip(points.min(axis=0), 0.0, 1.0), np.clip(points.max(axis=0), 0.0, 1.0)
         if not (high > low).all():
             return None
-        cells = np.zeros((ROWS, COLUMNS), np.uint8)
-        hull = cv2.convexHull(((points * [COLUMNS, ROWS] - 0.5) * 16.0).astype(np.int32))
+        cells = np.zeros((MASK_ROWS, MASK_COLUMNS), np.uint8)
+        hull = cv2.convexHull(((points * [MASK_COLUMNS, MASK_ROWS] - 0.5) * 16.0).astype(np.int32))
         cv2.fillConvexPoly(cells, hull, 1, shift=4)
-        shown = (cells == 1) & (covered == 0)
-        whole, count = int(np.count_nonzero(cells)), int(np.count_nonzero(shown))
+        is_visible = (cells == 1) & (covered == 0)
+        whole, count = int(np.count_nonzero(cells)), int(np.count_nonzero(is_visible))
         covered |= cells
-        if whole == 0 or count < MIN_SHOWN * whole:
+        if whole == 0 or count < MIN_VISIBLE_FRAC * whole:
             return None
         if count < 0.9 * whole:
-            rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
-            low = np.maximum(low, (columns[0] / COLUMNS, rows[0] / ROWS))
-            high = np.minimum(high, ((columns[-1] + 1) / COLUMNS, (rows[-1] + 1) / ROWS))
+            rows, columns = np.flatnonzero(is_visible.any(axis=1)), np.flatnonzero(is_visible.any(axis=0))
+            low = np.maximum(low, (columns[0] / MASK_COLUMNS, rows[0] / MASK_ROWS))
+            high = np.minimum(high, ((columns[-1] + 1) / MASK_COLUMNS, (rows[-1] + 1) / MASK_ROWS))
         side_px = (high - low) * (self._camera.width_px, self._camera.height_px)
         if side_px.min() < MIN_SIDE_PX:
             return None
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
-    def _evidence(self, empty: m.Evidence, seen: Seen, roll_rad: float) -> m.Evidence:
+    def _fill_evidence(self, empty: m.Evidence, visible: VisibleScene, roll_rad: float) -> m.Evidence:
         perception = self._config.perception
         bound = perception.max_roll_rad
         roll_rad = float(np.clip(roll_rad, -bound, bound)) if perception.follow_roll else 0.0
-        level = levelled(seen.water, roll_rad, empty.width_px / empty.height_px)
-        left, center, right = self._lanes.of(level)
+        level = level_mask(visible.water, roll_rad, empty.width_px / empty.height_px)
+        left, center, right = self._corridor_weights.lane_evidence(level)
         detections = tuple(
             m.Detection(label=label, confidence=CONFIDENCE, box_xyxy=box)
-            for label, box in seen.boxes[: perception.detections.max_boxes]
+            for label, box in visible.boxes[: perception.detections.max_boxes]
         )
         return m.Evidence(
             source_us=empty.source_us,
@@ -197,26 +214,28 @@ class OracleEyes:
             confidence_threshold=perception.detections.confidence,
             models=empty.models,
             roll_rad=roll_rad,
-            water_edge=water_edge(seen.water),
+            water_edge=find_water_edge(visible.water),
         )
 
 
-class _Lanes:
+class _CorridorWeights:
     """The corridors' weights over the mask."""
 
     def __init__(self, corridors: CorridorConfig) -> None:
-        self._rows = _shares(ROWS, corridors.top, 1.0)
-        self._clear = corridors.clear_column
-        self._columns = [_shares(COLUMNS, *span) for span in (corridors.left, corridors.center, corridors.right)]
+        self._rows = _overlap_frac(MASK_ROWS, corridors.top, 1.0)
+        self._clear_column_frac = corridors.clear_column
+        self._columns = [
+            _overlap_frac(MASK_COLUMNS, *span) for span in (corridors.left, corridors.center, corridors.right)
+        ]
 
-    def of(self, water: Bools) -> list[m.LaneEvidence]:
+    def lane_evidence(self, water: Bools) -> list[m.LaneEvidence]:
         """Left, centre, right."""
         of_column = (self._rows @ water) / self._rows.sum()
-        return [self._lane(of_column, columns) for columns in self._columns]
+        return [self._summarise_corridor(of_column, columns) for columns in self._columns]
 
-    def _lane(self, water: F64, columns: F64) -> m.LaneEvidence:
+    def _summarise_corridor(self, water: F64, columns: F64) -> m.LaneEvidence:
         best = run = 0.0
-        for is_clear, width in zip((water >= self._clear - 1e-12).tolist(), columns.tolist(), strict=True):
+        for is_clear, width in zip((water >= self._clear_column_frac - 1e-12).tolist(), columns.tolist(), strict=True):
             run = run + width if width > 0.0 and is_clear else 0.0
             best = max(best, run)
         total = float(columns.sum())
@@ -226,7 +245,7 @@ class _Lanes:
         )
 
 
-def levelled(water: Bools, roll_rad: float, aspect: float) -> Bools:
+def level_mask(water: Bools, roll_rad: float, aspect: float) -> Bools:
     """The mask turned about its middle so that the horizon is level; what comes in from outside is no water."""
     if abs(roll_rad) < 1e-3:
         return water
@@ -243,7 +262,7 @@ def levelled(water: Bools, roll_rad: float, aspect: float) -> Bools:
     return turned
 
 
-def water_edge(water: Bools) -> tuple[float, ...]:
+def find_water_edge(water: Bools) -> tuple[float, ...]:
     """Of each column, left to right, the lower edge of the first cell from below that is not water; 0.0: none."""
     rows = water.shape[0]
     blocked = ~water
@@ -251,7 +270,7 @@ def water_edge(water: Bools) -> tuple[float, ...]:
     return tuple(np.where(blocked.any(axis=0), last / rows, 0.0).tolist())
 
 
-def _shares(cells: int, start: float, end: float) -> F64:
+def _overlap_frac(cells: int, start: float, end: float) -> F64:
     """How much of each of `cells` equal cells of [0, 1] lies in [start, end]."""
     edges = np.arange(cells + 1) / cells
     inside: F64 = np.minimum(edges[1:], end) - np.maximum(edges[:-1], start)

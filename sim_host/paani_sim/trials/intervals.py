@@ -5,7 +5,7 @@ import math
 Z_95 = 1.959963984540054
 
 
-def wilson(successes: int, trials: int) -> tuple[float, float]:
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     """The 95 % interval of a share (E. B. Wilson, 1927), in [0, 1]; of no trials, all of it."""
     if trials == 0:
         return 0.0, 1.0

@@ -9,7 +9,7 @@ import msgspec
 
 from paani.config import Config, calibration_of, load_config
 
-NOMINAL_MPS = Config().navigator.cruise_mps
+NOMINAL_SPEED_MPS = Config().navigator.cruise_mps
 
 
 class Policy(StrEnum):
@@ -25,10 +25,10 @@ class Policy(StrEnum):
     ORACLE = "oracle"
 
 
-CAMERA = frozenset({Policy.PAANI, Policy.PAPER})
+CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAPER})
 
 
-def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
+def load_policy_config(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
     """Its settings; `sets` may choose another profile for those that are not the paper's.
 
     threads: the two nets side by side, for a drive that has two cores; what they say is the same.
@@ -45,11 +45,11 @@ def config_of(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False
     )
 
 
-def time_scale(config: Config) -> float:
+def time_limit_factor(config: Config) -> float:
     """A scenario's time limit is for the default cruising speed; who is told to go slower has longer."""
-    return NOMINAL_MPS / config.navigator.cruise_mps
+    return NOMINAL_SPEED_MPS / config.navigator.cruise_mps
 
 
-def look_hz(config: Config) -> float:
+def processed_frame_rate_hz(config: Config) -> float:
     """How often a picture is taken that is also looked at."""
     return min(config.eye.rate_hz, config.camera.rate_hz, config.perception.rate_hz)

@@ -11,14 +11,14 @@ from string import Template
 
 from paani.statistics.charts import bar
 from paani.whole_file import write_whole
-from paani_sim.trials.cases import Case, scenario_of
-from paani_sim.trials.result import UNDER_M, Closeness, TrialResult
+from paani_sim.trials.result import CLOSENESS_LIMIT_M, Closeness, TrialResult
 from paani_sim.trials.suite_summary import PolicyFigures, Share, Summary
-from paani_sim.trials.track_chart import plan_view
-from paani_sim.trials.worst import Again, drive_again, worst_of
+from paani_sim.trials.track_chart import draw_track_chart
+from paani_sim.trials.trial_cases import TrialCase, build_scenario
+from paani_sim.trials.worst_drives import RepeatedDrive, repeat_drives, select_worst_drives
 
-WORST = 6
-KEY = (
+WORST_COUNT = 6
+LEGEND = (
     '<p class="key"><span style="background:#0072b2"></span>track<span style="background:#c8321e"></span>contact'
     '<span style="background:#d98200"></span>buoy; ring: closer than 0.6 m'
     '<span style="background:#8a6d4b"></span>vessel'
@@ -28,15 +28,17 @@ KEY = (
 
 
 def write_report(
-    path: Path, summary: Summary, results: Mapping[Case, TrialResult], sets: Sequence[str], jobs: int
+    path: Path, summary: Summary, results: Mapping[TrialCase, TrialResult], sets: Sequence[str], jobs: int
 ) -> None:
     """The page, and beside it a folder with recordings and pictures. Raises UserError for what cannot be written."""
     folder = path.with_name(f"{path.stem}-drives")
-    again = drive_again(worst_of(results, WORST), results, sets, folder, jobs)
-    write_whole(path, page(summary, results, again, folder.name).encode(), "--report")
+    repeated = repeat_drives(select_worst_drives(results, WORST_COUNT), results, sets, folder, jobs)
+    write_whole(path, render_page(summary, results, repeated, folder.name).encode(), "--report")
 
 
-def page(summary: Summary, results: Mapping[Case, TrialResult], again: Sequence[Again], folder: str) -> str:
+def render_page(
+    summary: Summary, results: Mapping[TrialCase, TrialResult], repeated: Sequence[RepeatedDrive], folder: str
+) -> str:
     """The HTML text. folder: where recordings lie, from the page."""
     drives = sum(figures.trials for figures in summary.policies.values())
     km = sum(figures.distance_m for figures in summary.policies.values()) * 1e-3
@@ -45,24 +47,24 @@ def page(summary: Summary, results: Mapping[Case, TrialResult], again: Sequence[
         "<p>Every policy drives the same scenarios. Bars: the share and its 95 % Wilson interval. A contact is visible "
         "if the camera could have seen the thing within 15 m in the five seconds before. A near miss is a clearance "
         "below 0.5 m without contact; those of banks are not counted here.</p>",
-        _policies(summary.policies),
+        _policy_table(summary.policies),
         "<h2>How close</h2><p>Encounters within five metres, by the clearance at the closest point.</p>",
-        _closeness(summary.policies),
+        _closeness_table(summary.policies),
         "<h2>Worlds</h2>",
-        *(f"<h3>{escape(policy)}</h3>{_policies(worlds)}" for policy, worlds in summary.worlds.items()),
+        *(f"<h3>{escape(policy)}</h3>{_policy_table(worlds)}" for policy, worlds in summary.worlds.items()),
         "<h2>Why the boat stood</h2>",
-        _stops(summary.policies),
+        _stop_table(summary.policies),
     ]
     if summary.faults:
-        body += ["<h2>Faults</h2>", _faults(summary)]
-    body += ["<h2>Worst drives</h2>", KEY, *(_drive(each, results[each.case], folder) for each in again)]
+        body += ["<h2>Faults</h2>", _fault_table(summary)]
+    body += ["<h2>Worst drives</h2>", LEGEND, *(_drive_section(each, results[each.case], folder) for each in repeated)]
     template = Template((files("paani_sim.trials") / "page.html").read_text(encoding="utf-8"))
     return template.substitute(
         title=escape(summary.suite), subtitle=f"{drives} drives, {km:.2f} km", body="\n".join(body)
     )
 
 
-def _policies(rows: Mapping[str, PolicyFigures]) -> str:
+def _policy_table(rows: Mapping[str, PolicyFigures]) -> str:
     head = (
         "", "drives", "completed", "without contact", "contacts", "visible", "banks", "per km", "near misses",
         "contacts and near misses per km", "least clearance [m]", "off route rms [m]", "speed [m/s]",
@@ -72,23 +74,25 @@ def _policies(rows: Mapping[str, PolicyFigures]) -> str:
         head,
         [
             (
-                escape(name), str(p.trials), _share(p.completed_share), _share(p.untouched_share), _bad(p.collisions),
-                _bad(p.collisions_visible), str(p.collisions_bank), f"{p.contacts_per_km:.2f}", str(p.near_misses),
-                f"{p.close_per_km:.1f}", f"{p.min_clearance_m:.2f}", f"{p.off_route_rms_m:.2f}",
-                f"{p.mean_speed_mps:.2f}", f"{p.changes_per_min:.1f}",
-                "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
+                escape(name), str(p.trials), _share_cell(p.completed_share), _share_cell(p.untouched_share),
+                _count_cell(p.collisions), _count_cell(p.collisions_visible), str(p.collisions_bank),
+                f"{p.contacts_per_km:.2f}", str(p.near_misses), f"{p.close_per_km:.1f}",
+                f"{p.min_clearance_m:.2f}", f"{p.off_route_rms_m:.2f}", f"{p.mean_speed_mps:.2f}",
+                f"{p.changes_per_min:.1f}", "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
             )
             for name, p in rows.items()
         ],
     )  # fmt: skip
 
 
-def _closeness(rows: Mapping[str, PolicyFigures]) -> str:
+def _closeness_table(rows: Mapping[str, PolicyFigures]) -> str:
     body = [(escape(name), *(str(p.encounters.get(kind.value, 0)) for kind in Closeness)) for name, p in rows.items()]
-    return _table(("", "contact", *(f"under {under_m}&nbsp;m" for under_m in UNDER_M.values()), "farther"), body)
+    return _table(
+        ("", "contact", *(f"under {under_m}&nbsp;m" for under_m in CLOSENESS_LIMIT_M.values()), "farther"), body
+    )
 
 
-def _stops(rows: Mapping[str, PolicyFigures]) -> str:
+def _stop_table(rows: Mapping[str, PolicyFigures]) -> str:
     body = [
         (escape(name), reason.replace("_", " ").lower(), str(stop.count), f"{stop.seconds:.0f}")
         for name, p in rows.items()
@@ -97,13 +101,13 @@ def _stops(rows: Mapping[str, PolicyFigures]) -> str:
     return _table(("", "reason", "times", "seconds"), body, "words") if body else '<p class="faint">It never stood.</p>'
 
 
-def _faults(summary: Summary) -> str:
+def _fault_table(summary: Summary) -> str:
     head = ("", "drives", "completed", "contacts", "fans off in time", "latest fans off [s]", "latest at rest [s]")
     return _table(
         head,
         [
             (
-                escape(kind.replace("_", " ")), str(f.trials), str(f.completed), _bad(f.collisions),
+                escape(kind.replace("_", " ")), str(f.trials), str(f.completed), _count_cell(f.collisions),
                 f"{f.in_time} of {f.judged}" if f.judged else "-",
                 "-" if f.worst_zero_thrust_s is None else f"{f.worst_zero_thrust_s:.2f}",
                 "-" if f.worst_rest_s is None else f"{f.worst_rest_s:.2f}",
@@ -113,7 +117,7 @@ def _faults(summary: Summary) -> str:
     )  # fmt: skip
 
 
-def _drive(each: Again, result: TrialResult, folder: str) -> str:
+def _drive_section(each: RepeatedDrive, result: TrialResult, folder: str) -> str:
     facts = [f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s: {result.why.value}"]
     facts += [
         f'<span class="bad">touched {escape(c.what)} ({c.kind})</span> at {c.at_s:.1f} s, {c.speed_mps:.2f} m/s, '
@@ -126,7 +130,7 @@ def _drive(each: Again, result: TrialResult, folder: str) -> str:
         if e.closeness in {Closeness.GRAZING, Closeness.TIGHT}
     ]
     facts += [f"stood {s.seconds:.1f} s: {s.reason.replace('_', ' ').lower()} ({s.count})" for s in result.stops[:4]]
-    if not each.same:
+    if not each.is_equal:
         facts.append('<span class="bad">driven again it went otherwise: other code or settings</span>')
     strip = ""
     if each.strip:
@@ -137,7 +141,7 @@ def _drive(each: Again, result: TrialResult, folder: str) -> str:
     items = "".join(f"<li>{fact}</li>" for fact in facts)
     link = f"{escape(folder)}/{escape(each.log)}"
     return (
-        f'<div class="drive"><div>{plan_view(scenario_of(each.case).world, result)}</div>'
+        f'<div class="drive"><div>{draw_track_chart(build_scenario(each.case).world, result)}</div>'
         f'<div><h3>{escape(each.case.name)}</h3><ul>{items}</ul><a href="{link}">recording</a></div>{strip}</div>'
     )
 
@@ -149,10 +153,10 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -
     return f'<div class="wide"><table class="{kind}"><tr>{top}</tr>{body}</table></div>'
 
 
-def _share(s: Share) -> str:
+def _share_cell(s: Share) -> str:
     interval = f"<small>{100 * s.low:.1f} to {100 * s.high:.1f}</small>"
     return f"{100 * s.share:.1f} % {interval}{bar(s.share, s.low, s.high)}"
 
 
-def _bad(count: int) -> str:
+def _count_cell(count: int) -> str:
     return f'<span class="bad">{count}</span>' if count else "0"

@@ -7,8 +7,8 @@ from enum import StrEnum
 import msgspec
 
 from paani.statistics.dithering import Dithering
+from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.states import Why
 
 
 class Closeness(StrEnum):
@@ -25,8 +25,8 @@ class Closeness(StrEnum):
     CLEAR = "clear"
 
 
-NEAR_MISS_M = 0.5  # without touching: less than the hull's width
-UNDER_M = {Closeness.GRAZING: 0.3, Closeness.TIGHT: 0.6, Closeness.CLOSE: 1.5}
+NEAR_MISS_CLEARANCE_M = 0.5  # without touching: less than the hull's width
+CLOSENESS_LIMIT_M = {Closeness.GRAZING: 0.3, Closeness.TIGHT: 0.6, Closeness.CLOSE: 1.5}
 
 
 class Encounter(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,7 +53,7 @@ class Contact(msgspec.Struct, frozen=True, kw_only=True):
     visible: bool
 
 
-class Stops(msgspec.Struct, frozen=True, kw_only=True):
+class StopTotals(msgspec.Struct, frozen=True, kw_only=True):
     """How often and how long the boat was ordered to stand, for one reason."""
 
     reason: str
@@ -92,7 +92,7 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     seed: int
     policy: Policy
     world: str
-    why: Why
+    why: DriveOutcome
     completed: bool
     error: str
     goal_m: float
@@ -114,7 +114,7 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     unusable: int
     encounters: tuple[Encounter, ...]
     contacts: tuple[Contact, ...]
-    stops: tuple[Stops, ...]
+    stops: tuple[StopTotals, ...]
     reactions: tuple[Reaction, ...]
     latency: Latency
     dithering: Dithering

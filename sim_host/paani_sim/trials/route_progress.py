@@ -8,10 +8,13 @@ import numpy as np
 
 from paani.arrays import F64
 
-BACK_M, AHEAD_M = 10.0, 30.0  # where the boat is looked for, so that a route that comes near itself is not cut short
+SEARCH_BEHIND_M, SEARCH_AHEAD_M = (
+    10.0,
+    30.0,
+)  # where the boat is looked for, so that a route that comes near itself is not cut short
 
 
-class Along:
+class RouteProgress:
     """Follows one boat. `now_m`: along the route since the start, laps added up; `best_m`: the farthest so far."""
 
     def __init__(self, route_m: F64, *, closed: bool, start_m: tuple[float, float]) -> None:
@@ -22,19 +25,19 @@ class Along:
         self._begins_m = np.concatenate([[0.0], np.cumsum(self._lengths_m)[:-1]])
         self._closed = closed
         self.length_m = float(self._lengths_m.sum())
-        arc_m, self.off_m = self._nearest(start_m, None)
+        arc_m, self.cross_track_m = self._nearest(start_m, None)
         self._arc_m = self.start_arc_m = arc_m
-        self.now_m = self.best_m = 0.0
+        self.progress_m = self.best_progress_m = 0.0
 
     def update(self, position_m: tuple[float, float]) -> None:
         """The boat is here now. `off_m` is its distance to the route, positive to the left of it."""
-        arc_m, self.off_m = self._nearest(position_m, self._arc_m)
+        arc_m, self.cross_track_m = self._nearest(position_m, self._arc_m)
         step_m = arc_m - self._arc_m
         if self._closed:
             step_m -= self.length_m * round(step_m / self.length_m)
         self._arc_m = arc_m
-        self.now_m += step_m
-        self.best_m = max(self.best_m, self.now_m)
+        self.progress_m += step_m
+        self.best_progress_m = max(self.best_progress_m, self.progress_m)
 
     def _nearest(self, position_m: tuple[float, float], around_m: float | None) -> tuple[float, float]:
         rel = np.asarray(position_m) - self._first
@@ -46,8 +49,10 @@ class Along:
             if self._closed:
                 middle_m = (middle_m + 0.5 * self.length_m) % self.length_m - 0.5 * self.length_m
             reach_m = 0.5 * self._lengths_m
-            gap2 = np.where((middle_m < -BACK_M - reach_m) | (middle_m > AHEAD_M + reach_m), np.inf, gap2)
+            gap2 = np.where(
+                (middle_m < -SEARCH_BEHIND_M - reach_m) | (middle_m > SEARCH_AHEAD_M + reach_m), np.inf, gap2
+            )
         leg = int(np.argmin(gap2))
         side = self._legs[leg, 0] * away[leg, 1] - self._legs[leg, 1] * away[leg, 0]
-        off_m = math.copysign(math.hypot(*away[leg].tolist()), side)
-        return float(self._begins_m[leg] + part[leg] * self._lengths_m[leg]), off_m
+        cross_track_m = math.copysign(math.hypot(*away[leg].tolist()), side)
+        return float(self._begins_m[leg] + part[leg] * self._lengths_m[leg]), cross_track_m

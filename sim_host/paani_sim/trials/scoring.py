@@ -14,110 +14,117 @@ from paani.statistics.dithering import dithering
 from paani.statistics.order_statistics import nearest_rank
 from paani_sim.plant.plant import Hit
 from paani_sim.trials.drive import SAMPLE_HZ, Drive
-from paani_sim.trials.hull_clearance import BANK, FAR_M, Course, afloat, clearances_m, could_see
-from paani_sim.trials.policies import Policy, look_hz
-from paani_sim.trials.reactions import reactions_of
+from paani_sim.trials.drive_history import DriveSample, StopInterval, ThrustChange
+from paani_sim.trials.drive_states import DriveOutcome
+from paani_sim.trials.fault_reactions import measure_reactions
+from paani_sim.trials.hull_clearance import (
+    BANK,
+    MAX_CLEARANCE_M,
+    HullPath,
+    compute_clearances_m,
+    list_waterborne,
+    was_visible,
+)
+from paani_sim.trials.policies import Policy, processed_frame_rate_hz
 from paani_sim.trials.result import (
-    NEAR_MISS_M,
-    UNDER_M,
+    CLOSENESS_LIMIT_M,
+    NEAR_MISS_CLEARANCE_M,
     Closeness,
     Contact,
     Encounter,
     Latency,
-    Stops,
+    StopTotals,
     TrialResult,
 )
-from paani_sim.trials.states import Why
-from paani_sim.trials.track import Applying, Halt, Sample
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
 
-ENCOUNTER_M = {"thing": 5.0, BANK: UNDER_M[Closeness.CLOSE]}  # a bank is always somewhere
-APART_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
-SEEN_BEFORE_S, SEEN_WITHIN_M = 5.0, 15.0
-SCRAPE_S = 5.0
-BANK_GEOM = "bank_"  # how the names of the plant's pieces of bank begin
-TRACK_S = 2.0
+ENCOUNTER_RANGE_M = {"thing": 5.0, BANK: CLOSENESS_LIMIT_M[Closeness.CLOSE]}  # a bank is always somewhere
+ENCOUNTER_GAP_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
+VISIBLE_BEFORE_S, VISIBLE_RANGE_M = 5.0, 15.0
+CONTACT_GAP_S = 5.0
+BANK_GEOM_PREFIX = "bank_"  # how the names of the plant's pieces of bank begin
+TRACK_INTERVAL_S = 2.0
 
 
-def score(drive: Drive, policy: Policy) -> TrialResult:
+def score_drive(drive: Drive, policy: Policy) -> TrialResult:
     """Everything that is known of a drive that has ended."""
-    scenario, track, eye = drive.scenario, drive.track, drive.config.eye
-    world, samples = scenario.world, track.samples
-    course = course_of(world, drive.plant.vessel.hull, samples)
-    gaps_m = clearances_m(world, course)
-    contacts = contacts_of(world, drive.plant.hits, samples, course, eye)
-    encounters = encounters_of(world, samples, gaps_m, contacts)
-    off_m = np.array([sample.off_m for sample in samples] or [0.0])
+    scenario, history, eye = drive.scenario, drive.history, drive.config.eye
+    world, samples = scenario.world, history.samples
+    hull_path = build_hull_path(world, drive.plant.vessel.hull, samples)
+    clearances_m = compute_clearances_m(world, hull_path)
+    contacts = find_contacts(world, drive.plant.hits, samples, hull_path, eye)
+    encounters = find_encounters(world, samples, clearances_m, contacts)
+    cross_track_m = np.array([sample.cross_track_m for sample in samples] or [0.0])
     things = [encounter for encounter in encounters if encounter.what != BANK]
     banks = [encounter for encounter in encounters if encounter.what == BANK]
-    every = round(TRACK_S * SAMPLE_HZ)
+    every = round(TRACK_INTERVAL_S * SAMPLE_HZ)
     return TrialResult(
         scenario=scenario.name,
         seed=scenario.seed,
         policy=policy,
         world=world.name,
-        why=drive.why,
-        completed=drive.why is Why.COMPLETED,
+        why=drive.outcome,
+        completed=drive.outcome is DriveOutcome.COMPLETED,
         error=drive.error,
         goal_m=round(drive.goal_m, 3),
-        progress_m=round(drive.along.best_m, 3),
+        progress_m=round(drive.progress.best_progress_m, 3),
         distance_m=round(drive.plant.distance_m, 3),
         seconds=round(drive.elapsed_s, 3),
-        limit_s=round(drive.limit_s, 3),
+        limit_s=round(drive.time_limit_s, 3),
         collisions=len(contacts),
         collisions_visible=sum(contact.visible for contact in contacts),
         collisions_bank=sum(contact.what == BANK for contact in contacts),
         near_misses=sum(map(_is_near_miss, things)),
         near_misses_bank=sum(map(_is_near_miss, banks)),
-        min_clearance_m=_least_m(gaps for what, gaps in gaps_m.items() if what != BANK),
-        min_bank_clearance_m=_least_m([gaps_m[BANK]]),
-        off_route_rms_m=round(float(np.sqrt((off_m * off_m).mean())), 3),
-        off_route_max_m=round(float(np.abs(off_m).max()), 3),
+        min_clearance_m=_min_clearance_m(gaps for what, gaps in clearances_m.items() if what != BANK),
+        min_bank_clearance_m=_min_clearance_m([clearances_m[BANK]]),
+        off_route_rms_m=round(float(np.sqrt((cross_track_m * cross_track_m).mean())), 3),
+        off_route_max_m=round(float(np.abs(cross_track_m).max()), 3),
         energy_j=round(drive.plant.energy_j, 1),
         frames=drive.frames,
-        unusable=len(track.unusable),
+        unusable=len(history.unusable_frames),
         encounters=encounters,
         contacts=contacts,
-        stops=stops_of(track.halts, samples[-1].t_s if samples else 0.0),
-        reactions=reactions_of(scenario.faults, track, 1.0 / look_hz(drive.config)),
-        latency=latency_of(track.applied) if policy is not Policy.BLIND else Latency(),
-        dithering=dithering(track.advisories),
+        stops=summarise_stops(history.stops, samples[-1].t_s if samples else 0.0),
+        reactions=measure_reactions(scenario.faults, history, 1.0 / processed_frame_rate_hz(drive.config)),
+        latency=summarise_latency(history.thrust_changes) if policy is not Policy.BLIND else Latency(),
+        dithering=dithering(history.advisories),
         track=tuple((round(s.t_s, 1), round(s.x_m, 2), round(s.y_m, 2)) for s in samples[::every]),
         state_hash=drive.plant.state_hash(),
     )
 
 
-def course_of(world: World, hull: Hull, samples: Sequence[Sample]) -> Course:
+def build_hull_path(world: World, hull: Hull, samples: Sequence[DriveSample]) -> HullPath:
     """The samples as arrays."""
-    along = [sample.actors_along_m for sample in samples]
-    return Course(
+    progress = [sample.actors_along_m for sample in samples]
+    return HullPath(
         hull,
         np.array([sample.x_m for sample in samples]),
         np.array([sample.y_m for sample in samples]),
         np.array([sample.yaw_rad for sample in samples]),
-        np.array(along, np.float64).reshape(len(samples), len(world.actors)),
+        np.array(progress, np.float64).reshape(len(samples), len(world.actors)),
     )
 
 
-def contacts_of(
-    world: World, hits: Sequence[Hit], samples: Sequence[Sample], course: Course, eye: EyeConfig
+def find_contacts(
+    world: World, hits: Sequence[Hit], samples: Sequence[DriveSample], hull_path: HullPath, eye: EyeConfig
 ) -> tuple[Contact, ...]:
     """Each time the hull began to touch something, and what the camera could have seen of it.
 
     Scraping along a thing is one contact: it ends when there is none for `SCRAPE_S`.
     """
-    kinds, found, last_s = kinds_of(world), list[Contact](), dict[str, float]()
+    kinds, found, last_s = map_kinds(world), list[Contact](), dict[str, float]()
     half_fov_rad = math.radians(0.5 * eye.hfov_deg)
     for hit in hits:
         k = next((k for k, sample in enumerate(samples) if sample.t_s >= hit.time_s), len(samples) - 1)
         if k < 0:
             continue
-        what = BANK if hit.name.startswith(BANK_GEOM) else hit.name
+        what = BANK if hit.name.startswith(BANK_GEOM_PREFIX) else hit.name
         before_s, last_s[what] = last_s.get(what, -math.inf), hit.time_s
-        if hit.time_s - before_s <= SCRAPE_S:
+        if hit.time_s - before_s <= CONTACT_GAP_S:
             continue
-        before = course.part(slice(max(0, k - round(SEEN_BEFORE_S * SAMPLE_HZ)), k + 1, 2))
+        before = hull_path.slice_moments(slice(max(0, k - round(VISIBLE_BEFORE_S * SAMPLE_HZ)), k + 1, 2))
         found.append(
             Contact(
                 what=what,
@@ -126,22 +133,22 @@ def contacts_of(
                 x_m=round(samples[k].x_m, 2),
                 y_m=round(samples[k].y_m, 2),
                 speed_mps=round(abs(samples[max(0, k - 2)].surge_mps), 3),
-                visible=could_see(world, what, before, half_fov_rad, SEEN_WITHIN_M, eye.camera_forward_m),
+                visible=was_visible(world, what, before, half_fov_rad, VISIBLE_RANGE_M, eye.camera_forward_m),
             )
         )
     return tuple(found)
 
 
-def encounters_of(
-    world: World, samples: Sequence[Sample], gaps_m: dict[str, F64], contacts: Sequence[Contact]
+def find_encounters(
+    world: World, samples: Sequence[DriveSample], clearances_m: dict[str, F64], contacts: Sequence[Contact]
 ) -> tuple[Encounter, ...]:
     """Every approach, in order of time."""
-    kinds, found = kinds_of(world), []
-    for what, gaps in gaps_m.items():
-        near = np.flatnonzero(gaps < ENCOUNTER_M[BANK if what == BANK else "thing"])
+    kinds, found = map_kinds(world), []
+    for what, gaps in clearances_m.items():
+        near = np.flatnonzero(gaps < ENCOUNTER_RANGE_M[BANK if what == BANK else "thing"])
         if not len(near):
             continue
-        for part in np.split(near, np.flatnonzero(np.diff(near) > APART_S * SAMPLE_HZ) + 1):
+        for part in np.split(near, np.flatnonzero(np.diff(near) > ENCOUNTER_GAP_S * SAMPLE_HZ) + 1):
             k = int(part[np.argmin(gaps[part])])
             begin_s, end_s = samples[int(part[0])].t_s, samples[int(part[-1])].t_s
             touched = any(c.what == what and begin_s - 0.2 <= c.at_s <= end_s + 0.2 for c in contacts)
@@ -152,7 +159,7 @@ def encounters_of(
                     kind=kinds[what],
                     at_s=round(samples[k].t_s, 2),
                     clearance_m=round(clearance_m, 3),
-                    closeness=Closeness.CONTACT if touched else closeness_of(clearance_m),
+                    closeness=Closeness.CONTACT if touched else classify_closeness(clearance_m),
                     x_m=round(samples[k].x_m, 2),
                     y_m=round(samples[k].y_m, 2),
                 )
@@ -160,28 +167,28 @@ def encounters_of(
     return tuple(sorted(found, key=lambda encounter: (encounter.at_s, encounter.what)))
 
 
-def closeness_of(clearance_m: float) -> Closeness:
+def classify_closeness(clearance_m: float) -> Closeness:
     """The class of a closest point without contact."""
-    return next((kind for kind, under_m in UNDER_M.items() if clearance_m < under_m), Closeness.CLEAR)
+    return next((kind for kind, under_m in CLOSENESS_LIMIT_M.items() if clearance_m < under_m), Closeness.CLEAR)
 
 
-def kinds_of(world: World) -> dict[str, str]:
+def map_kinds(world: World) -> dict[str, str]:
     """What each thing afloat is."""
-    return {thing.id: thing.kind.value for thing in afloat(world)} | {BANK: BANK}
+    return {thing.id: thing.kind.value for thing in list_waterborne(world)} | {BANK: BANK}
 
 
-def stops_of(halts: Sequence[Halt], end_s: float) -> tuple[Stops, ...]:
+def summarise_stops(stops: Sequence[StopInterval], end_s: float) -> tuple[StopTotals, ...]:
     """By reason, the longest first."""
     count: collections.Counter[str] = collections.Counter()
     seconds: collections.defaultdict[str, float] = collections.defaultdict(float)
-    for halt in halts:
-        count[halt.reason] += 1
-        seconds[halt.reason] += (halt.ended_s if halt.ended_s is not None else end_s) - halt.t_s
+    for stop in stops:
+        count[stop.reason] += 1
+        seconds[stop.reason] += (stop.ended_s if stop.ended_s is not None else end_s) - stop.t_s
     order = sorted(count, key=lambda reason: (-seconds[reason], reason))
-    return tuple(Stops(reason=reason, count=count[reason], seconds=round(seconds[reason], 2)) for reason in order)
+    return tuple(StopTotals(reason=reason, count=count[reason], seconds=round(seconds[reason], 2)) for reason in order)
 
 
-def latency_of(applied: Sequence[Applying]) -> Latency:
+def summarise_latency(applied: Sequence[ThrustChange]) -> Latency:
     """Each picture's first thrust."""
     newest_us, found = 0, []
     for each in applied:
@@ -197,8 +204,8 @@ def latency_of(applied: Sequence[Applying]) -> Latency:
 
 
 def _is_near_miss(encounter: Encounter) -> bool:
-    return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_M
+    return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_CLEARANCE_M
 
 
-def _least_m(gaps_m: Iterable[F64]) -> float:
-    return round(min((float(gaps.min()) for gaps in gaps_m if len(gaps)), default=FAR_M), 3)
+def _min_clearance_m(clearances_m: Iterable[F64]) -> float:
+    return round(min((float(gaps.min()) for gaps in clearances_m if len(gaps)), default=MAX_CLEARANCE_M), 3)

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 
 from paani.statistics.order_statistics import nearest_rank
-from paani_sim.trials.cases import Case
-from paani_sim.trials.intervals import wilson
+from paani_sim.trials.intervals import wilson_interval
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import Closeness, TrialResult
+from paani_sim.trials.trial_cases import TrialCase
 
 
 class Share(msgspec.Struct, frozen=True, kw_only=True):
@@ -87,7 +87,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     faults: dict[str, FaultFigures]
 
 
-def summarise(suite: str, results: Mapping[Case, TrialResult]) -> Summary:
+def summarise_suite(suite: str, results: Mapping[TrialCase, TrialResult]) -> Summary:
     """By policy, by policy and world, and by fault."""
     plain = {case: result for case, result in sorted(results.items()) if not case.fault}
     policies = [policy for policy in Policy if any(case.policy is policy for case in plain)]
@@ -95,20 +95,22 @@ def summarise(suite: str, results: Mapping[Case, TrialResult]) -> Summary:
     kinds = sorted({case.fault for case in results if case.fault})
     return Summary(
         suite=suite,
-        policies={p.value: figures([r for c, r in plain.items() if c.policy is p]) for p in policies},
+        policies={p.value: summarise_drives([r for c, r in plain.items() if c.policy is p]) for p in policies},
         worlds={
             p.value: {
-                world: figures(chosen)
+                world: summarise_drives(chosen)
                 for world in worlds
                 if (chosen := [r for c, r in plain.items() if c.policy is p and c.world == world])
             }
             for p in policies
         },
-        faults={kind: fault_figures([r for c, r in sorted(results.items()) if c.fault == kind]) for kind in kinds},
+        faults={
+            kind: summarise_fault_drives([r for c, r in sorted(results.items()) if c.fault == kind]) for kind in kinds
+        },
     )
 
 
-def figures(results: Sequence[TrialResult]) -> PolicyFigures:
+def summarise_drives(results: Sequence[TrialResult]) -> PolicyFigures:
     """Of one or more drives."""
     count, seconds = len(results), sum(r.seconds for r in results)
     distance_m, minutes = sum(r.distance_m for r in results), sum(r.dithering.seconds for r in results) / 60.0
@@ -124,9 +126,9 @@ def figures(results: Sequence[TrialResult]) -> PolicyFigures:
     return PolicyFigures(
         trials=count,
         completed=completed,
-        completed_share=share(completed, count),
+        completed_share=share_with_interval(completed, count),
         untouched=untouched,
-        untouched_share=share(untouched, count),
+        untouched_share=share_with_interval(untouched, count),
         collisions=collisions,
         collisions_visible=sum(r.collisions_visible for r in results),
         collisions_bank=sum(r.collisions_bank for r in results),
@@ -146,16 +148,16 @@ def figures(results: Sequence[TrialResult]) -> PolicyFigures:
         encounters={kind.value: closeness[kind.value] for kind in Closeness},
         ended=dict(sorted(collections.Counter(r.why.value for r in results).items())),
         stops=dict(sorted(stops.items(), key=lambda item: (-item[1].seconds, item[0]))),
-        changes_per_min=_per(minutes, (r.dithering.changes for r in results)),
-        side_flips_per_min=_per(minutes, (r.dithering.side_flips for r in results)),
-        stop_go_flips_per_min=_per(minutes, (r.dithering.stop_go_flips for r in results)),
+        changes_per_min=_per_minute(minutes, (r.dithering.changes for r in results)),
+        side_flips_per_min=_per_minute(minutes, (r.dithering.side_flips for r in results)),
+        stop_go_flips_per_min=_per_minute(minutes, (r.dithering.stop_go_flips for r in results)),
         latency_p50_s=nearest_rank([one.p50_s or 0.0 for one in latencies], 50) if latencies else None,
         latency_max_s=max(one.max_s or 0.0 for one in latencies) if latencies else None,
         unusable_frac=round(sum(r.unusable for r in results) / max(1, sum(r.frames for r in results)), 4),
     )
 
 
-def fault_figures(results: Sequence[TrialResult]) -> FaultFigures:
+def summarise_fault_drives(results: Sequence[TrialResult]) -> FaultFigures:
     """Of the drives with one kind of fault."""
     reactions = [reaction for r in results for reaction in r.reactions]
     zero = [reaction.zero_thrust_s for reaction in reactions if reaction.zero_thrust_s is not None]
@@ -172,13 +174,13 @@ def fault_figures(results: Sequence[TrialResult]) -> FaultFigures:
     )
 
 
-def share(successes: int, trials: int) -> Share:
+def share_with_interval(successes: int, trials: int) -> Share:
     """With its interval."""
-    low, high = wilson(successes, trials)
+    low, high = wilson_interval(successes, trials)
     return Share(share=round(successes / trials, 4) if trials else 0.0, low=round(low, 4), high=round(high, 4))
 
 
-def table(summary: Summary) -> str:
+def format_summary(summary: Summary) -> str:
     """One line per policy, then one per fault."""
     lines = [
         f"{'policy':8} {'drives':>6}  {'completed [95 %]':22} {'no contact [95 %]':22} {'contacts':>8} {'visible':>7}"
@@ -186,8 +188,9 @@ def table(summary: Summary) -> str:
     ]
     for name, p in summary.policies.items():
         lines.append(
-            f"{name:8} {p.trials:6}  {_share(p.completed_share):22} {_share(p.untouched_share):22} {p.collisions:8}"
-            f" {p.collisions_visible:7} {p.collisions_bank:5} {p.contacts_per_km:7.2f} {p.near_misses:5}"
+            f"{name:8} {p.trials:6}  {_format_share(p.completed_share):22} {_format_share(p.untouched_share):22}"
+            f" {p.collisions:8} {p.collisions_visible:7} {p.collisions_bank:5} {p.contacts_per_km:7.2f}"
+            f" {p.near_misses:5}"
             f" {p.close_per_km:8.2f} {p.min_clearance_m:6.2f} {p.off_route_rms_m:8.2f}"
             f" {p.changes_per_min:9.2f} {p.distance_m * 1e-3:7.3f}"
         )
@@ -203,9 +206,9 @@ def table(summary: Summary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _share(s: Share) -> str:
+def _format_share(s: Share) -> str:
     return f"{100 * s.share:5.1f} % [{100 * s.low:4.1f}, {100 * s.high:5.1f}]"
 
 
-def _per(minutes: float, counts: Iterable[int]) -> float:
+def _per_minute(minutes: float, counts: Iterable[int]) -> float:
     return round(sum(counts) / minutes, 3) if minutes else 0.0

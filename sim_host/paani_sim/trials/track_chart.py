@@ -8,8 +8,8 @@ import numpy as np
 
 from paani.arrays import F64
 from paani.statistics.charts import Axes, circle, drawing, element, polygon, polyline
-from paani_sim.trials.outlines import AFLOAT_Z_M
 from paani_sim.trials.result import Closeness, TrialResult
+from paani_sim.trials.silhouettes import MAX_FLOATING_BASE_M
 from paani_sim.worlds import World, actor_at, along_at
 from paani_sim.worlds.footprint import placed, shape_of
 
@@ -20,7 +20,7 @@ SCALE_BAR_M = 10.0
 DOT_PX = 5.0
 
 
-def plan_view(world: World, result: TrialResult) -> str:
+def draw_track_chart(world: World, result: TrialResult) -> str:
     """Shore, route, things, actors where they were at the drive's worst moment, track, contacts and near misses."""
     track = np.array([(x, y) for _, x, y in result.track] or [world.start[:2]])
     low, high = track.min(axis=0) - MARGIN_M, track.max(axis=0) + MARGIN_M
@@ -48,9 +48,9 @@ def plan_view(world: World, result: TrialResult) -> str:
     parts += [
         area(each.kind.value, placed(shape_of(each), each.pose))
         for each in world.obstacles
-        if each.base_z_m < AFLOAT_Z_M
+        if each.base_z_m < MAX_FLOATING_BASE_M
     ]
-    at_s = worst_moment_s(result)
+    at_s = find_worst_moment_s(result)
     for actor in world.actors:
         parts.append(line("way", np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m))
         parts.append(area(actor.kind.value, placed(shape_of(actor), actor_at(actor, along_at(actor, at_s)))))
@@ -70,7 +70,7 @@ def plan_view(world: World, result: TrialResult) -> str:
     return drawing(round(WIDTH_PX), round(height_px), title, parts, class_="plan")
 
 
-def worst_moment_s(result: TrialResult) -> float:
+def find_worst_moment_s(result: TrialResult) -> float:
     """The first touch, else the closest point, else where it ended."""
     if result.contacts:
         return result.contacts[0].at_s

@@ -7,18 +7,18 @@ import pytest
 
 from paani.errors import UserError
 from paani_sim.trials import bench_water as bench
-from paani_sim.trials.bench_water import ACTORS, PLAIN, SIZES_PX, Cost, cost_part, plot, timed
+from paani_sim.trials.bench_water import ACTORS, DEFAULT_CASE, SIZES_PX, Cost, plot_costs, tabulate_costs, time_drive
 from paani_sim.trials.policies import Policy
 
 COSTS = [
     Cost(policy=policy, actors=count, width_px=size[0], height_px=size[1], cpu_s=0.1 + 0.01 * count)
-    for policy, count, size in [(p, n, PLAIN[1]) for p in (Policy.PAANI, Policy.ORACLE) for n in ACTORS]
-    + [(Policy.PAANI, PLAIN[0], size) for size in SIZES_PX]
+    for policy, count, size in [(p, n, DEFAULT_CASE[1]) for p in (Policy.PAANI, Policy.ORACLE) for n in ACTORS]
+    + [(Policy.PAANI, DEFAULT_CASE[0], size) for size in SIZES_PX]
 ]
 
 
 def test_the_plot_is_well_formed_and_names_both_policies() -> None:
-    drawn = ElementTree.fromstring(plot(COSTS))
+    drawn = ElementTree.fromstring(plot_costs(COSTS))
     said = " ".join(drawn.itertext())
     assert "paani" in said
     assert "oracle" in said
@@ -27,13 +27,13 @@ def test_the_plot_is_well_formed_and_names_both_policies() -> None:
 
 
 def test_the_table_has_a_row_for_each_measurement() -> None:
-    part = cost_part(COSTS)
+    part = tabulate_costs(COSTS)
     assert len(part.rows) == len(COSTS)
     assert all(len(row) == len(part.columns) for row in part.rows)
 
 
 def test_a_drive_is_timed_after_its_warm_up() -> None:
-    simulated_s, wall_s, cpu_s = timed(Policy.BLIND, 2, PLAIN[1], 0.5, threads=False)
+    simulated_s, wall_s, cpu_s = time_drive(Policy.BLIND, 2, DEFAULT_CASE[1], 0.5, threads=False)
     assert simulated_s == pytest.approx(0.5)
     assert wall_s > 0.0
     assert cpu_s > 0.0

@@ -7,18 +7,18 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-from paani_sim.trials.cases import Case, scenario_of
-from paani_sim.trials.drive_recorder import Recorder
-from paani_sim.trials.one import config_for
+from paani_sim.trials.drive_recorder import DriveRecorder
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.report import page
+from paani_sim.trials.report import render_page
 from paani_sim.trials.result import Contact, TrialResult
-from paani_sim.trials.suite_summary import summarise
-from paani_sim.trials.track_chart import plan_view, worst_moment_s
-from paani_sim.trials.worst import Again, worst_of
+from paani_sim.trials.run_trial import load_case_config
+from paani_sim.trials.suite_summary import summarise_suite
+from paani_sim.trials.track_chart import draw_track_chart, find_worst_moment_s
+from paani_sim.trials.trial_cases import TrialCase, build_scenario
+from paani_sim.trials.worst_drives import RepeatedDrive, select_worst_drives
 from tests.unit.paani_sim.trials.trial_results import RESULT
 
-CASES = [Case("lake", seed, Policy.PAANI) for seed in (1, 2, 3)]
+CASES = [TrialCase("lake", seed, Policy.PAANI) for seed in (1, 2, 3)]
 TOUCH = Contact(what="<met_1>", kind="buoy", at_s=7.0, x_m=0.0, y_m=0.0, speed_mps=0.5, visible=True)
 
 
@@ -29,24 +29,24 @@ def touched(result: TrialResult) -> TrialResult:
 def test_the_worst_come_first() -> None:
     late = msgspec.structs.replace(RESULT, completed=False)
     results = {CASES[0]: RESULT, CASES[1]: late, CASES[2]: touched(RESULT)}
-    assert worst_of(results, 2) == [CASES[2], CASES[1]]
-    assert worst_of({Case("lake", 1, Policy.BLIND): RESULT}, 2) == [Case("lake", 1, Policy.BLIND)]
+    assert select_worst_drives(results, 2) == [CASES[2], CASES[1]]
+    assert select_worst_drives({TrialCase("lake", 1, Policy.BLIND): RESULT}, 2) == [TrialCase("lake", 1, Policy.BLIND)]
 
 
 def test_the_worst_moment() -> None:
     """The touch, else the closest point, else where the drive ended."""
-    assert worst_moment_s(touched(RESULT)) == 7.0
-    assert worst_moment_s(RESULT) == 9.0
+    assert find_worst_moment_s(touched(RESULT)) == 7.0
+    assert find_worst_moment_s(RESULT) == 9.0
     ended = msgspec.structs.replace(RESULT, completed=False, track=((3.0, 0.0, 0.0), (44.0, 9.0, 0.0)))
-    assert worst_moment_s(ended) == 44.0
+    assert find_worst_moment_s(ended) == 44.0
 
 
 @pytest.mark.parametrize("world", ["lake", "canal"])
 def test_a_plan_is_well_formed_and_shows_the_track(world: str) -> None:
-    scenario = scenario_of(Case(world, 1, Policy.BLIND))
+    scenario = build_scenario(TrialCase(world, 1, Policy.BLIND))
     start = scenario.world.start
     track = tuple((2.0 * k, start.x_m + k, start.y_m) for k in range(9))
-    plan = plan_view(scenario.world, touched(msgspec.structs.replace(RESULT, track=track)))
+    plan = draw_track_chart(scenario.world, touched(msgspec.structs.replace(RESULT, track=track)))
     drawn = ElementTree.fromstring(plan)
     kinds = [element.get("class") for element in drawn]
     assert {"water", "route", "track", "start", "hit", "scale"} <= set(kinds)
@@ -56,9 +56,9 @@ def test_a_plan_is_well_formed_and_shows_the_track(world: str) -> None:
 
 def test_the_page_stands_alone() -> None:
     """Names are escaped, nothing is fetched, and the recording is linked."""
-    results = {CASES[0]: touched(RESULT), CASES[1]: RESULT, Case("lake", 1, Policy.BLIND): RESULT}
-    again = [Again(case=CASES[0], same=False, log="lake-1-paani.mcap", strip=b"png")]
-    text = page(summarise("quick", results), results, again, "all-drives")
+    results = {CASES[0]: touched(RESULT), CASES[1]: RESULT, TrialCase("lake", 1, Policy.BLIND): RESULT}
+    again = [RepeatedDrive(case=CASES[0], is_equal=False, log="lake-1-paani.mcap", strip=b"png")]
+    text = render_page(summarise_suite("quick", results), results, again, "all-drives")
     assert "&lt;met_1&gt;" in text
     assert "<met_1>" not in text
     assert 'href="all-drives/lake-1-paani.mcap"' in text
@@ -70,6 +70,6 @@ def test_the_page_stands_alone() -> None:
 
 def test_a_recording_that_failed_is_not_there(tmp_path: Path) -> None:
     file = tmp_path / "drive.mcap"
-    with pytest.raises(RuntimeError), Recorder(file, config_for(CASES[0])):
+    with pytest.raises(RuntimeError), DriveRecorder(file, load_case_config(CASES[0])):
         raise RuntimeError
     assert not list(tmp_path.iterdir())

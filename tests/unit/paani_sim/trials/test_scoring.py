@@ -9,14 +9,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani_sim.trials.hull_clearance import BANK, FAR_M, Course, actor_poses, clearances_m, could_see
-from paani_sim.trials.intervals import wilson
+from paani_sim.trials.drive_history import DriveHistory, DriveSample, StopInterval, ThrustChange
+from paani_sim.trials.fault_reactions import measure_reactions
+from paani_sim.trials.hull_clearance import (
+    BANK,
+    MAX_CLEARANCE_M,
+    HullPath,
+    compute_actor_poses,
+    compute_clearances_m,
+    was_visible,
+)
+from paani_sim.trials.intervals import wilson_interval
 from paani_sim.trials.lockstep_bus import START_US
-from paani_sim.trials.reactions import reactions_of
 from paani_sim.trials.result import Closeness, Contact
-from paani_sim.trials.route_progress import Along
-from paani_sim.trials.scoring import closeness_of, course_of, encounters_of, latency_of, stops_of
-from paani_sim.trials.track import Applying, Halt, Sample, Track
+from paani_sim.trials.route_progress import RouteProgress
+from paani_sim.trials.scoring import (
+    build_hull_path,
+    classify_closeness,
+    find_encounters,
+    summarise_latency,
+    summarise_stops,
+)
 from paani_sim.vessels import load_vessel
 from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, Pose2, World, actor_at
 
@@ -39,21 +52,23 @@ BARGE = Obstacle("barge", Kind.VESSEL, "barge", Pose2(0.0, -5.0, 0.0), 8.0, 2.0,
 SWIMMER = Actor("swimmer", Kind.PERSON, "swimming", np.array([[20.0, -10.0], [20.0, 10.0]]), 0.5, 1.2, 0.6, 0.4)
 
 
-def samples(places: list[tuple[float, float, float]], surge_mps: float = 0.6, along_m: float = 0.0) -> list[Sample]:
+def samples(
+    places: list[tuple[float, float, float]], surge_mps: float = 0.6, along_m: float = 0.0
+) -> list[DriveSample]:
     return [
-        Sample(
-            t_s=3.0 + 0.1 * k, x_m=x, y_m=y, yaw_rad=yaw, surge_mps=surge_mps, off_m=y, left_n=1.0, right_n=1.0,
+        DriveSample(
+            t_s=3.0 + 0.1 * k, x_m=x, y_m=y, yaw_rad=yaw, surge_mps=surge_mps, cross_track_m=y, left_n=1.0, right_n=1.0,
             collisions=0, in_contact=False, actors_along_m=(along_m,),
         )
         for k, (x, y, yaw) in enumerate(places)
     ]  # fmt: skip
 
 
-def course(world: World, places: list[tuple[float, float, float]], along_m: float = 0.0) -> Course:
-    track = samples(places, along_m=along_m)
+def hull_path(world: World, places: list[tuple[float, float, float]], along_m: float = 0.0) -> HullPath:
+    history = samples(places, along_m=along_m)
     if not world.actors:
-        track = [sample._replace(actors_along_m=()) for sample in track]
-    return course_of(world, HULL, track)
+        history = [sample._replace(actors_along_m=()) for sample in history]
+    return build_hull_path(world, HULL, history)
 
 
 def with_things(*things: Obstacle | Actor) -> World:
@@ -70,25 +85,25 @@ def with_things(*things: Obstacle | Actor) -> World:
 )
 def test_wilson_against_known_values(successes: int, trials: int, low: float, high: float) -> None:
     """R. G. Newcombe (1998) and the formula by hand."""
-    assert wilson(successes, trials) == pytest.approx((low, high), abs=1e-4)
+    assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=1e-4)
 
 
 @given(trials=st.integers(1, 2000), data=st.data())
 def test_wilson_holds_the_share(trials: int, data: st.DataObject) -> None:
     successes = data.draw(st.integers(0, trials))
-    low, high = wilson(successes, trials)
+    low, high = wilson_interval(successes, trials)
     assert 0.0 <= low <= successes / trials <= high <= 1.0
 
 
 def test_clearance_is_from_hull_to_footprint() -> None:
-    gaps = clearances_m(with_things(BUOY, BARGE), course(POND, [(0.0, 0.0, 0.0), (0.0, 0.0, 0.5 * math.pi)]))
+    gaps = compute_clearances_m(with_things(BUOY, BARGE), hull_path(POND, [(0.0, 0.0, 0.0), (0.0, 0.0, 0.5 * math.pi)]))
     assert gaps["buoy"] == pytest.approx([3.0 - 0.5 - HALF_WIDTH_M, 3.0 - 0.5 - HALF_LENGTH_M])
     assert gaps["barge"] == pytest.approx([4.0 - HALF_WIDTH_M, 4.0 - HALF_LENGTH_M])
-    assert gaps[BANK] == pytest.approx([FAR_M, FAR_M])
+    assert gaps[BANK] == pytest.approx([MAX_CLEARANCE_M, MAX_CLEARANCE_M])
 
 
 def test_clearance_to_a_bank_and_inside_a_thing() -> None:
-    gaps = clearances_m(with_things(BARGE), course(POND, [(0.0, 19.0, 0.0), (1.0, -5.0, 1.0)]))
+    gaps = compute_clearances_m(with_things(BARGE), hull_path(POND, [(0.0, 19.0, 0.0), (1.0, -5.0, 1.0)]))
     assert gaps[BANK][0] == pytest.approx(1.0 - HALF_WIDTH_M)
     assert gaps["barge"][1] == 0.0
 
@@ -97,7 +112,7 @@ def test_a_corner_of_a_bank_counts() -> None:
     """A spit that ends beside the hull, its corners nearer than its edges' ends are long."""
     shore = np.array([[-50.0, -20.0], [0.0, -20.0], [0.2, -1.0], [0.4, -20.0], [50.0, -20.0], [50.0, 20.0], [-50, 20]])
     world = dataclasses.replace(POND, shore_m=shore)
-    assert clearances_m(world, course(POND, [(0.2, 0.0, 0.0)]))[BANK][0] == pytest.approx(1.0 - HALF_WIDTH_M)
+    assert compute_clearances_m(world, hull_path(POND, [(0.2, 0.0, 0.0)]))[BANK][0] == pytest.approx(1.0 - HALF_WIDTH_M)
 
 
 @given(along_m=st.floats(-15.0, 40.0))
@@ -105,12 +120,12 @@ def test_actors_lie_beyond_their_path_s_end_as_they_came(along_m: float) -> None
     """A boat that has arrived does not swing round to the east."""
     path_m = np.array([[0.0, 0.0], [0.0, 10.0], [-8.0, 14.0]])
     boat = dataclasses.replace(SWIMMER, closed=False, path_m=path_m, length_m=6.2)
-    assert actor_poses(boat, np.array([along_m]))[0] == pytest.approx(actor_at(boat, along_m), abs=1e-9)
+    assert compute_actor_poses(boat, np.array([along_m]))[0] == pytest.approx(actor_at(boat, along_m), abs=1e-9)
 
 
 @given(along_m=st.floats(-5.0, 60.0))
 def test_actors_are_where_the_world_says(along_m: float) -> None:
-    x, y, yaw = actor_poses(SWIMMER, np.array([along_m]))[0]
+    x, y, yaw = compute_actor_poses(SWIMMER, np.array([along_m]))[0]
     expected = actor_at(SWIMMER, along_m)
     assert (x, y) == pytest.approx(expected[:2], abs=1e-9)
     if 1.0 < along_m % 20.0 < 19.0:  # at an end the path turns back on itself
@@ -131,7 +146,7 @@ def test_actors_are_where_the_world_says(along_m: float) -> None:
 )
 def test_what_the_camera_could_have_seen(places: list[tuple[float, float, float]], what: str, seen: bool) -> None:
     world = with_things(BUOY, BARGE)
-    assert could_see(world, what, course(POND, places), math.radians(35.0), 15.0, 0.55) is seen
+    assert was_visible(world, what, hull_path(POND, places), math.radians(35.0), 15.0, 0.55) is seen
 
 
 def test_encounters_have_one_closest_point_each() -> None:
@@ -139,26 +154,30 @@ def test_encounters_have_one_closest_point_each() -> None:
     there = [(x, 0.0, 0.0) for x in np.arange(-9.0, 9.0, 0.06).tolist()]
     back = [(x, 0.4, math.pi) for x in np.arange(9.0, -9.0, -0.06).tolist()]
     world = with_things(BUOY)
-    track = [sample._replace(actors_along_m=()) for sample in samples(there + back)]
-    gaps = clearances_m(world, course_of(world, HULL, track))
-    found = [each for each in encounters_of(world, track, gaps, ()) if each.what == "buoy"]
+    history = [sample._replace(actors_along_m=()) for sample in samples(there + back)]
+    gaps = compute_clearances_m(world, build_hull_path(world, HULL, history))
+    found = [each for each in find_encounters(world, history, gaps, ()) if each.what == "buoy"]
     assert [each.clearance_m for each in found] == pytest.approx([2.125, 1.725], abs=0.01)
     assert [each.closeness for each in found] == [Closeness.CLEAR, Closeness.CLEAR]
     touch = Contact(what="buoy", kind="buoy", at_s=found[0].at_s, x_m=0.0, y_m=0.0, speed_mps=0.5, visible=True)
-    touched = [each for each in encounters_of(world, track, gaps, (touch,)) if each.what == "buoy"]
+    touched = [each for each in find_encounters(world, history, gaps, (touch,)) if each.what == "buoy"]
     assert [each.closeness for each in touched] == [Closeness.CONTACT, Closeness.CLEAR]
 
 
 def test_closeness_classes() -> None:
-    found = [closeness_of(gap_m) for gap_m in (0.1, 0.3, 0.59, 0.6, 1.49, 1.5)]
+    found = [classify_closeness(gap_m) for gap_m in (0.1, 0.3, 0.59, 0.6, 1.49, 1.5)]
     assert found == [
         Closeness.GRAZING, Closeness.TIGHT, Closeness.TIGHT, Closeness.CLOSE, Closeness.CLOSE, Closeness.CLEAR
     ]  # fmt: skip
 
 
 def test_stops_by_reason() -> None:
-    halts = [Halt(5.0, "STALE_EVIDENCE", 6.5), Halt(9.0, "NO_SAFE_SIDE"), Halt(7.0, "STALE_EVIDENCE", 7.5)]
-    assert [(s.reason, s.count, s.seconds) for s in stops_of(halts, 20.0)] == [
+    stops = [
+        StopInterval(5.0, "STALE_EVIDENCE", 6.5),
+        StopInterval(9.0, "NO_SAFE_SIDE"),
+        StopInterval(7.0, "STALE_EVIDENCE", 7.5),
+    ]
+    assert [(s.reason, s.count, s.seconds) for s in summarise_stops(stops, 20.0)] == [
         ("NO_SAFE_SIDE", 1, 11.0),
         ("STALE_EVIDENCE", 2, 2.0),
     ]
@@ -166,22 +185,22 @@ def test_stops_by_reason() -> None:
 
 def test_latency_is_of_the_first_thrust_of_each_picture() -> None:
     applied = [
-        Applying(1_000_000, True, 0),
-        Applying(1_310_000, False, 1_200_000),
-        Applying(1_510_000, False, 1_400_000),
-        Applying(1_600_000, True, 0),
-        Applying(1_650_000, False, 1_400_000),
+        ThrustChange(1_000_000, True, 0),
+        ThrustChange(1_310_000, False, 1_200_000),
+        ThrustChange(1_510_000, False, 1_400_000),
+        ThrustChange(1_600_000, True, 0),
+        ThrustChange(1_650_000, False, 1_400_000),
     ]
-    assert latency_of(applied) == latency_of(applied[:3])
-    assert (latency_of(applied).p50_s, latency_of(applied).samples) == (0.11, 2)
+    assert summarise_latency(applied) == summarise_latency(applied[:3])
+    assert (summarise_latency(applied).p50_s, summarise_latency(applied).samples) == (0.11, 2)
 
 
-def reaction_of(*applied: Applying, frames_unusable: tuple[int, ...] = ()) -> tuple[float | None, bool]:
-    track = Track()
-    track.samples = samples([(0.0, 0.0, 0.0)] * 200)
-    track.applied = list(applied)
-    track.unusable = [(at_us, m.UnusableCause.BLACK) for at_us in frames_unusable]
-    [found] = reactions_of((Fault(FaultKind.CAMERA_BLACK, 10.0, 5.0),), track, 0.2)
+def reaction_of(*applied: ThrustChange, frames_unusable: tuple[int, ...] = ()) -> tuple[float | None, bool]:
+    history = DriveHistory()
+    history.samples = samples([(0.0, 0.0, 0.0)] * 200)
+    history.thrust_changes = list(applied)
+    history.unusable_frames = [(at_us, m.UnusableCause.BLACK) for at_us in frames_unusable]
+    [found] = measure_reactions((Fault(FaultKind.CAMERA_BLACK, 10.0, 5.0),), history, 0.2)
     return found.zero_thrust_s, found.in_time
 
 
@@ -191,32 +210,32 @@ def at(seconds: float) -> int:
 
 def test_reaction_to_a_black_camera() -> None:
     """Fans off within one frame and half a second, and no sooner on again than the camera sees."""
-    go, stop = Applying(at(4.0), False, 1), Applying(at(10.31), True, 0)
+    go, stop = ThrustChange(at(4.0), False, 1), ThrustChange(at(10.31), True, 0)
     assert reaction_of(go, stop) == (0.31, True)
-    assert reaction_of(go, stop, Applying(at(12.0), False, 2)) == (None, False)
-    assert reaction_of(go, stop, Applying(at(12.0), False, 2), Applying(at(14.0), True, 0)) == (4.0, False)
-    on = Applying(at(10.2), False, 1)  # it lay still for a moment as the camera failed, and was under way again
-    assert reaction_of(go, Applying(at(9.9), True, 0), on, Applying(at(10.5), True, 0)) == (0.5, True)
-    assert reaction_of(go, stop, Applying(at(16.0), False, 2)) == (0.31, True)
-    assert reaction_of(go, Applying(at(10.71), True, 0)) == (0.71, False)
+    assert reaction_of(go, stop, ThrustChange(at(12.0), False, 2)) == (None, False)
+    assert reaction_of(go, stop, ThrustChange(at(12.0), False, 2), ThrustChange(at(14.0), True, 0)) == (4.0, False)
+    on = ThrustChange(at(10.2), False, 1)  # it lay still for a moment as the camera failed, and was under way again
+    assert reaction_of(go, ThrustChange(at(9.9), True, 0), on, ThrustChange(at(10.5), True, 0)) == (0.5, True)
+    assert reaction_of(go, stop, ThrustChange(at(16.0), False, 2)) == (0.31, True)
+    assert reaction_of(go, ThrustChange(at(10.71), True, 0)) == (0.71, False)
     assert reaction_of(go) == (None, False)
-    assert reaction_of(go, Applying(at(9.0), True, 0)) == (0.0, True)
+    assert reaction_of(go, ThrustChange(at(9.0), True, 0)) == (0.0, True)
 
 
 def test_progress_along_an_open_and_a_closed_route() -> None:
-    line = Along(POND.route_m, closed=False, start_m=(-30.0, 0.0))
+    line = RouteProgress(POND.route_m, closed=False, start_m=(-30.0, 0.0))
     for x, y in [(-29.0, 1.0), (-20.0, -2.0), (-25.0, 0.0)]:
         line.update((x, y))
-    assert (line.now_m, line.best_m, line.off_m) == pytest.approx((5.0, 10.0, 0.0))
+    assert (line.progress_m, line.best_progress_m, line.cross_track_m) == pytest.approx((5.0, 10.0, 0.0))
     square = np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]])
-    ring = Along(square, closed=True, start_m=(20.0, 0.0))
+    ring = RouteProgress(square, closed=True, start_m=(20.0, 0.0))
     for place in [(39.0, 1.0), (40.0, 20.0), (39.0, 39.0), (20.0, 40.0), (0.0, 38.0), (0.0, 20.0), (1.0, 1.0), (19, 0)]:
         ring.update(place)
-    assert ring.best_m == pytest.approx(159.0)
+    assert ring.best_progress_m == pytest.approx(159.0)
 
 
 def test_a_route_that_comes_near_itself_is_not_cut_short() -> None:
     hairpin = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 3.0], [0.0, 3.0]])
-    along = Along(hairpin, closed=False, start_m=(10.0, 0.0))
-    along.update((11.0, 2.9))
-    assert along.now_m == pytest.approx(1.0)
+    progress = RouteProgress(hairpin, closed=False, start_m=(10.0, 0.0))
+    progress.update((11.0, 2.9))
+    assert progress.progress_m == pytest.approx(1.0)

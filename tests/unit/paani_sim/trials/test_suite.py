@@ -8,43 +8,49 @@ import pytest
 
 from paani.errors import UserError
 from paani_sim.trials import command
-from paani_sim.trials.cases import FAULTS, SUITES, Case, cases_of, read_case, scenario_of
-from paani_sim.trials.fingerprint import MadeWith, Maker
-from paani_sim.trials.policies import Policy, config_of
+from paani_sim.trials.drive_states import DriveOutcome
+from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
+from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import Reaction
-from paani_sim.trials.states import Why
-from paani_sim.trials.suite import Record, encoded, look, read_record, result_path
-from paani_sim.trials.suite_summary import Summary, summarise, table
+from paani_sim.trials.run_suite import (
+    StoredResult,
+    encode_stored_result,
+    find_stored_results,
+    read_stored_result,
+    result_path,
+)
+from paani_sim.trials.suite_summary import Summary, format_summary, summarise_suite
+from paani_sim.trials.trial_cases import SUITE_FAULTS, SUITES, TrialCase, build_scenario, list_cases, parse_case
 from paani_sim.worlds import WORLDS, FaultKind
 from tests.unit.paani_sim.trials.trial_results import RESULT
 
-CASES = [Case("lake", seed, Policy.PAANI) for seed in (1, 2, 3)]
+CASES = [TrialCase("lake", seed, Policy.PAANI) for seed in (1, 2, 3)]
 
 
 @pytest.fixture(scope="module")
-def maker() -> Maker:
-    return Maker(())
+def reader() -> FingerprintReader:
+    return FingerprintReader(())
 
 
 def test_suites() -> None:
     """`standard` drives 50 times in each world with every policy but the slow one, which drives 5 times in each."""
-    quick, standard = (cases_of(SUITES[name], tuple(WORLDS), Policy) for name in ("quick", "standard"))
+    quick, standard = (list_cases(SUITES[name], tuple(WORLDS), Policy) for name in ("quick", "standard"))
     assert len(quick) == len(WORLDS) * (2 * 3 + 1)
     for policy in Policy:
         plain = [case for case in standard if case.policy is policy and not case.fault]
-        wanted = 5 if policy is Policy.PAPER else 50
-        assert all(sum(case.world == world for case in plain) == wanted for world in WORLDS)
-    assert {case.fault for case in standard if case.fault} == {kind.value for kind in FAULTS} == set(FaultKind)
+        missing = 5 if policy is Policy.PAPER else 50
+        assert all(sum(case.world == world for case in plain) == missing for world in WORLDS)
+    assert {case.fault for case in standard if case.fault} == {kind.value for kind in SUITE_FAULTS} == set(FaultKind)
     assert len({case.stem for case in standard}) == len(standard) == len({case.name for case in standard})
 
 
 def test_cases_are_read_as_they_are_named() -> None:
     for case in (
-        Case("lake", 3, Policy.ORACLE),
-        Case("river", 1, Policy.PAANI, "camera_black"),
-        Case("a.toml", 2, Policy.BLIND),
+        TrialCase("lake", 3, Policy.ORACLE),
+        TrialCase("river", 1, Policy.PAANI, "camera_black"),
+        TrialCase("a.toml", 2, Policy.BLIND),
     ):
-        assert read_case(case.name) == case
+        assert parse_case(case.name) == case
 
 
 @pytest.mark.parametrize(
@@ -54,50 +60,50 @@ def test_cases_are_read_as_they_are_named() -> None:
 )  # fmt: skip
 def test_a_case_that_is_none(text: str, says: str) -> None:
     with pytest.raises(UserError, match=says):
-        read_case(text)
+        parse_case(text)
 
 
 def test_a_fault_begins_while_the_boat_drives() -> None:
-    scenario = scenario_of(Case("lake", 4, Policy.PAANI, "camera_frozen"))
+    scenario = build_scenario(TrialCase("lake", 4, Policy.PAANI, "camera_frozen"))
     [fault] = scenario.faults
     assert fault.kind is FaultKind.CAMERA_FROZEN
     assert 12.0 <= fault.start_s <= 30.0
-    assert scenario_of(Case("lake", 4, Policy.PAANI, "camera_frozen")).faults == scenario.faults
+    assert build_scenario(TrialCase("lake", 4, Policy.PAANI, "camera_frozen")).faults == scenario.faults
 
 
-def write(folder: Path, case: Case, made_with: MadeWith) -> None:
+def write(folder: Path, case: TrialCase, fingerprint: Fingerprint) -> None:
     path = result_path(folder, case)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(encoded(Record(made_with=made_with, result=RESULT)))
+    path.write_bytes(encode_stored_result(StoredResult(fingerprint=fingerprint, result=RESULT)))
 
 
-def test_a_run_is_gone_on_with(tmp_path: Path, maker: Maker) -> None:
+def test_a_run_is_gone_on_with(tmp_path: Path, reader: FingerprintReader) -> None:
     """Results made alike are kept; one of other code is named and driven again, and so is half a file."""
-    write(tmp_path, CASES[0], maker.of(CASES[0]))
-    write(tmp_path, CASES[1], msgspec.structs.replace(maker.of(CASES[1]), code="0", settings="0"))
-    kept = look(tmp_path, CASES, maker)
+    write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
+    write(tmp_path, CASES[1], msgspec.structs.replace(reader.fingerprint(CASES[1]), code="0", settings="0"))
+    kept = find_stored_results(tmp_path, CASES, reader)
     assert list(kept.results) == [CASES[0]]
-    assert kept.wanted == (CASES[1], CASES[2])
+    assert kept.missing == (CASES[1], CASES[2])
     assert kept.outdated == {"other code, settings": 1}
     path = result_path(tmp_path, CASES[0])
     path.write_bytes(path.read_bytes()[:100])
-    assert look(tmp_path, CASES, maker).wanted == tuple(CASES)
+    assert find_stored_results(tmp_path, CASES, reader).missing == tuple(CASES)
 
 
-def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Path, maker: Maker) -> None:
+def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Path, reader: FingerprintReader) -> None:
     case = CASES[0]
-    other = Maker(("navigator.cruise_mps=0.5",)).of(case)
-    assert maker.of(case).differs(other) == ["settings"]
+    other = FingerprintReader(("navigator.cruise_mps=0.5",)).fingerprint(case)
+    assert reader.fingerprint(case).list_differences(other) == ["settings"]
     file = tmp_path / "own.toml"
     file.write_text("a")
-    before = maker.of(Case(str(file), 1, Policy.BLIND))
+    before = reader.fingerprint(TrialCase(str(file), 1, Policy.BLIND))
     file.write_text("b")
-    assert before.differs(maker.of(Case(str(file), 1, Policy.BLIND))) == ["scenario"]
+    assert before.list_differences(reader.fingerprint(TrialCase(str(file), 1, Policy.BLIND))) == ["scenario"]
 
 
-def test_records_survive_their_file(tmp_path: Path, maker: Maker) -> None:
-    write(tmp_path, CASES[0], maker.of(CASES[0]))
-    record = read_record(result_path(tmp_path, CASES[0]))
+def test_records_survive_their_file(tmp_path: Path, reader: FingerprintReader) -> None:
+    write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
+    record = read_stored_result(result_path(tmp_path, CASES[0]))
     assert record is not None
     assert record.result == RESULT
 
@@ -105,7 +111,7 @@ def test_records_survive_their_file(tmp_path: Path, maker: Maker) -> None:
 def test_figures_have_what_the_scoring_reads() -> None:
     """`policies.<name>.{trials,completed,collisions,near_misses,distance_m}`, and intervals."""
     bad = msgspec.structs.replace(
-        RESULT, completed=False, why=Why.TIME_LIMIT, collisions=2, collisions_visible=1, near_misses=0
+        RESULT, completed=False, why=DriveOutcome.TIME_LIMIT, collisions=2, collisions_visible=1, near_misses=0
     )
     blind = msgspec.structs.replace(RESULT, policy=Policy.BLIND, near_misses=4)
     fault = msgspec.structs.replace(
@@ -117,10 +123,10 @@ def test_figures_have_what_the_scoring_reads() -> None:
     results = {
         CASES[0]: RESULT,
         CASES[1]: bad,
-        Case("lake", 1, Policy.BLIND): blind,
-        Case("lake", 1, Policy.PAANI, "camera_black"): fault,
+        TrialCase("lake", 1, Policy.BLIND): blind,
+        TrialCase("lake", 1, Policy.PAANI, "camera_black"): fault,
     }
-    summary = summarise("quick", results)
+    summary = summarise_suite("quick", results)
     read = json.loads(msgspec.json.encode(summary))
     paani = read["policies"]["paani"]
     assert [paani[k] for k in ("trials", "completed", "collisions", "near_misses", "distance_m")] == [2, 1, 2, 1, 100.0]
@@ -134,7 +140,7 @@ def test_figures_have_what_the_scoring_reads() -> None:
     assert read["worlds"]["paani"]["lake"]["trials"] == 2
     assert read["faults"]["camera_black"]["in_time"] == read["faults"]["camera_black"]["judged"] == 1
     assert msgspec.json.decode(msgspec.json.encode(summary), type=Summary) == summary
-    assert "camera_black" in table(summary)
+    assert "camera_black" in format_summary(summary)
 
 
 @pytest.mark.parametrize(
@@ -162,10 +168,12 @@ def test_words_that_are_no_options(words: list[str]) -> None:
     assert stop.value.code == 2
 
 
-def test_a_finished_run_is_only_read(tmp_path: Path, maker: Maker, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing is driven where every result is there; table and figures are written."""
-    for case in cases_of(SUITES["quick"], ["lake"], [Policy.BLIND]):
-        write(tmp_path, case, maker.of(case))
+def test_a_finished_run_is_only_read(
+    tmp_path: Path, reader: FingerprintReader, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is driven where every result is there; format_summary and figures are written."""
+    for case in list_cases(SUITES["quick"], ["lake"], [Policy.BLIND]):
+        write(tmp_path, case, reader.fingerprint(case))
     figures = tmp_path / "figures.json"
     words = ["--worlds", "lake", "--policy", "blind", "--out", str(tmp_path), "--json", str(figures)]
     assert command.main(words) == 0
@@ -176,8 +184,8 @@ def test_a_finished_run_is_only_read(tmp_path: Path, maker: Maker, capsys: pytes
 @pytest.mark.parametrize("policy", [Policy.PAANI, Policy.ORACLE, Policy.BLIND])
 def test_trials_look_through_the_wide_lens_unless_told(policy: Policy) -> None:
     """The paper's policy is the paper's, whatever is set."""
-    assert config_of(policy).profile == "wide"
-    told = config_of(policy, ["profile=paani"])
+    assert load_policy_config(policy).profile == "wide"
+    told = load_policy_config(policy, ["profile=paani"])
     assert (told.profile, told.eye.hfov_deg) == ("paani", 70.0)
     assert told.navigator.planner.use is (policy is not Policy.BLIND)
-    assert config_of(Policy.PAPER, ["profile=paani"]).profile == "paper"
+    assert load_policy_config(Policy.PAPER, ["profile=paani"]).profile == "paper"

@@ -1,16 +1,16 @@
 """A result to make others from."""
 
 from paani.statistics.dithering import Dithering
+from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.result import Closeness, Encounter, Latency, Stops, TrialResult
-from paani_sim.trials.states import Why
+from paani_sim.trials.result import Closeness, Encounter, Latency, StopTotals, TrialResult
 
 RESULT = TrialResult(
     scenario="random:lake:1",
     seed=1,
     policy=Policy.PAANI,
     world="lake",
-    why=Why.COMPLETED,
+    why=DriveOutcome.COMPLETED,
     completed=True,
     error="",
     goal_m=40.0,
@@ -34,7 +34,7 @@ RESULT = TrialResult(
         Encounter(what="a", kind="buoy", at_s=9.0, clearance_m=0.4, closeness=Closeness.TIGHT, x_m=0.0, y_m=0.0),
     ),
     contacts=(),
-    stops=(Stops(reason="NO_SAFE_SIDE", count=2, seconds=4.0),),
+    stops=(StopTotals(reason="NO_SAFE_SIDE", count=2, seconds=4.0),),
     reactions=(),
     latency=Latency(p50_s=0.1, p95_s=0.2, max_s=0.3, samples=9),
     dithering=Dithering(seconds=100.0, changes=5),

@@ -15,83 +15,84 @@ import msgspec
 
 from paani.errors import UserError
 from paani.whole_file import write_whole
-from paani_sim.trials.cases import Case
-from paani_sim.trials.fingerprint import MadeWith, Maker
-from paani_sim.trials.one import run_case
+from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.result import TrialResult
+from paani_sim.trials.run_trial import run_trial
+from paani_sim.trials.trial_cases import TrialCase
 
-TRIALS, EFFORTS = "trials", "efforts"
+RESULTS_FOLDER, EFFORTS_FOLDER = "trials", "efforts"
 # Bounds what a driver of OpenGL may leave behind. Not the executor's own `max_tasks_per_child`: in Python 3.11 it can
 # wait for ever for the process that should take over.
 DRIVES_PER_PROCESS = 32
-NICE = 5
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+NICENESS = 5
+THREAD_COUNT_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class StoredResult(msgspec.Struct, frozen=True, kw_only=True):
     """One result file."""
 
-    made_with: MadeWith
+    fingerprint: Fingerprint
     result: TrialResult
 
 
-class Failure(msgspec.Struct, frozen=True, kw_only=True):
+class FailedDrive(msgspec.Struct, frozen=True, kw_only=True):
     """A drive that gave no result."""
 
-    case: Case
-    why: str
+    case: TrialCase
+    reason: str
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
+class StoredSuite(msgspec.Struct, frozen=True, kw_only=True):
     """What a run folder already holds: results by case, what is still to be driven, and why of the old that are."""
 
-    results: dict[Case, TrialResult]
-    wanted: tuple[Case, ...]
+    results: dict[TrialCase, TrialResult]
+    missing: tuple[TrialCase, ...]
     outdated: dict[str, int]
 
 
-def look(folder: Path, cases: Sequence[Case], maker: Maker) -> Kept:
+def find_stored_results(folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader) -> StoredSuite:
     """Which results of the folder hold. One that was made otherwise, or cannot be read, is wanted again."""
-    results: dict[Case, TrialResult] = {}
-    wanted: list[Case] = []
+    results: dict[TrialCase, TrialResult] = {}
+    missing: list[TrialCase] = []
     outdated: dict[str, int] = {}
     for case in cases:
-        record, made_with = read_record(result_path(folder, case)), maker.of(case)
-        if record is not None and record.made_with == made_with:
+        record, fingerprint = read_stored_result(result_path(folder, case)), reader.fingerprint(case)
+        if record is not None and record.fingerprint == fingerprint:
             results[case] = record.result
             continue
-        wanted.append(case)
+        missing.append(case)
         if record is not None:
-            name = "other " + ", ".join(record.made_with.differs(made_with))
+            name = "other " + ", ".join(record.fingerprint.list_differences(fingerprint))
             outdated[name] = outdated.get(name, 0) + 1
-    return Kept(results=results, wanted=tuple(wanted), outdated=outdated)
+    return StoredSuite(results=results, missing=tuple(missing), outdated=outdated)
 
 
-def drive_all(
-    folder: Path, cases: Sequence[Case], maker: Maker, sets: Sequence[str], jobs: int
-) -> Iterator[tuple[Case, TrialResult | Failure]]:
+def run_cases(
+    folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
+) -> Iterator[tuple[TrialCase, TrialResult | FailedDrive]]:
     """Each case as it is done, its files written. Interrupted, the processes end and what is written stays.
 
     Raises UserError for the folder, and for a setting or a scenario that no drive can use.
     """
-    for name in (TRIALS, EFFORTS):
+    for name in (RESULTS_FOLDER, EFFORTS_FOLDER):
         _make_folder(folder / name)
-    for name in ONE_THREAD:
+    for name in THREAD_COUNT_VARIABLES:
         os.environ[name] = "1"
     batch = DRIVES_PER_PROCESS * jobs
     for first in range(0, len(cases), batch):
-        yield from _drive_batch(folder, cases[first : first + batch], maker, sets, jobs)
+        yield from _run_batch(folder, cases[first : first + batch], reader, sets, jobs)
 
 
-def _drive_batch(
-    folder: Path, cases: Sequence[Case], maker: Maker, sets: Sequence[str], jobs: int
-) -> Iterator[tuple[Case, TrialResult | Failure]]:
+def _run_batch(
+    folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
+) -> Iterator[tuple[TrialCase, TrialResult | FailedDrive]]:
     executor = concurrent.futures.ProcessPoolExecutor(
-        min(jobs, len(cases)), mp_context=multiprocessing.get_context("spawn"), initializer=_begin_process
+        min(jobs, len(cases)), mp_context=multiprocessing.get_context("spawn"), initializer=_initialise_worker
     )
     try:
         running = {
-            executor.submit(_drive, folder, case, maker.of(case), tuple(sets), jobs == 1): case for case in cases
+            executor.submit(_run_and_store, folder, case, reader.fingerprint(case), tuple(sets), jobs == 1): case
+            for case in cases
         }
         for future in concurrent.futures.as_completed(running):
             case = running[future]
@@ -107,45 +108,45 @@ def _drive_batch(
         executor.shutdown(wait=True, cancel_futures=True)
 
 
-def result_path(folder: Path, case: Case) -> Path:
+def result_path(folder: Path, case: TrialCase) -> Path:
     """Where its result lies."""
-    return folder / TRIALS / f"{case.stem}.json"
+    return folder / RESULTS_FOLDER / f"{case.stem}.json"
 
 
-def read_record(path: Path) -> Record | None:
+def read_stored_result(path: Path) -> StoredResult | None:
     """None where there is none, or none that can be read."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Record)
+        return msgspec.json.decode(path.read_bytes(), type=StoredResult)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None
 
 
-def encoded(record: Record) -> bytes:
+def encode_stored_result(record: StoredResult) -> bytes:
     """The bytes of a result file."""
     return msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n"
 
 
-def _drive(
-    folder: Path, case: Case, made_with: MadeWith, sets: tuple[str, ...], threads: bool
-) -> TrialResult | Failure:
+def _run_and_store(
+    folder: Path, case: TrialCase, fingerprint: Fingerprint, sets: tuple[str, ...], threads: bool
+) -> TrialResult | FailedDrive:
     """In a process of its own, which ends with the one that asked: what nobody waits for is not driven."""
     parent = multiprocessing.parent_process()
     if parent is not None and not parent.is_alive():
         os._exit(1)
     try:
-        result, effort = run_case(case, sets, threads=threads)
+        result, effort = run_trial(case, sets, threads=threads)
     except UserError:
         raise
     except Exception as error:  # noqa: BLE001  # one drive that fails is a finding, not the end of the run
-        return Failure(case=case, why=f"{type(error).__name__}: {error}")
-    write_whole(folder / EFFORTS / f"{case.stem}.json", msgspec.json.encode(effort) + b"\n")
-    write_whole(result_path(folder, case), encoded(Record(made_with=made_with, result=result)))
+        return FailedDrive(case=case, reason=f"{type(error).__name__}: {error}")
+    write_whole(folder / EFFORTS_FOLDER / f"{case.stem}.json", msgspec.json.encode(effort) + b"\n")
+    write_whole(result_path(folder, case), encode_stored_result(StoredResult(fingerprint=fingerprint, result=result)))
     return result
 
 
-def _begin_process() -> None:
+def _initialise_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.nice(NICE)
+    os.nice(NICENESS)
     cv2.setNumThreads(1)
 
 

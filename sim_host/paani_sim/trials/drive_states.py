@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 
-class Phase(StrEnum):
+class DrivePhase(StrEnum):
     """READY waits, disarmed, until the boat could go; RUNNING is armed."""
 
     READY = "ready"
@@ -11,7 +11,7 @@ class Phase(StrEnum):
     FINISHED = "finished"
 
 
-class Why(StrEnum):
+class DriveOutcome(StrEnum):
     """How a drive ended. Only COMPLETED is a success; touching something does not end a drive.
 
     STALLED: two minutes without progress along the route.

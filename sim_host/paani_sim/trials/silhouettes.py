@@ -9,7 +9,7 @@ from paani_sim.eye.camera import NEAR_M
 from paani_sim.worlds import Actor, Obstacle
 from paani_sim.worlds.footprint import CORNERS
 
-AFLOAT_Z_M = 0.2  # whatever stands higher stands on something else, or bridges the water
+MAX_FLOATING_BASE_M = 0.2  # whatever stands higher stands on something else, or bridges the water
 _RING = np.arange(CORNERS)
 _NEXT = (_RING + 1) % CORNERS
 _EDGES = np.concatenate(
@@ -21,13 +21,13 @@ _EDGES = np.concatenate(
 )
 
 
-def heights_of(thing: Obstacle | Actor) -> tuple[float, float]:
+def height_span_m(thing: Obstacle | Actor) -> tuple[float, float]:
     """Foot and top above the water [m]."""
     foot_m = thing.base_z_m if isinstance(thing, Obstacle) else 0.0
     return foot_m, foot_m + thing.height_m
 
 
-def silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> list[F64]:
+def project_silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> list[F64]:
     """Points around each silhouette, `(k, 2)` normalised to the picture (not cut to it); empty where it lies behind.
 
     outlines_m: `(n, 8, 2)`. heights_m: foot and top, `(n, 2)`. Their convex hull is the silhouette.

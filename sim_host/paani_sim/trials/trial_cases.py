@@ -16,10 +16,10 @@ from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import random_scenario
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
-SPLIT, PLUS = ":", "+"
-STARTS_S = (12.0, 30.0)  # when a fault begins, drawn by seed
+FIELD_SEPARATOR, FAULT_SEPARATOR = ":", "+"
+FAULT_START_RANGE_S = (12.0, 30.0)  # when a fault begins, drawn by seed
 # How long each fault of the suite lasts [s], and how bad it is in the unit of its kind.
-FAULTS = {
+SUITE_FAULTS = {
     FaultKind.CAMERA_BLACK: (8.0, 0.0),
     FaultKind.CAMERA_FROZEN: (8.0, 0.0),
     FaultKind.CAMERA_BLURRED: (8.0, 8.0),
@@ -31,11 +31,11 @@ FAULTS = {
     FaultKind.LINK_LOSS: (3.0, 0.0),
     FaultKind.THRUSTER_LOSS: (20.0, 0.5),
 }
-FAULT_WAY_M = 25.0  # long enough for a boat under way to meet its fault, and to go on after it
-CAMERA_FAULTS = tuple(kind for kind in FAULTS if kind.name.startswith("CAMERA"))
+FAULT_ROUTE_LENGTH_M = 25.0  # long enough for a boat under way to meet its fault, and to go on after it
+CAMERA_FAULTS = tuple(kind for kind in SUITE_FAULTS if kind.name.startswith("CAMERA"))
 
 
-class Case(msgspec.Struct, frozen=True, order=True):
+class TrialCase(msgspec.Struct, frozen=True, order=True):
     """One drive. `world`: a kind of world, where `seed` draws the scenario, or the name or file of one."""
 
     world: str
@@ -46,75 +46,75 @@ class Case(msgspec.Struct, frozen=True, order=True):
     @property
     def name(self) -> str:
         """As `--one` takes it."""
-        return f"{self.place}{SPLIT}{self.seed}{SPLIT}{self.policy.value}"
+        return f"{self.place}{FIELD_SEPARATOR}{self.seed}{FIELD_SEPARATOR}{self.policy.value}"
 
     @property
     def place(self) -> str:
         """World and fault."""
-        return self.world + (PLUS + self.fault if self.fault else "")
+        return self.world + (FAULT_SEPARATOR + self.fault if self.fault else "")
 
     @property
     def stem(self) -> str:
         """Of the files that belong to it."""
-        place = Path(self.world).stem if is_written(self.world) else self.world
-        return f"{place}{PLUS + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
+        place = Path(self.world).stem if is_fixed_scenario(self.world) else self.world
+        return f"{place}{FAULT_SEPARATOR + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
 
 
-class Suite(msgspec.Struct, frozen=True, kw_only=True):
+class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
     """`seeds` in every world for every policy; then, for `paani`, each fault in every world so many times.
 
     `paper_every`: of the seeds, how far apart those of PAPER are, which takes four times as long.
     """
 
     seeds: tuple[int, int]
-    paper_every: int = 1
+    paper_seed_stride: int = 1
     camera_faults: int = 0
     other_faults: int = 0
 
 
 SUITES = {
-    "quick": Suite(seeds=(1, 2), paper_every=2),
-    "standard": Suite(seeds=(1, 50), paper_every=10, camera_faults=3, other_faults=1),
+    "quick": TrialSuite(seeds=(1, 2), paper_seed_stride=2),
+    "standard": TrialSuite(seeds=(1, 50), paper_seed_stride=10, camera_faults=3, other_faults=1),
 }
 
 
-def is_written(world: str) -> bool:
+def is_fixed_scenario(world: str) -> bool:
     """A scenario that somebody wrote, by name or as a file; not a kind of world to draw one in."""
     return world.endswith(".toml") or world in SCENARIOS
 
 
-def cases_of(
-    suite: Suite, worlds: Sequence[str], policies: Iterable[Policy], seeds: tuple[int, int] | None = None
-) -> list[Case]:
+def list_cases(
+    suite: TrialSuite, worlds: Sequence[str], policies: Iterable[Policy], seeds: tuple[int, int] | None = None
+) -> list[TrialCase]:
     """Every drive of a suite, in the order in which they are driven. seeds: others, all of them for every policy."""
     first, last = seeds or suite.seeds
-    every = {Policy.PAPER: 1 if seeds else suite.paper_every}
+    every = {Policy.PAPER: 1 if seeds else suite.paper_seed_stride}
     chosen = tuple(policies)
     found = [
-        Case(world, seed, policy)
+        TrialCase(world, seed, policy)
         for seed in range(first, last + 1)
         for world in worlds
         for policy in chosen
         if (seed - first) % every.get(policy, 1) == 0
     ]
     if Policy.PAANI in chosen:
-        for kind in FAULTS:
+        for kind in SUITE_FAULTS:
             count = suite.camera_faults if kind in CAMERA_FAULTS else suite.other_faults
             found += [
-                Case(world, seed, Policy.PAANI, kind.value)
+                TrialCase(world, seed, Policy.PAANI, kind.value)
                 for seed in range(first, first + count)
                 for world in worlds
-                if not is_written(world)
+                if not is_fixed_scenario(world)
             ]
     return found
 
 
-def read_case(text: str) -> Case:
+def parse_case(text: str) -> TrialCase:
     """From `WORLD[+FAULT]:SEED:POLICY`. Raises UserError."""
-    place, _, rest = text.partition(SPLIT)
-    seed, _, policy = rest.partition(SPLIT)
-    world, _, fault = place.partition(PLUS)
-    if not (is_written(world) or world in WORLDS):
+    place, _, rest = text.partition(FIELD_SEPARATOR)
+    seed, _, policy = rest.partition(FIELD_SEPARATOR)
+    world, _, fault = place.partition(FAULT_SEPARATOR)
+    if not (is_fixed_scenario(world) or world in WORLDS):
         raise UserError(f"--one {text}: no world '{world}' (have: {', '.join((*WORLDS, *SCENARIOS))}; or a file)")
     if fault and fault not in set(FaultKind):
         raise UserError(f"--one {text}: no fault '{fault}' (have: {', '.join(FaultKind)})")
@@ -122,20 +122,22 @@ def read_case(text: str) -> Case:
         raise UserError(f"--one {text}: no policy '{policy}' (have: {', '.join(Policy)})")
     if not seed.isdecimal():
         raise UserError(f"--one {text}: '{seed}' is no seed")
-    return Case(world, int(seed), Policy(policy), fault)
+    return TrialCase(world, int(seed), Policy(policy), fault)
 
 
-def scenario_of(case: Case) -> Scenario:
+def build_scenario(case: TrialCase) -> Scenario:
     """The scenario, with its fault. Raises UserError for a scenario file that cannot be used."""
-    if is_written(case.world):
+    if is_fixed_scenario(case.world):
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
         scenario = random_scenario(case.world, case.seed)
     if not case.fault:
         return scenario
     kind = FaultKind(case.fault)
-    duration_s, amount = FAULTS[kind]
+    duration_s, amount = SUITE_FAULTS[kind]
     rng = np.random.default_rng([zlib.crc32(case.place.encode()), case.seed])
-    fault = Fault(kind, round(float(rng.uniform(*STARTS_S)), 2), duration_s, amount)
-    task = dataclasses.replace(scenario.task, distance_m=min(scenario.task.distance_m or FAULT_WAY_M, FAULT_WAY_M))
+    fault = Fault(kind, round(float(rng.uniform(*FAULT_START_RANGE_S)), 2), duration_s, amount)
+    task = dataclasses.replace(
+        scenario.task, distance_m=min(scenario.task.distance_m or FAULT_ROUTE_LENGTH_M, FAULT_ROUTE_LENGTH_M)
+    )
     return dataclasses.replace(scenario, task=task, faults=(*scenario.faults, fault))

@@ -4,60 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from paani_sim.trials.drive_history import DriveHistory, DriveSample, ThrustChange
 from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.result import Reaction
-from paani_sim.trials.track import Applying, Sample, Track
 from paani_sim.worlds import Fault, FaultKind
 
 REST_MPS = 0.05
-IN_TIME_S = 0.5  # on top of one frame
+REACTION_LIMIT_S = 0.5  # on top of one frame
 CAMERA_FAULTS = frozenset(
     (FaultKind.CAMERA_BLACK, FaultKind.CAMERA_FROZEN, FaultKind.CAMERA_BLURRED, FaultKind.CAMERA_DROPPED)
 )
 
 
-def reactions_of(faults: Sequence[Fault], track: Track, frame_s: float) -> tuple[Reaction, ...]:
+def measure_reactions(faults: Sequence[Fault], history: DriveHistory, frame_s: float) -> tuple[Reaction, ...]:
     """Of every camera fault that began while the boat was armed. frame_s: between two pictures."""
-    if not track.samples:
+    if not history.samples:
         return ()
-    first_s, last_s = track.samples[0].t_s, track.samples[-1].t_s
+    first_s, last_s = history.samples[0].t_s, history.samples[-1].t_s
     return tuple(
-        _reaction(fault, track, frame_s)
+        _measure_reaction(fault, history, frame_s)
         for fault in faults
         if fault.kind in CAMERA_FAULTS and first_s <= fault.start_s <= last_s
     )
 
 
-def _reaction(fault: Fault, track: Track, frame_s: float) -> Reaction:
+def _measure_reaction(fault: Fault, history: DriveHistory, frame_s: float) -> Reaction:
     start_us = START_US + round(fault.start_s * 1e6)
-    end_s = min(fault.start_s + fault.duration_s, track.samples[-1].t_s)
-    noticed = [stamp_us for stamp_us, _ in track.unusable if stamp_us >= start_us]
-    zero_s = _off_s(track.applied, fault.start_s, end_s)
+    end_s = min(fault.start_s + fault.duration_s, history.samples[-1].t_s)
+    noticed = [stamp_us for stamp_us, _ in history.unusable_frames if stamp_us >= start_us]
+    zero_s = _zero_thrust_delay_s(history.thrust_changes, fault.start_s, end_s)
     return Reaction(
         fault=fault.kind.value,
         at_s=round(fault.start_s, 2),
         noticed_s=round((noticed[0] - start_us) * 1e-6, 3) if noticed else None,
         zero_thrust_s=round(zero_s, 3) if zero_s is not None else None,
-        rest_s=_rest_s(track.samples, fault.start_s, end_s),
-        in_time=zero_s is not None and zero_s <= frame_s + IN_TIME_S,
+        rest_s=_rest_delay_s(history.samples, fault.start_s, end_s),
+        in_time=zero_s is not None and zero_s <= frame_s + REACTION_LIMIT_S,
     )
 
 
-def _off_s(applied: Sequence[Applying], start_s: float, end_s: float) -> float | None:
+def _zero_thrust_delay_s(changes: Sequence[ThrustChange], start_s: float, end_s: float) -> float | None:
     """How long after the start of the fault the fans went off for the rest of it; None: they did not."""
     since_s: float | None = 0.0  # off before the first thrust
-    for each in applied:
-        after_s = (each.at_us - START_US) * 1e-6 - start_s
+    for change in changes:
+        after_s = (change.at_us - START_US) * 1e-6 - start_s
         if after_s >= end_s - start_s:
             break
-        if not each.is_zero:
+        if not change.is_zero:
             since_s = None
         elif since_s is None:
             since_s = max(after_s, 0.0)
     return since_s
 
 
-def _rest_s(samples: Sequence[Sample], start_s: float, end_s: float) -> float | None:
+def _rest_delay_s(samples: Sequence[DriveSample], start_s: float, end_s: float) -> float | None:
     return next(
         (
             round(sample.t_s - start_s, 2)

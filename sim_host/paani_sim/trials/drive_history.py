@@ -8,10 +8,10 @@ from paani import messages as m
 from paani_sim.plant.adapter import Applied
 from paani_sim.plant.plant import Plant
 from paani_sim.trials.autonomy_stack import AutonomyStack
-from paani_sim.trials.route_progress import Along
+from paani_sim.trials.route_progress import RouteProgress
 
 
-class Sample(NamedTuple):
+class DriveSample(NamedTuple):
     """Ten times a second while the boat is armed."""
 
     t_s: float
@@ -19,7 +19,7 @@ class Sample(NamedTuple):
     y_m: float
     yaw_rad: float
     surge_mps: float
-    off_m: float
+    cross_track_m: float
     left_n: float
     right_n: float
     collisions: int
@@ -27,7 +27,7 @@ class Sample(NamedTuple):
     actors_along_m: tuple[float, ...]
 
 
-class Halt(NamedTuple):
+class StopInterval(NamedTuple):
     """From when on the boat was ordered not to move, and why: the advice's reason where that was it."""
 
     t_s: float
@@ -35,7 +35,7 @@ class Halt(NamedTuple):
     ended_s: float | None = None
 
 
-class Applying(NamedTuple):
+class ThrustChange(NamedTuple):
     """When the fans were set to another force: the moment [us], whether to none, and the picture behind it [us]."""
 
     at_us: int
@@ -43,62 +43,62 @@ class Applying(NamedTuple):
     picture_us: int
 
 
-class Track:
+class DriveHistory:
     """Fills while the drive runs."""
 
     def __init__(self) -> None:
-        self.samples: list[Sample] = []
-        self.halts: list[Halt] = []
+        self.samples: list[DriveSample] = []
+        self.stops: list[StopInterval] = []
         self.advisories: list[m.Advisory] = []
-        self.applied: list[Applying] = []
-        self.unusable: list[tuple[int, m.UnusableCause]] = []  # picture's stamp and cause
+        self.thrust_changes: list[ThrustChange] = []
+        self.unusable_frames: list[tuple[int, m.UnusableCause]] = []  # picture's stamp and cause
         self._in_force: m.Thrust | None = None
         self._was_zero = True
 
-    def evidence(self, evidence: m.Evidence, now_us: int) -> None:
+    def record_evidence(self, evidence: m.Evidence, now_us: int) -> None:
         """One picture's evidence reached the board."""
         if not evidence.usable:
-            self.unusable.append((evidence.source_us, evidence.cause))
+            self.unusable_frames.append((evidence.source_us, evidence.cause))
 
-    def thrust(self, applied: Applied, in_force: m.Thrust | None, now_us: int) -> None:
+    def record_thrust(self, applied: Applied, in_force: m.Thrust | None, now_us: int) -> None:
         """What the fans do in this step, and the command behind it."""
         is_zero = applied.left_n == 0.0 and applied.right_n == 0.0
         picture_us = in_force.source_us if in_force is not None else 0
         before_us = self._in_force.source_us if self._in_force is not None else 0
         if is_zero is not self._was_zero or picture_us != before_us:
-            self.applied.append(Applying(now_us, is_zero, picture_us))
+            self.thrust_changes.append(ThrustChange(now_us, is_zero, picture_us))
         self._in_force, self._was_zero = in_force, is_zero
 
-    def sample(self, plant: Plant, along: Along, autonomy: AutonomyStack, applied: Applied) -> None:
+    def record_sample(self, plant: Plant, progress: RouteProgress, autonomy: AutonomyStack, applied: Applied) -> None:
         """Take one."""
         t_s = plant.sim_us * 1e-6
         x_m, y_m = plant.position_m
         actors_along_m = plant.actors_along_m
         surge_mps = plant.velocity[0]
         self.samples.append(
-            Sample(
-                t_s, x_m, y_m, plant.attitude.yaw_rad, surge_mps, along.off_m, applied.left_n, applied.right_n,
-                plant.collisions, plant.in_contact, actors_along_m,
+            DriveSample(
+                t_s, x_m, y_m, plant.attitude.yaw_rad, surge_mps, progress.cross_track_m,
+                applied.left_n, applied.right_n, plant.collisions, plant.in_contact, actors_along_m,
             )
         )  # fmt: skip
         advisory, command = autonomy.advisory, autonomy.command
         if advisory is not None and (not self.advisories or advisory is not self.advisories[-1]):
             self.advisories.append(advisory)
         if command is not None:
-            self._watch_halts(t_s, command, advisory)
+            self._update_stops(t_s, command, advisory)
 
-    def _watch_halts(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
-        halted = bool(self.halts) and self.halts[-1].ended_s is None
+    def _update_stops(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
+        is_stopped = bool(self.stops) and self.stops[-1].ended_s is None
         if command.enable:
-            if halted:
-                self.halts[-1] = self.halts[-1]._replace(ended_s=t_s)
+            if is_stopped:
+                self.stops[-1] = self.stops[-1]._replace(ended_s=t_s)
             return
         first = command.inhibits[0]
         if first is m.Inhibit.NOT_ARMED:
             return
         reason = advisory.reason.value if first is m.Inhibit.ADVISED_STOP and advisory else first.value
-        if halted and self.halts[-1].reason == reason:
+        if is_stopped and self.stops[-1].reason == reason:
             return
-        if halted:
-            self.halts[-1] = self.halts[-1]._replace(ended_s=t_s)
-        self.halts.append(Halt(t_s, reason))
+        if is_stopped:
+            self.stops[-1] = self.stops[-1]._replace(ended_s=t_s)
+        self.stops.append(StopInterval(t_s, reason))

@@ -1,0 +1,76 @@
+"""One trial in this process: scenario, drive, score."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import msgspec
+
+from paani.clock import process_cpu_s, stopwatch_ms
+from paani.config import Config
+from paani_sim.trials.drive import Drive
+from paani_sim.trials.evidence_source import CameraEvidenceSource, EvidenceSource
+from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource
+from paani_sim.trials.lockstep_bus import MessageTap
+from paani_sim.trials.policies import CAMERA_POLICIES, Policy, load_policy_config
+from paani_sim.trials.result import TrialResult
+from paani_sim.trials.scoring import score_drive
+from paani_sim.trials.trial_cases import TrialCase, build_scenario
+from paani_sim.worlds import Scenario
+
+
+class ComputeEffort(msgspec.Struct, frozen=True, kw_only=True):
+    """What the drive cost: no part of the result, for it differs each time."""
+
+    wall_s: float
+    cpu_s: float
+    simulated_s: float
+
+
+def open_evidence_source(policy: Policy, scenario: Scenario, config: Config) -> EvidenceSource | None:
+    """Who looks. Raises UserError where there is no OpenGL."""
+    if policy in CAMERA_POLICIES:
+        return CameraEvidenceSource(scenario.world, scenario.faults, config)
+    return GroundTruthEvidenceSource(scenario.world, scenario.faults, config) if policy is Policy.ORACLE else None
+
+
+def load_case_config(case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
+    """The policy's settings with the scenario's vessel. Raises UserError for the scenario or a setting."""
+    config, vessel = load_policy_config(case.policy, sets, threads=threads), build_scenario(case).vessel
+    if vessel == Scenario.vessel:
+        return config
+    return msgspec.structs.replace(config, plant=msgspec.structs.replace(config.plant, vessel=vessel))
+
+
+def build_drive(
+    case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
+) -> Drive:
+    """Ready to begin; to be closed. Raises UserError for the scenario or a setting."""
+    config, scenario = load_case_config(case, sets, threads=threads), build_scenario(case)
+    evidence_source = open_evidence_source(case.policy, scenario, config)
+    try:
+        return Drive(scenario, config, evidence_source, tap=tap)
+    except BaseException:
+        if evidence_source is not None:
+            evidence_source.close()
+        raise
+
+
+def run_trial(
+    case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
+) -> tuple[TrialResult, ComputeEffort]:
+    """Drive to the end and score. Raises UserError as `drive_of`."""
+    wall_ms, cpu_s = stopwatch_ms(), process_cpu_s()
+    drive = build_drive(case, sets, threads=threads, tap=tap)
+    try:
+        drive.run()
+        result = score_drive(drive, case.policy)
+        simulated_s = drive.plant.sim_us * 1e-6
+    finally:
+        drive.close()
+    effort = ComputeEffort(
+        wall_s=round((stopwatch_ms() - wall_ms) * 1e-3, 3),
+        cpu_s=round(process_cpu_s() - cpu_s, 3),
+        simulated_s=round(simulated_s, 2),
+    )
+    return result, effort
