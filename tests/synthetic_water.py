@@ -6,10 +6,10 @@ import numpy as np
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.navigator.avoidance.rollout import Ways
-from paani_services.navigator.mapping.observation import Memory, remember
+from paani_services.navigator.avoidance.rollout import Trajectories
+from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import Grid
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 from paani_sim.eye.camera import BoatPose, look_from, project
 from paani_sim.eye.mounted import camera_of
 
@@ -21,11 +21,11 @@ ROWS, COLUMNS = 64, 80
 START_US = 5_000_000
 Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
 FAR_M = 500.0
-AT_REST, NOTHING = BoatPose(0.0, 0.0, 0.0), Memory()
+AT_REST, EMPTY_MEMORY = BoatPose(0.0, 0.0, 0.0), ObservationMemory()
 ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
 
 
-def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
+def water_edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
     """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
     position, turn = look_from(boat, EYE)
     right = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * EYE.width_px
@@ -41,7 +41,7 @@ def edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -
     return tuple(np.where(ends.any(axis=0), lowest / ROWS, 0.0).tolist())
 
 
-def box_over(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_m: float = 0.0) -> m.Detection:
+def detection_of(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_m: float = 0.0) -> m.Detection:
     """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
     west, south, east, north = bar
     corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
@@ -82,48 +82,53 @@ def odometry(at_us: int, boat: BoatPose, surge_mps: float = 0.0, **changes: obje
     return m.Odometry(**(given | changes))  # type: ignore[arg-type]
 
 
-def seen(
+def observe_from(
     boat: BoatPose = AT_REST,
     edge: tuple[float, ...] | None = None,
     at_us: int = START_US,
-    memory: Memory = NOTHING,
+    memory: ObservationMemory = EMPTY_MEMORY,
     **changes: object,
-) -> Memory:
+) -> ObservationMemory:
     """The memory after one more picture from there; open water by default."""
-    shown = edge if edge is not None else edge_of(boat)
-    memory = gone(memory, at_us, boat)
-    return remember(memory, None, evidence(at_us, shown, **changes), PLANNER)
+    shown = edge if edge is not None else water_edge_of(boat)
+    memory = move_to(memory, at_us, boat)
+    return update_memory(memory, None, evidence(at_us, shown, **changes), PLANNER)
 
 
-def looked_away(seconds: float, thing: m.Detection, edge: tuple[float, ...] | None = None) -> tuple[Memory, int]:
+def observe_then_look_astern(
+    seconds: float, thing: m.Detection, edge: tuple[float, ...] | None = None
+) -> tuple[ObservationMemory, int]:
     """The memory of a boat that saw this ahead three times, and has looked astern since; and when that is."""
-    memory, at_us = NOTHING, START_US
+    memory, at_us = EMPTY_MEMORY, START_US
     for _ in range(3):
-        memory, at_us = seen(edge=edge, at_us=at_us, memory=memory, detections=(thing,)), at_us + 800_000
+        memory, at_us = observe_from(edge=edge, at_us=at_us, memory=memory, detections=(thing,)), at_us + 800_000
     for _ in range(round(seconds / 0.8)):
-        memory, at_us = seen(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
+        memory, at_us = observe_from(ASTERN, at_us=at_us, memory=memory), at_us + 800_000
     return memory, at_us - 800_000
 
 
-def gone(memory: Memory, at_us: int, boat: BoatPose) -> Memory:
+def move_to(memory: ObservationMemory, at_us: int, boat: BoatPose) -> ObservationMemory:
     """The memory of a boat that has gone on to there, as its odometry tells ten times a second."""
-    while memory.here is not None and memory.here.at_us < at_us:
-        here = memory.here
-        step_us = min(at_us - here.at_us, 100_000)
-        part = step_us / (at_us - here.at_us)
-        way_m = (boat.x_m - here.x_m, boat.y_m - here.y_m)
+    while memory.odom_pose is not None and memory.odom_pose.stamp_us < at_us:
+        here = memory.odom_pose
+        step_us = min(at_us - here.stamp_us, 100_000)
+        part = step_us / (at_us - here.stamp_us)
+        travelled_m = (boat.x_m - here.x_m, boat.y_m - here.y_m)
         cos, sin = np.cos(boat.yaw_rad), np.sin(boat.yaw_rad)
         speed = part * 1e6 / step_us
-        surge, sway = speed * (cos * way_m[0] + sin * way_m[1]), speed * (cos * way_m[1] - sin * way_m[0])
-        memory = remember(
-            memory, odometry(here.at_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
+        surge, sway = (
+            speed * (cos * travelled_m[0] + sin * travelled_m[1]),
+            speed * (cos * travelled_m[1] - sin * travelled_m[0]),
         )
-    return memory if memory.here is not None else remember(memory, odometry(at_us, boat), None, PLANNER)
+        memory = update_memory(
+            memory, odometry(here.stamp_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
+        )
+    return memory if memory.odom_pose is not None else update_memory(memory, odometry(at_us, boat), None, PLANNER)
 
 
-def standing_gaps_m(grid: Grid, ways: Ways) -> np.ndarray:
+def standing_gaps_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.ndarray:
     """From each place of one way to the middle of the nearest occupied cell [times]."""
     rows, columns = np.nonzero(grid.occupied)
     x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
-    gaps_m: np.ndarray = np.hypot(ways.x_m - x_m, ways.y_m - y_m).min(axis=1, initial=np.inf)
+    gaps_m: np.ndarray = np.hypot(trajectories.x_m - x_m, trajectories.y_m - y_m).min(axis=1, initial=np.inf)
     return gaps_m

@@ -10,7 +10,7 @@ import pytest
 
 from paani.config import load_config
 from paani.messages import FenceArea, Inhibit, Keep, Waypoint
-from paani_services.navigator.avoidance.fence import distance_m, is_allowed
+from paani_services.navigator.avoidance.fence import distance_to_edge_m, is_allowed
 from paani_sim.worlds import Current, Wind, World
 from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
 
@@ -46,7 +46,7 @@ def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None
             break
     assert fastest_mps > 0.5
     assert is_allowed(boat.mission.fence, boat.plant.position_m)
-    assert distance_m(boat.mission.fence, boat.plant.position_m) < 6.0
+    assert distance_to_edge_m(boat.mission.fence, boat.plant.position_m) < 6.0
     boat.plant.close()
 
 

@@ -27,14 +27,14 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
-from paani_services.navigator.avoidance.rollout import PARTS
+from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION
 from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, edge_of, evidence, odometry
+from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, evidence, odometry, water_edge_of
 
 CONFIG = load_config().navigator
 PAPER = load_config(profile="paper").navigator
@@ -58,7 +58,7 @@ class Pool:
             self.now_us += STEP_US
             self._drift()
             if self.looks:
-                self.shown = evidence(self.now_us, edge_of(self.boat, self.bars, self.bank_m))
+                self.shown = evidence(self.now_us, water_edge_of(self.boat, self.bars, self.bank_m))
             side = LaneRisk(blocked=self.shut_in)
             advisory = Advisory(
                 source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR, left=side, right=side
@@ -115,7 +115,7 @@ class Pool:
 
 def test_open_water_is_sailed_as_without_a_planner() -> None:
     """Same course and speed where nothing is in the way."""
-    with_planner, without = Pool(), Pool(camera=UNCALIBRATED)
+    with_planner, without = Pool(), Pool(camera=UNCALIBRATED_CAMERA)
     for one, other in zip(with_planner.run(12.0), without.run(12.0), strict=True):
         if other.enable and with_planner.now_us > START_US + 300_000:
             assert one.enable
@@ -158,7 +158,7 @@ def test_turn_advice_halves_the_speed_and_leans_to_its_side(turn: Direction) -> 
 @pytest.mark.parametrize("direction", list(Direction))
 def test_without_a_valid_calibration_the_planner_refuses_to_act(direction: Direction) -> None:
     """The heading heuristic decides as before, to the byte, whatever the pictures show."""
-    blocked, unseen = Pool(bank_m=1.5, camera=UNCALIBRATED), Pool(camera=UNCALIBRATED)
+    blocked, unseen = Pool(bank_m=1.5, camera=UNCALIBRATED_CAMERA), Pool(camera=UNCALIBRATED_CAMERA)
     unseen.looks = False
     blocked.direction = unseen.direction = direction
     for one, other in zip(blocked.run(2.0), unseen.run(2.0), strict=True):
@@ -170,12 +170,13 @@ def test_the_decider_gives_it_the_pictures_and_the_calibration() -> None:
     config = load_config()
     seeing = msgspec.structs.replace(config, calibration=CAMERA.calibration)
     inputs = {topic.name: Input() for topic in DECIDER.inputs}
-    shown = evidence(START_US, edge_of(AT_REST))
+    shown = evidence(START_US, water_edge_of(AT_REST))
     inputs |= {keys.EVIDENCE.name: Input(shown), keys.ODOMETRY.name: Input(odometry(START_US, AT_REST), START_US)}
-    sights = [
-        DECIDER.decide(NavigatorState(), inputs, START_US, c)[0].planner_state.memory.sights for c in (seeing, config)
+    observations = [
+        DECIDER.decide(NavigatorState(), inputs, START_US, c)[0].planner_state.memory.observations
+        for c in (seeing, config)
     ]
-    assert [len(each) for each in sights] == [1, 0]
+    assert [len(each) for each in observations] == [1, 0]
 
 
 def test_the_paper_has_no_planner() -> None:
@@ -260,7 +261,7 @@ def test_a_boat_that_cannot_brake_gives_up_at_once() -> None:
 
 def test_a_stuck_detection_does_not_spin_the_boat() -> None:
     """90 degrees without the planner; with it the route holds the boat, whatever is advised for how long."""
-    for camera, high_deg in ((UNCALIBRATED, 97.0), (CAMERA, 45.0)):
+    for camera, high_deg in ((UNCALIBRATED_CAMERA, 97.0), (CAMERA, 45.0)):
         pool = Pool(camera=camera)
         pool.settle(3.0)
         pool.direction = Direction.LEFT
@@ -274,7 +275,7 @@ def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Dire
     pool = Pool((4.0, -2.0, 5.0, 2.0))
     pool.direction, pool.shut_in = turn, True
     ordered = [order.speed_mps for order in pool.run(60.0)]
-    assert max(ordered) <= PARTS[-1] * CONFIG.cruise_mps
+    assert max(ordered) <= PIVOT_SPEED_FRACTION * CONFIG.cruise_mps
     assert math.hypot(pool.boat.x_m, pool.boat.y_m) < 0.3
     side = 1.0 if turn is Direction.LEFT else -1.0
     assert math.radians(60.0) < side * pool.boat.yaw_rad <= math.radians(CONFIG.planner.span_deg + 1.0)
@@ -293,7 +294,7 @@ def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
     advisory = Advisory(
         source_us=START_US, direction=Direction.STRAIGHT, reason=Reason.CENTER_CLEAR, right=LaneRisk(occupied=True)
     )
-    for camera, steers in ((CAMERA, True), (UNCALIBRATED, False)):
+    for camera, steers in ((CAMERA, True), (UNCALIBRATED_CAMERA, False)):
         pool = Pool(boat=BoatPose(0.0, 2.0, 0.0), camera=camera)
         pool.settle(1.0)
         heard = pool.heard(

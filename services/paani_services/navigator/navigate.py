@@ -21,9 +21,15 @@ from paani.messages import (
     Odometry,
     SimTime,
 )
-from paani_services.navigator.avoidance.fence import bounded_speed, is_allowed
-from paani_services.navigator.avoidance.replanning import SAME_COURSE_RAD, Pilot, brakes, looked, steered
-from paani_services.navigator.avoidance.rollout import Wish
+from paani_services.navigator.avoidance.fence import is_allowed, limit_speed
+from paani_services.navigator.avoidance.replanning import (
+    COURSE_TOLERANCE_RAD,
+    PlannerState,
+    is_braking,
+    observe,
+    replan,
+)
+from paani_services.navigator.avoidance.rollout import GuidanceSetpoint
 from paani_services.navigator.guidance.ilos import IlosState, hold_integral, integrate
 from paani_services.navigator.guidance.mission_progress import (
     LegSetpoint,
@@ -42,7 +48,7 @@ from paani_services.navigator.guidance.visual_turns import (
     latch_heading,
 )
 from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 
 
 class NavigatorState(
@@ -64,7 +70,7 @@ class NavigatorState(
     ilos: IlosState = IlosState()
     turn: VisualTurn | None = None
     passed_obstacles: PassedObstacles = PassedObstacles()
-    planner_state: Pilot = Pilot()
+    planner_state: PlannerState = PlannerState()
     sim_us: int = -1
     clock_advanced_us: int | None = None
 
@@ -90,7 +96,7 @@ def navigate(
     now_us: int,
     domain: int,
     config: NavigatorConfig,
-    camera: Camera = UNCALIBRATED,
+    camera: Camera = UNCALIBRATED_CAMERA,
 ) -> tuple[NavigatorState, NavCommand]:
     """One step. The order carries the advisory's `source_us` and the plant's newest stamp.
 
@@ -103,7 +109,7 @@ def navigate(
     state = _end_visual_turn(state, inputs)
     is_planned = config.planner.acts_on(camera.calibration)
     if is_planned:
-        planner_state = looked(state.planner_state, inputs.odometry, inputs.evidence, config.planner)
+        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner)
         state = msgspec.structs.replace(state, planner_state=planner_state)
     odometry, advisory = inputs.odometry, inputs.advisory
     if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
@@ -140,18 +146,20 @@ def navigate(
         heading_rad = limit_course_rad(setpoint.course_rad, state.passed_obstacles)
     if is_planned and not inhibits and speed_mps > 0.0:
         # The planner weighs the advised side against what the map shows.
-        wish = Wish(heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), turns=_is_turn_to_look(advisory))
-        planner_state, plan = steered(
-            state.planner_state, odometry, wish, now_us, camera, config.planner, mission.fence
+        planner_setpoint = GuidanceSetpoint(
+            heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=_is_turn_to_look(advisory)
+        )
+        planner_state, plan = replan(
+            state.planner_state, odometry, planner_setpoint, now_us, camera, config.planner, mission.fence
         )
         state = msgspec.structs.replace(state, planner_state=planner_state)
         heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
-        if speed_mps <= 0.0 and not brakes(planner_state, odometry, now_us, config.planner):
+        if speed_mps <= 0.0 and not is_braking(planner_state, odometry, now_us, config.planner):
             inhibits.append(Inhibit.NO_FREE_PATH)
     if direction not in TURN_DIRECTIONS:
-        is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= SAME_COURSE_RAD
+        is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= COURSE_TOLERANCE_RAD
         state = _integrate_cross_track(state, setpoint, odometry, now_us, config, is_on_course=is_on_course)
-    bounded_mps = bounded_speed(mission.fence, odometry, heading_rad, speed_mps, config)
+    bounded_mps = limit_speed(mission.fence, odometry, heading_rad, speed_mps, config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, _build_command(

@@ -18,7 +18,7 @@ from paani.geometry import geodetic_from_enu
 from paani.messages import FenceArea
 from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
-from paani_services.navigator.avoidance.fence import trouble
+from paani_services.navigator.avoidance.fence import find_route_violation
 from paani_services.navigator.files.fence_file import load_fence
 from paani_services.navigator.files.line_simplification import simplify_line
 from paani_services.navigator.files.map_frame import LatLon
@@ -97,7 +97,7 @@ def _check(options: argparse.Namespace) -> None:
         fences.append((f"world {options.world}", _world_fence(options.world, map_origin_deg)))
     margin_m = load_config().navigator.fence_margin_m
     for name, fence in fences:
-        found = trouble(fence, route.waypoints, margin_m, repeat=route.repeat)
+        found = find_route_violation(fence, route.waypoints, margin_m, repeat=route.repeat)
         if found is not None:
             raise UserError(f"{where}: waypoints[{found[0]}]: {found[1]} ({name})")
     sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, good{_inside_text(fences)}\n")

@@ -1,114 +1,163 @@
-"""How near a boat comes to what stands and to what moves, and how near it may. Pure."""
+"""Clearance of trajectories to the static cells of the grid and to predicted dynamic obstacles. Pure.
+
+Static clearance is read from a signed distance field of the grid. A dynamic obstacle is predicted with constant
+velocity and grows with the uncertainty of that velocity.
+"""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from paani.arrays import F64
 from paani.config import PlannerConfig
-from paani_services.navigator.avoidance.rollout import Start, Ways
-from paani_services.navigator.mapping.distance_field import signed_m
-from paani_services.navigator.mapping.dynamic_obstacles import Mover
+from paani_services.navigator.avoidance.rollout import BoatState, Trajectories
+from paani_services.navigator.mapping.distance_field import signed_distance_field_m
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 
-ASTRAY_MPS = 0.1  # what is out of sight changes its course and speed: measured, 1.2 m in 12 s
-AHEAD_S = np.arange(0.0, 30.5, 0.5)  # a boat that turns away from what comes at 0.13 m/s takes 20 s
-GAIN_M = 0.1  # of a way out: half a cell
+# Growth of an obstacle's position uncertainty per second out of sight [m/s], for changes of course and speed; measured:
+# 1.2 m in 12 s.
+UNSEEN_GROWTH_MPS = 0.1
+# Times from now [s] at which the approach of an obstacle is predicted: a boat needs 20 s to turn away from an obstacle
+# that comes at 0.13 m/s.
+APPROACH_TIMES_S = np.arange(0.0, 30.5, 0.5)
+ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 
-def clearance_m(grid: Grid, config: PlannerConfig) -> F64:
-    """From the middle of each cell to what is there, at most 4 m; negative within, the further in the less [100, 100].
+class Approach(NamedTuple):
+    """The approach of an obstacle to a boat at rest: distance now, and distance and time of its closest point (CPA)."""
 
-    What is out of sight may have drifted nearer; a person or a vessel may be anywhere in `Grid.strayed`.
+    now_m: float
+    cpa_m: float
+    tcpa_s: float
+
+
+def clearance_field_m(grid: OccupancyGrid, config: PlannerConfig) -> F64:
+    """Signed distance from the middle of each cell to the nearest static obstacle, at most 4 m [100, 100].
+
+    It is negative inside an obstacle. Occluded cells are taken to have drifted nearer by `hidden_drift_m`, and cells
+    that a person or a vessel out of sight may have reached count as occupied.
     """
-    drifted_m = signed_m(grid.hidden) - config.hidden_drift_m
-    found_m = np.minimum(signed_m(grid.occupied), drifted_m)
-    return np.minimum(found_m, signed_m(grid.strayed)) if grid.strayed.any() else found_m
+    occluded_m = signed_distance_field_m(grid.occluded) - config.hidden_drift_m
+    field_m = np.minimum(signed_distance_field_m(grid.occupied), occluded_m)
+    if not grid.reachable_unseen.any():
+        return field_m
+    return np.minimum(field_m, signed_distance_field_m(grid.reachable_unseen))
 
 
-def looked_up(grid: Grid, field: F64, ways: Ways) -> F64:
-    """The field at these places, between the middles of four cells; at the rim of the grid, the rim's."""
-    column = np.clip((ways.x_m - grid.west_m) / CELL_M - 0.5, 0.0, CELLS - 1.001)
-    row = np.clip((ways.y_m - grid.south_m) / CELL_M - 0.5, 0.0, CELLS - 1.001)
+def interpolate_field(grid: OccupancyGrid, field: F64, trajectories: Trajectories) -> F64:
+    """Interpolate the field bilinearly at each position; positions off the grid get the value at its border."""
+    column = np.clip((trajectories.x_m - grid.west_m) / CELL_M - 0.5, 0.0, GRID_CELLS - 1.001)
+    row = np.clip((trajectories.y_m - grid.south_m) / CELL_M - 0.5, 0.0, GRID_CELLS - 1.001)
     left, low = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
     right_part, high_part = column - left, row - low
-    flat, at = field.ravel(), low * CELLS + left
+    flat, at = field.ravel(), low * GRID_CELLS + left
     lower = flat[at] * (1.0 - right_part) + flat[at + 1] * right_part
-    upper = flat[at + CELLS] * (1.0 - right_part) + flat[at + CELLS + 1] * right_part
+    upper = flat[at + GRID_CELLS] * (1.0 - right_part) + flat[at + GRID_CELLS + 1] * right_part
     return np.asarray(lower * (1.0 - high_part) + upper * high_part)
 
 
-def gap_to_m(mover: Mover, x_m: F64, y_m: F64, at_s: F64) -> F64:
-    """From places to the outline of a thing that moves on, at these times from now; less what is kept beside it.
+def predicted_clearance_m(obstacle: DynamicObstacle, x_m: F64, y_m: F64, time_s: F64) -> F64:
+    """Distance from positions to the predicted outline of an obstacle at these times, less the room kept around it.
 
-    Uncertainty is one standard deviation of its velocity, and `ASTRAY_MPS` from when it was last seen.
+    The outline moves with constant velocity. It grows by one standard deviation of that velocity, counted from when
+    the obstacle was last seen, and by `UNSEEN_GROWTH_MPS` for the time out of sight.
     """
-    motion = mover.motion
-    east_m, north_m = x_m - at_s * motion.east_mps, y_m - at_s * motion.north_mps
+    velocity = obstacle.velocity
+    east_m, north_m = x_m - time_s * velocity.east_mps, y_m - time_s * velocity.north_mps
     square = np.full(east_m.shape, np.inf)
-    for x, y in zip(mover.east_m.tolist(), mover.north_m.tolist(), strict=True):
+    for x, y in zip(obstacle.east_m.tolist(), obstacle.north_m.tolist(), strict=True):
         east, north = east_m - x, north_m - y
         square = np.minimum(square, east * east + north * north)
-    astray_m = motion.deviation_mps * (at_s + mover.age_s) + ASTRAY_MPS * mover.age_s
-    return np.asarray(np.sqrt(square) - mover.room_m - astray_m)
+    growth_m = velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
+    return np.asarray(np.sqrt(square) - obstacle.standoff_m - growth_m)
 
 
-def nearest_m(gap_m: F64, movers: Sequence[Mover], ways: Ways) -> F64:
-    """To what stands and to what moves [times, candidates]."""
-    return np.asarray(
-        np.minimum.reduce([gap_m, *(gap_to_m(each, ways.x_m, ways.y_m, ways.at_s[:, None]) for each in movers)])
-    )
+def least_clearance_m(static_m: F64, obstacles: Sequence[DynamicObstacle], trajectories: Trajectories) -> F64:
+    """Clearance to the nearest of all static and dynamic obstacles [times, candidates]."""
+    time_s = trajectories.time_s[:, None]
+    dynamic_m = (predicted_clearance_m(each, trajectories.x_m, trajectories.y_m, time_s) for each in obstacles)
+    return np.asarray(np.minimum.reduce([static_m, *dynamic_m]))
 
 
-def footprint_m(at_s: F64, gap_m: float | F64, config: PlannerConfig) -> F64:
-    """The radius that must be free at each time: hull, margin, and drift within the horizon (Q6).
+def required_clearance_m(time_s: F64, resting_m: float | F64, config: PlannerConfig) -> F64:
+    """Clearance that a trajectory must keep at each time: hull, margin, and drift within the horizon (Q6).
 
-    gap_m: to the nearest thing, boat at rest. Where that is less, a way that comes no nearer is allowed: it leads out.
-    Within a thing both are negative.
+    `resting_m` is the clearance of the boat at rest. Where that is less, half a cell less than that is required, so
+    that a boat beside an obstacle can leave it; inside an obstacle both are negative.
     """
-    drift_m = np.where(at_s <= config.horizon_s + 1e-9, config.drift_mps * at_s, 0.0)
+    drift_m = np.where(time_s <= config.horizon_s + 1e-9, config.drift_mps * time_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
-    return np.asarray(np.minimum(radius_m, gap_m - 0.5 * CELL_M))
+    return np.asarray(np.minimum(radius_m, resting_m - 0.5 * CELL_M))
 
 
 def margins(config: PlannerConfig) -> list[PlannerConfig]:
-    """Margins and drift to keep, the largest first: the whole one, half way to Q6's, that, the hull and half a cell."""
+    """The settings with ever smaller margins and drift.
+
+    They are the whole margin, half way to that of Q6, that of Q6, and hull and half a cell without drift.
+    """
     half_way_m = 0.5 * (config.margin_m + config.tight_margin_m)
     less = ((half_way_m, config.drift_mps), (config.tight_margin_m, config.drift_mps), (0.5 * CELL_M, 0.0))
     tighter = [(margin_m, drift_mps) for margin_m, drift_mps in less if margin_m < config.margin_m]
     return [config, *(msgspec.structs.replace(config, margin_m=m, drift_mps=d) for m, d in tighter)]
 
 
-def spare_m(mover: Mover, ways: Ways, start: Start, config: PlannerConfig) -> F64:
-    """Between the footprint and a thing that moves. What comes near a boat at rest may come no nearer on the way."""
-    at_s = ways.at_s[:, None]
-    rest_m = gap_to_m(mover, np.full_like(at_s, start.x_m), np.full_like(at_s, start.y_m), at_s)[:, 0]
-    rest_m = np.minimum.accumulate(np.where(ways.at_s <= config.horizon_s + 1e-9, rest_m, np.inf))
-    kept_m = np.maximum(footprint_m(ways.at_s, rest_m, config), 0.0)  # nothing excuses a way into its room
-    return np.asarray(gap_to_m(mover, ways.x_m, ways.y_m, at_s) - kept_m[:, None])
+def separation_margin_m(
+    obstacle: DynamicObstacle, trajectories: Trajectories, start: BoatState, config: PlannerConfig
+) -> F64:
+    """Clearance to a dynamic obstacle beyond the required one [times, candidates]; negative where it is too near.
+
+    An obstacle that comes near a boat at rest may come as near on the trajectory, but no nearer, and no trajectory may
+    enter the room kept around it.
+    """
+    time_s = trajectories.time_s[:, None]
+    resting_m = predicted_clearance_m(
+        obstacle, np.full_like(time_s, start.x_m), np.full_like(time_s, start.y_m), time_s
+    )[:, 0]
+    is_in_horizon = trajectories.time_s <= config.horizon_s + 1e-9
+    resting_m = np.minimum.accumulate(np.where(is_in_horizon, resting_m, np.inf))
+    required_m = np.maximum(required_clearance_m(trajectories.time_s, resting_m, config), 0.0)
+    clearance_m = predicted_clearance_m(obstacle, trajectories.x_m, trajectories.y_m, time_s)
+    return np.asarray(clearance_m - required_m[:, None])
 
 
-def all_spare_m(movers: Sequence[Mover], ways: Ways, start: Start, config: PlannerConfig) -> F64:
-    """`spare_m` of the nearest; without any, without end."""
-    far_m = np.full(ways.x_m.shape, np.inf)
-    return np.asarray(np.minimum.reduce([far_m, *(spare_m(each, ways, start, config) for each in movers)]))
+def least_separation_margin_m(
+    obstacles: Sequence[DynamicObstacle], trajectories: Trajectories, start: BoatState, config: PlannerConfig
+) -> F64:
+    """The smallest `separation_margin_m` of all obstacles; infinite without any."""
+    infinite_m = np.full(trajectories.x_m.shape, np.inf)
+    margins_m = (separation_margin_m(each, trajectories, start, config) for each in obstacles)
+    return np.asarray(np.minimum.reduce([infinite_m, *margins_m]))
 
 
-def led(mover: Mover, lead_s: float) -> Mover:
-    """The same so much later: what comes near this one passes ahead of it."""
-    motion = mover.motion
-    return mover._replace(
-        east_m=mover.east_m + lead_s * motion.east_mps, north_m=mover.north_m + lead_s * motion.north_mps
+def advanced_in_time(obstacle: DynamicObstacle, lead_s: float) -> DynamicObstacle:
+    """The obstacle where it will be `lead_s` later: a trajectory that comes near that one passes ahead of it."""
+    velocity = obstacle.velocity
+    return obstacle._replace(
+        east_m=obstacle.east_m + lead_s * velocity.east_mps, north_m=obstacle.north_m + lead_s * velocity.north_mps
     )
 
 
-def comes_near(movers: Sequence[Mover], x_m: F64, y_m: F64, tight_m: float) -> bool:
-    """Something that moves for certain comes to a boat that lies there [1], if it goes on as it does."""
-    for mover in movers:
-        as_it_does = mover._replace(motion=mover.motion._replace(deviation_mps=0.0))
-        gaps_m = gap_to_m(as_it_does, x_m, y_m, AHEAD_S)
-        if mover.is_sure and gaps_m.min() < min(tight_m, gaps_m[0] - GAIN_M):
+def closest_point_of_approach(obstacle: DynamicObstacle, x_m: F64, y_m: F64) -> Approach:
+    """CPA and TCPA of an obstacle that keeps its velocity exactly, to a boat at rest at this position [1]."""
+    exact = obstacle._replace(velocity=obstacle.velocity._replace(deviation_mps=0.0))
+    distances_m = predicted_clearance_m(exact, x_m, y_m, APPROACH_TIMES_S)
+    closest = int(distances_m.argmin())
+    return Approach(float(distances_m[0]), float(distances_m[closest]), float(APPROACH_TIMES_S[closest]))
+
+
+def is_give_way_needed(obstacles: Sequence[DynamicObstacle], x_m: F64, y_m: F64, limit_m: float) -> bool:
+    """Whether an obstacle that moves for certain will come nearer than the limit to a boat at rest there [1].
+
+    An obstacle that is as near already, and comes no nearer, does not count.
+    """
+    for obstacle in obstacles:
+        if not obstacle.is_moving:
+            continue
+        approach = closest_point_of_approach(obstacle, x_m, y_m)
+        if approach.cpa_m < min(limit_m, approach.now_m - ESCAPE_GAIN_M):
             return True
     return False

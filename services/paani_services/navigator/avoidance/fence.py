@@ -14,10 +14,10 @@ from paani.geometry import wrap_rad
 from paani.messages import FenceArea, Keep, Odometry, Waypoint
 from paani_services.navigator.guidance.path_progress import Point, velocity_over_ground_mps
 
-DRIFTING_MPS = 0.1  # below it the course over ground is noise
-CREEP_MPS = 0.05  # a slower order would not move the boat
-BACK_RAD = math.radians(60.0)  # an order this far from the nearest way in still leads in
-NUDGE_M = 0.01
+MIN_COURSE_SPEED_MPS = 0.1  # below it the course over ground is noise
+MIN_ORDERED_SPEED_MPS = 0.05  # a slower order would not move the boat
+RETURN_SECTOR_RAD = math.radians(60.0)  # an order this far from the nearest way in still leads in
+PROBE_OFFSET_M = 0.01
 
 Fence = tuple[FenceArea, ...]
 
@@ -48,7 +48,7 @@ def edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
         last = corner
 
 
-def distance_m(fence: Fence, at_m: Point) -> float:
+def distance_to_edge_m(fence: Fence, at_m: Point) -> float:
     """To the nearest edge of any area, infinite without a fence."""
     return min(
         (math.dist(at_m, _nearest(at_m, *edge)) for area in fence for edge in edges(area)),
@@ -56,7 +56,7 @@ def distance_m(fence: Fence, at_m: Point) -> float:
     )
 
 
-def room_m(fence: Fence, from_m: Point, to_m: Point) -> float:
+def allowed_distance_m(fence: Fence, from_m: Point, to_m: Point) -> float:
     """How far along the straight way between two points everything is allowed; infinite if all of it is."""
     length_m = math.dist(from_m, to_m)
     if not is_allowed(fence, from_m):
@@ -64,24 +64,24 @@ def room_m(fence: Fence, from_m: Point, to_m: Point) -> float:
     cuts = sorted(cut for area in fence for edge in edges(area) for cut in _crossings(from_m, to_m, *edge))
     for cut, beyond in pairwise((*cuts, 1.0)):
         middle = 0.5 * (cut + beyond)
-        if not is_allowed(fence, _between(from_m, to_m, middle)):
+        if not is_allowed(fence, _interpolate(from_m, to_m, middle)):
             return cut * length_m
     return math.inf if is_allowed(fence, to_m) else length_m
 
 
-def way_back_rad(fence: Fence, at_m: Point) -> float | None:
+def return_bearing_rad(fence: Fence, at_m: Point) -> float | None:
     """Direction of the nearest allowed point from one that is not; None where there is none."""
     found = sorted(
         (_nearest(at_m, *edge) for area in fence for edge in edges(area)), key=lambda point: math.dist(at_m, point)
     )
     for x_m, y_m in found:
         rad = portable.atan2(y_m - at_m[1], x_m - at_m[0])
-        if is_allowed(fence, (x_m + NUDGE_M * portable.cos(rad), y_m + NUDGE_M * portable.sin(rad))):
+        if is_allowed(fence, (x_m + PROBE_OFFSET_M * portable.cos(rad), y_m + PROBE_OFFSET_M * portable.sin(rad))):
             return rad
     return None
 
 
-def bounded_speed(
+def limit_speed(
     fence: Fence, odometry: Odometry, heading_rad: float, speed_mps: float, config: NavigatorConfig
 ) -> float | None:
     """The speed at which the ordered heading may be sailed, or None where the boat may not move.
@@ -94,19 +94,19 @@ def bounded_speed(
         return speed_mps
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
-        return _speed_outside(fence, here, heading_rad, speed_mps, config)
+        return _limit_speed_outside(fence, here, heading_rad, speed_mps, config)
     east_mps, north_mps = velocity_over_ground_mps(odometry)
-    if math.hypot(east_mps, north_mps) > DRIFTING_MPS:
+    if math.hypot(east_mps, north_mps) > MIN_COURSE_SPEED_MPS:
         stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
-        if room_m(fence, here, stops_at) < math.inf:
+        if allowed_distance_m(fence, here, stops_at) < math.inf:
             return None
     reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
     ahead = (here[0] + reach_m * portable.cos(heading_rad), here[1] + reach_m * portable.sin(heading_rad))
-    allowed_mps = (room_m(fence, here, ahead) - config.fence_margin_m) / config.fence_stop_s
-    return min(speed_mps, allowed_mps) if allowed_mps >= min(CREEP_MPS, speed_mps) else None
+    allowed_mps = (allowed_distance_m(fence, here, ahead) - config.fence_margin_m) / config.fence_stop_s
+    return min(speed_mps, allowed_mps) if allowed_mps >= min(MIN_ORDERED_SPEED_MPS, speed_mps) else None
 
 
-def trouble(
+def find_route_violation(
     fence: Fence, waypoints: tuple[Waypoint, ...], margin_m: float, *, repeat: bool = False
 ) -> tuple[int, str] | None:
     """The first waypoint that is not allowed, or whose leg to the next is not or comes nearer than the margin."""
@@ -117,23 +117,23 @@ def trouble(
         if not _is_clear(fence, point, point, margin_m):
             return number, f"is nearer than {margin_m} m to the fence"
     for number, (start, end) in enumerate(pairwise((*points, points[0]) if repeat else points)):
-        if room_m(fence, start, end) < math.inf:
+        if allowed_distance_m(fence, start, end) < math.inf:
             return number, "the leg to the next leaves the fence"
         if not _is_clear(fence, start, end, margin_m):
             return number, f"the leg to the next comes nearer than {margin_m} m to the fence"
     return None
 
 
-def segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
+def do_segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     """Whether two pieces of line touch or cross."""
-    return _may_be_near(one, other, 0.0) and _apart_m(one, other) == 0.0
+    return _may_be_within(one, other, 0.0) and _segment_distance_m(one, other) == 0.0
 
 
-def _speed_outside(
+def _limit_speed_outside(
     fence: Fence, here: Point, heading_rad: float, speed_mps: float, config: NavigatorConfig
 ) -> float | None:
-    back_rad = way_back_rad(fence, here) if config.fence_return else None
-    if back_rad is None or abs(wrap_rad(heading_rad - back_rad)) > BACK_RAD:
+    back_rad = return_bearing_rad(fence, here) if config.fence_return else None
+    if back_rad is None or abs(wrap_rad(heading_rad - back_rad)) > RETURN_SECTOR_RAD:
         return None
     return speed_mps
 
@@ -145,14 +145,14 @@ def _nearest(at_m: Point, start: Point, end: Point) -> Point:
     if length2 == 0.0:
         return start
     part = ((at_m[0] - start[0]) * along_x + (at_m[1] - start[1]) * along_y) / length2
-    return _between(start, end, min(1.0, max(0.0, part)))
+    return _interpolate(start, end, min(1.0, max(0.0, part)))
 
 
 def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
     """Nothing within the margin of the allowed way is an edge, but for edges between two areas that keep in."""
     way = (start, end)
     return not any(
-        _may_be_near(way, edge, margin_m) and _apart_m(way, edge) < margin_m and _is_border(fence, edge)
+        _may_be_within(way, edge, margin_m) and _segment_distance_m(way, edge) < margin_m and _is_border(fence, edge)
         for area in fence
         for edge in edges(area)
     )
@@ -162,14 +162,14 @@ def _is_border(fence: Fence, edge: tuple[Point, Point]) -> bool:
     """Whether somewhere along the edge one side of it is not allowed: at its middle or just inside its ends."""
     (x1, y1), (x2, y2) = edge
     length_m = math.dist(*edge)
-    left = (-(y2 - y1) / length_m * NUDGE_M, (x2 - x1) / length_m * NUDGE_M)
-    middles = (_between(*edge, part) for part in (0.01, 0.25, 0.5, 0.75, 0.99))
+    left = (-(y2 - y1) / length_m * PROBE_OFFSET_M, (x2 - x1) / length_m * PROBE_OFFSET_M)
+    middles = (_interpolate(*edge, part) for part in (0.01, 0.25, 0.5, 0.75, 0.99))
     return not all(
         is_allowed(fence, (x_m + side * left[0], y_m + side * left[1])) for x_m, y_m in middles for side in (-1.0, 1.0)
     )
 
 
-def _may_be_near(one: tuple[Point, Point], other: tuple[Point, Point], within_m: float) -> bool:
+def _may_be_within(one: tuple[Point, Point], other: tuple[Point, Point], within_m: float) -> bool:
     """False where the boxes around them are further apart than that: most pairs are settled here."""
     ((x1, y1), (x2, y2)), ((x3, y3), (x4, y4)) = one, other
     return (
@@ -180,7 +180,7 @@ def _may_be_near(one: tuple[Point, Point], other: tuple[Point, Point], within_m:
     )
 
 
-def _apart_m(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
+def _segment_distance_m(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
     """Distance between two pieces of line; 0 where they meet."""
     if any(True for _ in _crossings(*one, *other)):
         return 0.0
@@ -192,7 +192,7 @@ def _on_edge(area: FenceArea, at_m: Point) -> bool:
     return any(_nearest(at_m, *edge) == at_m for edge in edges(area))
 
 
-def _between(start: Point, end: Point, part: float) -> Point:
+def _interpolate(start: Point, end: Point, part: float) -> Point:
     return start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
 
 

@@ -6,10 +6,10 @@ from paani.arrays import Bools
 from paani.messages import FenceArea, Keep
 from paani_services.navigator.avoidance.fence import Fence, edges
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 
 
-def fenced(grid: Grid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0)) -> Grid:
+def apply_fence(grid: OccupancyGrid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:
     """The grid with every cell occupied whose middle the fence does not allow; as `fence.is_allowed` but for edges.
 
     offset_m: east and north of a place in the map, from where it is on the grid.
@@ -17,23 +17,23 @@ def fenced(grid: Grid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0))
     if not fence:
         return grid
     inner = [_inside(grid, area, offset_m) for area in fence if area.keep is Keep.IN]
-    allowed = np.logical_or.reduce(inner) if inner else np.ones((CELLS, CELLS), np.bool_)
+    allowed = np.logical_or.reduce(inner) if inner else np.ones((GRID_CELLS, GRID_CELLS), np.bool_)
     for area in fence:
         if area.keep is Keep.OUT:
             allowed &= ~_inside(grid, area, offset_m)
     return grid._replace(
         occupied=grid.occupied | ~allowed,
-        hidden=grid.hidden & allowed,
+        occluded=grid.occluded & allowed,
         free=grid.free & allowed,
-        beside=grid.beside & allowed,
+        blind_zone=grid.blind_zone & allowed,
     )
 
 
-def _inside(grid: Grid, area: FenceArea, offset_m: tuple[float, float]) -> Bools:
+def _inside(grid: OccupancyGrid, area: FenceArea, offset_m: tuple[float, float]) -> Bools:
     """Cells from whose middle a ray to the east crosses the polygon's edge an odd number of times."""
-    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    middle = (np.arange(GRID_CELLS) + 0.5) * CELL_M
     x_m, y_m = grid.west_m + offset_m[0] + middle, grid.south_m + offset_m[1] + middle
-    inside = np.zeros((CELLS, CELLS), np.bool_)
+    inside = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     for (x1, y1), (x2, y2) in edges(area):
         first, last = np.searchsorted(y_m, sorted((y1, y2)))
         if first == last:

@@ -1,4 +1,4 @@
-"""The metric planner at work: what the pictures show is remembered, and every new one gives a new plan. Pure."""
+"""When the local planner makes a new plan, and from which observations. Pure."""
 
 import math
 
@@ -8,74 +8,93 @@ from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry
 from paani_services.navigator.avoidance.fence import Fence
-from paani_services.navigator.avoidance.fence_cells import fenced
-from paani_services.navigator.avoidance.planner import Plan, plan
-from paani_services.navigator.avoidance.rollout import CARRIED_MPS, Start, Wish
-from paani_services.navigator.mapping.dynamic_obstacles import is_denied, movers
-from paani_services.navigator.mapping.observation import Memory, remember
+from paani_services.navigator.avoidance.fence_cells import apply_fence
+from paani_services.navigator.avoidance.planner import Plan, plan_motion
+from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint
+from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles, is_refuted
+from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.mapping.occupancy_grid import Moving, lay
+from paani_services.navigator.mapping.occupancy_grid import BoxIds, build_occupancy_grid
 
-SAME_COURSE_RAD = math.radians(3.0)
+COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
 
 
-class Pilot(msgspec.Struct, frozen=True):
-    """What was seen, the plan in force, the course and side it was made for, when, and on which picture.
+class PlannerState(
+    msgspec.Struct,
+    frozen=True,
+    rename={"advised_side": "side", "waiting_since_us": "waits_us", "frame_id": "frame"},
+):
+    """The remembered observations, and the plan in force. It is recorded under the field names given by `rename`.
 
-    waits_us: since when no plan has led the boat on.
+    course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
+    waiting_since_us: since when no plan has led the boat onward.
     """
 
-    memory: Memory = Memory()
+    memory: ObservationMemory = ObservationMemory()
     plan: Plan | None = None
     course_rad: float = 0.0
-    side: float = 0.0
+    advised_side: float = 0.0
     planned_us: int = 0
-    waits_us: int | None = None
-    frame: tuple[int, int] = (-1, -1)
+    waiting_since_us: int | None = None
+    frame_id: tuple[int, int] = (-1, -1)
 
 
-def looked(pilot: Pilot, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig) -> Pilot:
-    """The pilot with what is new to remember."""
-    return msgspec.structs.replace(pilot, memory=remember(pilot.memory, odometry, evidence, config))
+def observe(
+    state: PlannerState, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig
+) -> PlannerState:
+    """Add the newest odometry, and the newest evidence if it is of a new frame, to the planner's memory."""
+    return msgspec.structs.replace(state, memory=update_memory(state.memory, odometry, evidence, config))
 
 
-def steered(
-    pilot: Pilot,
+def replan(
+    state: PlannerState,
     odometry: Odometry,
-    wish: Wish,
+    setpoint: GuidanceSetpoint,
     now_us: int,
     camera: Camera,
     config: PlannerConfig,
     fence: Fence = (),
-) -> tuple[Pilot, Plan]:
-    """The plan for this wish, within the fence and no faster than wished for.
+) -> tuple[PlannerState, Plan]:
+    """The plan for this setpoint, within the fence and no faster than the setpoint allows.
 
-    It is made anew for a new picture, another course or side, or after `replan_s`.
+    A new plan is made for a new frame, another course or advised side, or after `replan_s`. Without an odometry pose
+    the boat stops.
     """
-    held, here = pilot.plan, pilot.memory.here
+    plan, here = state.plan, state.memory.odom_pose
     if here is None:
-        return pilot, Plan(odometry.yaw_rad, 0.0)
-    is_other = wish.side != pilot.side or abs(wrap_rad(wish.course_rad - pilot.course_rad)) > SAME_COURSE_RAD
-    is_new = is_other or pilot.memory.frame != pilot.frame
-    if held is None or is_new or not 0.0 <= (now_us - pilot.planned_us) * 1e-6 < config.replan_s:
-        sights = pilot.memory.sights
-        moving = movers(sights, now_us, camera, config) if config.predict else ()
-        boxes: Moving = frozenset().union(*(mover.boxes for mover in moving))
-        grid = lay(sights, (here.x_m, here.y_m), now_us, camera, config, boxes)
-        moving = tuple(mover for mover in moving if not is_denied(mover, grid))
-        grid = fenced(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
-        moves = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
-        start = Start(here.x_m, here.y_m, odometry.yaw_rad, *moves)
-        since_us = now_us if pilot.waits_us is None else pilot.waits_us
-        patient = (now_us - since_us) * 1e-6 < config.patience_s
-        held = plan(grid, start, wish, held, config, moving, patient=patient)
-        waits_us = since_us if held.waits or held.speed_mps == 0.0 else None
-        pilot = Pilot(pilot.memory, held, wish.course_rad, wish.side, now_us, waits_us, pilot.memory.frame)
-    return pilot, msgspec.structs.replace(held, speed_mps=min(held.speed_mps, wish.speed_mps))
+        return state, Plan(odometry.yaw_rad, 0.0)
+    is_other_side = setpoint.advised_side != state.advised_side
+    is_other_course = abs(wrap_rad(setpoint.course_rad - state.course_rad)) > COURSE_TOLERANCE_RAD
+    is_new = is_other_side or is_other_course or state.memory.frame_id != state.frame_id
+    if plan is None or is_new or not 0.0 <= (now_us - state.planned_us) * 1e-6 < config.replan_s:
+        observations = state.memory.observations
+        obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
+        boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
+        grid = build_occupancy_grid(observations, (here.x_m, here.y_m), now_us, camera, config, boxes)
+        obstacles = tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
+        grid = apply_fence(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
+        velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
+        start = BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
+        since_us = now_us if state.waiting_since_us is None else state.waiting_since_us
+        may_wait = (now_us - since_us) * 1e-6 < config.patience_s
+        plan = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
+        state = PlannerState(
+            state.memory,
+            plan,
+            setpoint.course_rad,
+            setpoint.advised_side,
+            now_us,
+            since_us if plan.is_waiting or plan.speed_mps == 0.0 else None,
+            state.memory.frame_id,
+        )
+    return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
 
 
-def brakes(pilot: Pilot, odometry: Odometry, now_us: int, config: PlannerConfig) -> bool:
-    """Whether a boat that no plan moves any more is still to take its way off: what is left may be wind and current."""
-    waits_us = pilot.waits_us
-    is_new = waits_us is not None and (now_us - waits_us) * 1e-6 < config.brake_s
-    return is_new and odometry.surge_mps > CARRIED_MPS
+def is_braking(state: PlannerState, odometry: Odometry, now_us: int, config: PlannerConfig) -> bool:
+    """Whether a boat whose plan is to stop is still ordered to brake, instead of getting no thrust at all.
+
+    It brakes for at most `brake_s`, and only while its surge is more than what wind and current may cause.
+    """
+    since_us = state.waiting_since_us
+    has_just_stopped = since_us is not None and (now_us - since_us) * 1e-6 < config.brake_s
+    return has_just_stopped and odometry.surge_mps > RESIDUAL_DRIFT_MPS

@@ -1,4 +1,4 @@
-"""Where a boat gets by each of its candidates for heading and speed, and with its fans off. Pure."""
+"""Simulation of candidate headings and speeds: where each takes the boat, and where it coasts. Pure."""
 
 import math
 from typing import NamedTuple
@@ -10,13 +10,14 @@ from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 
-CARRIED_MPS = 0.1  # of a boat's speed with its fans off, what may be wind and current
-FULL_HELM_RAD = 0.5  # the controller's steering saturates there
-PARTS = (1.0, 0.5, 0.1)  # of the speed allowed that are tried; at the last a boat turns all but on the spot, if it can
+RESIDUAL_DRIFT_MPS = 0.1  # speed that a boat with its thrusters off may keep from wind and current [m/s]
+STEERING_SATURATION_RAD = 0.5  # heading error at which the controller's steering saturates [rad]
+PIVOT_SPEED_FRACTION = 0.1  # of the allowed speed; at so little a boat that can pivots, all but on the spot
+SPEED_FRACTIONS = (1.0, 0.5, PIVOT_SPEED_FRACTION)  # of the allowed speed that are sampled
 
 
-class Start(NamedTuple):
-    """Where the boat is and how it moves."""
+class BoatState(NamedTuple):
+    """Position, heading and velocity of the boat, from which candidates are rolled out."""
 
     x_m: float
     y_m: float
@@ -26,102 +27,106 @@ class Start(NamedTuple):
     sway_mps: float = 0.0
 
 
-class Ways(NamedTuple):
-    """Where candidates lead: positions and way made [times, candidates], times from now [times]."""
+class Trajectories(NamedTuple):
+    """Simulated trajectories: positions and distance travelled [times, candidates], and times from now [times]."""
 
     x_m: F64
     y_m: F64
-    way_m: F64
-    at_s: F64
+    travelled_m: F64
+    time_s: F64
 
 
-class Wish(NamedTuple):
-    """The wanted course and the speed allowed. side: the one advised, 1 port, -1 starboard, 0 neither.
+class GuidanceSetpoint(NamedTuple):
+    """Course and speed asked for by guidance; the speed is the highest allowed.
 
-    turns: no way ahead is asked for, but a turn to that side where the boat lies.
+    advised_side: 1 port, -1 starboard, 0 neither.
+    is_pivot_only: a pivot to the advised side is asked for, and no way ahead.
     """
 
     course_rad: float
     speed_mps: float
-    side: float = 0.0
-    turns: bool = False
+    advised_side: float = 0.0
+    is_pivot_only: bool = False
 
 
-def candidates(start: Start, wish: Wish, config: PlannerConfig) -> tuple[F64, F64]:
-    """Headings relative to the one now and speeds [n], the wanted one first, the nearest to it next, port before.
+def sample_candidates(start: BoatState, setpoint: GuidanceSetpoint, config: PlannerConfig) -> tuple[F64, F64]:
+    """Headings relative to the present one, and speeds [n]: the desired course first, then its neighbours, port first.
 
-    Where the wanted course lies abaft the beam, those on its far side are turned to the other way round: a way out.
+    Every heading is given as the shorter turn. Where the desired course lies abaft the beam, headings beyond it are
+    therefore reached by turning the other way round, which offers a way out past whatever lies abeam.
     """
-    wanted_rad = wrap_rad(wish.course_rad - start.yaw_rad)
+    desired_rad = wrap_rad(setpoint.course_rad - start.yaw_rad)
     spacing_rad = math.radians(config.spacing_deg)
     count = math.floor(config.span_deg / config.spacing_deg)
     steps = [0, *(side * number for number in range(1, count + 1) for side in (1, -1))]
     if 2 * count * config.spacing_deg >= 360.0:
-        steps.pop()  # the same as the one before
-    speed_mps = min(wish.speed_mps, config.speed_mps)
-    parts = PARTS if config.turn_radius_m == 0.0 else PARTS[:-1]
-    offsets = np.array([wrap_rad(wanted_rad + step * spacing_rad) for step in steps for _ in parts])
-    return offsets, np.array([part * speed_mps for part in parts] * len(steps))
+        steps.pop()  # the last two headings are the same one
+    speed_mps = min(setpoint.speed_mps, config.speed_mps)
+    fractions = SPEED_FRACTIONS if config.turn_radius_m == 0.0 else SPEED_FRACTIONS[:-1]
+    offsets_rad = np.array([wrap_rad(desired_rad + step * spacing_rad) for step in steps for _ in fractions])
+    return offsets_rad, np.array([fraction * speed_mps for fraction in fractions] * len(steps))
 
 
-def roll_out(start: Start, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Ways:
-    """Where the boat gets in steps of `step_s` up to `horizon_s`, then at full speed and twice as long up to `look_m`.
+def roll_out(start: BoatState, offsets_rad: F64, speeds_mps: F64, config: PlannerConfig) -> Trajectories:
+    """Simulate each candidate in steps of `step_s` up to `horizon_s`, then at full speed in double steps to `look_m`.
 
-    Speed changes by `accel_mps2` at most; it turns towards the heading by `yaw_rate_radps` at most and on no tighter
-    circle than `turn_radius_m`, for fans that only push. What carries it sideways now, wind or current, goes on to.
+    Surge changes by `accel_mps2` at most. The boat turns to its heading by `yaw_rate_radps` at most and, for thrusters
+    that only push, on no tighter circle than `turn_radius_m`. The present sway, from wind or current, goes on.
     """
-    fine = round(config.horizon_s / config.step_s)
-    coarse = math.ceil(config.look_m / (2.0 * config.step_s * config.speed_mps))
-    steps_s = [config.step_s] * fine + [2.0 * config.step_s] * coarse
+    fine_steps = round(config.horizon_s / config.step_s)
+    coarse_steps = math.ceil(config.look_m / (2.0 * config.step_s * config.speed_mps))
+    steps_s = [config.step_s] * fine_steps + [2.0 * config.step_s] * coarse_steps
     count = offsets_rad.size
     cos, sin = (np.full(count, of(start.yaw_rad)) for of in (portable.cos, portable.sin))
     east_mps, north_mps = -start.sway_mps * sin, start.sway_mps * cos
-    x_m, y_m, way_m = np.full(count, start.x_m), np.full(count, start.y_m), np.zeros(count)
-    turned, rate = np.zeros(count), np.full(count, start.yaw_rate_radps)
-    speed = np.full(count, max(start.surge_mps, 0.0))
-    rows = [(x_m, y_m, way_m)]
+    x_m, y_m, travelled_m = np.full(count, start.x_m), np.full(count, start.y_m), np.zeros(count)
+    turned_rad, rate_radps = np.zeros(count), np.full(count, start.yaw_rate_radps)
+    surge_mps = np.full(count, max(start.surge_mps, 0.0))
+    rows = [(x_m, y_m, travelled_m)]
     for number, step_s in enumerate(steps_s):
-        if number == fine:  # from here on the way counts, not when
-            speed, speeds_mps = np.maximum(speed, config.speed_mps), np.maximum(speeds_mps, config.speed_mps)
-        helm = _between((offsets_rad - turned) / FULL_HELM_RAD, 1.0)
-        gain = config.accel_mps2 * step_s
-        driven = np.maximum(speeds_mps, config.helm_speed_mps * np.abs(helm))
-        speed = speed + _between(driven - speed, gain)
-        fastest = np.full(count, config.yaw_rate_radps)
+        if number == fine_steps:  # beyond the horizon the path matters, not the time
+            surge_mps = np.maximum(surge_mps, config.speed_mps)
+            speeds_mps = np.maximum(speeds_mps, config.speed_mps)
+        helm = _clip((offsets_rad - turned_rad) / STEERING_SATURATION_RAD, 1.0)
+        driven_mps = np.maximum(speeds_mps, config.helm_speed_mps * np.abs(helm))
+        surge_mps = surge_mps + _clip(driven_mps - surge_mps, config.accel_mps2 * step_s)
+        limit_radps = np.full(count, config.yaw_rate_radps)
         if config.turn_radius_m > 0.0:
-            fastest = np.minimum(fastest, speed / config.turn_radius_m)
-        swing = config.yaw_accel_radps2 * step_s
-        rate = rate + _between(helm * fastest - rate, swing)
-        half = 0.5 * step_s * rate
-        turned = turned + 2.0 * half
+            limit_radps = np.minimum(limit_radps, surge_mps / config.turn_radius_m)
+        rate_radps = rate_radps + _clip(helm * limit_radps - rate_radps, config.yaw_accel_radps2 * step_s)
+        half = 0.5 * step_s * rate_radps
+        turned_rad = turned_rad + 2.0 * half
         # A rotation by 2 atan(half), which is right to 1e-4 rad a step and needs no sine.
         scale = 1.0 + half * half
         cos, sin = (
             ((1.0 - half * half) * cos - 2.0 * half * sin) / scale,
             ((1.0 - half * half) * sin + 2.0 * half * cos) / scale,
         )
-        along = speed * step_s
-        x_m, y_m = x_m + along * cos + step_s * east_mps, y_m + along * sin + step_s * north_mps
-        way_m = way_m + along
-        rows.append((x_m, y_m, way_m))
-    xs, ys, ways = (np.stack(column) for column in zip(*rows, strict=True))
-    return Ways(xs, ys, ways, np.concatenate([[0.0], np.cumsum(steps_s)]))
+        step_m = surge_mps * step_s
+        x_m, y_m = x_m + step_m * cos + step_s * east_mps, y_m + step_m * sin + step_s * north_mps
+        travelled_m = travelled_m + step_m
+        rows.append((x_m, y_m, travelled_m))
+    xs, ys, paths = (np.stack(column) for column in zip(*rows, strict=True))
+    return Trajectories(xs, ys, paths, np.concatenate([[0.0], np.cumsum(steps_s)]))
 
 
-def coasting(start: Start, at_s: F64, config: PlannerConfig) -> Ways:
-    """Where the boat gets with its fans off, on its heading: drag takes its way off, but for `CARRIED_MPS` of it."""
-    surge = max(start.surge_mps, 0.0)
-    carried = min(surge, CARRIED_MPS)
-    own, way = surge - carried, [0.0]
-    for step_s in np.diff(at_s).tolist():
-        own /= 1.0 + step_s * (config.drag_per_s + config.drag_per_m * own)
-        way.append(way[-1] + step_s * (carried + own))
-    way_m = np.array(way)[:, None]
+def roll_out_coasting(start: BoatState, time_s: F64, config: PlannerConfig) -> Trajectories:
+    """Simulate the boat with its thrusters off and its heading kept: one trajectory, with a column of positions.
+
+    Drag takes its surge off, except for `RESIDUAL_DRIFT_MPS`, which may be wind and current.
+    """
+    surge_mps = max(start.surge_mps, 0.0)
+    residual_mps = min(surge_mps, RESIDUAL_DRIFT_MPS)
+    own_mps, distances_m = surge_mps - residual_mps, [0.0]
+    for step_s in np.diff(time_s).tolist():
+        own_mps /= 1.0 + step_s * (config.drag_per_s + config.drag_per_m * own_mps)
+        distances_m.append(distances_m[-1] + step_s * (residual_mps + own_mps))
+    travelled_m = np.array(distances_m)[:, None]
     cos, sin = portable.cos(start.yaw_rad), portable.sin(start.yaw_rad)
-    drift_m = (start.sway_mps * at_s)[:, None]
-    return Ways(start.x_m + cos * way_m - sin * drift_m, start.y_m + sin * way_m + cos * drift_m, way_m, at_s)
+    drift_m = (start.sway_mps * time_s)[:, None]
+    x_m, y_m = start.x_m + cos * travelled_m - sin * drift_m, start.y_m + sin * travelled_m + cos * drift_m
+    return Trajectories(x_m, y_m, travelled_m, time_s)
 
 
-def _between(values: F64, limit: float) -> F64:
-    """Each, but no further from zero than the limit."""
+def _clip(values: F64, limit: float) -> F64:
     return np.asarray(np.minimum(np.maximum(values, -limit), limit))

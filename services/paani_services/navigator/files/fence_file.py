@@ -12,7 +12,7 @@ import msgspec
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
-from paani_services.navigator.avoidance.fence import segments_meet
+from paani_services.navigator.avoidance.fence import do_segments_meet
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.geojson import (
     Geometry,
@@ -115,7 +115,7 @@ def _require_simple_polygon(area: FenceArea, where: str) -> None:
         if math.dist(start, end) < MIN_LEG_M:
             raise UserError(f"{where}: corners[{number}] and the next are the same")
     for (one, first), (other, second) in itertools.combinations(enumerate(edges), 2):
-        if other - one not in {1, len(edges) - 1} and segments_meet(first, second):
+        if other - one not in {1, len(edges) - 1} and do_segments_meet(first, second):
             raise UserError(f"{where}: the edges from corners[{one}] and corners[{other}] cross")
     if abs(sum(x1 * y2 - x2 * y1 for (x1, y1), (x2, y2) in edges)) / 2.0 < MIN_AREA_M2:
         raise UserError(f"{where}: has an area below {MIN_AREA_M2} m2")

@@ -11,7 +11,7 @@ from paani.config import NavigatorConfig
 from paani.config.section import Positive, Section
 from paani.errors import UserError
 from paani.messages import LegKind, Mission, MissionLeg, Route, Waypoint
-from paani_services.navigator.avoidance.fence import trouble
+from paani_services.navigator.avoidance.fence import find_route_violation
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.fence_file import load_fence
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
@@ -168,7 +168,7 @@ def _waypoints_of_point(
 def _require_inside_fence(mission: Mission, margin_m: float, where: str, *, legs: bool) -> None:
     """Raises UserError for the first waypoint or leg outside the fence or nearer than `margin_m` to it."""
     for number, leg in enumerate(mission.legs):
-        found = trouble(mission.fence, leg.waypoints, margin_m, repeat=leg.repeat)
+        found = find_route_violation(mission.fence, leg.waypoints, margin_m, repeat=leg.repeat)
         if found is not None:
             waypoint, what = found
             raise UserError(f"{where}: {f'legs[{number}].' if legs else ''}waypoints[{waypoint}]: {what}")

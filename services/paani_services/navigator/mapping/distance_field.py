@@ -6,23 +6,23 @@ from numpy.typing import NDArray
 from paani.arrays import F64, Bools
 from paani_services.navigator.mapping.observed_cells import CELL_M
 
-FIELD_CELLS = 20  # distances are known up to 4 m
+MAX_DISTANCE_CELLS = 20  # distances are known up to 4 m
 
 
-def distance_m(cells: Bools) -> F64:
+def distance_field_m(cells: Bools) -> F64:
     """From the middle of each cell to the middle of the nearest of these, at most 4 m; of the mask's shape."""
-    far = FIELD_CELLS * FIELD_CELLS
-    found: NDArray[np.int16] = np.where(cells, 0, far).astype(np.int16)
+    far_squared = MAX_DISTANCE_CELLS * MAX_DISTANCE_CELLS
+    found: NDArray[np.int16] = np.where(cells, 0, far_squared).astype(np.int16)
     for axis in (0, 1):
-        given = found if axis == 0 else found.T
-        best = given.copy()
-        for off in range(1, FIELD_CELLS):
-            np.minimum(best[off:], given[:-off] + off * off, out=best[off:])
-            np.minimum(best[:-off], given[off:] + off * off, out=best[:-off])
-        found = best if axis == 0 else best.T
+        squared = found if axis == 0 else found.T
+        nearest = squared.copy()
+        for off in range(1, MAX_DISTANCE_CELLS):
+            np.minimum(nearest[off:], squared[:-off] + off * off, out=nearest[off:])
+            np.minimum(nearest[:-off], squared[off:] + off * off, out=nearest[:-off])
+        found = nearest if axis == 0 else nearest.T
     return CELL_M * np.sqrt(found.astype(np.float64))
 
 
-def signed_m(cells: Bools) -> F64:
+def signed_distance_field_m(cells: Bools) -> F64:
     """As `distance_m` outside, inside the negative of what leads out, at least -4 m."""
-    return np.asarray(distance_m(cells) - distance_m(~cells))
+    return np.asarray(distance_field_m(cells) - distance_field_m(~cells))

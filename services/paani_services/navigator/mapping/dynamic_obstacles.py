@@ -12,32 +12,40 @@ import numpy as np
 from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.mapping.observation import BOX_COLUMNS, FOOT_STEPS, Box, Sight
-from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, hull_top
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid, Moving
-from paani_services.navigator.mapping.projection import Lens, lens_at, ranges_m, rays, together
+from paani_services.navigator.mapping.observation import BOX_STEPS, OUTLINE_POINTS, Observation, ObstacleBox
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, own_hull_top
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, OccupancyGrid
+from paani_services.navigator.mapping.projection import (
+    PinholeCamera,
+    pinhole_at,
+    pixel_rays,
+    ranges_to_water_m,
+    stack_cameras,
+)
 
-ROW = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
-HULL_ROWS = 2.0  # and a hull's, which the mask ends: half a row of 64, and so for as long as it takes to the next
-PLACE_M, ACROSS_ROWS = 0.05, 2.3  # and everything else of its place, near and far
-OF_WIDTH = 0.03  # what shows of a thing changes with the side it shows
-SIGNIFICANT = 4.0  # standard deviations of a velocity that is no chance
-STILL_MPS = 0.08  # slower things stand: Q6's drift covers them
-DRIFT_FIT_S, DRIFT_MPS = 8.0, 0.3  # what drifts goes a metre meanwhile, and no faster
-DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
-FIXES, SPAN_S = 3, 0.7  # fewer or shorter say nothing
-FIXES_HZ = 5.0  # errors of pictures that follow faster are the same
-LOST_S = 1.0  # five pictures
-EXPECTED = 5.0  # degrees of freedom
-USUAL_MPS = 0.7  # of what moves: how far the fit goes from rest without evidence
+BOX_EDGE_DEVIATION = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
+HULL_EDGE_FACTOR = (
+    2.0  # and a hull's, which the mask ends: half a row of 64, and so for as long as it takes to the next
+)
+POSITION_DEVIATION_M, CROSS_RANGE_FACTOR = 0.05, 2.3  # and everything else of its place, near and far
+WIDTH_DEVIATION_FRACTION = 0.03  # what shows of a thing changes with the side it shows
+MIN_SIGNIFICANCE = 4.0  # standard deviations of a velocity that is no chance
+MIN_SPEED_MPS = 0.08  # slower things stand: Q6's drift covers them
+DRIFT_FIT_S, MAX_DRIFT_MPS = 8.0, 0.3  # what drifts goes a metre meanwhile, and no faster
+MIN_DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
+MIN_MEASUREMENTS, MIN_SPAN_S = 3, 0.7  # fewer or shorter say nothing
+INDEPENDENT_RATE_HZ = 5.0  # errors of pictures that follow faster are the same
+MIN_UNSEEN_S = 1.0  # five pictures
+PRIOR_DEGREES_OF_FREEDOM = 5.0  # degrees of freedom
+PRIOR_SPEED_DEVIATION_MPS = 0.7  # of what moves: how far the fit goes from rest without evidence
 GATE_M, GATE_MPS = 0.5, 1.2  # between two places of one thing: its size, and how fast it may be
-CUT = 4  # a box that comes this near to the picture's sides [1/512] may go on beyond
+BORDER_STEPS = 4  # a box that comes this near to the picture's sides [1/512] may go on beyond
 
-Symmetric = tuple[float, float, float]  # a 2 x 2 matrix: east-east, east-north, north-north
-Pair = tuple[float, float]
+SymmetricMatrix = tuple[float, float, float]  # a 2 x 2 matrix: east-east, east-north, north-north
+PlaneVector = tuple[float, float]
 
 
-class Fix(NamedTuple):
+class PositionMeasurement(NamedTuple):
     """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
 
     box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
@@ -45,22 +53,22 @@ class Fix(NamedTuple):
     one; whole: both.
     """
 
-    box: tuple[int, int]
+    box_id: tuple[int, int]
     label: Label
-    at_s: float
-    place_m: Pair
-    weight: Symmetric
-    along_m: float
+    time_s: float
+    position_m: PlaneVector
+    information_matrix: SymmetricMatrix
+    range_deviation_m: float
     outline: tuple[F64, F64]
-    ends: tuple[bool, bool]
+    shows_ends: tuple[bool, bool]
 
     @property
-    def whole(self) -> bool:
+    def is_whole(self) -> bool:
         """Not cut by the picture's sides."""
-        return all(self.ends)
+        return all(self.shows_ends)
 
 
-class Motion(NamedTuple):
+class Velocity(NamedTuple):
     """Velocity, and its standard deviation in the direction in which that is larger."""
 
     east_mps: float
@@ -68,23 +76,23 @@ class Motion(NamedTuple):
     deviation_mps: float
 
 
-class Fit(NamedTuple):
+class VelocityEstimate(NamedTuple):
     """A velocity, and the inverse of its covariance times it, which says how far from chance it is.
 
     deviation_mps: as in `Motion`.
     """
 
-    velocity_mps: Pair
-    pull: Pair
+    velocity_mps: PlaneVector
+    information_vector: PlaneVector
     deviation_mps: float
 
     @property
-    def certainty(self) -> float:
+    def squared_significance(self) -> float:
         """Standard deviations between it and rest, squared."""
-        return self.velocity_mps[0] * self.pull[0] + self.velocity_mps[1] * self.pull[1]
+        return self.velocity_mps[0] * self.information_vector[0] + self.velocity_mps[1] * self.information_vector[1]
 
 
-class Mover(NamedTuple):
+class DynamicObstacle(NamedTuple):
     """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen, whole or adrift.
 
     boxes: what it has left behind; where it was within `free_s` of when it was last seen stays occupied.
@@ -92,242 +100,301 @@ class Mover(NamedTuple):
 
     east_m: F64
     north_m: F64
-    room_m: float
-    motion: Motion
+    standoff_m: float
+    velocity: Velocity
     age_s: float
-    boxes: Moving
+    vacated_boxes: BoxIds
 
     @property
-    def is_sure(self) -> bool:
+    def is_moving(self) -> bool:
         """It moves for certain; a person who may swim has a deviation alone."""
-        return any(self.motion[:2])
+        return any(self.velocity[:2])
 
 
-def movers(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> tuple[Mover, ...]:
+def find_dynamic_obstacles(
+    observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
+) -> tuple[DynamicObstacle, ...]:
     """Everything that moved for certain when it was last seen whole, vessels adrift, and people in sight.
 
     sights: oldest first.
     """
     found = []
-    for track in _tracks(sights, now_us, camera, config):
-        whole = [fix for fix in track if fix.whole]
-        motion, last = motion_of(whole, config.fit_s), whole[-1] if whole else track[-1]
-        if motion is None and track[-1].label is Label.VESSEL:
-            motion, last = _drift_of(track, whole), track[-1]
-        if motion is None:
-            if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].at_s <= config.occupied_s:
-                found.append(_person(track, config))
+    for track in _associate_measurements(observations, now_us, camera, config):
+        complete = [measurement for measurement in track if measurement.is_whole]
+        velocity, last = estimate_velocity(complete, config.fit_s), complete[-1] if complete else track[-1]
+        if velocity is None and track[-1].label is Label.VESSEL:
+            velocity, last = _estimate_drift(track, complete), track[-1]
+        if velocity is None:
+            if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].time_s <= config.occupied_s:
+                found.append(_possible_swimmer(track, config))
             continue
         found.append(
-            Mover(
-                last.outline[0] - last.at_s * motion.east_mps,
-                last.outline[1] - last.at_s * motion.north_mps,
+            DynamicObstacle(
+                last.outline[0] - last.time_s * velocity.east_mps,
+                last.outline[1] - last.time_s * velocity.north_mps,
                 config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
-                motion,
-                -last.at_s,
-                frozenset(fix.box for fix in track if fix.at_s < track[-1].at_s - config.free_s),
+                velocity,
+                -last.time_s,
+                frozenset(
+                    measurement.box_id for measurement in track if measurement.time_s < track[-1].time_s - config.free_s
+                ),
             )
         )
     return tuple(found)
 
 
-def _drift_of(track: list[Fix], whole: list[Fix]) -> Motion | None:
+def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMeasurement]) -> Velocity | None:
     """Of a vessel, over `DRIFT_FIT_S`: of its middle; of the surer end where too few pictures show it whole."""
-    fitted = _lately_fitted(whole, track[-1].at_s)
-    if fitted is None:
-        ends = [_lately_fitted(_placed_at_end(track, end), track[-1].at_s) for end in (0, 1)]
-        fitted = max((fit for fit in ends if fit is not None), key=lambda fit: fit.certainty, default=None)
-    motion = _unless_chance(fitted)
-    if motion is None or math.hypot(*motion[:2]) > DRIFT_MPS:
+    estimate = _fit_recent(complete, track[-1].time_s)
+    if estimate is None:
+        shows_ends = [_fit_recent(_measurements_of_end(track, end), track[-1].time_s) for end in (0, 1)]
+        estimate = max(
+            (end for end in shows_ends if end is not None), key=lambda end: end.squared_significance, default=None
+        )
+    velocity = _velocity_if_significant(estimate)
+    if velocity is None or math.hypot(*velocity[:2]) > MAX_DRIFT_MPS:
         return None
-    return motion._replace(deviation_mps=max(motion.deviation_mps, DRIFT_DEVIATION_MPS))
+    return velocity._replace(deviation_mps=max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS))
 
 
-def _lately_fitted(fixes: list[Fix], last_s: float) -> Fit | None:
-    return _fitted(fixes, DRIFT_FIT_S) if fixes and last_s - fixes[-1].at_s <= DRIFT_FIT_S else None
+def _fit_recent(measurements: list[PositionMeasurement], last_s: float) -> VelocityEstimate | None:
+    return (
+        _fit_velocity(measurements, DRIFT_FIT_S)
+        if measurements and last_s - measurements[-1].time_s <= DRIFT_FIT_S
+        else None
+    )
 
 
-def _placed_at_end(track: list[Fix], end: int) -> list[Fix]:
+def _measurements_of_end(track: list[PositionMeasurement], end: int) -> list[PositionMeasurement]:
     """The fixes that show its left end, 0, or its right one, 1: placed there."""
     return [
-        fix._replace(place_m=(float(fix.outline[0][-end]), float(fix.outline[1][-end])))
-        for fix in track
-        if fix.ends[end]
+        measurement._replace(position_m=(float(measurement.outline[0][-end]), float(measurement.outline[1][-end])))
+        for measurement in track
+        if measurement.shows_ends[end]
     ]
 
 
-def _person(track: list[Fix], config: PlannerConfig) -> Mover:
+def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -> DynamicObstacle:
     """A person seen more than once, who may stand or swim anywhere: as fast as the fixes do not rule out, cut ones too.
 
     Where they are stays occupied.
     """
-    fitted, last = _fitted(track, config.fit_s), track[-1]
+    estimate, last = _fit_velocity(track, config.fit_s), track[-1]
     fastest_mps = config.person_mps
-    if fitted is not None:
-        fastest_mps = min(fastest_mps, math.hypot(*fitted.velocity_mps) + fitted.deviation_mps)
-    return Mover(*last.outline, config.person_near_m, Motion(0.0, 0.0, fastest_mps), -last.at_s, frozenset())
+    if estimate is not None:
+        fastest_mps = min(fastest_mps, math.hypot(*estimate.velocity_mps) + estimate.deviation_mps)
+    return DynamicObstacle(
+        *last.outline, config.person_near_m, Velocity(0.0, 0.0, fastest_mps), -last.time_s, frozenset()
+    )
 
 
-def is_denied(mover: Mover, grid: Grid) -> bool:
+def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
     """Out of sight for `LOST_S`, and the last pictures show water all over where it should be: it did not go on."""
-    if mover.age_s < LOST_S:
+    if obstacle.age_s < MIN_UNSEEN_S:
         return False
-    column = np.floor((mover.east_m - grid.west_m) / CELL_M).astype(np.int64)
-    row = np.floor((mover.north_m - grid.south_m) / CELL_M).astype(np.int64)
-    on_grid = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
+    column = np.floor((obstacle.east_m - grid.west_m) / CELL_M).astype(np.int64)
+    row = np.floor((obstacle.north_m - grid.south_m) / CELL_M).astype(np.int64)
+    on_grid = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
     return bool(on_grid.all() and grid.free[row, column].all())
 
 
-def motion_of(fixes: list[Fix], fit_s: float) -> Motion | None:
+def estimate_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Velocity | None:
     """The velocity over the last `fit_s`; None where it may be chance."""
-    return _unless_chance(_fitted(fixes, fit_s))
+    return _velocity_if_significant(_fit_velocity(measurements, fit_s))
 
 
-def _unless_chance(fitted: Fit | None) -> Motion | None:
-    if fitted is None or fitted.certainty < SIGNIFICANT * SIGNIFICANT or math.hypot(*fitted.velocity_mps) < STILL_MPS:
+def _velocity_if_significant(estimate: VelocityEstimate | None) -> Velocity | None:
+    if (
+        estimate is None
+        or estimate.squared_significance < MIN_SIGNIFICANCE * MIN_SIGNIFICANCE
+        or math.hypot(*estimate.velocity_mps) < MIN_SPEED_MPS
+    ):
         return None
-    return Motion(*fitted.velocity_mps, fitted.deviation_mps)
+    return Velocity(*estimate.velocity_mps, estimate.deviation_mps)
 
 
-def _fitted(fixes: list[Fix], fit_s: float) -> Fit | None:
+def _fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> VelocityEstimate | None:
     """The weighted least squares' velocity over the last `fit_s`, drawn towards rest; None of too few fixes.
 
     With place and velocity as unknowns the normal equations are [W, T; T, S] [p; v] = [a; b], each a 2 x 2 matrix:
     (S - T W^-1 T) v = b - T W^-1 a.
     """
-    fixes = [fix for fix in fixes if fixes[-1].at_s - fix.at_s <= fit_s]
-    span_s = fixes[-1].at_s - fixes[0].at_s if fixes else 0.0
-    if len(fixes) < FIXES or span_s < SPAN_S:
+    measurements = [
+        measurement for measurement in measurements if measurements[-1].time_s - measurement.time_s <= fit_s
+    ]
+    span_s = measurements[-1].time_s - measurements[0].time_s if measurements else 0.0
+    if len(measurements) < MIN_MEASUREMENTS or span_s < MIN_SPAN_S:
         return None
-    weights = times = squares = (0.0, 0.0, 0.0)
-    places = moments = (0.0, 0.0)
-    first = fixes[0]
-    for fix in fixes:
-        t_s = fix.at_s - first.at_s
-        pull = _times(fix.weight, (fix.place_m[0] - first.place_m[0], fix.place_m[1] - first.place_m[1]))
-        weights, times = _plus(weights, 1.0, fix.weight), _plus(times, t_s, fix.weight)
-        squares = _plus(squares, t_s * t_s, fix.weight)
-        places = (places[0] + pull[0], places[1] + pull[1])
-        moments = (moments[0] + t_s * pull[0], moments[1] + t_s * pull[1])
-    inverse = _inverse(weights)
-    drawn = _times(times, _times(inverse, places))
-    pull = (moments[0] - drawn[0], moments[1] - drawn[1])
-    told = _plus(squares, -1.0, _between(times, inverse))
+    weight_sum = time_sum = square_sum = (0.0, 0.0, 0.0)
+    position_sum = moment_sum = (0.0, 0.0)
+    first = measurements[0]
+    for measurement in measurements:
+        t_s = measurement.time_s - first.time_s
+        information_vector = _multiply(
+            measurement.information_matrix,
+            (measurement.position_m[0] - first.position_m[0], measurement.position_m[1] - first.position_m[1]),
+        )
+        weight_sum, time_sum = (
+            _add_scaled(weight_sum, 1.0, measurement.information_matrix),
+            _add_scaled(time_sum, t_s, measurement.information_matrix),
+        )
+        square_sum = _add_scaled(square_sum, t_s * t_s, measurement.information_matrix)
+        position_sum = (position_sum[0] + information_vector[0], position_sum[1] + information_vector[1])
+        moment_sum = (moment_sum[0] + t_s * information_vector[0], moment_sum[1] + t_s * information_vector[1])
+    inverse = _invert(weight_sum)
+    reduced = _multiply(time_sum, _multiply(inverse, position_sum))
+    information_vector = (moment_sum[0] - reduced[0], moment_sum[1] - reduced[1])
+    information_matrix = _add_scaled(square_sum, -1.0, _congruence(time_sum, inverse))
     # Pictures that follow fast, and places that lie further off the line than they should, tell less; others more.
-    fast = min(1.0, (1.0 + FIXES_HZ * span_s) / len(fixes))
-    share = fast / _misfit(fixes, _times(_inverse(told), pull), inverse, places, times)
-    rest = 1.0 / (USUAL_MPS * USUAL_MPS)
-    covariance = _inverse(_plus((rest, 0.0, rest), share, told))
-    pull = (share * pull[0], share * pull[1])
-    return Fit(_times(covariance, pull), pull, math.sqrt(max(covariance[0], covariance[2])))
+    fast = min(1.0, (1.0 + INDEPENDENT_RATE_HZ * span_s) / len(measurements))
+    share = fast / _reduced_chi_squared(
+        measurements, _multiply(_invert(information_matrix), information_vector), inverse, position_sum, time_sum
+    )
+    rest = 1.0 / (PRIOR_SPEED_DEVIATION_MPS * PRIOR_SPEED_DEVIATION_MPS)
+    covariance = _invert(_add_scaled((rest, 0.0, rest), share, information_matrix))
+    information_vector = (share * information_vector[0], share * information_vector[1])
+    return VelocityEstimate(
+        _multiply(covariance, information_vector), information_vector, math.sqrt(max(covariance[0], covariance[2]))
+    )
 
 
-def _misfit(fixes: list[Fix], velocity: Pair, inverse: Symmetric, places: Pair, times: Symmetric) -> float:
+def _reduced_chi_squared(
+    measurements: list[PositionMeasurement],
+    velocity: PlaneVector,
+    inverse: SymmetricMatrix,
+    position_sum: PlaneVector,
+    time_sum: SymmetricMatrix,
+) -> float:
     """Squared residuals over variances, for each degree of freedom: 1 where the errors are as expected.
 
     `EXPECTED` more that are so keep it from what a few fixes show by chance.
     """
-    moved = _times(times, velocity)
-    start = _times(inverse, (places[0] - moved[0], places[1] - moved[1]))
-    total, first = 0.0, fixes[0]
-    for fix in fixes:
-        t_s = fix.at_s - first.at_s
+    moved = _multiply(time_sum, velocity)
+    start = _multiply(inverse, (position_sum[0] - moved[0], position_sum[1] - moved[1]))
+    total, first = 0.0, measurements[0]
+    for measurement in measurements:
+        t_s = measurement.time_s - first.time_s
         off = (
-            fix.place_m[0] - first.place_m[0] - start[0] - t_s * velocity[0],
-            fix.place_m[1] - first.place_m[1] - start[1] - t_s * velocity[1],
+            measurement.position_m[0] - first.position_m[0] - start[0] - t_s * velocity[0],
+            measurement.position_m[1] - first.position_m[1] - start[1] - t_s * velocity[1],
         )
-        pull = _times(fix.weight, off)
-        total += off[0] * pull[0] + off[1] * pull[1]
-    return (total + EXPECTED) / (2 * len(fixes) - 4 + EXPECTED)
+        information_vector = _multiply(measurement.information_matrix, off)
+        total += off[0] * information_vector[0] + off[1] * information_vector[1]
+    return (total + PRIOR_DEGREES_OF_FREEDOM) / (2 * len(measurements) - 4 + PRIOR_DEGREES_OF_FREEDOM)
 
 
-def _tracks(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> list[list[Fix]]:
+def _associate_measurements(
+    observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
+) -> list[list[PositionMeasurement]]:
     """The fixes of each thing, oldest first: of one kind, the nearest to the nearest within a gate."""
-    tracks: list[list[Fix]] = []
-    for fixes in _fixes(sights, now_us, camera, config):
+    tracks: list[list[PositionMeasurement]] = []
+    for measurements in _measure_positions(observations, now_us, camera, config):
         pairs = sorted(
-            (math.dist(track[-1].place_m, fix.place_m), t, f)
+            (math.dist(track[-1].position_m, measurement.position_m), t, f)
             for t, track in enumerate(tracks)
-            for f, fix in enumerate(fixes)
-            if track[-1].label is fix.label and fix.at_s - track[-1].at_s <= config.fit_s
+            for f, measurement in enumerate(measurements)
+            if track[-1].label is measurement.label and measurement.time_s - track[-1].time_s <= config.fit_s
         )
         taken: set[int] = set()
         extended: set[int] = set()
-        for away_m, t, f in pairs:
-            last, fix = tracks[t][-1], fixes[f]
-            gate_m = GATE_M + GATE_MPS * (fix.at_s - last.at_s) + last.along_m + fix.along_m
-            if t not in extended and f not in taken and away_m <= gate_m:
-                tracks[t].append(fix)
+        for distance_m, t, f in pairs:
+            last, measurement = tracks[t][-1], measurements[f]
+            gate_m = (
+                GATE_M
+                + GATE_MPS * (measurement.time_s - last.time_s)
+                + last.range_deviation_m
+                + measurement.range_deviation_m
+            )
+            if t not in extended and f not in taken and distance_m <= gate_m:
+                tracks[t].append(measurement)
                 extended.add(t)
                 taken.add(f)
-        tracks += [[fix] for f, fix in enumerate(fixes) if f not in taken]
+        tracks += [[measurement] for f, measurement in enumerate(measurements) if f not in taken]
     return tracks
 
 
-def _fixes(sights: tuple[Sight, ...], now_us: int, camera: Camera, config: PlannerConfig) -> Iterator[list[Fix]]:
+def _measure_positions(
+    observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
+) -> Iterator[list[PositionMeasurement]]:
     """Of each picture with boxes, where those stand whose whole outline is within reach."""
-    shown = [sight for sight in sights if sight.boxes and sight.at_us <= now_us]
-    if not shown:
+    with_boxes = [observation for observation in observations if observation.boxes and observation.stamp_us <= now_us]
+    if not with_boxes:
         return
-    lenses = [lens_at(sight.station, camera.calibration, sight.aspect) for sight in shown]
-    lens = together([own for sight, own in zip(shown, lenses, strict=True) for _ in sight.boxes])
-    boxes = [box for sight in shown for box in sight.boxes]
+    camera_models = [
+        pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio) for observation in with_boxes
+    ]
+    camera_model = stack_cameras(
+        [own for observation, own in zip(with_boxes, camera_models, strict=True) for _ in observation.boxes]
+    )
+    boxes = [box for observation in with_boxes for box in observation.boxes]
     left, right = (np.array(sides)[:, None] for sides in ([box.left for box in boxes], [box.right for box in boxes]))
-    u = (left + (right - left) * ((np.arange(BOX_COLUMNS) + 0.5) / BOX_COLUMNS)) / FOOT_STEPS
-    v = np.array([box.ends for box in boxes]) / FOOT_STEPS
-    given = rays(lens, u, np.minimum(v, hull_top(camera.hull, u)))
-    range_m = ranges_m(lens, given, config.mover_range_m)
-    east_m: F64 = lens.at_m[0] + range_m * given.east
-    north_m: F64 = lens.at_m[1] + range_m * given.north
+    u = (left + (right - left) * ((np.arange(OUTLINE_POINTS) + 0.5) / OUTLINE_POINTS)) / BOX_STEPS
+    v = np.array([box.waterline for box in boxes]) / BOX_STEPS
+    given = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
+    range_m = ranges_to_water_m(camera_model, given, config.mover_range_m)
+    east_m: F64 = camera_model.position_m[0] + range_m * given.east
+    north_m: F64 = camera_model.position_m[1] + range_m * given.north
     reached = set(np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist())
     row = 0
-    for sight, own in zip(shown, lenses, strict=True):
-        at_s = (sight.at_us - now_us) * 1e-6
+    for observation, own in zip(with_boxes, camera_models, strict=True):
+        time_s = (observation.stamp_us - now_us) * 1e-6
         found = []
-        for number, box in enumerate(sight.boxes, row):
+        for number, box in enumerate(observation.boxes, row):
             if number in reached:
-                key, outline = (sight.at_us, number - row), (east_m[number], north_m[number])
-                found.append(_fix(key, box, at_s, own, camera.calibration.height_m, outline))
-        row += len(sight.boxes)
+                key, outline = (observation.stamp_us, number - row), (east_m[number], north_m[number])
+                found.append(_measure_position(key, box, time_s, own, camera.calibration.height_m, outline))
+        row += len(observation.boxes)
         yield found
 
 
-def _fix(key: tuple[int, int], box: Box, at_s: float, lens: Lens, height_m: float, outline: tuple[F64, F64]) -> Fix:
+def _measure_position(
+    key: tuple[int, int],
+    box: ObstacleBox,
+    time_s: float,
+    camera_model: PinholeCamera,
+    height_m: float,
+    outline: tuple[F64, F64],
+) -> PositionMeasurement:
     """One row of the picture is range^2 / height times its angle along the ray; across, much less."""
-    camera_m, row_rad = (float(lens.at_m[0]), float(lens.at_m[1])), ROW / float(lens.focal[1])
+    camera_m, row_rad = (
+        (float(camera_model.position_m[0]), float(camera_model.position_m[1])),
+        BOX_EDGE_DEVIATION / float(camera_model.focal[1]),
+    )
     easts, norths = (axis.tolist() for axis in outline)
-    place_m = (sum(easts) / BOX_COLUMNS, sum(norths) / BOX_COLUMNS)
-    away_m = max(math.dist(place_m, camera_m), PLACE_M)
-    wide_m = OF_WIDTH * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
-    end_rad = row_rad if box.is_small else HULL_ROWS * row_rad
-    along_m = PLACE_M + wide_m + end_rad * away_m * away_m / height_m
-    across_m = PLACE_M + wide_m + ACROSS_ROWS * row_rad * away_m
-    east, north = (place_m[0] - camera_m[0]) / away_m, (place_m[1] - camera_m[1]) / away_m
-    along, across = 1.0 / (along_m * along_m), 1.0 / (across_m * across_m)
-    weight = (
+    position_m = (sum(easts) / OUTLINE_POINTS, sum(norths) / OUTLINE_POINTS)
+    distance_m = max(math.dist(position_m, camera_m), POSITION_DEVIATION_M)
+    wide_m = WIDTH_DEVIATION_FRACTION * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
+    end_rad = row_rad if box.is_small else HULL_EDGE_FACTOR * row_rad
+    range_deviation_m = POSITION_DEVIATION_M + wide_m + end_rad * distance_m * distance_m / height_m
+    across_m = POSITION_DEVIATION_M + wide_m + CROSS_RANGE_FACTOR * row_rad * distance_m
+    east, north = (position_m[0] - camera_m[0]) / distance_m, (position_m[1] - camera_m[1]) / distance_m
+    along, across = 1.0 / (range_deviation_m * range_deviation_m), 1.0 / (across_m * across_m)
+    information_matrix = (
         along * east * east + across * north * north,
         (along - across) * east * north,
         along * north * north + across * east * east,
     )
-    foot = box.low < FOOT_STEPS - CUT
-    ends = (foot and box.left > CUT, foot and box.right < FOOT_STEPS - CUT)
-    return Fix(key, box.label, at_s, place_m, weight, along_m, outline, ends)
+    foot = box.bottom < BOX_STEPS - BORDER_STEPS
+    shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)
+    return PositionMeasurement(
+        key, box.label, time_s, position_m, information_matrix, range_deviation_m, outline, shows_ends
+    )
 
 
-def _times(a: Symmetric, b: Pair) -> Pair:
+def _multiply(a: SymmetricMatrix, b: PlaneVector) -> PlaneVector:
     return (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[2] * b[1])
 
 
-def _plus(a: Symmetric, scale: float, b: Symmetric) -> Symmetric:
+def _add_scaled(a: SymmetricMatrix, scale: float, b: SymmetricMatrix) -> SymmetricMatrix:
     return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
 
 
-def _inverse(a: Symmetric) -> Symmetric:
+def _invert(a: SymmetricMatrix) -> SymmetricMatrix:
     scale = 1.0 / (a[0] * a[2] - a[1] * a[1])
     return (scale * a[2], -scale * a[1], scale * a[0])
 
 
-def _between(a: Symmetric, b: Symmetric) -> Symmetric:
+def _congruence(a: SymmetricMatrix, b: SymmetricMatrix) -> SymmetricMatrix:
     """The symmetric a b a."""
-    first, second = _times(b, (a[0], a[1])), _times(b, (a[1], a[2]))
+    first, second = _multiply(b, (a[0], a[1])), _multiply(b, (a[1], a[2]))
     return (a[0] * first[0] + a[1] * first[1], a[0] * second[0] + a[1] * second[1], a[1] * second[0] + a[2] * second[1])

@@ -14,18 +14,25 @@ from paani import portable
 from paani.arrays import F64, I64, Bools
 from paani.config import CalibrationConfig, PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.mapping.observation import EDGE_STEPS, FOOT_STEPS, MASK_ROW, Box, Foot, Sight
-from paani_services.navigator.mapping.projection import Lens, Rays, lens_at, ranges_m, rays
+from paani_services.navigator.mapping.observation import (
+    BOX_STEPS,
+    EDGE_STEPS,
+    MASK_ROW_FRAC,
+    FootLine,
+    Observation,
+    ObstacleBox,
+)
+from paani_services.navigator.mapping.projection import PinholeCamera, Rays, pinhole_at, pixel_rays, ranges_to_water_m
 
 CELL_M = 0.2  # Q2
-FOOT_COLUMNS = 24
-FOOT_DEEP_M = 1.5  # a thing is as deep as it is wide, but no deeper
-HULL_DEEP_M, HULL_LONG_M = 2.5, 6.0  # nor is a vessel: beam and length of most
-CUT_FRAC = 0.99  # a box that reaches this low goes on below the picture
-CUT_NEARER_M = 0.8
-ROWS = 2.0 * MASK_ROW  # how far its edge is off a box's
-SIGHTS_HELD = 512
-WIDEST = 1 << 24  # columns of the map: 3,355 km
+FOOT_SAMPLES = 24
+MAX_FOOT_DEPTH_M = 1.5  # a thing is as deep as it is wide, but no deeper
+MAX_HULL_DEPTH_M, MAX_HULL_LENGTH_M = 2.5, 6.0  # nor is a vessel: beam and length of most
+CUT_OFF_FRAC = 0.99  # a box that reaches this low goes on below the picture
+CUT_OFF_ALLOWANCE_M = 0.8
+BOX_EDGE_TOLERANCE_FRAC = 2.0 * MASK_ROW_FRAC  # how far its edge is off a box's
+CACHED_OBSERVATIONS = 512
+MAP_COLUMNS = 1 << 24  # columns of the map: 3,355 km
 
 Polygon = tuple[tuple[float, float], ...]
 
@@ -34,134 +41,160 @@ class Camera(NamedTuple):
     """The calibrated camera, and the own hull in its picture as in `perception.ego_polygon`."""
 
     calibration: CalibrationConfig = CalibrationConfig()
-    hull: Polygon = ()
+    ego_polygon: Polygon = ()
 
 
-class Cells(NamedTuple):
+class CellIndices(NamedTuple):
     """Cells of the map [n], each once; cell (0, 0) has its south-west corner in the map's origin."""
 
     column: I64
     row: I64
 
 
-class Shown(NamedTuple):
+class ObservedCells(NamedTuple):
     """What one picture shows; a cell may be both. people: where they are, without the room that is kept round them.
 
     vessels: occupied by one.
     """
 
-    free: Cells
-    occupied: Cells
-    people: Cells
-    vessels: Cells
+    free: CellIndices
+    occupied: CellIndices
+    people: CellIndices
+    vessels: CellIndices
 
 
-@functools.lru_cache(maxsize=SIGHTS_HELD)
-def shown(sight: Sight, moving: tuple[Box, ...], camera: Camera, config: PlannerConfig, *, every: int) -> Shown:
+@functools.lru_cache(maxsize=CACHED_OBSERVATIONS)
+def project_to_cells(
+    observation: Observation,
+    moving_boxes: tuple[ObstacleBox, ...],
+    camera: Camera,
+    config: PlannerConfig,
+    *,
+    column_step: int,
+) -> ObservedCells:
     """The cells of a sight with an edge. moving: its boxes that occupy nothing. every: columns from one taken for free
     water to the next.
     """
-    lens = lens_at(sight.station, camera.calibration, sight.aspect)
-    edge = np.frombuffer(sight.edge, np.uint8).astype(np.float64) / EDGE_STEPS
+    camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
+    edge = np.frombuffer(observation.water_edge, np.uint8).astype(np.float64) / EDGE_STEPS
     u = (np.arange(edge.size) + 0.5) / edge.size
-    top = hull_top(camera.hull, u)
-    near_m = ranges_m(lens, rays(lens, u, top), config.max_range_m)
-    ends = rays(lens, u, np.minimum(edge, top))
-    far_m = ranges_m(lens, ends, config.max_range_m)
-    water = ends.fall > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
+    top = own_hull_top(camera.ego_polygon, u)
+    near_m = ranges_to_water_m(camera_model, pixel_rays(camera_model, u, top), config.max_range_m)
+    ends = pixel_rays(camera_model, u, np.minimum(edge, top))
+    far_m = ranges_to_water_m(camera_model, ends, config.max_range_m)
+    water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
     open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
-    open_m[np.arange(edge.size) % every > 0] = 0.0
-    gone = np.zeros(u.shape, np.bool_)
-    for box in moving:
-        gone |= _ends_at(box, u, edge)
-    deep_m, is_hull = np.full(u.shape, config.thickness_m), np.zeros(u.shape, np.bool_)
-    for box in sight.boxes:
-        if box.label is Label.VESSEL and box not in moving:
-            is_hull[_lay_hull(box, lens, u, ends, far_m, deep_m, config)] = True
-    stays = np.isfinite(far_m) & ~gone
-    deep = np.where(stays, np.ceil(deep_m / CELL_M) + 1.0, 0.0)
-    points = [_points(lens, ends, far_m, deep)]
-    points += [_foot(lens, foot, camera, config) for foot in sight.feet if _stays(foot, moving)]
-    free = _points(lens, ends, near_m, np.ceil(open_m / CELL_M))
-    alone = msgspec.structs.replace(config, person_room_m=0.0)
-    people = [_foot(lens, foot, camera, alone) for foot in sight.feet if foot.person and _stays(foot, moving)]
-    hulls = _points(lens, ends, far_m, np.where(is_hull, deep, 0.0))
-    return Shown(_cells(*free), _joined(points), _joined(people), _cells(*hulls))
+    open_m[np.arange(edge.size) % column_step > 0] = 0.0
+    is_moving = np.zeros(u.shape, np.bool_)
+    for box in moving_boxes:
+        is_moving |= _is_water_ended_by(box, u, edge)
+    depth_m, is_hull = np.full(u.shape, config.thickness_m), np.zeros(u.shape, np.bool_)
+    for box in observation.boxes:
+        if box.label is Label.VESSEL and box not in moving_boxes:
+            is_hull[_complete_hull(box, camera_model, u, ends, far_m, depth_m, config)] = True
+    is_static = np.isfinite(far_m) & ~is_moving
+    depth = np.where(is_static, np.ceil(depth_m / CELL_M) + 1.0, 0.0)
+    points = [_points_along_rays(camera_model, ends, far_m, depth)]
+    points += [
+        _foot_points(camera_model, foot, camera, config) for foot in observation.feet if _is_static(foot, moving_boxes)
+    ]
+    free = _points_along_rays(camera_model, ends, near_m, np.ceil(open_m / CELL_M))
+    without_margin = msgspec.structs.replace(config, person_room_m=0.0)
+    people = [
+        _foot_points(camera_model, foot, camera, without_margin)
+        for foot in observation.feet
+        if foot.is_person and _is_static(foot, moving_boxes)
+    ]
+    hulls = _points_along_rays(camera_model, ends, far_m, np.where(is_hull, depth, 0.0))
+    return ObservedCells(_cells_at(*free), _cells_of_all(points), _cells_of_all(people), _cells_at(*hulls))
 
 
-def _lay_hull(box: Box, lens: Lens, u: F64, ends: Rays, far_m: F64, deep_m: F64, config: PlannerConfig) -> I64:
+def _complete_hull(
+    box: ObstacleBox, camera_model: PinholeCamera, u: F64, ends: Rays, far_m: F64, depth_m: F64, config: PlannerConfig
+) -> I64:
     """Complete a vessel in `far_m`, and how deep each column is in `deep_m`: it hides what of it lies behind.
 
     Where the mask looks through part of it (a white bow is taken for water), that is as far away as the part beside
     it; where through all of it, the box's lower end counts. What stands before it is not part of it. The columns that
     are its own.
     """
-    across = np.flatnonzero((u > box.left / FOOT_STEPS) & (u < box.right / FOOT_STEPS))
+    across = np.flatnonzero((u > box.left / BOX_STEPS) & (u < box.right / BOX_STEPS))
     low_m, least_m = (
-        ranges_m(lens, rays(lens, u[across], np.full(across.shape, box.low / FOOT_STEPS + below)), config.max_range_m)
-        for below in (0.0, ROWS)
+        ranges_to_water_m(
+            camera_model,
+            pixel_rays(camera_model, u[across], np.full(across.shape, box.bottom / BOX_STEPS + below)),
+            config.max_range_m,
+        )
+        for below in (0.0, BOX_EDGE_TOLERANCE_FRAC)
     )
     if across.size == 0 or not np.isfinite(low_m).all():
         return across[:0]
     own = far_m[across] >= least_m
-    seen = across[own & (far_m[across] <= low_m.min() + HULL_LONG_M)]
+    seen = across[own & (far_m[across] <= low_m.min() + MAX_HULL_LENGTH_M)]
     beside_m = low_m if seen.size == 0 else far_m[seen[np.abs(across[:, None] - seen[None, :]).argmin(axis=1)]]
     far_m[across] = np.minimum(far_m[across], np.where(own, beside_m, np.inf))
     wide_m = _width_m(Rays(*(axis[across] for axis in ends)), far_m[across])
-    deep_m[across] = np.maximum(deep_m[across], min(wide_m, HULL_DEEP_M))
+    depth_m[across] = np.maximum(depth_m[across], min(wide_m, MAX_HULL_DEPTH_M))
     return across[own]
 
 
-def hull_top(hull: Polygon, u: F64) -> F64:
+def own_hull_top(ego_polygon: Polygon, u: F64) -> F64:
     """The highest edge of the own hull at each of these columns, 1 where there is none [n] in [0, 1]."""
     top = np.ones_like(u)
-    for (x1, y1), (x2, y2) in zip(hull, (*hull[1:], *hull[:1]), strict=True):
-        low, high = min(x1, x2), max(x1, x2)
-        wide = high - low
-        part = (u - x1) / (x2 - x1) if wide > 0.0 else np.zeros_like(u)
-        top = np.where((u >= low) & (u <= high), np.minimum(top, y1 + part * (y2 - y1)), top)
+    for (x1, y1), (x2, y2) in zip(ego_polygon, (*ego_polygon[1:], *ego_polygon[:1]), strict=True):
+        bottom, high = min(x1, x2), max(x1, x2)
+        width = high - bottom
+        part = (u - x1) / (x2 - x1) if width > 0.0 else np.zeros_like(u)
+        top = np.where((u >= bottom) & (u <= high), np.minimum(top, y1 + part * (y2 - y1)), top)
     return top
 
 
-def _ends_at(box: Box, u: F64, edge: F64) -> Bools:
+def _is_water_ended_by(box: ObstacleBox, u: F64, edge: F64) -> Bools:
     """Columns where it is this thing that ends the water: near its foot; a hull's lies as high as half its box."""
-    left, top, right, low = (side / FOOT_STEPS for side in (box.left, box.top, box.right, box.low))
-    wide = 1.0 / len(u)
-    high = low - ROWS if box.is_small else 0.5 * (top + low)
-    return np.asarray((u > left - wide) & (u < right + wide) & (edge >= high) & (edge <= low + ROWS))
+    left, top, right, bottom = (side / BOX_STEPS for side in (box.left, box.top, box.right, box.bottom))
+    width = 1.0 / len(u)
+    high = bottom - BOX_EDGE_TOLERANCE_FRAC if box.is_small else 0.5 * (top + bottom)
+    return np.asarray(
+        (u > left - width) & (u < right + width) & (edge >= high) & (edge <= bottom + BOX_EDGE_TOLERANCE_FRAC)
+    )
 
 
-def _stays(foot: Foot, moving: tuple[Box, ...]) -> bool:
+def _is_static(foot: FootLine, moving_boxes: tuple[ObstacleBox, ...]) -> bool:
     """It belongs to none of these."""
-    wide = FOOT_STEPS // 64  # a column of the mask
-    return all(foot.low != box.low or foot.left < box.left - wide or foot.right > box.right + wide for box in moving)
+    width = BOX_STEPS // 64  # a column of the mask
+    return all(
+        foot.bottom != box.bottom or foot.left < box.left - width or foot.right > box.right + width
+        for box in moving_boxes
+    )
 
 
-def _foot(lens: Lens, foot: Foot, camera: Camera, config: PlannerConfig) -> tuple[F64, F64]:
+def _foot_points(camera_model: PinholeCamera, foot: FootLine, camera: Camera, config: PlannerConfig) -> tuple[F64, F64]:
     """Points on the water under a box: along its lower end, as far behind as it is wide; more round people."""
-    left, right, low = (end / FOOT_STEPS for end in (foot.left, foot.right, foot.low))
-    given, range_m = _along(lens, left, right, low, camera, config)
+    left, right, bottom = (end / BOX_STEPS for end in (foot.left, foot.right, foot.bottom))
+    given, range_m = _foot_rays(camera_model, left, right, bottom, camera, config)
     if not np.isfinite(range_m).all():
         return np.empty(0), np.empty(0)
     wide_m = _width_m(given, range_m)
-    room_m = config.person_room_m if foot.person else 0.0
+    room_m = config.person_room_m if foot.is_person else 0.0
     if room_m > 0.0:
         more = (right - left) * room_m / max(wide_m, CELL_M)
-        given, range_m = _along(lens, left - more, right + more, low, camera, config)
+        given, range_m = _foot_rays(camera_model, left - more, right + more, bottom, camera, config)
         if not np.isfinite(range_m).all():
             return np.empty(0), np.empty(0)
-    nearer_m = room_m + (CUT_NEARER_M if low >= CUT_FRAC else 0.0)
-    deep = math.ceil((nearer_m + room_m + max(config.thickness_m, min(wide_m, FOOT_DEEP_M))) / CELL_M) + 1
-    return _points(lens, given, np.maximum(range_m - nearer_m, 0.0), np.full(range_m.shape, float(deep)))
+    nearer_m = room_m + (CUT_OFF_ALLOWANCE_M if bottom >= CUT_OFF_FRAC else 0.0)
+    depth = math.ceil((nearer_m + room_m + max(config.thickness_m, min(wide_m, MAX_FOOT_DEPTH_M))) / CELL_M) + 1
+    return _points_along_rays(
+        camera_model, given, np.maximum(range_m - nearer_m, 0.0), np.full(range_m.shape, float(depth))
+    )
 
 
-def _along(
-    lens: Lens, left: float, right: float, low: float, camera: Camera, config: PlannerConfig
+def _foot_rays(
+    camera_model: PinholeCamera, left: float, right: float, bottom: float, camera: Camera, config: PlannerConfig
 ) -> tuple[Rays, F64]:
     """Rays through the lower end of a box, and how far along each the water lies."""
-    u = left + (right - left) * (np.arange(FOOT_COLUMNS) + 0.5) / FOOT_COLUMNS
-    given = rays(lens, u, np.minimum(low, hull_top(camera.hull, u)))
-    return given, ranges_m(lens, given, config.max_range_m)
+    u = left + (right - left) * (np.arange(FOOT_SAMPLES) + 0.5) / FOOT_SAMPLES
+    given = pixel_rays(camera_model, u, np.minimum(bottom, own_hull_top(camera.ego_polygon, u)))
+    return given, ranges_to_water_m(camera_model, given, config.max_range_m)
 
 
 def _width_m(given: Rays, range_m: F64) -> float:
@@ -169,22 +202,24 @@ def _width_m(given: Rays, range_m: F64) -> float:
     return math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
 
 
-def _points(lens: Lens, given: Rays, first_m: F64, counts: F64) -> tuple[F64, F64]:
+def _points_along_rays(camera_model: PinholeCamera, given: Rays, first_m: F64, counts: F64) -> tuple[F64, F64]:
     """East and north of so many places on each ray, a cell apart, from that far on; all arrays of the rays' shape."""
     times = np.maximum(counts, 0.0).astype(np.int64)
     ray = np.repeat(np.arange(times.size), times)
     place = np.arange(ray.size) - np.repeat(np.cumsum(times) - times, times)
     range_m = first_m[ray] + CELL_M * place
-    return lens.at_m[0] + range_m * given.east[ray], lens.at_m[1] + range_m * given.north[ray]
+    return camera_model.position_m[0] + range_m * given.east[ray], camera_model.position_m[1] + range_m * given.north[
+        ray
+    ]
 
 
-def _joined(points: list[tuple[F64, F64]]) -> Cells:
+def _cells_of_all(points: list[tuple[F64, F64]]) -> CellIndices:
     east_m, north_m = zip(*points, strict=True) if points else ((), ())
-    return _cells(np.concatenate([np.empty(0), *east_m]), np.concatenate([np.empty(0), *north_m]))
+    return _cells_at(np.concatenate([np.empty(0), *east_m]), np.concatenate([np.empty(0), *north_m]))
 
 
-def _cells(east_m: F64, north_m: F64) -> Cells:
+def _cells_at(east_m: F64, north_m: F64) -> CellIndices:
     column, row = (np.floor(axis / CELL_M).astype(np.int64) for axis in (east_m, north_m))
-    each_once = np.unique(row * WIDEST + column)
-    row = (each_once + WIDEST // 2) // WIDEST
-    return Cells(each_once - row * WIDEST, row)
+    each_once = np.unique(row * MAP_COLUMNS + column)
+    row = (each_once + MAP_COLUMNS // 2) // MAP_COLUMNS
+    return CellIndices(each_once - row * MAP_COLUMNS, row)

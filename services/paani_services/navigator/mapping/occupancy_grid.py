@@ -10,21 +10,28 @@ import numpy as np
 
 from paani.arrays import F64, I64, Bools
 from paani.config import PlannerConfig
-from paani_services.navigator.mapping.distance_field import distance_m
-from paani_services.navigator.mapping.observation import Sight
-from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, Cells, Shown, hull_top, shown
-from paani_services.navigator.mapping.projection import Station, lens_at, ranges_m, rays
+from paani_services.navigator.mapping.distance_field import distance_field_m
+from paani_services.navigator.mapping.observation import Observation
+from paani_services.navigator.mapping.observed_cells import (
+    CELL_M,
+    Camera,
+    CellIndices,
+    ObservedCells,
+    own_hull_top,
+    project_to_cells,
+)
+from paani_services.navigator.mapping.projection import Pose, pinhole_at, pixel_rays, ranges_to_water_m
 
-CELLS = 100  # Q2
-REST = Station(0.0, 0.0, 0.0, 0.0, 0.0)
-OLD_EVERY = 2  # columns of a picture that is too old to free a cell, and only says what is gone
+GRID_CELLS = 100  # Q2
+LEVEL_POSE = Pose(0.0, 0.0, 0.0, 0.0, 0.0)
+OLD_COLUMN_STEP = 2  # columns of a picture that is too old to free a cell, and only says what is gone
 
-Moving = frozenset[tuple[int, int]]  # boxes of what moves: the sight's stamp and the box's number in it
-NOTHING_MOVES: Moving = frozenset()
-UNCALIBRATED = Camera()
+BoxIds = frozenset[tuple[int, int]]  # boxes of what moves: the sight's stamp and the box's number in it
+NO_BOXES: BoxIds = frozenset()
+UNCALIBRATED_CAMERA = Camera()
 
 
-class Grid(NamedTuple):
+class OccupancyGrid(NamedTuple):
     """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
 
     west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
@@ -35,26 +42,26 @@ class Grid(NamedTuple):
     west_m: float
     south_m: float
     occupied: Bools
-    hidden: Bools
+    occluded: Bools
     free: Bools
-    beside: Bools
+    blind_zone: Bools
     people: Bools
-    strayed: Bools
+    reachable_unseen: Bools
 
     @property
     def unknown(self) -> Bools:
         """Nothing is known."""
-        return ~(self.occupied | self.free | self.beside)
+        return ~(self.occupied | self.free | self.blind_zone)
 
 
-def lay(
-    sights: tuple[Sight, ...],
+def build_occupancy_grid(
+    observations: tuple[Observation, ...],
     position_m: tuple[float, float],
     now_us: int,
     camera: Camera,
     config: PlannerConfig,
-    moving: Moving = NOTHING_MOVES,
-) -> Grid:
+    moving_boxes: BoxIds = NO_BOXES,
+) -> OccupancyGrid:
     """The grid around the boat. sights: oldest first. moving: what moves occupies no cell.
 
     Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
@@ -62,122 +69,131 @@ def lay(
     picture does not show because it is too near, given that there is a picture: whoever arms the boat answers for it at
     the start, and what drifts in from astern no camera sees anyway.
     """
-    west, south = (math.floor(at_m / CELL_M) - CELLS // 2 for at_m in position_m)
+    west, south = (math.floor(at_m / CELL_M) - GRID_CELLS // 2 for at_m in position_m)
     longest_us, free_us, occupied_us = (
         now_us - round(age_s * 1e6)
         for age_s in (max(config.occupied_s, config.hidden_s), config.free_s, config.occupied_s)
     )
-    known = [sight for sight in sights if longest_us <= sight.at_us <= now_us]
-    known = [sight for sight in known if len(sight.edge) == len(known[-1].edge)]
-    first_free = sum(sight.at_us < free_us for sight in known)
-    first_occupied = sum(sight.at_us < occupied_us for sight in known)
+    recent = [observation for observation in observations if longest_us <= observation.stamp_us <= now_us]
+    recent = [observation for observation in recent if len(observation.water_edge) == len(recent[-1].water_edge)]
+    first_free = sum(observation.stamp_us < free_us for observation in recent)
+    first_occupied = sum(observation.stamp_us < occupied_us for observation in recent)
     pictures = []
-    for number, sight in enumerate(known):
-        boxes = tuple(box for k, box in enumerate(sight.boxes) if (sight.at_us, k) in moving)
-        pictures.append(shown(sight, boxes, camera, config, every=OLD_EVERY if number < first_free else 1))
-    free_of = _last_shown([picture.free for picture in pictures], west, south)
-    occupied_of = _last_shown([picture.occupied for picture in pictures], west, south)
+    for number, observation in enumerate(recent):
+        boxes = tuple(box for k, box in enumerate(observation.boxes) if (observation.stamp_us, k) in moving_boxes)
+        pictures.append(
+            project_to_cells(
+                observation, boxes, camera, config, column_step=OLD_COLUMN_STEP if number < first_free else 1
+            )
+        )
+    free_of = _last_observed([picture.free for picture in pictures], west, south)
+    occupied_of = _last_observed([picture.occupied for picture in pictures], west, south)
     not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
     occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
     if config.outvoted_by > 0:
-        occupied_now &= ~_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
-    people_of = _last_shown([picture.people for picture in pictures], west, south)
-    vessels_of = _last_shown([picture.vessels for picture in pictures], west, south)
+        occupied_now &= ~_is_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
+    people_of = _last_observed([picture.people for picture in pictures], west, south)
+    vessels_of = _last_observed([picture.vessels for picture in pictures], west, south)
     people_now, vessels_now = (
         occupied_now & (last_of >= 0) & ((last_of >= free_of) | (last_of >= first_occupied))
         for last_of in (people_of, vessels_of)
     )
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
-    ages_s = np.zeros(len(known) + 1)  # of what was lately in sight, or, at last, never
-    ages_s[:first_occupied] = [(now_us - sight.at_us) * 1e-6 for sight in known[:first_occupied]]
+    ages_s = np.zeros(len(recent) + 1)  # of what was lately in sight, or, at last, never
+    ages_s[:first_occupied] = [(now_us - observation.stamp_us) * 1e-6 for observation in recent[:first_occupied]]
     swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
     drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
-    strayed = _reached(people_now, swum_m[people_of]) | _reached(vessels_now, drifted_m[vessels_of])
-    shape = (CELLS, CELLS)
-    grid = Grid(
+    reachable_unseen = _dilate(people_now, swum_m[people_of]) | _dilate(vessels_now, drifted_m[vessels_of])
+    shape = (GRID_CELLS, GRID_CELLS)
+    grid = OccupancyGrid(
         west * CELL_M,
         south * CELL_M,
         occupied=occupied_now.reshape(shape),
-        hidden=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
+        occluded=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
         free=free_now.reshape(shape),
-        beside=np.zeros(shape, np.bool_),
+        blind_zone=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
-        strayed=strayed & ~free_now.reshape(shape),
+        reachable_unseen=reachable_unseen & ~free_now.reshape(shape),
     )
-    if first_free == len(known):
+    if first_free == len(recent):
         return grid
-    reach_m = blind_reach_m(known[-1].aspect, camera, config)
-    return grid._replace(beside=_within(grid, position_m, reach_m) & ~(grid.occupied | grid.free))
+    reach_m = blind_zone_radius_m(recent[-1].aspect_ratio, camera, config)
+    return grid._replace(blind_zone=_cells_within(grid, position_m, reach_m) & ~(grid.occupied | grid.free))
 
 
-def blind_reach_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
+def blind_zone_radius_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
     """How far from the boat the water begins that a picture shows, boat at rest; 0 if that is beyond `blind_m`."""
-    lens = lens_at(REST, camera.calibration, aspect)
+    camera_model = pinhole_at(LEVEL_POSE, camera.calibration, aspect)
     u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    given = rays(lens, u, hull_top(camera.hull, u))
-    near_m = ranges_m(lens, given, config.max_range_m)
+    given = pixel_rays(camera_model, u, own_hull_top(camera.ego_polygon, u))
+    near_m = ranges_to_water_m(camera_model, given, config.max_range_m)
     if not np.isfinite(near_m).all():
         return 0.0
-    east_m, north_m = lens.at_m[0] + near_m * given.east, lens.at_m[1] + near_m * given.north
+    east_m, north_m = (
+        camera_model.position_m[0] + near_m * given.east,
+        camera_model.position_m[1] + near_m * given.north,
+    )
     reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
     return reach_m if reach_m <= config.blind_m else 0.0
 
 
-def _reached(cells: Bools, reach_m: F64) -> Bools:
+def _dilate(cells: Bools, reach_m: F64) -> Bools:
     """Cells that lie within the reach of these, each of its own [100 * 100]: in [100, 100]."""
-    found = np.zeros((CELLS, CELLS), np.bool_)
+    found = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     steps = np.ceil(reach_m / CELL_M) * cells
     for reach in np.unique(steps[steps > 0.0]):
-        found |= distance_m((steps == reach).reshape(found.shape)) <= reach * CELL_M
+        found |= distance_field_m((steps == reach).reshape(found.shape)) <= reach * CELL_M
     return found
 
 
-def _outvoted(pictures: list[Shown], occupied_of: I64, west: int, south: int, config: PlannerConfig) -> Bools:
+def _is_outvoted(
+    pictures: list[ObservedCells], occupied_of: I64, west: int, south: int, config: PlannerConfig
+) -> Bools:
     """Cells that one of these pictures alone shows occupied, they and all around them, and enough later ones free.
 
     occupied_of: the number of the last of them that shows each cell occupied.
     """
-    number, cell = _all_shown([picture.occupied for picture in pictures], west, south)
-    first = np.full(CELLS * CELLS, len(pictures), np.int64)
+    number, cell = _all_observed([picture.occupied for picture in pictures], west, south)
+    first = np.full(GRID_CELLS * GRID_CELLS, len(pictures), np.int64)
     first[cell[::-1]] = number[::-1]
-    earliest = _around(first.reshape(CELLS, CELLS), np.minimum)
-    latest = _around(occupied_of.reshape(CELLS, CELLS), np.maximum)
-    number, cell = _all_shown([picture.free for picture in pictures], west, south)
-    denied = np.bincount(cell[number > occupied_of[cell]], minlength=CELLS * CELLS)
+    earliest = _extreme_of_neighbours(first.reshape(GRID_CELLS, GRID_CELLS), np.minimum)
+    latest = _extreme_of_neighbours(occupied_of.reshape(GRID_CELLS, GRID_CELLS), np.maximum)
+    number, cell = _all_observed([picture.free for picture in pictures], west, south)
+    denied = np.bincount(cell[number > occupied_of[cell]], minlength=GRID_CELLS * GRID_CELLS)
     return np.asarray((earliest == latest).ravel() & (denied >= config.outvoted_by))
 
 
-def _around(values: I64, best: np.ufunc) -> I64:
+def _extreme_of_neighbours(values: I64, extreme: np.ufunc) -> I64:
     """The best of each cell and the eight around it."""
     for _ in range(2):
         found = values.copy()
-        best(found[1:], values[:-1], out=found[1:])
-        best(found[:-1], values[1:], out=found[:-1])
+        extreme(found[1:], values[:-1], out=found[1:])
+        extreme(found[:-1], values[1:], out=found[:-1])
         values = found.T
     return values
 
 
-def _last_shown(pictures: list[Cells], west: int, south: int) -> I64:
+def _last_observed(pictures: list[CellIndices], west: int, south: int) -> I64:
     """The number of the last picture that shows each cell of the grid, -1 where none does [100 * 100]."""
-    last = np.full(CELLS * CELLS, -1, np.int64)
-    number, cell = _all_shown(pictures, west, south)
+    last = np.full(GRID_CELLS * GRID_CELLS, -1, np.int64)
+    number, cell = _all_observed(pictures, west, south)
     last[cell] = number
     return last
 
 
-def _all_shown(pictures: list[Cells], west: int, south: int) -> tuple[I64, I64]:
+def _all_observed(pictures: list[CellIndices], west: int, south: int) -> tuple[I64, I64]:
     """Every cell of the grid that each picture shows: the picture's number, rising, and the cell's."""
     if not pictures:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     number = np.repeat(np.arange(len(pictures)), [picture.column.size for picture in pictures])
     column = np.concatenate([picture.column for picture in pictures]) - west
     row = np.concatenate([picture.row for picture in pictures]) - south
-    inside = (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
-    return number[inside], (row * CELLS + column)[inside]
+    inside = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
+    return number[inside], (row * GRID_CELLS + column)[inside]
 
 
-def _within(grid: Grid, position_m: tuple[float, float], reach_m: float) -> Bools:
+def _cells_within(grid: OccupancyGrid, position_m: tuple[float, float], reach_m: float) -> Bools:
     """Cells whose middle lies within reach."""
-    middle = (np.arange(CELLS) + 0.5) * CELL_M
+    middle = (np.arange(GRID_CELLS) + 0.5) * CELL_M
     east_m, north_m = grid.west_m + middle - position_m[0], grid.south_m + middle - position_m[1]
     return np.asarray((east_m * east_m)[None, :] + (north_m * north_m)[:, None] <= reach_m * reach_m)

@@ -18,10 +18,10 @@ from paani.config import CalibrationConfig
 Number = float | F64
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]  # by rows
-LEVEL = 1e-6  # a ray that falls less than this per unit meets no water
+MIN_DESCENT = 1e-6  # a ray that falls less than this per unit meets no water
 
 
-class Station(NamedTuple):
+class Pose(NamedTuple):
     """Where the boat is in the map, and how it lies."""
 
     x_m: float
@@ -31,14 +31,14 @@ class Station(NamedTuple):
     pitch_rad: float
 
 
-class Lens(NamedTuple):
+class PinholeCamera(NamedTuple):
     """Map-from-camera rotation (camera axes: out, right, down), where the camera is [m], focal lengths and centre.
 
     Focal lengths and centre are in picture widths and heights. Of several pictures at once, each number is a column.
     """
 
-    turn: Matrix
-    at_m: Vector
+    rotation: Matrix
+    position_m: Vector
     focal: tuple[Number, Number]
     centre: tuple[float, float]
 
@@ -48,23 +48,23 @@ class Rays(NamedTuple):
 
     east: F64
     north: F64
-    fall: F64
+    descent: F64
 
 
 @functools.lru_cache(maxsize=64)
-def lens_at(station: Station, calibration: CalibrationConfig, aspect: float) -> Lens:
+def pinhole_at(pose: Pose, calibration: CalibrationConfig, aspect: float) -> PinholeCamera:
     """The calibrated camera of a boat that lies so. aspect: picture width over height, pixels square."""
-    body = rotation(station.roll_rad, station.pitch_rad, station.yaw_rad)
-    mount = rotation(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
-    turn = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
+    body = rotation_matrix(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
+    mount = rotation_matrix(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
+    rotation = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
     ahead, above = calibration.forward_m, calibration.height_m
     east, north, up = (row[0] * ahead + row[2] * above for row in body)
     focal = 0.5 / portable.tan(0.5 * math.radians(calibration.hfov_deg))
-    at_m = (station.x_m + east, station.y_m + north, up)
-    return Lens(turn, at_m, (focal, focal * aspect), calibration.centre_frac)
+    position_m = (pose.x_m + east, pose.y_m + north, up)
+    return PinholeCamera(rotation, position_m, (focal, focal * aspect), calibration.centre_frac)
 
 
-def together(lenses: Sequence[Lens]) -> Lens:
+def stack_cameras(cameras: Sequence[PinholeCamera]) -> PinholeCamera:
     """The lenses of several pictures as one, its numbers [pictures, 1]; they share the centre."""
 
     def column(numbers: Iterable[Number]) -> F64:
@@ -72,18 +72,18 @@ def together(lenses: Sequence[Lens]) -> Lens:
 
     first, second, third = (
         (
-            column(lens.turn[row][0] for lens in lenses),
-            column(lens.turn[row][1] for lens in lenses),
-            column(lens.turn[row][2] for lens in lenses),
+            column(camera.rotation[row][0] for camera in cameras),
+            column(camera.rotation[row][1] for camera in cameras),
+            column(camera.rotation[row][2] for camera in cameras),
         )
         for row in range(3)
     )
-    east, north, up = (column(lens.at_m[axis] for lens in lenses) for axis in range(3))
-    focal_x, focal_y = (column(lens.focal[axis] for lens in lenses) for axis in range(2))
-    return Lens((first, second, third), (east, north, up), (focal_x, focal_y), lenses[0].centre)
+    east, north, up = (column(camera.position_m[axis] for camera in cameras) for axis in range(3))
+    focal_x, focal_y = (column(camera.focal[axis] for camera in cameras) for axis in range(2))
+    return PinholeCamera((first, second, third), (east, north, up), (focal_x, focal_y), cameras[0].centre)
 
 
-def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
+def rotation_matrix(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
     """Yaw about z, then pitch about y, then roll about x."""
     cr, sr = portable.cos(roll_rad), portable.sin(roll_rad)
     cp, sp = portable.cos(pitch_rad), portable.sin(pitch_rad)
@@ -95,26 +95,26 @@ def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
     )
 
 
-def rays(lens: Lens, u: F64, v: F64) -> Rays:
+def pixel_rays(camera: PinholeCamera, u: F64, v: F64) -> Rays:
     """The rays r = R K^-1 [u, v, 1] of points of the picture, Q1's first half.
 
     u, v: fractions of width and height, [n] or [pictures, n].
     """
-    right = (u - lens.centre[0]) / lens.focal[0]
-    down = (v - lens.centre[1]) / lens.focal[1]
-    east, north, up = (row[0] + row[1] * right + row[2] * down for row in lens.turn)
+    right = (u - camera.centre[0]) / camera.focal[0]
+    down = (v - camera.centre[1]) / camera.focal[1]
+    east, north, up = (row[0] + row[1] * right + row[2] * down for row in camera.rotation)
     along = np.sqrt(east * east + north * north)
-    along = np.where(along > LEVEL, along, LEVEL)
+    along = np.where(along > MIN_DESCENT, along, MIN_DESCENT)
     return Rays(east / along, north / along, -up / along)
 
 
-def ranges_m(lens: Lens, given: Rays, max_range_m: float) -> F64:
+def ranges_to_water_m(camera: PinholeCamera, given: Rays, max_range_m: float) -> F64:
     """How far along the water from below the camera each ray meets it, Q1's second half; infinity where it does not.
 
     Rejected are rays at or above the horizon, and those that meet the water beyond `max_range_m`.
     """
-    meets = given.fall > LEVEL
-    range_m = lens.at_m[2] / np.where(meets, given.fall, 1.0)
+    meets = given.descent > MIN_DESCENT
+    range_m = camera.position_m[2] / np.where(meets, given.descent, 1.0)
     return np.where(meets & (range_m > 0.0) & (range_m <= max_range_m), range_m, np.inf)
 
 

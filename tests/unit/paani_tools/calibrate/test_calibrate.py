@@ -24,7 +24,7 @@ from paani_sim.worlds import load_world
 from paani_tools.calibrate.gather import looks
 from paani_tools.calibrate.horizon import waterline
 from paani_tools.calibrate.mount import mount_of
-from tests.synthetic_water import edge_of, evidence, odometry
+from tests.synthetic_water import evidence, odometry, water_edge_of
 from tests.unit.paani.logs import small_logs
 
 SHORE_M = 150.0
@@ -43,7 +43,7 @@ def rocking(count: int, seed: int = 1) -> Iterator[tuple[int, float, float]]:
 def drawn(count: int, roll_off: float, pitch_off: float) -> Iterator[Pair]:
     """Flat water to a shore at 150 m, from a camera mounted 6 degrees down and turned on by these angles besides."""
     for at_us, roll, pitch in rocking(count):
-        seen = edge_of(BoatPose(0.0, 0.0, 0.3, 0.177, roll + roll_off, pitch + pitch_off), bank_m=SHORE_M)
+        seen = water_edge_of(BoatPose(0.0, 0.0, 0.3, 0.177, roll + roll_off, pitch + pitch_off), bank_m=SHORE_M)
         yield evidence(at_us, seen), odometry(at_us, BoatPose(0.0, 0.0, 0.3, roll_rad=roll, pitch_rad=pitch))
 
 
@@ -70,7 +70,7 @@ def test_the_mount_is_found_to_a_tenth_of_a_degree(roll_deg: float, pitch_deg: f
 
 def test_what_stands_before_the_shore_is_left_out() -> None:
     """A boat moored over a quarter of the picture, and holes in the mask, move the line by nothing."""
-    clean = edge_of(BoatPose(0.0, 0.0, 0.0, roll_rad=0.03), bank_m=SHORE_M)
+    clean = water_edge_of(BoatPose(0.0, 0.0, 0.0, roll_rad=0.03), bank_m=SHORE_M)
     spoilt = tuple(45 / 64 if 5 <= i < 25 else 0.0 if i % 9 == 0 else edge for i, edge in enumerate(clean))
     rng = np.random.default_rng(1)
     line = waterline(evidence(1, spoilt), rng)
@@ -107,7 +107,7 @@ def edgeless(pairs: Iterator[Pair]) -> Iterator[Pair]:
 
 
 def still(count: int) -> Iterator[Pair]:
-    seen = edge_of(BoatPose(0.0, 0.0, 0.0), bank_m=SHORE_M)
+    seen = water_edge_of(BoatPose(0.0, 0.0, 0.0), bank_m=SHORE_M)
     for at_us, _, _ in rocking(count):
         yield evidence(at_us, seen), odometry(at_us, BoatPose(0.0, 0.0, 0.0, pitch_rad=1e-6))
 

@@ -15,12 +15,12 @@ from paani.config import load_config
 from paani.errors import UserError
 from paani.messages import Direction, FenceArea, Inhibit, Keep, Odometry, Route, Waypoint
 from paani_services.navigator.avoidance.fence import (
-    bounded_speed,
-    distance_m,
+    allowed_distance_m,
+    distance_to_edge_m,
+    find_route_violation,
     is_allowed,
-    room_m,
-    trouble,
-    way_back_rad,
+    limit_speed,
+    return_bearing_rad,
 )
 from paani_services.navigator.files.fence_file import load_fence
 from paani_services.navigator.guidance.mission_progress import mission_of_route
@@ -65,10 +65,10 @@ def test_inside_keep_in_and_outside_keep_out(point: tuple[float, float], allowed
 def test_areas_that_keep_in_join() -> None:
     """The boat may cross from one into the other; the edge between them is no edge."""
     joined = (box(Keep.IN, 0, 0, 20, 20), box(Keep.IN, 18, 0, 40, 20))
-    assert room_m(joined, (5, 10), (35, 10)) == math.inf
-    assert trouble(joined, straight_to((5, 10), (35, 10)).waypoints, 2.0) is None
+    assert allowed_distance_m(joined, (5, 10), (35, 10)) == math.inf
+    assert find_route_violation(joined, straight_to((5, 10), (35, 10)).waypoints, 2.0) is None
     apart = (box(Keep.IN, 0, 0, 20, 20), box(Keep.IN, 25, 0, 40, 20))
-    assert room_m(apart, (5, 10), (35, 10)) == pytest.approx(15.0)
+    assert allowed_distance_m(apart, (5, 10), (35, 10)) == pytest.approx(15.0)
 
 
 @given(
@@ -85,44 +85,44 @@ def test_room_is_what_walking_finds(
     turns = np.cumsum([share for _, share in spokes]) / sum(share for _, share in spokes) * 2.0 * math.pi
     star = area(keep, *((r * math.cos(a), r * math.sin(a)) for (r, _), a in zip(spokes, turns.tolist(), strict=True)))
     fence, length_m = (star,), math.dist(start, end)
-    room = room_m(fence, start, end)
+    room = allowed_distance_m(fence, start, end)
 
-    def after(way_m: float) -> tuple[float, float]:
-        part = way_m / length_m if length_m else 0.0
+    def after(travelled_m: float) -> tuple[float, float]:
+        part = travelled_m / length_m if length_m else 0.0
         return start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
 
     assert is_allowed(fence, start) or room == 0.0
-    for way_m in np.linspace(0.0, min(room, length_m), 16)[:-1].tolist() if room > 0.0 else ():
-        assert is_allowed(fence, after(way_m)) or distance_m(fence, after(way_m)) < 1e-6
+    for travelled_m in np.linspace(0.0, min(room, length_m), 16)[:-1].tolist() if room > 0.0 else ():
+        assert is_allowed(fence, after(travelled_m)) or distance_to_edge_m(fence, after(travelled_m)) < 1e-6
     if 0.0 < room < length_m - 1e-3:
         assert any(not is_allowed(fence, after(room + beyond)) for beyond in (1e-9, 1e-6, 1e-4)) or (
-            distance_m(fence, after(room)) < 1e-6
+            distance_to_edge_m(fence, after(room)) < 1e-6
         )
 
 
 def test_speed_falls_towards_the_edge_and_ends_before_it() -> None:
     """Margin and way to stop always fit: at 5 m from the edge 0.7 m/s, at 3 m 0.3 m/s, at 1.6 m nothing."""
-    speeds = [bounded_speed(FENCE, at(x_m, 4.0), 0.0, 0.6, PAANI) for x_m in (20.0, 35.0, 37.0, 38.4)]
+    speeds = [limit_speed(FENCE, at(x_m, 4.0), 0.0, 0.6, PAANI) for x_m in (20.0, 35.0, 37.0, 38.4)]
     assert speeds == [0.6, 0.6, pytest.approx(0.3), None]
-    assert bounded_speed(FENCE, at(38.4, 4.0), math.pi, 0.6, PAANI) == 0.6
+    assert limit_speed(FENCE, at(38.4, 4.0), math.pi, 0.6, PAANI) == 0.6
 
 
 def test_way_over_ground_counts_not_the_heading() -> None:
     """Carried towards the edge while heading along it: no thrust, whatever is ordered."""
     carried = at(20.0, 17.5, 0.0, surge_mps=0.1, sway_mps=0.6)
-    assert bounded_speed(FENCE, carried, 0.0, 0.6, PAANI) is None
-    assert bounded_speed(FENCE, at(20.0, 17.5, 0.0, surge_mps=0.6), 0.0, 0.6, PAANI) == 0.6
+    assert limit_speed(FENCE, carried, 0.0, 0.6, PAANI) is None
+    assert limit_speed(FENCE, at(20.0, 17.5, 0.0, surge_mps=0.6), 0.0, 0.6, PAANI) == 0.6
 
 
 def test_outside_nothing_moves_unless_the_way_back_is_allowed() -> None:
     outside = at(42.0, 10.0)
     for heading_rad in (math.pi, 0.0, 2.0):
-        assert bounded_speed(FENCE, outside, heading_rad, 0.6, PAANI) is None
-    assert way_back_rad(FENCE, (42.0, 10.0)) == pytest.approx(math.pi)
-    assert bounded_speed(FENCE, outside, math.radians(140.0), 0.6, RETURNING) == 0.6
+        assert limit_speed(FENCE, outside, heading_rad, 0.6, PAANI) is None
+    assert return_bearing_rad(FENCE, (42.0, 10.0)) == pytest.approx(math.pi)
+    assert limit_speed(FENCE, outside, math.radians(140.0), 0.6, RETURNING) == 0.6
     for heading_rad in (0.0, math.radians(100.0), math.radians(-115.0)):
-        assert bounded_speed(FENCE, outside, heading_rad, 0.6, RETURNING) is None
-    assert way_back_rad(FENCE, (12.0, 9.0)) == pytest.approx(-math.pi / 2)
+        assert limit_speed(FENCE, outside, heading_rad, 0.6, RETURNING) is None
+    assert return_bearing_rad(FENCE, (12.0, 9.0)) == pytest.approx(-math.pi / 2)
 
 
 @given(
@@ -182,7 +182,7 @@ def test_pushed_out_the_boat_stays_still_or_comes_back() -> None:
 def test_a_route_that_leaves_the_fence_is_named_by_its_waypoint(
     points: tuple[tuple[float, float], ...], index: int, what: str
 ) -> None:
-    found = trouble(FENCE, straight_to(*points).waypoints, 1.5)
+    found = find_route_violation(FENCE, straight_to(*points).waypoints, 1.5)
     assert found is not None
     assert found[0] == index
     assert what in found[1]

@@ -11,18 +11,18 @@ from hypothesis import strategies as st
 
 from paani.messages import FenceArea, Keep, Waypoint
 from paani_services.navigator.avoidance.fence import is_allowed
-from paani_services.navigator.avoidance.fence_cells import fenced
-from paani_services.navigator.avoidance.planner import Plan, plan
-from paani_services.navigator.avoidance.replanning import Pilot, steered
-from paani_services.navigator.avoidance.rollout import Start, Wish
-from paani_services.navigator.mapping.observation import Memory
+from paani_services.navigator.avoidance.fence_cells import apply_fence
+from paani_services.navigator.avoidance.planner import Plan, plan_motion
+from paani_services.navigator.avoidance.replanning import PlannerState, replan
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
+from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid, lay
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, edge_of, odometry, seen
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
+from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, observe_from, odometry, water_edge_of
 
 ATHWART: Bar = (3.6, -0.9, 4.2, 0.9)
-AHEAD = Wish(0.0, 0.6)
-RESTING = Start(0.0, 0.0, 0.0)
+AHEAD = GuidanceSetpoint(0.0, 0.6)
+RESTING = BoatState(0.0, 0.0, 0.0)
 
 
 def area(keep: Keep, *corners: tuple[float, float]) -> FenceArea:
@@ -33,12 +33,12 @@ def box(keep: Keep, x1: float, y1: float, x2: float, y2: float) -> FenceArea:
     return area(keep, (x1, y1), (x2, y1), (x2, y2), (x1, y2))
 
 
-def memory_of(*bars: Bar) -> Memory:
-    return seen(edge=edge_of(AT_REST, bars, 500.0))
+def memory_of(*bars: Bar) -> ObservationMemory:
+    return observe_from(edge=water_edge_of(AT_REST, bars, 500.0))
 
 
-def pool(*bars: Bar) -> Grid:
-    return lay(memory_of(*bars).sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
+def pool(*bars: Bar) -> OccupancyGrid:
+    return build_occupancy_grid(memory_of(*bars).observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 POINT = st.tuples(st.floats(-12.0, 12.0), st.floats(-12.0, 12.0))
@@ -51,9 +51,9 @@ def test_a_cell_is_barred_where_its_middle_is_not_allowed(
     """Any polygons, crossing themselves included: the same verdict as point by point. No middle lies on an edge."""
     inner, outer = ([(x_m + 0.0137, y_m + 0.0291) for x_m, y_m in corners] for corners in (inner, outer))
     fence = (area(Keep.IN, *inner), area(Keep.OUT, *outer))
-    grid = fenced(pool(), fence)
-    for row in range(0, CELLS, 9):
-        for column in range(0, CELLS, 9):
+    grid = apply_fence(pool(), fence)
+    for row in range(0, GRID_CELLS, 9):
+        for column in range(0, GRID_CELLS, 9):
             middle = (grid.west_m + CELL_M * (column + 0.5), grid.south_m + CELL_M * (row + 0.5))
             assert bool(grid.occupied[row, column]) is not is_allowed(fence, middle)
 
@@ -61,20 +61,20 @@ def test_a_cell_is_barred_where_its_middle_is_not_allowed(
 def test_a_fence_takes_and_gives_nothing() -> None:
     """Beyond it nothing is free; within it everything stays as it was."""
     before = pool(ATHWART)
-    after = fenced(before, (box(Keep.IN, -50.0, -50.0, 2.0, 50.0),))
-    within = np.broadcast_to(np.arange(CELLS) * CELL_M + before.west_m < 1.9, (CELLS, CELLS))
-    for name in ("occupied", "free", "beside", "hidden"):
+    after = apply_fence(before, (box(Keep.IN, -50.0, -50.0, 2.0, 50.0),))
+    within = np.broadcast_to(np.arange(GRID_CELLS) * CELL_M + before.west_m < 1.9, (GRID_CELLS, GRID_CELLS))
+    for name in ("occupied", "free", "blind_zone", "occluded"):
         assert (getattr(after, name) & within == getattr(before, name) & within).all()
-    assert after.occupied[~within & (np.arange(CELLS) * CELL_M + before.west_m > 2.1)].all()
+    assert after.occupied[~within & (np.arange(GRID_CELLS) * CELL_M + before.west_m > 2.1)].all()
     assert not (after.free & after.occupied).any()
-    assert fenced(before, ()) is before
+    assert apply_fence(before, ()) is before
 
 
 def test_a_fence_lies_in_the_map_and_the_grid_where_it_was_reckoned() -> None:
     """What is 2 m east on the grid is 5 m east in the map."""
     fence = (box(Keep.IN, -50.0, -50.0, 5.0, 50.0),)
-    east_m = np.arange(CELLS) * CELL_M + pool().west_m
-    barred = fenced(pool(), fence, (3.0, 0.0)).occupied
+    east_m = np.arange(GRID_CELLS) * CELL_M + pool().west_m
+    barred = apply_fence(pool(), fence, (3.0, 0.0)).occupied
     assert barred[:, east_m > 2.0].all()
     assert not barred[:, east_m < 1.8].any()
 
@@ -82,7 +82,7 @@ def test_a_fence_lies_in_the_map_and_the_grid_where_it_was_reckoned() -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) -> None:
     fence = (box(Keep.OUT, -2.0, side * 0.9, 12.0, side * 9.0),)
-    found = plan(fenced(pool(ATHWART), fence), RESTING, AHEAD, None, PLANNER)
+    found = plan_motion(apply_fence(pool(ATHWART), fence), RESTING, AHEAD, None, PLANNER)
     assert found.speed_mps > 0.0
     assert math.copysign(1.0, found.heading_rad) == -side
 
@@ -93,7 +93,7 @@ def test_no_way_where_the_fence_leaves_none() -> None:
     fence = (box(Keep.IN, -1.0, -1.0, 1.6, 1.0),)
 
     def ordered(within: tuple[FenceArea, ...]) -> Plan:
-        return steered(Pilot(memory_of()), at_rest, AHEAD, START_US, CAMERA, PLANNER, within)[1]
+        return replan(PlannerState(memory_of()), at_rest, AHEAD, START_US, CAMERA, PLANNER, within)[1]
 
     assert ordered(()).speed_mps > 0.0
     assert ordered(fence).speed_mps == 0.0

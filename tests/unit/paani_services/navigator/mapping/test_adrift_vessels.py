@@ -7,27 +7,37 @@ import numpy as np
 import pytest
 
 from paani.messages import Label
-from paani_services.navigator.avoidance.clearance import clearance_m, gap_to_m
-from paani_services.navigator.avoidance.planner import LOSE_M, plan
-from paani_services.navigator.avoidance.rollout import Start, Wish, roll_out
-from paani_services.navigator.mapping.dynamic_obstacles import Motion, Mover, movers
-from paani_services.navigator.mapping.observation import Memory
+from paani_services.navigator.avoidance.clearance import clearance_field_m, predicted_clearance_m
+from paani_services.navigator.avoidance.planner import ESCAPE_TOLERANCE_M, plan_motion
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, roll_out
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, Velocity, find_dynamic_obstacles
+from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid, lay
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, box_over, edge_of, looked_away, seen
+from tests.synthetic_water import (
+    AT_REST,
+    CAMERA,
+    PLANNER,
+    START_US,
+    Bar,
+    detection_of,
+    observe_from,
+    observe_then_look_astern,
+    water_edge_of,
+)
 
 HULL: Bar = (4.0, -1.0, 5.0, 1.0)
 
 
-def passed(seconds: float, label: Label = Label.VESSEL) -> tuple[Memory, int]:
+def passed(seconds: float, label: Label = Label.VESSEL) -> tuple[ObservationMemory, int]:
     """Of a boat that saw this ahead, and has looked astern since."""
-    return looked_away(seconds, box_over(HULL, 0.8, label), edge_of(AT_REST, (HULL,)))
+    return observe_then_look_astern(seconds, detection_of(HULL, 0.8, label), water_edge_of(AT_REST, (HULL,)))
 
 
-def off_m(grid: Grid) -> float:
+def off_m(grid: OccupancyGrid) -> float:
     """How far ahead of the boat the nearest of it is."""
-    clear_m = clearance_m(grid, PLANNER)
+    clear_m = clearance_field_m(grid, PLANNER)
     row = int(-grid.south_m / CELL_M)
     columns = np.flatnonzero(clear_m[row] <= 0.0)
     return float(grid.west_m + CELL_M * (columns.min() + 0.5))
@@ -37,43 +47,43 @@ def off_m(grid: Grid) -> float:
 def test_a_vessel_out_of_sight_drifts(seconds: float, nearer_m: float) -> None:
     """0.15 m/s (Q6), 1.2 m at most; in trials one at 0.08 m/s came up 0.06 m short of the boat that passed it."""
     memory, now_us = passed(seconds)
-    grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
+    grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
     assert off_m(grid) == pytest.approx(4.0 - nearer_m, abs=1.5 * CELL_M)
     still = msgspec.structs.replace(PLANNER, vessel_reach_m=0.0)
-    assert not lay(memory.sights, (0.0, 0.0), now_us, CAMERA, still).strayed.any()
+    assert not build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, still).reachable_unseen.any()
 
 
 @pytest.mark.parametrize("label", [Label.PIER, Label.BUOY])
 def test_what_is_made_fast_drifts_no_further_than_all_that_is_hidden(label: Label) -> None:
     memory, now_us = passed(16.0, label)
-    grid = lay(memory.sights, (0.0, 0.0), now_us, CAMERA, PLANNER)
-    assert not grid.strayed.any()
+    grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
+    assert not grid.reachable_unseen.any()
     assert off_m(grid) == pytest.approx(4.0 - PLANNER.hidden_drift_m, abs=1.5 * CELL_M)
 
 
 def test_it_has_not_drifted_to_where_a_picture_shows_water() -> None:
     memory, now_us = passed(12.0)
-    memory = seen(BoatPose(0.0, 0.0, 0.7), at_us=now_us + 200_000, memory=memory)
-    grid = lay(memory.sights, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
-    assert grid.strayed.any()
-    assert not (grid.strayed & grid.free).any()
+    memory = observe_from(BoatPose(0.0, 0.0, 0.7), at_us=now_us + 200_000, memory=memory)
+    grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
+    assert grid.reachable_unseen.any()
+    assert not (grid.reachable_unseen & grid.free).any()
 
 
 def watched(
     velocity_mps: tuple[float, float], x_m: float, y_m: float, label: Label = Label.VESSEL
-) -> tuple[Mover, ...]:
+) -> tuple[DynamicObstacle, ...]:
     """What moves for certain, when a boat at rest has watched this for 8 s; it came to that place last."""
-    memory, at_us = Memory(), START_US
+    memory, at_us = ObservationMemory(), START_US
     for k in range(41):
         left_s = 0.2 * (40 - k)
         east, north = x_m - left_s * velocity_mps[0], y_m - left_s * velocity_mps[1]
         hull: Bar = (east - 0.4, north - 1.0, east + 0.4, north + 1.0)
         at_us = START_US + 200_000 * k
-        box = box_over(hull, 0.8, label)
+        box = detection_of(hull, 0.8, label)
         x1, y1, x2, y2 = box.box_xyxy
         cut = msgspec.structs.replace(box, box_xyxy=(max(x1, 0.0), y1, min(x2, 1.0), min(y2, 1.0)))
-        memory = seen(edge=edge_of(AT_REST, (hull,)), at_us=at_us, memory=memory, detections=(cut,))
-    return tuple(each for each in movers(memory.sights, at_us, CAMERA, PLANNER) if each.is_sure)
+        memory = observe_from(edge=water_edge_of(AT_REST, (hull,)), at_us=at_us, memory=memory, detections=(cut,))
+    return tuple(each for each in find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER) if each.is_moving)
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.13), (-0.13, 0.0), (-0.09, -0.09)])
@@ -81,7 +91,7 @@ def watched(
 def test_a_vessel_adrift_is_told_from_a_moored_one_in_time(velocity: tuple[float, float], side_m: float) -> None:
     """0.13 m/s is 0.33 m in `fit_s`, which one row of the mask is worth at 4 m; in 8 s it is 1 m."""
     (vessel,) = watched(velocity, 4.0, side_m)
-    assert vessel.motion[:2] == pytest.approx(velocity, abs=0.06)
+    assert vessel.velocity[:2] == pytest.approx(velocity, abs=0.06)
 
 
 @pytest.mark.parametrize("side_m", [0.0, 2.2])
@@ -96,35 +106,42 @@ def test_a_pier_is_given_no_such_time() -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_boat_that_waits_turns_to_where_it_wants_to_go(side: float) -> None:
     """What passes out of sight is seen so, and the course it keeps is told; hulls that cannot turn on the spot stay."""
-    grid = lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER)
-    resting, wish = Start(0.0, 0.0, 0.0), Wish(1.8 * side, 0.6)
-    drifting = Mover(np.array([0.3]), np.array([2.6 * side]), 0.2, Motion(0.08, 0.0, 0.03), 3.0, frozenset())
-    found = plan(grid, resting, wish, None, PLANNER, (drifting,))
+    grid = build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    resting, setpoint = BoatState(0.0, 0.0, 0.0), GuidanceSetpoint(1.8 * side, 0.6)
+    drifting = DynamicObstacle(
+        np.array([0.3]), np.array([2.6 * side]), 0.2, Velocity(0.08, 0.0, 0.03), 3.0, frozenset()
+    )
+    found = plan_motion(grid, resting, setpoint, None, PLANNER, (drifting,))
     assert found.speed_mps == pytest.approx(0.06)
     assert found.heading_rad == pytest.approx(1.8 * side)
     on = roll_out(resting, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
-    near = on.at_s <= PLANNER.horizon_s
+    near = on.time_s <= PLANNER.horizon_s
     assert np.hypot(on.x_m, on.y_m)[near].max() < 0.2
-    turned = Start(0.0, 0.0, 1.8 * side)
-    assert plan(grid, turned, wish, None, PLANNER, (drifting,)).speed_mps == 0.0
+    turned = BoatState(0.0, 0.0, 1.8 * side)
+    assert plan_motion(grid, turned, setpoint, None, PLANNER, (drifting,)).speed_mps == 0.0
     pushes_only = msgspec.structs.replace(PLANNER, turn_radius_m=0.5)
-    assert plan(grid, resting, wish, None, pushes_only, (drifting,)).speed_mps == 0.0
+    assert plan_motion(grid, resting, setpoint, None, pushes_only, (drifting,)).speed_mps == 0.0
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 60.0, 170.0])
 def test_a_boat_leaves_where_something_unseen_may_have_got_to(course_deg: float) -> None:
     """More cases in which the boat moves: it had lain there, open water ahead, until it was run into (harbour-21)."""
-    grid, start = lay(seen().sights, (0.0, 0.0), START_US, CAMERA, PLANNER), Start(0.0, 0.0, 0.0)
-    middle_m = CELL_M * (np.arange(CELLS) + 0.5)
+    grid, start = (
+        build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER),
+        BoatState(0.0, 0.0, 0.0),
+    )
+    middle_m = CELL_M * (np.arange(GRID_CELLS) + 0.5)
     east_m, north_m = grid.west_m + middle_m[None, :] + 1.6, grid.south_m + middle_m[:, None] - 1.2
-    grid = grid._replace(strayed=(np.hypot(east_m, north_m) < 2.8) & ~grid.free)
-    assert clearance_m(grid, PLANNER)[CELLS // 2, CELLS // 2] < -0.3
-    coming = Mover(np.array([-1.6]), np.array([1.2]), 0.2, Motion(0.1, -0.08, 0.05), 14.0, frozenset())
-    assert gap_to_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here already
-    found = plan(grid, start, Wish(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
+    grid = grid._replace(reachable_unseen=(np.hypot(east_m, north_m) < 2.8) & ~grid.free)
+    assert clearance_field_m(grid, PLANNER)[GRID_CELLS // 2, GRID_CELLS // 2] < -0.3
+    coming = DynamicObstacle(np.array([-1.6]), np.array([1.2]), 0.2, Velocity(0.1, -0.08, 0.05), 14.0, frozenset())
+    assert predicted_clearance_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here already
+    found = plan_motion(grid, start, GuidanceSetpoint(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
     assert 0.0 < found.speed_mps < 0.6
     on = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
-    gaps_m = gap_to_m(coming, on.x_m, on.y_m, on.at_s[:, None])[on.at_s <= PLANNER.horizon_s]
-    rests_m = gap_to_m(coming, np.zeros(1), np.zeros(1), on.at_s[:, None])[on.at_s <= PLANNER.horizon_s]
-    assert (gaps_m >= rests_m - LOSE_M).all()
+    gaps_m = predicted_clearance_m(coming, on.x_m, on.y_m, on.time_s[:, None])[on.time_s <= PLANNER.horizon_s]
+    rests_m = predicted_clearance_m(coming, np.zeros(1), np.zeros(1), on.time_s[:, None])[
+        on.time_s <= PLANNER.horizon_s
+    ]
+    assert (gaps_m >= rests_m - ESCAPE_TOLERANCE_M).all()
     assert gaps_m[-1] > rests_m[-1]

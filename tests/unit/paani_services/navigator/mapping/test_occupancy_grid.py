@@ -13,13 +13,18 @@ from hypothesis import strategies as st
 from paani.config import CalibrationConfig, PlannerConfig, calibration_of, load_config
 from paani.errors import UserError
 from paani.messages import Detection, Label
-from paani_services.navigator.mapping.observation import Foot, Memory
-from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, hull_top
-from paani_services.navigator.mapping.occupancy_grid import CELLS, Grid, blind_reach_m, lay
-from paani_services.navigator.mapping.projection import Station, lens_at, ranges_m, rays
+from paani_services.navigator.mapping.observation import FootLine, ObservationMemory
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, own_hull_top
+from paani_services.navigator.mapping.occupancy_grid import (
+    GRID_CELLS,
+    OccupancyGrid,
+    blind_zone_radius_m,
+    build_occupancy_grid,
+)
+from paani_services.navigator.mapping.projection import Pose, pinhole_at, pixel_rays, ranges_to_water_m
 from paani_sim.eye.camera import BoatPose, project
 from paani_sim.eye.camera import Camera as Eye
-from tests.synthetic_water import AT_REST, CAMERA, CONFIG, EYE, PLANNER, START_US, edge_of, seen
+from tests.synthetic_water import AT_REST, CAMERA, CONFIG, EYE, PLANNER, START_US, observe_from, water_edge_of
 
 ASPECT = 320 / 240
 PAPER = load_config(profile="paper").navigator.planner
@@ -27,18 +32,18 @@ AHEAD_5_M = ((5.0, -1.0, 5.6, 1.0),)
 
 
 def grid_of(
-    memory: Memory,
+    memory: ObservationMemory,
     age_s: float = 0.1,
     position_m: tuple[float, float] = (0.0, 0.0),
     config: PlannerConfig = PLANNER,
-) -> Grid:
-    now_us = memory.sights[-1].at_us + round(age_s * 1e6) if memory.sights else START_US
-    return lay(memory.sights, position_m, now_us, CAMERA, config)
+) -> OccupancyGrid:
+    now_us = memory.observations[-1].stamp_us + round(age_s * 1e6) if memory.observations else START_US
+    return build_occupancy_grid(memory.observations, position_m, now_us, CAMERA, config)
 
 
-def cell(grid: Grid, x_m: float, y_m: float) -> str:
+def cell(grid: OccupancyGrid, x_m: float, y_m: float) -> str:
     row, column = math.floor((y_m - grid.south_m) / CELL_M), math.floor((x_m - grid.west_m) / CELL_M)
-    named = {"occupied": grid.occupied, "free": grid.free, "beside": grid.beside, "unknown": grid.unknown}
+    named = {"occupied": grid.occupied, "free": grid.free, "blind_zone": grid.blind_zone, "unknown": grid.unknown}
     found = [name for name, cells in named.items() if cells[row, column]]
     assert len(found) == 1
     return found[0]
@@ -62,11 +67,11 @@ def test_q1_a_pixel_of_the_water_comes_back_to_its_point(
     y_m = boat.y_m + math.sin(yaw) * east + math.cos(yaw) * north
     eye = Eye(up_m=0.9)  # on the water where the body's origin is
     u_px, v_px = project(np.array([[x_m, y_m, 0.0]]), boat, eye)[0]
-    lens = lens_at(Station(boat.x_m, boat.y_m, yaw, roll, pitch), CAMERA.calibration, ASPECT)
-    given_rays = rays(lens, np.array([u_px / 320]), np.array([v_px / 240]))
-    range_m = ranges_m(lens, given_rays, 50.0)
-    assert lens.at_m[0] + float(range_m[0] * given_rays.east[0]) == pytest.approx(x_m, abs=1e-6)
-    assert lens.at_m[1] + float(range_m[0] * given_rays.north[0]) == pytest.approx(y_m, abs=1e-6)
+    camera_model = pinhole_at(Pose(boat.x_m, boat.y_m, yaw, roll, pitch), CAMERA.calibration, ASPECT)
+    given_rays = pixel_rays(camera_model, np.array([u_px / 320]), np.array([v_px / 240]))
+    range_m = ranges_to_water_m(camera_model, given_rays, 50.0)
+    assert camera_model.position_m[0] + float(range_m[0] * given_rays.east[0]) == pytest.approx(x_m, abs=1e-6)
+    assert camera_model.position_m[1] + float(range_m[0] * given_rays.north[0]) == pytest.approx(y_m, abs=1e-6)
 
 
 def test_q1_a_mount_that_is_turned_is_turned_back() -> None:
@@ -81,49 +86,49 @@ def test_q1_a_mount_that_is_turned_is_turned_back() -> None:
     )
     level = msgspec.structs.replace(turned, pitch_down_deg=0.0, roll_deg=0.0, yaw_deg=0.0)
     u, v = np.array([0.3, 0.5, 0.8]), np.array([0.9, 0.95, 0.99])
-    mounted = rays(lens_at(Station(0.0, 0.0, 0.0, 0.0, 0.0), turned, ASPECT), u, v)
-    carried = rays(
-        lens_at(Station(0.0, 0.0, math.radians(-12.0), math.radians(4.0), math.radians(9.0)), level, ASPECT), u, v
+    mounted = pixel_rays(pinhole_at(Pose(0.0, 0.0, 0.0, 0.0, 0.0), turned, ASPECT), u, v)
+    carried = pixel_rays(
+        pinhole_at(Pose(0.0, 0.0, math.radians(-12.0), math.radians(4.0), math.radians(9.0)), level, ASPECT), u, v
     )
     for one, other in zip(mounted, carried, strict=True):
         assert one == pytest.approx(other)
-    middle = rays(lens_at(Station(0.0, 0.0, 0.0, 0.0, 0.0), turned, ASPECT), np.array([0.45]), np.array([0.6]))
-    assert float(middle.fall[0]) == pytest.approx(math.tan(math.radians(9.0)))
+    middle = pixel_rays(pinhole_at(Pose(0.0, 0.0, 0.0, 0.0, 0.0), turned, ASPECT), np.array([0.45]), np.array([0.6]))
+    assert float(middle.descent[0]) == pytest.approx(math.tan(math.radians(9.0)))
 
 
 def test_q1_rays_at_and_above_the_horizon_and_far_ones_are_rejected() -> None:
     """Q1: horizon and range rejection; no ray ever meets water behind the camera."""
-    lens = lens_at(Station(0.0, 0.0, 0.0, 0.0, 0.0), CAMERA.calibration, ASPECT)
-    horizon = 0.5 - lens.focal[1] * math.tan(math.radians(6.0))
+    camera_model = pinhole_at(Pose(0.0, 0.0, 0.0, 0.0, 0.0), CAMERA.calibration, ASPECT)
+    horizon = 0.5 - camera_model.focal[1] * math.tan(math.radians(6.0))
     v = np.array([0.0, horizon - 0.01, horizon, horizon + 0.02, horizon + 0.08, 1.0])
-    found = ranges_m(lens, rays(lens, np.full(6, 0.5), v), 30.0)
+    found = ranges_to_water_m(camera_model, pixel_rays(camera_model, np.full(6, 0.5), v), 30.0)
     assert np.isinf(found[:4]).all()  # the fourth meets the water at 43 m
     assert 8.0 < found[4] < 30.0
-    assert found[5] == pytest.approx(0.9 / math.tan(math.radians(6.0) + math.atan(0.5 / lens.focal[1])))
+    assert found[5] == pytest.approx(0.9 / math.tan(math.radians(6.0) + math.atan(0.5 / camera_model.focal[1])))
 
 
 def test_q2_the_grid_is_unknown_by_default_and_lies_in_the_map() -> None:
     """Q2: 100 x 100 cells of 0.2 m around the boat; its cells stay where they are while the boat moves."""
-    grid = grid_of(Memory(), position_m=(3.17, -8.04))
-    assert (CELLS, CELL_M) == (100, 0.2)
+    grid = grid_of(ObservationMemory(), position_m=(3.17, -8.04))
+    assert (GRID_CELLS, CELL_M) == (100, 0.2)
     assert grid.occupied.shape == (100, 100)
     assert grid.unknown.all()
     assert grid.west_m == pytest.approx(-7.0)
     assert grid.south_m == pytest.approx(-18.2)
-    moved = grid_of(Memory(), position_m=(3.45, -8.04))
+    moved = grid_of(ObservationMemory(), position_m=(3.45, -8.04))
     assert moved.west_m == pytest.approx(-6.6)
 
 
 def test_open_water_is_free_from_the_picture_s_lower_end_to_the_range_limit() -> None:
-    grid = grid_of(seen())
+    grid = grid_of(observe_from())
     assert cell(grid, 2.5, 0.0) == cell(grid, 8.3, 0.0) == cell(grid, 5.0, 2.9) == "free"
     assert cell(grid, 8.9, 0.0) == cell(grid, 5.0, 4.5) == cell(grid, -3.0, 0.0) == "unknown"
-    assert cell(grid, 1.0, 0.0) == cell(grid, -1.5, -1.0) == "beside"
+    assert cell(grid, 1.0, 0.0) == cell(grid, -1.5, -1.0) == "blind_zone"
     assert not grid.occupied.any()
 
 
 def test_what_ends_the_water_is_occupied_and_what_lies_behind_it_unknown() -> None:
-    grid = grid_of(seen(edge=edge_of(AT_REST, AHEAD_5_M)))
+    grid = grid_of(observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M)))
     assert cell(grid, 3.5, 0.0) == "free"
     rows, columns = np.nonzero(grid.occupied)
     x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
@@ -136,14 +141,14 @@ def test_what_ends_the_water_is_occupied_and_what_lies_behind_it_unknown() -> No
 
 def test_q3_lifetimes() -> None:
     """Q3: free for 0.8 s, occupied for 2.0 s; then unknown again."""
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
-    at = memory.sights[-1].at_us
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
+    at = memory.observations[-1].stamp_us
     for age_s, free, occupied in (
         (0.79, "free", "occupied"),
         (0.81, "unknown", "occupied"),
         (2.01, "unknown", "unknown"),
     ):
-        grid = lay(memory.sights, (0.0, 0.0), at + round(age_s * 1e6), CAMERA, PAPER)
+        grid = build_occupancy_grid(memory.observations, (0.0, 0.0), at + round(age_s * 1e6), CAMERA, PAPER)
         assert cell(grid, 3.5, 0.0) == free
         assert cell(grid, 5.0, 0.0) == occupied
     assert (PAPER.free_s, PAPER.occupied_s) == (PLANNER.free_s, PLANNER.occupied_s) == (0.8, 2.0)
@@ -153,42 +158,44 @@ def test_q3_lifetimes() -> None:
 def test_q3_occupied_wins_for_its_lifetime(config: PlannerConfig) -> None:
     """Pictures that show open water there do not free a cell that one saw occupied (Q3), or two, less than 2 s ago."""
     vouched_us = 0 if config is PAPER else 200_000
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), at_us=START_US - 200_000)
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), memory=memory)
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), at_us=START_US - 200_000)
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), memory=memory)
     for later_us in range(200_000, 2_400_000, 200_000):
-        memory = seen(at_us=START_US + later_us, memory=memory)
+        memory = observe_from(at_us=START_US + later_us, memory=memory)
         expected = "occupied" if later_us + vouched_us + 100_000 <= 2_000_000 else "free"
         assert cell(grid_of(memory, config=config), 5.0, 0.0) == expected
 
 
 def test_what_one_picture_alone_shows_two_later_ones_deny() -> None:
     """A glint of the sun is gone within two pictures; the paper's lifetimes keep it for 2 s."""
-    memory = seen(at_us=START_US - 200_000)
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M), memory=memory)
+    memory = observe_from(at_us=START_US - 200_000)
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), memory=memory)
     for pictures, expected in enumerate(("occupied", "occupied", "free", "free")):
         assert cell(grid_of(memory), 5.0, 0.0) == expected
         assert cell(grid_of(memory, config=PAPER), 5.0, 0.0) == "occupied"
-        memory = seen(at_us=START_US + 200_000 * (pictures + 1), memory=memory)
+        memory = observe_from(at_us=START_US + 200_000 * (pictures + 1), memory=memory)
 
 
 def test_a_thing_whose_edge_wavers_by_a_cell_is_not_denied() -> None:
     """Two pictures show it, each a cell off the other: they vouch for each other."""
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
-    memory = seen(edge=edge_of(AT_REST, ((5.2, -1.0, 5.8, 1.0),)), at_us=START_US + 200_000, memory=memory)
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
+    memory = observe_from(
+        edge=water_edge_of(AT_REST, ((5.2, -1.0, 5.8, 1.0),)), at_us=START_US + 200_000, memory=memory
+    )
     for later_us in (400_000, 600_000, 800_000):
-        memory = seen(at_us=START_US + later_us, memory=memory)
+        memory = observe_from(at_us=START_US + later_us, memory=memory)
         assert cell(grid_of(memory), 5.0, 0.0) == cell(grid_of(memory), 5.4, 0.0) == "occupied"
 
 
 def test_what_is_out_of_sight_stays_occupied_longer() -> None:
     """Turned away from it, the boat remembers a bar for `hidden_s`; the paper's lifetimes forget it."""
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     away = BoatPose(0.0, 0.0, 1.5)
     for later_us in range(200_000, 21_000_000, 200_000):
-        memory = seen(away, at_us=START_US + later_us, memory=memory)
+        memory = observe_from(away, at_us=START_US + later_us, memory=memory)
         hidden = cell(grid_of(memory, 0.0), 5.0, 0.0)
         assert hidden == ("occupied" if later_us <= 20_000_000 else "unknown")
-        paper = lay(memory.sights, (0.0, 0.0), memory.sights[-1].at_us, CAMERA, PAPER)
+        paper = build_occupancy_grid(memory.observations, (0.0, 0.0), memory.observations[-1].stamp_us, CAMERA, PAPER)
         assert cell(paper, 5.0, 0.0) == ("occupied" if later_us <= 2_000_000 else "unknown")
 
 
@@ -198,7 +205,7 @@ def test_a_thing_stands_where_its_box_ends_below() -> None:
     (left, low), (right, _) = project(corners, AT_REST, EYE) / (320, 240)
     box = (min(left, right), low - 0.2, max(left, right), low)
     buoy = Detection(label=Label.BUOY, confidence=0.9, box_xyxy=tuple(map(float, box)))  # type: ignore[arg-type]
-    grid = grid_of(seen(detections=(buoy,)))
+    grid = grid_of(observe_from(detections=(buoy,)))
     assert cell(grid, 4.05, 0.0) == cell(grid, 4.05, 0.3) == cell(grid, 4.5, -0.3) == "occupied"
     assert cell(grid, 4.05, 0.8) == cell(grid, 3.5, 0.0) == "free"
 
@@ -211,7 +218,7 @@ def test_people_are_given_more_room() -> None:
     found = {}
     for label in (Label.PERSON, Label.BUOY):
         thing = Detection(label=label, confidence=0.9, box_xyxy=tuple(map(float, box)))  # type: ignore[arg-type]
-        grid = grid_of(seen(detections=(thing,)))
+        grid = grid_of(observe_from(detections=(thing,)))
         found[label] = [cell(grid, 4.05, 0.0), cell(grid, 4.05, 0.9), cell(grid, 3.5, 0.0), cell(grid, 4.05, 1.5)]
     assert found[Label.PERSON] == ["occupied", "occupied", "occupied", "free"]
     assert found[Label.BUOY] == ["occupied", "free", "free", "free"]
@@ -222,11 +229,13 @@ def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     aslant = tuple(0.45 + 0.005 * column for column in range(80))
     box = (0.0, 0.42, 1.0, aslant[-1])
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
-    with_box, by_mask = (grid_of(seen(edge=aslant, detections=boxes)) for boxes in ((vessel,), ()))
+    with_box, by_mask = (grid_of(observe_from(edge=aslant, detections=boxes)) for boxes in ((vessel,), ()))
     assert (with_box.occupied >= by_mask.occupied).all()
     assert (with_box.free | with_box.occupied == by_mask.free | with_box.occupied).all()
     holed = (*aslant[:30], *([0.4] * 20), *aslant[50:])
-    assert seen(edge=holed, detections=(vessel,)).sights[-1].feet == (Foot(192, 320, math.ceil(aslant[-1] * 512)),)
+    assert observe_from(edge=holed, detections=(vessel,)).observations[-1].feet == (
+        FootLine(192, 320, math.ceil(aslant[-1] * 512)),
+    )
 
 
 def test_a_column_that_a_box_covers_in_part_is_not_looked_through() -> None:
@@ -235,26 +244,26 @@ def test_a_column_that_a_box_covers_in_part_is_not_looked_through() -> None:
     vessel, wider = (
         Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=(0.0, 0.5, right, 0.99)) for right in (0.33, 0.35)
     )
-    assert seen(edge=aslant, detections=(vessel,)).sights[-1].feet == ()
-    (foot,) = seen(edge=aslant, detections=(wider,)).sights[-1].feet
+    assert observe_from(edge=aslant, detections=(vessel,)).observations[-1].feet == ()
+    (foot,) = observe_from(edge=aslant, detections=(wider,)).observations[-1].feet
     assert (foot.left, foot.right) == (26 * 512 // 80, -(-28 * 512 // 80))
     thin = Detection(label=Label.PIER, confidence=0.9, box_xyxy=(0.505, 0.5, 0.511, 0.9))
-    assert len(seen(edge=aslant, detections=(thin,)).sights[-1].feet) == 1
+    assert len(observe_from(edge=aslant, detections=(thin,)).observations[-1].feet) == 1
 
 
 def test_a_hull_is_whole_and_as_deep_as_it_is_wide() -> None:
     """The mask takes its bow for water, and shows its side alone: 2 m wide at 4 m, it is 2 m deep."""
-    side = edge_of(AT_REST, ((4.0, -1.0, 4.4, 1.0),))
+    side = water_edge_of(AT_REST, ((4.0, -1.0, 4.4, 1.0),))
     columns = [column for column, end in enumerate(side) if end > 0.5]
     bow = columns[: len(columns) // 3]
-    far = edge_of(AT_REST)[bow[0]]
+    far = water_edge_of(AT_REST)[bow[0]]
     holed = tuple(far if column in bow else end for column, end in enumerate(side))
     box = (columns[0] / 80, 0.0, (columns[-1] + 1) / 80, max(side))  # mast and all
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
-    grid = grid_of(seen(edge=holed, detections=(vessel,)))
+    grid = grid_of(observe_from(edge=holed, detections=(vessel,)))
     for x_m, y_m, expected in ((4.2, 0.7, "occupied"), (4.2, -0.7, "occupied"), (5.7, 0.0, "occupied")):
         assert cell(grid, x_m, y_m) == expected
-    assert cell(grid_of(seen(edge=holed)), 4.2, 0.7) == "free"
+    assert cell(grid_of(observe_from(edge=holed)), 4.2, 0.7) == "free"
     assert cell(grid, 3.4, 0.7) == cell(grid, 4.2, 1.5) == "free"
 
 
@@ -267,7 +276,7 @@ def test_what_stands_before_a_vessel_is_no_part_of_it() -> None:
         box = (0.1, 0.0, 0.9, low) if low else (left, 0.0, right, foot)
         vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
         behind = ((6.0, -1.5, 6.4, 1.5),) if low is None else ()
-        grid = grid_of(seen(edge=edge_of(AT_REST, (*post, *behind)), detections=(vessel,)))
+        grid = grid_of(observe_from(edge=water_edge_of(AT_REST, (*post, *behind)), detections=(vessel,)))
         assert cell(grid, 3.1, 0.0) == "occupied"
         assert cell(grid, 3.1, 0.7) == cell(grid, 3.1, -0.7) == "free"
 
@@ -276,36 +285,36 @@ def test_a_hull_that_the_mask_misses_stands_at_the_end_of_its_box() -> None:
     corners = np.array([[4.0, -0.8, 0.0], [4.0, 0.8, 0.0]])
     (right, low), (left, _) = project(corners, AT_REST, EYE) / [EYE.width_px, EYE.height_px]
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=(left, 0.0, right, low))
-    grid = grid_of(seen(detections=(vessel,)))
+    grid = grid_of(observe_from(detections=(vessel,)))
     assert cell(grid, 4.1, 0.0) == cell(grid, 4.1, 0.6) == "occupied"
     assert cell(grid, 3.4, 0.0) == "free"
 
 
 def test_a_box_cut_below_stands_nearer_than_the_picture_shows() -> None:
     box = Detection(label=Label.PERSON, confidence=0.9, box_xyxy=(0.45, 0.6, 0.55, 1.0))
-    grid = grid_of(seen(detections=(box,)))
+    grid = grid_of(observe_from(detections=(box,)))
     assert cell(grid, 1.4, 0.0) == "occupied"
 
 
 def test_no_water_at_the_bottom_is_something_at_the_bottom() -> None:
-    grid = grid_of(seen(edge=(1.0,) * 80))
+    grid = grid_of(observe_from(edge=(1.0,) * 80))
     assert not grid.free.any()
     assert cell(grid, 2.0, 0.0) == "occupied"
 
 
 def test_water_above_the_horizon_is_no_water() -> None:
     """A meadow read as water reaches above the horizon: its columns say nothing. Two degrees are forgiven."""
-    horizon = min(edge_of(AT_REST)) - 1 / 64
-    assert cell(grid_of(seen(edge=(horizon - 0.04,) * 80)), 4.0, 0.0) == "free"
-    assert not grid_of(seen(edge=(horizon - 0.12,) * 80)).free.any()
-    assert not grid_of(seen(edge=(0.0,) * 80)).free.any()
+    horizon = min(water_edge_of(AT_REST)) - 1 / 64
+    assert cell(grid_of(observe_from(edge=(horizon - 0.04,) * 80)), 4.0, 0.0) == "free"
+    assert not grid_of(observe_from(edge=(horizon - 0.12,) * 80)).free.any()
+    assert not grid_of(observe_from(edge=(0.0,) * 80)).free.any()
 
 
 @pytest.mark.parametrize("roll", [-0.15, 0.15])
 @pytest.mark.parametrize("pitch", [-0.03, 0.06])
 def test_roll_and_pitch_move_nothing_on_the_water(roll: float, pitch: float) -> None:
     boat = BoatPose(0.0, 0.0, 0.0, roll_rad=roll, pitch_rad=pitch)
-    grid = grid_of(seen(boat, edge_of(boat, AHEAD_5_M)))
+    grid = grid_of(observe_from(boat, water_edge_of(boat, AHEAD_5_M)))
     rows, columns = np.nonzero(grid.occupied)
     x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
     assert 4.2 < x_m.min() <= 5.1
@@ -315,20 +324,22 @@ def test_roll_and_pitch_move_nothing_on_the_water(roll: float, pitch: float) -> 
 
 def test_nothing_of_a_boat_that_sees_too_little_is_beside_it() -> None:
     """A camera that looks level, or from high up, is blind further than `blind_m`: unknown stays unknown."""
-    assert 1.9 < blind_reach_m(ASPECT, CAMERA, PLANNER) < 2.6
+    assert 1.9 < blind_zone_radius_m(ASPECT, CAMERA, PLANNER) < 2.6
     for sets in (["eye.pitch_down_deg=-30"], ["eye.camera_height_m=3"]):
         camera = Camera(calibration_of(load_config(sets=sets).eye))
-        assert blind_reach_m(ASPECT, camera, PLANNER) == 0.0
+        assert blind_zone_radius_m(ASPECT, camera, PLANNER) == 0.0
 
 
 def test_the_own_hull_hides_the_water_below_it() -> None:
     """Free begins above the hull's upper edge in each column."""
     hull = ((0.3, 1.0), (0.4, 0.8), (0.6, 0.8), (0.7, 1.0))
-    assert hull_top(hull, np.array([0.1, 0.35, 0.5, 0.9])) == pytest.approx([1.0, 0.9, 0.8, 1.0])
-    memory = seen()
-    now_us = memory.sights[-1].at_us
+    assert own_hull_top(hull, np.array([0.1, 0.35, 0.5, 0.9])) == pytest.approx([1.0, 0.9, 0.8, 1.0])
+    memory = observe_from()
+    now_us = memory.observations[-1].stamp_us
     camera = Camera(CAMERA.calibration, hull)
-    grid = lay(memory.sights, (0.0, 0.0), now_us, camera, msgspec.structs.replace(PLANNER, blind_m=0.0))
+    grid = build_occupancy_grid(
+        memory.observations, (0.0, 0.0), now_us, camera, msgspec.structs.replace(PLANNER, blind_m=0.0)
+    )
     assert cell(grid, 2.2, 0.0) == "unknown"
     assert cell(grid, 3.2, 0.0) == "free"
 

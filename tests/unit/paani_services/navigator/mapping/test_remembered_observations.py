@@ -10,18 +10,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.messages import Odometry, SegmentationSource, TimeBase
-from paani_services.navigator.mapping.observation import Memory, pose_at, remember, shows_water
-from paani_services.navigator.mapping.occupancy_grid import Grid, lay
+from paani_services.navigator.mapping.observation import (
+    ObservationMemory,
+    interpolate_pose,
+    is_free_space_evidence,
+    update_memory,
+)
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, edge_of, evidence, odometry, seen
+from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, evidence, observe_from, odometry, water_edge_of
 
 AHEAD_5_M = ((5.0, -1.0, 5.6, 1.0),)
 
 
-def grid_of(memory: Memory, age_s: float) -> Grid:
-    assert memory.here is not None
-    now_us = memory.sights[-1].at_us + round(age_s * 1e6)
-    return lay(memory.sights, (memory.here.x_m, memory.here.y_m), now_us, CAMERA, PLANNER)
+def grid_of(memory: ObservationMemory, age_s: float) -> OccupancyGrid:
+    assert memory.odom_pose is not None
+    now_us = memory.observations[-1].stamp_us + round(age_s * 1e6)
+    return build_occupancy_grid(
+        memory.observations, (memory.odom_pose.x_m, memory.odom_pose.y_m), now_us, CAMERA, PLANNER
+    )
 
 
 @pytest.mark.parametrize(
@@ -36,28 +43,30 @@ def grid_of(memory: Memory, age_s: float) -> Grid:
 )
 def test_what_is_no_free_space_evidence_is_not_remembered(changes: dict[str, object]) -> None:
     """F2: a fallback mask never frees a cell, nor does a recording or an unusable picture."""
-    shown = evidence(START_US, edge_of(AT_REST))
-    assert shows_water(shown)
-    assert not shows_water(msgspec.structs.replace(shown, **changes))
-    memory = remember(Memory(), odometry(START_US, AT_REST), msgspec.structs.replace(shown, **changes), PLANNER)
-    assert memory.sights == ()
+    shown = evidence(START_US, water_edge_of(AT_REST))
+    assert is_free_space_evidence(shown)
+    assert not is_free_space_evidence(msgspec.structs.replace(shown, **changes))
+    memory = update_memory(
+        ObservationMemory(), odometry(START_US, AT_REST), msgspec.structs.replace(shown, **changes), PLANNER
+    )
+    assert memory.observations == ()
 
 
 def test_a_picture_without_odometry_near_it_is_not_remembered() -> None:
     """Roll, pitch and place must be known within `max_pose_gap_s` of the picture."""
-    known = remember(Memory(), odometry(START_US, AT_REST), None, PLANNER)
+    known = update_memory(ObservationMemory(), odometry(START_US, AT_REST), None, PLANNER)
     gap_us = round(PLANNER.max_pose_gap_s * 1e6)
-    open_water = edge_of(AT_REST)
-    assert remember(known, None, evidence(START_US + gap_us, open_water), PLANNER).sights
-    assert not remember(known, None, evidence(START_US + gap_us + 1, open_water), PLANNER).sights
-    assert not remember(Memory(), None, evidence(START_US, open_water), PLANNER).sights
+    open_water = water_edge_of(AT_REST)
+    assert update_memory(known, None, evidence(START_US + gap_us, open_water), PLANNER).observations
+    assert not update_memory(known, None, evidence(START_US + gap_us + 1, open_water), PLANNER).observations
+    assert not update_memory(ObservationMemory(), None, evidence(START_US, open_water), PLANNER).observations
 
 
 def test_the_pose_between_two_odometries_lies_between_them() -> None:
-    memory = remember(Memory(), odometry(START_US, BoatPose(0.0, 0.0, 3.1)), None, PLANNER)
+    memory = update_memory(ObservationMemory(), odometry(START_US, BoatPose(0.0, 0.0, 3.1)), None, PLANNER)
     later = odometry(START_US + 100_000, BoatPose(0.0, 0.0, -3.1, pitch_rad=0.02), surge_mps=1.0)
-    memory = remember(memory, later, None, PLANNER)
-    pose = pose_at(memory.poses, START_US + 25_000, 0.15)
+    memory = update_memory(memory, later, None, PLANNER)
+    pose = interpolate_pose(memory.poses, START_US + 25_000, 0.15)
     assert pose is not None
     assert pose.x_m == pytest.approx(-0.025, abs=1e-4)
     assert pose.pitch_rad == pytest.approx(0.005)
@@ -66,13 +75,13 @@ def test_the_pose_between_two_odometries_lies_between_them() -> None:
 
 def test_what_was_seen_stays_where_it_is_while_gps_wanders() -> None:
     """The position strays by 3 m under a boat at rest, and jumps by 8: nothing seen is nearer or further for it."""
-    memory = seen(edge=edge_of(AT_REST, AHEAD_5_M))
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     before = grid_of(memory, age_s=1.5)
     for k in range(1, 16):
         stray = BoatPose(0.2 * k + (8.0 if k > 7 else 0.0), -0.1 * k, 0.0)
-        memory = remember(memory, odometry(START_US + 100_000 * k, stray), None, PLANNER)
-    assert memory.here is not None
-    assert (memory.here.x_m, memory.here.y_m) == (0.0, 0.0)
+        memory = update_memory(memory, odometry(START_US + 100_000 * k, stray), None, PLANNER)
+    assert memory.odom_pose is not None
+    assert (memory.odom_pose.x_m, memory.odom_pose.y_m) == (0.0, 0.0)
     assert before.occupied.any()
     assert (grid_of(memory, age_s=1.5).occupied == before.occupied).all()
 
@@ -81,16 +90,16 @@ def test_what_was_seen_stays_where_it_is_while_gps_wanders() -> None:
 @given(st.floats(-0.8, 0.8), st.floats(-0.3, 0.3), st.floats(-3.1, 3.1), st.floats(-0.3, 0.3))
 def test_the_way_over_ground_is_reckoned(surge: float, sway: float, yaw: float, rate: float) -> None:
     """Against the sum of what each twentieth of a second adds, over 5 s."""
-    memory = remember(Memory(), odometry(START_US, BoatPose(3.0, 4.0, yaw)), None, PLANNER)
+    memory = update_memory(ObservationMemory(), odometry(START_US, BoatPose(3.0, 4.0, yaw)), None, PLANNER)
     x_m, y_m = 3.0, 4.0
     for k in range(1, 101):
         heading = yaw + rate * 0.05 * k
         boat = BoatPose(0.0, 0.0, heading)
-        memory = remember(memory, odometry(START_US + 50_000 * k, boat, surge, sway_mps=sway), None, PLANNER)
+        memory = update_memory(memory, odometry(START_US + 50_000 * k, boat, surge, sway_mps=sway), None, PLANNER)
         x_m += 0.05 * (surge * math.cos(heading) - sway * math.sin(heading))
         y_m += 0.05 * (surge * math.sin(heading) + sway * math.cos(heading))
-    assert memory.here is not None
-    assert (memory.here.x_m, memory.here.y_m) == pytest.approx((x_m, y_m), abs=1e-6)
+    assert memory.odom_pose is not None
+    assert (memory.odom_pose.x_m, memory.odom_pose.y_m) == pytest.approx((x_m, y_m), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -102,10 +111,10 @@ def test_the_way_over_ground_is_reckoned(surge: float, sway: float, yaw: float, 
 )
 def test_another_epoch_or_a_gap_forgets_what_was_seen(after: Odometry) -> None:
     """The boat may be anywhere under the cells: unknown is the safe direction."""
-    assert remember(seen(), after, None, PLANNER).sights == ()
+    assert update_memory(observe_from(), after, None, PLANNER).observations == ()
 
 
 @pytest.mark.parametrize("changes", [{"surge_mps": math.nan}, {"sway_mps": math.inf}, {"healthy": False}])
 def test_odometry_that_is_unusable_is_no_way(changes: dict[str, float]) -> None:
-    memory = seen()
-    assert remember(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
+    memory = observe_from()
+    assert update_memory(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
