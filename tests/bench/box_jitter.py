@@ -22,7 +22,7 @@ from paani import messages as m
 from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
-from paani.statistics.figure_table import Part, part_text
+from paani.statistics.figure_table import FigureTable, table_text
 from paani_services.advisor.association import iou
 from paani_services.perception.pipeline import Perceiver
 from paani_sim.eye.camera import BoatPose, Camera
@@ -116,7 +116,7 @@ def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Genera
     return sights
 
 
-def jitter(found: list[list[Sight]]) -> Part:
+def jitter(found: list[list[Sight]]) -> FigureTable:
     """By size: how often the detector misses, and how far a box edge moves against the truth between two frames."""
     rows = []
     for low, high in itertools.pairwise(SIZES_PX):
@@ -140,7 +140,9 @@ def jitter(found: list[list[Sight]]) -> Part:
             round(edge_px, 2), round(100.0 * float(np.mean(grown > MISTAKEN)), 1), round(float(np.median(sure)), 2),
         ))  # fmt: skip
     columns = ("size px", "frames", "missed %", "edge px", "mistaken %", "confidence")
-    return Part(name="box jitter", columns=columns, rows=tuple(rows), note="edge: standard deviation of one box edge.")
+    return FigureTable(
+        name="box jitter", columns=columns, rows=tuple(rows), note="edge: standard deviation of one box edge."
+    )
 
 
 def judged(found: list[list[Sight]], profile: str, every: int) -> tuple[str, str, int, float, int]:
@@ -194,10 +196,10 @@ def _motions(sights: list[Sight], config: Config) -> list[m.MotionState]:
 def main(count: int) -> int:
     """Print both tables."""
     found = approaches(count)
-    sys.stdout.write(part_text(jitter(found)))
+    sys.stdout.write(table_text(jitter(found)))
     rows = tuple(judged(found, profile, every) for profile in ("paani", "paper") for every in (1, 2, 5, 10))
     columns = ("constants", "Hz", "closing", "known %", "wrong")
-    sys.stdout.write("\n" + part_text(Part(name="rendered approaches", columns=columns, rows=rows)))
+    sys.stdout.write("\n" + table_text(FigureTable(name="rendered approaches", columns=columns, rows=rows)))
     return 0
 
 

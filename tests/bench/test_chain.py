@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from paani.config import Config
-from paani_tools.bench.chain import Bench, text_of
+from paani_tools.bench.chain import Bench, chain_text
 from paani_tools.up.run_summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -29,6 +29,6 @@ def test_bench_chain(private_sets: tuple[str, ...]) -> None:
     assert set(figures["run"]["latency_ms"]) == set(STAGES)
     assert set(figures["run"]["services"]) == set(Config().services)
     assert figures["transport_over_inference"] > 0
-    text = text_of(msgspec.json.decode(result.stdout, type=Bench))
+    text = chain_text(msgspec.json.decode(result.stdout, type=Bench))
     assert all(stage in text for stage in STAGES)
     assert all(service in text for service in Config().services)

@@ -15,7 +15,7 @@ from paani_services.perception.corridors import classify, summarise
 from paani_services.perception.engine import OnnxEngine
 from paani_tools.bench.eyes import paper_shaped
 from paani_tools.bench.eyes.command import Eyes, main, text
-from paani_tools.bench.eyes.stages import Row, Step, measured, ratios, rows
+from paani_tools.bench.eyes.stages import Row, Step, measure_steps, ratios, rows
 from tests.pictures import river
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -50,7 +50,7 @@ def test_measured_runs_everything_in_turn() -> None:
 
     steps = {name: step(name) for name in ("a", "b")}
     ticks = iter(range(1000))
-    *_, (_, taken) = measured(steps, pictures, 3, lambda: float(next(ticks)))
+    *_, (_, taken) = measure_steps(steps, pictures, 3, lambda: float(next(ticks)))
     assert seen[:4] == [("a", seen[0][1]), ("b", seen[0][1]), ("a", seen[2][1]), ("b", seen[2][1])]
     assert seen[0][1] != seen[2][1]
     assert rows(taken) == (Row("a", 1.0, 1.0, 1.0, 3), Row("b", 1.0, 1.0, 1.0, 3))
@@ -64,7 +64,7 @@ def test_ratios_of_what_was_measured() -> None:
 
 def test_the_papers_shape_sees_what_perception_sees() -> None:
     """It is a fair comparison: the same networks, the same corridors, to the width of a cell."""
-    config, picture = CorridorConfig(), paper_shaped.stretched(river())
+    config, picture = CorridorConfig(), paper_shaped.stretch(river())
     ours = summarise(*classify(OnnxEngine.load("segmenter", "", 1).run(picture), 1.0), config)
     theirs = paper_shaped.lanes(OnnxEngine.load("segmenter", "", 1, whole=True).run(picture), config)
     for mine, (non_water, uncertainty, clear_width) in zip(ours, theirs, strict=True):
@@ -75,7 +75,7 @@ def test_the_papers_shape_sees_what_perception_sees() -> None:
     candidates[0, :, 0] = (100, 100, 50, 40, 0.9, 0, 0, 0)
     candidates[0, :, 1] = (102, 100, 50, 40, 0, 0.8, 0, 0)
     candidates[0, :, 2] = (200, 100, 50, 40, 0, 0.8, 0, 0)
-    assert [score for _, score in paper_shaped.boxes(candidates, DetectorConfig())] == pytest.approx([0.9, 0.8])
+    assert [score for _, score in paper_shaped.decode_boxes(candidates, DetectorConfig())] == pytest.approx([0.9, 0.8])
 
 
 def test_the_paper_runs_two_threads_within_a_step_and_one_between_c14_d11() -> None:

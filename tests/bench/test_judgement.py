@@ -12,8 +12,8 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.errors import UserError
-from paani.statistics.figure_table import Part, part_text
-from paani_tools.bench.judgement import BOXES, crowded
+from paani.statistics.figure_table import FigureTable, table_text
+from paani_tools.bench.judgement import BOXES, crowded_evidence
 from paani_tools.bench.steadiness import steadiness
 from tests.unit.paani.logs.small_logs import START_US, begin, put
 
@@ -56,7 +56,7 @@ def test_a_mistake_is_one_line(words: tuple[str, ...], named: str) -> None:
 
 def test_dithering_counts_a_recorded_drive_by_both_profiles(tmp_path: Path) -> None:
     log = begin(tmp_path)
-    for number, evidence in enumerate(crowded(40)):
+    for number, evidence in enumerate(crowded_evidence(40)):
         sent_us = START_US + number * 200_000
         stamped = m.Evidence(**{
             **{name: getattr(evidence, name) for name in evidence.__struct_fields__},
@@ -76,11 +76,11 @@ def test_dithering_counts_a_recorded_drive_by_both_profiles(tmp_path: Path) -> N
 
 
 def test_a_table_has_numbers_to_the_right() -> None:
-    part = Part(name="a", columns=("what", "n"), rows=(("x", 1.5), ("long", None)), note="b")
-    assert part_text(part) == "a\nwhat      n\nx     1.500\nlong      -\nb\n"
+    part = FigureTable(name="a", columns=("what", "n"), rows=(("x", 1.5), ("long", None)), note="b")
+    assert table_text(part) == "a\nwhat      n\nx     1.500\nlong      -\nb\n"
 
 
 def test_the_pictures_are_crowded_and_the_same_every_time() -> None:
-    first = list(crowded(30))
-    assert first == list(crowded(30))
+    first = list(crowded_evidence(30))
+    assert first == list(crowded_evidence(30))
     assert all(len(evidence.detections) == BOXES for evidence in first)

@@ -16,14 +16,14 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     transport_over_inference: float | None
 
 
-def bench_of(report: Report, machine: Machine) -> Bench:
+def chain_bench(report: Report, machine: Machine) -> Bench:
     """Combine one run with the state of the machine."""
     transport, inference = (report.latency_ms[stage].p50 for stage in ("transport", "inference"))
     ratio = round(transport / inference, 3) if transport is not None and inference else None
     return Bench(machine=machine, run=report, transport_over_inference=ratio)
 
 
-def text_of(bench: Bench) -> str:
+def chain_text(bench: Bench) -> str:
     """Two tables and three lines."""
     run, machine = bench.run, bench.machine
     lines = [

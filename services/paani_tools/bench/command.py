@@ -14,16 +14,16 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
 from paani.option_paths import output_file
-from paani.statistics.figure_table import Part, installed_commands, installed_parts, part_text
-from paani.statistics.measured import Machine, Report, measured
+from paani.statistics.figure_table import FigureTable, installed_commands, installed_tables, table_text
+from paani.statistics.measured import Machine, Report, measure_tables
 from paani.whole_file import write_whole
-from paani_tools.bench.chain import bench_of, text_of
+from paani_tools.bench.chain import chain_bench, chain_text
 from paani_tools.bench.judgement import contract, step
 from paani_tools.bench.recording_cost import recorder
 from paani_tools.bench.steadiness import steadiness
-from paani_tools.replay.speed import replay
+from paani_tools.replay.speed import measure_replay
 from paani_tools.up.command import seconds, up_sets
-from paani_tools.up.lifecycle import Outcome, drive
+from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.terminal import Display
 
@@ -70,8 +70,8 @@ def _chain(options: argparse.Namespace) -> int:
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
     outcome = asyncio.run(_run(options))
     machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
-    bench = bench_of(outcome.report, machine)
-    sys.stdout.write(msgspec.json.encode(bench).decode() + "\n" if options.json else "\n" + text_of(bench))
+    bench = chain_bench(outcome.report, machine)
+    sys.stdout.write(msgspec.json.encode(bench).decode() + "\n" if options.json else "\n" + chain_text(bench))
     if outcome.failure:
         sys.stderr.write(f"paani: {outcome.failure}\n")
         return 1
@@ -81,24 +81,24 @@ def _chain(options: argparse.Namespace) -> int:
 async def _run(options: argparse.Namespace) -> Outcome:
     sets = up_sets(world=options.world, camera=None, headless=True)
     plan = await make_plan(config_from(options, sets))
-    return await drive(plan, options.seconds, Display(sys.stderr if options.json else sys.stdout))
+    return await run_plan(plan, options.seconds, Display(sys.stderr if options.json else sys.stdout))
 
 
 def _judgement(options: argparse.Namespace) -> int:
     """Print each part as it is done. Raises UserError for a drive that cannot be read or a file not written."""
     config = config_from(options)
-    parts: dict[str, Callable[[], Part]] = {
+    parts: dict[str, Callable[[], FigureTable]] = {
         "step": lambda: step(config, options.frames),
         "contract": lambda: contract(config, options.frames),
     }
     if options.drive:
         parts["dithering"] = lambda: steadiness(options.drive)
-        parts["replay"] = lambda: replay(options.drive)
-    parts |= installed_parts()
+        parts["replay"] = lambda: measure_replay(options.drive)
+    parts |= installed_tables()
     for name in options.only:
         if name not in parts:
             raise UserError(f"--only {name}: no such part (have: {', '.join(parts)})")
-    report = measured(parts[name] for name in options.only or parts)
+    report = measure_tables(parts[name] for name in options.only or parts)
     if options.json:
         write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
     return 0
@@ -114,7 +114,7 @@ def _recorder(options: argparse.Namespace) -> int:
         sys.stderr.write(f"paani: {failure}\n")
         return 1
     machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
-    sys.stdout.write("\n" + part_text(part))
+    sys.stdout.write("\n" + table_text(part))
     sys.stdout.write(
         f"\n{machine.cores} cores, load {machine.load_before:.2f} before and {machine.load_after:.2f} after\n"
     )

@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.clock import stopwatch_ms
 from paani.config import Config, with_settings
 from paani.decider import Decider, Input, decider_of
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani.statistics.order_statistics import median, nearest_rank
 
 BOXES = 24  # C9
@@ -34,7 +34,7 @@ class Figures(msgspec.Struct):
     judged: list[int] = []
 
 
-def step(config: Config, frames: int) -> Part:
+def step(config: Config, frames: int) -> FigureTable:
     """The advisor's whole step on the same crowded pictures, three ways, one after another in each frame."""
     decider = decider_of("advisor")
     settings = {
@@ -44,7 +44,7 @@ def step(config: Config, frames: int) -> Part:
     }
     found = {name: Figures() for name in settings}
     states = {name: decider.state() for name in settings}
-    for number, evidence in enumerate(crowded(WARM_FRAMES + frames)):
+    for number, evidence in enumerate(crowded_evidence(WARM_FRAMES + frames)):
         for name in (FRAME, EXPLAINED, REPUBLISHED):
             if name == REPUBLISHED:
                 states[name] = states[EXPLAINED]
@@ -53,7 +53,7 @@ def step(config: Config, frames: int) -> Part:
                 found[name].ms.append(best_ms)
                 found[name].judged.append(0 if name == REPUBLISHED else said.counterfactual.judged)
     base_ms = median(found[FRAME].ms)
-    return Part(
+    return FigureTable(
         name=f"advisor step, {BOXES} boxes, {frames} frames",
         columns=("step", "p50 ms", "p95 ms", "p99 ms", "ratio of p50", "sets p50", "sets max"),
         rows=tuple(
@@ -70,7 +70,7 @@ def step(config: Config, frames: int) -> Part:
     )
 
 
-def contract(config: Config, rounds: int) -> Part:
+def contract(config: Config, rounds: int) -> FigureTable:
     """Typed JSON beside the paper's shape, JSON text inside a JSON string, for the same messages."""
     rows = []
     for message in _messages(config):
@@ -99,7 +99,7 @@ def contract(config: Config, rounds: int) -> Part:
             )
             for name in shapes
         ]
-    return Part(
+    return FigureTable(
         name=f"message as JSON, {BOXES} boxes, medians of {rounds}",
         columns=("message", "shape", "bytes", "encode us", "decode us", "bytes ratio", "time ratio"),
         rows=tuple(rows),
@@ -108,7 +108,7 @@ def contract(config: Config, rounds: int) -> Part:
     )
 
 
-def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
+def crowded_evidence(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
     """Evidence with 24 boxes that drift, a few of which come and go, in water of every kind."""
     rng = random.Random(seed)
     boxes = [_box(rng) for _ in range(BOXES)]
@@ -117,7 +117,7 @@ def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
         if number % STEADY_FRAMES == 0:
             boxes = [*boxes[REPLACED:], *(_box(rng) for _ in range(REPLACED))]
             lanes = tuple(m.LaneEvidence(non_water=rng.random() ** 2, uncertainty=0.2 * rng.random()) for _ in range(3))
-        boxes = [_drifted(box, rng) for box in boxes]
+        boxes = [_drifted_evidence(box, rng) for box in boxes]
         yield m.Evidence(
             source_us=START_US + number * PERIOD_US,
             frame_seq=number,
@@ -134,7 +134,7 @@ def crowded(frames: int, seed: int = 1) -> Iterator[m.Evidence]:
         )
 
 
-def _drifted(box: m.Detection, rng: random.Random) -> m.Detection:
+def _drifted_evidence(box: m.Detection, rng: random.Random) -> m.Detection:
     x1, y1, x2, y2 = box.box_xyxy
     dx, dy = rng.uniform(-DRIFT, DRIFT), rng.uniform(-DRIFT, DRIFT)
     dx, dy = min(max(dx, -x1), 1.0 - x2), min(max(dy, -y1), 1.0 - y2)
@@ -170,7 +170,7 @@ def _messages(config: Config) -> tuple[m.Message, ...]:
     decider = decider_of("advisor")
     state: Any = decider.state()
     said: tuple[m.Message, ...] = ()
-    for evidence in crowded(STEADY_FRAMES):
+    for evidence in crowded_evidence(STEADY_FRAMES):
         inputs = {topic.name: Input() for topic in decider.inputs} | {keys.EVIDENCE.name: Input(evidence)}
         state, outputs = decider.decide(state, inputs, evidence.source_us + AGE_US, config)
         said = (evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name])

@@ -11,10 +11,10 @@ from paani import keys
 from paani.cli import config_from
 from paani.logs.reader import open_log
 from paani.logs.writer import HEADER
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani_tools.logs.info import LogInfo, info_of
 from paani_tools.up.command import up_sets
-from paani_tools.up.lifecycle import Outcome, drive
+from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import Report
 from paani_tools.up.terminal import Display
@@ -23,23 +23,23 @@ PICTURES = ("camera.rate_hz=10", "eye.rate_hz=10", "perception.rate_hz=10")
 MIB = 2**20
 
 
-def recorder(options: argparse.Namespace, display: Display) -> tuple[Part, str]:
+def recorder(options: argparse.Namespace, display: Display) -> tuple[FigureTable, str]:
     """Drive for `options.seconds` and record it. Returns the figures, and why the drive failed (empty: it did not)."""
     with tempfile.TemporaryDirectory(prefix="paani-bench-") as folder:
         outcome = asyncio.run(_drive(options, Path(folder), display))
         if outcome.failure:
-            return Part(name="recorder", columns=("figure",), rows=()), outcome.failure
+            return FigureTable(name="recorder", columns=("figure",), rows=()), outcome.failure
         return figures(outcome.report, info_of(open_log(Path(folder)))), ""
 
 
-def figures(report: Report, info: LogInfo) -> Part:
+def figures(report: Report, info: LogInfo) -> FigureTable:
     """Side by side with the router, which carries the same messages without keeping them."""
     own, router = report.services["recorder"], report.services["router"]
     topics = {topic.topic: topic for topic in info.topics}
     pictures = topics.get(keys.PICTURE.name)
     heard = [topic for topic in info.topics if not topic.topic.startswith("viewer/")]
     bus = sum(topic.rate_hz for topic in heard if not topic.topic.endswith(HEADER))
-    return Part(
+    return FigureTable(
         name="recorder",
         columns=("figure", "value"),
         rows=(
@@ -59,4 +59,4 @@ def figures(report: Report, info: LogInfo) -> Part:
 
 async def _drive(options: argparse.Namespace, folder: Path, display: Display) -> Outcome:
     sets = (*up_sets(world=None, camera=None, headless=True, record=folder), *PICTURES)
-    return await drive(await make_plan(config_from(options, sets)), options.seconds, display)
+    return await run_plan(await make_plan(config_from(options, sets)), options.seconds, display)

@@ -15,7 +15,7 @@ from paani.decider import Input, decider_of
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.statistics.dithering import dithering
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 
 STEP_US = 200_000  # J17: between pictures the advice is given again
 PROMPT_US = 100_000  # from picture to evidence: a machine that was busy while recording is not the policy's doing
@@ -24,7 +24,7 @@ STEADYING = ("advisor.policy.release_margin", "advisor.policy.side_change_margin
 WITHOUT = tuple(f"{path}=0" for path in STEADYING)
 
 
-def steadiness(drives: list[Path]) -> Part:
+def steadiness(drives: list[Path]) -> FigureTable:
     """Every drive judged by `paper`, by `paani`, and by `paani` without what steadies it. Raises UserError."""
     settings = {
         "paper": load_config(profile="paper"),
@@ -42,7 +42,7 @@ def steadiness(drives: list[Path]) -> Part:
                 drive.name, name, round(found.seconds), found.changes, found.interruptions, found.side_flips,
                 found.stop_go_flips, found.changes_per_min, found.side_flips_per_min, found.stop_go_flips_per_min,
             ))  # fmt: skip
-    return Part(
+    return FigureTable(
         name="dithering",
         columns=(
             "drive",

@@ -9,8 +9,8 @@ from paani.config import CalibrationConfig
 from paani.errors import UserError
 from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
-from paani_tools.calibrate.gather import heard_live, looks, recorded
-from paani_tools.calibrate.mount import Mount, mount_of
+from paani_tools.calibrate.gather import collect_live, collect_recorded, waterline_observations
+from paani_tools.calibrate.mount import Mount, estimate_mount
 
 MAX_SECONDS = 3600.0
 
@@ -25,20 +25,20 @@ def main(argv: list[str]) -> int:
         if getattr(config.calibration, name) <= 0.0:
             raise UserError(f"calibration.{name} is not known (--set calibration.{name}=...)")
     if options.live is not None:
-        heard = asyncio.run(heard_live(config.bus, options.live))
+        heard = asyncio.run(collect_live(config.bus, options.live))
     else:
-        heard = recorded(options.recording)
-    mount = mount_of(looks(*heard), config.calibration, options.shore_m)
+        heard = collect_recorded(options.recording)
+    mount = estimate_mount(waterline_observations(*heard), config.calibration, options.shore_m)
     sys.stdout.write(
         f"pitch_down_deg {mount.pitch_down_deg:.2f}, roll_deg {mount.roll_deg:.2f}; {mount.pictures} pictures,"
         f" {mount.spread_deg:.2f} degrees between them, {mount.residual_deg:.2f} between columns\n"
     )
     if options.out is not None:
-        write_whole(options.out, fragment(config.calibration, mount).encode(), "--out")
+        write_whole(options.out, calibration_toml(config.calibration, mount).encode(), "--out")
     return 0
 
 
-def fragment(calibration: CalibrationConfig, mount: Mount) -> str:
+def calibration_toml(calibration: CalibrationConfig, mount: Mount) -> str:
     """The section as TOML, for `paani up --config`."""
     centre = ", ".join(f"{part:g}" for part in calibration.centre_frac)
     return (

@@ -17,8 +17,8 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.messages import Evidence, Message, Odometry, TimeBase
-from paani_tools.calibrate.horizon import waterline
-from paani_tools.calibrate.mount import Look
+from paani_tools.calibrate.horizon import fit_waterline
+from paani_tools.calibrate.mount import WaterlineObservation
 from paani_tools.inspect.listen import observer
 from paani_tools.progress import Progress
 
@@ -28,11 +28,11 @@ MAX_PICTURES = 2000
 SEED = 1
 DEPTH = 1024
 SHOW_S = 0.25
-Heard = tuple[list[Evidence], list[Odometry]]
+Collected = tuple[list[Evidence], list[Odometry]]
 T = TypeVar("T", bound=Message)
 
 
-def recorded(path: Path) -> Heard:
+def collect_recorded(path: Path) -> Collected:
     """What a recording holds of both. Raises UserError naming the file and what it lacks."""
     log = open_log(path)
     evidence: list[Evidence] = []
@@ -53,10 +53,10 @@ def recorded(path: Path) -> Heard:
     return evidence, odometry
 
 
-async def heard_live(bus_config: BusConfig, seconds: float) -> Heard:
+async def collect_live(bus_config: BusConfig, seconds: float) -> Collected:
     """What comes over the bus in that time. Raises UserError where nothing listens or something does not come."""
     async with observer(bus_config) as bus:
-        heard: Heard = ([], [])
+        heard: Collected = ([], [])
         tasks = [
             asyncio.create_task(_collect(bus.queue(keys.EVIDENCE, DEPTH), heard[0])),
             asyncio.create_task(_collect(bus.queue(keys.ODOMETRY, DEPTH), heard[1])),
@@ -74,7 +74,7 @@ async def heard_live(bus_config: BusConfig, seconds: float) -> Heard:
     return heard
 
 
-def looks(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[Look]:
+def waterline_observations(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[WaterlineObservation]:
     """Waterlines of live pictures with the attitude heard within 0.1 s of each, boat slow; at most MAX_PICTURES.
 
     Raises UserError when the attitude is missing throughout.
@@ -88,15 +88,15 @@ def looks(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[Lo
     chosen = list(frames.values())[:: max(1, len(frames) // MAX_PICTURES)]
     rng = np.random.default_rng(SEED)
     stamps = [o.source_us for o in attitudes]
-    found: list[Look] = []
+    found: list[WaterlineObservation] = []
     for frame in chosen:
         at = bisect_left(stamps, frame.source_us)
         nearest = min(attitudes[max(0, at - 1) : at + 1], key=lambda o: abs(o.source_us - frame.source_us))
         if abs(nearest.source_us - frame.source_us) > MAX_GAP_US or abs(nearest.surge_mps) > MAX_SPEED_MPS:
             continue
-        line = waterline(frame, rng)
+        line = fit_waterline(frame, rng)
         if line is not None:
-            found.append(Look(line, nearest.roll_rad, nearest.pitch_rad))
+            found.append(WaterlineObservation(line, nearest.roll_rad, nearest.pitch_rad))
     return found
 
 

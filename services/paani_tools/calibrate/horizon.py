@@ -25,7 +25,7 @@ class Waterline(NamedTuple):
     rows: int
 
 
-def waterline(evidence: Evidence, rng: np.random.Generator) -> Waterline | None:
+def fit_waterline(evidence: Evidence, rng: np.random.Generator) -> Waterline | None:
     """The line by random sample consensus; None where no line holds half of the columns.
 
     What stands before the shore ends the water lower, and a hole in the mask higher: both are left out.

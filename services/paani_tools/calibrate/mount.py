@@ -20,7 +20,7 @@ MIN_MOTION_ROWS = 0.3  # standard deviation of where the line lies in the rows o
 MIN_SHORE_HEIGHTS = 40.0  # a shore nearer than this many camera heights lies 1.4 degrees below the horizon, or more
 
 
-class Look(NamedTuple):
+class WaterlineObservation(NamedTuple):
     """One waterline, and the boat's roll and pitch when it was seen [rad]."""
 
     line: Waterline
@@ -38,14 +38,18 @@ class Mount(NamedTuple):
     pictures: int
 
 
-def mount_of(looks: Sequence[Look], calibration: CalibrationConfig, shore_m: float) -> Mount:
+def estimate_mount(
+    observations: Sequence[WaterlineObservation], calibration: CalibrationConfig, shore_m: float
+) -> Mount:
     """The mount that puts every waterline where a shore `shore_m` away lies, `atan(height / shore)` below the horizon.
 
     calibration: field of view, centre, height and yaw of the mount; its pitch and roll are where the search begins.
     Raises UserError when the pictures are too few or do not agree.
     """
-    if len(looks) < MIN_PICTURES:
-        raise UserError(f"{len(looks)} pictures show a straight far waterline; at least {MIN_PICTURES} are needed")
+    if len(observations) < MIN_PICTURES:
+        raise UserError(
+            f"{len(observations)} pictures show a straight far waterline; at least {MIN_PICTURES} are needed"
+        )
     if shore_m < MIN_SHORE_HEIGHTS * calibration.height_m:
         raise UserError(
             f"--shore-m {shore_m:g}: too near for a camera at {calibration.height_m:g} m"
@@ -54,44 +58,50 @@ def mount_of(looks: Sequence[Look], calibration: CalibrationConfig, shore_m: flo
     dip_rad = math.atan(calibration.height_m / shore_m)
     found = np.radians([calibration.pitch_down_deg, calibration.roll_deg])
     for _ in range(ROUNDS):
-        off, slopes = _with_slopes(looks, calibration, found, dip_rad)
+        off, slopes = _with_slopes(observations, calibration, found, dip_rad)
         weights = 1.0 / np.maximum(np.abs(off), np.radians(0.5))  # a far-off column counts less
         found = found - np.linalg.lstsq(slopes * weights[:, None], off * weights, rcond=None)[0]
         if np.abs(found).max() > math.radians(MAX_TILT_DEG):
             raise UserError("the waterlines and the IMU do not agree on any mount")
-    off = _off(looks, calibration, found, dip_rad)
-    ends = np.cumsum([look.line.u.size for look in looks])[:-1]
+    off = _off(observations, calibration, found, dip_rad)
+    ends = np.cumsum([look.line.u.size for look in observations])[:-1]
     between = np.degrees([part.mean() for part in np.split(off, ends)])
     mount = Mount(
         pitch_down_deg=math.degrees(found[0]),
         roll_deg=math.degrees(found[1]),
         spread_deg=float(between.std()),
         residual_deg=float(np.degrees(off.std())),
-        pictures=len(looks),
+        pictures=len(observations),
     )
     if mount.spread_deg > MAX_SPREAD_DEG:
         raise UserError(
             f"the pictures do not agree: {mount.spread_deg:.2f} degrees between them, {MAX_SPREAD_DEG:g} are allowed"
         )
-    moved = np.concatenate([look.line.v * look.line.rows for look in looks]).std()
+    moved = np.concatenate([look.line.v * look.line.rows for look in observations]).std()
     if moved < MIN_MOTION_ROWS:
         raise UserError("the boat lay too still to tell more than a row of the mask: let it rock, or turn it")
     return mount
 
 
-def _with_slopes(looks: Sequence[Look], calibration: CalibrationConfig, tilt: F64, dip_rad: float) -> tuple[F64, F64]:
+def _with_slopes(
+    observations: Sequence[WaterlineObservation], calibration: CalibrationConfig, tilt: F64, dip_rad: float
+) -> tuple[F64, F64]:
     """Residuals [n] and their slopes over pitch and roll [n, 2]."""
-    off = _off(looks, calibration, tilt, dip_rad)
+    off = _off(observations, calibration, tilt, dip_rad)
     steps = np.eye(2) * STEP_RAD
-    return off, np.column_stack([(_off(looks, calibration, tilt + step, dip_rad) - off) / STEP_RAD for step in steps])
+    return off, np.column_stack(
+        [(_off(observations, calibration, tilt + step, dip_rad) - off) / STEP_RAD for step in steps]
+    )
 
 
-def _off(looks: Sequence[Look], calibration: CalibrationConfig, tilt: F64, dip_rad: float) -> F64:
+def _off(
+    observations: Sequence[WaterlineObservation], calibration: CalibrationConfig, tilt: F64, dip_rad: float
+) -> F64:
     """How far each end of the water lies above where the shore should, as an angle [rad]."""
     focal = 0.5 / math.tan(0.5 * math.radians(calibration.hfov_deg))
     mount = _rotation(tilt[1], tilt[0], math.radians(calibration.yaw_deg))
     found = []
-    for look in looks:
+    for look in observations:
         right = (look.line.u - calibration.centre_frac[0]) / focal
         down = (look.line.v - calibration.centre_frac[1]) / (focal * look.line.aspect)
         ray = np.stack([np.ones_like(right), -right, -down])

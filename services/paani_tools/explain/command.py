@@ -16,8 +16,8 @@ from paani.errors import UserError
 from paani.logs.reader import Log, open_log
 from paani.option_paths import input_path, output_file
 from paani_tools.explain.moment import Moment, last_change_us, moment_at
-from paani_tools.explain.narrative import story_of
-from paani_tools.look.annotate import annotated
+from paani_tools.explain.narrative import narrative_of
+from paani_tools.look.annotate import annotate_picture
 from paani_tools.replay.compatibility import provenance_of
 
 DAY_US = 86_400_000_000
@@ -38,7 +38,7 @@ def main(argv: list[str]) -> int:
     log = open_log(options.file)
     config = provenance_of(log, force=True).config
     moment = moment_at(log, last_change_us(log) if options.at is None else time_us(options.at, log))
-    sys.stdout.write(story_of(moment, config))
+    sys.stdout.write(narrative_of(moment, config))
     if options.picture is not None:
         _write(options.picture, picture_of(log, moment, config.perception.corridors))
     return 0
@@ -66,7 +66,7 @@ def picture_of(log: Log, moment: Moment, corridors: CorridorConfig) -> NDArray[n
     if moment.mask is not None:
         mask = cv2.imdecode(np.frombuffer(moment.mask.data, np.uint8), cv2.IMREAD_GRAYSCALE)
         mask = mask if mask is not None and mask.max() <= 2 else None
-    return annotated(
+    return annotate_picture(
         np.asarray(bgr, np.uint8),
         None if mask is None else np.asarray(mask, np.uint8),
         moment.evidence,

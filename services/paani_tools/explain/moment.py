@@ -10,7 +10,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.errors import UserError
-from paani.logs.pictures import RecordedPicture, paired
+from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log
 
 BEFORE_US, AFTER_US = 5_000_000, 3_000_000  # where the rest of a decision is looked for
@@ -123,7 +123,7 @@ def _pictures(log: Log, frame: tuple[int, int], near_us: int) -> Iterator[Record
     topics = [keys.PICTURE.name, keys.MASK.name]
     names = [*topics, *(f"{name}/header" for name in topics)]
     decoder = msgspec.json.Decoder(m.PictureHeader)
-    for item in paired(log.records(names, near_us - BEFORE_US, near_us + AFTER_US), topics):
+    for item in paired_pictures(log.records(names, near_us - BEFORE_US, near_us + AFTER_US), topics):
         if isinstance(item, RecordedPicture):
             try:
                 header = decoder.decode(item.header)

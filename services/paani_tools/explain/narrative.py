@@ -29,7 +29,7 @@ LIMITS = {
 INDENT = 12
 
 
-def story_of(moment: Moment, config: Config) -> str:
+def narrative_of(moment: Moment, config: Config) -> str:
     """The whole story, one paragraph for each process."""
     lines = [_title(moment), ""]
     for name, told in (

@@ -14,7 +14,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import BusConfig
 from paani_tools.inspect.listen import is_up, messages, observer, rates
-from paani_tools.inspect.topic_table import markdown, plain, topic_named
+from paani_tools.inspect.topic_table import topic_named, topics_markdown, topics_text
 
 COUNT_S = 3.0
 
@@ -25,7 +25,7 @@ def topics(argv: list[str]) -> int:
     parser.add_argument("--markdown", action="store_true", help="as the contract's README shows it")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
-    text = markdown() if options.markdown else plain(asyncio.run(_live_rates(config_from(options).bus)))
+    text = topics_markdown() if options.markdown else topics_text(asyncio.run(_live_rates(config_from(options).bus)))
     sys.stdout.write(text)
     return 0
 

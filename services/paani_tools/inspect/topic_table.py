@@ -12,7 +12,7 @@ from paani.errors import UserError
 HEAD = ("topic", "type", "producer", "rate [Hz]", "fresh [s]", "travels as", "what it is")
 
 
-def rows() -> list[tuple[str, ...]]:
+def topic_rows() -> list[tuple[str, ...]]:
     """One row of text for each topic, in the order of the table."""
     return [
         (t.name, t.type.__name__, t.producer, f"{t.rate_hz:g}", f"{t.fresh_s:g}", t.stance.value, t.summary)
@@ -20,17 +20,17 @@ def rows() -> list[tuple[str, ...]]:
     ]
 
 
-def markdown() -> str:
+def topics_markdown() -> str:
     """The table in Markdown, as the contract's README shows it."""
     lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
-    lines += ["| `" + row[0] + "` | " + " | ".join(row[1:]) + " |" for row in rows()]
+    lines += ["| `" + row[0] + "` | " + " | ".join(row[1:]) + " |" for row in topic_rows()]
     return "\n".join(lines) + "\n"
 
 
-def plain(live_hz: Mapping[str, float] | None) -> str:
+def topics_text(live_hz: Mapping[str, float] | None) -> str:
     """The table in columns, with the rates measured now when there is a bus."""
     head: tuple[str, ...] = HEAD
-    body = rows()
+    body = topic_rows()
     if live_hz is not None:
         head = (*HEAD[:4], "now [Hz]", *HEAD[4:])
         body = [(*row[:4], f"{live_hz[row[0]]:.1f}", *row[4:]) for row in body]

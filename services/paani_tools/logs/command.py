@@ -14,7 +14,7 @@ from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
 from paani.option_paths import input_path, output_file, output_folder
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
-from paani_tools.logs.info import info_of, list_text, text_of
+from paani_tools.logs.info import info_of, info_text, list_text
 from paani_tools.progress import Progress
 
 
@@ -33,8 +33,8 @@ def main(argv: list[str]) -> int:
 def _info(path: Path, *, as_json: bool) -> int:
     log = open_log(path)
     with Progress("reading") as progress:
-        info = info_of(log, Along(log, progress))
-    sys.stdout.write(msgspec.json.encode(info).decode() + "\n" if as_json else text_of(info))
+        info = info_of(log, ReadProgress(log, progress))
+    sys.stdout.write(msgspec.json.encode(info).decode() + "\n" if as_json else info_text(info))
     for problem in info.problems:
         sys.stderr.write(f"paani: {problem}\n")
     return 1 if info.problems else 0
@@ -63,7 +63,7 @@ def _export(options: argparse.Namespace) -> int:
     log = open_log(options.path)
     for export, path in wanted:
         with Progress(path.name) as progress:
-            told = export(log, path, Along(log, progress))
+            told = export(log, path, ReadProgress(log, progress))
         sys.stdout.write(told + "\n")
     for problem in log.problems:
         sys.stderr.write(f"{problem}\n")
@@ -79,7 +79,7 @@ def _list(folder: Path) -> int:
     return 0
 
 
-class Along:
+class ReadProgress:
     """Shows how far the reading of a log is."""
 
     def __init__(self, log: Log, progress: Progress) -> None:

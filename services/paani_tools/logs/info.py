@@ -62,7 +62,7 @@ class Manifest(msgspec.Struct):
     models: tuple[Model, ...] = ()
 
 
-class Heard:
+class ChannelTimes:
     """First, last and longest silence of one channel."""
 
     def __init__(self, at_us: int) -> None:
@@ -70,7 +70,7 @@ class Heard:
         self.gap_us = 0
         self.messages = 1
 
-    def hear(self, at_us: int) -> None:
+    def add(self, at_us: int) -> None:
         self.gap_us = max(self.gap_us, at_us - self.last_us)
         self.last_us = at_us
         self.messages += 1
@@ -78,14 +78,14 @@ class Heard:
 
 def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> LogInfo:
     """Reads all of it. `seen` is told every record, for whoever shows progress."""
-    heard: dict[str, Heard] = {}
-    directions = Directions()
+    channels: dict[str, ChannelTimes] = {}
+    directions = DirectionChanges()
     for record in log.records():
         seen(record)
-        if record.topic in heard:
-            heard[record.topic].hear(record.log_us)
+        if record.topic in channels:
+            channels[record.topic].add(record.log_us)
         else:
-            heard[record.topic] = Heard(record.log_us)
+            channels[record.topic] = ChannelTimes(record.log_us)
         if record.topic == keys.ADVISORY.name:
             directions.take(record.data)
     duration_s = (log.end_us - log.start_us) * 1e-6
@@ -108,7 +108,7 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
                 dropped=_sum(DROPPED, lost, name),
                 missing=_sum(MISSING, lost, name),
             )
-            for name, one in sorted(heard.items())
+            for name, one in sorted(channels.items())
         ),
         advisories=directions.advisories,
         direction_changes_per_min=round(60 * directions.changes / duration_s, 2) if directions.advisories else None,
@@ -116,7 +116,7 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
     )
 
 
-class Directions:
+class DirectionChanges:
     """Counts how often the advised direction becomes another."""
 
     def __init__(self) -> None:
@@ -135,12 +135,12 @@ class Directions:
         self.advisories += 1
 
 
-def text_of(info: LogInfo) -> str:
+def info_text(info: LogInfo) -> str:
     """A page for a terminal."""
     version = info.versions
     lines = [
         f"{info.path}: {info.files} {'file' if info.files == 1 else 'files'}, {info.size_bytes / MIB:.1f} MiB",
-        f"{moment(info.start_us)}, {info.duration_s:.1f} s",
+        f"{utc_text(info.start_us)}, {info.duration_s:.1f} s",
         ", ".join(f"{name} {text}" for name, text in info.facts.items()),
         f"paani {version.get('paani', '?')}, commit {version.get('commit') or '?'}",
         f"Python {version.get('python', '?')}, {version.get('platform', '?')}",
@@ -166,7 +166,7 @@ def list_text(folder: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def moment(at_us: int) -> str:
+def utc_text(at_us: int) -> str:
     """A stamp in words."""
     return datetime.datetime.fromtimestamp(at_us * 1e-6, tz=datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 

@@ -1,1 +1,1 @@
-"""Judging pictures at the desk: the boat's own eyes and judgement, without bus or simulator."""
+"""Judging pictures at the desk: the boat's own eyes and verdict, without bus or simulator."""

@@ -19,7 +19,7 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 ADVICE_COLOURS = {Direction.STRAIGHT: FREE, Direction.STOP: BLOCKED, Direction.NO_DATA: BLOCKED}
 
 
-def annotated(bgr: U8, mask: U8 | None, evidence: Evidence, advisory: Advisory, corridors: CorridorConfig) -> U8:
+def annotate_picture(bgr: U8, mask: U8 | None, evidence: Evidence, advisory: Advisory, corridors: CorridorConfig) -> U8:
     """The picture, 800 px wide, with mask tint, corridors, boxes, and the advice below it.
 
     bgr: uint8 [H, W, 3]. mask: uint8 classes (0 water, 1 obstacle, 2 sky) of any size, or None.
@@ -84,12 +84,12 @@ def _banner(evidence: Evidence, advisory: Advisory) -> U8:
         reason += f" ({evidence.cause.replace('_', ' ')})"
     (width, _), _ = cv2.getTextSize(reason, FONT, 0.7, 1)
     cv2.putText(banner, reason, (WIDTH_PX - width - MARGIN_PX, 40), FONT, 0.7, INK, 1, cv2.LINE_AA)
-    for i, line in enumerate(wrapped(advisory.explanation, TEXT_SCALE, WIDTH_PX - 2 * MARGIN_PX)[:3]):
+    for i, line in enumerate(wrap_text(advisory.explanation, TEXT_SCALE, WIDTH_PX - 2 * MARGIN_PX)[:3]):
         cv2.putText(banner, line, (MARGIN_PX, 80 + i * LINE_PX), FONT, TEXT_SCALE, INK, 1, cv2.LINE_AA)
     return banner
 
 
-def wrapped(text: str, scale: float, width_px: int) -> list[str]:
+def wrap_text(text: str, scale: float, width_px: int) -> list[str]:
     """Lines of whole words, none drawn wider than `width_px` unless a single word is."""
     lines: list[str] = []
     for word in text.split():

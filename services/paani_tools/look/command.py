@@ -15,9 +15,9 @@ from paani.messages import Detection, Direction, LaneRisk, Reason, Text, Unit, U
 from paani.option_paths import input_path, output_file, output_folder
 from paani.whole_file import write_whole
 from paani_services.perception.pipeline import Perceiver
-from paani_tools.look.annotate import annotated
+from paani_tools.look.annotate import annotate_picture
 from paani_tools.look.contact_sheet import ContactSheet
-from paani_tools.look.verdict import Judgement, judged
+from paani_tools.look.verdict import Verdict, judge_path
 
 EPOCHS_PER_PATH = 1_000_000
 DEFAULT_OUT = Path("runs/look")
@@ -31,7 +31,7 @@ class Lanes(msgspec.Struct, frozen=True):
     right: LaneRisk
 
 
-class Brief(msgspec.Struct, frozen=True):
+class JsonLine(msgspec.Struct, frozen=True):
     """One line of `--json`: these fields, in this order. `risk` is left, centre, right; boxes are normalised xyxy."""
 
     path: Text
@@ -60,26 +60,26 @@ def main(argv: list[str]) -> int:
     shown = 0
     try:
         for index, path in enumerate(options.paths):
-            for judgement in judged(path, index * EPOCHS_PER_PATH, perceiver, config):
+            for verdict in judge_path(path, index * EPOCHS_PER_PATH, perceiver, config):
                 shown += 1
-                sys.stdout.write(json_line(judgement) if options.json else readable_line(judgement))
-                if (out or options.sheet) and judgement.bgr is not None:
-                    picture = annotated(
-                        judgement.bgr,
-                        judgement.mask,
-                        judgement.evidence,
-                        judgement.advisory,
+                sys.stdout.write(json_line(verdict) if options.json else readable_line(verdict))
+                if (out or options.sheet) and verdict.bgr is not None:
+                    picture = annotate_picture(
+                        verdict.bgr,
+                        verdict.mask,
+                        verdict.evidence,
+                        verdict.advisory,
                         config.perception.corridors,
                     )
                     if out is not None:
-                        _save(out / file_name(judgement.name, taken), picture)
+                        _save(out / file_name(verdict.name, taken), picture)
                     if options.sheet is not None:
                         sheet.add(picture)
-                _progress(f"{shown}  {judgement.advisory.direction:12}  {judgement.name[-60:]}")
+                _progress(f"{shown}  {verdict.advisory.direction:12}  {verdict.name[-60:]}")
     finally:
         perceiver.close()
         _progress(None)
-    if options.sheet is not None and (drawn := sheet.drawn()) is not None:
+    if options.sheet is not None and (drawn := sheet.compose()) is not None:
         write_whole(options.sheet, cv2.imencode(options.sheet.suffix, drawn)[1].tobytes(), "--sheet")
     if out is not None and sys.stderr.isatty():
         sys.stderr.write(f"{shown} judged, annotated pictures in {out}\n")
@@ -98,28 +98,28 @@ def file_name(name: str, taken: set[str]) -> str:
     raise AssertionError("count never ends")
 
 
-def readable_line(judgement: Judgement) -> str:
+def readable_line(verdict: Verdict) -> str:
     """One line for people: picture, direction, reason (and what is wrong with the picture), risks, why in words."""
-    advice, evidence = judgement.advisory, judgement.evidence
+    advice, evidence = verdict.advisory, verdict.evidence
     reason = advice.reason.value if evidence.usable else f"{advice.reason.value} ({evidence.cause.value})"
     risks = " ".join(f"{lane.risk:.2f}" for lane in (advice.left, advice.center, advice.right))
     shown = risks if evidence.usable else "-"
-    return f"{judgement.name}  {advice.direction.value:<12}  {reason}  risk {shown}  {advice.explanation}\n"
+    return f"{verdict.name}  {advice.direction.value:<12}  {reason}  risk {shown}  {advice.explanation}\n"
 
 
-def json_line(judgement: Judgement) -> str:
-    """One line for programs: `Brief`."""
-    advice = judgement.advisory
+def json_line(verdict: Verdict) -> str:
+    """One line for programs: `JsonLine`."""
+    advice = verdict.advisory
     lanes = (advice.left, advice.center, advice.right)
-    line = Brief(
-        path=judgement.name,
-        usable=judgement.evidence.usable,
-        cause=judgement.evidence.cause,
+    line = JsonLine(
+        path=verdict.name,
+        usable=verdict.evidence.usable,
+        cause=verdict.evidence.cause,
         direction=advice.direction,
         reason=advice.reason,
         risk=(lanes[0].risk, lanes[1].risk, lanes[2].risk),
         lanes=Lanes(*lanes),
-        detections=judgement.evidence.detections,
+        detections=verdict.evidence.detections,
         explanation=advice.explanation,
     )
     return msgspec.json.encode(line).decode() + "\n"

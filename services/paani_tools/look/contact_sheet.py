@@ -29,7 +29,7 @@ class ContactSheet:
             self._kept.append(np.asarray(small, np.uint8))
         self._seen += 1
 
-    def drawn(self) -> U8 | None:
+    def compose(self) -> U8 | None:
         """The sheet, uint8 [H, W, 3]; None where nothing was added."""
         if not self._kept:
             return None

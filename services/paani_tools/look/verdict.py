@@ -17,7 +17,7 @@ PRESENTATIONS, PRESENTATION_US = 8, 100_000  # U8: a still is shown eight times 
 START_US = 1_000_000
 
 
-class Judgement(NamedTuple):
+class Verdict(NamedTuple):
     """One frame, what was seen in it (mask None when unusable), the advice, and the advisor's memory after it."""
 
     name: str
@@ -29,7 +29,7 @@ class Judgement(NamedTuple):
     state: AdvisorState
 
 
-def judged(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> Iterator[Judgement]:
+def judge_path(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> Iterator[Verdict]:
     """Judge every frame of a picture, folder or video.
 
     epoch: the first of this path's; every still has its own, a video one. A still is looked at once and
@@ -44,12 +44,12 @@ def judged(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> Iter
         if moving:
             evidence, mask = _perceive(perceiver, frame, epoch, number)
             state, advisory, tracks = advise(state, evidence, evidence.source_us, config)
-            yield Judgement(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
+            yield Verdict(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
         else:
-            yield judged_still(frame, epoch + number, perceiver, config, number)
+            yield judge_still(frame, epoch + number, perceiver, config, number)
 
 
-def judged_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config, number: int = 0) -> Judgement:
+def judge_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config, number: int = 0) -> Verdict:
     """One still on its own, looked at once and presented to a fresh advisor eight times."""
     evidence, mask = _perceive(perceiver, frame, epoch, number)
     state, advisory, tracks = advise(AdvisorState(), evidence, evidence.source_us, config)
@@ -62,7 +62,7 @@ def judged_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config,
             frame_seq=evidence.frame_seq + shown,
         )
         state, advisory, tracks = advise(state, again, stamp_us, config)
-    return Judgement(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
+    return Verdict(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)
 
 
 def _perceive(perceiver: Perceiver, frame: Frame, epoch: int, number: int) -> tuple[Evidence, U8 | None]:

@@ -13,11 +13,11 @@ from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
 from paani_tools.replay.difference import Difference, first_difference
-from paani_tools.replay.recompute import Again, Excuse, Losses, Recompute
+from paani_tools.replay.recompute import ExpectedGap, Losses, Recomputation, RecomputedStep
 
 SHOWN = 20
 
-OnAgain = Callable[[Again], None]
+StepCallback = Callable[[RecomputedStep], None]
 
 
 class Unexplained(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,40 +63,40 @@ def check_service(
     config: Config,
     records: Iterable[Record],
     losses: Losses,
-    on_again: OnAgain | None = None,
+    on_step: StepCallback | None = None,
 ) -> ServiceCheck:
     """Compute every step of one service again and compare.
 
     records: those of `Ledger(decider).topics`. digest: SHA-256 of all bytes computed.
     """
-    recompute = Recompute(decider, config, losses, evolve=False)
+    recompute = Recomputation(decider, config, losses, evolve=False)
     ledger = recompute.ledger
     result = ServiceCheck(service=decider.service)
     causes: collections.Counter[str] = collections.Counter()
     differences: list[Difference] = []
     digest = hashlib.sha256()
-    for again in recompute.steps(records):
+    for step in recompute.steps(records):
         result.steps += 1
-        if on_again is not None:
-            on_again(again)
-        if again.missing_before:
-            causes["steps are not in the log"] += again.missing_before
-        if again.skip is not None:
-            if again.excuse is Excuse.START:
+        if on_step is not None:
+            on_step(step)
+        if step.missing_before:
+            causes["steps are not in the log"] += step.missing_before
+        if step.skip is not None:
+            if step.excuse is ExpectedGap.START:
                 result.before_start += 1
-            elif again.excuse is Excuse.LOST:
+            elif step.excuse is ExpectedGap.LOST:
                 result.lost += 1
             else:
-                causes[again.skip + (f" ({again.detail})" if again.detail else "")] += 1
+                causes[step.skip + (f" ({step.detail})" if step.detail else "")] += 1
             continue
-        differs = again.state_same is False
-        result.states += again.state_same is not None
+        differs = step.state_same is False
+        result.states += step.state_same is not None
         result.differing_states += differs
-        for sent, recorded, computed in again.outputs:
+        for sent, recorded, computed in step.outputs:
             digest.update(computed)
             if recorded is None:
                 early = ledger.precedes(sent.topic, sent.epoch, sent.seq)
-                if early or losses.at_edge(again.given.log_us):
+                if early or losses.at_edge(step.given.log_us):
                     result.at_edges += 1
                 elif recompute.is_lost(sent.topic):
                     result.lost += 1
@@ -109,8 +109,8 @@ def check_service(
                 differs = True
                 result.differing_messages += 1
                 if len(differences) < SHOWN:
-                    differences.append(first_difference(again.given.step.source_us, sent, recorded, computed))
-        result.decisions += bool(again.outputs) or differs
+                    differences.append(first_difference(step.given.step.source_us, sent, recorded, computed))
+        result.decisions += bool(step.outputs) or differs
         result.differ += differs
     orphans: collections.Counter[str] = collections.Counter()
     for log_us, (topic, _, _) in ledger.orphans:

@@ -21,7 +21,7 @@ from paani.whole_file import write_whole
 from paani_tools.progress import Progress
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.report_text import change_text, check_text
-from paani_tools.replay.republish import Republishing, replay_config, republish, topics_of
+from paani_tools.replay.republish import RepublishOptions, replay_config, republish, topics_of
 from paani_tools.replay.verify import ChangeReport, CheckReport, change_log, check_log
 
 ROUTER = "bus.router=tcp/127.0.0.1:7448"  # beside the live bus
@@ -56,7 +56,7 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
     for text in options.sets:
         if not text.startswith(LISTENING):
             raise UserError(f"--set {text}: a republished drive takes only bus and dashboard settings (see --check)")
-    what = Republishing(
+    what = RepublishOptions(
         from_s=options.from_s,
         to_s=options.to_s,
         speed=options.speed,
@@ -87,7 +87,7 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
     return 0
 
 
-async def _until_told(log: Log, config: Config, what: Republishing, progress: Progress) -> str:
+async def _until_told(log: Log, config: Config, what: RepublishOptions, progress: Progress) -> str:
     """Republish; a signal ends it in order."""
     work = asyncio.create_task(republish(log, config, what, progress.at))
     loop = asyncio.get_running_loop()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from paani import messages as m
 
 
-def words(message: m.Message) -> str:
+def decision_text(message: m.Message) -> str:
     """What is decided; empty for a message that only carries numbers."""
     match message:
         case m.Advisory():
@@ -19,7 +19,7 @@ def words(message: m.Message) -> str:
     return ""
 
 
-def why(message: m.Message) -> str:
+def reason_text(message: m.Message) -> str:
     """The reason in words, where the message has one."""
     match message:
         case m.Advisory():

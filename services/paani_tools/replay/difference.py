@@ -24,7 +24,7 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
     computed: str
 
 
-def first_difference(at_us: int, sent: m.SentMessage, recorded: bytes, computed: bytes) -> Difference:
+def first_difference(at_us: int, sent: m.OutputMessage, recorded: bytes, computed: bytes) -> Difference:
     """Name the first differing field of two payloads that are not the same bytes."""
     field, before, now = next(
         differing_fields(recorded, computed), ("(bytes)", f"{len(recorded)} bytes", f"{len(computed)} bytes")

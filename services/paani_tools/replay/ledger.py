@@ -21,11 +21,11 @@ KEEP_US = 60_000_000
 FORGET_EVERY_US = 1_000_000
 LATE_US = 3_000_000  # messages of one moment reach the recorder in any order within this
 
-Name = tuple[str, int, int]  # topic, epoch, seq
-NOTHING: Mapping[Name, bytes] = types.MappingProxyType({})
+MessageId = tuple[str, int, int]  # topic, epoch, seq
+NO_PAYLOADS: Mapping[MessageId, bytes] = types.MappingProxyType({})
 
 
-class Given(NamedTuple):
+class RecordedStep(NamedTuple):
     """One step. `inputs` is None where `lacks` says why.
 
     absent: topics of the messages that it had heard and the log has not, but for those sent before the log began;
@@ -39,7 +39,7 @@ class Given(NamedTuple):
     lacks: str
     absent: tuple[str, ...]
     early: bool
-    sent: tuple[tuple[m.SentMessage, bytes | None], ...]
+    sent: tuple[tuple[m.OutputMessage, bytes | None], ...]
 
 
 class _Head(msgspec.Struct):
@@ -47,7 +47,7 @@ class _Head(msgspec.Struct):
     seq: int
 
 
-class _Held:
+class _StoredMessage:
     __slots__ = ("claimed", "data", "log_us")
 
     def __init__(self, data: bytes, log_us: int) -> None:
@@ -62,7 +62,7 @@ class Ledger:
     malformed: messages without a readable header, by topic.
     """
 
-    def __init__(self, decider: Decider[Any], instead: Mapping[Name, bytes] = NOTHING) -> None:
+    def __init__(self, decider: Decider[Any], instead: Mapping[MessageId, bytes] = NO_PAYLOADS) -> None:
         self._instead = instead
         self.step_topic = keys.STEPS[decider.service].name
         heard = (*decider.inputs, *decider.own)
@@ -70,17 +70,17 @@ class Ledger:
         self._empty = {topic.name: Input() for topic in decider.inputs}
         self._outputs = {topic.name for topic in decider.outputs}
         self.topics = frozenset((self.step_topic, *self._decoders, *self._outputs))
-        self.orphans: list[tuple[int, Name]] = []
+        self.orphans: list[tuple[int, MessageId]] = []
         self.malformed: collections.Counter[str] = collections.Counter()
-        self._messages: dict[Name, _Held] = {}
-        self._order: collections.deque[Name] = collections.deque()
+        self._messages: dict[MessageId, _StoredMessage] = {}
+        self._order: collections.deque[MessageId] = collections.deque()
         self._forget_us = 0
         self._newest_heard: dict[str, tuple[int, int, Any]] = {}
         self._first: dict[str, dict[int, int]] = {}  # topic: epoch: first seq recorded
         self._claimed: dict[tuple[str, int], tuple[int, int]] = {}  # (topic, epoch): lowest and highest seq
-        self._unclaimed: list[tuple[int, Name]] = []
+        self._unclaimed: list[tuple[int, MessageId]] = []
 
-    def steps(self, records: Iterable[Record]) -> Iterator[Given]:
+    def steps(self, records: Iterable[Record]) -> Iterator[RecordedStep]:
         """Every step in the order recorded, each a few seconds of log later than it came."""
         waiting: collections.deque[tuple[int, m.Step]] = collections.deque()
         head, step_decoder = msgspec.json.Decoder(_Head), msgspec.json.Decoder(m.Step)
@@ -91,7 +91,7 @@ class Ledger:
                     waiting.append((log_us, step_decoder.decode(data)))
                 else:
                     name = head.decode(data)
-                    self._keep((topic, name.epoch, name.seq), _Held(data, log_us))
+                    self._keep((topic, name.epoch, name.seq), _StoredMessage(data, log_us))
             except (msgspec.MsgspecError, UnicodeDecodeError):
                 self.malformed[topic] += 1
             while waiting and waiting[0][0] + LATE_US <= log_us:
@@ -109,7 +109,7 @@ class Ledger:
         first = self._first.get(topic, {})
         return seq < first[epoch] if epoch in first else bool(first) and epoch < min(first)
 
-    def _given(self, log_us: int, step: m.Step) -> Given:
+    def _given(self, log_us: int, step: m.Step) -> RecordedStep:
         sent = []
         for message in step.sent:
             held = self._messages.get((message.topic, message.epoch, message.seq))
@@ -133,11 +133,11 @@ class Ledger:
             elif not self.precedes(heard.topic, heard.epoch, heard.seq):
                 absent.append(heard.topic)
         early = bool(lacks) and not absent and not undecodable
-        return Given(
+        return RecordedStep(
             log_us, step, None if lacks else inputs, lacks, () if undecodable else tuple(absent), early, tuple(sent)
         )
 
-    def _message(self, heard: m.HeardMessage) -> tuple[Any, str]:
+    def _message(self, heard: m.InputMessage) -> tuple[Any, str]:
         """The message that was heard, or why there is none."""
         last = self._newest_heard.get(heard.topic)
         if last is not None and last[:2] == (heard.epoch, heard.seq):
@@ -153,7 +153,7 @@ class Ledger:
         self._newest_heard[heard.topic] = heard.epoch, heard.seq, message
         return message, ""
 
-    def _keep(self, name: Name, held: _Held) -> None:
+    def _keep(self, name: MessageId, held: _StoredMessage) -> None:
         """Note a message; of two with one name the first counts."""
         if name in self._messages:
             return
@@ -174,7 +174,7 @@ class Ledger:
             if name[0] in self._outputs and not held.claimed:
                 self._unclaimed.append((held.log_us, name))
 
-    def _is_between(self, name: Name) -> bool:
+    def _is_between(self, name: MessageId) -> bool:
         topic, epoch, seq = name
         low, high = self._claimed.get((topic, epoch), (0, -1))
         return low < seq < high

@@ -12,10 +12,10 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
-from paani_tools.replay.ledger import LATE_US, NOTHING, Given, Ledger, Name
+from paani_tools.replay.ledger import LATE_US, NO_PAYLOADS, Ledger, MessageId, RecordedStep
 
 
-class Skip(StrEnum):
+class SkipReason(StrEnum):
     """Why a step cannot be computed again."""
 
     BEFORE_STATE = "before the first state in the log"
@@ -25,7 +25,7 @@ class Skip(StrEnum):
     FAILED = "the decider failed"
 
 
-class Excuse(StrEnum):
+class ExpectedGap(StrEnum):
     """Why it is right that a step cannot be computed again."""
 
     START = "the log begins later than what it needs"
@@ -45,23 +45,23 @@ class Losses(NamedTuple):
         )
 
 
-class Again(NamedTuple):
+class RecomputedStep(NamedTuple):
     """One step, computed again: what each sent message was, and what it is now; or why it is not.
 
     state_same: whether the state before it is the recorded one; None where none is recorded.
     missing_before: steps just before it that are not in the log, without excuse.
     """
 
-    given: Given
-    outputs: tuple[tuple[m.SentMessage, bytes | None, bytes], ...] = ()
-    skip: Skip | None = None
+    given: RecordedStep
+    outputs: tuple[tuple[m.OutputMessage, bytes | None, bytes], ...] = ()
+    skip: SkipReason | None = None
     detail: str = ""
-    excuse: Excuse | None = None
+    excuse: ExpectedGap | None = None
     state_same: bool | None = None
     missing_before: int = 0
 
 
-class Recompute:
+class Recomputation:
     """`steps` goes through the records once.
 
     evolve: settings are changed, so a recorded state is only taken up at the start and after a break.
@@ -75,7 +75,7 @@ class Recompute:
         losses: Losses,
         *,
         evolve: bool,
-        instead: Mapping[Name, bytes] = NOTHING,
+        instead: Mapping[MessageId, bytes] = NO_PAYLOADS,
     ) -> None:
         self.ledger = Ledger(decider, instead)
         self._decider, self._config, self._evolve = decider, config, evolve
@@ -83,15 +83,15 @@ class Recompute:
         self._encoder = msgspec.json.Encoder()
         self._states = msgspec.json.Decoder(type(decider.state()))
         self._state: Any = None
-        self._reason = Skip.BEFORE_STATE
-        self._excuse: Excuse | None = Excuse.START
+        self._reason = SkipReason.BEFORE_STATE
+        self._excuse: ExpectedGap | None = ExpectedGap.START
         self._last: m.Step | None = None
         self._lost = dict(losses.counted)
         self._losses = losses
         self._last_us = 0
         self.lost_steps = 0
 
-    def steps(self, records: Iterable[Record]) -> Iterator[Again]:
+    def steps(self, records: Iterable[Record]) -> Iterator[RecomputedStep]:
         """Every step that the log has, in order."""
         for given in self.ledger.steps(records):
             last, step = self._last, given.step
@@ -103,15 +103,15 @@ class Recompute:
                 begun = any(last_us < start_us <= given.log_us for start_us, _ in self._losses.recordings)
                 same = step.epoch == last.epoch
                 missing = step.seq - (last.seq + 1 if same else 0)
-                excuse = Excuse.START if begun else None
+                excuse = ExpectedGap.START if begun else None
                 if missing and not begun and self.is_lost(self.ledger.step_topic, missing):
-                    excuse, self.lost_steps = Excuse.LOST, self.lost_steps + missing
+                    excuse, self.lost_steps = ExpectedGap.LOST, self.lost_steps + missing
                 if not same:  # the process began again
-                    self._state, self._reason, self._excuse = None, Skip.AFTER_BREAK, excuse
+                    self._state, self._reason, self._excuse = None, SkipReason.AFTER_BREAK, excuse
                 elif missing:
-                    self._lose(Skip.AFTER_BREAK, excuse)
+                    self._lose(SkipReason.AFTER_BREAK, excuse)
                 missing = missing if excuse is None else 0
-            yield self._again(given)._replace(missing_before=missing)
+            yield self._recompute(given)._replace(missing_before=missing)
 
     def is_lost(self, topic: str, count: int = 1) -> bool:
         """Whether the recorder has counted as many more messages of a topic as lost."""
@@ -120,37 +120,37 @@ class Recompute:
         self._lost[topic] = self._lost.get(topic, 0) - count
         return True
 
-    def _again(self, given: Given) -> Again:
+    def _recompute(self, given: RecordedStep) -> RecomputedStep:
         step, same = given.step, None
         if step.state:
             try:
                 recorded = self._states.decode(step.state)
             except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-                self._lose(Skip.STATE_UNREADABLE, None)
-                return Again(given, skip=Skip.STATE_UNREADABLE, detail=str(error))
+                self._lose(SkipReason.STATE_UNREADABLE, None)
+                return RecomputedStep(given, skip=SkipReason.STATE_UNREADABLE, detail=str(error))
             if self._state is not None and not self._evolve:
                 same = self._encoder.encode(self._state).decode() == step.state
             if self._state is None or not self._evolve:
                 self._state = recorded
         if self._state is None:
-            return Again(given, skip=self._reason, excuse=self._excuse)
+            return RecomputedStep(given, skip=self._reason, excuse=self._excuse)
         if given.inputs is None:
-            excuse = Excuse.START if given.early or self._losses.at_edge(given.log_us) else None
+            excuse = ExpectedGap.START if given.early or self._losses.at_edge(given.log_us) else None
             if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
-                excuse = Excuse.LOST
-            self._lose(Skip.AFTER_BREAK, excuse)
-            return Again(given, skip=Skip.LACKS_INPUT, detail=given.lacks, excuse=excuse)
+                excuse = ExpectedGap.LOST
+            self._lose(SkipReason.AFTER_BREAK, excuse)
+            return RecomputedStep(given, skip=SkipReason.LACKS_INPUT, detail=given.lacks, excuse=excuse)
         try:
             self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
             compared = tuple(
                 (sent, recorded, self._encoded(sent, outputs[sent.topic])) for sent, recorded in given.sent
             )
         except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
-            self._lose(Skip.AFTER_BREAK, None)
-            return Again(given, skip=Skip.FAILED, detail=f"{type(error).__name__}: {error}")
-        return Again(given, compared, state_same=same)
+            self._lose(SkipReason.AFTER_BREAK, None)
+            return RecomputedStep(given, skip=SkipReason.FAILED, detail=f"{type(error).__name__}: {error}")
+        return RecomputedStep(given, compared, state_same=same)
 
-    def _encoded(self, sent: m.SentMessage, message: m.Message) -> bytes:
+    def _encoded(self, sent: m.OutputMessage, message: m.Message) -> bytes:
         """As the bus would have sent it, with the header that the step has kept."""
         return self._encoder.encode(
             msgspec.structs.replace(
@@ -163,6 +163,6 @@ class Recompute:
             )
         )
 
-    def _lose(self, reason: Skip, excuse: Excuse | None) -> None:
+    def _lose(self, reason: SkipReason, excuse: ExpectedGap | None) -> None:
         """The state is not known any more, until the next one recorded."""
         self._state, self._reason, self._excuse = None, reason, excuse

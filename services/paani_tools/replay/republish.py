@@ -21,9 +21,9 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, encode_config
 from paani.errors import UserError
-from paani.logs.pictures import RecordedPicture, paired
+from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log, Record
-from paani_tools.replay.shift import Shift
+from paani_tools.replay.shift import TimeShift
 
 # Whoever hears these may move a boat or change how it is guided.
 COMMANDS = frozenset({keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name})
@@ -36,7 +36,7 @@ OnProgress = Callable[[float], None]
 Item = Record | RecordedPicture
 
 
-class Republishing(msgspec.Struct, frozen=True, kw_only=True):
+class RepublishOptions(msgspec.Struct, frozen=True, kw_only=True):
     """What to republish: seconds since the log's start, how fast, which topics (None: all), whether commands too."""
 
     from_s: float = 0.0
@@ -48,7 +48,7 @@ class Republishing(msgspec.Struct, frozen=True, kw_only=True):
     dashboard: bool = False
 
 
-class Republished(msgspec.Struct, frozen=True, kw_only=True):
+class RepublishResult(msgspec.Struct, frozen=True, kw_only=True):
     """What was republished. late_ms: how late messages were, median and 95th percentile."""
 
     messages: int
@@ -56,7 +56,7 @@ class Republished(msgspec.Struct, frozen=True, kw_only=True):
     late_ms: tuple[float, float]
 
 
-def topics_of(log: Log, what: Republishing) -> list[keys.Topic[Any]]:
+def topics_of(log: Log, what: RepublishOptions) -> list[keys.Topic[Any]]:
     """The topics of the log that will be republished. Raises UserError for one that is not there."""
     known: dict[str, keys.Topic[Any]] = {topic.name: topic for topic in keys.TOPICS}
     for service in keys.SERVICES:
@@ -87,7 +87,7 @@ def replay_config(config: Config, log: Log) -> Config:
     )
 
 
-async def republish(log: Log, config: Config, what: Republishing, on_progress: OnProgress) -> Republished:
+async def republish(log: Log, config: Config, what: RepublishOptions, on_progress: OnProgress) -> RepublishResult:
     """Run the router and republish until the end, or until cancelled.
 
     Raises UserError when the router's address is taken, or a service that could move a boat joins the bus.
@@ -114,7 +114,7 @@ class Player:
         log: Log,
         topics: list[keys.Topic[Any]],
         buses: dict[str, Bus],
-        what: Republishing,
+        what: RepublishOptions,
         on_progress: OnProgress,
     ) -> None:
         self._log, self._what, self._on_progress = log, what, on_progress
@@ -130,7 +130,7 @@ class Player:
         self._late_ms: list[float] = []
         self._messages = 0
 
-    async def play(self) -> Republished:
+    async def play(self) -> RepublishResult:
         """All passes, the first a moment from now."""
         what, log = self._what, self._log
         from_us = log.start_us + round(what.from_s * 1e6)
@@ -140,22 +140,22 @@ class Player:
         epoch_ms = (begin_us - log.start_us) // 1000
         passes = 0
         while passes == 0 or what.loop:
-            shift = Shift(
+            shift = TimeShift(
                 from_us, begin_us, what.speed, epoch_ms + passes * (log.end_us - log.start_us) // 1000 + passes
             )
             await self._pass(shift, from_us, to_us)
             passes += 1
             begin_us = max(begin_us + round(span_us / what.speed), self._clock.now_us())
         late = sorted(self._late_ms) or [0.0]
-        return Republished(
+        return RepublishResult(
             messages=self._messages, passes=passes, late_ms=(late[len(late) // 2], late[int(len(late) * 0.95)])
         )
 
-    async def _pass(self, shift: Shift, from_us: int, to_us: int) -> None:
+    async def _pass(self, shift: TimeShift, from_us: int, to_us: int) -> None:
         names = [*self._publishers, *(f"{name}/header" for name in self._pictures)]
-        items = paired(self._log.records(names, from_us, to_us), self._pictures)
+        items = paired_pictures(self._log.records(names, from_us, to_us), self._pictures)
         async for item in _read_ahead(items):
-            due_us = shift.moved_us(item.log_us)
+            due_us = shift.shift_us(item.log_us)
             wait_us = due_us - self._clock.now_us()
             if wait_us > 0:
                 await asyncio.sleep(wait_us * 1e-6)
@@ -164,13 +164,13 @@ class Player:
             self._on_progress((item.log_us - from_us) / max(1, to_us - from_us))
         del self._late_ms[:-100_000]
 
-    def _publish(self, item: Item, shift: Shift) -> None:
+    def _publish(self, item: Item, shift: TimeShift) -> None:
         publisher = self._publishers[item.topic]
         if isinstance(item, Record):
-            publisher.forward(shift.moved(item.data))
+            publisher.forward(shift.shift_message(item.data))
         elif isinstance(publisher, PicturePublisher):
             with contextlib.suppress(msgspec.MsgspecError):  # of another version
-                publisher.forward_picture(self._header.decode(shift.moved(item.header)), item.data)
+                publisher.forward_picture(self._header.decode(shift.shift_message(item.header)), item.data)
         self._messages += 1
 
 
@@ -196,7 +196,7 @@ async def _opened(stack: contextlib.AsyncExitStack, config: Config, user: str) -
     return bus
 
 
-async def _unless_moving(observer: Bus, work: Coroutine[Any, Any, Republished]) -> Republished:
+async def _unless_moving(observer: Bus, work: Coroutine[Any, Any, RepublishResult]) -> RepublishResult:
     """Await the work; stop it when something that can move a boat joins this bus."""
 
     async def mover() -> str:

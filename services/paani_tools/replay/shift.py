@@ -17,7 +17,7 @@ STAMP = re.compile(rb'(_us\\*":)(\d{16})(?!\d)')
 EPOCH = re.compile(rb'(epoch\\*":)(\d{13})(?!\d)')
 
 
-class Shift(msgspec.Struct, frozen=True):
+class TimeShift(msgspec.Struct, frozen=True):
     """Recorded time `from_us` is replayed at `to_us`, `speed` times as fast. Epochs grow by `epoch_ms`."""
 
     from_us: int
@@ -25,13 +25,13 @@ class Shift(msgspec.Struct, frozen=True):
     speed: float
     epoch_ms: int
 
-    def moved_us(self, stamp_us: int) -> int:
+    def shift_us(self, stamp_us: int) -> int:
         """The replayed time of a recorded one."""
         if self.speed == 1.0:
             return stamp_us - self.from_us + self.to_us
         return self.to_us + round((stamp_us - self.from_us) / self.speed)
 
-    def moved(self, data: bytes) -> bytes:
+    def shift_message(self, data: bytes) -> bytes:
         """A message in JSON, moved."""
-        data = STAMP.sub(lambda found: found[1] + b"%d" % max(0, self.moved_us(int(found[2]))), data)
+        data = STAMP.sub(lambda found: found[1] + b"%d" % max(0, self.shift_us(int(found[2]))), data)
         return EPOCH.sub(lambda found: found[1] + b"%d" % (int(found[2]) + self.epoch_ms), data)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from paani.clock import process_cpu_s
 from paani.logs.reader import open_log
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.verify import check_log
 
 
-def replay(drives: Iterable[Path]) -> Part:
+def measure_replay(drives: Iterable[Path]) -> FigureTable:
     """Check each recording once. Raises UserError for one that cannot be read."""
     rows = []
     for path in drives:
@@ -32,7 +32,7 @@ def replay(drives: Iterable[Path]) -> Part:
                 report.differ,
             )
         )
-    return Part(
+    return FigureTable(
         name="replay --check",
         columns=("drive", "log [s]", "took [s]", "x real time", "x real time, own CPU", "decisions", "differ"),
         rows=tuple(rows),

@@ -13,9 +13,9 @@ from paani.config import Config, with_settings
 from paani.decider import Decider, deciders
 from paani.logs.reader import Log
 from paani_tools.progress import Progress
-from paani_tools.replay.check import OnAgain, ServiceCheck, check_service
-from paani_tools.replay.ledger import Ledger, Name
-from paani_tools.replay.recompute import Again, Losses
+from paani_tools.replay.check import ServiceCheck, StepCallback, check_service
+from paani_tools.replay.ledger import Ledger, MessageId
+from paani_tools.replay.recompute import Losses, RecomputedStep
 from paani_tools.replay.whatif import ServiceChanges, changes_of
 
 
@@ -95,7 +95,7 @@ def change_log(
     began_ms = stopwatch_ms()
     changed, losses = with_settings(config, sets), losses_of(log)
     chosen = _installed(log)
-    instead: dict[Name, bytes] = {}
+    instead: dict[MessageId, bytes] = {}
     with Progress("deciding") as progress:
         services = tuple(
             changes_of(
@@ -127,9 +127,9 @@ def _installed(log: Log) -> list[Decider[Any]]:
     return [installed[name] for name in keys.STEPS if name in found and name in installed]
 
 
-def _shown(progress: Progress, log: Log, service: str, number: int, total: int) -> OnAgain:
-    def show(again: Again) -> None:
-        done = (again.given.log_us - log.start_us) / max(1, log.end_us - log.start_us)
+def _shown(progress: Progress, log: Log, service: str, number: int, total: int) -> StepCallback:
+    def show(step: RecomputedStep) -> None:
+        done = (step.given.log_us - log.start_us) / max(1, log.end_us - log.start_us)
         progress.at((number + done) / total, service)
 
     return show

@@ -11,11 +11,11 @@ import msgspec
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
-from paani_tools.replay.check import OnAgain
-from paani_tools.replay.decision_text import why, words
+from paani_tools.replay.check import StepCallback
+from paani_tools.replay.decision_text import decision_text, reason_text
 from paani_tools.replay.difference import differing_fields
-from paani_tools.replay.ledger import Name
-from paani_tools.replay.recompute import Losses, Recompute
+from paani_tools.replay.ledger import MessageId
+from paani_tools.replay.recompute import Losses, Recomputation
 
 GAP_US = 1_000_000  # changed decisions further apart are two episodes
 SHOWN_FIELDS = 6
@@ -52,8 +52,8 @@ def changes_of(
     records: Iterable[Record],
     start_us: int,
     losses: Losses,
-    instead: dict[Name, bytes],
-    on_again: OnAgain | None = None,
+    instead: dict[MessageId, bytes],
+    on_step: StepCallback | None = None,
 ) -> ServiceChanges:
     """Decide everything again with `config`, on the recorded inputs; the state evolves from the first one recorded,
     and from the next one after a break.
@@ -65,12 +65,12 @@ def changes_of(
     episodes: list[Episode] = []
     fields: collections.Counter[str] = collections.Counter()
     messages = changed = numbers = skipped = 0
-    for again in Recompute(decider, config, losses, evolve=True, instead=instead).steps(records):
-        if on_again is not None:
-            on_again(again)
-        skipped += again.skip is not None
-        at_s = (again.given.step.source_us - start_us) * 1e-6
-        for sent, recorded, computed in again.outputs:
+    for step in Recomputation(decider, config, losses, evolve=True, instead=instead).steps(records):
+        if on_step is not None:
+            on_step(step)
+        skipped += step.skip is not None
+        at_s = (step.given.step.source_us - start_us) * 1e-6
+        for sent, recorded, computed in step.outputs:
             if recorded is None:
                 continue
             messages += 1
@@ -82,13 +82,16 @@ def changes_of(
             except msgspec.MsgspecError:
                 skipped += 1
                 continue
-            if words(before) == words(now):
+            if decision_text(before) == decision_text(now):
                 numbers += 1
                 fields.update(path.partition("[")[0] for path, _, _ in differing_fields(recorded, computed))
                 continue
             changed += 1
             episode = open_episodes.get(sent.topic)
-            same = episode is not None and (episode.recorded, episode.computed) == (words(before), words(now))
+            same = episode is not None and (episode.recorded, episode.computed) == (
+                decision_text(before),
+                decision_text(now),
+            )
             if episode is not None and same and at_s - episode.end_s <= GAP_US * 1e-6:
                 episode.end_s, episode.decisions = at_s, episode.decisions + 1
                 continue
@@ -97,10 +100,10 @@ def changes_of(
                 start_s=at_s,
                 end_s=at_s,
                 decisions=1,
-                recorded=words(before),
-                computed=words(now),
-                recorded_why=why(before),
-                computed_why=why(now),
+                recorded=decision_text(before),
+                computed=decision_text(now),
+                recorded_why=reason_text(before),
+                computed_why=reason_text(now),
             )
             episodes.append(open_episodes[sent.topic])
     return ServiceChanges(

@@ -14,9 +14,9 @@ from paani.messages import Text
 from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
 from paani_services.perception.pipeline import Perceiver
-from paani_tools.look.verdict import PRESENTATION_US, PRESENTATIONS, Judgement
+from paani_tools.look.verdict import PRESENTATION_US, PRESENTATIONS, Verdict
 from paani_tools.progress import Progress
-from paani_tools.scenario.stills import Row, Skipped, Stale, probed, row_of, shown, stills_of
+from paani_tools.scenario.stills import Row, Skipped, Stale, present_still, probe_stale, row_of, stills_of
 from paani_tools.scenario.stills_table import families_table, stills_table
 from paani_tools.scenario.trajectories import Family, families
 
@@ -68,12 +68,12 @@ def main(argv: list[str]) -> int:
 def stills_report(paths: list[Path], config: Config) -> StillsReport:
     """Show every picture and the black one. Raises UserError as `main` does."""
     stills = stills_of(paths)
-    judgements: list[Judgement] = []
+    judgements: list[Verdict] = []
     skipped: list[Skipped] = []
     perceiver = Perceiver(config.perception, stopwatch_ms)
     try:
         with Progress("scenario") as progress:
-            for number, found in enumerate(shown(stills, perceiver, config)):
+            for number, found in enumerate(present_still(stills, perceiver, config)):
                 progress.at(number / (len(stills) + 1))
                 if isinstance(found, Skipped):
                     skipped.append(found)
@@ -88,7 +88,7 @@ def stills_report(paths: list[Path], config: Config) -> StillsReport:
         models=judgements[-1].evidence.models,
         confidence_threshold=config.perception.detections.confidence,
         rows=tuple(row_of(judgement) for judgement in judgements),
-        stale=probed(judgements, config),
+        stale=probe_stale(judgements, config),
         skipped=tuple(skipped),
     )
 

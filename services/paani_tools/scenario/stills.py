@@ -23,7 +23,7 @@ from paani.messages import (
 from paani_services.advisor.advise import advise
 from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, pictures_in
 from paani_services.perception.pipeline import Perceiver
-from paani_tools.look.verdict import Judgement, judged, judged_still
+from paani_tools.look.verdict import Verdict, judge_path, judge_still
 
 STALE_AGE_S = 9.3  # V16
 MIN_PROBES = 5  # V16
@@ -87,24 +87,24 @@ def stills_of(paths: list[Path]) -> list[tuple[Path, bool]]:
     return found
 
 
-def shown(stills: list[tuple[Path, bool]], perceiver: Perceiver, config: Config) -> Iterator[Judgement | Skipped]:
+def present_still(stills: list[tuple[Path, bool]], perceiver: Perceiver, config: Config) -> Iterator[Verdict | Skipped]:
     """Each still judged alone, the black picture last.
 
     Raises UserError naming a file that was asked for itself and is no picture; one among others in a folder is skipped.
     """
     for epoch, (file, named) in enumerate(stills):
         try:
-            yield from judged(file, epoch, perceiver, config)
+            yield from judge_path(file, epoch, perceiver, config)
         except UserError as error:
             if named:
                 raise
             yield Skipped(str(file), str(error).removeprefix(f"{file}: "))
     width, height = BLACK_WH
     black = Frame(np.zeros((height, width, 3), np.uint8), BLACK, 0, TimeBase.FRAME_INDEX, 0.0)
-    yield judged_still(black, len(stills), perceiver, config)
+    yield judge_still(black, len(stills), perceiver, config)
 
 
-def row_of(judgement: Judgement) -> Row:
+def row_of(judgement: Verdict) -> Row:
     """The line of the table for one input."""
     advice = judgement.advisory
     return Row(
@@ -118,7 +118,7 @@ def row_of(judgement: Judgement) -> Row:
     )
 
 
-def probed(judgements: list[Judgement], config: Config) -> Stale:
+def probe_stale(judgements: list[Verdict], config: Config) -> Stale:
     """Ask each input's advisor again when its last picture is 9.3 s old; at least five times over all inputs."""
     answers: list[Advisory] = []
     for number in range(max(MIN_PROBES, len(judgements))):

@@ -35,9 +35,9 @@ def families_table(families: Sequence[Family]) -> str:
         (
             family.name,
             str(family.trajectories),
-            ended(family.wanted, family.wanted_cause),
+            outcomes_text(family.wanted, family.wanted_cause),
             f"{family.as_wanted}/{family.trajectories}",
-            ", ".join(f"{outcome.count} {ended(outcome.state, outcome.cause)}" for outcome in family.outcomes),
+            ", ".join(f"{outcome.count} {outcomes_text(outcome.state, outcome.cause)}" for outcome in family.outcomes),
         )
         for family in families
     ]
@@ -50,13 +50,14 @@ def motion_text(motion: Sequence[Motion]) -> str:
         return "-"
     surest = sorted(motion, key=lambda track: -track.confidence)
     named = [
-        f"{track.label} {track.confidence:.2f} {ended(track.state, track.cause)}" for track in surest[:NAMED_TRACKS]
+        f"{track.label} {track.confidence:.2f} {outcomes_text(track.state, track.cause)}"
+        for track in surest[:NAMED_TRACKS]
     ]
     more = len(motion) - NAMED_TRACKS
     return ", ".join(named) + (f", {more} more" if more > 0 else "")
 
 
-def ended(state: str, cause: MotionCause) -> str:
+def outcomes_text(state: str, cause: MotionCause) -> str:
     """A motion state with the cause of an unknown one."""
     return state if cause is MotionCause.NONE else f"{state} ({cause})"
 

@@ -13,7 +13,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.option_paths import input_file, output_file, output_folder
 from paani.whole_file import write_whole
-from paani_tools.up.lifecycle import Outcome, drive
+from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import Report
 from paani_tools.up.terminal import Display
@@ -88,7 +88,7 @@ async def _up(options: argparse.Namespace) -> Outcome:
         fence=options.fence,
     )
     plan = await make_plan(config_from(options, sets))
-    return await drive(plan, options.seconds, Display(sys.stdout))
+    return await run_plan(plan, options.seconds, Display(sys.stdout))
 
 
 def _parser() -> argparse.ArgumentParser:

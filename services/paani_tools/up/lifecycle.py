@@ -22,7 +22,7 @@ from paani_tools.up.collect import Collector
 from paani_tools.up.plan import Plan
 from paani_tools.up.run_summary import Report, Summary
 from paani_tools.up.silence import ROUTER
-from paani_tools.up.supervise import RECORDER, NotKeptAlive, Supervisor
+from paani_tools.up.supervise import RECORDER, ServiceFailed, Supervisor
 from paani_tools.up.terminal import Display
 
 READY_S = 120.0
@@ -36,14 +36,14 @@ class Outcome(NamedTuple):
     failure: str
 
 
-async def drive(plan: Plan, seconds: float | None, display: Display) -> Outcome:
+async def run_plan(plan: Plan, seconds: float | None, display: Display) -> Outcome:
     """Run the plan for `seconds` after every service is alive (None: until a signal), then stop everything.
 
     Raises UserError when a service ends with a user's mistake; nothing is left running in any case.
     """
     clock, summary = WallClock(), Summary()
     logs = await asyncio.to_thread(_prepare, plan)
-    supervisor = Supervisor(plan, logs, display.say)
+    supervisor = Supervisor(plan, logs, display.print_line)
     told_to_stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     signals = [signal.SIGINT, signal.SIGTERM]
@@ -53,8 +53,8 @@ async def drive(plan: Plan, seconds: float | None, display: Display) -> Outcome:
         loop.add_signal_handler(number, told_to_stop.set)
     failure = ""
     try:
-        await _until(told_to_stop, _run(plan, supervisor, summary, clock, seconds, display))
-    except NotKeptAlive as error:
+        await _run_until(told_to_stop, _run(plan, supervisor, summary, clock, seconds, display))
+    except ServiceFailed as error:
         failure = str(error)
     finally:
         report = summary.report(clock.now_us(), plan.config.profile, plan.config.world.name, supervisor.restarts)
@@ -76,19 +76,19 @@ async def _run(
             bus = await open_bus(plan.config.bus, OBSERVER, clock)
             collector = Collector(bus, summary)
             for service in plan.services:
-                bus.on(keys.health(service), functools.partial(_heard, supervisor))
+                bus.on(keys.health(service), functools.partial(_on_health, supervisor))
             for work in (supervisor.follow_alive(bus), supervisor.watch(), collector.run()):
                 tasks.append(group.create_task(work))
             if RECORDER in plan.services:
                 tasks.append(group.create_task(supervisor.keep_running(RECORDER), name=RECORDER))
-                await _recording(supervisor)
+                await _await_recorder(supervisor)
             for name in plan.services:
                 if name not in {ROUTER, RECORDER}:
                     tasks.append(group.create_task(supervisor.keep_running(name), name=name))
-            await _all_alive(supervisor, display)
+            await _await_all_alive(supervisor, display)
             summary.begin(clock.now_us())
             if plan.config.dashboard.serve:
-                display.say(f"open http://{plan.config.dashboard.host}:{plan.config.dashboard.port}")
+                display.print_line(f"open http://{plan.config.dashboard.host}:{plan.config.dashboard.port}")
             await asyncio.sleep(math.inf if seconds is None else seconds)
             for task in tasks:
                 task.cancel()
@@ -101,28 +101,28 @@ async def _run(
             await bus.close()
 
 
-async def _recording(supervisor: Supervisor) -> None:
+async def _await_recorder(supervisor: Supervisor) -> None:
     """The recorder hears everybody's first word only if it is there before them."""
     try:
         await asyncio.wait_for(supervisor.is_alive(RECORDER), READY_S)
     except TimeoutError:
-        raise NotKeptAlive(f"not alive after {READY_S:.0f} s: {RECORDER}") from None
+        raise ServiceFailed(f"not alive after {READY_S:.0f} s: {RECORDER}") from None
 
 
-async def _all_alive(supervisor: Supervisor, display: Display) -> None:
+async def _await_all_alive(supervisor: Supervisor, display: Display) -> None:
     started_ms = stopwatch_ms()
     total = len(supervisor.units)
     while missing := supervisor.missing:
         elapsed_s = (stopwatch_ms() - started_ms) * 1e-3
         if elapsed_s > READY_S:
-            raise NotKeptAlive(f"not alive after {READY_S:.0f} s: {', '.join(missing)}")
+            raise ServiceFailed(f"not alive after {READY_S:.0f} s: {', '.join(missing)}")
         display.waiting(total - len(missing), total, missing, elapsed_s)
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(supervisor.all_alive(), PROGRESS_S)
-    display.say(f"all {total} processes alive after {(stopwatch_ms() - started_ms) * 1e-3:.1f} s")
+    display.print_line(f"all {total} processes alive after {(stopwatch_ms() - started_ms) * 1e-3:.1f} s")
 
 
-async def _until(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> None:
+async def _run_until(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> None:
     """Await the work, or give it up when told to stop."""
     run, stopping = asyncio.create_task(work), asyncio.create_task(stop.wait())
     await asyncio.wait({run, stopping}, return_when=asyncio.FIRST_COMPLETED)
@@ -132,8 +132,8 @@ async def _until(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> None:
         await run
 
 
-def _heard(supervisor: Supervisor, health: m.Health) -> None:
-    supervisor.heard(health.service)
+def _on_health(supervisor: Supervisor, health: m.Health) -> None:
+    supervisor.on_health(health.service)
 
 
 def _prepare(plan: Plan) -> Path:
@@ -146,7 +146,7 @@ def _prepare(plan: Plan) -> Path:
 def _cause(group: BaseExceptionGroup[BaseException]) -> BaseException:
     """The reason to tell: a user's mistake before anything else."""
     leaves = list(_leaves(group))
-    return next((leaf for kind in (UserError, NotKeptAlive) for leaf in leaves if isinstance(leaf, kind)), leaves[0])
+    return next((leaf for kind in (UserError, ServiceFailed) for leaf in leaves if isinstance(leaf, kind)), leaves[0])
 
 
 def _leaves(error: BaseException) -> Iterator[BaseException]:

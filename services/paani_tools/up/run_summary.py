@@ -89,7 +89,7 @@ def percentiles(samples: Iterable[float]) -> Percentiles:
     return Percentiles(p50=p50, p95=p95, p99=p99, samples=len(ordered))
 
 
-class LifeTotals(dict[object, float]):
+class ProcessTotals(dict[object, float]):
     """Newest value of a counter in each life of its producer; it begins again at zero with each life."""
 
     @property
@@ -117,9 +117,9 @@ class Summary:
         self._reasons: collections.Counter[str] = collections.Counter({r.value: 0 for r in m.Reason})
         self._cpu: dict[str, list[float]] = {}
         self._rss_mib: dict[str, float] = {}
-        self._drops: collections.defaultdict[str, LifeTotals] = collections.defaultdict(LifeTotals)
-        self._superseded: collections.defaultdict[str, LifeTotals] = collections.defaultdict(LifeTotals)
-        self._distance_m, self._collisions, self._waypoints = LifeTotals(), LifeTotals(), LifeTotals()
+        self._drops: collections.defaultdict[str, ProcessTotals] = collections.defaultdict(ProcessTotals)
+        self._superseded: collections.defaultdict[str, ProcessTotals] = collections.defaultdict(ProcessTotals)
+        self._distance_m, self._collisions, self._waypoints = ProcessTotals(), ProcessTotals(), ProcessTotals()
         self._place: dict[tuple[str, str], tuple[int, int]] = {}
         self._lost: collections.Counter[str] = collections.Counter()
         self._evidence, self._advisories, self._commands = Stamps(), Stamps(), Stamps()

@@ -24,7 +24,7 @@ class Silence:
         self._heard_us[service] = now_us
         self._starting.add(service)
 
-    def heard(self, service: str, now_us: int) -> None:
+    def note_health(self, service: str, now_us: int) -> None:
         """It is alive and has spoken. What comes after its process ended does not count."""
         if service in self._heard_us:
             self._heard_us[service] = now_us

@@ -40,11 +40,11 @@ CHILD_ENVIRONMENT = {
 Say = Callable[[str], None]
 
 
-class NotKeptAlive(Exception):
+class ServiceFailed(Exception):
     """A process that ends again and again and was never alive."""
 
 
-class Unit:
+class ServiceProcess:
     """One service: its process, and what is known of it."""
 
     def __init__(self, name: str, log: Path) -> None:
@@ -75,7 +75,7 @@ class Supervisor:
             **CHILD_ENVIRONMENT,
             "PAANI_CONFIG_JSON": encode_config(plan.config).decode(),
         }
-        self.units = {name: Unit(name, logs / f"{name}.log") for name in plan.services}
+        self.units = {name: ServiceProcess(name, logs / f"{name}.log") for name in plan.services}
         self._changed = asyncio.Event()
         self._stopping = False
 
@@ -115,12 +115,12 @@ class Supervisor:
             self._silence.ended(name)
             self._set_alive(unit, alive=False)
             if code == USER_MISTAKE and not (name == RECORDER and unit.ever_alive):  # the boat goes on without it
-                raise UserError(await asyncio.to_thread(_mistake, unit))
+                raise UserError(await asyncio.to_thread(_mistake_text, unit))
             delay_s = unit.backoff.after((self._clock.now_us() - started_us) * 1e-6)
             if not unit.ever_alive and unit.backoff.failures >= GIVE_UP_FAILURES:
                 last = await asyncio.to_thread(_last_line, unit.log)
-                raise NotKeptAlive(f"{name} ended {unit.backoff.failures} times before it was alive: {last}")
-            self._say(f"{name} ended ({_ending(code)}); starting it again in {delay_s:.1f} s (log: {unit.log})")
+                raise ServiceFailed(f"{name} ended {unit.backoff.failures} times before it was alive: {last}")
+            self._say(f"{name} ended ({_exit_text(code)}); starting it again in {delay_s:.1f} s (log: {unit.log})")
             await asyncio.sleep(delay_s)
             unit.fallen = True
             unit.restarts += 1
@@ -130,12 +130,12 @@ class Supervisor:
         async for name, alive in bus.alive_events():
             if name in self.units:
                 if alive:
-                    self._silence.heard(name, self._clock.now_us())
+                    self._silence.note_health(name, self._clock.now_us())
                 self._set_alive(self.units[name], alive=alive)
 
-    def heard(self, name: str) -> None:
+    def on_health(self, name: str) -> None:
         """A service has reported its health. Called on any thread."""
-        self._silence.heard(name, self._clock.now_us())
+        self._silence.note_health(name, self._clock.now_us())
 
     async def watch(self) -> None:
         """Kill what hangs, which `keep_running` starts again, and keep the logs bounded."""
@@ -158,12 +158,12 @@ class Supervisor:
             for unit in units:
                 unit.send(signal.SIGTERM)
                 unit.send(signal.SIGCONT)
-            await _ended(units, limit_s)
+            await _await_ends(units, limit_s)
         for unit in self.units.values():
             unit.send(signal.SIGKILL)
-        await _ended([*self.units.values()], KILL_S)
+        await _await_ends([*self.units.values()], KILL_S)
 
-    async def _launch(self, unit: Unit) -> None:
+    async def _launch(self, unit: ServiceProcess) -> None:
         log = await asyncio.to_thread(open_log, unit.log, afresh=not unit.restarts)
         unit.process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -181,7 +181,7 @@ class Supervisor:
         log.close()
         self._silence.started(unit.name, self._clock.now_us())
 
-    def _set_alive(self, unit: Unit, *, alive: bool) -> None:
+    def _set_alive(self, unit: ServiceProcess, *, alive: bool) -> None:
         if alive and unit.fallen:
             self._say(f"{unit.name} is back")
             unit.fallen = False
@@ -190,7 +190,7 @@ class Supervisor:
         self._changed.set()
 
 
-async def _ended(units: list[Unit], limit_s: float) -> None:
+async def _await_ends(units: list[ServiceProcess], limit_s: float) -> None:
     waits = [asyncio.create_task(unit.process.wait()) for unit in units if unit.process is not None]
     if waits:
         _, late = await asyncio.wait(waits, timeout=limit_s)
@@ -198,7 +198,7 @@ async def _ended(units: list[Unit], limit_s: float) -> None:
             task.cancel()
 
 
-def _ending(code: int) -> str:
+def _exit_text(code: int) -> str:
     return signal.Signals(-code).name if code < 0 else f"exit {code}"
 
 
@@ -207,5 +207,5 @@ def _last_line(log: Path) -> str:
     return lines[-1] if lines else f"nothing in {log}"
 
 
-def _mistake(unit: Unit) -> str:
+def _mistake_text(unit: ServiceProcess) -> str:
     return _last_line(unit.log).removeprefix(f"paani {unit.name}: ").removeprefix("paani: ")

@@ -16,7 +16,7 @@ class Display:
         self._updating = stream.isatty()
         self._shown = ""
 
-    def say(self, line: str) -> None:
+    def print_line(self, line: str) -> None:
         """One line that stays."""
         self._write(f"{CLEAR}{line}\n" if self._updating and self._shown else f"{line}\n")
         self._shown = ""

@@ -84,14 +84,14 @@ class Stepper(Generic[S, I]):
             m.Step(
                 source_us=self._now_us,
                 heard=tuple(
-                    m.HeardMessage(
+                    m.InputMessage(
                         topic=name, epoch=given.message.epoch, seq=given.message.seq, received_us=given.received_us
                     )
                     for name, given in self._inputs.items()
                     if given.message is not None
                 ),
                 sent=tuple(
-                    m.SentMessage(topic=name, epoch=message.epoch, seq=message.seq, sent_us=message.sent_us)
+                    m.OutputMessage(topic=name, epoch=message.epoch, seq=message.seq, sent_us=message.sent_us)
                     for name, message in sent.items()
                 ),
                 state=state,

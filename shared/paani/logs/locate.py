@@ -15,7 +15,7 @@ from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metada
 
 from paani.errors import UserError
 from paani.logs.layout import DAMAGE, MAGIC, PROFILE, Layout, Span, line_of, messages_in, unpacked_chunk
-from paani.logs.scan import HEAD, Damage, Found, content, scan
+from paani.logs.scan import HEAD, Damage, ScannedRecord, content, scan
 
 FOOTER_BYTES = HEAD.size + 20
 MAX_LOOSE_BYTES = 1 << 20
@@ -90,7 +90,7 @@ def _read_summary(layout: Layout, data: mmap.mmap) -> bool:
 
 def _read_data(layout: Layout, data: mmap.mmap) -> None:
     """Fill the layout by going through the whole file; damage is named and left out."""
-    loose: list[Found] = []
+    loose: list[ScannedRecord] = []
     for piece in scan(data):
         if isinstance(piece, Damage):
             layout.problems.append(f"bytes {piece.start} to {piece.end} cannot be read ({piece.cause})")
@@ -114,22 +114,22 @@ def _read_data(layout: Layout, data: mmap.mmap) -> None:
     _learn_loose(layout, data, loose)
 
 
-def _record_at(data: mmap.mmap, at: int) -> Found:
+def _record_at(data: mmap.mmap, at: int) -> ScannedRecord:
     """The record at a byte of the file. Raises ValueError where there is none."""
     if at + HEAD.size > len(data):
         raise ValueError("a record lies outside the file")
     opcode, length = HEAD.unpack_from(data, at)
     if at + HEAD.size + length > len(data):
         raise ValueError("a record lies outside the file")
-    return Found(opcode, at, at + HEAD.size + length)
+    return ScannedRecord(opcode, at, at + HEAD.size + length)
 
 
-def _learn_span(layout: Layout, chunk: Found, start_ns: int, end_ns: int) -> None:
+def _learn_span(layout: Layout, chunk: ScannedRecord, start_ns: int, end_ns: int) -> None:
     start = chunk.start + HEAD.size
     layout.spans.append(Span(start, chunk.end - start, start_ns // 1000, end_ns // 1000))
 
 
-def _learn_loose(layout: Layout, data: mmap.mmap, records: list[Found]) -> None:
+def _learn_loose(layout: Layout, data: mmap.mmap, records: list[ScannedRecord]) -> None:
     """Messages outside chunks, one after the other."""
     if not records:
         return
@@ -160,7 +160,7 @@ def _learn_channel(layout: Layout, inside: bytes) -> None:
     layout.channels[channel.id] = channel.topic
 
 
-def _learn(layout: Layout, data: mmap.mmap, record: Found) -> None:
+def _learn(layout: Layout, data: mmap.mmap, record: ScannedRecord) -> None:
     """A header, an attachment or a metadata record; the first of a name wins. A damaged one is named and left out."""
     inside = content(data, record)
     try:

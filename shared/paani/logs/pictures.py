@@ -20,7 +20,7 @@ class RecordedPicture(NamedTuple):
     data: bytes
 
 
-def paired(records: Iterable[Record], topics: Iterable[str]) -> Iterator[Record | RecordedPicture]:
+def paired_pictures(records: Iterable[Record], topics: Iterable[str]) -> Iterator[Record | RecordedPicture]:
     """Records in their order, where picture and header of the given topics become one; a half alone is left out."""
     waiting: dict[str, Record] = {}
     wanted = frozenset(topics)

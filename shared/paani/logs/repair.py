@@ -36,7 +36,7 @@ from mcap.records import (
 
 from paani.errors import UserError
 from paani.logs.layout import MAGIC, PROFILE
-from paani.logs.scan import HEAD, Damage, Data, Found, content, records_in, scan, stream_of, unpacked
+from paani.logs.scan import HEAD, Damage, Data, ScannedRecord, content, records_in, scan, stream_of, unpacked
 
 FOOTER_BYTES = HEAD.size + 20
 _MESSAGE = struct.Struct("<HIQQ")
@@ -93,7 +93,7 @@ def repair(path: Path, told_to_stop: Callable[[], bool] = lambda: False) -> Repa
 
 
 def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaired:
-    pieces: list[Found | Damage] = []
+    pieces: list[ScannedRecord | Damage] = []
     for piece in scan(data):
         pieces.append(piece)
         if told_to_stop():
@@ -106,7 +106,7 @@ def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaire
     beside = path.with_name(f".{path.name}.repairing")
     try:
         with beside.open("wb") as file:
-            found = [piece for piece in pieces if isinstance(piece, Found)]
+            found = [piece for piece in pieces if isinstance(piece, ScannedRecord)]
             mended = Mended(file, data, found)
             for piece in found:
                 mended.take(piece)
@@ -128,7 +128,7 @@ def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaire
 class Mended:
     """The repaired file, record by record; chunks and attachments are copied as they are."""
 
-    def __init__(self, file: BinaryIO, data: Data, pieces: list[Found]) -> None:
+    def __init__(self, file: BinaryIO, data: Data, pieces: list[ScannedRecord]) -> None:
         self._file, self._data = file, data
         self._schemas, self._channels = definitions(data, pieces)
         self._chunks: list[ChunkIndex] = []
@@ -146,7 +146,7 @@ class Mended:
     def messages(self) -> int:
         return self._counts.total()
 
-    def take(self, piece: Found) -> None:
+    def take(self, piece: ScannedRecord) -> None:
         """Copy a chunk, an attachment or a metadata record; the rest is written anew."""
         inside = content(self._data, piece)
         match piece.opcode:
@@ -166,7 +166,7 @@ class Mended:
         self._put(DataEnd(0))
         self._summary()
 
-    def _take_chunk(self, piece: Found, chunk: Chunk) -> None:
+    def _take_chunk(self, piece: ScannedRecord, chunk: Chunk) -> None:
         indexes = self._indexes(unpacked(self._data, piece))
         if not indexes:
             return
@@ -200,7 +200,7 @@ class Mended:
                 self._counts[number] += 1
         return indexes
 
-    def _take_attachment(self, piece: Found, attachment: Attachment) -> None:
+    def _take_attachment(self, piece: ScannedRecord, attachment: Attachment) -> None:
         if attachment.name in self._attached:
             return
         self._attached.add(attachment.name)
@@ -264,13 +264,13 @@ class Mended:
         record.write(builder)
         self._file.write(builder.end())
 
-    def _copy(self, piece: Found) -> int:
+    def _copy(self, piece: ScannedRecord) -> int:
         start = self._file.tell()
         self._file.write(self._data[piece.start : piece.end])
         return start
 
 
-def definitions(data: Data, pieces: list[Found]) -> tuple[dict[int, Schema], dict[int, Channel]]:
+def definitions(data: Data, pieces: list[ScannedRecord]) -> tuple[dict[int, Schema], dict[int, Channel]]:
     """Schemas and channels by number. Those in chunks, which have a checksum, go before those that stand bare."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -303,8 +303,8 @@ def definitions(data: Data, pieces: list[Found]) -> tuple[dict[int, Schema], dic
     return schemas, channels
 
 
-def _require_ours(path: Path, data: Data, pieces: list[Found | Damage]) -> None:
-    found = [piece for piece in pieces if isinstance(piece, Found)]
+def _require_ours(path: Path, data: Data, pieces: list[ScannedRecord | Damage]) -> None:
+    found = [piece for piece in pieces if isinstance(piece, ScannedRecord)]
     profiles = [Header.read(stream_of(content(data, p))).profile for p in found if p.opcode == Opcode.HEADER]
     marked = any(
         Metadata.read(stream_of(content(data, piece))).name == PROFILE

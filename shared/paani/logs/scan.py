@@ -24,7 +24,7 @@ OPCODES = frozenset(opcode.value for opcode in Opcode)
 Data = bytes | mmap.mmap
 
 
-class Found(NamedTuple):
+class ScannedRecord(NamedTuple):
     """A record that can be read: its opcode, and where it lies, its head included."""
 
     opcode: int
@@ -40,7 +40,7 @@ class Damage(NamedTuple):
     cause: str
 
 
-def scan(data: Data) -> Iterator[Found | Damage]:
+def scan(data: Data) -> Iterator[ScannedRecord | Damage]:
     """Every record in order, of data and summary alike. What lies between two that can be read is damage.
 
     A chunk or attachment can be read when its checksum is right. Nothing is raised, whatever the bytes.
@@ -62,19 +62,19 @@ def scan(data: Data) -> Iterator[Found | Damage]:
         at = resumed
 
 
-def content(data: Data, record: Found) -> bytes:
+def content(data: Data, record: ScannedRecord) -> bytes:
     """The bytes of a record after its head."""
     return bytes(data[record.start + HEAD.size : record.end])
 
 
-def unpacked(data: Data, chunk: Found) -> bytes:
+def unpacked(data: Data, chunk: ScannedRecord) -> bytes:
     """The records in a chunk that `scan` has found."""
     stream, length = get_chunk_data_stream(Chunk.read(stream_of(content(data, chunk))), validate_crc=False)
     inside: bytes = stream.read(length)
     return inside
 
 
-def records_in(inside: bytes) -> Iterator[Found]:
+def records_in(inside: bytes) -> Iterator[ScannedRecord]:
     """The whole records in an unpacked chunk."""
     at = 0
     while at + HEAD.size <= len(inside):
@@ -82,7 +82,7 @@ def records_in(inside: bytes) -> Iterator[Found]:
         end = at + HEAD.size + length
         if end > len(inside):
             return
-        yield Found(opcode, at, end)
+        yield ScannedRecord(opcode, at, end)
         at = end
 
 
@@ -90,12 +90,12 @@ def stream_of(data: bytes) -> ReadDataStream:
     return ReadDataStream(io.BytesIO(data))
 
 
-def _record(data: Data, at: int) -> tuple[Found, str]:
+def _record(data: Data, at: int) -> tuple[ScannedRecord, str]:
     """The record at a place, and why it cannot be read."""
     if at + HEAD.size > len(data):
-        return Found(0, at, len(data)), "cut"
+        return ScannedRecord(0, at, len(data)), "cut"
     opcode, length = HEAD.unpack_from(data, at)
-    record = Found(opcode, at, at + HEAD.size + length)
+    record = ScannedRecord(opcode, at, at + HEAD.size + length)
     if opcode not in OPCODES:
         return record, "not a record"
     if record.end > len(data):
@@ -103,7 +103,7 @@ def _record(data: Data, at: int) -> tuple[Found, str]:
     return record, _fault(data, record)
 
 
-def _fault(data: Data, record: Found) -> str:
+def _fault(data: Data, record: ScannedRecord) -> str:
     inside = content(data, record)
     stream = stream_of(inside)
     try:
@@ -132,7 +132,7 @@ def _fault(data: Data, record: Found) -> str:
     return "" if record.opcode == Opcode.ATTACHMENT or stream.count == len(inside) else "a record of the wrong length"
 
 
-def _resume(data: Data, at: int, damaged: Found) -> int:
+def _resume(data: Data, at: int, damaged: ScannedRecord) -> int:
     """Where reading can go on: after the damaged record, if its length is right, else at the next whole chunk."""
     if at < damaged.end < len(data) and not _record(data, damaged.end)[1]:
         return damaged.end

@@ -24,7 +24,7 @@ from paani.messages.advisor import (
     Tracks,
 )
 from paani.messages.camera import PictureHeader, TimeBase
-from paani.messages.decision import HeardMessage, SentMessage, Step
+from paani.messages.decision import InputMessage, OutputMessage, Step
 from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
@@ -61,11 +61,11 @@ __all__ = [
     "GpsFix",
     "Hazard",
     "Health",
-    "HeardMessage",
     "ImuSample",
     "InferenceTiming",
     "Inhibit",
     "InputHealth",
+    "InputMessage",
     "Keep",
     "Label",
     "Lane",
@@ -81,6 +81,7 @@ __all__ = [
     "NavCommand",
     "NonNegative",
     "Odometry",
+    "OutputMessage",
     "PictureHeader",
     "Pulse",
     "Reason",
@@ -90,7 +91,6 @@ __all__ = [
     "RotationUse",
     "Route",
     "SegmentationSource",
-    "SentMessage",
     "Shadow",
     "Signed",
     "SimTime",

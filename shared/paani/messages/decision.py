@@ -11,7 +11,7 @@ from paani.messages.header import Count, Message, Stamp, Text
 State = Annotated[str, msgspec.Meta(max_length=1_000_000)]
 
 
-class HeardMessage(msgspec.Struct, frozen=True, kw_only=True):
+class InputMessage(msgspec.Struct, frozen=True, kw_only=True):
     """One message that a step was given, and when it came."""
 
     topic: Text
@@ -20,7 +20,7 @@ class HeardMessage(msgspec.Struct, frozen=True, kw_only=True):
     received_us: Stamp
 
 
-class SentMessage(msgspec.Struct, frozen=True, kw_only=True):
+class OutputMessage(msgspec.Struct, frozen=True, kw_only=True):
     """One message that a step sent, with what the bus put into its header."""
 
     topic: Text
@@ -36,6 +36,6 @@ class Step(Message, frozen=True, kw_only=True):
     from which the following steps can be computed again.
     """
 
-    heard: tuple[HeardMessage, ...] = ()
-    sent: tuple[SentMessage, ...] = ()
+    heard: tuple[InputMessage, ...] = ()
+    sent: tuple[OutputMessage, ...] = ()
     state: State = ""

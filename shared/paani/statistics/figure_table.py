@@ -1,8 +1,8 @@
 """One table of figures, and where others put theirs.
 
 A package adds a table to `paani bench judgement` with an entry point in the group `paani.benches`: a function without
-arguments that gives a `Part`. It adds a benchmark of its own with one in the group `paani.bench_commands`: a function
-of the words that follow the benchmark's name, `def main(argv: list[str]) -> int`.
+arguments that gives a `FigureTable`. It adds a benchmark of its own with one in the group `paani.bench_commands`: a
+function of the words that follow the benchmark's name, `def main(argv: list[str]) -> int`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import msgspec
 Cell = str | int | float | None
 
 
-class Part(msgspec.Struct, frozen=True, kw_only=True):
+class FigureTable(msgspec.Struct, frozen=True, kw_only=True):
     """`rows` have as many cells as there are `columns`; None where nothing was measured. `note`: how to read it."""
 
     name: str
@@ -24,7 +24,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
     note: str = ""
 
 
-def installed_parts() -> dict[str, Callable[[], Part]]:
+def installed_tables() -> dict[str, Callable[[], FigureTable]]:
     """What is installed, by name."""
     return {point.name: point.load() for point in sorted(entry_points(group="paani.benches"), key=lambda p: p.name)}
 
@@ -34,7 +34,7 @@ def installed_commands() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group="paani.bench_commands")}
 
 
-def part_text(part: Part) -> str:
+def table_text(part: FigureTable) -> str:
     """Numbers to the right, words to the left."""
     cells = [tuple(map(_cell, row)) for row in part.rows]
     widths = [max(map(len, column)) for column in zip(part.columns, *cells, strict=True)]

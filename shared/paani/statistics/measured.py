@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 
 import msgspec
 
-from paani.statistics.figure_table import Part, part_text
+from paani.statistics.figure_table import FigureTable, table_text
 
 
 class Machine(msgspec.Struct, frozen=True, kw_only=True):
@@ -23,15 +23,15 @@ class Report(msgspec.Struct, frozen=True, kw_only=True):
     """What `--json` writes."""
 
     machine: Machine
-    parts: tuple[Part, ...]
+    parts: tuple[FigureTable, ...]
 
 
-def measured(parts: Iterable[Callable[[], Part]]) -> Report:
+def measure_tables(parts: Iterable[Callable[[], FigureTable]]) -> Report:
     """Print each table as it is done, then what the run shared the machine with."""
     cores, load_before, done = os.cpu_count() or 1, os.getloadavg()[0], []
     for part in parts:
         done.append(part())
-        sys.stdout.write("\n" + part_text(done[-1]))
+        sys.stdout.write("\n" + table_text(done[-1]))
         sys.stdout.flush()
     machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
     sys.stdout.write(

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from paani.clock import process_cpu_s
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani.statistics.order_statistics import median, nearest_rank
 from paani_sim.eye.camera import BoatPose, Camera
 from paani_sim.eye.renderer import Eye
@@ -18,7 +18,7 @@ FRAMES, WARM_FRAMES = 60, 3
 SAME_FRAMES = 3  # a picture costs what the quickest of so many takes: others use the machine too
 
 
-def eye() -> Part:
+def eye() -> FigureTable:
     """CPU time of `Eye.render` round the river's route, one rasterising thread."""
     world = load_world(WORLD)
     rows = []
@@ -27,7 +27,7 @@ def eye() -> Part:
         size = f"{width_px} x {height_px}"
         rows.append((size, actors, median(found), nearest_rank(found, 95), len(found)))
     base = next(row[2] for row in rows if row[:2] == ("320 x 240", len(world.actors)))
-    return Part(
+    return FigureTable(
         name=f"rendered picture of the {WORLD}",
         columns=("picture", "actors", "CPU ms p50", "CPU ms p95", "n", "ratio of p50"),
         rows=tuple((*row, row[2] / base) for row in rows),

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from paani.arrays import F64
 from paani.config import PlantConfig
 from paani.geometry import wrap_rad
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani_sim.plant.plant import Plant
 from paani_sim.worlds import Current, Wind, World, load_world
 
@@ -175,14 +175,14 @@ def _wide_water(manoeuvre: Manoeuvre) -> World:
     )
 
 
-def oracle() -> Part:
+def oracle() -> FigureTable:
     """Every manoeuvre with both vessels."""
     rows = [
         (vessel, manoeuvre.name, *compare(vessel, manoeuvre))
         for vessel in ("paper", "otter")
         for manoeuvre in MANOEUVRES
     ]
-    return Part(
+    return FigureTable(
         name="plant beside Fossen's 3-DOF model, solved with scipy",
         columns=("vessel", "manoeuvre", "way m", "position, largest difference m", "heading, largest difference deg"),
         rows=tuple(rows),

@@ -5,7 +5,7 @@ import statistics
 
 from paani.clock import process_cpu_s
 from paani.config import PlantConfig
-from paani.statistics.figure_table import Part
+from paani.statistics.figure_table import FigureTable
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import Actor, Current, Waves, Wind, World, load_world
@@ -18,7 +18,7 @@ WARM_S, RUN_S, ROUNDS = 20.0, 10.0, 5
 FANS_N = (2.0, 4.0)
 
 
-def physics() -> Part:
+def physics() -> FigureTable:
     """The otter circling on the river, sensors read when due; CPU time of one core, median of interleaved rounds."""
     plants = {
         (count, rough): Plant(_water(count, rough=rough), PlantConfig(vessel="otter"))
@@ -41,7 +41,7 @@ def physics() -> Part:
         for plant in plants.values():
             plant.close()
     cost_s = {case: statistics.median(times) for case, times in taken.items()}
-    return Part(
+    return FigureTable(
         name="physics",
         columns=("actors", "waves, wakes, gusts, current", "us a step", "x real time a core", "over still and empty"),
         rows=tuple(

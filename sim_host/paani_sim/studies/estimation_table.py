@@ -17,7 +17,7 @@ from paani import messages as m
 from paani.config import Config, load_config
 from paani.cores import estimator_of
 from paani.geometry import clip, enu_from_geodetic, wrap_rad
-from paani.statistics.figure_table import Part, part_text
+from paani.statistics.figure_table import FigureTable, table_text
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import Fault, FaultKind, Pose2, Waves, Wind, World, load_world
@@ -174,14 +174,14 @@ def estimation_table(
             yield row_of(condition.name, seed, list(course(condition, seed, config)), _water(condition))
 
 
-def estimation() -> Part:
+def estimation() -> FigureTable:
     """The table for `paani bench water`."""
     return part_of(list(estimation_table()))
 
 
-def part_of(rows: list[EstimationRow]) -> Part:
+def part_of(rows: list[EstimationRow]) -> FigureTable:
     """Metres, degrees, seconds."""
-    return Part(
+    return FigureTable(
         name="estimation",
         columns=(
             "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg", "speed m/s", "NIS",
@@ -260,4 +260,4 @@ def _longest(flags: list[bool]) -> int:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else len(SEEDS)
-    sys.stdout.write(part_text(part_of(list(estimation_table(tuple(range(1, count + 1)))))))
+    sys.stdout.write(table_text(part_of(list(estimation_table(tuple(range(1, count + 1)))))))

@@ -22,7 +22,7 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config, load_config
 from paani.decider import Decider, Input, decider_of
-from paani.statistics.figure_table import Part, part_text
+from paani.statistics.figure_table import FigureTable, table_text
 from paani_sim.eye.camera import Camera
 from paani_sim.studies.encounters import Course, Family, Look, course, looks, pose_at, range_at
 
@@ -99,14 +99,14 @@ def motion_table(
     return rows
 
 
-def motion() -> Part:
+def motion() -> FigureTable:
     """The table for `paani bench judgement`."""
     return part_of(motion_table(seed=1, n=20))
 
 
-def part_of(rows: list[MotionRow]) -> Part:
+def part_of(rows: list[MotionRow]) -> FigureTable:
     """Fractions in percent; None where there was nothing to judge."""
-    return Part(
+    return FigureTable(
         name="motion",
         columns=(
             "constants", "Hz", "encounter", "closing", "known %", "tracks", "known %", "judged", "wrong %", "late %",
@@ -264,4 +264,4 @@ def _percent(part: int, whole: int) -> float | None:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(part_text(part_of(motion_table(int(sys.argv[1]), int(sys.argv[2])))))
+    sys.stdout.write(table_text(part_of(motion_table(int(sys.argv[1]), int(sys.argv[2])))))

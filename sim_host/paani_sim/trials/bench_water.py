@@ -16,8 +16,8 @@ from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
 from paani.option_paths import output_file
 from paani.statistics.charts import drawing, element, lines
-from paani.statistics.figure_table import Cell, Part
-from paani.statistics.measured import measured
+from paani.statistics.figure_table import Cell, FigureTable
+from paani.statistics.measured import measure_tables
 from paani.whole_file import write_whole
 from paani_sim.eye.render_cost import eye
 from paani_sim.plant.reference_model import oracle
@@ -49,11 +49,11 @@ def main(argv: list[str]) -> int:
     """Measure and print. Raises UserError for a file that cannot be written."""
     costs: list[Cost] = []
 
-    def cost() -> Part:
+    def cost() -> FigureTable:
         costs.extend(measure_costs())
         return tabulate_costs(costs)
 
-    parts: dict[str, Callable[[], Part]] = {
+    parts: dict[str, Callable[[], FigureTable]] = {
         "physics": physics, "eye": eye, "lockstep": measure_lockstep,
         "cost": cost, "oracle": oracle, "estimation": estimation,
     }  # fmt: skip
@@ -67,7 +67,7 @@ def main(argv: list[str]) -> int:
     names = options.only or list(parts)
     if options.svg and "cost" not in names:
         raise UserError("--svg needs the part cost")
-    report = measured(parts[name] for name in names)
+    report = measure_tables(parts[name] for name in names)
     if options.json:
         write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
     if options.svg:
@@ -75,14 +75,14 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def measure_lockstep() -> Part:
+def measure_lockstep() -> FigureTable:
     """Whole drives: one with both cores to itself, and two side by side with one each."""
     rows: list[tuple[Cell, ...]] = []
     for policy in (Policy.PAANI, Policy.ORACLE, Policy.BLIND, Policy.PAPER):
         simulated_s, wall_s, cpu_s = time_drive(policy, 2, DEFAULT_CASE[1], RUN_S, threads=True)
         rows.append((policy.value, 1, simulated_s / wall_s, cpu_s / simulated_s))
         rows.append((policy.value, 2, _measure_parallel_speed(policy), None))
-    return Part(
+    return FigureTable(
         name="lockstep",
         columns=("policy", "drives at once", "x real time, together", "CPU s a simulated s"),
         rows=tuple(rows),
@@ -103,9 +103,9 @@ def measure_costs() -> list[Cost]:
     return found
 
 
-def tabulate_costs(costs: list[Cost]) -> Part:
+def tabulate_costs(costs: list[Cost]) -> FigureTable:
     """As a table."""
-    return Part(
+    return FigureTable(
         name="cost",
         columns=("policy", "actors", "picture", "CPU s a simulated s"),
         rows=tuple((c.policy.value, c.actors, f"{c.width_px} x {c.height_px}", c.cpu_s) for c in costs),

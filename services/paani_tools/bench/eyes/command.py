@@ -20,10 +20,10 @@ from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_whole
 from paani_models.catalogue import verified_path
 from paani_services.perception.picture_decoding import decoded
-from paani_tools.bench.eyes.drawn_scene import SIZE_WH, drawn
+from paani_tools.bench.eyes.drawn_scene import SIZE_WH, draw_scene
 from paani_tools.bench.eyes.memory import Footprint
-from paani_tools.bench.eyes.stages import Candidate, Ratio, Row, fit, measured, ratios, rows, steps
-from paani_tools.bench.eyes.work import Work, work
+from paani_tools.bench.eyes.stages import Candidate, Ratio, Row, measure_steps, ratios, rows, steps, usable_pictures
+from paani_tools.bench.eyes.work import Work, count_work
 
 SUFFIXES = {".jpg", ".jpeg", ".png"}
 MAX_PICTURES = 64
@@ -31,7 +31,7 @@ RSS_BAR_MIB = 200.0
 
 
 class Eyes(msgspec.Struct, frozen=True):
-    """What `--json` writes. `footprint` is of a process of its own; `work` is of pairs of nets, the first in use.
+    """What `--json` writes. `footprint` is of a process of its own; `count_work` is of pairs of nets, the first in use.
 
     `refused`: pictures that the gate did not let through, and that were left out.
     """
@@ -71,9 +71,9 @@ def main(argv: list[str]) -> int:
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     config = config_from(options)
-    pictures = _read(options.folder) if options.folder else [drawn(seed) for seed in range(8)]
+    pictures = _read(options.folder) if options.folder else [draw_scene(seed) for seed in range(8)]
     given = len(pictures)
-    pictures = fit(pictures, config.perception)
+    pictures = usable_pictures(pictures, config.perception)
     if not pictures:
         raise UserError("the gate refuses every picture, so there is nothing to time")
     candidates = [_candidate(folder) for folder in options.others]
@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
     timed = steps(config.perception, candidates, options.paper_pair, stopwatch_ms)
     taken: dict[str, list[float]] = {}
-    for turn, taken in measured(  # noqa: B007 - the last one is the result
+    for turn, taken in measure_steps(  # noqa: B007 - the last one is the result
         timed, pictures, options.rounds, stopwatch_ms
     ):
         if sys.stderr.isatty():
@@ -180,14 +180,14 @@ def _footprint(config: Config) -> Footprint:
 def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair: Path | None) -> tuple[Work, ...]:
     given = {"detector": config.detector, "segmenter": config.segmenter}
     used = {role: Path(path) if path else verified_path(role) for role, path in given.items()}
-    found = [work("nets in use", used.values())]
+    found = [count_work("nets in use", used.values())]
     for candidate in candidates:
         other = {"detector": candidate.detector, "segmenter": candidate.segmenter}
         found.append(
-            work(candidate.name, (Path(path) if path else verified_path(role) for role, path in other.items()))
+            count_work(candidate.name, (Path(path) if path else verified_path(role) for role, path in other.items()))
         )
     if paper_pair is not None:
-        found.append(work("paper's pair", (paper_pair / "yolo11n.onnx", paper_pair / "paper-segmenter.onnx")))
+        found.append(count_work("paper's pair", (paper_pair / "yolo11n.onnx", paper_pair / "paper-segmenter.onnx")))
     return tuple(found)
 
 

@@ -8,7 +8,7 @@ from paani.arrays import U8
 SIZE_WH = (320, 240)  # A8
 
 
-def drawn(seed: int) -> U8:
+def draw_scene(seed: int) -> U8:
     """Sky, textured banks, rippled water: BGR uint8 [240, 320, 3]."""
     rng = np.random.default_rng(seed)
     width, height = SIZE_WH

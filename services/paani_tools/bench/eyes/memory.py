@@ -9,7 +9,7 @@ from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, decode_config
 from paani.messages import PictureHeader
 from paani_services.perception.pipeline import Perceiver
-from paani_tools.bench.eyes.drawn_scene import drawn
+from paani_tools.bench.eyes.drawn_scene import draw_scene
 
 SETTLED, FRAMES = 40, 240
 
@@ -28,9 +28,9 @@ def resident_mib() -> float:
     return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS")) / 1024.0
 
 
-def footprint(config: PerceptionConfig) -> Footprint:
+def measure_footprint(config: PerceptionConfig) -> Footprint:
     """Perceive drawn pictures in turn."""
-    perceiver, pictures = Perceiver(config, stopwatch_ms), [drawn(seed) for seed in range(8)]
+    perceiver, pictures = Perceiver(config, stopwatch_ms), [draw_scene(seed) for seed in range(8)]
     settled = 0.0
     for frame in range(FRAMES):
         if frame == SETTLED:
@@ -44,5 +44,5 @@ def footprint(config: PerceptionConfig) -> Footprint:
 
 
 if __name__ == "__main__":
-    found = footprint(decode_config(sys.stdin.buffer.read()).perception)
+    found = measure_footprint(decode_config(sys.stdin.buffer.read()).perception)
     sys.stdout.write(msgspec.json.encode(found).decode() + "\n")

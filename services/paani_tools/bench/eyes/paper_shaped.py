@@ -19,19 +19,21 @@ PAD_GREY = 114
 WATER = 0
 
 
-class Seen(NamedTuple):
+class PaperEvidence(NamedTuple):
     """Boxes x1, y1, x2, y2 in net pixels with their scores; N, U and clear width of each corridor."""
 
     boxes: list[tuple[F32, float]]
     lanes: list[tuple[float, float, float]]
 
 
-def perceive(bgr: U8, detect: Run, segment: Run, detections: DetectorConfig, corridors: CorridorConfig) -> Seen:
+def perceive(
+    bgr: U8, detect: Run, segment: Run, detections: DetectorConfig, corridors: CorridorConfig
+) -> PaperEvidence:
     """One picture, BGR uint8 [H, W, 3]."""
-    return Seen(boxes(detect(boxed(bgr)), detections), lanes(segment(stretched(bgr)), corridors))
+    return PaperEvidence(decode_boxes(detect(letterbox(bgr)), detections), lanes(segment(stretch(bgr)), corridors))
 
 
-def boxed(bgr: U8) -> F32:
+def letterbox(bgr: U8) -> F32:
     """float32 [1, 3, 256, 320]."""
     scale = min(320 / bgr.shape[1], 256 / bgr.shape[0])
     inner = cv2.resize(bgr, (round(bgr.shape[1] * scale), round(bgr.shape[0] * scale)))
@@ -42,13 +44,13 @@ def boxed(bgr: U8) -> F32:
     return np.ascontiguousarray(rgb.transpose(2, 0, 1)[None])
 
 
-def stretched(bgr: U8) -> F32:
+def stretch(bgr: U8) -> F32:
     """float32 [1, 3, 256, 320], normalised."""
     rgb = cv2.cvtColor(cv2.resize(bgr, (320, 256)), cv2.COLOR_BGR2RGB).astype(np.float32) / 255.0
     return np.ascontiguousarray(((rgb - MEAN) / STD).transpose(2, 0, 1)[None])
 
 
-def boxes(output: F32, config: DetectorConfig) -> list[tuple[F32, float]]:
+def decode_boxes(output: F32, config: DetectorConfig) -> list[tuple[F32, float]]:
     """Best first."""
     rows = output[0].T
     rows = rows[np.isfinite(rows).all(axis=1)]
@@ -61,12 +63,12 @@ def boxes(output: F32, config: DetectorConfig) -> list[tuple[F32, float]]:
             found.append((np.array([cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2], np.float32), float(scores[i])))
     kept: list[tuple[F32, float]] = []
     for box, score in found:
-        if all(overlap(box, other) <= config.nms_iou for other, _ in kept):
+        if all(box_iou(box, other) <= config.nms_iou for other, _ in kept):
             kept.append((box, score))
     return kept[: config.max_boxes]
 
 
-def overlap(a: F32, b: F32) -> float:
+def box_iou(a: F32, b: F32) -> float:
     """Intersection over union."""
     width = max(0.0, float(min(a[2], b[2]) - max(a[0], b[0])))
     height = max(0.0, float(min(a[3], b[3]) - max(a[1], b[1])))

@@ -57,7 +57,7 @@ class Candidate(msgspec.Struct, frozen=True):
     segmenter: str = ""
 
 
-def fit(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
+def usable_pictures(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
     """Those that the gate lets through: the others would cost a pipeline nothing."""
     fitness = load_fitness(config.image_quality, 1)
     return [
@@ -67,7 +67,7 @@ def fit(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
     ]
 
 
-def measured(
+def measure_steps(
     steps: dict[str, Step], pictures: Sequence[U8], rounds: int, stopwatch_ms: Callable[[], float]
 ) -> Iterator[tuple[int, dict[str, list[float]]]]:
     """Run all steps in turn on each picture; yields the round and all times so far, [ms]. A few rounds warm up."""

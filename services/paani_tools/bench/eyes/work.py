@@ -16,7 +16,7 @@ class Work(msgspec.Struct, frozen=True):
     multiply_adds: int | None
 
 
-def work(name: str, files: Iterable[Path]) -> Work:
+def count_work(name: str, files: Iterable[Path]) -> Work:
     """Of all the files together."""
     paths = list(files)
     counts = [count_multiply_adds(path) for path in paths]

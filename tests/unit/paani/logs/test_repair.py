@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.logs.repair import Interrupted, is_finished, repair, repair_all
-from paani.logs.scan import Damage, Found, scan
+from paani.logs.scan import Damage, ScannedRecord, scan
 from tests.unit.paani.logs.small_logs import NAME, begin, finished, unfinished
 
 pytestmark = pytest.mark.slow
@@ -39,8 +39,8 @@ def cut() -> bytes:
         return unfinished(Path(folder), N, EVERY).read_bytes()
 
 
-def chunks(data: bytes) -> list[Found]:
-    return [piece for piece in scan(data) if isinstance(piece, Found) and piece.opcode == Opcode.CHUNK]
+def chunks(data: bytes) -> list[ScannedRecord]:
+    return [piece for piece in scan(data) if isinstance(piece, ScannedRecord) and piece.opcode == Opcode.CHUNK]
 
 
 def poses(path: Path) -> list[int]:

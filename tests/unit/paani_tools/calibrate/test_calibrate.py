@@ -21,9 +21,9 @@ from paani_sim.eye import BoatPose, Camera
 from paani_sim.eye.gl import Context
 from paani_sim.eye.renderer import Eye
 from paani_sim.worlds import load_world
-from paani_tools.calibrate.gather import looks
-from paani_tools.calibrate.horizon import waterline
-from paani_tools.calibrate.mount import mount_of
+from paani_tools.calibrate.gather import waterline_observations
+from paani_tools.calibrate.horizon import fit_waterline
+from paani_tools.calibrate.mount import estimate_mount
 from tests.synthetic_water import evidence, odometry, water_edge_of
 from tests.unit.paani.logs import small_logs
 
@@ -61,7 +61,7 @@ def recording(folder: Path, pairs: Iterator[Pair]) -> Path:
 def test_the_mount_is_found_to_a_tenth_of_a_degree(roll_deg: float, pitch_deg: float) -> None:
     pairs = list(drawn(60, math.radians(roll_deg), math.radians(pitch_deg)))
     config = load_config(sets=KNOWN[1::2]).calibration
-    mount = mount_of(looks(*zip(*pairs, strict=True)), config, SHORE_M)
+    mount = estimate_mount(waterline_observations(*zip(*pairs, strict=True)), config, SHORE_M)
     assert mount.pitch_down_deg == pytest.approx(6.0 + pitch_deg, abs=0.15)
     assert mount.roll_deg == pytest.approx(roll_deg, abs=0.15)
     assert mount.pictures == 60
@@ -73,11 +73,11 @@ def test_what_stands_before_the_shore_is_left_out() -> None:
     clean = water_edge_of(BoatPose(0.0, 0.0, 0.0, roll_rad=0.03), bank_m=SHORE_M)
     spoilt = tuple(45 / 64 if 5 <= i < 25 else 0.0 if i % 9 == 0 else edge for i, edge in enumerate(clean))
     rng = np.random.default_rng(1)
-    line = waterline(evidence(1, spoilt), rng)
+    line = fit_waterline(evidence(1, spoilt), rng)
     assert line is not None
     assert np.abs(line.v - np.array(clean)[np.round(line.u * 80 - 0.5).astype(int)]).max() == 0.0
-    assert waterline(evidence(1, (0.0,) * 80), rng) is None
-    assert waterline(evidence(1, tuple(np.linspace(0.2, 0.9, 80) ** 3)), rng) is None
+    assert fit_waterline(evidence(1, (0.0,) * 80), rng) is None
+    assert fit_waterline(evidence(1, tuple(np.linspace(0.2, 0.9, 80) ** 3)), rng) is None
 
 
 def test_a_recording_becomes_settings_that_can_be_used(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -181,6 +181,6 @@ def test_rendered_pictures_give_the_mount_to_0_3_degrees(down_deg: float, roll_d
             shown, _ = perceiver.perceive(eye.render(boat, 0.2 * number).bgr, header, 0.0)
             pairs.append((shown, odometry(at_us, BoatPose(0.0, 0.0, 0.0, roll_rad=roll, pitch_rad=pitch))))
     perceiver.close()
-    mount = mount_of(looks(*zip(*pairs, strict=True)), config.calibration, 80.0)  # 63 to 106 m
+    mount = estimate_mount(waterline_observations(*zip(*pairs, strict=True)), config.calibration, 80.0)  # 63 to 106 m
     assert mount.pitch_down_deg == pytest.approx(down_deg, abs=0.3)
     assert mount.roll_deg == pytest.approx(roll_deg, abs=0.3)

@@ -7,20 +7,20 @@ import pytest
 from paani import keys
 from paani.errors import UserError
 from paani_tools.inspect.command import rate_line
-from paani_tools.inspect.topic_table import markdown, plain, topic_named
+from paani_tools.inspect.topic_table import topic_named, topics_markdown, topics_text
 
 
 def test_markdown_has_a_row_for_each_topic() -> None:
-    lines = markdown().splitlines()
+    lines = topics_markdown().splitlines()
     assert len(lines) == 2 + len(keys.TOPICS)
     assert len({line.count("|") for line in lines}) == 1
-    assert all(f"| `{topic.name}` |" in markdown() for topic in keys.TOPICS)
+    assert all(f"| `{topic.name}` |" in topics_markdown() for topic in keys.TOPICS)
 
 
 def test_live_rates_are_a_column_of_their_own() -> None:
     live = {topic.name: 4.25 for topic in keys.TOPICS}
-    assert plain(live).count("4.2") >= len(keys.TOPICS)
-    assert "now [Hz]" not in plain(None)
+    assert topics_text(live).count("4.2") >= len(keys.TOPICS)
+    assert "now [Hz]" not in topics_text(None)
 
 
 def test_topics_are_found_by_name_and_mistakes_are_told() -> None:

@@ -15,7 +15,7 @@ from paani import messages as m
 from paani.cli import main
 from paani.logs.reader import open_log
 from paani.logs.writer import LogWriter
-from paani_tools.logs.info import Directions
+from paani_tools.logs.info import DirectionChanges
 from tests.unit.paani.logs.small_logs import NAME, START_US, about, finished, unfinished
 
 ONE = "20231114T221320Z-1.mcap"
@@ -48,7 +48,7 @@ def test_info_tells_what_is_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_changes_of_direction_are_counted() -> None:
-    directions = Directions()
+    directions = DirectionChanges()
     for direction in ("STRAIGHT", "STRAIGHT", "LEFT", "STRAIGHT", "STOP"):
         advisory = m.Advisory(source_us=0, direction=m.Direction(direction), reason=m.Reason.CENTER_CLEAR)
         directions.take(msgspec.json.encode(advisory))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from paani.cli import main as paani
-from paani_tools.look.annotate import FONT, wrapped
+from paani_tools.look.annotate import FONT, wrap_text
 from paani_tools.look.command import file_name, main
 from paani_tools.look.contact_sheet import COLUMNS, GAP_PX, MOST, THUMBNAIL_PX, ContactSheet
 from tests.pictures import PICTURES, river
@@ -157,11 +157,11 @@ def test_names_never_clash() -> None:
 def test_an_explanation_is_wrapped_by_its_drawn_width() -> None:
     """Wide letters take more room than narrow ones; a word that fits nowhere has a line of its own."""
     for letters in ("wwww", "iiii"):
-        lines = wrapped(" ".join([letters] * 60), 0.6, 400)
+        lines = wrap_text(" ".join([letters] * 60), 0.6, 400)
         assert sum(len(line.split()) for line in lines) == 60
         assert all(cv2.getTextSize(line, FONT, 0.6, 1)[0][0] <= 400 for line in lines)
-    assert wrapped("a " + "w" * 90 + " b", 0.6, 400) == ["a", "w" * 90, "b"]
-    assert wrapped("", 0.6, 400) == []
+    assert wrap_text("a " + "w" * 90 + " b", 0.6, 400) == ["a", "w" * 90, "b"]
+    assert wrap_text("", 0.6, 400) == []
 
 
 def test_a_sheet_shows_the_folder_in_one_picture(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,10 +179,10 @@ def test_a_sheet_shows_the_folder_in_one_picture(folder: Path, tmp_path: Path, m
 
 def test_a_sheet_of_many_is_spread_over_all_of_them() -> None:
     sheet = ContactSheet()
-    assert sheet.drawn() is None
+    assert sheet.compose() is None
     for level in range(200):
         sheet.add(np.full((60, 80, 3), level, np.uint8))
-    drawn = sheet.drawn()
+    drawn = sheet.compose()
     assert drawn is not None
     rows = drawn.shape[0] // (THUMBNAIL_PX * 60 // 80 + GAP_PX)
     shown = [

@@ -69,12 +69,12 @@ class Desk:
             m.Step(
                 source_us=self.now_us,
                 heard=tuple(
-                    m.HeardMessage(topic=n, epoch=i.message.epoch, seq=i.message.seq, received_us=i.received_us)
+                    m.InputMessage(topic=n, epoch=i.message.epoch, seq=i.message.seq, received_us=i.received_us)
                     for n, i in inputs.items()
                     if i.message is not None
                 ),
                 sent=tuple(
-                    m.SentMessage(topic=n, epoch=s.epoch, seq=s.seq, sent_us=s.sent_us)
+                    m.OutputMessage(topic=n, epoch=s.epoch, seq=s.seq, sent_us=s.sent_us)
                     for n, s in zip(outputs, sent, strict=False)
                 ),
                 state=msgspec.json.encode(before).decode() if due else "",

@@ -13,10 +13,10 @@ from paani.decider import decider_of
 from paani_tools.replay.check import check_service
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Losses
-from paani_tools.replay.shift import Shift
+from paani_tools.replay.shift import TimeShift
 from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, drive
 
-LATER = Shift(T0_US, T0_US + 86_400_000_000, 1.0, 86_400_000)
+LATER = TimeShift(T0_US, T0_US + 86_400_000_000, 1.0, 86_400_000)
 
 
 def test_stamps_and_epochs_move_by_one_offset_and_nothing_else() -> None:
@@ -25,9 +25,9 @@ def test_stamps_and_epochs_move_by_one_offset_and_nothing_else() -> None:
         reason=m.Reason.CENTER_RISK, frame_seq=3, frame_epoch=T0_US // 1000 + 2, evidence_sent_us=0,
         explanation="1800000000000000 and \u00e9",
     )  # fmt: skip
-    moved = msgspec.json.decode(LATER.moved(msgspec.json.encode(advisory)), type=m.Advisory)
+    moved = msgspec.json.decode(LATER.shift_message(msgspec.json.encode(advisory)), type=m.Advisory)
     expected = msgspec.structs.replace(
-        advisory, source_us=LATER.moved_us(T0_US + 5), sent_us=LATER.moved_us(T0_US + 9),
+        advisory, source_us=LATER.shift_us(T0_US + 5), sent_us=LATER.shift_us(T0_US + 9),
         epoch=advisory.epoch + 86_400_000, frame_epoch=advisory.frame_epoch + 86_400_000,
     )  # fmt: skip
     assert moved == expected
@@ -35,14 +35,14 @@ def test_stamps_and_epochs_move_by_one_offset_and_nothing_else() -> None:
 
 def test_time_that_is_not_unix_time_stays() -> None:
     time = m.SimTime(source_us=T0_US, sim_us=61_000_000, stamp_us=900_000_000_000)
-    moved = msgspec.json.decode(LATER.moved(msgspec.json.encode(time)), type=m.SimTime)
+    moved = msgspec.json.decode(LATER.shift_message(msgspec.json.encode(time)), type=m.SimTime)
     assert (moved.sim_us, moved.stamp_us, moved.source_us) == (61_000_000, 900_000_000_000, T0_US + 86_400_000_000)
 
 
 @given(st.lists(st.integers(0, 10**10), min_size=2, max_size=6), st.sampled_from([0.01, 0.5, 1.0, 3.0, 1000.0]))
 def test_the_order_of_times_and_equal_stamps_stay(offsets_us: list[int], speed: float) -> None:
-    shift = Shift(T0_US, T0_US + 10**12, speed, 5)
-    moved = [shift.moved_us(T0_US + offset) for offset in offsets_us]
+    shift = TimeShift(T0_US, T0_US + 10**12, speed, 5)
+    moved = [shift.shift_us(T0_US + offset) for offset in offsets_us]
     for (a, x), (b, y) in zip(
         zip(offsets_us, moved, strict=True), zip(offsets_us[1:], moved[1:], strict=False), strict=False
     ):
@@ -54,7 +54,7 @@ def test_the_order_of_times_and_equal_stamps_stay(offsets_us: list[int], speed: 
 @pytest.mark.parametrize("service", keys.DECIDING_SERVICES)
 def test_a_moved_drive_is_still_exact(service: str) -> None:
     """Ledger, states and messages move together: what was recorded from a replay can be checked as well."""
-    moved = [record._replace(data=LATER.moved(record.data)) for record in drive(14.0)]
+    moved = [record._replace(data=LATER.shift_message(record.data)) for record in drive(14.0)]
     decider = decider_of(service)
     records = [r for r in moved if r.topic in Ledger(decider).topics]
     result = check_service(decider, CONFIG, records, Losses({}, ()))
@@ -64,4 +64,4 @@ def test_a_moved_drive_is_still_exact(service: str) -> None:
 
 def test_any_bytes_go_through() -> None:
     for data in (b"", b"\xff\xfe", b'{"a_us":18000000000000001}', b'{"a_us":1.8e15}', b'{"epoch":"1800000000000"}'):
-        assert LATER.moved(data) == data
+        assert LATER.shift_message(data) == data

@@ -136,7 +136,7 @@ def test_a_plain_stream_gets_a_line_only_when_something_changes() -> None:
     display = Display(stream)
     for elapsed_s in (0.0, 0.2, 0.4):
         display.waiting(1, 2, ["eye"], elapsed_s)
-    display.say("all 2 processes alive after 0.6 s")
+    display.print_line("all 2 processes alive after 0.6 s")
     assert stream.getvalue().splitlines() == [
         "starting  1/2   0.0 s  waiting for eye",
         "all 2 processes alive after 0.6 s",
@@ -152,6 +152,6 @@ def test_a_terminal_has_one_line_that_is_updated() -> None:
     display = Display(stream)
     display.waiting(0, 2, ["router", "eye"], 0.0)
     display.waiting(1, 2, ["eye"], 0.2)
-    display.say("alive")
+    display.print_line("alive")
     assert stream.getvalue().count("\n") == 1
     assert stream.getvalue().endswith("\x1b[Kalive\n")

@@ -13,7 +13,7 @@ def run(silence: Silence, from_s: float, to_s: float, speaking: tuple[str, ...])
     for step in range(round(from_s * 2), round(to_s * 2) + 1):
         now_us = step * 500_000
         for service in speaking:
-            silence.heard(service, now_us)
+            silence.note_health(service, now_us)
         for service in silence.hung(now_us):
             found.setdefault(service, step / 2)
     return found
@@ -64,5 +64,5 @@ def test_a_supervisor_that_slept_judges_nobody() -> None:
 def test_what_has_ended_cannot_hang() -> None:
     silence = started()
     silence.ended("advisor")
-    silence.heard("advisor", 10_500_000)
+    silence.note_health("advisor", 10_500_000)
     assert run(silence, 10.5, 30, ("router", "plant")) == {}
