@@ -15,10 +15,10 @@ from paani.messages import (
     Tracks,
     UnusableCause,
 )
-from paani_services.advisor.counterfactual import counterfactual
+from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
-from paani_services.advisor.policy import Decision, PolicyState, decide, side_block_risk
-from paani_services.advisor.risk import LANES, lane_components, lane_water, obstacles_from_tracks
+from paani_services.advisor.policy import Decision, PolicyState, decide, frame_components, frame_facts, side_block_risk
+from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
     TrackerState,
     is_valid_detection,
@@ -94,10 +94,9 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
     if evidence.usable and fits:
         water = {lane: lane_water(evidence, lane, config) for lane in LANES}
         obstacles = obstacles_from_tracks(tracker, config, evidence.width_px / max(1, evidence.height_px), water)
-        lanes = {lane: lane_components(water[lane], obstacles, lane, config) for lane in LANES}
-        policy, decision = decide(state.policy, lanes, obstacles, config)
-        why = counterfactual(state.policy, decision, water, obstacles, config)
-        decision = msgspec.structs.replace(decision, counterfactual=why)
+        facts = frame_facts(state.policy, water, obstacles, config)
+        policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
+        decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
     else:
         policy = msgspec.structs.replace(policy, clear_frames=0)  # an unusable frame interrupts a run of clear ones
         decision = _stop_for(NO_DECISION, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)

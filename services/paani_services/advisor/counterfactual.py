@@ -1,16 +1,15 @@
-"""Which evidence decided: the smallest sets without which the advice would be another (beyond J13). Pure.
+"""The counterfactual of a decision: the smallest sets of evidence without which the direction would be another. Pure.
 
 A piece of evidence is an accepted track that overlaps a corridor, or the water of one corridor; water taken away means
-clear, certain water: N = 0 and U = 0. The policy is asked again about the same frame with the same memory, as if the
-pieces had been gone for as long as a turn is kept, because a turn that merely lasts has no evidence of its own.
-
-All sets of one size are judged at once: what stands where is worked out for every set, to the bit as `decide` does it,
-and the policy's own `direct` names the direction. Each set that is reported has then been put to `decide` itself.
+clear, certain water: N = 0 and U = 0. The policy itself is asked again about the same frame with the same memory
+(beyond J13): `evaluate` about all sets of one size at once, as arrays, and `select_direction` about what follows. It is
+asked as if the pieces had been gone for as long as a turn is retained, because a retained turn has no evidence.
 """
 
 import functools
 import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -18,83 +17,127 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.arrays import F64, Bools
-from paani.config import Config, RiskConfig
-from paani.messages import ChangedBy, Counterfactual, Direction, Lane, LaneEvidence, Limit, Reason, Removal
+from paani.config import Config
+from paani.messages import ChangedBy, Counterfactual, Direction, Lane, Limit, Reason, Removal
 from paani_services.advisor.policy import (
     OPPOSITE_SIDE,
     Decision,
+    Evaluation,
+    FrameFacts,
     PolicyInput,
-    PolicyState,
-    decide,
-    fills_lane,
-    held_side,
-    is_vessel_ahead,
-    is_without_water,
-    lane_risk_limit,
-    may_search,
+    evaluate,
+    frame_components,
     preferred_side,
-    reach_into_center,
     select_direction,
 )
-from paani_services.advisor.risk import LANES, Obstacle, lane_components, lane_span, overlap
+from paani_services.advisor.risk import LANES, Operands, Truth, Value
 
-Factors = tuple[tuple[int | None, float], ...]  # of a product: the bit of a piece (None: it stays) and its factor
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
-MAX_SHOWN = 3
-CLEAR_WATER = LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
-SIDES = (None, "left", "right", None)
+MAX_SHOWN = 3  # sets that the advisory carries
 LIMITS = {"left": Limit.LEFT_RISK, "center": Limit.CENTER_RISK, "right": Limit.RIGHT_RISK}
 
 
 class Pieces(NamedTuple):
-    """What may be taken away, in the order of the bits: tracks by id, then lanes from the left."""
+    """The evidence that may be taken away: obstacles by index, in the order of their tracks' ids, then lanes.
 
-    tracks: tuple[Obstacle, ...]
+    left_out: tracks beyond `MAX_TRACKS`, which always stay.
+    """
+
+    obstacles: tuple[int, ...]
     water: tuple[str, ...]
     left_out: int
 
     @property
-    def all(self) -> int:
-        return len(self.tracks) + len(self.water)
+    def total(self) -> int:
+        return len(self.obstacles) + len(self.water)
 
 
-def counterfactual(
-    state: PolicyState,
-    decision: Decision,
-    water: dict[str, LaneEvidence],
-    obstacles: tuple[Obstacle, ...],
-    config: Config,
-) -> Counterfactual:
-    """What would have changed the decision on one frame.
+class Subsets(NamedTuple):
+    """All sets of one size out of some pieces, in order.
 
-    state: the policy's memory before the frame. water, obstacles: what `decision` was made from. The work is bounded:
-    no more than 24 tracks and three lanes, in sets of at most `advisor.counterfactual_size`.
+    members: the pieces of each set. kept: pieces x sets, False where the set takes the piece away. taking: of each
+    piece, the sets that take it away.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    kept: Bools
+    taking: tuple[NDArray[np.intp], ...]
+
+
+class WithoutSubsets:
+    """The selections of evidence that remain after each of the sets is taken away; see `risk.Selection`."""
+
+    def __init__(self, pieces: Pieces, subsets: Subsets) -> None:
+        self._subsets = subsets
+        self._piece_of_obstacle = {i: piece for piece, i in enumerate(pieces.obstacles)}
+        self._piece_of_water = {lane: len(pieces.obstacles) + i for i, lane in enumerate(pieces.water)}
+
+    def has_water(self, lane: str) -> Truth:
+        """Whether the water of the lane remains; it does where it is no piece."""
+        piece = self._piece_of_water.get(lane)
+        return True if piece is None else self._subsets.kept[piece]
+
+    def water_value(self, lane: str, value: float) -> Value:
+        """The value of a term of the lane's water, or 0 where that is taken away."""
+        piece = self._piece_of_water.get(lane)
+        return value if piece is None else np.where(self._subsets.kept[piece], value, 0.0)
+
+    def has_any(self, obstacles: Sequence[int]) -> Truth:
+        """Whether any of these obstacles remains; one that is no piece always does."""
+        if not obstacles:
+            return False
+        pieces = [self._piece_of_obstacle.get(i) for i in obstacles]
+        found: Bools = np.full(len(self._subsets.members), None in pieces)
+        for piece in pieces:
+            if piece is not None:
+                found |= self._subsets.kept[piece]
+        return found
+
+    def noisy_or(self, operands: Operands) -> Value:
+        """Noisy-OR of the operands that remain, in the order of the scalar one, so that no bit differs."""
+        none: F64 = np.ones(len(self._subsets.members))
+        for i, value in operands:
+            piece = self._piece_of_obstacle.get(i)
+            if piece is None:
+                none *= 1.0 - value
+            else:
+                taking = self._subsets.taking[piece]
+                without = none[taking]
+                none *= 1.0 - value
+                none[taking] = without
+        return np.minimum(np.maximum(1.0 - none, 0.0), 1.0)
+
+
+def find_counterfactual(facts: FrameFacts, decision: Decision, config: Config) -> Counterfactual:
+    """Find what would have changed the decision on one frame.
+
+    facts: what `decision` was made from. The work is bounded: no more than 24 tracks and three lanes, in sets of at
+    most `advisor.counterfactual_size`.
     """
     if decision.direction is Direction.STRAIGHT:
         return Counterfactual()
     if decision.reason is Reason.TURN_RETAINED:
         return Counterfactual(changed_by=ChangedBy.CLEAR_PICTURES)
-    limit, margin = nearest_limit(state, decision, obstacles, config)
+    limit, margin = nearest_limit(facts, decision)
     if config.advisor.counterfactual_size == 0:
         return Counterfactual(changed_by=ChangedBy.MORE_EVIDENCE, limit=limit, margin=margin)
-    pieces = pieces_of(water, obstacles, config)
-    scene = _scene(state, pieces, water, obstacles, config)
+    pieces = removable_pieces(facts)
     judged = 0
-    for size in range(1, min(config.advisor.counterfactual_size, pieces.all) + 1):
-        sets = _sets_of(pieces.all, size)
-        judged += len(sets.members)
-        codes = _codes(scene, sets)
-        changing = np.flatnonzero(IS_NOT[decision.direction][codes])
+    for size in range(1, min(config.advisor.counterfactual_size, pieces.total) + 1):
+        subsets = _subsets(pieces.total, size)
+        judged += len(subsets.members)
+        remaining = WithoutSubsets(pieces, subsets)
+        indices = _input_indices(evaluate(facts, frame_components(facts, remaining, config), remaining, config))
+        changing = np.flatnonzero(IS_NOT[decision.direction][indices])
         if not changing.size:
             continue
-        straight_first = changing[np.argsort(IS_NOT[Direction.STRAIGHT][codes[changing]], kind="stable")]
-        removals = [
-            _removal(pieces, sets.members[i], state, water, obstacles, config)
-            for i in straight_first[:MAX_SHOWN].tolist()
-        ]
+        straight_first = changing[np.argsort(IS_NOT[Direction.STRAIGHT][indices[changing]], kind="stable")]
         return Counterfactual(
             changed_by=ChangedBy.EVIDENCE,
-            removals=tuple(removal for removal in removals if removal.direction is not decision.direction),
+            removals=tuple(
+                _removal(facts, pieces, subsets.members[i], DIRECTIONS[indices[i]])
+                for i in straight_first[:MAX_SHOWN].tolist()
+            ),
             found=changing.size,
             judged=judged,
             left_out=pieces.left_out,
@@ -106,58 +149,40 @@ def counterfactual(
     )
 
 
-def direction_without(
-    track_ids: tuple[int, ...],
-    lanes: tuple[str, ...],
-    state: PolicyState,
-    water: dict[str, LaneEvidence],
-    obstacles: tuple[Obstacle, ...],
-    config: Config,
-) -> Direction:
-    """What the policy decides on the same frame without these tracks and without the water of these lanes."""
-    seen = tuple(o for o in obstacles if o.id not in track_ids)
-    parts = {lane: lane_components(CLEAR_WATER if lane in lanes else water[lane], seen, lane, config) for lane in LANES}
-    patient = msgspec.structs.replace(state, clear_frames=config.advisor.policy.clear_frames)
-    return decide(patient, parts, seen, config)[1].direction
-
-
-def pieces_of(water: dict[str, LaneEvidence], obstacles: tuple[Obstacle, ...], config: Config) -> Pieces:
-    """Everything that weighs: what overlaps no corridor, and water that adds no risk, changes nothing."""
-    spans = [lane_span(lane, config.perception.corridors) for lane in LANES]
-    inside = [o for o in obstacles if any(overlap(o.box, span) > 0.0 for span in spans)]
-    inside.sort(key=lambda o: (-o.severity * o.presence, o.id))
+def removable_pieces(facts: FrameFacts) -> Pieces:
+    """All evidence that has a weight: a track outside every corridor, or water without risk, changes nothing."""
+    obstacles = facts.obstacles
+    inside = list({i: None for lane in facts.lanes.values() for i, _ in lane.terms.obstacles})
+    inside.sort(key=lambda i: (-obstacles[i].severity * obstacles[i].presence, obstacles[i].id))
+    water = {name: lane.terms.water for name, lane in facts.lanes.items()}
     return Pieces(
-        tracks=tuple(sorted(inside[:MAX_TRACKS], key=lambda o: o.id)),
+        obstacles=tuple(sorted(inside[:MAX_TRACKS], key=lambda i: obstacles[i].id)),
         water=tuple(lane for lane in LANES if water[lane].non_water > 0.0 or water[lane].uncertainty > 0.0),
         left_out=max(0, len(inside) - MAX_TRACKS),
     )
 
 
-def nearest_limit(
-    state: PolicyState, decision: Decision, obstacles: tuple[Obstacle, ...], config: Config
-) -> tuple[Limit, float]:
+def nearest_limit(facts: FrameFacts, decision: Decision) -> tuple[Limit, float]:
     """The limit that changes the direction when it alone is crossed, and how far the number lies above it.
 
-    A lane that is blocked by more than its risk is not set free by its risk.
+    The risk of a lane that something else blocks as well has no such limit.
     """
-    policy = config.advisor.policy
     lanes = {"left": decision.left, "center": decision.center, "right": decision.right}
     risks = {lane: lanes[lane].risk for lane in LANES}
+    held, needed = facts.held_side, facts.needed_gain
     policy_input = msgspec.structs.replace(decision.policy_input, retained_turn=None)
-    vessel = any(is_vessel_ahead(o, config) for o in obstacles)
     found: list[tuple[float, Limit]] = []
     for lane in LANES:
         limit = lanes[lane].limit
         margin = risks[lane] - limit
-        if lanes[lane].occupied or is_without_water(lanes[lane].non_water, policy) or (lane == "center" and vessel):
+        if lanes[lane].occupied or facts.lanes[lane].is_without_water or (lane == "center" and facts.vessels_ahead):
             continue
         across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
         moved = msgspec.structs.replace(
-            policy_input, preferred_side=preferred_side(state, across, config), **{f"{lane}_blocked": margin < 0.0}
+            policy_input, preferred_side=preferred_side(held, needed, across), **{f"{lane}_blocked": margin < 0.0}
         )
         if select_direction(moved) is not decision.direction:
             found.append((margin, LIMITS[lane]))
-    held, needed = held_side(state, config)
     other_side = msgspec.structs.replace(policy_input, preferred_side=OPPOSITE_SIDE[policy_input.preferred_side])
     if needed < math.inf and select_direction(other_side) is not decision.direction:
         found.append((risks[held] - risks[OPPOSITE_SIDE[held]] - needed, Limit.SIDE_GAIN))
@@ -167,181 +192,48 @@ def nearest_limit(
     return nearest, margin
 
 
-class _Lane(NamedTuple):
-    """One corridor. obstacles, urgencies: the factors of E for the tracks inside, in order.
-
-    water: the bit of its water (None: adds nothing). is_dry: it shows none. occupying: bits of the tracks that do.
-    """
-
-    non_water: float
-    uncertainty: float
-    water: int | None
-    is_without_water: bool
-    obstacles: Factors
-    urgencies: Factors
-    occupying: tuple[int | None, ...]
-    limit: float
-
-
-class _Sets(NamedTuple):
-    """All sets of a size, in order; kept: pieces x sets, False where taken; taking: the sets that take each piece."""
-
-    members: tuple[tuple[int, ...], ...]
-    kept: Bools
-    taking: tuple[NDArray[np.intp], ...]
-
-
-class _Scene(NamedTuple):
-    """What every set of pieces is taken from. vessels, places: bits of those ahead, and of those at each place."""
-
-    lanes: dict[str, _Lane]
-    vessels: tuple[int | None, ...]
-    places: dict[str, tuple[int | None, ...]]
-    held: str
-    needed: float
-    may_search: bool
-    water_limit: float
-    weights: RiskConfig
-
-
-def _scene(
-    state: PolicyState,
-    pieces: Pieces,
-    water: dict[str, LaneEvidence],
-    obstacles: tuple[Obstacle, ...],
-    config: Config,
-) -> _Scene:
-    policy = config.advisor.policy
-    bit = {track.id: i for i, track in enumerate(pieces.tracks)}
-    wet = {lane: len(pieces.tracks) + i for i, lane in enumerate(pieces.water)}
-    lanes = {}
-    for lane, before in zip(LANES, state.occupied_frames, strict=True):
-        span = lane_span(lane, config.perception.corridors)
-        inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
-        filling = [o for o in obstacles if fills_lane(o, lane, config)]
-        lasting = before + 1 >= policy.occupancy_frames
-        dry = is_without_water(water[lane].non_water, policy)
-        lanes[lane] = _Lane(
-            non_water=water[lane].non_water,
-            uncertainty=water[lane].uncertainty,
-            water=wet.get(lane),
-            is_without_water=dry,
-            obstacles=tuple((bit.get(o.id), 1.0 - o.severity * share * o.presence) for o, share in inside),
-            urgencies=tuple((bit.get(o.id), 1.0 - o.urgency * share) for o, share in inside if o.urgency > 0.0),
-            occupying=tuple(bit.get(o.id) for o in filling if lasting or o.is_danger),
-            limit=lane_risk_limit(lane, state, config),
-        )
-    middle = lane_span("center", config.perception.corridors)
-    places = [(reach_into_center(o.box, policy), bit.get(o.id)) for o in obstacles if overlap(o.box, middle) > 0.0]
-    held, needed = held_side(state, config)
-    return _Scene(
-        lanes=lanes,
-        vessels=tuple(bit.get(o.id) for o in obstacles if is_vessel_ahead(o, config)),
-        places={name: tuple(i for place, i in places if place == name) for name in ("core", "left", "right")},
-        held=held,
-        needed=needed,
-        may_search=may_search(state, config),
-        water_limit=policy.center_block_risk,
-        weights=config.advisor.risk,
+def _input_indices(found: Evaluation) -> NDArray[np.int64]:
+    """The index in `POLICY_INPUTS` of what follows from each set."""
+    indices: NDArray[np.int64] = (
+        found.blocked["left"] * np.int64(1)
+        + found.blocked["center"] * np.int64(2)
+        + found.blocked["right"] * np.int64(4)
+        + found.prefers_right * np.int64(8)
+        + found.left_incursion * np.int64(16)
+        + found.right_incursion * np.int64(32)
+        + found.may_search * np.int64(64)
     )
+    return indices
 
 
-def _codes(scene: _Scene, sets: _Sets) -> NDArray[np.int64]:
-    """What stands where, for each set."""
-    count, kept = len(sets.members), sets.kept
-
-    def any_left(bits: tuple[int | None, ...]) -> Bools:
-        found: Bools = np.full(count, None in bits)
-        for i in bits:
-            if i is not None:
-                found |= kept[i]
-        return found
-
-    def product(factors: Factors) -> F64:
-        found = np.ones(count)
-        for i, factor in factors:
-            if i is None:
-                found *= factor
-            else:
-                without = found[sets.taking[i]]
-                found *= factor
-                found[sets.taking[i]] = without
-        return found
-
-    def risk(lane: _Lane) -> F64:
-        wet = np.ones(count, bool) if lane.water is None else kept[lane.water]
-        weights = scene.weights
-        return np.minimum(
-            1.0,
-            weights.non_water * np.where(wet, lane.non_water, 0.0)
-            + weights.obstacle * np.clip(1.0 - product(lane.obstacles), 0.0, 1.0)
-            + weights.urgency * np.clip(1.0 - product(lane.urgencies), 0.0, 1.0)
-            + weights.uncertainty * np.where(wet, lane.uncertainty, 0.0),
-        )
-
-    risks = {name: risk(lane) for name, lane in scene.lanes.items()}
-    dry = {name: any_left((lane.water,) if lane.is_without_water else ()) for name, lane in scene.lanes.items()}
-    blocked = {
-        name: (risks[name] >= lane.limit) | dry[name] | any_left(lane.occupying) for name, lane in scene.lanes.items()
-    }
-    center = scene.lanes["center"]
-    wet = np.ones(count, bool) if center.water is None else kept[center.water]
-    alone = scene.weights.non_water * center.non_water + scene.weights.uncertainty * center.uncertainty
-    core, left, right = (any_left(scene.places[name]) for name in ("core", "left", "right"))
-    edge = (left != right) & ~core & ~(wet & (alone >= scene.water_limit))
-    gain = risks[scene.held] - risks[OPPOSITE_SIDE[scene.held]]
-    changes = (gain > 0.0) & (gain >= scene.needed)
-    codes: NDArray[np.int64] = (
-        blocked["left"] * 1
-        + (blocked["center"] | any_left(scene.vessels)) * 2
-        + blocked["right"] * 4
-        + (changes != (scene.held == "right")) * 8
-        + np.where(edge, np.where(left, 16, 32), 0)
-        + (scene.may_search & ~(dry["left"] & dry["center"] & dry["right"])) * 64
+POLICY_INPUTS = tuple(
+    PolicyInput(
+        left_blocked=bool(index & 1),
+        center_blocked=bool(index & 2),
+        right_blocked=bool(index & 4),
+        preferred_side="right" if index & 8 else "left",
+        incursion_side="left" if index & 16 else "right" if index & 32 else None,
+        may_search=bool(index & 64),
     )
-    return codes
-
-
-CODES = 128
-
-
-def _direction_of(code: int) -> Direction:
-    return select_direction(
-        PolicyInput(
-            left_blocked=bool(code & 1),
-            center_blocked=bool(code & 2),
-            right_blocked=bool(code & 4),
-            preferred_side="right" if code & 8 else "left",
-            incursion_side=SIDES[code >> 4 & 3],
-            may_search=bool(code & 64),
-        )
-    )
-
-
-IS_NOT = {
-    direction: np.array([_direction_of(code) is not direction for code in range(CODES)]) for direction in Direction
-}
+    for index in range(128)
+)
+DIRECTIONS = tuple(map(select_direction, POLICY_INPUTS))
+IS_NOT = {direction: np.array([found is not direction for found in DIRECTIONS]) for direction in Direction}
 
 
 @functools.lru_cache(maxsize=3 * (MAX_TRACKS + len(LANES) + 1))
-def _sets_of(pieces: int, size: int) -> _Sets:
+def _subsets(pieces: int, size: int) -> Subsets:
     members = tuple(itertools.combinations(range(pieces), size))
     kept = np.ones((pieces, len(members)), bool)
     kept[np.array(members).T, np.arange(len(members))] = False
     kept.flags.writeable = False
-    return _Sets(members, kept, tuple(np.flatnonzero(~row) for row in kept))
+    return Subsets(members, kept, tuple(np.flatnonzero(~row) for row in kept))
 
 
-def _removal(
-    pieces: Pieces,
-    bits: tuple[int, ...],
-    state: PolicyState,
-    water: dict[str, LaneEvidence],
-    obstacles: tuple[Obstacle, ...],
-    config: Config,
-) -> Removal:
-    tracks = len(pieces.tracks)
-    ids = tuple(pieces.tracks[i].id for i in bits if i < tracks)
-    lanes = tuple(pieces.water[i - tracks] for i in bits if i >= tracks)
-    direction = direction_without(ids, lanes, state, water, obstacles, config)
-    return Removal(direction=direction, track_ids=ids, water=tuple(Lane(lane) for lane in lanes))
+def _removal(facts: FrameFacts, pieces: Pieces, taken: tuple[int, ...], direction: Direction) -> Removal:
+    tracks = len(pieces.obstacles)
+    return Removal(
+        direction=direction,
+        track_ids=tuple(facts.obstacles[pieces.obstacles[i]].id for i in taken if i < tracks),
+        water=tuple(Lane(pieces.water[i - tracks]) for i in taken if i >= tracks),
+    )

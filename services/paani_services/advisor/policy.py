@@ -1,15 +1,36 @@
-"""From three corridors to one direction: thresholds, overrides, sides, hysteresis (J5-J10). Pure."""
+"""The policy: from the risks of three corridors to one direction. Pure.
+
+Thresholds, then overrides (occupancy, a vessel ahead, a lane without water), then the choice of a side, with hysteresis
+over distinct frames (J5-J10). It is written once, for all evidence of a frame and for selections of it: `evaluate` maps
+the evidence that counts to the input of the policy, and `select_direction` maps that to a direction. The counterfactual
+asks both about many selections at once.
+"""
 
 import math
+from typing import NamedTuple
 
 import msgspec
 
 from paani.config import Config, PolicyConfig
-from paani.messages import SIDE_OF, BoxXyxy, Counterfactual, Direction, LaneRisk, Reason
+from paani.messages import SIDE_OF, BoxXyxy, Counterfactual, Direction, LaneEvidence, LaneRisk, Reason
 from paani_services.advisor.association import area
-from paani_services.advisor.risk import LANES, LaneComponents, Obstacle, lane_span, overlap, shared_width
+from paani_services.advisor.risk import (
+    ALL_EVIDENCE,
+    LANES,
+    LaneComponents,
+    LaneTerms,
+    Obstacle,
+    Selection,
+    Truth,
+    Value,
+    lane_components,
+    lane_span,
+    lane_terms,
+    overlap,
+    shared_width,
+)
 
-MIN_OCCUPYING_PRESENCE = 0.5  # an obstacle fainter than this has been out of sight too long to occupy a lane
+MIN_OCCUPYING_PRESENCE = 0.5  # presence below which an unseen obstacle occupies no lane
 FULL_TURNS = {"left": Direction.LEFT, "right": Direction.RIGHT}
 SLIGHT_TURNS = {"left": Direction.SLIGHT_LEFT, "right": Direction.SLIGHT_RIGHT}
 OPPOSITE_SIDE = {"left": "right", "right": "left"}
@@ -27,9 +48,9 @@ RECORDED_NAMES = {  # of the fields of `PolicyInput` in a recorded state
 class PolicyState(msgspec.Struct, frozen=True, rename={"no_way_frames": "shut_frames"}):
     """What one distinct frame leaves for the next.
 
-    occupied_frames: frames in a row each lane was occupied. turn: the turn in progress. clear_frames: frames in a row
-    the centre was clear. blocked: which lanes were. shut_frames: frames in a row that showed water but no way that is
-    free; a look to one side that was in vain counts no more when it begins to look to the other.
+    occupied_frames: consecutive frames in which each lane was filled. turn: the turn in progress. clear_frames:
+    consecutive frames in which the centre was clear. blocked: the lanes that were blocked. no_way_frames: consecutive
+    frames that showed water but no free way; set back to the beginning of a search where the search changes sides.
     """
 
     occupied_frames: tuple[int, int, int] = (0, 0, 0)
@@ -40,11 +61,11 @@ class PolicyState(msgspec.Struct, frozen=True, rename={"no_way_frames": "shut_fr
 
 
 class PolicyInput(msgspec.Struct, frozen=True, rename=RECORDED_NAMES):
-    """All that a direction depends on.
+    """Everything that the direction is a function of.
 
-    left, center, right: is the lane blocked. incursion: the side from which obstacles reach into the centre but not its
-    core. better: the side to take if both are free. kept: a turn that has not yet been clear for long enough.
-    looks: no way has been free for so long that the boat is to look for one, turning where it is.
+    incursion_side: the side from which obstacles reach into the centre but not into its core. preferred_side: the side
+    to take where both are free. retained_turn: a turn whose end has not been clear for long enough. may_search: no way
+    has been free for so long that the boat may turn on the spot to find one.
     """
 
     left_blocked: bool = True
@@ -56,8 +77,52 @@ class PolicyInput(msgspec.Struct, frozen=True, rename=RECORDED_NAMES):
     may_search: bool = False
 
 
+class LaneFacts(NamedTuple):
+    """One corridor in one frame. Obstacles are given by index.
+
+    limit: the risk at which it is blocked. is_without_water: its water alone blocks it. filling: obstacles low and wide
+    enough to occupy it. occupying: those of them that occupy it in this frame.
+    """
+
+    terms: LaneTerms
+    limit: float
+    is_without_water: bool
+    filling: tuple[int, ...]
+    occupying: tuple[int, ...]
+
+
+class FrameFacts(NamedTuple):
+    """One frame as the policy sees it, before it is asked which evidence counts. Obstacles are given by index.
+
+    vessels_ahead: vessels large enough to block the centre (J7). reaching: obstacles in the centre by the part of it
+    that they reach, `core`, `left` or `right` edge (J9). held_side: the side to take unless the other one is better by
+    `needed_gain`.
+    """
+
+    lanes: dict[str, LaneFacts]
+    obstacles: tuple[Obstacle, ...]
+    vessels_ahead: tuple[int, ...]
+    reaching: dict[str, tuple[int, ...]]
+    held_side: str
+    needed_gain: float
+    may_search: bool
+
+
+class Evaluation(NamedTuple):
+    """What the policy makes of the evidence that counts; arrays where it was asked about many selections."""
+
+    blocked: dict[str, Truth]
+    occupied: dict[str, Truth]
+    vessel_ahead: Truth
+    shows_water: Truth
+    left_incursion: Truth
+    right_incursion: Truth
+    prefers_right: Truth
+    may_search: Truth
+
+
 class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"}):
-    """One direction, why, the lanes that decided it, and what would have changed it."""
+    """One direction, its reason, the lanes that decided it, and what would have changed it."""
 
     direction: Direction
     reason: Reason
@@ -68,36 +133,97 @@ class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"})
     counterfactual: Counterfactual = Counterfactual()
 
 
-def decide(
-    state: PolicyState,
-    lanes: dict[str, LaneComponents],
-    obstacles: tuple[Obstacle, ...],
-    config: Config,
-) -> tuple[PolicyState, Decision]:
-    """Judge one distinct, usable frame.
+def frame_facts(
+    state: PolicyState, water: dict[str, LaneEvidence], obstacles: tuple[Obstacle, ...], config: Config
+) -> FrameFacts:
+    """Collect what the policy needs of one frame.
 
-    lanes: components by corridor name. A republish must not come here: each call counts as one frame.
+    water: of each corridor. state: what the frame before left.
     """
     policy = config.advisor.policy
-    frames, occupied = _lane_occupancy(state, obstacles, config)
-    vessel = any(is_vessel_ahead(o, config) for o in obstacles)
-    limits = {lane: lane_risk_limit(lane, state, config) for lane in LANES}
-    dry = {lane: is_without_water(lanes[lane].non_water, policy) for lane in LANES}
-    blocked = {
-        lane: occupied[lane] or dry[lane] or lanes[lane].risk >= limits[lane] or (lane == "center" and vessel)
-        for lane in LANES
-    }
-    shows_water = not all(dry.values())
-    judged = {lane: _lane_risk(lanes[lane], limits[lane], occupied[lane], blocked[lane]) for lane in LANES}
-    clear_frames = 0 if blocked["center"] else state.clear_frames + 1
-    risks = {lane: lanes[lane].risk for lane in LANES}
+    lanes = {}
+    for lane, before in zip(LANES, state.occupied_frames, strict=True):
+        filling = [i for i, o in enumerate(obstacles) if fills_lane(o, lane, config)]
+        is_lasting = before + 1 >= policy.occupancy_frames
+        lanes[lane] = LaneFacts(
+            terms=lane_terms(water[lane], obstacles, lane, config),
+            limit=lane_risk_limit(lane, state, config),
+            is_without_water=is_without_water(water[lane].non_water, policy),
+            filling=tuple(filling),
+            occupying=tuple(i for i in filling if is_lasting or obstacles[i].is_danger),
+        )
+    reaching: dict[str, list[int]] = {"core": [], "left": [], "right": []}
+    for i, _ in lanes["center"].terms.obstacles:
+        reaching[reach_into_center(obstacles[i].box, policy)].append(i)
+    held, needed = held_side(state, config)
+    return FrameFacts(
+        lanes=lanes,
+        obstacles=obstacles,
+        vessels_ahead=tuple(i for i, o in enumerate(obstacles) if is_vessel_ahead(o, config)),
+        reaching={part: tuple(found) for part, found in reaching.items()},
+        held_side=held,
+        needed_gain=needed,
+        may_search=may_search(state, config),
+    )
+
+
+def frame_components(facts: FrameFacts, evidence: Selection, config: Config) -> dict[str, LaneComponents]:
+    """The risk of each corridor with its components, from the evidence that counts."""
+    return {lane: lane_components(facts.lanes[lane].terms, lane, evidence, config.advisor.risk) for lane in LANES}
+
+
+def evaluate(
+    facts: FrameFacts, components: dict[str, LaneComponents], evidence: Selection, config: Config
+) -> Evaluation:
+    """Apply thresholds and overrides to the evidence that counts (J5-J7, J9).
+
+    components: of the same evidence. An incursion from one edge of the centre is one whose obstacles reach neither its
+    core nor its other edge, where the water alone does not block the centre.
+    """
+    without_water, occupied, blocked = {}, {}, {}
+    for lane, found in facts.lanes.items():
+        without_water[lane] = found.is_without_water & evidence.has_water(lane)
+        occupied[lane] = evidence.has_any(found.occupying)
+        blocked[lane] = (components[lane].risk >= found.limit) | without_water[lane] | occupied[lane]
+    vessel_ahead = evidence.has_any(facts.vessels_ahead)
+    blocked["center"] = blocked["center"] | vessel_ahead
+    center, weights = components["center"], config.advisor.risk
+    water_risk = weights.non_water * center.non_water + weights.uncertainty * center.uncertainty
+    core, left, right = (evidence.has_any(facts.reaching[part]) for part in ("core", "left", "right"))
+    is_inner = core | (water_risk >= config.advisor.policy.center_block_risk)
+    gain = components[facts.held_side].risk - components[OPPOSITE_SIDE[facts.held_side]].risk
+    shows_water = True ^ (without_water["left"] & without_water["center"] & without_water["right"])
+    return Evaluation(
+        blocked=blocked,
+        occupied=occupied,
+        vessel_ahead=vessel_ahead,
+        shows_water=shows_water,
+        left_incursion=left & (True ^ (right | is_inner)),
+        right_incursion=right & (True ^ (left | is_inner)),
+        prefers_right=_is_clear_gain(gain, facts.needed_gain) ^ (facts.held_side == "right"),
+        may_search=facts.may_search & shows_water,
+    )
+
+
+def decide(
+    state: PolicyState, facts: FrameFacts, components: dict[str, LaneComponents], config: Config
+) -> tuple[PolicyState, Decision]:
+    """Judge one distinct, usable frame by all its evidence.
+
+    facts, components: of the frame. A republished frame must not come here: each call counts as one frame.
+    """
+    policy = config.advisor.policy
+    found = evaluate(facts, components, ALL_EVIDENCE, config)
+    judged = {lane: _lane_risk(lane, facts, components, found) for lane in LANES}
+    risks = {lane: judged[lane].risk for lane in LANES}
+    clear_frames = 0 if found.blocked["center"] else state.clear_frames + 1
     policy_input = PolicyInput(
-        left_blocked=blocked["left"],
-        center_blocked=blocked["center"],
-        right_blocked=blocked["right"],
-        incursion_side=_edge_incursion(judged["center"], obstacles, config),
-        preferred_side=preferred_side(state, risks, config),
-        may_search=shows_water and may_search(state, config),
+        left_blocked=judged["left"].blocked,
+        center_blocked=judged["center"].blocked,
+        right_blocked=judged["right"].blocked,
+        incursion_side="left" if found.left_incursion else "right" if found.right_incursion else None,
+        preferred_side="right" if found.prefers_right else "left",
+        may_search=bool(found.may_search),
         retained_turn=state.turn if clear_frames < policy.clear_frames else None,
     )
     direction = select_direction(policy_input)
@@ -109,66 +235,70 @@ def decide(
         reason = Reason.NO_SIDE_FOR_LONG
     elif policy_input.incursion_side is not None:
         reason = Reason.CENTER_EDGE_INCURSION
-    elif not policy_input.left_blocked and not policy_input.right_blocked and _is_tie(state, risks, config):
+    elif not policy_input.left_blocked and not policy_input.right_blocked and _is_tie(facts, risks, config):
         reason = Reason.TIE_STARBOARD if state.turn is None else Reason.TIE_KEPT_SIDE
     else:
-        reason = _blocked_center_reason(judged["center"], vessel)
+        reason = _blocked_center_reason(judged["center"], is_vessel_ahead=bool(found.vessel_ahead))
     turn = direction if direction in SIDE_OF else None
     if direction is Direction.STOP:
         turn = state.turn  # the side is remembered through a stop, so that a tie resumes it
     no_way_frames = 0
-    if shows_water and has_no_free_side(policy_input):
+    if found.shows_water and has_no_free_side(policy_input):
         no_way_frames = 1 + (policy.look_frames if is_search_exhausted(state, config) else state.no_way_frames)
     after = PolicyState(
-        frames,
-        turn,
-        clear_frames,
-        (policy_input.left_blocked, policy_input.center_blocked, policy_input.right_blocked),
-        no_way_frames,
+        occupied_frames=_occupied_frames(state, facts, policy),
+        turn=turn,
+        clear_frames=clear_frames,
+        blocked=(policy_input.left_blocked, policy_input.center_blocked, policy_input.right_blocked),
+        no_way_frames=no_way_frames,
     )
     return after, Decision(direction, reason, judged["left"], judged["center"], judged["right"], policy_input)
 
 
 def select_direction(policy_input: PolicyInput) -> Direction:
-    """The direction for what stands where (J5, J8-J10, resolutions 12-14)."""
+    """The direction that follows from the input (J5, J8-J10).
+
+    A clear centre goes straight, unless a turn is retained. A blocked centre turns to the free side, or to the
+    preferred one where both are free; away from an incursion from one edge, slightly where that side is free; and
+    stops where no side is free, unless the boat may search.
+    """
     blocked = {"left": policy_input.left_blocked, "right": policy_input.right_blocked}
     if not policy_input.center_blocked:
-        retained_turn = policy_input.retained_turn
-        return (
-            retained_turn if retained_turn is not None and not blocked[SIDE_OF[retained_turn]] else Direction.STRAIGHT
-        )
+        turn = policy_input.retained_turn
+        return turn if turn is not None and not blocked[SIDE_OF[turn]] else Direction.STRAIGHT
     if has_no_free_side(policy_input) and not policy_input.may_search:
         return Direction.STOP
     if policy_input.incursion_side is not None:
-        away = OPPOSITE_SIDE[policy_input.incursion_side]  # the other way would turn towards it
+        away = OPPOSITE_SIDE[policy_input.incursion_side]  # the other side would turn towards the obstacle
         return FULL_TURNS[away] if blocked[away] else SLIGHT_TURNS[away]
     free = [side for side in ("left", "right") if not blocked[side]]
     return FULL_TURNS[free[0] if len(free) == 1 else policy_input.preferred_side]
 
 
 def has_no_free_side(policy_input: PolicyInput) -> bool:
-    """The centre is blocked, and so is each side that could be taken instead."""
+    """Whether the centre is blocked and so is every side that could be taken instead."""
     away = OPPOSITE_SIDE.get(policy_input.incursion_side or "")
     sides = {"left": policy_input.left_blocked, "right": policy_input.right_blocked}
     return policy_input.center_blocked and (sides[away] if away is not None else all(sides.values()))
 
 
 def may_search(state: PolicyState, config: Config) -> bool:
-    """No way was free for `look_frames`, and the boat can turn where it is, by a map of what stands around it."""
+    """Whether no way was free for `look_frames`, and the boat can turn on the spot by a map of what is around it."""
     needed = config.advisor.policy.look_frames
     can_turn = _is_planner_active(config) and config.navigator.planner.turn_radius_m == 0.0
     return can_turn and 0 < needed <= state.no_way_frames
 
 
 def is_search_exhausted(state: PolicyState, config: Config) -> bool:
-    """It has looked to one side for twice as long as it waited: at 0.35 rad/s and 5 Hz that is most of a turn about."""
+    """Whether it searched on one side for twice `look_frames`: most of a full turn at 0.35 rad/s and 5 Hz."""
     return state.no_way_frames >= 3 * config.advisor.policy.look_frames
 
 
 def held_side(state: PolicyState, config: Config) -> tuple[str, float]:
-    """The side to take unless the other is better, and by how much it must be (resolution 13).
+    """The side to take unless the other is better, and by how much its risk must then be lower.
 
-    A boat that looks for a way looks on to the side it began with, and then, where that was in vain, to the other.
+    Without a turn in progress it is starboard, and a tie's width is enough. A boat that searches goes on to the side it
+    began with whatever the risks are, and to the other one once that search is exhausted.
     """
     policy = config.advisor.policy
     if state.turn is None:
@@ -179,22 +309,18 @@ def held_side(state: PolicyState, config: Config) -> tuple[str, float]:
     return SIDE_OF[state.turn], max(policy.tie, policy.side_change_margin)
 
 
-def preferred_side(state: PolicyState, risks: dict[str, float], config: Config) -> str:
-    """The side to take when both are free: the lower risk, but not for a small gain."""
-    held, needed = held_side(state, config)
+def preferred_side(held: str, needed: float, risks: dict[str, float]) -> str:
+    """The side to take where both are free: the one held, unless the other's risk is lower by a clear gain."""
     other = OPPOSITE_SIDE[held]
-    gain = risks[held] - risks[other]
-    return other if gain > 0.0 and gain >= needed else held
+    return other if _is_clear_gain(risks[held] - risks[other], needed) else held
 
 
 def fills_lane(obstacle: Obstacle, lane: str, config: Config) -> bool:
-    """Low in the picture, before the lane's water, and wide enough to occupy it (J6)."""
+    """Whether the obstacle is low enough in the picture, and wide enough, to occupy the lane (J6)."""
     policy = config.advisor.policy
-    if (
-        lane in obstacle.exempt_lanes
-        or obstacle.presence < MIN_OCCUPYING_PRESENCE
-        or obstacle.box[3] < policy.occupancy_bottom
-    ):
+    if lane in obstacle.exempt_lanes or obstacle.presence < MIN_OCCUPYING_PRESENCE:
+        return False
+    if obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
     coverage = policy.planned_coverage if _is_planner_active(config) else policy.occupancy_coverage
@@ -202,14 +328,14 @@ def fills_lane(obstacle: Obstacle, lane: str, config: Config) -> bool:
 
 
 def is_without_water(non_water: float, policy: PolicyConfig) -> bool:
-    """A lane that shows no water, whatever its risk: land, a wall, or a hull from side to side."""
+    """Whether so little of the lane is water that it is blocked whatever its risk."""
     return non_water > policy.dry
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
-    """A vessel whose part inside the centre corridor is large (J7).
+    """Whether the obstacle is a vessel whose part inside the centre corridor is large (J7).
 
-    Inside its core where the metric planner acts: what reaches into the corridor's edges alone leaves a way beside it.
+    Inside its core where the metric planner acts, because a vessel in an edge of the corridor leaves a way beside it.
     """
     if not obstacle.is_vessel or obstacle.presence < MIN_OCCUPYING_PRESENCE:
         return False
@@ -220,41 +346,45 @@ def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
 
 
 def reach_into_center(box: BoxXyxy, policy: PolicyConfig) -> str:
-    """Where a box that overlaps the centre reaches: its core, or only its left or right edge (J9, resolution 12)."""
+    """The part of the centre corridor that a box in it reaches: its core, or only its left or right edge (J9)."""
     if shared_width(box, (policy.core_left, policy.core_right)) > 0.0:
         return "core"
     return "left" if box[2] <= policy.core_left else "right"
 
 
 def side_block_risk(config: Config) -> float:
-    """The risk at which a side is blocked (J5); another where the metric planner looks for the way in."""
+    """The risk at which a side is blocked (J5); higher where the metric planner looks for a way between obstacles."""
     policy = config.advisor.policy
     return policy.planned_side_block_risk if _is_planner_active(config) else policy.side_block_risk
 
 
 def lane_risk_limit(lane: str, state: PolicyState, config: Config) -> float:
-    """The risk at which a lane is blocked (J5); once blocked, it must be clearly below that to be free again."""
+    """The risk at which a lane is blocked (J5); lower by `release_margin` where it was blocked before."""
     policy = config.advisor.policy
     limit = policy.center_block_risk if lane == "center" else side_block_risk(config)
     return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
 
 
 def _is_planner_active(config: Config) -> bool:
-    """The metric planner acts, and finds out in metres whether there is room."""
+    """Whether the metric planner acts, which finds out in metres whether there is room."""
     return config.navigator.planner.acts_on(config.calibration)
 
 
-def _is_tie(state: PolicyState, risks: dict[str, float], config: Config) -> bool:
-    """The side held is not the better one by a tie's width, and the other is no clear gain."""
-    held, needed = held_side(state, config)
-    gain = risks[held] - risks[OPPOSITE_SIDE[held]]
-    return -config.advisor.policy.tie < gain < needed
+def _is_clear_gain(gain: Value, needed: float) -> Truth:
+    """Whether the other side's risk is lower by as much as a change of side needs."""
+    return (gain > 0.0) & (gain >= needed)
 
 
-def _blocked_center_reason(center: LaneRisk, vessel: bool) -> Reason:
+def _is_tie(facts: FrameFacts, risks: dict[str, float], config: Config) -> bool:
+    """Whether the held side is not better by a tie's width, and the other side is no clear gain."""
+    gain = risks[facts.held_side] - risks[OPPOSITE_SIDE[facts.held_side]]
+    return -config.advisor.policy.tie < gain < facts.needed_gain
+
+
+def _blocked_center_reason(center: LaneRisk, *, is_vessel_ahead: bool) -> Reason:
     if center.risk >= center.limit:
         return Reason.CENTER_RISK
-    return Reason.CENTER_VESSEL if vessel and not center.occupied else Reason.CENTER_OCCUPIED
+    return Reason.CENTER_VESSEL if is_vessel_ahead and not center.occupied else Reason.CENTER_OCCUPIED
 
 
 def _no_side_reason(left: LaneRisk, right: LaneRisk) -> Reason:
@@ -262,44 +392,26 @@ def _no_side_reason(left: LaneRisk, right: LaneRisk) -> Reason:
     return Reason.NO_SIDE_UNOCCUPIED if only_occupied else Reason.NO_SAFE_SIDE
 
 
-def _edge_incursion(center: LaneRisk, obstacles: tuple[Obstacle, ...], config: Config) -> str | None:
-    """The side from which obstacles reach into the corridor but not its core (J9, resolution 12); else None.
-
-    Water that blocks by itself, or obstacles on both edges, are no mere incursion.
-    """
-    policy, weights = config.advisor.policy, config.advisor.risk
-    water = weights.non_water * center.non_water + weights.uncertainty * center.uncertainty
-    if water >= policy.center_block_risk:
-        return None
-    places = {reach_into_center(o.box, policy) for o in obstacles if o.id in center.track_ids}
-    return places.pop() if len(places) == 1 and "core" not in places else None
+def _occupied_frames(state: PolicyState, facts: FrameFacts, policy: PolicyConfig) -> tuple[int, int, int]:
+    """Consecutive frames in which each lane was filled, counted up to `occupancy_frames` (J6)."""
+    left, center, right = (
+        min(before + 1, policy.occupancy_frames) if facts.lanes[lane].filling else 0
+        for lane, before in zip(LANES, state.occupied_frames, strict=True)
+    )
+    return left, center, right
 
 
-def _lane_occupancy(
-    state: PolicyState, obstacles: tuple[Obstacle, ...], config: Config
-) -> tuple[tuple[int, int, int], dict[str, bool]]:
-    """Lanes filled low in the picture: at once by an immediate danger, else over distinct frames (J6)."""
-    policy = config.advisor.policy
-    counts: list[int] = []
-    occupied: dict[str, bool] = {}
-    for lane, before in zip(LANES, state.occupied_frames, strict=True):
-        filling = [o for o in obstacles if fills_lane(o, lane, config)]
-        count = min(before + 1, policy.occupancy_frames) if filling else 0
-        counts.append(count)
-        occupied[lane] = count >= policy.occupancy_frames or any(o.is_danger for o in filling)
-    return (counts[0], counts[1], counts[2]), occupied
-
-
-def _lane_risk(lane: LaneComponents, limit: float, occupied: bool, blocked: bool) -> LaneRisk:
+def _lane_risk(lane: str, facts: FrameFacts, components: dict[str, LaneComponents], found: Evaluation) -> LaneRisk:
+    parts, terms = components[lane], facts.lanes[lane].terms
     return LaneRisk(
-        risk=lane.risk,
-        non_water=lane.non_water,
-        obstacle=lane.obstacle,
-        urgency=lane.urgency,
-        uncertainty=lane.uncertainty,
-        clear_width=lane.clear_width,
-        occupied=occupied,
-        blocked=blocked,
-        track_ids=lane.track_ids,
-        limit=limit,
+        risk=float(parts.risk),
+        non_water=float(parts.non_water),
+        obstacle=float(parts.obstacle),
+        urgency=float(parts.urgency),
+        uncertainty=float(parts.uncertainty),
+        clear_width=terms.water.clear_width,
+        occupied=bool(found.occupied[lane]),
+        blocked=bool(found.blocked[lane]),
+        track_ids=terms.track_ids,
+        limit=facts.lanes[lane].limit,
     )

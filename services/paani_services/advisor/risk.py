@@ -1,17 +1,23 @@
 """Risk R_j of each corridor of the picture: its water, its obstacles and their urgency, weighted (J1-J4). Pure."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Protocol
 
 import msgspec
+import numpy as np
 
 from paani import portable
+from paani.arrays import F64, Bools
 from paani.config import CalibrationConfig, Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
 from paani_services.advisor.tracker import TrackerState, current_urgency, is_accepted, is_immediate_danger, presence
 
 LANES = ("left", "center", "right")
+Truth = bool | Bools
+Value = float | F64
+Operands = tuple[tuple[int, float], ...]  # of a noisy-OR: index of an obstacle, and its value
 NEAR_FROM, NEAR_SPAN = 0.30, 0.70  # of the picture: a bottom at 0.30 is far, at 1.0 as near as can be
 TALL_SPAN = 0.50  # of the picture: a box of half its height, or more, is as tall as counts
 NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # weights of nearness and height in the severity; the paper gives none
@@ -34,16 +40,66 @@ class Obstacle(msgspec.Struct, frozen=True):
     exempt_lanes: tuple[str, ...] = ()
 
 
-class LaneComponents(msgspec.Struct, frozen=True):
-    """Risk R_j of one corridor and its components; `track_ids` are the obstacles that overlap it (J13)."""
+class LaneTerms(NamedTuple):
+    """What one corridor's risk is made of in one frame, before it is asked which evidence counts.
 
-    risk: float
-    non_water: float
-    obstacle: float
-    urgency: float
-    uncertainty: float
-    clear_width: float
+    obstacles, urgencies: the operands of the two noisy-ORs, each with the index of its obstacle, in order. A track of
+    which nothing is urgent adds no urgency. track_ids: of the obstacles that overlap the corridor (J13).
+    """
+
+    water: LaneEvidence
+    obstacles: Operands
+    urgencies: Operands
     track_ids: tuple[int, ...]
+
+
+class LaneComponents(msgspec.Struct, frozen=True):
+    """Risk R_j of one corridor and its components, as numbers, or as arrays where many selections are asked about."""
+
+    risk: Value
+    non_water: Value
+    obstacle: Value
+    urgency: Value
+    uncertainty: Value
+
+
+class Selection(Protocol):
+    """Which evidence of a frame counts: all of it, or many selections of it at once, and then values are arrays."""
+
+    def has_water(self, lane: str) -> Truth:
+        """Whether the water of the lane counts; else it is clear and certain."""
+
+    def water_value(self, lane: str, value: float) -> Value:
+        """The value of a term of the lane's water, or 0 where that does not count."""
+
+    def has_any(self, obstacles: Sequence[int]) -> Truth:
+        """Whether any of these obstacles counts."""
+
+    def noisy_or(self, operands: Operands) -> Value:
+        """Noisy-OR of the operands whose obstacles count."""
+
+
+class AllEvidence:
+    """The selection that a frame is judged by: everything counts."""
+
+    def has_water(self, lane: str) -> bool:
+        """True of every lane."""
+        return True
+
+    def water_value(self, lane: str, value: float) -> float:
+        """The value itself."""
+        return value
+
+    def has_any(self, obstacles: Sequence[int]) -> bool:
+        """Whether there is one."""
+        return bool(obstacles)
+
+    def noisy_or(self, operands: Operands) -> float:
+        """Noisy-OR of all operands."""
+        return noisy_or(value for _, value in operands)
+
+
+ALL_EVIDENCE = AllEvidence()
 
 
 def severity(confidence: float, box: BoxXyxy) -> float:
@@ -90,15 +146,15 @@ def noisy_or(values: Iterable[float]) -> float:
     return clip(1.0 - none, 0.0, 1.0)
 
 
-def corridor_risk(non_water: float, obstacle: float, urgency: float, uncertainty: float, weights: RiskConfig) -> float:
+def corridor_risk(non_water: Value, obstacle: Value, urgency: Value, uncertainty: Value, weights: RiskConfig) -> Value:
     """Risk of a corridor: R = min(1, 0.55 N + 0.65 O + 0.20 M + 0.15 U) (J4)."""
-    return min(
-        1.0,
+    risk = (
         weights.non_water * non_water
         + weights.obstacle * obstacle
         + weights.urgency * urgency
-        + weights.uncertainty * uncertainty,
+        + weights.uncertainty * uncertainty
     )
+    return np.minimum(1.0, risk) if isinstance(risk, np.ndarray) else min(1.0, risk)
 
 
 def obstacles_from_tracks(
@@ -144,20 +200,29 @@ def lane_water(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
     )
 
 
-def lane_components(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> LaneComponents:
-    """Risk R_j of one corridor with its components."""
+def lane_terms(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> LaneTerms:
+    """The terms of one corridor's risk: its water, and the obstacles that overlap it."""
     span = lane_span(lane, config.perception.corridors)
-    inside = [(o, share) for o in obstacles if (share := overlap(o.box, span)) > 0.0]
-    obstacle = noisy_or(o.severity * share * o.presence for o, share in inside)
-    urgency = noisy_or(o.urgency * share for o, share in inside)
+    inside = [(i, o, share) for i, o in enumerate(obstacles) if (share := overlap(o.box, span)) > 0.0]
+    return LaneTerms(
+        water=water,
+        obstacles=tuple((i, o.severity * share * o.presence) for i, o, share in inside),
+        urgencies=tuple((i, o.urgency * share) for i, o, share in inside if o.urgency > 0.0),
+        track_ids=tuple(o.id for _, o, _ in inside),
+    )
+
+
+def lane_components(terms: LaneTerms, lane: str, evidence: Selection, weights: RiskConfig) -> LaneComponents:
+    """Risk R_j of one corridor with its components, from the evidence that counts (J4)."""
+    non_water = evidence.water_value(lane, terms.water.non_water)
+    uncertainty = evidence.water_value(lane, terms.water.uncertainty)
+    obstacle, urgency = evidence.noisy_or(terms.obstacles), evidence.noisy_or(terms.urgencies)
     return LaneComponents(
-        risk=corridor_risk(water.non_water, obstacle, urgency, water.uncertainty, config.advisor.risk),
-        non_water=water.non_water,
+        risk=corridor_risk(non_water, obstacle, urgency, uncertainty, weights),
+        non_water=non_water,
         obstacle=obstacle,
         urgency=urgency,
-        uncertainty=water.uncertainty,
-        clear_width=water.clear_width,
-        track_ids=tuple(o.id for o, _ in inside),
+        uncertainty=uncertainty,
     )
 
 

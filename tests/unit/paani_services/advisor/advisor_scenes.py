@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config
-from paani_services.advisor.policy import Decision, PolicyState, decide
-from paani_services.advisor.risk import LANES, Obstacle, lane_components, severity
+from paani_services.advisor.policy import Decision, FrameFacts, PolicyState, decide, frame_components, frame_facts
+from paani_services.advisor.risk import ALL_EVIDENCE, LANES, Obstacle, severity
 
 SIZES = (0.02, 0.08, 0.15, 0.3, 0.6)
 
@@ -23,8 +23,11 @@ class Scene(msgspec.Struct, frozen=True):
     obstacles: tuple[Obstacle, ...]
 
     def decided(self, config: Config) -> Decision:
-        lanes = {lane: lane_components(self.water[lane], self.obstacles, lane, config) for lane in LANES}
-        return decide(self.state, lanes, self.obstacles, config)[1]
+        facts = self.facts(config)
+        return decide(self.state, facts, frame_components(facts, ALL_EVIDENCE, config), config)[1]
+
+    def facts(self, config: Config) -> FrameFacts:
+        return frame_facts(self.state, self.water, self.obstacles, config)
 
 
 def scene(seed: int, tracks: int) -> Scene:

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, load_config
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.counterfactual import CLEAR_WATER, counterfactual, nearest_limit
+from paani_services.advisor.counterfactual import find_counterfactual, nearest_limit
 from paani_services.advisor.explanation import explain_advisory
-from paani_services.advisor.policy import PolicyState, decide
-from paani_services.advisor.risk import LANES, lane_components
+from paani_services.advisor.policy import PolicyState, decide, frame_components, frame_facts
+from paani_services.advisor.risk import ALL_EVIDENCE, LANES
 from tests.unit.paani_services.advisor.advisor_evidence import (
     CALIBRATED,
     CLEAR,
@@ -31,14 +31,14 @@ from tests.unit.paani_services.advisor.advisor_evidence import (
 )
 from tests.unit.paani_services.advisor.advisor_scenes import Scene, scene, scenes
 
+CLEAR_WATER = m.LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
 D, R, By = m.Direction, m.Reason, m.ChangedBy
 CONFIGS = st.sampled_from((PAANI, PAPER, CALIBRATED))
 Taken = tuple[tuple[int, ...], tuple[str, ...]]  # track ids, lanes
 
 
 def why(given_scene: Scene, config: Config) -> m.Counterfactual:
-    decision = given_scene.decided(config)
-    return counterfactual(given_scene.state, decision, given_scene.water, given_scene.obstacles, config)
+    return find_counterfactual(given_scene.facts(config), given_scene.decided(config), config)
 
 
 def without(given_scene: Scene, taken: Taken) -> Scene:
@@ -123,17 +123,18 @@ def test_crossing_the_nearest_limit_changes_the_direction(given_scene: Scene, co
     decision = given_scene.decided(config)
     if decision.direction is D.STRAIGHT or decision.reason is R.TURN_RETAINED:
         return
-    limit, margin = nearest_limit(given_scene.state, decision, given_scene.obstacles, config)
+    limit, margin = nearest_limit(given_scene.facts(config), decision)
     if limit not in {m.Limit.CENTER_RISK, m.Limit.LEFT_RISK, m.Limit.RIGHT_RISK}:
         return
     name = limit.value.removesuffix("_risk")
-    parts = {each: lane_components(given_scene.water[each], given_scene.obstacles, each, config) for each in LANES}
+    parts = frame_components(given_scene.facts(config), ALL_EVIDENCE, config)
     moved = parts[name].risk - margin + (-1e-9 if margin >= 0.0 else 1e-9)
     parts[name] = msgspec.structs.replace(parts[name], risk=moved)
     patient = msgspec.structs.replace(given_scene.state, clear_frames=10_000)
-    assert decide(patient, parts, given_scene.obstacles, config)[1].direction is not decision.direction
+    facts = frame_facts(patient, given_scene.water, given_scene.obstacles, config)
+    assert decide(patient, facts, parts, config)[1].direction is not decision.direction
     shy = msgspec.structs.replace(parts[name], risk=moved + (2e-9 if margin >= 0.0 else -2e-9))
-    assert decide(patient, parts | {name: shy}, given_scene.obstacles, config)[1].direction is decision.direction
+    assert decide(patient, facts, parts | {name: shy}, config)[1].direction is decision.direction
 
 
 def test_the_nearest_limit_by_hand() -> None:

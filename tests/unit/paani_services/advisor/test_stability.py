@@ -12,8 +12,16 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, load_config
 from paani.statistics.dithering import Dithering, dithering
-from paani_services.advisor.policy import OPPOSITE_SIDE, PolicyState, held_side, lane_risk_limit, preferred_side
-from paani_services.advisor.risk import LANES, lane_components, severity
+from paani_services.advisor.policy import (
+    OPPOSITE_SIDE,
+    PolicyState,
+    frame_components,
+    frame_facts,
+    held_side,
+    lane_risk_limit,
+    preferred_side,
+)
+from paani_services.advisor.risk import ALL_EVIDENCE, LANES, severity
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, PAANI, PAPER, murky, play, water
 from tests.unit.paani_services.advisor.advisor_scenes import Scene, scene, scenes
 
@@ -171,8 +179,8 @@ def test_the_side_taken_is_never_much_the_worse(
     left: float, right: float, turn: m.Direction | None, config: Config
 ) -> None:
     policy = config.advisor.policy
-    side = preferred_side(PolicyState(turn=turn), {"left": left, "right": right}, config)
     risks = {"left": left, "right": right}
+    side = preferred_side(*held_side(PolicyState(turn=turn), config), risks)
     assert risks[side] - risks[OPPOSITE_SIDE[side]] <= max(policy.tie, policy.side_change_margin)
 
 
@@ -181,4 +189,5 @@ def test_the_scenes_cover_every_direction() -> None:
     decided = [scene(seed, seed % 7).decided(PAANI) for seed in range(400)]
     assert {d.direction for d in decided} == set(D) - {D.NO_DATA}
     assert severity(1.0, (0.0, 0.5, 1.0, 1.0)) == 1.0
-    assert lane_components(m.LaneEvidence(), (), "center", PAANI).risk == pytest.approx(0.70)
+    unseen = frame_facts(PolicyState(), {lane: m.LaneEvidence() for lane in LANES}, (), PAANI)
+    assert frame_components(unseen, ALL_EVIDENCE, PAANI)["center"].risk == pytest.approx(0.70)
