@@ -1,4 +1,4 @@
-"""Orders, route, estimates and the operator's word."""
+"""What guides the boat: the order, the route, the thrust, the operator's arming, and the estimate of the pose."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from paani.messages.header import Count, Finite, Message, NonNegative, Signed, S
 
 
 class Inhibit(StrEnum):
-    """Why the boat is not ordered to move. An order that moves has none."""
+    """Why the boat may not move. An order that moves the boat has none."""
 
     NOT_ARMED = "NOT_ARMED"
     NO_CLOCK = "NO_CLOCK"
@@ -37,9 +37,14 @@ class Inhibit(StrEnum):
 
 
 class NavCommand(Message, frozen=True, kw_only=True):
-    """Atomic order to the controller: heading, speed, enable, frame, validity together (B11).
+    """Atomic order to the controller: heading, speed, enable, frame and the reasons not to move, together (B11).
 
-    `echo_us` is the newest plant stamp the navigator had heard: the plant judges age on its own clock.
+    `heading_rad` and `speed_mps` count in `frame`; both are 0 unless `enable` is true. `inhibits`: every reason not to
+    move. `echo_us`: the newest stamp of the plant's clock that the navigator had, so that the plant can judge the
+    order's age on its own clock. `direction` and `advisory_sent_us` are those of the advisory that was followed.
+    `waypoint_index`: the waypoint steered for. `waypoints_reached`: of all legs since the start. `cross_track_m`:
+    distance from the line of the leg, positive to its left. `leg_index`: the leg of the mission that is due; `leg`:
+    the same in words.
     """
 
     enable: bool
@@ -57,19 +62,24 @@ class NavCommand(Message, frozen=True, kw_only=True):
     leg: Text = ""
 
     def is_news_after(self, sent: NavCommand | None) -> bool:
-        """New evidence, other advice or another gate goes out at once; the rest waits for the period."""
+        """Whether evidence, advice or inhibits differ from those of the order sent before: then it is sent at once."""
         if sent is None:
             return True
         return (self.source_us, self.direction, self.inhibits) != (sent.source_us, sent.direction, sent.inhibits)
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True):
+    """A point of the map: metres east (`x_m`) and north (`y_m`) of its origin."""
+
     x_m: Finite
     y_m: Finite
 
 
 class Route(Message, frozen=True, kw_only=True):
-    """The route being followed, in the map frame; republished so that late joiners have it."""
+    """The route that is followed, in the map frame; published again and again for processes that start late.
+
+    `repeat`: the last waypoint leads back to the first.
+    """
 
     name: Text
     waypoints: tuple[Waypoint, ...]
@@ -77,7 +87,11 @@ class Route(Message, frozen=True, kw_only=True):
 
 
 class Thrust(Message, frozen=True, kw_only=True):
-    """Normalised differential thrust, negative: astern (B12); not so where `controller.astern` is 0 (N7)."""
+    """Normalised thrust of the two fans, negative astern (B12); never astern where `controller.astern` is 0 (N7).
+
+    `enabled` false: zero thrust for the reasons in `inhibits`. `echo_us`, from the order, is the newest stamp of the
+    plant's clock that the navigator had. `command_sent_us` is when that order was sent.
+    """
 
     left: Signed
     right: Signed
@@ -90,17 +104,18 @@ class Thrust(Message, frozen=True, kw_only=True):
 
 
 class Arming(Message, frozen=True, kw_only=True):
-    """The operator's word. `stopped` latches until the operator arms again."""
+    """Whether the operator has armed the boat. `stopped`: a stop was pressed; held until the boat is armed again."""
 
     armed: bool
     stopped: bool = False
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """Estimated pose and body velocities; an estimate, never simulator truth (L4).
+    """Estimated pose in the map and velocities along the body's axes; an estimate, never the simulator's truth (L4).
 
-    nis: squared Mahalanobis distance of the newest GPS position from the expected one, 2 on average if the stated
-    spread is right; 0: none yet. refused_fixes: how many lay too far off to be used, since the estimate began.
+    `healthy` false: the boat may not be guided by it. `stopped`: slow for `localization.stopped_after_s` (L5).
+    `nis`: normalised innovation squared of the newest fix, 2 on average if the stated standard deviation is right; 0
+    before the first. `refused_fixes`: fixes outside the validation gate since the estimate began.
     """
 
     x_m: Finite

@@ -1,4 +1,4 @@
-"""What the boat is to do, leg by leg, and where it may not go."""
+"""The mission: what the boat is to do, leg by leg, and the fence that it may not leave."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class LegKind(StrEnum):
 class MissionLeg(msgspec.Struct, frozen=True, kw_only=True):
     """One leg, in the map frame.
 
-    waypoints: of FOLLOW_ROUTE the line in the order sailed (`repeat`: the last leads back to the first, and
-    `laps` 0 has no end); of HOLD_STATION the place, of RETURN_HOME home. None of these two: where the leg began,
-    and where the boat was armed first. `duration_s` 0: until the operator stops the boat and arms it again.
-    `speed_mps` 0: cruise.
+    `waypoints`: for FOLLOW_ROUTE the route in the order in which it is followed; for HOLD_STATION the station, without
+    it where the leg began; for RETURN_HOME home, without it where the boat was first armed and free to move.
+    `repeat`: the last waypoint leads back to the first, `laps` times, 0 without end. `radius_m`: of the station.
+    `duration_s`: time on station, 0 until the operator stops the boat and arms it again. `speed_mps` 0: cruise.
     """
 
     kind: LegKind
@@ -38,14 +38,14 @@ class MissionLeg(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Keep(StrEnum):
-    """On which side of its edge an area keeps the boat."""
+    """Whether an area keeps the boat in or out."""
 
     IN = "in"
     OUT = "out"
 
 
 class FenceArea(msgspec.Struct, frozen=True, kw_only=True):
-    """A simple polygon in the map frame; the last corner leads back to the first."""
+    """An area of the fence: a polygon of the map whose edges do not cross; the last corner leads back to the first."""
 
     keep: Keep
     corners: tuple[Waypoint, ...]
@@ -53,7 +53,10 @@ class FenceArea(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Mission(Message, frozen=True, kw_only=True):
-    """The legs in order and the fence. Where areas keep in, the boat stays inside at least one of them."""
+    """The legs in order, and the fence.
+
+    The boat stays inside at least one of the areas that keep in, if there are any, and outside all that keep out.
+    """
 
     name: Text
     legs: tuple[MissionLeg, ...]

@@ -1,4 +1,4 @@
-"""The simulated boat: clock, sensors, applied thrust, truth."""
+"""The plant (a simulated or a real boat): clock, sensors, applied thrust, and the simulator's truth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from paani.messages.header import Count, Finite, Message, NonNegative, Signed, S
 
 
 class SimTime(Message, frozen=True, kw_only=True):
-    """The plant's clock: `sim_us` advances only while the simulation runs; `stamp_us` is its own clock to echo."""
+    """The plant's clock.
+
+    `sim_us` advances only while the simulation runs. `stamp_us` is the plant's own clock; orders and thrust echo it.
+    """
 
     sim_us: Stamp
     stamp_us: Stamp
@@ -19,6 +22,11 @@ class SimTime(Message, frozen=True, kw_only=True):
 
 
 class GpsFix(Message, frozen=True, kw_only=True):
+    """A fix of the GPS receiver: position, speed and course over ground (`cog_rad` counter-clockwise from east).
+
+    `position_std_m`: standard deviation per axis that the receiver states. `fix` false: the receiver has no position.
+    """
+
     latitude_deg: Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
     longitude_deg: Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
     sog_mps: NonNegative
@@ -28,7 +36,10 @@ class GpsFix(Message, frozen=True, kw_only=True):
 
 
 class ImuSample(Message, frozen=True, kw_only=True):
-    """Body rates and specific force (at rest: +9.81 on z). `orientation_available` false means no yaw (A12)."""
+    """Angular rates and specific force along the body's axes (at rest +9.81 on z), and orientation.
+
+    `orientation_available` false: the IMU gives no yaw, as one without a compass (A12).
+    """
 
     gyro_x_radps: Finite
     gyro_y_radps: Finite
@@ -43,7 +54,7 @@ class ImuSample(Message, frozen=True, kw_only=True):
 
 
 class ZeroCause(StrEnum):
-    """Why the thrust adapter applies zero; NONE when it applies the command."""
+    """Why the thrust adapter applies zero; NONE while it applies the thrust that it was sent."""
 
     NONE = "none"
     NO_COMMAND = "no_command"
@@ -62,9 +73,12 @@ class ZeroCause(StrEnum):
 
 
 class ThrustApplied(Message, frozen=True, kw_only=True):
-    """What the last gate did: the force it applies now and why it is zero when it is.
+    """What the thrust adapter, the last decision before force, applies now, and why where it applies zero.
 
-    Astern is negative. `since_us` is when what is applied now came into force: this command, or zero.
+    `left` and `right`: normalised, negative astern; `left_n` and `right_n`: the same in newtons. `command_seq`,
+    `command_sent_us` and `command_source_us` are those of the newest thrust message accepted. `rejected`: thrust
+    messages refused so far. `lost_pulse`: the process whose pulse is missing. `since_us`: since when the present
+    thrust, or zero, is applied.
     """
 
     left: Signed
@@ -81,9 +95,10 @@ class ThrustApplied(Message, frozen=True, kw_only=True):
 
 
 class TruePose(Message, frozen=True, kw_only=True):
-    """Simulator truth, under the verbatim `@truth` chunk: for the eye, the dashboard and scoring only.
+    """The simulator's truth, under the verbatim `@truth` chunk: for the eye, the dashboard and scoring only.
 
-    `actors_along_m` is how far down its path each moving thing is, in the world's order; empty: as far as time says.
+    `distance_m`: way made so far. `collisions`: contacts so far; `in_contact`: one is going on. `actors_along_m`: how
+    far along its path each moving thing is, in the order of the world; empty: as far as the time says.
     """
 
     sim_us: Stamp
