@@ -79,7 +79,7 @@ def approaches(count: int) -> list[list[Sight]]:
 
 
 def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Generator) -> list[Sight]:
-    kind, look, long, wide, tall, from_m = THINGS[number % len(THINGS)]
+    kind, observation, long, wide, tall, from_m = THINGS[number % len(THINGS)]
     while True:
         start = random_pose(eye.world, rng)
         way = np.array([math.cos(start.yaw_rad), math.sin(start.yaw_rad)])
@@ -89,8 +89,10 @@ def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Genera
     side_m, turned = rng.uniform(-1.5, 1.5), Pose2(0.0, 0.0, float(rng.uniform(-math.pi, math.pi)))
     x_m = start.x_m + from_m * way[0] - side_m * way[1]
     y_m = start.y_m + from_m * way[1] + side_m * way[0]
-    thing = Obstacle("thing", kind, look, turned._replace(x_m=x_m, y_m=y_m), long, wide, tall, variant=number % 12)
-    eye.place([thing])
+    target = Obstacle(
+        "thing", kind, observation, turned._replace(x_m=x_m, y_m=y_m), long, wide, tall, variant=number % 12
+    )
+    eye.place([target])
     sights = []
     for k in range(int((from_m - LAST_M) / SPEED_MPS * RATE_HZ)):
         at_s = k / RATE_HZ

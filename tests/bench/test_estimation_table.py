@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from paani_sim.studies.estimation_table import CONDITIONS, EstimationRow, estimation_table, part_of
+from paani_sim.studies.estimation_table import CONDITIONS, EstimationRow, estimation_table, tabulate_rows
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +13,7 @@ def rows() -> dict[str, EstimationRow]:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("condition", [each.name for each in CONDITIONS])
+@pytest.mark.parametrize("condition", [step.name for step in CONDITIONS])
 def test_the_stated_spread_is_right_in_every_condition(rows: dict[str, EstimationRow], condition: str) -> None:
     """L3, L4: mean NIS about 2, and position errors no larger than published, while GPS and compass are at fault."""
     row = rows[condition]
@@ -47,6 +47,6 @@ def test_faults_of_gps_end_health_and_others_do_not(rows: dict[str, EstimationRo
 
 @pytest.mark.timeout(300)
 def test_the_part_has_a_row_for_each_course(rows: dict[str, EstimationRow]) -> None:
-    part = part_of(list(rows.values()))
-    assert [row[0] for row in part.rows] == [each.name for each in CONDITIONS]
+    part = tabulate_rows(list(rows.values()))
+    assert [row[0] for row in part.rows] == [step.name for step in CONDITIONS]
     assert all(len(row) == len(part.columns) for row in part.rows)

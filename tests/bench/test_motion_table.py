@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from paani_sim.studies.encounters import Family
+from paani_sim.studies.encounters import EncounterFamily
 from paani_sim.studies.motion_table import MotionRow, motion_table
 
-CLOSING = (Family.APPROACH, Family.APPROACH_TURNING)
+CLOSING = (EncounterFamily.APPROACH, EncounterFamily.APPROACH_TURNING)
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from paani_services.controller.control import ControllerInputs, ControllerState,
 from paani_services.localization.estimator import Estimator
 from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
-from paani_sim.plant.adapter import Applied, ThrustAdapter
+from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import World, load_world
@@ -65,7 +65,7 @@ class Lockstep:
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
         self.odometry: Odometry | None = None
-        self.applied: Applied = self.adapter.decide(START_US)
+        self.applied: AppliedThrust = self.adapter.decide(START_US)
         self.seq = 0
 
     @property
@@ -121,9 +121,9 @@ class Lockstep:
         )
         self.seq += 1
         self.thrust = msgspec.structs.replace(thrust, seq=self.seq, epoch=1, producer="controller")
-        self.adapter.hear_arming(arming, now_us)
+        self.adapter.receive_arming(arming, now_us)
         for service in self.config.plant.adapter.require_pulses:
-            self.adapter.hear_pulse(service, now_us)
+            self.adapter.receive_pulse(service, now_us)
         self.adapter.offer(self.thrust, now_us)
 
 

@@ -9,25 +9,35 @@ import pytest
 
 from paani import messages as m
 from paani_sim.eye.camera import Camera
-from paani_sim.studies.encounters import Course, Family, Look, course, looks, pose_at, range_at
-from paani_sim.studies.motion_table import UNCOMPENSATED, motion_table, part_of
+from paani_sim.studies.encounters import (
+    EncounterCourse,
+    EncounterFamily,
+    FrameObservation,
+    boat_pose_at,
+    draw_course,
+    range_at_m,
+    simulate_frames,
+)
+from paani_sim.studies.motion_table import UNCOMPENSATED, motion_table, tabulate_rows
 
 C = m.MotionCause
 
 
-def played(family: Family, number: int, rate_hz: float = 5.0) -> tuple[Course, list[Look]]:
+def played(
+    family: EncounterFamily, number: int, rate_hz: float = 5.0
+) -> tuple[EncounterCourse, list[FrameObservation]]:
     rng = np.random.default_rng([7, number])
-    given = course(family, rng)
-    return given, list(looks(given, rate_hz, Camera(), rng))
+    course = draw_course(family, rng)
+    return course, list(simulate_frames(course, rate_hz, Camera(), rng))
 
 
-@pytest.mark.parametrize("family", list(Family))
-def test_frames_come_at_their_rate_with_boxes_inside_the_picture(family: Family) -> None:
+@pytest.mark.parametrize("family", list(EncounterFamily))
+def test_frames_come_at_their_rate_with_boxes_inside_the_picture(family: EncounterFamily) -> None:
     """Same seed, same frames; boxes are sound; a whole thing's box is the truth but for jitter and reflections."""
     off = []
     for number in range(6):
-        given, frames = played(family, number)
-        assert (given, frames) == played(family, number)
+        course, frames = played(family, number)
+        assert (course, frames) == played(family, number)
         periods = np.diff([frame.at_s for frame in frames])
         assert np.median(periods) == pytest.approx(0.2, abs=0.02)
         for frame in frames:
@@ -47,24 +57,28 @@ def test_frames_come_at_their_rate_with_boxes_inside_the_picture(family: Family)
 def test_what_each_family_does() -> None:
     """Approach closes, recede opens, stationary and turn keep their range; a turn sweeps across the picture."""
     for number in range(6):
-        for family, sign in ((Family.APPROACH, 1), (Family.APPROACH_TURNING, 1), (Family.RECEDE, -1)):
-            given, _ = played(family, number)
-            assert np.sign(range_at(given, 0.0) - range_at(given, 10.0)) == sign
-        for family in (Family.STATIONARY, Family.TURN):
-            given, frames = played(family, number)
-            assert range_at(given, 5.0) == range_at(given, 0.0)
+        for family, sign in (
+            (EncounterFamily.APPROACH, 1),
+            (EncounterFamily.APPROACH_TURNING, 1),
+            (EncounterFamily.RECEDE, -1),
+        ):
+            course, _ = played(family, number)
+            assert np.sign(range_at_m(course, 0.0) - range_at_m(course, 10.0)) == sign
+        for family in (EncounterFamily.STATIONARY, EncounterFamily.TURN):
+            course, frames = played(family, number)
+            assert range_at_m(course, 5.0) == range_at_m(course, 0.0)
             middles = [0.5 * (f.truth[0] + f.truth[2]) for f in frames if f.truth is not None]
-            assert (max(middles) - min(middles) > 0.5) == (family is Family.TURN)
-        given, _ = played(Family.TURN, number)
-        (before, _), (after, _) = pose_at(given, 1.0), pose_at(given, 2.0)
-        assert after.yaw_rad - before.yaw_rad == pytest.approx(given.turn_radps)
-        hidden = [f for f in played(Family.GAPS, number)[1] if f.box is None]
+            assert (max(middles) - min(middles) > 0.5) == (family is EncounterFamily.TURN)
+        course, _ = played(EncounterFamily.TURN, number)
+        (before, _), (after, _) = boat_pose_at(course, 1.0), boat_pose_at(course, 2.0)
+        assert after.yaw_rad - before.yaw_rad == pytest.approx(course.turn_radps)
+        hidden = [f for f in played(EncounterFamily.GAPS, number)[1] if f.box is None]
         assert hidden
 
 
 def test_gaps_and_cut_boxes_are_never_judged_and_say_why() -> None:
     """U9: a thing that is out of sight or cut by the picture's edge is unknown."""
-    rows = motion_table(3, 8, ("paani",), (5.0,), (Family.CLIPPED, Family.GAPS))
+    rows = motion_table(3, 8, ("paani",), (5.0,), (EncounterFamily.CLIPPED, EncounterFamily.GAPS))
     clipped, gaps = rows[0], rows[1]
     assert (clipped.closing, clipped.judged) == (0, 0)
     assert gaps.closing > 20
@@ -73,17 +87,19 @@ def test_gaps_and_cut_boxes_are_never_judged_and_say_why() -> None:
 
 def test_a_turn_is_no_approach() -> None:
     """The same turns, with and without compensation: identities and signs."""
-    kept, lost = (motion_table(3, 12, (profile,), (5.0,), (Family.TURN,))[0] for profile in ("paani", UNCOMPENSATED))
+    kept, lost = (
+        motion_table(3, 12, (profile,), (5.0,), (EncounterFamily.TURN,))[0] for profile in ("paani", UNCOMPENSATED)
+    )
     assert kept.judged > 50
     assert kept.wrong < 0.05 * kept.judged
     assert lost.wrong > 0.5 * lost.judged > 10
-    assert kept.identities <= 1.3 * kept.things
-    assert lost.identities > 3 * lost.things
+    assert kept.identities <= 1.3 * kept.targets
+    assert lost.identities > 3 * lost.targets
 
 
 def test_i22_the_papers_rate() -> None:
     """I22: `paper` knows nothing at 0.5 Hz; every unknown has a cause."""
-    families = (Family.APPROACH, Family.RECEDE, Family.STATIONARY)
+    families = (EncounterFamily.APPROACH, EncounterFamily.RECEDE, EncounterFamily.STATIONARY)
     paper = motion_table(3, 6, ("paper",), (0.5,), families)[-1]
     assert (paper.judged, paper.family) == (0, None)
     assert paper.closing == sum(count for _, count in paper.causes) > 0
@@ -94,8 +110,8 @@ def test_i22_the_papers_rate() -> None:
 
 
 def test_the_table_has_a_row_for_each_and_one_for_all() -> None:
-    rows = motion_table(3, 1, ("paani", "paper"), (1.0, 5.0), (Family.APPROACH, Family.PASS))
-    part = part_of(rows)
+    rows = motion_table(3, 1, ("paani", "paper"), (1.0, 5.0), (EncounterFamily.APPROACH, EncounterFamily.PASS))
+    part = tabulate_rows(rows)
     assert [row[:3] for row in part.rows] == [
         (profile, rate, encounter)
         for profile in ("paani", "paper")

@@ -18,11 +18,11 @@ FRAMES, WARM_FRAMES = 60, 3
 SAME_FRAMES = 3  # a picture costs what the quickest of so many takes: others use the machine too
 
 
-def eye() -> FigureTable:
+def measure_eye() -> FigureTable:
     """CPU time of `Eye.render` round the river's route, one rasterising thread."""
     world = load_world(WORLD)
     rows = []
-    for width_px, height_px, actors in _cases(len(world.actors)):
+    for width_px, height_px, actors in _list_cases(len(world.actors)):
         found = frame_costs_ms(with_actors(world, actors), Camera(width_px=width_px, height_px=height_px))
         size = f"{width_px} x {height_px}"
         rows.append((size, actors, median(found), nearest_rank(found, 95), len(found)))
@@ -35,7 +35,7 @@ def eye() -> FigureTable:
     )
 
 
-def _cases(own: int) -> list[tuple[int, int, int]]:
+def _list_cases(own: int) -> list[tuple[int, int, int]]:
     middle = SIZES_PX[1]
     return [(*size, own) for size in SIZES_PX] + [(*middle, actors) for actors in ACTORS]
 
@@ -55,13 +55,13 @@ def frame_costs_ms(world: World, camera: Camera) -> list[float]:
     way = np.roll(world.route_m, -1, axis=0) - world.route_m
     yaws = np.arctan2(way[:, 1], way[:, 0])[np.linspace(0, len(world.route_m) - 1, FRAMES).astype(int)]
     found = []
-    with Eye(world, camera) as looking:
+    with Eye(world, camera) as renderer:
         for k in range(-WARM_FRAMES, FRAMES):
             pose = BoatPose(float(places[k, 0]), float(places[k, 1]), float(yaws[k]))
             best_ms = np.inf
             for _ in range(SAME_FRAMES):
                 begin_s = process_cpu_s()
-                looking.render(pose, 1.0 * k + WARM_FRAMES)
+                renderer.render(pose, 1.0 * k + WARM_FRAMES)
                 best_ms = min(best_ms, 1e3 * (process_cpu_s() - begin_s))
             if k >= 0:
                 found.append(best_ms)

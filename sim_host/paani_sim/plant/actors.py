@@ -8,16 +8,16 @@ import numpy as np
 
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Pose2, along_at
 
-KEEP_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
+VESSEL_KEEPS_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 SWIMMER_KEEPS_CLEAR_M = 1.0
-ABREAST_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
-SLOWING_MPS2 = 0.15  # a small craft that throttles back
+ABREAST_MARGIN_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
+DECELERATION_MPS2 = 0.15  # a small craft that throttles back
 # One who has stood still for the boat this long makes way for a while: astern, or ahead of a boat abaft the beam.
-PATIENCE_S, MAKING_WAY_MPS, MAKING_WAY_S = 8.0, 0.4, 30.0
+PATIENCE_S, YIELDING_MPS, YIELDING_S = 8.0, 0.4, 30.0
 STANDING_MPS = 0.05
 
 
-class Track:
+class ActorPath:
     """An actor's path, measured once: `at` is `actor_at` to the last bits, much sooner."""
 
     def __init__(self, actor: Actor) -> None:
@@ -25,14 +25,14 @@ class Track:
         steps = np.diff(path_m, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
         self._closed = actor.closed
-        self._reach_m = 0.5 * actor.length_m
+        self._half_length_m = 0.5 * actor.length_m
         self._arc_m: list[float] = np.concatenate([[0.0], np.cumsum(lengths)]).tolist()
         self._legs: list[list[float]] = np.column_stack([path_m[:-1], steps / lengths[:, None]]).tolist()
 
-    def at(self, along_m: float) -> Pose2:
+    def pose_at(self, along_m: float) -> Pose2:
         """Where the actor is `along_m` down its path."""
         x_m, y_m, east, north = self._point(along_m)
-        ahead, behind = self._point(along_m + self._reach_m), self._point(along_m - self._reach_m)
+        ahead, behind = self._point(along_m + self._half_length_m), self._point(along_m - self._half_length_m)
         east_m, north_m = ahead[0] - behind[0], ahead[1] - behind[1]
         if not (east_m or north_m):
             east_m, north_m = east, north
@@ -43,11 +43,11 @@ class Track:
         at_m = along_m % arc_m[-1] if self._closed else min(max(along_m, 0.0), arc_m[-1])
         leg = min(bisect.bisect_right(arc_m, at_m) - 1, len(self._legs) - 1)
         x_m, y_m, east, north = self._legs[leg]
-        part_m = at_m - arc_m[leg]
-        return x_m + part_m * east, y_m + part_m * north, east, north
+        beyond_m = at_m - arc_m[leg]
+        return x_m + beyond_m * east, y_m + beyond_m * north, east, north
 
 
-def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
+def yielding_speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
     """How fast the actor goes with the boat there; `boat_reach_m` is the boat's half length.
 
     One that gives way slows so that it could stop short of a boat ahead, `KEEP_CLEAR_M` or, who swims,
@@ -56,15 +56,18 @@ def speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_re
     """
     if actor.behaviour is not Behaviour.GIVES_WAY:
         return actor.speed_mps
-    ahead_m, aside_m = boat_from_m(pose, boat_xy_m)
-    if ahead_m <= -0.5 * actor.length_m - boat_reach_m or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_M:
+    ahead_m, aside_m = locate_boat_m(pose, boat_xy_m)
+    if (
+        ahead_m <= -0.5 * actor.length_m - boat_reach_m
+        or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_MARGIN_M
+    ):
         return actor.speed_mps
-    keep_clear_m = SWIMMER_KEEPS_CLEAR_M if actor.kind is Kind.PERSON else KEEP_CLEAR_M
-    room_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - keep_clear_m
-    return min(actor.speed_mps, math.sqrt(2.0 * SLOWING_MPS2 * max(room_m, 0.0)))
+    keep_clear_m = SWIMMER_KEEPS_CLEAR_M if actor.kind is Kind.PERSON else VESSEL_KEEPS_CLEAR_M
+    distance_to_stop_m = ahead_m - 0.5 * actor.length_m - boat_reach_m - keep_clear_m
+    return min(actor.speed_mps, math.sqrt(2.0 * DECELERATION_MPS2 * max(distance_to_stop_m, 0.0)))
 
 
-def boat_from_m(pose: Pose2, boat_xy_m: tuple[float, float]) -> tuple[float, float]:
+def locate_boat_m(pose: Pose2, boat_xy_m: tuple[float, float]) -> tuple[float, float]:
     """How far the boat's middle is ahead of the actor's, along its heading, and how far aside, on either side."""
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     east_m, north_m = boat_xy_m[0] - pose.x_m, boat_xy_m[1] - pose.y_m
@@ -77,13 +80,13 @@ class Actors:
     def __init__(self, actors: Sequence[Actor], every_s: float, boat_reach_m: float) -> None:
         """At their starts."""
         self._actors = tuple(actors)
-        self._tracks = [Track(actor) for actor in actors]
+        self._paths = [ActorPath(actor) for actor in actors]
         self._every_s = every_s
         self._boat_reach_m = boat_reach_m
         self.along_m = tuple(along_at(actor, 0.0) for actor in actors)
         self._waited_s = [0.0] * len(self._actors)
         self.speeds_mps = tuple(0.0 for _ in actors)
-        self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, self.along_m, strict=True)]
+        self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, self.along_m, strict=True)]
 
     def advance(self, t_s: float, boat_xy_m: tuple[float, float]) -> None:
         """To simulated time `t_s`, `every_s` after the last one; who holds on is where the time says, to the bit."""
@@ -91,20 +94,20 @@ class Actors:
         for number, (actor, pose, along_m) in enumerate(zip(self._actors, self.poses, self.along_m, strict=True)):
             speed = 0.0
             if t_s > actor.start_s:
-                speed = speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
-                speed = self._patient(number, speed, pose, boat_xy_m)
+                speed = yielding_speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
+                speed = self._apply_patience(number, speed, pose, boat_xy_m)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
-        self.poses = [track.at(along_m) for track, along_m in zip(self._tracks, along, strict=True)]
+        self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, along, strict=True)]
 
-    def _patient(self, number: int, speed: float, pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
+    def _apply_patience(self, number: int, speed: float, pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
         """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `MAKING_WAY_S`."""
         waited_s = self._waited_s[number]
         if waited_s >= PATIENCE_S:
-            self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + MAKING_WAY_S else 0.0
-            return -MAKING_WAY_MPS if boat_from_m(pose, boat_xy_m)[0] > 0.0 else MAKING_WAY_MPS
+            self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + YIELDING_S else 0.0
+            return -YIELDING_MPS if locate_boat_m(pose, boat_xy_m)[0] > 0.0 else YIELDING_MPS
         stands = speed < STANDING_MPS < self._actors[number].speed_mps
         self._waited_s[number] = waited_s + self._every_s if stands else 0.0
         return speed

@@ -13,7 +13,7 @@ from paani.messages import Arming, Thrust, ZeroCause
 PRODUCER = "controller"
 
 
-class Applied(NamedTuple):
+class AppliedThrust(NamedTuple):
     """Normalised thrust and force of each fan, astern negative, and why they are zero when they are."""
 
     left: float
@@ -49,7 +49,7 @@ class ThrustAdapter:
 
         An invalid command from the controller itself also revokes the one in force.
         """
-        cause = self._fault(thrust, now_us)
+        cause = self._find_refusal(thrust, now_us)
         if cause is ZeroCause.NONE:
             self._epoch, self._seq = thrust.epoch, thrust.seq
             self.command, self._accepted_us = thrust, now_us
@@ -61,22 +61,22 @@ class ThrustAdapter:
             self._accepted_us = None
         return cause
 
-    def hear_arming(self, arming: Arming, now_us: int) -> None:
+    def receive_arming(self, arming: Arming, now_us: int) -> None:
         """The operator's newest word, and when it came."""
         self._arming, self._arming_us = arming, now_us
 
-    def hear_pulse(self, service: str, now_us: int) -> None:
+    def receive_pulse(self, service: str, now_us: int) -> None:
         """A vital process showed that its event loop runs."""
         self._pulses_us[service] = now_us
 
-    def decide(self, now_us: int) -> Applied:
+    def decide(self, now_us: int) -> AppliedThrust:
         """What the fans do now."""
         cause, lost_pulse = self._zero_cause(now_us)
         if cause is not ZeroCause.NONE or self.command is None:
-            return Applied(0.0, 0.0, 0.0, 0.0, cause, lost_pulse)
+            return AppliedThrust(0.0, 0.0, 0.0, 0.0, cause, lost_pulse)
         force_n = self._config.force_per_unit_n
         left, right = self.command.left, self.command.right
-        return Applied(left, right, force_n * left, force_n * right, cause)
+        return AppliedThrust(left, right, force_n * left, force_n * right, cause)
 
     def _zero_cause(self, now_us: int) -> tuple[ZeroCause, str]:
         config = self._config
@@ -85,8 +85,8 @@ class ThrustAdapter:
         if now_us - self._arming_us > config.arming_timeout_s * 1e6:
             return ZeroCause.ARMING_LOST, ""
         for service in config.require_pulses:
-            heard_us = self._pulses_us.get(service)
-            if heard_us is None or now_us - heard_us > config.pulse_timeout_s * 1e6:
+            received_us = self._pulses_us.get(service)
+            if received_us is None or now_us - received_us > config.pulse_timeout_s * 1e6:
                 return ZeroCause.PULSE_LOST, service
         if self.command is None or self._accepted_us is None:
             return self._refused, ""
@@ -96,7 +96,7 @@ class ThrustAdapter:
             return ZeroCause.NOT_ENABLED, ""
         return ZeroCause.NONE, ""
 
-    def _fault(self, thrust: Thrust, now_us: int) -> ZeroCause:
+    def _find_refusal(self, thrust: Thrust, now_us: int) -> ZeroCause:
         if thrust.producer != PRODUCER:
             return ZeroCause.WRONG_PRODUCER
         if thrust.domain != self._domain:

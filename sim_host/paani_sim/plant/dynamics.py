@@ -13,7 +13,9 @@ from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.water.wind import wind_force
 
 WATER_DENSITY_KGPM3 = 1000.0
-FASTEST = 10.0  # m/s or rad/s: beyond it drag grows linearly, or explicit steps would diverge after a hard hit
+DRAG_LINEAR_ABOVE = (
+    10.0  # m/s or rad/s: beyond it drag grows linearly, or explicit steps would diverge after a hard hit
+)
 
 
 class HullState(NamedTuple):
@@ -50,7 +52,7 @@ class Attitude(NamedTuple):
 Wrench = tuple[float, float, float, float, float, float]
 
 
-def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = CALM) -> Wrench:
+def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: Surroundings = CALM) -> Wrench:
     """Force in the map frame [N] and moment in the body frame [N m], without gravity.
 
     Drag opposes surge, sway and yaw through the water with F = -c1 v - c2 |v| v (K5). Heave is
@@ -61,25 +63,25 @@ def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = 
     """
     forward_x, forward_y, forward_z, left_x, left_y, left_z = _body_axes(state)
     drag, buoyancy, hull = vessel.drag, vessel.buoyancy, vessel.hull
-    vx_mps, vy_mps = state.vx_mps - around.current_x_mps, state.vy_mps - around.current_y_mps
+    vx_mps, vy_mps = state.vx_mps - surroundings.current_x_mps, state.vy_mps - surroundings.current_y_mps
     surge_mps = forward_x * vx_mps + forward_y * vy_mps + forward_z * state.vz_mps
     sway_mps = left_x * vx_mps + left_y * vy_mps + left_z * state.vz_mps
     yaw_rate = state.yaw_rate_radps
 
     weight_n = hull.mass_kg * GRAVITY_MPS2
     thrust_n = fans.left_n + fans.right_n
-    ahead_n = thrust_n - _drag(surge_mps, drag.surge_linear, drag.surge_quadratic) - weight_n * around.slope_ahead
-    sideways_n = -_drag(sway_mps, drag.sway_linear, drag.sway_quadratic) - weight_n * around.slope_left
+    ahead_n = thrust_n - _drag(surge_mps, drag.surge_linear, drag.surge_quadratic) - weight_n * surroundings.slope_ahead
+    sideways_n = -_drag(sway_mps, drag.sway_linear, drag.sway_quadratic) - weight_n * surroundings.slope_left
     port_nm = 0.5 * vessel.fans.spacing_m * (fans.right_n - fans.left_n)
     port_nm -= _drag(yaw_rate, drag.yaw_linear, drag.yaw_quadratic)
 
     if vessel.wave_reflection_frac:
         drift_npm2 = 0.5 * WATER_DENSITY_KGPM3 * GRAVITY_MPS2 * hull.length_m * vessel.wave_reflection_frac**2
-        ahead_n += drift_npm2 * (forward_x * around.envelope_x_m2 + forward_y * around.envelope_y_m2)
-        sideways_n += drift_npm2 * (left_x * around.envelope_x_m2 + left_y * around.envelope_y_m2)
+        ahead_n += drift_npm2 * (forward_x * surroundings.envelope_x_m2 + forward_y * surroundings.envelope_y_m2)
+        sideways_n += drift_npm2 * (left_x * surroundings.envelope_x_m2 + left_y * surroundings.envelope_y_m2)
 
     if vessel.windage.lateral_area_m2 or vessel.windage.frontal_area_m2:
-        air_x_mps, air_y_mps = around.wind_x_mps - state.vx_mps, around.wind_y_mps - state.vy_mps
+        air_x_mps, air_y_mps = surroundings.wind_x_mps - state.vx_mps, surroundings.wind_y_mps - state.vy_mps
         wind = wind_force(
             forward_x * air_x_mps + forward_y * air_y_mps,
             left_x * air_x_mps + left_y * air_y_mps,
@@ -98,8 +100,8 @@ def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = 
 
     up_n = clip(
         weight_n
-        + buoyancy.heave_stiffness * (buoyancy.equilibrium_z_m + around.elevation_m - state.z_m)
-        - buoyancy.heave_damping * (state.vz_mps - around.elevation_rate_mps),
+        + buoyancy.heave_stiffness * (buoyancy.equilibrium_z_m + surroundings.elevation_m - state.z_m)
+        - buoyancy.heave_damping * (state.vz_mps - surroundings.elevation_rate_mps),
         0.0,
         buoyancy.max_weights * weight_n,
     )
@@ -108,16 +110,16 @@ def wrench(state: HullState, fans: Fans, vessel: Vessel, around: Surroundings = 
         forward_x * ahead_n + left_x * sideways_n,
         forward_y * ahead_n + left_y * sideways_n,
         forward_z * ahead_n + left_z * sideways_n + up_n,
-        buoyancy.roll_stiffness * (around.slope_left - angles.roll_rad)
-        - buoyancy.roll_damping * (state.roll_rate_radps - around.slope_left_rate_ps),
-        -buoyancy.pitch_stiffness * (around.slope_ahead + angles.pitch_rad)
-        - buoyancy.pitch_damping * (state.pitch_rate_radps + around.slope_ahead_rate_ps)
+        buoyancy.roll_stiffness * (surroundings.slope_left - angles.roll_rad)
+        - buoyancy.roll_damping * (state.roll_rate_radps - surroundings.slope_left_rate_ps),
+        -buoyancy.pitch_stiffness * (surroundings.slope_ahead + angles.pitch_rad)
+        - buoyancy.pitch_damping * (state.pitch_rate_radps + surroundings.slope_ahead_rate_ps)
         + vessel.fans.height_m * thrust_n,
         port_nm,
     )
 
 
-def lagging(fans: Fans, order: Fans, lag_s: float, step_s: float) -> Fans:
+def apply_fan_lag(fans: Fans, order: Fans, lag_s: float, step_s: float) -> Fans:
     """The fans' forces one step later: a first-order approach to what is ordered."""
     if lag_s == 0.0:
         return order
@@ -154,4 +156,4 @@ def _body_axes(state: HullState) -> tuple[float, float, float, float, float, flo
 
 
 def _drag(speed: float, linear: float, quadratic: float) -> float:
-    return linear * speed + quadratic * min(abs(speed), FASTEST) * speed
+    return linear * speed + quadratic * min(abs(speed), DRAG_LINEAR_ABOVE) * speed

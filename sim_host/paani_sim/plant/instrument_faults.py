@@ -8,20 +8,20 @@ from paani_sim.worlds.faults import Fault, FaultKind, active
 Faults = tuple[Fault, ...]
 
 
-def shifted(truth: Truth, faults: Faults, t_s: float) -> Truth:
+def apply_gps_jump(truth: Truth, faults: Faults, t_s: float) -> Truth:
     """Where a GPS that has jumped believes to be."""
     jump = active(faults, FaultKind.GPS_JUMP, t_s)
     return truth._replace(x_m=truth.x_m + jump.amount) if jump else truth
 
 
-def cut_off(reading: GpsReading, last: GpsReading, faults: Faults, t_s: float) -> GpsReading:
+def apply_gps_outage(reading: GpsReading, last: GpsReading, faults: Faults, t_s: float) -> GpsReading:
     """In an outage: no fix, no speed, and the `last` position that there was."""
     if active(faults, FaultKind.GPS_OUTAGE, t_s) is None:
         return reading
     return last._replace(sog_mps=0.0, cog_rad=0.0, fix=False)
 
 
-def biased(reading: ImuReading, faults: Faults, t_s: float) -> ImuReading:
+def apply_imu_bias(reading: ImuReading, faults: Faults, t_s: float) -> ImuReading:
     """With the faults of compass and gyro."""
     compass = active(faults, FaultKind.COMPASS_BIAS, t_s)
     gyro = active(faults, FaultKind.GYRO_BIAS, t_s)
@@ -33,7 +33,7 @@ def biased(reading: ImuReading, faults: Faults, t_s: float) -> ImuReading:
     return reading
 
 
-def weakened(fans: Fans, faults: Faults, t_s: float) -> Fans:
+def apply_thruster_loss(fans: Fans, faults: Faults, t_s: float) -> Fans:
     """With the force that a thruster has lost."""
     loss = active(faults, FaultKind.THRUSTER_LOSS, t_s)
     if loss is None:

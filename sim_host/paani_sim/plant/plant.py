@@ -11,8 +11,8 @@ import numpy as np
 from paani.config import PlantConfig
 from paani_sim.plant import passive
 from paani_sim.plant.actors import Actors
-from paani_sim.plant.dynamics import Attitude, Fans, HullState, attitude, body_velocity, lagging, wrench
-from paani_sim.plant.instrument_faults import biased, cut_off, shifted, weakened
+from paani_sim.plant.dynamics import Attitude, Fans, HullState, apply_fan_lag, attitude, body_velocity, compute_wrench
+from paani_sim.plant.instrument_faults import apply_gps_jump, apply_gps_outage, apply_imu_bias, apply_thruster_loss
 from paani_sim.plant.sensors import (
     GpsReading,
     ImuReading,
@@ -23,7 +23,7 @@ from paani_sim.plant.sensors import (
 )
 from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.water.surroundings import CALM, Surroundings
-from paani_sim.water.wakes import Maker
+from paani_sim.water.wakes import WakeSource
 from paani_sim.water.water import Water
 from paani_sim.worlds import Fault, Kind, Scenario, World
 from paani_sim.worlds.spec import build_spec
@@ -36,7 +36,7 @@ class PlantDiverged(Exception):
     """The integration left the finite numbers: forces or settings are impossible."""
 
 
-class Hit(NamedTuple):
+class ContactStart(NamedTuple):
     """The boat began to touch the geom of this name: an obstacle's or actor's id, or `bank_<n>`."""
 
     time_s: float
@@ -74,7 +74,7 @@ class Plant:
         self._accelerometer = self._data.sensor("accelerometer").data
         self._gyro = self._data.sensor("gyro").data
         self._fans = Fans(0.0, 0.0)
-        self._around = CALM
+        self._surroundings = CALM
         passive.install(self._model, self._apply_forces)
 
         boat = self._model.body("boat").id
@@ -96,14 +96,14 @@ class Plant:
         self.energy_j = 0.0
         self.collisions = 0
         self.in_contact = False
-        self.hits: list[Hit] = []
+        self.contact_starts: list[ContactStart] = []
         self._last_contact_s = -math.inf
-        self._last_touch_s: dict[str, float] = {}
+        self._last_contact_of_s: dict[str, float] = {}
         mujoco.set_mju_user_warning(_keep_no_log_file)
         mujoco.mj_forward(self._model, self._data)
 
     @classmethod
-    def of(cls, scenario: Scenario, config: PlantConfig) -> Self:
+    def from_scenario(cls, scenario: Scenario, config: PlantConfig) -> Self:
         """The boat of a scenario; a vessel in the settings goes before the scenario's."""
         vessel = config.vessel or scenario.vessel
         return cls(scenario.world, msgspec.structs.replace(config, vessel=vessel), scenario.seed, scenario.faults)
@@ -151,7 +151,7 @@ class Plant:
     @property
     def surroundings(self) -> Surroundings:
         """Water and air about the hull in the last step."""
-        return self._around
+        return self._surroundings
 
     def step(self, left_n: float, right_n: float) -> None:
         """Advance one step with these fan forces [N] ordered. Raises PlantDiverged."""
@@ -161,9 +161,11 @@ class Plant:
         if self.steps % self._actors_every == 0:
             self._move_actors(now_s, (x_m, y_m))
         yaw_rad = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        self._around = self._water.about(x_m, y_m, yaw_rad, now_s)
-        order = weakened(Fans(left_n, right_n), self._faults, now_s) if self._faults else Fans(left_n, right_n)
-        self._fans = lagging(self._fans, order, self._vessel.fans.lag_s, step_s)
+        self._surroundings = self._water.surroundings_at(x_m, y_m, yaw_rad, now_s)
+        order = (
+            apply_thruster_loss(Fans(left_n, right_n), self._faults, now_s) if self._faults else Fans(left_n, right_n)
+        )
+        self._fans = apply_fan_lag(self._fans, order, self._vessel.fans.lag_s, step_s)
         mujoco.mj_step(self._model, self._data)
         self.steps += 1
         pose, velocity = self._qpos.tolist(), self._qvel.tolist()
@@ -177,16 +179,16 @@ class Plant:
         """One fix; to be read at `gps_rate_hz`, the wandering error advances by one period."""
         origin_deg = (self._world.origin_lat_deg, self._world.origin_lon_deg)
         now_s = self.sim_us * 1e-6
-        truth = shifted(self._truth(), self._faults, now_s)
+        truth = apply_gps_jump(self._truth(), self._faults, now_s)
         self._errors, reading = measure_gps(self._errors, truth, origin_deg, self._config.sensors, self._gps_rng)
-        reading = cut_off(reading, self._last_fix, self._faults, now_s)
+        reading = apply_gps_outage(reading, self._last_fix, self._faults, now_s)
         self._last_fix = reading
         return reading
 
     def read_imu(self) -> ImuReading:
         """One IMU sample."""
         reading = measure_imu(self._errors, self._truth(), self._config.sensors, self._imu_rng)
-        return biased(reading, self._faults, self.sim_us * 1e-6) if self._faults else reading
+        return apply_imu_bias(reading, self._faults, self.sim_us * 1e-6) if self._faults else reading
 
     def state_hash(self) -> str:
         """SHA-256 of position and velocity, to compare runs bit by bit."""
@@ -201,7 +203,7 @@ class Plant:
         mujoco.mj_forward(self._model, self._data)
 
     def _apply_forces(self, data: mujoco.MjData) -> None:
-        data.qfrc_passive[:6] = wrench(self._hull_state(), self._fans, self._vessel, self._around)
+        data.qfrc_passive[:6] = compute_wrench(self._hull_state(), self._fans, self._vessel, self._surroundings)
 
     def _hull_state(self) -> HullState:
         return HullState(*self._qpos.tolist()[2:], *self._qvel.tolist())
@@ -214,8 +216,8 @@ class Plant:
 
     def _power_w(self, cos: float, sin: float, velocity: list[float]) -> float:
         """Work of the fans on the hull as it goes through the water: each one's force times its speed ahead."""
-        around, yaw_rate = self._around, velocity[5]
-        ahead_mps = cos * (velocity[0] - around.current_x_mps) + sin * (velocity[1] - around.current_y_mps)
+        surroundings, yaw_rate = self._surroundings, velocity[5]
+        ahead_mps = cos * (velocity[0] - surroundings.current_x_mps) + sin * (velocity[1] - surroundings.current_y_mps)
         turn_mps = 0.5 * self._vessel.fans.spacing_m * yaw_rate
         left_w, right_w = self._fans.left_n * (ahead_mps - turn_mps), self._fans.right_n * (ahead_mps + turn_mps)
         return abs(left_w) + abs(right_w)
@@ -229,7 +231,7 @@ class Plant:
         halves = [0.5 * pose.yaw_rad for pose in poses]
         self._data.mocap_quat[self._mocap] = [(math.cos(half), 0.0, 0.0, math.sin(half)) for half in halves]
         actors, speeds = self._world.actors, self._actors.speeds_mps
-        self._water.pass_by([Maker(*poses[i], speeds[i], actors[i].width_m) for i in self._vessels], now_s)
+        self._water.update_vessels([WakeSource(*poses[i], speeds[i], actors[i].width_m) for i in self._vessels], now_s)
 
     def _count_contacts(self) -> None:
         self.in_contact = False
@@ -240,16 +242,18 @@ class Plant:
         for pair, gap_m in zip(contacts.geom.tolist(), contacts.dist.tolist(), strict=True):
             if gap_m <= 0.0:
                 self.in_contact = True
-                self._touch(next(self._geom_names[geom] for geom in pair if geom not in self._boat_geoms), now_s)
+                self._record_contact(
+                    next(self._geom_names[geom] for geom in pair if geom not in self._boat_geoms), now_s
+                )
         if self.in_contact:
             if now_s - self._last_contact_s > COLLISION_GAP_S:
                 self.collisions += 1
             self._last_contact_s = now_s
 
-    def _touch(self, name: str, now_s: float) -> None:
-        if now_s - self._last_touch_s.get(name, -math.inf) > COLLISION_GAP_S:
-            self.hits.append(Hit(now_s, name))
-        self._last_touch_s[name] = now_s
+    def _record_contact(self, name: str, now_s: float) -> None:
+        if now_s - self._last_contact_of_s.get(name, -math.inf) > COLLISION_GAP_S:
+            self.contact_starts.append(ContactStart(now_s, name))
+        self._last_contact_of_s[name] = now_s
 
 
 def _keep_no_log_file(_: str) -> None:

@@ -27,7 +27,7 @@ FAN_ARM_M = 0.30
 OTTER_ADDED = np.array([0.1, 1.5, 1.7])  # otter.py: -Xu'/m, -Yv'/m, -Nr'/Iz
 OTTER_LAG_S = 0.1  # otter.py
 FRONTAL_M2, LATERAL_M2 = 0.15, 0.30
-EVERY_S = 0.1
+SAMPLE_S = 0.1
 HALF_WIDTH_M = 300.0  # of the water below: the current is the same all about the boat
 
 
@@ -57,48 +57,48 @@ MANOEUVRES = (
 )
 
 
-class Difference(NamedTuple):
+class ManoeuvreDifference(NamedTuple):
     """Largest differences of plant and model, at the same times."""
 
-    way_m: float
+    distance_m: float
     position_m: float
     heading_deg: float
 
 
-def compare(vessel: str, manoeuvre: Manoeuvre) -> Difference:
+def compare_manoeuvre(vessel: str, manoeuvre: Manoeuvre) -> ManoeuvreDifference:
     """Both through the same manoeuvre."""
-    expected, found = solved(vessel, manoeuvre), driven(vessel, manoeuvre)
-    return Difference(
-        way_m=float(np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()),
+    expected, found = solve_reference(vessel, manoeuvre), simulate_plant(vessel, manoeuvre)
+    return ManoeuvreDifference(
+        distance_m=float(np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()),
         position_m=float(np.linalg.norm(found[:, :2] - expected[:, :2], axis=1).max()),
         heading_deg=max(abs(math.degrees(wrap_rad(float(turn)))) for turn in found[:, 2] - expected[:, 2]),
     )
 
 
-def solved(vessel: str, manoeuvre: Manoeuvre) -> F64:
+def solve_reference(vessel: str, manoeuvre: Manoeuvre) -> F64:
     """`(n, 3)` x, y [m] and heading [rad] of the published model every `EVERY_S`."""
-    times = np.arange(0.0, manoeuvre.seconds + 1e-9, EVERY_S)
+    times = np.arange(0.0, manoeuvre.seconds + 1e-9, SAMPLE_S)
     turn = manoeuvre.zigzag_rad
 
-    def passes(side: float) -> Callable[[float, F64], float]:
-        def left_over(_: float, state: F64) -> float:
+    def heading_reached(side: float) -> Callable[[float, F64], float]:
+        def heading_left(_: float, state: F64) -> float:
             return float(state[2] - side * turn)
 
-        left_over.terminal = True  # type: ignore[attr-defined]  # how scipy is told to stop there
-        left_over.direction = side  # type: ignore[attr-defined]
-        return left_over
+        heading_left.terminal = True  # type: ignore[attr-defined]  # how scipy is told to stop there
+        heading_left.direction = side  # type: ignore[attr-defined]
+        return heading_left
 
     state, start_s, side, parts = np.zeros(8), 0.0, 1.0, []
     while start_s < manoeuvre.seconds:
         fans = (manoeuvre.left_n, manoeuvre.right_n) if side > 0.0 else (manoeuvre.right_n, manoeuvre.left_n)
         run = solve_ivp(
-            lambda _, x, fans=fans: _rates(x, vessel, manoeuvre, np.array(fans)),
+            lambda _, x, fans=fans: _state_derivative(x, vessel, manoeuvre, np.array(fans)),
             (start_s, manoeuvre.seconds),
             state,
             rtol=1e-8,
             atol=1e-9,
             dense_output=True,
-            events=passes(side) if turn else None,
+            events=heading_reached(side) if turn else None,
         )
         within = times[(times >= start_s) & (times < run.t[-1] + 1e-12)]
         parts.append(run.sol(within)[:3].T)
@@ -106,30 +106,32 @@ def solved(vessel: str, manoeuvre: Manoeuvre) -> F64:
     return np.vstack(parts)[: len(times)]
 
 
-def _rates(state: F64, vessel: str, manoeuvre: Manoeuvre, ordered_n: F64) -> F64:
+def _state_derivative(state: F64, vessel: str, manoeuvre: Manoeuvre, ordered_n: F64) -> F64:
     """Of x, y, heading, u, v, r and the two fans' forces; u, v, r over ground."""
     heading, rate = state[2], state[5]
     cos, sin = math.cos(heading), math.sin(heading)
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     toward = manoeuvre.current_rad
     current = manoeuvre.current_mps * np.array([math.cos(toward), math.sin(toward), 0.0])
-    through = state[3:6] - rotation.T @ current
+    through_water = state[3:6] - rotation.T @ current
 
     rigid = np.array([MASS_KG, MASS_KG, YAW_INERTIA_KGM2])
     added = rigid * (OTTER_ADDED if vessel == "otter" else 0.0)
     coriolis_rigid = MASS_KG * np.array([[0.0, -rate, 0.0], [rate, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    coriolis_added = np.array([[0.0, 0.0, -added[1] * through[1]], [0.0, 0.0, added[0] * through[0]], [0.0, 0.0, 0.0]])
+    coriolis_added = np.array(
+        [[0.0, 0.0, -added[1] * through_water[1]], [0.0, 0.0, added[0] * through_water[0]], [0.0, 0.0, 0.0]]
+    )
     fans_n = state[6:8] if vessel == "otter" else ordered_n
     force = np.array([fans_n.sum(), 0.0, FAN_ARM_M * (fans_n[1] - fans_n[0])])
-    force -= (LINEAR + QUADRATIC * np.abs(through)) * through
+    force -= (LINEAR + QUADRATIC * np.abs(through_water)) * through_water
     if vessel == "otter":
-        force += _wind(state[3:6] - rotation.T @ np.array([0.0, manoeuvre.wind_mps, 0.0]))
-    through_rate = (force - (coriolis_rigid + coriolis_added) @ through) / (rigid + added)
+        force += _wind_force(state[3:6] - rotation.T @ np.array([0.0, manoeuvre.wind_mps, 0.0]))
+    through_rate = (force - (coriolis_rigid + coriolis_added) @ through_water) / (rigid + added)
     current_rate = rate * np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) @ rotation.T @ current
     return np.concatenate([rotation @ state[3:6], through_rate + current_rate, (ordered_n - state[6:8]) / OTTER_LAG_S])
 
 
-def _wind(through_air: F64) -> F64:
+def _wind_force(through_air: F64) -> F64:
     """Section 10.1: 0.5 rho V^2 (A_F c_x cos, A_L c_y sin, A_L L c_n sin 2) of the angle the air comes from."""
     speed_mps, angle = math.hypot(through_air[0], through_air[1]), math.atan2(through_air[1], through_air[0])
     shape = (
@@ -140,26 +142,26 @@ def _wind(through_air: F64) -> F64:
     return 0.5 * 1.225 * speed_mps**2 * np.array(shape)
 
 
-def driven(vessel: str, manoeuvre: Manoeuvre) -> F64:
+def simulate_plant(vessel: str, manoeuvre: Manoeuvre) -> F64:
     """`(n, 3)` as `solved`, of the plant."""
-    plant = Plant(_wide_water(manoeuvre), PlantConfig(vessel=vessel))
+    plant = Plant(_build_open_water(manoeuvre), PlantConfig(vessel=vessel))
     try:
         plant.place(0.0, 0.0, 0.0)
         left_n, right_n, side, track = manoeuvre.left_n, manoeuvre.right_n, 1.0, [(0.0, 0.0, 0.0)]
-        every = round(EVERY_S * 100)
+        steps_per_sample = round(SAMPLE_S * 100)
         for step in range(1, round(manoeuvre.seconds * 100) + 1):
             plant.step(left_n, right_n)
             heading = plant.attitude.yaw_rad
             if manoeuvre.zigzag_rad and side * heading >= manoeuvre.zigzag_rad:
                 left_n, right_n, side = right_n, left_n, -side
-            if step % every == 0:
+            if step % steps_per_sample == 0:
                 track.append((*plant.position_m, heading))
         return np.array(track)
     finally:
         plant.close()
 
 
-def _wide_water(manoeuvre: Manoeuvre) -> World:
+def _build_open_water(manoeuvre: Manoeuvre) -> World:
     """A broad channel along the current, without wind, with the boat in its middle."""
     along = np.array([math.cos(manoeuvre.current_rad), math.sin(manoeuvre.current_rad)])
     left = np.array([-along[1], along[0]])
@@ -175,10 +177,10 @@ def _wide_water(manoeuvre: Manoeuvre) -> World:
     )
 
 
-def oracle() -> FigureTable:
+def compare_with_reference() -> FigureTable:
     """Every manoeuvre with both vessels."""
     rows = [
-        (vessel, manoeuvre.name, *compare(vessel, manoeuvre))
+        (vessel, manoeuvre.name, *compare_manoeuvre(vessel, manoeuvre))
         for vessel in ("paper", "otter")
         for manoeuvre in MANOEUVRES
     ]

@@ -18,29 +18,29 @@ WARM_S, RUN_S, ROUNDS = 20.0, 10.0, 5
 FANS_N = (2.0, 4.0)
 
 
-def physics() -> FigureTable:
+def measure_physics() -> FigureTable:
     """The otter circling on the river, sensors read when due; CPU time of one core, median of interleaved rounds."""
     plants = {
-        (count, rough): Plant(_water(count, rough=rough), PlantConfig(vessel="otter"))
+        (count, rough): Plant(_build_world(count, rough=rough), PlantConfig(vessel="otter"))
         for rough in (False, True)
         for count in ACTORS
     }
     start = load_world("river").start
-    taken: dict[tuple[int, bool], list[float]] = {case: [] for case in plants}
+    cpu_s: dict[tuple[int, bool], list[float]] = {case: [] for case in plants}
     try:
         for plant in plants.values():
             plant.place(*start)
-            _sail(plant, WARM_S)
+            _run_plant(plant, WARM_S)
         for _ in range(ROUNDS):
             for case, plant in plants.items():
                 plant.place(*start)  # wherever wind and current have taken it
                 before_s = process_cpu_s()
-                _sail(plant, RUN_S)
-                taken[case].append(process_cpu_s() - before_s)
+                _run_plant(plant, RUN_S)
+                cpu_s[case].append(process_cpu_s() - before_s)
     finally:
         for plant in plants.values():
             plant.close()
-    cost_s = {case: statistics.median(times) for case, times in taken.items()}
+    cost_s = {case: statistics.median(times) for case, times in cpu_s.items()}
     return FigureTable(
         name="physics",
         columns=("actors", "waves, wakes, gusts, current", "us a step", "x real time a core", "over still and empty"),
@@ -52,22 +52,22 @@ def physics() -> FigureTable:
     )
 
 
-def _water(actors: int, *, rough: bool) -> World:
+def _build_world(actors: int, *, rough: bool) -> World:
     world = load_world("river")
     lead = world.actors[0]
-    fleet = tuple(_following(lead, number, actors) for number in range(actors))
+    fleet = tuple(_place_on_path(lead, number, actors) for number in range(actors))
     world = dataclasses.replace(world, actors=fleet, wind=Wind(0.0, 0.0))
     if not rough:
         return world
     return dataclasses.replace(world, wind=WIND, waves=Waves(FETCH_M), current=CURRENT)
 
 
-def _following(lead: Actor, number: int, actors: int) -> Actor:
+def _place_on_path(lead: Actor, number: int, actors: int) -> Actor:
     """Evenly spread round the path of `lead`, fast enough for a wake."""
     return dataclasses.replace(lead, id=f"actor_{number}", start_m=number * 240.0 / actors, speed_mps=2.5)
 
 
-def _sail(plant: Plant, seconds: float) -> None:
+def _run_plant(plant: Plant, seconds: float) -> None:
     config = PlantConfig()
     gps_every = round(1.0 / (config.step_s * config.sensors.gps_rate_hz))
     for _ in range(round(seconds / config.step_s)):

@@ -1,7 +1,7 @@
 """What the plant measures and does, as messages. `source_us` dates the step they speak of."""
 
 from paani import messages as m
-from paani_sim.plant.adapter import Applied, ThrustAdapter
+from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
 from paani_sim.plant.plant import Plant
 
 
@@ -51,7 +51,7 @@ def pose_message(plant: Plant, source_us: int) -> m.TruePose:
     )
 
 
-def applied_message(adapter: ThrustAdapter, applied: Applied, source_us: int, since_us: int) -> m.ThrustApplied:
+def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, since_us: int) -> m.ThrustApplied:
     """What the last gate does now, and the command behind it."""
     command = adapter.command
     return m.ThrustApplied(

@@ -25,9 +25,9 @@ from paani_sim.worlds import Fault, FaultKind, Pose2, Waves, Wind, World, load_w
 SEEDS = (1, 2, 3)
 START_US = 1_000_000_000
 REST_S, UNDER_WAY_S, LEG_S = 60.0, 300.0, 25.0
-AHEAD_N, MOST_N = 6.0, 15.0
+CRUISE_FORCE_N, MAX_FORCE_N = 6.0, 15.0
 FAULT_AT_S = 150.0
-STILL_MPS, STILL_S, MOTION_MPS = 0.02, 2.0, 0.05  # truly at rest, and for how long; said to move (L5)
+REST_SPEED_MPS, REST_TIME_S, FALSE_MOTION_MPS = 0.02, 2.0, 0.05  # truly at rest, and for how long; said to move (L5)
 
 
 class Condition(NamedTuple):
@@ -49,7 +49,7 @@ CONDITIONS = (
 )
 
 
-class Instant(NamedTuple):
+class EstimationStep(NamedTuple):
     """One step of the estimator: what is true, what it says, and the compass and fix it was given."""
 
     at_s: float
@@ -57,7 +57,7 @@ class Instant(NamedTuple):
     y_m: float
     yaw_rad: float
     speed_mps: float
-    said: m.Odometry
+    estimate: m.Odometry
     compass_rad: float
     fix: m.GpsFix | None
 
@@ -90,9 +90,9 @@ class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
     refused: int
 
 
-def course(condition: Condition, seed: int, config: Config) -> Iterator[Instant]:
+def simulate_course(condition: Condition, seed: int, config: Config) -> Iterator[EstimationStep]:
     """The boat's minutes, step by step of the estimator."""
-    world = _water(condition)
+    world = _build_world(condition)
     origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
     estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
     plant = Plant(world, config.plant, seed, condition.faults)
@@ -107,59 +107,59 @@ def course(condition: Condition, seed: int, config: Config) -> Iterator[Instant]
     samples, fix = list[m.ImuSample](), None
     try:
         while (at_s := plant.sim_us * 1e-6) < 2.0 * REST_S + UNDER_WAY_S:
-            plant.step(*_fans_n(plant, at_s))
+            plant.step(*_steer_fans_n(plant, at_s))
             now_us = START_US + plant.sim_us
             if plant.steps % every["imu"] == 0:
                 samples.append(imu_message(plant, now_us))
             if plant.steps % every["gps"] == 0:
                 fix = gps_message(plant, now_us)
             if plant.steps % every["estimate"] == 0:
-                _, said = estimator.step(samples, fix, now_us)
+                _, estimate = estimator.step(samples, fix, now_us)
                 surge_mps, sway_mps, _ = plant.velocity
                 speed_mps = math.hypot(surge_mps, sway_mps)
                 truth = (*plant.position_m, plant.attitude.yaw_rad, speed_mps)
-                yield Instant(plant.sim_us * 1e-6, *truth, said, samples[-1].yaw_rad, fix)
+                yield EstimationStep(plant.sim_us * 1e-6, *truth, estimate, samples[-1].yaw_rad, fix)
                 samples, fix = [], None
     finally:
         plant.close()
 
 
-def row_of(condition: str, seed: int, instants: list[Instant], world: World) -> EstimationRow:
+def summarise_course(condition: str, seed: int, steps: list[EstimationStep], world: World) -> EstimationRow:
     """The figures of one course, from the first healthy estimate on."""
-    first = next((number for number, each in enumerate(instants) if each.said.healthy), None)
+    first = next((number for number, step in enumerate(steps) if step.estimate.healthy), None)
     if first is None:
         raise ValueError(f"{condition}, seed {seed}: never healthy")
-    instants = instants[first:]
-    step_s = instants[1].at_s - instants[0].at_s
-    off2_m2 = [_off2_m2(each) for each in instants]
-    healthy = [off2 for off2, each in zip(off2_m2, instants, strict=True) if each.said.healthy]
-    used, refused = list[float](), instants[0].said.refused_fixes
-    for each in instants:
-        if each.fix is not None and each.fix.fix and each.said.refused_fixes == refused:
-            used.append(each.said.nis)
-        refused = each.said.refused_fixes
+    steps = steps[first:]
+    step_s = steps[1].at_s - steps[0].at_s
+    off2_m2 = [_squared_error_m2(step) for step in steps]
+    healthy = [off2 for off2, step in zip(off2_m2, steps, strict=True) if step.estimate.healthy]
+    used, refused = list[float](), steps[0].estimate.refused_fixes
+    for step in steps:
+        if step.fix is not None and step.fix.fix and step.estimate.refused_fixes == refused:
+            used.append(step.estimate.nis)
+        refused = step.estimate.refused_fixes
     half = 1.96 * math.sqrt(4.0 / len(used))
-    still = list(_at_rest(instants))
-    false = [math.hypot(each.said.surge_mps, each.said.sway_mps) > MOTION_MPS for each in still]
+    still = list(_at_rest(steps))
+    false = [math.hypot(step.estimate.surge_mps, step.estimate.sway_mps) > FALSE_MOTION_MPS for step in still]
     return EstimationRow(
         condition=condition,
         seed=seed,
         position_m=_rms(off2_m2),
         healthy_position_m=_rms(healthy),
-        gps_m=_rms([_fix_off2_m2(each, world) for each in instants if each.fix is not None and each.fix.fix]),
-        heading_deg=math.degrees(_rms([wrap_rad(each.said.yaw_rad - each.yaw_rad) ** 2 for each in instants])),
-        compass_deg=math.degrees(_rms([wrap_rad(each.compass_rad - each.yaw_rad) ** 2 for each in instants])),
+        gps_m=_rms([_squared_fix_error_m2(step, world) for step in steps if step.fix is not None and step.fix.fix]),
+        heading_deg=math.degrees(_rms([wrap_rad(step.estimate.yaw_rad - step.yaw_rad) ** 2 for step in steps])),
+        compass_deg=math.degrees(_rms([wrap_rad(step.compass_rad - step.yaw_rad) ** 2 for step in steps])),
         speed_mps=_rms(
-            [(math.hypot(each.said.surge_mps, each.said.sway_mps) - each.speed_mps) ** 2 for each in instants]
+            [(math.hypot(step.estimate.surge_mps, step.estimate.sway_mps) - step.speed_mps) ** 2 for step in steps]
         ),
         nis=sum(used) / len(used),
         nis_low=2.0 - half,
         nis_high=2.0 + half,
-        nees=sum(off2 / each.said.position_std_m**2 for off2, each in zip(off2_m2, instants, strict=True))
-        / len(instants),
+        nees=sum(off2 / step.estimate.position_std_m**2 for off2, step in zip(off2_m2, steps, strict=True))
+        / len(steps),
         false_motion_frac=sum(false) / len(false) if false else None,
-        false_motion_s=_longest(false) * step_s,
-        unhealthy_s=step_s * sum(not each.said.healthy for each in instants),
+        false_motion_s=_longest_run(false) * step_s,
+        unhealthy_s=step_s * sum(not step.estimate.healthy for step in steps),
         refused=refused,
     )
 
@@ -171,15 +171,17 @@ def estimation_table(
     config = load_config(sets=["plant.vessel=otter"])  # wind takes hold of it
     for condition in conditions:
         for seed in seeds:
-            yield row_of(condition.name, seed, list(course(condition, seed, config)), _water(condition))
+            yield summarise_course(
+                condition.name, seed, list(simulate_course(condition, seed, config)), _build_world(condition)
+            )
 
 
-def estimation() -> FigureTable:
+def tabulate_estimation() -> FigureTable:
     """The table for `paani bench water`."""
-    return part_of(list(estimation_table()))
+    return tabulate_rows(list(estimation_table()))
 
 
-def part_of(rows: list[EstimationRow]) -> FigureTable:
+def tabulate_rows(rows: list[EstimationRow]) -> FigureTable:
     """Metres, degrees, seconds."""
     return FigureTable(
         name="estimation",
@@ -201,7 +203,7 @@ def part_of(rows: list[EstimationRow]) -> FigureTable:
     )  # fmt: skip
 
 
-def _water(condition: Condition) -> World:
+def _build_world(condition: Condition) -> World:
     """The lake with nothing in it."""
     return dataclasses.replace(
         load_world("lake"),
@@ -213,43 +215,43 @@ def _water(condition: Condition) -> World:
     )
 
 
-def _fans_n(plant: Plant, at_s: float) -> tuple[float, float]:
+def _steer_fans_n(plant: Plant, at_s: float) -> tuple[float, float]:
     """Left and right: nothing at rest, else ahead on the leg's heading."""
     if not REST_S <= at_s < REST_S + UNDER_WAY_S:
         return 0.0, 0.0
     heading_rad = 0.4 + math.floor((at_s - REST_S) / LEG_S) * math.pi / 3.0
     _, _, yaw_rate_radps = plant.velocity
     turn_n = 10.0 * wrap_rad(heading_rad - plant.attitude.yaw_rad) - 8.0 * yaw_rate_radps
-    return clip(AHEAD_N - turn_n, 0.0, MOST_N), clip(AHEAD_N + turn_n, 0.0, MOST_N)
+    return clip(CRUISE_FORCE_N - turn_n, 0.0, MAX_FORCE_N), clip(CRUISE_FORCE_N + turn_n, 0.0, MAX_FORCE_N)
 
 
-def _at_rest(instants: list[Instant]) -> Iterator[Instant]:
+def _at_rest(steps: list[EstimationStep]) -> Iterator[EstimationStep]:
     """Those before which the boat lay truly still for as long as it takes to be called stopped."""
-    since_s = -STILL_S
-    for each in instants:
-        if each.speed_mps >= STILL_MPS:
-            since_s = each.at_s
-        elif each.at_s - since_s >= STILL_S:
-            yield each
+    since_s = -REST_TIME_S
+    for step in steps:
+        if step.speed_mps >= REST_SPEED_MPS:
+            since_s = step.at_s
+        elif step.at_s - since_s >= REST_TIME_S:
+            yield step
 
 
-def _off2_m2(each: Instant) -> float:
-    return (each.said.x_m - each.x_m) ** 2 + (each.said.y_m - each.y_m) ** 2
+def _squared_error_m2(step: EstimationStep) -> float:
+    return (step.estimate.x_m - step.x_m) ** 2 + (step.estimate.y_m - step.y_m) ** 2
 
 
-def _fix_off2_m2(each: Instant, world: World) -> float:
-    assert each.fix is not None
+def _squared_fix_error_m2(step: EstimationStep, world: World) -> float:
+    assert step.fix is not None
     x_m, y_m = enu_from_geodetic(
-        each.fix.latitude_deg, each.fix.longitude_deg, world.origin_lat_deg, world.origin_lon_deg
+        step.fix.latitude_deg, step.fix.longitude_deg, world.origin_lat_deg, world.origin_lon_deg
     )
-    return (x_m - each.x_m) ** 2 + (y_m - each.y_m) ** 2
+    return (x_m - step.x_m) ** 2 + (y_m - step.y_m) ** 2
 
 
 def _rms(squares: list[float]) -> float:
     return math.sqrt(sum(squares) / len(squares)) if squares else math.nan
 
 
-def _longest(flags: list[bool]) -> int:
+def _longest_run(flags: list[bool]) -> int:
     """The longest run of True."""
     longest = run = 0
     for flag in flags:
@@ -260,4 +262,4 @@ def _longest(flags: list[bool]) -> int:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else len(SEEDS)
-    sys.stdout.write(table_text(part_of(list(estimation_table(tuple(range(1, count + 1)))))))
+    sys.stdout.write(table_text(tabulate_rows(list(estimation_table(tuple(range(1, count + 1)))))))

@@ -24,15 +24,23 @@ from paani.config import Config, load_config
 from paani.decider import Decider, Input, decider_of
 from paani.statistics.figure_table import FigureTable, table_text
 from paani_sim.eye.camera import Camera
-from paani_sim.studies.encounters import Course, Family, Look, course, looks, pose_at, range_at
+from paani_sim.studies.encounters import (
+    EncounterCourse,
+    EncounterFamily,
+    FrameObservation,
+    boat_pose_at,
+    draw_course,
+    range_at_m,
+    simulate_frames,
+)
 
 RATES_HZ = (0.5, 1.0, 2.0, 4.0, 5.0, 10.0)
 UNCOMPENSATED = "no rotation"  # `paani` that takes its own turning for motion
 PROFILES = ("paani", UNCOMPENSATED, "paper")
 RULE_S, RULE_PERIODS = 1.5, 6.0
-MIN_CLOSING_PER_S, STILL_PER_S = 0.08, 1e-9
+MIN_CLOSING_PER_S, STATIC_PER_S = 0.08, 1e-9
 MIN_SIZE_PX = 16.0
-NOW_S = 0.5
+RECENT_S = 0.5
 START_US = 1_000_000_000
 STEP_S = 0.2  # the advisor repeats itself, and hears odometry
 LATENCY_S, ODOMETRY_AGE_S = 0.25, 0.03  # from the picture to its evidence; of the newest odometry
@@ -51,7 +59,7 @@ class MotionRow(msgspec.Struct, frozen=True, kw_only=True):
 
     profile: str
     rate_hz: float
-    family: Family | None
+    family: EncounterFamily | None
     closing: int = 0
     known: int = 0
     tracks: int = 0
@@ -59,12 +67,12 @@ class MotionRow(msgspec.Struct, frozen=True, kw_only=True):
     judged: int = 0
     wrong: int = 0
     late: int = 0
-    things: int = 0
+    targets: int = 0
     identities: int = 0
     causes: tuple[tuple[m.MotionCause, int], ...] = ()
 
 
-class _Moment(NamedTuple):
+class _JudgedFrame(NamedTuple):
     """What was said of the thing at one frame, and what was true."""
 
     motion: m.MotionState
@@ -80,31 +88,33 @@ def motion_table(
     n: int,
     profiles: tuple[str, ...] = PROFILES,
     rates_hz: tuple[float, ...] = RATES_HZ,
-    families: tuple[Family, ...] = tuple(Family),
+    families: tuple[EncounterFamily, ...] = tuple(EncounterFamily),
 ) -> list[MotionRow]:
     """`n` encounters of each family at each rate, the same ones for every profile; all families together last."""
     advisor = decider_of("advisor")
     rows = []
     for profile in profiles:
-        config = config_of(profile)
+        config = load_profile_config(profile)
         for rate_hz in rates_hz:
             found = []
             for family in families:
                 row = MotionRow(profile=profile, rate_hz=rate_hz, family=family)
                 for number in range(n):
-                    rng = np.random.default_rng([seed, list(Family).index(family), number])
-                    row = _with(row, list(_moments(advisor, config, course(family, rng), rate_hz, rng)))
+                    rng = np.random.default_rng([seed, list(EncounterFamily).index(family), number])
+                    row = _add_encounter(
+                        row, list(_judge_encounter(advisor, config, draw_course(family, rng), rate_hz, rng))
+                    )
                 found.append(row)
-            rows += [*found, _together(found)]
+            rows += [*found, _sum_rows(found)]
     return rows
 
 
-def motion() -> FigureTable:
+def tabulate_motion() -> FigureTable:
     """The table for `paani bench judgement`."""
-    return part_of(motion_table(seed=1, n=20))
+    return tabulate_rows(motion_table(seed=1, n=20))
 
 
-def part_of(rows: list[MotionRow]) -> FigureTable:
+def tabulate_rows(rows: list[MotionRow]) -> FigureTable:
     """Fractions in percent; None where there was nothing to judge."""
     return FigureTable(
         name="motion",
@@ -116,7 +126,7 @@ def part_of(rows: list[MotionRow]) -> FigureTable:
             (
                 row.profile, f"{row.rate_hz:g}", row.family or "all", row.closing, _percent(row.known, row.closing),
                 row.tracks, _percent(row.known_tracks, row.tracks), row.judged, _percent(row.wrong, row.judged),
-                _percent(row.late, row.judged), round(row.identities / max(1, row.things), 2),
+                _percent(row.late, row.judged), round(row.identities / max(1, row.targets), 2),
                 ", ".join(f"{cause} {count}" for cause, count in row.causes[:CAUSES]),
             )
             for row in rows
@@ -125,85 +135,87 @@ def part_of(rows: list[MotionRow]) -> FigureTable:
     )  # fmt: skip
 
 
-def config_of(profile: str) -> Config:
+def load_profile_config(profile: str) -> Config:
     """A profile's configuration."""
     if profile == UNCOMPENSATED:
         return load_config(sets=["advisor.motion.compensate_rotation=false"])
     return load_config(profile=profile)
 
 
-def _moments(
-    advisor: Decider[Any], config: Config, given: Course, rate_hz: float, rng: np.random.Generator
-) -> Iterator[_Moment]:
+def _judge_encounter(
+    advisor: Decider[Any], config: Config, course: EncounterCourse, rate_hz: float, rng: np.random.Generator
+) -> Iterator[_JudgedFrame]:
     """Let the advisor hear one encounter as it would live."""
     camera = Camera(hfov_deg=config.eye.hfov_deg, down_deg=config.eye.pitch_down_deg)
     need_s = max(RULE_S, RULE_PERIODS / rate_hz)
     state, heard = advisor.state(), {topic.name: Input() for topic in advisor.inputs}
-    step_s, since = 0.0, list[Look]()
-    for number, frame in enumerate(looks(given, rate_hz, camera, rng)):
+    step_s, since = 0.0, list[FrameObservation]()
+    for number, frame in enumerate(simulate_frames(course, rate_hz, camera, rng)):
         now_s = frame.at_s + LATENCY_S
         while step_s < now_s:
-            heard[keys.ODOMETRY.name] = Input(_odometry(given, step_s - ODOMETRY_AGE_S, rng), _us(step_s))
+            heard[keys.ODOMETRY.name] = Input(_odometry(course, step_s - ODOMETRY_AGE_S, rng), _us(step_s))
             state, _ = advisor.decide(state, heard, _us(step_s), config)
             step_s += STEP_S
-        heard[keys.ODOMETRY.name] = Input(_odometry(given, now_s - ODOMETRY_AGE_S, rng), _us(now_s))
-        heard[keys.EVIDENCE.name] = Input(_evidence(frame, number, given, camera), _us(now_s))
+        heard[keys.ODOMETRY.name] = Input(_odometry(course, now_s - ODOMETRY_AGE_S, rng), _us(now_s))
+        heard[keys.EVIDENCE.name] = Input(_evidence(frame, number, course, camera), _us(now_s))
         state, outputs = advisor.decide(state, heard, _us(now_s), config)
         since = [*(f for f in since if f.at_s >= frame.at_s - need_s), frame]
-        yield _compared(outputs[keys.TRACKS.name], given, frame, since, need_s)
+        yield _judge_frame(outputs[keys.TRACKS.name], course, frame, since, need_s)
 
 
-def _compared(said: m.Message, given: Course, frame: Look, since: list[Look], need_s: float) -> _Moment:
+def _judge_frame(
+    said: m.Message, course: EncounterCourse, frame: FrameObservation, since: list[FrameObservation], need_s: float
+) -> _JudgedFrame:
     assert isinstance(said, m.Tracks)
     seen = [track for track in said.tracks if not track.held] if frame.box is not None else []
     track = max(seen or said.tracks, key=lambda t: (t.hits, -t.id), default=None)
     motion = track.motion if track else m.MotionState.UNKNOWN
     cause = track.motion_cause if track else m.MotionCause.TOO_FEW_SAMPLES
-    wrong = _contradicts(motion, _closing_per_s(given, frame.at_s, said.motion_history_s))
+    wrong = _contradicts(motion, _closing_per_s(course, frame.at_s, said.motion_history_s))
     closing = (
         frame.at_s >= need_s
-        and _closing_per_s(given, frame.at_s, need_s) >= MIN_CLOSING_PER_S
-        and all(look.whole and look.size_px >= MIN_SIZE_PX for look in since)
+        and _closing_per_s(course, frame.at_s, need_s) >= MIN_CLOSING_PER_S
+        and all(observation.whole and observation.size_px >= MIN_SIZE_PX for observation in since)
     )
-    late = not wrong and _contradicts(motion, _closing_per_s(given, frame.at_s, NOW_S))
-    return _Moment(motion, cause, frozenset(t.id for t in seen), closing, wrong, late)
+    late = not wrong and _contradicts(motion, _closing_per_s(course, frame.at_s, RECENT_S))
+    return _JudgedFrame(motion, cause, frozenset(t.id for t in seen), closing, wrong, late)
 
 
-def _closing_per_s(given: Course, at_s: float, over_s: float) -> float:
+def _closing_per_s(course: EncounterCourse, at_s: float, over_s: float) -> float:
     """How fast the logarithm of the range shrank, on average over the time before `at_s`."""
     start_s = max(0.0, at_s - over_s)
     if at_s - start_s < 1e-6:
         return 0.0
-    return (math.log(range_at(given, start_s)) - math.log(range_at(given, at_s))) / (at_s - start_s)
+    return (math.log(range_at_m(course, start_s)) - math.log(range_at_m(course, at_s))) / (at_s - start_s)
 
 
 def _contradicts(motion: m.MotionState, closing_per_s: float) -> bool:
     if motion is m.MotionState.APPROACHING:
-        return closing_per_s <= STILL_PER_S
-    return motion is m.MotionState.RECEDING and closing_per_s >= -STILL_PER_S
+        return closing_per_s <= STATIC_PER_S
+    return motion is m.MotionState.RECEDING and closing_per_s >= -STATIC_PER_S
 
 
 def _us(at_s: float) -> int:
     return START_US + round(at_s * 1e6)
 
 
-def _odometry(given: Course, at_s: float, rng: np.random.Generator) -> m.Odometry:
-    pose, rate_radps = pose_at(given, at_s)
+def _odometry(course: EncounterCourse, at_s: float, rng: np.random.Generator) -> m.Odometry:
+    pose, rate_radps = boat_pose_at(course, at_s)
     return m.Odometry(
         source_us=_us(at_s),
         x_m=pose.x_m,
         y_m=pose.y_m,
         yaw_rad=pose.yaw_rad + rng.normal(0.0, YAW_STD_RAD),
-        surge_mps=given.boat_mps,
+        surge_mps=course.boat_mps,
         yaw_rate_radps=rate_radps + rng.normal(0.0, YAW_RATE_STD_RADPS),
         healthy=True,
     )
 
 
-def _evidence(frame: Look, number: int, given: Course, camera: Camera) -> m.Evidence:
+def _evidence(frame: FrameObservation, number: int, course: EncounterCourse, camera: Camera) -> m.Evidence:
     found: tuple[m.Detection, ...] = ()
     if frame.box is not None:
-        found = (m.Detection(label=given.thing.label, confidence=frame.confidence, box_xyxy=frame.box),)
+        found = (m.Detection(label=course.target.label, confidence=frame.confidence, box_xyxy=frame.box),)
     clear = m.LaneEvidence(non_water=0.0, uncertainty=0.0, clear_width=1.0)
     return m.Evidence(
         source_us=_us(frame.at_s),
@@ -221,7 +233,7 @@ def _evidence(frame: Look, number: int, given: Course, camera: Camera) -> m.Evid
     )
 
 
-def _with(row: MotionRow, moments: list[_Moment]) -> MotionRow:
+def _add_encounter(row: MotionRow, moments: list[_JudgedFrame]) -> MotionRow:
     """The row with one more encounter."""
     closing = [moment for moment in moments if moment.closing]
     unknown = [moment.cause for moment in closing if moment.motion is m.MotionState.UNKNOWN]
@@ -237,19 +249,19 @@ def _with(row: MotionRow, moments: list[_Moment]) -> MotionRow:
         judged=sum(moment.motion is not m.MotionState.UNKNOWN for moment in moments),
         wrong=sum(moment.wrong for moment in moments),
         late=sum(moment.late for moment in moments),
-        things=1,
+        targets=1,
         identities=len(frozenset[int]().union(*(moment.ids for moment in moments))),
         causes=tuple(Counter(unknown).items()),
     )
-    return msgspec.structs.replace(_together([row, one]), family=row.family)
+    return msgspec.structs.replace(_sum_rows([row, one]), family=row.family)
 
 
-def _together(rows: list[MotionRow]) -> MotionRow:
+def _sum_rows(rows: list[MotionRow]) -> MotionRow:
     """The sum of rows of one profile and rate."""
     causes: Counter[m.MotionCause] = Counter()
     for row in rows:
         causes.update(dict(row.causes))
-    counts = ("closing", "known", "tracks", "known_tracks", "judged", "wrong", "late", "things", "identities")
+    counts = ("closing", "known", "tracks", "known_tracks", "judged", "wrong", "late", "targets", "identities")
     return MotionRow(
         profile=rows[0].profile,
         rate_hz=rows[0].rate_hz,
@@ -264,4 +276,4 @@ def _percent(part: int, whole: int) -> float | None:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(table_text(part_of(motion_table(int(sys.argv[1]), int(sys.argv[2])))))
+    sys.stdout.write(table_text(tabulate_rows(motion_table(int(sys.argv[1]), int(sys.argv[2])))))

@@ -19,10 +19,10 @@ from paani.statistics.charts import drawing, element, lines
 from paani.statistics.figure_table import Cell, FigureTable
 from paani.statistics.measured import measure_tables
 from paani.whole_file import write_whole
-from paani_sim.eye.render_cost import eye
-from paani_sim.plant.reference_model import oracle
-from paani_sim.plant.step_cost import physics
-from paani_sim.studies.estimation_table import estimation
+from paani_sim.eye.render_cost import measure_eye
+from paani_sim.plant.reference_model import compare_with_reference
+from paani_sim.plant.step_cost import measure_physics
+from paani_sim.studies.estimation_table import tabulate_estimation
 from paani_sim.trials.drive import Drive
 from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.run_suite import THREAD_COUNT_VARIABLES
@@ -54,8 +54,8 @@ def main(argv: list[str]) -> int:
         return tabulate_costs(costs)
 
     parts: dict[str, Callable[[], FigureTable]] = {
-        "physics": physics, "eye": eye, "lockstep": measure_lockstep,
-        "cost": cost, "oracle": oracle, "estimation": estimation,
+        "physics": measure_physics, "eye": measure_eye, "lockstep": measure_lockstep,
+        "cost": cost, "oracle": compare_with_reference, "estimation": tabulate_estimation,
     }  # fmt: skip
     parser = argparse.ArgumentParser(prog="paani bench water", description="How fast the simulator is, and how true.")
     parser.add_argument("--only", nargs="+", choices=tuple(parts), metavar="PART", help=f"of {', '.join(parts)}")

@@ -13,7 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config
 from paani.cores import estimator_of
-from paani_sim.plant.adapter import Applied, ThrustAdapter
+from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
 from paani_sim.trials.autonomy_stack import AutonomyStack
@@ -68,7 +68,7 @@ class Drive:
         world = scenario.world
         self.scenario, self.config = scenario, config
         self._evidence_source = evidence_source
-        self.plant = Plant.of(scenario, config.plant)
+        self.plant = Plant.from_scenario(scenario, config.plant)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
         self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self._clock = PlantClock(self.plant)
@@ -77,7 +77,7 @@ class Drive:
             config, build_mission(scenario), self._bus, self._clock, blind=evidence_source is None
         )
         self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
-        self.applied: Applied = self.adapter.decide(START_US)
+        self.applied: AppliedThrust = self.adapter.decide(START_US)
         self.progress = RouteProgress(
             world.route_m, closed=world.route_closed, start_m=(world.start.x_m, world.start.y_m)
         )
@@ -220,13 +220,13 @@ class Drive:
         if self._is_due("arming"):
             arming = m.Arming(source_us=now_us, armed=self.phase is DrivePhase.RUNNING)
             arming = self._bus.put(keys.ARMING, arming)
-            self.adapter.hear_arming(arming, now_us)
+            self.adapter.receive_arming(arming, now_us)
             if linked:
                 self.autonomy.deliver(keys.ARMING, arming)
         if self._is_due("pulse"):
             for service in self.config.plant.adapter.require_pulses:
                 if linked or service not in keys.BOARD_SERVICES:
-                    self.adapter.hear_pulse(service, now_us)
+                    self.adapter.receive_pulse(service, now_us)
         if self._is_due("report"):
             clock = m.SimTime(source_us=now_us, sim_us=self.plant.sim_us, stamp_us=now_us)
             clock = self._bus.put(keys.SIM_TIME, clock)

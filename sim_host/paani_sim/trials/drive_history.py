@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from paani import messages as m
-from paani_sim.plant.adapter import Applied
+from paani_sim.plant.adapter import AppliedThrust
 from paani_sim.plant.plant import Plant
 from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.route_progress import RouteProgress
@@ -60,7 +60,7 @@ class DriveHistory:
         if not evidence.usable:
             self.unusable_frames.append((evidence.source_us, evidence.cause))
 
-    def record_thrust(self, applied: Applied, in_force: m.Thrust | None, now_us: int) -> None:
+    def record_thrust(self, applied: AppliedThrust, in_force: m.Thrust | None, now_us: int) -> None:
         """What the fans do in this step, and the command behind it."""
         is_zero = applied.left_n == 0.0 and applied.right_n == 0.0
         picture_us = in_force.source_us if in_force is not None else 0
@@ -69,7 +69,9 @@ class DriveHistory:
             self.thrust_changes.append(ThrustChange(now_us, is_zero, picture_us))
         self._in_force, self._was_zero = in_force, is_zero
 
-    def record_sample(self, plant: Plant, progress: RouteProgress, autonomy: AutonomyStack, applied: Applied) -> None:
+    def record_sample(
+        self, plant: Plant, progress: RouteProgress, autonomy: AutonomyStack, applied: AppliedThrust
+    ) -> None:
         """Take one."""
         t_s = plant.sim_us * 1e-6
         x_m, y_m = plant.position_m

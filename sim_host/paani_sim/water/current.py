@@ -24,8 +24,8 @@ class CurrentField:
 
     def __init__(self, world: World) -> None:
         """Only a world with a current has a grid."""
-        self._still = world.current.speed_mps == 0.0
-        if self._still:
+        self._is_still = world.current.speed_mps == 0.0
+        if self._is_still:
             return
         low, high = world.shore_m.min(axis=0), world.shore_m.max(axis=0)
         columns, rows = (int(n) + 2 for n in np.ceil((high - low) / CELL_M))
@@ -37,16 +37,16 @@ class CurrentField:
 
     def at(self, x_m: float, y_m: float) -> tuple[float, float]:
         """In the map frame [m/s]; beyond the grid as on its rim."""
-        if self._still:
+        if self._is_still:
             return 0.0, 0.0
         column = min(max((x_m - self._low_m[0]) / CELL_M, 0.0), self._last[0])
         row = min(max((y_m - self._low_m[1]) / CELL_M, 0.0), self._last[1])
         i, j = int(column), int(row)
         right, up = column - i, row - j
-        return _between(self._x_mps, i, j, right, up), _between(self._y_mps, i, j, right, up)
+        return _interpolate(self._x_mps, i, j, right, up), _interpolate(self._y_mps, i, j, right, up)
 
 
-def _between(grid: list[list[float]], i: int, j: int, right: float, up: float) -> float:
+def _interpolate(grid: list[list[float]], i: int, j: int, right: float, up: float) -> float:
     below, above = grid[j], grid[j + 1]
     low = below[i] + right * (below[i + 1] - below[i])
     return low + up * (above[i] + right * (above[i + 1] - above[i]) - low)
@@ -65,13 +65,13 @@ def _velocity_mps(world: World, low_m: F64, shape: tuple[int, int]) -> tuple[F32
         ahead = np.zeros(shape, int)
         part = bank_m / max(float(bank_m.max()), CELL_M)
     else:
-        middle_m, ahead, direction = _channel(world.channel_m, low_m, shape)
+        middle_m, ahead, direction = _project_to_channel(world.channel_m, low_m, shape)
         part = bank_m / np.maximum(bank_m + middle_m, CELL_M)
     speed_mps = world.current.speed_mps * part**EXPONENT
     return speed_mps * direction[ahead, 0], speed_mps * direction[ahead, 1]
 
 
-def _channel(channel_m: F64, low_m: F64, shape: tuple[int, int]) -> tuple[F32, npt.NDArray[np.int_], F64]:
+def _project_to_channel(channel_m: F64, low_m: F64, shape: tuple[int, int]) -> tuple[F32, npt.NDArray[np.int_], F64]:
     """Distance to the centre line, which of its points is nearest, and the directions of them all."""
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(channel_m, axis=0), axis=1))])
     along_m = np.arange(0.0, arc_m[-1] + CELL_M, CELL_M)

@@ -15,14 +15,14 @@ from paani_sim.water.waves import GRAVITY_MPS2
 
 CUSP_RAD = math.acos(math.sqrt(2.0 / 3.0))  # 35.3 degrees off the course run the waves at the cusp
 DEPTH_M = 3.0  # of the water under the vessels, for the height alone
-LEAST_HEIGHT_M = 0.005
-FURTHEST_M = 60.0  # from the sailing line
-LEAST_SPEED_MPS = 0.5
-REACH = 3.0  # a packet is felt within so many of its standard deviations
-CAPACITY = 4096
+MIN_HEIGHT_M = 0.005
+MAX_DISTANCE_M = 60.0  # from the sailing line
+MIN_SPEED_MPS = 0.5
+PACKET_REACH_STD = 3.0  # a packet is felt within so many of its standard deviations
+MAX_PACKETS = 4096
 
 
-class Maker(NamedTuple):
+class WakeSource(NamedTuple):
     """A vessel under way."""
 
     x_m: float
@@ -61,22 +61,22 @@ def height_m(speed_mps: float, distance_m: float) -> float:
     return 1.2 * DEPTH_M / math.cbrt(distance_m / DEPTH_M) * froude2**2
 
 
-def launch(maker: Maker, at_s: float, since_m: float) -> tuple[Packet, Packet]:
+def emit_packets(source: WakeSource, at_s: float, since_m: float) -> tuple[Packet, Packet]:
     """The packets to port and starboard of a vessel that has gone `since_m` since its last ones.
 
     Their crests continue those of the packets before, for omega = k U cos(35.3 deg); their amplitude is of the
     height `DEPTH_M` away, shared so that all packets of a straight course add up to it.
     """
-    spread_m = wavelength_m(maker.speed_mps)
+    spread_m = wavelength_m(source.speed_mps)
     k = 2.0 * math.pi / spread_m
-    phase_mps = maker.speed_mps * math.cos(CUSP_RAD)
+    phase_mps = source.speed_mps * math.cos(CUSP_RAD)
     share = since_m * math.sqrt(0.5) / (math.sqrt(2.0 * math.pi) * spread_m)
-    amplitude_m = 0.5 * share * height_m(maker.speed_mps, DEPTH_M)
+    amplitude_m = 0.5 * share * height_m(source.speed_mps, DEPTH_M)
 
     def one(side: float) -> Packet:
-        cos, sin = math.cos(maker.yaw_rad + side * CUSP_RAD), math.sin(maker.yaw_rad + side * CUSP_RAD)
+        cos, sin = math.cos(source.yaw_rad + side * CUSP_RAD), math.sin(source.yaw_rad + side * CUSP_RAD)
         return Packet(
-            maker.x_m, maker.y_m, at_s, k * cos, k * sin, k * phase_mps,
+            source.x_m, source.y_m, at_s, k * cos, k * sin, k * phase_mps,
             0.5 * phase_mps * cos, 0.5 * phase_mps * sin, spread_m, amplitude_m,
         )  # fmt: skip
 
@@ -86,27 +86,27 @@ def launch(maker: Maker, at_s: float, since_m: float) -> tuple[Packet, Packet]:
 class Wakes:
     """All packets that still run."""
 
-    def __init__(self, makers: int) -> None:
+    def __init__(self, sources: int) -> None:
         """`makers`: how many vessels `pass_by` will be told of, always in the same order."""
-        self._last_m = [(math.inf, math.inf)] * makers
-        self._packets: npt.NDArray[np.float64] = np.zeros((CAPACITY, len(Packet._fields)))
+        self._last_m = [(math.inf, math.inf)] * sources
+        self._packets: npt.NDArray[np.float64] = np.zeros((MAX_PACKETS, len(Packet._fields)))
         self._launched = 0
 
-    def pass_by(self, makers: Sequence[Maker], at_s: float) -> None:
+    def update_vessels(self, sources: Sequence[WakeSource], at_s: float) -> None:
         """Where the vessels are now; those that make waves leave a pair of packets every wavelength they go."""
-        for index, maker in enumerate(makers):
+        for index, source in enumerate(sources):
             last_x_m, last_y_m = self._last_m[index]
-            since_m = math.hypot(maker.x_m - last_x_m, maker.y_m - last_y_m)
-            if maker.speed_mps < LEAST_SPEED_MPS or height_m(maker.speed_mps, maker.width_m) < LEAST_HEIGHT_M:
-                self._last_m[index] = maker.x_m, maker.y_m
-            elif since_m >= wavelength_m(maker.speed_mps):
+            since_m = math.hypot(source.x_m - last_x_m, source.y_m - last_y_m)
+            if source.speed_mps < MIN_SPEED_MPS or height_m(source.speed_mps, source.width_m) < MIN_HEIGHT_M:
+                self._last_m[index] = source.x_m, source.y_m
+            elif since_m >= wavelength_m(source.speed_mps):
                 if math.isfinite(since_m):
-                    for packet in launch(maker, at_s, since_m):
-                        self._packets[self._launched % CAPACITY] = packet
+                    for packet in emit_packets(source, at_s, since_m):
+                        self._packets[self._launched % MAX_PACKETS] = packet
                         self._launched += 1
-                self._last_m[index] = maker.x_m, maker.y_m
+                self._last_m[index] = source.x_m, source.y_m
 
-    def near(self, x_m: float, y_m: float, at_s: float, within_m: float) -> list[Packet]:
+    def packets_near(self, x_m: float, y_m: float, at_s: float, within_m: float) -> list[Packet]:
         """The packets whose reach comes `within_m` of a place now, with the height they have there."""
         if not self._launched:
             return []
@@ -114,12 +114,12 @@ class Wakes:
         age_s = at_s - packets[:, 2]
         middle_x = packets[:, 0] + packets[:, 6] * age_s - x_m
         middle_y = packets[:, 1] + packets[:, 7] * age_s - y_m
-        close = np.hypot(middle_x, middle_y) < REACH * packets[:, 8] + within_m
+        close = np.hypot(middle_x, middle_y) < PACKET_REACH_STD * packets[:, 8] + within_m
         found = []
         for index in np.flatnonzero(close).tolist():
             packet = Packet(*packets[index].tolist())
             gone_m = math.hypot(packet.vx_mps, packet.vy_mps) * (at_s - packet.at_s) * math.sin(CUSP_RAD)
             amplitude_m = packet.amplitude_m / math.cbrt(max(gone_m, packet.spread_m) / DEPTH_M)
-            if gone_m < FURTHEST_M:
+            if gone_m < MAX_DISTANCE_M:
                 found.append(packet._replace(amplitude_m=amplitude_m))
         return found

@@ -9,17 +9,17 @@ import numpy as np
 from paani_sim.vessels import Vessel
 from paani_sim.water.current import CurrentField
 from paani_sim.water.surroundings import CALM, Surroundings
-from paani_sim.water.wakes import REACH, Maker, Packet, Wakes
-from paani_sim.water.waves import Response, hull_response, wind_sea
+from paani_sim.water.wakes import PACKET_REACH_STD, Packet, Wakes, WakeSource
+from paani_sim.water.waves import HullResponse, hull_response, wind_sea
 from paani_sim.water.wind import Gusts
 from paani_sim.worlds.world import World
 
-SURFACE_EVERY_S = 0.02  # the shortest waves felt take 0.4 s
-DRIFT_EVERY_S = 0.1  # gusts, current, heading towards the waves
-WITHIN_M = 1.0  # how far boat and packets come closer in that time
+SURFACE_UPDATE_S = 0.02  # the shortest waves felt take 0.4 s
+SLOW_UPDATE_S = 0.1  # gusts, current, heading towards the waves
+PACKET_MARGIN_M = 1.0  # how far boat and packets come closer in that time
 
 
-class Train(NamedTuple):
+class WaveTrain(NamedTuple):
     """One regular wave with what the hull feels of it."""
 
     kx_radpm: float
@@ -35,57 +35,57 @@ class Train(NamedTuple):
 class Water:
     """Surroundings of a hull that moves; equal seeds and calls give equal surroundings."""
 
-    def __init__(self, world: World, vessel: Vessel, makers: int, seed: np.random.SeedSequence) -> None:
+    def __init__(self, world: World, vessel: Vessel, sources: int, seed: np.random.SeedSequence) -> None:
         """`makers`: how many vessels `pass_by` will be told of."""
         waves, gusts = seed.spawn(2)
         wind = world.wind
         self._length_m, self._spacing_m = vessel.hull.length_m, vessel.hull.spacing_m
         self._sea = wind_sea(wind.speed_mps, wind.toward_rad, world.waves.fetch_m, np.random.default_rng(waves))
-        self._gusts = Gusts(wind, DRIFT_EVERY_S, np.random.default_rng(gusts))
+        self._gusts = Gusts(wind, SLOW_UPDATE_S, np.random.default_rng(gusts))
         self._current = CurrentField(world)
-        self._wakes = Wakes(makers)
+        self._wakes = Wakes(sources)
         self._toward = math.cos(wind.toward_rad), math.sin(wind.toward_rad)
-        self._drift_s = self._surface_s = -math.inf
-        self._trains: list[Train] = []
-        self._packets: list[tuple[Packet, Response]] = []
+        self._slow_updated_s = self._surface_updated_s = -math.inf
+        self._trains: list[WaveTrain] = []
+        self._packets: list[tuple[Packet, HullResponse]] = []
         self._now = CALM
 
-    def pass_by(self, makers: Sequence[Maker], at_s: float) -> None:
+    def update_vessels(self, sources: Sequence[WakeSource], at_s: float) -> None:
         """Where the other vessels are now."""
-        self._wakes.pass_by(makers, at_s)
+        self._wakes.update_vessels(sources, at_s)
 
-    def about(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> Surroundings:
+    def surroundings_at(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> Surroundings:
         """What surrounds the hull; to be asked with rising `at_s` [simulated s]."""
-        if at_s - self._drift_s >= DRIFT_EVERY_S - 1e-9:
-            self._drift_s = at_s
-            self._drift(x_m, y_m, yaw_rad, at_s)
-        if (self._trains or self._packets) and at_s - self._surface_s >= SURFACE_EVERY_S - 1e-9:
-            self._surface_s = at_s
-            self._now = _surface(self._now, self._trains, self._packets, self._toward, (x_m, y_m, at_s))
+        if at_s - self._slow_updated_s >= SLOW_UPDATE_S - 1e-9:
+            self._slow_updated_s = at_s
+            self._update_slow(x_m, y_m, yaw_rad, at_s)
+        if (self._trains or self._packets) and at_s - self._surface_updated_s >= SURFACE_UPDATE_S - 1e-9:
+            self._surface_updated_s = at_s
+            self._now = _add_surface(self._now, self._trains, self._packets, self._toward, (x_m, y_m, at_s))
         return self._now
 
-    def _drift(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> None:
+    def _update_slow(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> None:
         self._trains = []
         for wave in self._sea:
             a, kx, ky, omega, phase = wave
-            felt = self._felt(kx, ky, yaw_rad)
-            lift, ahead, left = a * felt.elevation, a * felt.slope_ahead_pm, a * felt.slope_left_pm
-            self._trains.append(Train(kx, ky, omega, phase, lift, ahead, left, a))
-        packets = self._wakes.near(x_m, y_m, at_s, WITHIN_M)
-        self._packets = [(packet, self._felt(packet.kx_radpm, packet.ky_radpm, yaw_rad)) for packet in packets]
+            response = self._hull_response(kx, ky, yaw_rad)
+            lift, ahead, left = a * response.elevation, a * response.slope_ahead_pm, a * response.slope_left_pm
+            self._trains.append(WaveTrain(kx, ky, omega, phase, lift, ahead, left, a))
+        packets = self._wakes.packets_near(x_m, y_m, at_s, PACKET_MARGIN_M)
+        self._packets = [(packet, self._hull_response(packet.kx_radpm, packet.ky_radpm, yaw_rad)) for packet in packets]
         self._now = Surroundings(
             *self._current.at(x_m, y_m), *self._gusts.velocity_mps, *(self._now[4:] if self._trains or packets else ())
         )
         self._gusts.advance()
 
-    def _felt(self, kx_radpm: float, ky_radpm: float, yaw_rad: float) -> Response:
+    def _hull_response(self, kx_radpm: float, ky_radpm: float, yaw_rad: float) -> HullResponse:
         return hull_response(kx_radpm, ky_radpm, yaw_rad, self._length_m, self._spacing_m)
 
 
-def _surface(
+def _add_surface(
     now: Surroundings,
-    trains: list[Train],
-    packets: list[tuple[Packet, Response]],
+    trains: list[WaveTrain],
+    packets: list[tuple[Packet, HullResponse]],
     toward: tuple[float, float],
     here: tuple[float, float, float],
 ) -> Surroundings:
@@ -104,19 +104,19 @@ def _surface(
         left_rate += slope_left * omega * c
         crest += amplitude * c
         quarter += amplitude * s
-    for packet, felt in packets:
+    for packet, response in packets:
         px, py, since_s = x_m - packet.x_m, y_m - packet.y_m, at_s - packet.at_s
         off_m = math.hypot(px - packet.vx_mps * since_s, py - packet.vy_mps * since_s)
-        if off_m < REACH * packet.spread_m:
+        if off_m < PACKET_REACH_STD * packet.spread_m:
             a = packet.amplitude_m * math.exp(-0.5 * (off_m / packet.spread_m) ** 2)
             angle = packet.kx_radpm * px + packet.ky_radpm * py - packet.omega_radps * since_s
             c, s = a * cos(angle), a * sin(angle)
-            elevation += felt.elevation * c
-            rate += felt.elevation * packet.omega_radps * s
-            ahead -= felt.slope_ahead_pm * s
-            left -= felt.slope_left_pm * s
-            ahead_rate += felt.slope_ahead_pm * packet.omega_radps * c
-            left_rate += felt.slope_left_pm * packet.omega_radps * c
+            elevation += response.elevation * c
+            rate += response.elevation * packet.omega_radps * s
+            ahead -= response.slope_ahead_pm * s
+            left -= response.slope_left_pm * s
+            ahead_rate += response.slope_ahead_pm * packet.omega_radps * c
+            left_rate += response.slope_left_pm * packet.omega_radps * c
     envelope_m2 = crest * crest + quarter * quarter
     envelope = envelope_m2 * toward[0], envelope_m2 * toward[1]
     return Surroundings(*now[:4], elevation, rate, ahead, left, ahead_rate, left_rate, *envelope)

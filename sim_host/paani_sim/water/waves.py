@@ -13,7 +13,7 @@ import numpy.typing as npt
 GRAVITY_MPS2 = 9.81
 COMPONENTS = 12
 PEAK_ENHANCEMENT = 3.3  # gamma of the mean JONSWAP spectrum
-_BAND = (0.5, 4.0)  # frequencies kept, of the peak's: beyond them lies less than 1 % of the energy
+_BAND_OF_PEAK = (0.5, 4.0)  # frequencies kept, of the peak's: beyond them lies less than 1 % of the energy
 
 
 class Component(NamedTuple):
@@ -54,7 +54,7 @@ def wind_sea(wind_mps: float, toward_rad: float, fetch_m: float, rng: np.random.
     """
     if wind_mps <= 0.0 or fetch_m <= 0.0:
         return ()
-    omega = np.linspace(*_BAND, 2000) * peak_omega_radps(wind_mps, fetch_m)
+    omega = np.linspace(*_BAND_OF_PEAK, 2000) * peak_omega_radps(wind_mps, fetch_m)
     energy = np.cumsum(spectrum_m2s(omega, wind_mps, fetch_m)) * (omega[1] - omega[0])
     shares = (np.arange(COMPONENTS) + 0.5) / COMPONENTS
     omegas = np.interp(shares * energy[-1], energy, omega)
@@ -68,7 +68,7 @@ def wind_sea(wind_mps: float, toward_rad: float, fetch_m: float, rng: np.random.
     return tuple(Component(amplitude_m, *map(float, row)) for row in rows)
 
 
-class Response(NamedTuple):
+class HullResponse(NamedTuple):
     """What a hull of two slender pontoons feels of a regular wave, per metre of its amplitude.
 
     The mean elevation under it (in phase with the crest) and the slopes that turn it (a quarter period off).
@@ -79,13 +79,13 @@ class Response(NamedTuple):
     slope_left_pm: float
 
 
-def hull_response(kx_radpm: float, ky_radpm: float, yaw_rad: float, length_m: float, spacing_m: float) -> Response:
+def hull_response(kx_radpm: float, ky_radpm: float, yaw_rad: float, length_m: float, spacing_m: float) -> HullResponse:
     """Averages of the wave over two waterlines (Froude-Krylov): along the hull the elevation falls as sinc(k L / 2)."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     ahead, left = kx_radpm * cos + ky_radpm * sin, ky_radpm * cos - kx_radpm * sin
     along, across = 0.5 * ahead * length_m, 0.5 * left * spacing_m
     mean = _sinc(along)
-    return Response(
+    return HullResponse(
         elevation=mean * math.cos(across),
         slope_ahead_pm=ahead * _slope(along) * math.cos(across),
         slope_left_pm=left * mean * _sinc(across),

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
-from paani_sim.plant.actors import KEEP_CLEAR_M, SWIMMER_KEEPS_CLEAR_M, Actors, Track, speed_mps
+from paani_sim.plant.actors import SWIMMER_KEEPS_CLEAR_M, VESSEL_KEEPS_CLEAR_M, ActorPath, Actors, yielding_speed_mps
 from paani_sim.worlds import Actor, Behaviour, Kind, Pose2, actor_at, load_world
 
 BOAT_REACH_M = 0.65
@@ -28,9 +28,9 @@ def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: Any) -> Acto
 def test_track_is_the_path(name: str) -> None:
     """The eye places actors with `actor_at`, the plant with its own measure of the path: one pose."""
     for actor in load_world(name).actors:
-        track = Track(actor)
+        track = ActorPath(actor)
         for along_m in np.linspace(-20.0, 400.0, 211):
-            exact, quick = actor_at(actor, float(along_m)), track.at(float(along_m))
+            exact, quick = actor_at(actor, float(along_m)), track.pose_at(float(along_m))
             assert math.hypot(exact.x_m - quick.x_m, exact.y_m - quick.y_m) < 1e-9
             assert abs(wrap_rad(exact.yaw_rad - quick.yaw_rad)) < 1e-6
 
@@ -41,7 +41,7 @@ def test_skipper_stops_short_and_goes_on_when_clear() -> None:
     for step in range(steps):
         actors.advance(EVERY_S * (step + 1), (30.0, 0.5))
     gap_m = 30.0 - BOAT_REACH_M - (actors.along_m[0] + 2.5)
-    assert gap_m == pytest.approx(KEEP_CLEAR_M, abs=0.05)
+    assert gap_m == pytest.approx(VESSEL_KEEPS_CLEAR_M, abs=0.05)
     assert actors.speeds_mps[0] < 0.02
     stopped_m = actors.along_m[0]
     for step in range(200):
@@ -80,11 +80,11 @@ def test_nobody_moves_before_the_start() -> None:
 def test_giving_way_only_ever_slows(x_m: float, y_m: float, yaw: float) -> None:
     """Between stop and its own speed; a boat well astern or aside is none of its business."""
     pose = Pose2(0.0, 0.0, yaw)
-    speed = speed_mps(straight(), pose, (x_m, y_m), BOAT_REACH_M)
+    speed = yielding_speed_mps(straight(), pose, (x_m, y_m), BOAT_REACH_M)
     assert 0.0 <= speed <= 1.5
     if math.cos(yaw) * x_m + math.sin(yaw) * y_m <= -2.5 - BOAT_REACH_M or math.hypot(x_m, y_m) > 20.0:
         assert speed == 1.5
-    assert speed_mps(straight(Behaviour.HOLDS_ON), pose, (x_m, y_m), BOAT_REACH_M) == 1.5
+    assert yielding_speed_mps(straight(Behaviour.HOLDS_ON), pose, (x_m, y_m), BOAT_REACH_M) == 1.5
 
 
 def test_who_has_waited_long_backs_off_and_tries_again() -> None:
@@ -99,7 +99,7 @@ def test_who_has_waited_long_backs_off_and_tries_again() -> None:
         if stopped_m:
             back_m = min(back_m, actors.along_m[0])
     assert stopped_m == pytest.approx(furthest_m, abs=0.1)
-    assert furthest_m + 2.5 < 30.0 - BOAT_REACH_M - KEEP_CLEAR_M + 0.1
+    assert furthest_m + 2.5 < 30.0 - BOAT_REACH_M - VESSEL_KEEPS_CLEAR_M + 0.1
     assert back_m == pytest.approx(stopped_m - 12.0, abs=0.1)
 
 

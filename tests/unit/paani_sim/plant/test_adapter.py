@@ -38,9 +38,9 @@ def ready(config: AdapterConfig = CONFIG) -> ThrustAdapter:
 
 
 def keep_alive(adapter: ThrustAdapter, now_us: int) -> None:
-    adapter.hear_arming(ARMED, now_us)
+    adapter.receive_arming(ARMED, now_us)
     for service in CONFIG.require_pulses:
-        adapter.hear_pulse(service, now_us)
+        adapter.receive_pulse(service, now_us)
 
 
 def test_o1_force_is_75_n_per_unit() -> None:
@@ -138,9 +138,9 @@ def test_disabled_command_is_accepted_and_gives_zero() -> None:
 def test_no_force_without_the_operators_word(arming: Arming | None) -> None:
     adapter = ThrustAdapter(CONFIG, domain=43)
     for service in CONFIG.require_pulses:
-        adapter.hear_pulse(service, NOW_US)
+        adapter.receive_pulse(service, NOW_US)
     if arming is not None:
-        adapter.hear_arming(arming, NOW_US)
+        adapter.receive_arming(arming, NOW_US)
     adapter.offer(thrust(), NOW_US)
     assert adapter.decide(NOW_US).zero_cause is ZeroCause.NOT_ARMED
 
@@ -149,20 +149,20 @@ def test_arming_must_be_repeated() -> None:
     adapter = ready()
     now_us = NOW_US + 500_001
     for service in CONFIG.require_pulses:
-        adapter.hear_pulse(service, now_us)
+        adapter.receive_pulse(service, now_us)
     adapter.offer(thrust(echo_us=now_us), now_us)
     assert adapter.decide(now_us).zero_cause is ZeroCause.ARMING_LOST
-    adapter.hear_arming(ARMED, now_us)
+    adapter.receive_arming(ARMED, now_us)
     assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
 
 
 def test_a_latched_stop_holds_while_everything_else_comes_back() -> None:
     adapter = ready()
-    adapter.hear_arming(Arming(source_us=1, armed=False, stopped=True), NOW_US)
+    adapter.receive_arming(Arming(source_us=1, armed=False, stopped=True), NOW_US)
     for n in range(20):
         now_us = NOW_US + n * 100_000
         for service in CONFIG.require_pulses:
-            adapter.hear_pulse(service, now_us)
+            adapter.receive_pulse(service, now_us)
         adapter.offer(thrust(seq=8 + n, echo_us=now_us), now_us)
         assert adapter.decide(now_us).zero_cause is ZeroCause.NOT_ARMED
 
@@ -172,21 +172,21 @@ def test_each_vital_process_must_beat(silent: str) -> None:
     """A process that hangs for longer than 0.35 s stops the boat; its next beat frees it."""
     adapter = ready()
     now_us = NOW_US + 350_001
-    adapter.hear_arming(ARMED, now_us)
+    adapter.receive_arming(ARMED, now_us)
     for service in CONFIG.require_pulses:
         if service != silent:
-            adapter.hear_pulse(service, now_us)
+            adapter.receive_pulse(service, now_us)
     adapter.offer(thrust(echo_us=now_us), now_us)
     applied = adapter.decide(now_us)
     assert (applied.zero_cause, applied.lost_pulse) == (ZeroCause.PULSE_LOST, silent)
     assert applied.left_n == applied.right_n == 0.0
-    adapter.hear_pulse(silent, now_us)
+    adapter.receive_pulse(silent, now_us)
     assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
 
 
 def test_a_vital_process_that_never_beat_keeps_the_boat_still() -> None:
     adapter = ThrustAdapter(CONFIG, domain=43)
-    adapter.hear_arming(ARMED, NOW_US)
+    adapter.receive_arming(ARMED, NOW_US)
     adapter.offer(thrust(), NOW_US)
     applied = adapter.decide(NOW_US)
     assert (applied.zero_cause, applied.lost_pulse) == (ZeroCause.PULSE_LOST, CONFIG.require_pulses[0])

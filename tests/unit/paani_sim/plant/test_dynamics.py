@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paani_sim.plant.dynamics import Fans, HullState, attitude, body_velocity, wrench
+from paani_sim.plant.dynamics import Fans, HullState, attitude, body_velocity, compute_wrench
 from paani_sim.vessels import load_vessel
 from paani_sim.water.waves import GRAVITY_MPS2
 
@@ -25,16 +25,16 @@ def turned(angle_rad: float, axis: int) -> HullState:
 
 def test_k5_drag_of_surge_sway_and_yaw() -> None:
     """K5: F = -c1 v - c2 |v| v with 4/20, 20/80, 4/25."""
-    assert wrench(AFLOAT._replace(vx_mps=0.5), IDLE, PAPER)[0] == pytest.approx(-(4 * 0.5 + 20 * 0.25))
-    assert wrench(AFLOAT._replace(vy_mps=-0.5), IDLE, PAPER)[1] == pytest.approx(20 * 0.5 + 80 * 0.25)
+    assert compute_wrench(AFLOAT._replace(vx_mps=0.5), IDLE, PAPER)[0] == pytest.approx(-(4 * 0.5 + 20 * 0.25))
+    assert compute_wrench(AFLOAT._replace(vy_mps=-0.5), IDLE, PAPER)[1] == pytest.approx(20 * 0.5 + 80 * 0.25)
     spinning = AFLOAT._replace(yaw_rate_radps=0.4)
-    assert wrench(spinning, IDLE, PAPER)[5] == pytest.approx(-(4 * 0.4 + 25 * 0.16))
+    assert compute_wrench(spinning, IDLE, PAPER)[5] == pytest.approx(-(4 * 0.4 + 25 * 0.16))
 
 
 def test_k5_drag_follows_the_body_axes() -> None:
     """Going north while heading north is surge, not sway."""
     north = turned(math.pi / 2.0, axis=2)._replace(vy_mps=0.5)
-    force = wrench(north, IDLE, PAPER)
+    force = compute_wrench(north, IDLE, PAPER)
     assert body_velocity(north) == pytest.approx((0.5, 0.0))
     assert force[:2] == pytest.approx((0.0, -(4 * 0.5 + 20 * 0.25)))
 
@@ -51,7 +51,7 @@ def test_k5_drag_follows_the_body_axes() -> None:
 )
 def test_k6_heave_force(z_m: float, vz_mps: float, force_n: float) -> None:
     """K6: F_z = clip(m g + 650 (0.177 - z) - 90 z', 0, 3 m g)."""
-    assert wrench(AFLOAT._replace(z_m=z_m, vz_mps=vz_mps), IDLE, PAPER)[2] == pytest.approx(force_n)
+    assert compute_wrench(AFLOAT._replace(z_m=z_m, vz_mps=vz_mps), IDLE, PAPER)[2] == pytest.approx(force_n)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -59,21 +59,21 @@ def test_k7_tilt_is_restored_and_damped(axis: int) -> None:
     """K7: 90 N m per rad and 24 N m s per rad, in roll and in pitch."""
     tilted = turned(0.1, axis)
     rate = "roll_rate_radps" if axis == 0 else "pitch_rate_radps"
-    assert wrench(tilted, IDLE, PAPER)[3 + axis] == pytest.approx(-9.0)
+    assert compute_wrench(tilted, IDLE, PAPER)[3 + axis] == pytest.approx(-9.0)
     moving = AFLOAT._replace(**{rate: 0.5})
-    assert wrench(moving, IDLE, PAPER)[3 + axis] == pytest.approx(-12.0)
+    assert compute_wrench(moving, IDLE, PAPER)[3 + axis] == pytest.approx(-12.0)
 
 
 def test_fans_push_forward_turn_and_lower_the_bow() -> None:
     """1b #17: fans 0.60 m apart; the right fan alone turns to port (counter-clockwise)."""
-    force = wrench(AFLOAT, Fans(0.0, 10.0), PAPER)
+    force = compute_wrench(AFLOAT, Fans(0.0, 10.0), PAPER)
     assert force == pytest.approx((10.0, 0.0, WEIGHT_N, 0.0, 0.12 * 10.0, 0.3 * 10.0))
 
 
 @given(speeds, speeds, st.floats(-3.0, 3.0))
 def test_drag_takes_energy_whatever_the_motion(vx: float, vy: float, rate: float) -> None:
     state = AFLOAT._replace(vx_mps=vx, vy_mps=vy, yaw_rate_radps=rate)
-    fx, fy, _, _, _, moment = wrench(state, IDLE, PAPER)
+    fx, fy, _, _, _, moment = compute_wrench(state, IDLE, PAPER)
     assert fx * vx + fy * vy + moment * rate <= 0.0
 
 

@@ -157,7 +157,7 @@ def test_vessel_of_the_settings_goes_before_the_scenario_s(open_plant: OpenPlant
     """A scenario's vessel, seed and faults make its boat; `--set plant.vessel=...` tries another vessel in it."""
     scenario = Scenario("still", open_water(), seed=4, vessel="otter", faults=(Fault(FaultKind.GPS_OUTAGE, 0.0),))
     for config, vessel in ((PlantConfig(), "otter"), (PlantConfig(vessel="paper"), "paper")):
-        plant = Plant.of(scenario, config)
+        plant = Plant.from_scenario(scenario, config)
         try:
             assert plant.vessel == load_vessel(vessel)
             assert not plant.read_gps().fix

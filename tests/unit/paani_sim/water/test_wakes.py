@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from paani_sim.water.wakes import CUSP_RAD, DEPTH_M, Maker, Wakes, height_m, launch, wavelength_m
+from paani_sim.water.wakes import CUSP_RAD, DEPTH_M, Wakes, WakeSource, emit_packets, height_m, wavelength_m
 
 SPEED_MPS = 2.5
 KELVIN_RAD = math.asin(1.0 / 3.0)  # half angle of the wedge: 19.47 degrees
@@ -15,14 +15,14 @@ def passed(speed_mps: float, seconds: float = 60.0) -> Wakes:
     """A vessel that has run east along y = 0 and is at the origin after `seconds`."""
     wakes = Wakes(1)
     for t_s in np.arange(0.0, seconds + 1e-9, 0.05):
-        wakes.pass_by([Maker(speed_mps * (t_s - seconds), 0.0, 0.0, speed_mps, 2.0)], float(t_s))
+        wakes.update_vessels([WakeSource(speed_mps * (t_s - seconds), 0.0, 0.0, speed_mps, 2.0)], float(t_s))
     return wakes
 
 
 def surface_m(wakes: Wakes, x_m: float, y_m: float, t_s: float) -> complex:
     """Elevation, and a quarter period later."""
     total = 0j
-    for packet in wakes.near(x_m, y_m, t_s, 0.0):
+    for packet in wakes.packets_near(x_m, y_m, t_s, 0.0):
         age_s = t_s - packet.at_s
         px, py = x_m - packet.x_m, y_m - packet.y_m
         off_m = math.hypot(px - packet.vx_mps * age_s, py - packet.vy_mps * age_s)
@@ -42,7 +42,7 @@ def test_wavelength_and_height() -> None:
 
 def test_packets_keep_the_crests_of_those_before() -> None:
     """omega = k U cos 35.3 deg: the wave that the vessel meets stands still for it; and it is a deep-water wave."""
-    packet, _ = launch(Maker(0.0, 0.0, 0.3, SPEED_MPS, 2.0), 0.0, 1.0)
+    packet, _ = emit_packets(WakeSource(0.0, 0.0, 0.3, SPEED_MPS, 2.0), 0.0, 1.0)
     k = math.hypot(packet.kx_radpm, packet.ky_radpm)
     assert packet.omega_radps == pytest.approx(k * SPEED_MPS * math.cos(CUSP_RAD))
     assert packet.omega_radps**2 == pytest.approx(9.81 * k)
@@ -63,13 +63,13 @@ def test_wake_lies_on_the_cusp() -> None:
 
 def test_nothing_ahead_and_nothing_from_the_slow() -> None:
     assert abs(surface_m(passed(SPEED_MPS), 10.0, 0.0, 60.0)) == 0.0
-    assert passed(0.9).near(-20.0, 7.0, 60.0, 50.0) == []
+    assert passed(0.9).packets_near(-20.0, 7.0, 60.0, 50.0) == []
 
 
 def test_wake_runs_on_when_its_maker_stops() -> None:
     wakes = passed(SPEED_MPS, 20.0)
     for step in range(200):
-        wakes.pass_by([Maker(0.0, 0.0, 0.0, 0.0, 2.0)], 20.0 + 0.05 * step)
+        wakes.update_vessels([WakeSource(0.0, 0.0, 0.0, 0.0, 2.0)], 20.0 + 0.05 * step)
     gone_m = 0.5 * SPEED_MPS * math.cos(CUSP_RAD) * 10.0
     abeam_m = gone_m * math.sin(CUSP_RAD)
     assert abs(surface_m(wakes, gone_m * math.cos(CUSP_RAD) - 2.0, abeam_m, 30.0)) > 0.1 * height_m(SPEED_MPS, DEPTH_M)

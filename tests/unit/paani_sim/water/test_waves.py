@@ -67,13 +67,13 @@ def test_no_wind_or_no_fetch_is_flat() -> None:
 def test_response_is_the_average_over_both_pontoons(k: float, toward: float, yaw: float) -> None:
     """Against a numeric average of the wave, and its least-squares slopes, along two lines."""
     kx, ky = k * math.cos(toward), k * math.sin(toward)
-    felt = hull_response(kx, ky, yaw, LENGTH_M, SPACING_M)
+    response = hull_response(kx, ky, yaw, LENGTH_M, SPACING_M)
     along = (np.arange(2000) + 0.5) / 2000 * LENGTH_M - 0.5 * LENGTH_M
     x, y = np.meshgrid(along, [-0.5 * SPACING_M, 0.5 * SPACING_M])
     phase = k * (x * math.cos(toward - yaw) + y * math.sin(toward - yaw))
-    assert felt.elevation == pytest.approx(float(np.cos(phase).mean()), abs=1e-5)
-    assert felt.slope_ahead_pm == pytest.approx(float((np.sin(phase) * x).sum() / (x * x).sum()), abs=1e-4 * k)
-    assert felt.slope_left_pm == pytest.approx(float((np.sin(phase) * y).sum() / (y * y).sum()), abs=1e-4 * k)
+    assert response.elevation == pytest.approx(float(np.cos(phase).mean()), abs=1e-5)
+    assert response.slope_ahead_pm == pytest.approx(float((np.sin(phase) * x).sum() / (x * x).sum()), abs=1e-4 * k)
+    assert response.slope_left_pm == pytest.approx(float((np.sin(phase) * y).sum() / (y * y).sum()), abs=1e-4 * k)
 
 
 def test_hull_averages_short_waves_away() -> None:
