@@ -11,7 +11,7 @@ import pytest
 
 from paani.config import CorridorConfig, DetectorConfig, load_config
 from paani.errors import UserError
-from paani_services.perception.corridors import classify, summarise
+from paani_services.perception.corridors import classify_cells, summarise_corridors
 from paani_services.perception.engine import OnnxEngine
 from paani_tools.bench.eyes import paper_shaped
 from paani_tools.bench.eyes.command import Eyes, main, text
@@ -65,8 +65,8 @@ def test_ratios_of_what_was_measured() -> None:
 def test_the_papers_shape_sees_what_perception_sees() -> None:
     """It is a fair comparison: the same networks, the same corridors, to the width of a cell."""
     config, picture = CorridorConfig(), paper_shaped.stretch(river())
-    ours = summarise(*classify(OnnxEngine.load("segmenter", "", 1).run(picture), 1.0), config)
-    theirs = paper_shaped.lanes(OnnxEngine.load("segmenter", "", 1, whole=True).run(picture), config)
+    ours = summarise_corridors(*classify_cells(OnnxEngine.load("segmenter", "", 1).run(picture), 1.0), config)
+    theirs = paper_shaped.lanes(OnnxEngine.load("segmenter", "", 1, full_size=True).run(picture), config)
     for mine, (non_water, uncertainty, clear_width) in zip(ours, theirs, strict=True):
         assert mine.non_water == pytest.approx(non_water, abs=0.02)
         assert mine.uncertainty == pytest.approx(uncertainty, abs=0.02)

@@ -12,7 +12,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
-from paani_services.perception.journal import FOLDER, NAME
+from paani_services.perception.journal import JOURNAL_FOLDER, NEWER_FILE
 from tests.conftest import OpenAs, Spawn
 from tests.pictures import noisy, river
 
@@ -36,7 +36,7 @@ async def test_every_observation_is_in_the_journal(spawn: Spawn, open_as: OpenAs
             async with asyncio.timeout(20):
                 sent.append(await evidence.get())
     runtime = tmp_path / "runtime"
-    lines = (await asyncio.to_thread((runtime / FOLDER / NAME).read_bytes)).splitlines()
+    lines = (await asyncio.to_thread((runtime / JOURNAL_FOLDER / NEWER_FILE).read_bytes)).splitlines()
     assert [msgspec.json.decode(line, type=m.Evidence) for line in lines] == sent
     files = await asyncio.to_thread(lambda: [file.suffix for file in runtime.rglob("*")])
     assert ".mcap" not in files

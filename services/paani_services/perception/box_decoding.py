@@ -1,4 +1,4 @@
-"""Raw detector output to boxes in the picture (C4-C10). Pure."""
+"""Detector output to boxes in the picture: confidence threshold, then non-maximum suppression (C4-C10). Pure."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,22 +6,23 @@ from numpy.typing import NDArray
 from paani.arrays import F32
 from paani.config import DetectorConfig
 from paani.messages import Detection, Label
-from paani_services.perception.preprocess import Letterbox
+from paani_services.perception.preprocessing import LetterboxTransform
 
 LABELS = tuple(Label)
-MIN_SIDE = 1e-4  # normalised; a box thinner than this has no size to speak of
+MIN_SIDE = 1e-4  # fraction of the picture; a thinner box has no usable size
 
 
-def decode(
-    output: F32, place: Letterbox, config: DetectorConfig, classes: tuple[str, ...] = LABELS
+def decode_boxes(
+    output: F32, transform: LetterboxTransform, config: DetectorConfig, classes: tuple[str, ...] = LABELS
 ) -> tuple[Detection, ...]:
-    """Boxes by falling confidence.
+    """Detections in order of falling confidence.
 
-    classes: what each score row stands for; a row that is none of our labels is left out.
-
-    output: float32 [1, 4 + classes, N], rows cx, cy, w, h in net pixels, then scores in [0, 1]. Non-finite
-    candidates are dropped (C5), the threshold is exclusive (C6), at most `nms_input` go into class-agnostic
-    suppression (C7, C8), at most `max_boxes` come out (C9), in normalised source coordinates (C10).
+    output: float32 [1, 4 + classes, N], rows cx, cy, w, h in pixels of the network's input, then scores in [0, 1].
+    transform: from the picture to that input. classes: what each score row stands for; rows of classes that are no
+    `Label` are ignored.
+    Candidates with a number that is not finite are dropped (C5), the threshold is exclusive (C6), at most `nms_input`
+    candidates enter the suppression, which ignores classes (C7, C8), and at most `max_boxes` boxes leave it (C9), in
+    normalised coordinates of the picture (C10).
     """
     rows = output[0]
     if classes != LABELS:
@@ -32,45 +33,48 @@ def decode(
         labels = list(LABELS)
     with np.errstate(invalid="ignore"):
         confidence = rows[4:].max(axis=0)
-        keep = np.flatnonzero(np.isfinite(rows).all(axis=0) & (confidence > config.confidence))
-    ranked = keep[np.argsort(-confidence[keep], kind="stable")][: config.nms_input]
-    boxes = in_picture(rows[:4, ranked], place)
-    solid = (boxes[2] - boxes[0] > MIN_SIDE) & (boxes[3] - boxes[1] > MIN_SIDE)
-    ranked, boxes = ranked[solid], boxes[:, solid]
-    chosen = suppress(boxes, config.nms_iou)[: config.max_boxes]
-    kinds = rows[4:, ranked].argmax(axis=0)
+        valid = np.flatnonzero(np.isfinite(rows).all(axis=0) & (confidence > config.confidence))
+    ranked = valid[np.argsort(-confidence[valid], kind="stable")][: config.nms_input]
+    boxes = to_picture_coordinates(rows[:4, ranked], transform)
+    has_size = (boxes[2] - boxes[0] > MIN_SIDE) & (boxes[3] - boxes[1] > MIN_SIDE)
+    ranked, boxes = ranked[has_size], boxes[:, has_size]
+    kept = suppress_overlaps(boxes, config.nms_iou)[: config.max_boxes]
+    best_class = rows[4:, ranked].argmax(axis=0)
     return tuple(
         Detection(
-            label=labels[int(kinds[i])],
+            label=labels[int(best_class[i])],
             confidence=min(1.0, float(confidence[ranked[i]])),
             box_xyxy=(float(boxes[0, i]), float(boxes[1, i]), float(boxes[2, i]), float(boxes[3, i])),
         )
-        for i in chosen
+        for i in kept
     )
 
 
-def in_picture(centred: F32, place: Letterbox) -> NDArray[np.float64]:
-    """cx, cy, w, h in net pixels [4, n] to normalised x1, y1, x2, y2 [4, n], cut at the picture's edges."""
+def to_picture_coordinates(centred: F32, transform: LetterboxTransform) -> NDArray[np.float64]:
+    """cx, cy, w, h in input pixels [4, n] to normalised x1, y1, x2, y2 [4, n], cut at the picture's edges."""
     cx, cy, w, h = centred.astype(np.float64)
     x = np.stack((cx - w / 2, cx + w / 2))
     y = np.stack((cy - h / 2, cy + h / 2))
-    x = (x - place.left_px) / (place.scale_x * place.source_w_px)
-    y = (y - place.top_px) / (place.scale_y * place.source_h_px)
+    x = (x - transform.left_px) / (transform.scale_x * transform.source_w_px)
+    y = (y - transform.top_px) / (transform.scale_y * transform.source_h_px)
     return np.asarray(np.clip(np.stack((x[0], y[0], x[1], y[1])), 0.0, 1.0), np.float64)
 
 
-def suppress(boxes: NDArray[np.float64], max_iou: float) -> list[int]:
-    """Greedy suppression, whatever the class: indices kept, in the order given. boxes: xyxy [4, n], best first."""
+def suppress_overlaps(boxes: NDArray[np.float64], max_iou: float) -> list[int]:
+    """Greedy non-maximum suppression, whatever the class: indices of the boxes kept, in the order given.
+
+    boxes: xyxy [4, n], most confident first.
+    """
     x1, y1, x2, y2 = boxes
     areas = (x2 - x1) * (y2 - y1)
     width = np.minimum(x2[:, None], x2) - np.maximum(x1[:, None], x1)
     height = np.minimum(y2[:, None], y2) - np.maximum(y1[:, None], y1)
-    both = np.clip(width, 0.0, None) * np.clip(height, 0.0, None)
-    overlaps = both > max_iou * (areas[:, None] + areas - both)
-    alive = np.ones(len(areas), bool)
+    intersection = np.clip(width, 0.0, None) * np.clip(height, 0.0, None)
+    overlaps = intersection > max_iou * (areas[:, None] + areas - intersection)
+    is_candidate = np.ones(len(areas), bool)
     kept: list[int] = []
     for i in range(len(areas)):
-        if alive[i]:
+        if is_candidate[i]:
             kept.append(i)
-            alive &= ~overlaps[i]
+            is_candidate &= ~overlaps[i]
     return kept

@@ -1,7 +1,7 @@
-"""Class scores of the mask to three corridors of water (E1-E7). Pure.
+"""Segmenter output to a class mask, three corridors of water and the water's edge (E1-E7). Pure.
 
-A cell is 4x4 pixels of the answer. Its score is what a net that ends with a fourfold resize gave before it; of any
-other answer, the pixel to the right of and below the cell's middle.
+A cell of the mask is 4x4 pixels of the segmenter's output. A segmenter that ends with a fourfold resize gives the
+cells' scores before it; of any other output, the pixel right of and below the cell's middle is taken.
 """
 
 from typing import NamedTuple
@@ -14,108 +14,124 @@ from paani.arrays import F32, U8
 from paani.config import CorridorConfig
 from paani.messages import LaneEvidence
 
-STRIDE, MIDDLE = 4, 2
-MIN_ROWS = 32
-MIN_COUNTED = 0.5  # a corridor of which less can be seen is unknown, which is blocked
+CELL_PX, CELL_MIDDLE_PX = 4, 2  # side of a cell, and the pixel of it that is taken
+MIN_CELL_ROWS = 32  # output with fewer rows than this many cells have consists of cells already
+MIN_VISIBLE_FRAC = 0.5  # a corridor of which less is visible is unknown, and so blocked
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
-# Glints of the sun near the boat: 2 or 3 cells there are 0.15 m seen from 1 m, and no swimmer's head seen from 5 m.
-SPECK_CELLS, SPECKS_BELOW = 3, 2.0 / 3.0
+# Specks are glints of the sun near the boat: regions of at most this many cells, whose top lies in the lowest third of
+# the picture. Two or three cells there are 0.15 m seen from 1 m, and no swimmer's head seen from 5 m.
+SPECK_MAX_CELLS, SPECK_MIN_TOP_FRAC = 3, 2.0 / 3.0
 
 
-class Lanes(NamedTuple):
+class CorridorEvidence(NamedTuple):
+    """Evidence of the three corridors."""
+
     left: LaneEvidence
     center: LaneEvidence
     right: LaneEvidence
 
 
-def cells_only(shape: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Shape [1, C, h, w] of the cells of an answer [1, C, H, W]; None where `classify` does not take them for cells."""
+def cell_shape(shape: tuple[int, ...]) -> tuple[int, ...] | None:
+    """Shape [1, C, h, w] of the cells of an output [1, C, H, W]; None where `classify_cells` does not take cells."""
     if len(shape) != 4:
         return None
-    cells = (*shape[:2], shape[2] // STRIDE, shape[3] // STRIDE)
-    return cells if cells[2] < STRIDE * MIN_ROWS <= shape[2] else None
+    cells = (*shape[:2], shape[2] // CELL_PX, shape[3] // CELL_PX)
+    return cells if cells[2] < CELL_PX * MIN_CELL_ROWS <= shape[2] else None
 
 
-def classify(logits: F32, temperature: float) -> tuple[U8, F32]:
-    """Class mask and confidence of each cell (E1).
+def classify_cells(logits: F32, temperature: float) -> tuple[U8, F32]:
+    """Class mask uint8 and confidence float32 [h, w]: argmax and largest softmax probability of each cell (E1).
 
-    logits: float32 [1, 3, H, W] of water, obstacle, sky. Returns uint8 and float32 [h, w]: argmax and largest softmax
-    probability of each cell's score. Where there are few rows, each is a cell.
+    logits: float32 [1, 3, H, W] of water, obstacle, sky; with fewer than `CELL_PX * MIN_CELL_ROWS` rows, of cells.
     """
-    cells = logits[0, :, MIDDLE::STRIDE, MIDDLE::STRIDE] if logits.shape[2] >= STRIDE * MIN_ROWS else logits[0]
+    cells = (
+        logits[0, :, CELL_MIDDLE_PX::CELL_PX, CELL_MIDDLE_PX::CELL_PX]
+        if logits.shape[2] >= CELL_PX * MIN_CELL_ROWS
+        else logits[0]
+    )
     scores = cells / np.float32(temperature)
     largest = scores.max(axis=0)
     confidence = 1.0 / np.exp(scores - largest).sum(axis=0)
     return scores.argmax(axis=0).astype(np.uint8), confidence.astype(np.float32)
 
 
-def summarise(mask: U8, confidence: F32, corridors: CorridorConfig, counts: F32 | None = None) -> Lanes:
-    """N_j, U_j and clear width of each corridor, cells at its border counted by the part inside.
+def summarise_corridors(
+    mask: U8, confidence: F32, corridors: CorridorConfig, visible_frac: F32 | None = None
+) -> CorridorEvidence:
+    """Non-water fraction, uncertainty and clear width of each corridor; cells on its border count in part (E4-E6).
 
-    counts: how much of each cell counts (own hull and what lies outside the picture do not); None: everything.
-    A corridor of which less than half counts is blocked.
+    visible_frac: visible fraction of each cell (own hull and what lies outside the picture are not visible); None: all
+    is visible. A corridor of which less than `MIN_VISIBLE_FRAC` is visible is blocked.
     """
-    rows = shares(mask.shape[0], corridors.top, 1.0)
-    counts = np.ones(mask.shape, np.float32) if counts is None else counts
-    seen = counts.astype(np.float64)
-    water = (mask == WATER) * seen
-    return Lanes(
+    rows = overlap_fractions(mask.shape[0], corridors.top, 1.0)
+    visible = (np.ones(mask.shape, np.float32) if visible_frac is None else visible_frac).astype(np.float64)
+    water = (mask == WATER) * visible
+    return CorridorEvidence(
         *(
-            _lane(water, confidence * seen, seen, rows, shares(mask.shape[1], *span), corridors.clear_column)
+            _summarise_corridor(
+                water,
+                confidence * visible,
+                visible,
+                rows,
+                overlap_fractions(mask.shape[1], *span),
+                corridors.clear_column,
+            )
             for span in (corridors.left, corridors.center, corridors.right)
         )
     )
 
 
-def water_edge(mask: U8, counts: F32) -> tuple[float, ...]:
-    """Where the water that begins at the picture's bottom ends, for each column: see `Evidence.water_edge`.
+def find_water_edge(mask: U8, visible_frac: F32) -> tuple[float, ...]:
+    """For each column, where the water that begins at the picture's bottom ends: `Evidence.water_edge`.
 
-    mask: uint8 [h, w], as the picture is, not levelled. counts: how much of each cell is not own hull, [h, w].
-    A column of nothing but own hull has no water. Specks with water all round end nothing: see `SPECK_CELLS`.
+    mask: uint8 [h, w], as the picture is, not levelled. visible_frac: fraction of each cell that is not own hull.
+    A column of nothing but own hull has no water. Specks count as water: see `SPECK_MAX_CELLS`.
     """
     height = mask.shape[0]
-    hull = counts < MIN_COUNTED
-    ends = _without_specks((mask != WATER) & ~hull)
-    lowest = height - ends[::-1].argmax(axis=0)  # its lower edge, in cells from the top
-    edge = np.where(ends.any(axis=0), lowest, np.where(hull.all(axis=0), height, 0))
+    hull = visible_frac < MIN_VISIBLE_FRAC
+    is_end = _remove_specks((mask != WATER) & ~hull)
+    lowest = height - is_end[::-1].argmax(axis=0)  # its lower edge, in cells from the top
+    edge = np.where(is_end.any(axis=0), lowest, np.where(hull.all(axis=0), height, 0))
     return tuple((edge / height).tolist())
 
 
-def _without_specks(ends: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    count, part_of, box, _ = cv2.connectedComponentsWithStats(ends.astype(np.uint8), connectivity=8)
-    is_speck = (box[:, cv2.CC_STAT_AREA] <= SPECK_CELLS) & (box[:, cv2.CC_STAT_TOP] >= SPECKS_BELOW * ends.shape[0])
-    return ends & ~is_speck[part_of] if count > 1 else ends
+def _remove_specks(is_end: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    count, region_of, box, _ = cv2.connectedComponentsWithStats(is_end.astype(np.uint8), connectivity=8)
+    is_speck = (box[:, cv2.CC_STAT_AREA] <= SPECK_MAX_CELLS) & (
+        box[:, cv2.CC_STAT_TOP] >= SPECK_MIN_TOP_FRAC * is_end.shape[0]
+    )
+    return is_end & ~is_speck[region_of] if count > 1 else is_end
 
 
-def shares(cells: int, start: float, end: float) -> NDArray[np.float64]:
-    """How much of each of `cells` equal cells of [0, 1] lies in [start, end]: [cells] in [0, 1]."""
+def overlap_fractions(cells: int, start: float, end: float) -> NDArray[np.float64]:
+    """Fraction of each of `cells` equal parts of [0, 1] that lies in [start, end]: [cells] in [0, 1]."""
     edges = np.arange(cells + 1) / cells
     inside = np.minimum(edges[1:], end) - np.maximum(edges[:-1], start)
     return np.asarray(np.clip(inside, 0.0, None) * cells, np.float64)
 
 
-def _lane(
+def _summarise_corridor(
     water: NDArray[np.float64],
     confidence: NDArray[np.float64],
-    seen: NDArray[np.float64],
+    visible: NDArray[np.float64],
     rows: NDArray[np.float64],
     columns: NDArray[np.float64],
     clear_column: float,
 ) -> LaneEvidence:
-    seen_of_column = rows @ seen
-    total = float(seen_of_column @ columns)
-    if total < MIN_COUNTED * rows.sum() * columns.sum():
+    visible_of_column = rows @ visible
+    total = float(visible_of_column @ columns)
+    if total < MIN_VISIBLE_FRAC * rows.sum() * columns.sum():
         return LaneEvidence()
     water_of_column = rows @ water
     non_water = 1.0 - float(water_of_column @ columns) / total  # E4
     uncertainty = 1.0 - float(rows @ confidence @ columns) / total  # E5
-    best = run = 0.0
-    clear = (seen_of_column > 0.0) & (water_of_column >= (clear_column - 1e-12) * seen_of_column)
+    longest = run = 0.0
+    clear = (visible_of_column > 0.0) & (water_of_column >= (clear_column - 1e-12) * visible_of_column)
     for is_clear, width in zip(clear.tolist(), columns.tolist(), strict=True):
         run = run + width if width > 0.0 and is_clear else 0.0
-        best = max(best, run)
+        longest = max(longest, run)
     return LaneEvidence(
         non_water=min(1.0, max(0.0, non_water)),
         uncertainty=min(1.0, max(0.0, uncertainty)),
-        clear_width=min(1.0, best / float(columns.sum())),  # E6
+        clear_width=min(1.0, longest / float(columns.sum())),  # E6
     )

@@ -1,4 +1,7 @@
-"""What runs a model on the CPU. The one place in the services that imports onnxruntime, and only once it is needed."""
+"""Inference engines: one interface to run a model on the CPU, and its implementation by onnxruntime.
+
+This is the only file of the services that imports onnxruntime, and it does so only when a model is loaded.
+"""
 
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol, Self
@@ -10,30 +13,32 @@ from paani.config import EngineName
 from paani.errors import UserError
 from paani_models.catalogue import Model, choose_model, file_sha256
 from paani_models.engines.last_resize import drop_last_resize
-from paani_services.perception.corridors import cells_only
+from paani_services.perception.corridors import cell_shape
 from paani_services.perception.ncnn_engine import NcnnEngine
 
+# NumPy's name of an element type, and that of onnxruntime.
 ORT_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
 
 class Engine(Protocol):
-    """One loaded model and its contract."""
+    """One loaded model, and the contract of its input and output."""
 
     contract: Model
 
     @classmethod
     def load(cls, role: str, path: str, threads: int) -> Self:
-        """The shipped model of a role ("detector", "segmenter", "gate"), checksum compared, or a file of the user's.
+        """Load the model at `path`, or without a path the shipped model of a role, after comparing its checksum.
 
-        A manifest beside the user's file may state another size, preprocessing or order of classes. Raises UserError
-        naming a file that is missing, corrupt, no model, or of other shapes than its contract.
+        role: "detector", "segmenter" or "gate", the fitness network. A manifest beside the user's file may state
+        another size, preprocessing or order of classes. Raises UserError naming a file that is missing, corrupt, no
+        model, or of other shapes than its contract.
         """
         ...
 
     def run(self, tensor: F32 | U8) -> F32:
-        """One inference: the contract's input to its output. Other threads go on meanwhile.
+        """One inference: the contract's input to its output. Other threads run meanwhile.
 
-        Of a segmenter that ends by resizing its scores fourfold: those scores, one per cell.
+        A segmenter that ends by resizing its scores fourfold returns the scores before that, one per cell.
         """
         ...
 
@@ -42,19 +47,21 @@ class Engine(Protocol):
         ...
 
 
-def engine_named(name: EngineName) -> type[Engine]:
-    """The engine of `perception.engine`."""
+def engine_class(name: EngineName) -> type[Engine]:
+    """The engine that the setting `perception.engine` names."""
     return NcnnEngine if name == "ncnn" else OnnxEngine
 
 
 def check_onnxruntime(release: str) -> None:
-    """Raises UserError for a release that must not even be imported."""
+    """Raises UserError for a release of onnxruntime that must not even be imported."""
     if release.split(".")[:2] == ["1", "21"]:
-        raise UserError(f"onnxruntime {release}: is an illegal instruction to ARM Cortex-A53; install 1.22 or later")
+        raise UserError(
+            f"onnxruntime {release}: executes an illegal instruction on ARM Cortex-A53; install 1.22 or later"
+        )
 
 
 class OnnxEngine:
-    """An ONNX file, by onnxruntime."""
+    """Runs an ONNX file by onnxruntime."""
 
     def __init__(self, session: Any, contract: Model, name: str) -> None:
         self._session, self._name = session, name
@@ -62,12 +69,12 @@ class OnnxEngine:
         self.contract = contract
 
     @classmethod
-    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False, whole: bool = False) -> Self:
-        """As any engine. spinning: idle threads wait busily; two models that do so get in each other's way.
+    def load(cls, role: str, path: str, threads: int, *, spinning: bool = False, full_size: bool = False) -> Self:
+        """As `Engine.load`. spinning: idle threads wait busily, which slows a second model that runs beside this one.
 
-        whole: a segmenter answers at full size.
+        full_size: a segmenter returns its contract's output, not the cells before its last resize.
         """
-        check_onnxruntime(_installed())
+        check_onnxruntime(_installed_release())
         import onnxruntime as ort  # noqa: PLC0415 - a release that is refused would end the process here
 
         contract, file = choose_model(role, path)
@@ -78,22 +85,22 @@ class OnnxEngine:
         options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(file.parent))
         options.log_severity_level = 3
 
-        def opened(model: str | bytes) -> Any:
+        def open_session(model: str | bytes) -> Any:
             try:
                 return ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
             except Exception as error:  # onnxruntime raises classes of its own that it does not export
                 raise UserError(f"{file}: not an ONNX model that can run here") from error
 
-        session = opened(str(file))
-        for found, wanted in zip(_ends(session), (contract.input, contract.output), strict=True):
+        session = open_session(str(file))
+        for found, wanted in zip(_signature(session), (contract.input, contract.output), strict=True):
             if found != [(wanted.shape, ORT_TYPES[wanted.dtype])]:
                 raise UserError(f"{file}: {role} must have {wanted.dtype} {list(wanted.shape)}, found {found}")
-        cells = None if whole or role != "segmenter" else cells_only(contract.output.shape)
+        cells = None if full_size or role != "segmenter" else cell_shape(contract.output.shape)
         if cells and (model := drop_last_resize(file.read_bytes())):
-            del session  # its memory serves the other
-            session = opened(model)
-            if _ends(session)[1][0][0] != cells:
-                return cls.load(role, path, threads, spinning=spinning, whole=True)
+            del session  # frees its memory before the other session takes its own
+            session = open_session(model)
+            if _signature(session)[1][0][0] != cells:
+                return cls.load(role, path, threads, spinning=spinning, full_size=True)
         return cls(session, contract, f"{role} {checksum[:12]}")
 
     def run(self, tensor: F32 | U8) -> F32:
@@ -101,18 +108,18 @@ class OnnxEngine:
         return np.asarray(self._session.run(None, {self._input: tensor})[0], np.float32)
 
     def info(self) -> str:
-        """Role and the beginning of the file's checksum."""
+        """Role, and the beginning of the file's checksum."""
         return self._name
 
 
-def _ends(session: Any) -> tuple[list[tuple[tuple[int, ...], str]], ...]:
-    """Shapes and kinds of the inputs and of the outputs."""
+def _signature(session: Any) -> tuple[list[tuple[tuple[int, ...], str]], ...]:
+    """Shapes and element types of the inputs and of the outputs."""
     ends = (session.get_inputs(), session.get_outputs())
     return tuple([(tuple(end.shape), end.type) for end in found] for found in ends)
 
 
-def _installed() -> str:
-    """The release of onnxruntime; empty for one that was built here and states none."""
+def _installed_release() -> str:
+    """The release of onnxruntime; empty for one built from source that states none."""
     try:
         return version("onnxruntime")
     except PackageNotFoundError:

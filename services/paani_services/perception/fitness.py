@@ -4,7 +4,7 @@ from paani.arrays import U8
 from paani.config import ImageQualityConfig
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.image_quality import FitnessFunction
-from paani_services.perception.preprocess import shrunk, tables_for
+from paani_services.perception.preprocessing import lookup_tables_for, shrink_picture
 
 
 def load_fitness(config: ImageQualityConfig, threads: int) -> FitnessFunction | None:
@@ -16,9 +16,9 @@ def load_fitness(config: ImageQualityConfig, threads: int) -> FitnessFunction | 
         return None
     engine = OnnxEngine.load("gate", config.model, threads)
     height, width = engine.contract.size_hw
-    table = tables_for(engine.contract)
+    table = lookup_tables_for(engine.contract)
 
     def fitness(reduced: U8) -> float:
-        return float(engine.run(shrunk(reduced, height, width, table))[0, 0])
+        return float(engine.run(shrink_picture(reduced, height, width, table))[0, 0])
 
     return fitness

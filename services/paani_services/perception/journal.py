@@ -1,27 +1,28 @@
-"""The newest observations on disk: one line of JSON each, in two files that together never exceed a size.
+"""Observation journal: the newest evidence on disk, one line of JSON each, in two files of bounded size (P2, P5).
 
-It is perception's own: there without a recorder, and no recording (`*.mcap`), process log (`logs/`) or table of an
-export (`*.csv`) has its name.
+Perception keeps it whether or not a recorder runs. Its files are named unlike recordings (`*.mcap`), process logs
+(`logs/`) and exported tables (`*.csv`).
 """
 
 import os
 from pathlib import Path
 
-FOLDER, NAME, OLDER = "journal", "observations.jsonl", "observations.older.jsonl"
+JOURNAL_FOLDER = "journal"
+NEWER_FILE, OLDER_FILE = "observations.jsonl", "observations.older.jsonl"
 
 
 class Journal:
-    """Appends to the newer file; when that is half the size, it takes the place of the older.
+    """Appends to the newer file; once that holds half of `max_bytes`, it replaces the older file.
 
-    max_bytes: of both together; 0 writes nothing. A disk that fails costs lines, nothing else.
+    max_bytes: of both files together; 0 writes nothing. A disk that fails loses lines and nothing else.
     """
 
     def __init__(self, folder: Path, max_bytes: int) -> None:
-        self._newer, self._older = folder / NAME, folder / OLDER
+        self._newer, self._older = folder / NEWER_FILE, folder / OLDER_FILE
         self._max_bytes = max_bytes // 2
 
-    def add(self, line: bytes) -> bool:
-        """Append one observation; false where it could not be kept. A line cut by a crash is ended first."""
+    def append(self, line: bytes) -> bool:
+        """Append one observation; false where it could not be written. A line that a crash cut short is ended first."""
         if not self._max_bytes:
             return True
         if len(line) + 2 > self._max_bytes:

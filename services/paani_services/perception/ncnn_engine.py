@@ -1,4 +1,4 @@
-"""Runs a converted model by ncnn, which small ARM boards do faster."""
+"""Inference by ncnn, which is faster than onnxruntime on small ARM boards."""
 
 from typing import Self
 
@@ -8,11 +8,11 @@ from paani.arrays import F32, U8
 from paani.errors import UserError
 from paani_models.catalogue import Model, choose_model, file_sha256
 from paani_models.engines.ncnn_runner import Run, blob_before_resize, open_ncnn, verified_ncnn_files
-from paani_services.perception.corridors import cells_only
+from paani_services.perception.corridors import cell_shape
 
 
 class NcnnEngine:
-    """One model, by the converted files beside it."""
+    """Runs the files that `paani models convert` wrote beside an ONNX file."""
 
     def __init__(self, run: Run, contract: Model, name: str) -> None:
         self._run, self._name = run, name
@@ -20,7 +20,7 @@ class NcnnEngine:
 
     @classmethod
     def load(cls, role: str, path: str, threads: int) -> Self:
-        """As any engine; also raises UserError where the converted files are missing or not those of this model."""
+        """As `Engine.load`; also raises UserError where the converted files are missing or of another model."""
         contract, file = choose_model(role, path)
         if contract.input.dtype != "float32":
             raise UserError(f"{file}: takes {contract.input.dtype}; ncnn runs float32 models alone")
@@ -29,7 +29,7 @@ class NcnnEngine:
         shape = run(np.zeros(contract.input.shape, np.float32)).shape
         if shape != contract.output.shape:
             raise UserError(f"{files.param}: {role} must give {list(contract.output.shape)}, found {list(shape)}")
-        cells = cells_only(shape) if role == "segmenter" else None
+        cells = cell_shape(shape) if role == "segmenter" else None
         if cells and (name := blob_before_resize(files)):
             short = open_ncnn(files, threads, name)
             run = short if short(np.zeros(contract.input.shape, np.float32)).shape == cells else run

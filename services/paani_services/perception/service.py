@@ -1,4 +1,4 @@
-"""Perception process: the camera's newest picture in; evidence and mask out."""
+"""Perception process: the camera's newest picture in, evidence and class mask out."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -13,30 +13,30 @@ from paani.bus import Bus, Picture
 from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
 from paani.runtime import runtime_dir
-from paani_services.perception.journal import FOLDER, Journal
+from paani_services.perception.journal import JOURNAL_FOLDER, Journal
 from paani_services.perception.pipeline import Perceiver
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Look at the newest picture at most `perception.rate_hz` times a second, off the loop."""
+    """Process the newest picture at most `perception.rate_hz` times a second, in a thread beside the event loop."""
     pictures = bus.latest_picture(keys.PICTURE)
     odometry = bus.latest(keys.ODOMETRY)
-    evidence, masks = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
+    evidence_publisher, mask_publisher = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
-    journal = Journal(folder / FOLDER, round(config.perception.journal_max_mib * 2**20))
+    journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
     last, due_us = (-1, -1), 0
 
-    def look(picture: Picture) -> tuple[m.Evidence, Picture | None]:
+    def perceive(picture: Picture) -> tuple[m.Evidence, Picture | None]:
         age_s = (clock.now_us() - picture.header.source_us) * 1e-6
-        roll_rad = roll_at(picture.header.source_us, odometry.value, config.perception.max_roll_age_s)
-        found, mask = perceiver.perceive(picture.data, picture.header, age_s, roll_rad)
-        return found, mask_picture(mask, picture.header) if mask is not None and masks.is_watched() else None
+        roll_rad = roll_at_capture_rad(picture.header.source_us, odometry.value, config.perception.max_roll_age_s)
+        evidence, mask = perceiver.perceive(picture.data, picture.header, age_s, roll_rad)
+        return evidence, encode_mask(mask, picture.header) if mask is not None and mask_publisher.is_watched() else None
 
-    def keep(observation: m.Evidence) -> None:
-        if not journal.add(msgspec.json.encode(observation)):
+    def write_to_journal(observation: m.Evidence) -> None:
+        if not journal.append(msgspec.json.encode(observation)):
             bus.count_drop("journal")
 
     try:
@@ -49,26 +49,26 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue
                 last, due_us = frame, clock.now_us() + period_us
-                found, mask = await loop.run_in_executor(worker, look, picture)
-                sent = evidence.put(found)
-                worker.submit(keep, sent)
+                evidence, mask = await loop.run_in_executor(worker, perceive, picture)
+                sent = evidence_publisher.put(evidence)
+                worker.submit(write_to_journal, sent)
                 if mask is not None:
-                    masks.put_picture(mask.header, mask.data)
+                    mask_publisher.put_picture(mask.header, mask.data)
                 bus.note(f"unusable: {sent.cause}" if not sent.usable else sent.models)
     finally:
         worker.shutdown(wait=False)
         perceiver.close()
 
 
-def roll_at(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:
-    """The boat's roll when a picture was taken; 0 where nothing that near is known."""
+def roll_at_capture_rad(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:
+    """The boat's roll when a picture was taken; 0 where no odometry of that time is known."""
     if odometry is None or abs(source_us - odometry.source_us) * 1e-6 > max_age_s:
         return 0.0
     return odometry.roll_rad
 
 
-def mask_picture(mask: U8, header: m.PictureHeader) -> Picture:
-    """The mask as a PNG of class numbers, under the name of the frame it was drawn from."""
+def encode_mask(mask: U8, header: m.PictureHeader) -> Picture:
+    """The mask as a PNG of class numbers, with the frame id of the picture it was made from."""
     height, width = mask.shape
     named = msgspec.structs.replace(header, width_px=width, height_px=height, media_type="image/png")
     return Picture(named, cv2.imencode(".png", mask)[1].tobytes())

@@ -13,11 +13,11 @@ from paani.errors import UserError
 from paani.messages import UnusableCause
 from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_whole
-from paani_services.perception.corridors import classify
-from paani_services.perception.engine import engine_named
+from paani_services.perception.corridors import classify_cells
+from paani_services.perception.engine import engine_class
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
-from paani_services.perception.preprocess import stretch, tables_for
+from paani_services.perception.preprocessing import lookup_tables_for, stretch_picture
 from paani_tools.faults.corpus import find_source_folders, read_clean_pictures, read_listed_pictures, read_scenes
 from paani_tools.faults.measure import CleanFigures, LevelFigures, Totals, measure_clean, measure_levels, sum_up
 from paani_tools.faults.severity_curves import draw_severity_curves
@@ -38,14 +38,16 @@ class PictureModels:
     def __init__(self, config: PerceptionConfig) -> None:
         """Raises UserError for a model that cannot be used."""
         self._config = config
-        self._segmenter = engine_named(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
-        self._table = tables_for(self._segmenter.contract)
+        self._segmenter = engine_class(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
+        self._table = lookup_tables_for(self._segmenter.contract)
         self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
 
     def segment(self, bgr: U8) -> U8:
         """Classes uint8 [64, 80]."""
         height, width = self._segmenter.contract.size_hw
-        return classify(self._segmenter.run(stretch(bgr, height, width, self._table)), self._config.temperature)[0]
+        return classify_cells(
+            self._segmenter.run(stretch_picture(bgr, height, width, self._table)), self._config.temperature
+        )[0]
 
     def judge(self, bgr: U8) -> UnusableCause:
         """The gate's verdict, as on the first picture of a camera."""

@@ -19,7 +19,7 @@ from paani.errors import UserError
 from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_whole
 from paani_models.catalogue import verified_path
-from paani_services.perception.picture_decoding import decoded
+from paani_services.perception.picture_decoding import decode_picture
 from paani_tools.bench.eyes.drawn_scene import SIZE_WH, draw_scene
 from paani_tools.bench.eyes.memory import Footprint
 from paani_tools.bench.eyes.stages import Candidate, Ratio, Row, measure_steps, ratios, rows, steps, usable_pictures
@@ -159,7 +159,7 @@ def _read(folder: Path) -> list[U8]:
         raise UserError(f"--folder {folder}: no pictures ({', '.join(sorted(SUFFIXES))})")
     found = []
     for path in files[:: max(1, len(files) // MAX_PICTURES)][:MAX_PICTURES]:
-        picture = decoded(path.read_bytes())
+        picture = decode_picture(path.read_bytes())
         if picture is None:
             raise UserError(f"{path}: not a readable picture")
         found.append(np.asarray(cv2.resize(picture, SIZE_WH), np.uint8))

@@ -12,13 +12,13 @@ from paani.arrays import U8
 from paani.config import PerceptionConfig
 from paani.messages import PictureHeader, UnusableCause
 from paani.statistics.order_statistics import median, nearest_rank
-from paani_services.perception.box_decoding import decode
-from paani_services.perception.corridors import classify, summarise
-from paani_services.perception.engine import OnnxEngine, engine_named
+from paani_services.perception.box_decoding import decode_boxes
+from paani_services.perception.corridors import classify_cells, summarise_corridors
+from paani_services.perception.engine import OnnxEngine, engine_class
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.pipeline import Perceiver
-from paani_services.perception.preprocess import letterbox, stretch, tables_for
+from paani_services.perception.preprocessing import letterbox_picture, lookup_tables_for, stretch_picture
 from paani_tools.bench.eyes import paper_shaped
 
 Step = Callable[[U8], object]
@@ -151,32 +151,32 @@ def steps(
 
 def _stages(config: PerceptionConfig) -> dict[str, Step]:
     """The pipeline's own steps, one thread each, on the picture at hand; later ones on what a first picture gave."""
-    detector = engine_named(config.engine).load("detector", config.detector, 1)
-    segmenter = engine_named(config.engine).load("segmenter", config.segmenter, 1)
-    table_d, table_s = tables_for(detector.contract), tables_for(segmenter.contract)
+    detector = engine_class(config.engine).load("detector", config.detector, 1)
+    segmenter = engine_class(config.engine).load("segmenter", config.segmenter, 1)
+    table_d, table_s = lookup_tables_for(detector.contract), lookup_tables_for(segmenter.contract)
     (height, width), (rows_s, columns_s) = detector.contract.size_hw, segmenter.contract.size_hw
     grey = detector.contract.preprocessing.pad_grey
     fitness = load_fitness(config.image_quality, 1)
     blank = np.zeros((240, 320, 3), np.uint8)
-    tensor, place = letterbox(blank, height, width, grey, table_d)
-    stretched = stretch(blank, rows_s, columns_s, table_s)
+    tensor, place = letterbox_picture(blank, height, width, grey, table_d)
+    stretched = stretch_picture(blank, rows_s, columns_s, table_s)
     candidates, logits = detector.run(tensor), segmenter.run(stretched)
-    mask, confidence = classify(logits, config.temperature)
+    mask, confidence = classify_cells(logits, config.temperature)
     return {
         "gate": lambda bgr: check_image_quality(ImageQualityState(), bgr, 0, config.image_quality, fitness),
-        "letterbox": lambda bgr: letterbox(bgr, height, width, grey, table_d),
-        "stretch": lambda bgr: stretch(bgr, rows_s, columns_s, table_s),
+        "letterbox": lambda bgr: letterbox_picture(bgr, height, width, grey, table_d),
+        "stretch": lambda bgr: stretch_picture(bgr, rows_s, columns_s, table_s),
         "detector, 1 thread": lambda _: detector.run(tensor),
         "segmenter, 1 thread": lambda _: segmenter.run(stretched),
-        "boxes": lambda _: decode(candidates, place, config.detections, detector.contract.classes),
-        "classes of cells": lambda _: classify(logits, config.temperature),
-        "corridors": lambda _: summarise(mask, confidence, config.corridors),
+        "boxes": lambda _: decode_boxes(candidates, place, config.detections, detector.contract.classes),
+        "classes of cells": lambda _: classify_cells(logits, config.temperature),
+        "corridors": lambda _: summarise_corridors(mask, confidence, config.corridors),
     }
 
 
 def _bare(config: PerceptionConfig, threads: int) -> Step:
-    detector = engine_named(config.engine).load("detector", config.detector, threads)
-    segmenter = engine_named(config.engine).load("segmenter", config.segmenter, threads)
+    detector = engine_class(config.engine).load("detector", config.detector, threads)
+    segmenter = engine_class(config.engine).load("segmenter", config.segmenter, threads)
     inputs = [np.zeros(e.contract.input.shape, e.contract.input.dtype) for e in (detector, segmenter)]
 
     def both(_: U8) -> None:
@@ -201,5 +201,5 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
 
 def _paper_shaped(config: PerceptionConfig) -> Step:
     detector = OnnxEngine.load("detector", config.detector, 2, spinning=True)
-    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True, whole=True)
+    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True, full_size=True)
     return lambda bgr: paper_shaped.perceive(bgr, detector.run, segmenter.run, config.detections, config.corridors)

@@ -24,10 +24,10 @@ from paani_models.detector.shipped_network import candidate_grid  # noqa: E402
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, export_untrained, largest_export_difference, write_onnx  # noqa: E402
 from paani_models.training.training_state import load_checkpoint  # noqa: E402
-from paani_services.perception.box_decoding import decode  # noqa: E402
+from paani_services.perception.box_decoding import decode_boxes  # noqa: E402
 from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
-from paani_services.perception.preprocess import Letterbox  # noqa: E402
+from paani_services.perception.preprocessing import LetterboxTransform  # noqa: E402
 from tests.pictures import river  # noqa: E402
 
 pytestmark = pytest.mark.train
@@ -261,7 +261,7 @@ def test_rows_beyond_the_classes_are_no_boxes_c11() -> None:
     rows[0, :6, 0] = (160, 128, 40, 30, 0.1, 0.9)
     rows[0, 8:] = 7.0
     classes = (*CONTRACTS["yolo11n"].classes, *["-"] * 32)
-    found = decode(rows, Letterbox(1.0, 1.0, 0, 0, 320, 256), DetectorConfig(), classes)
+    found = decode_boxes(rows, LetterboxTransform(1.0, 1.0, 0, 0, 320, 256), DetectorConfig(), classes)
     (only,) = found
     assert only.label is m.Label.VESSEL
     assert only.confidence == pytest.approx(0.9)

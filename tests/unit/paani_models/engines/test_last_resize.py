@@ -12,7 +12,7 @@ from onnx import TensorProto, external_data_helper, helper, numpy_helper
 
 from paani_models.catalogue import verified_path
 from paani_models.engines.last_resize import drop_last_resize
-from paani_services.perception.corridors import classify
+from paani_services.perception.corridors import classify_cells
 from paani_services.perception.engine import OnnxEngine
 
 SHAPE = (1, 3, 256, 320)
@@ -97,8 +97,8 @@ def test_perception_reads_each_cell_of_a_users_net_at_its_middle(
     path.write_bytes(own)
     scores = OnnxEngine.load("segmenter", str(path), 1).run(picture())
     assert scores.shape == cells
-    mask, _ = classify(scores, 1.0)
-    whole = OnnxEngine.load("segmenter", str(path), 1, whole=True).run(picture())
+    mask, _ = classify_cells(scores, 1.0)
+    whole = OnnxEngine.load("segmenter", str(path), 1, full_size=True).run(picture())
     assert whole.shape == SHAPE
     middles = (whole[:, :, 1::4] + whole[:, :, 2::4])[0]
     theirs = (middles[:, :, 1::4] + middles[:, :, 2::4]).argmax(0)

@@ -19,7 +19,7 @@ from paani_models.commands.models import data_folder, main
 from paani_models.engines.contract_check import MAX_DIFFERENCE, synthetic_inputs
 from paani_models.engines.ncnn_runner import ncnn_files, open_ncnn, verified_ncnn_files
 from paani_models.engines.onnx_runner import open_network
-from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_named
+from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_class
 from paani_services.perception.ncnn_engine import NcnnEngine
 from paani_services.perception.pipeline import Perceiver
 from tests.pictures import river
@@ -56,7 +56,7 @@ def detector(tmp_path: Path) -> Path:
 
 
 def test_both_engines_answer_alike(segmenter: Path) -> None:
-    one, other = (engine_named(name).load("segmenter", str(segmenter), 1) for name in ("onnxruntime", "ncnn"))
+    one, other = (engine_class(name).load("segmenter", str(segmenter), 1) for name in ("onnxruntime", "ncnn"))
     assert isinstance(one, OnnxEngine)
     assert isinstance(other, NcnnEngine)
     assert one.contract == other.contract

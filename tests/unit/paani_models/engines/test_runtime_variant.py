@@ -22,7 +22,7 @@ from paani_models.commands.models import data_folder  # noqa: E402
 from paani_models.engines.runtime_variant import write_variant  # noqa: E402
 from paani_services.perception.engine import OnnxEngine  # noqa: E402
 from paani_services.perception.pipeline import Perceiver  # noqa: E402
-from paani_services.perception.preprocess import stretch, tables_for  # noqa: E402
+from paani_services.perception.preprocessing import lookup_tables_for, stretch_picture  # noqa: E402
 from tests.pictures import PICTURES, river  # noqa: E402
 
 pytestmark = pytest.mark.slow
@@ -72,12 +72,12 @@ def test_perception_reads_the_cells_between_which_the_whole_answer_lies(
 ) -> None:
     """One picture, three ways: the shipped file as perception runs it, its variant, and its whole answer."""
     contract, picture = load_catalogue()["segmenter"], river(4)
-    shown = stretch(picture, *contract.size_hw, tables_for(contract))
-    cells, whole = (OnnxEngine.load("segmenter", "", 1, whole=whole).run(shown) for whole in (False, True))
+    shown = stretch_picture(picture, *contract.size_hw, lookup_tables_for(contract))
+    cells, whole = (OnnxEngine.load("segmenter", "", 1, full_size=whole).run(shown) for whole in (False, True))
     own = OnnxEngine.load("segmenter", str(variant / "segmenter.onnx"), 1)
     assert cells.shape == (1, 3, 64, 80)
     assert whole.shape == contract.output.shape
-    np.testing.assert_allclose(own.run(stretch(picture, *contract.size_hw, None)), cells, atol=TOLERANCE)
+    np.testing.assert_allclose(own.run(stretch_picture(picture, *contract.size_hw, None)), cells, atol=TOLERANCE)
     for plane, answer in zip(cells[0], whole[0], strict=True):
         between = cv2.resize(plane, (320, 256), interpolation=cv2.INTER_LINEAR)
         np.testing.assert_allclose(answer, between, atol=TOLERANCE)

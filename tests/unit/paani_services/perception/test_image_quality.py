@@ -1,4 +1,4 @@
-"""The usable-picture gate: what no camera sees is refused, what cameras see is not."""
+"""Image-quality check: what no working camera delivers is refused, what cameras deliver is not."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ FITNESS = load_fitness(ON, 1)
     ("covered_80", {C.COVERED}),
 ])  # fmt: skip
 @pytest.mark.parametrize("size_wh", [(320, 240), (640, 480)])
-def test_what_no_camera_should_see(name: str, causes: set[UnusableCause], size_wh: tuple[int, int]) -> None:
+def test_what_no_camera_delivers_is_refused_with_its_cause(
+    name: str, causes: set[UnusableCause], size_wh: tuple[int, int]
+) -> None:
     """J19, W1, U8: each with its cause, in its first frame, through JPEG."""
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_NEAREST)
     if name == "white_noise":
@@ -51,14 +53,14 @@ def test_what_no_camera_should_see(name: str, causes: set[UnusableCause], size_w
 
 
 @pytest.mark.parametrize("name", ["river", "river_in_fog", "river_at_dusk", "river_in_light_noise"])
-def test_what_cameras_see(name: str) -> None:
+def test_what_cameras_deliver_is_usable(name: str) -> None:
     assert check_image_quality(ImageQualityState(), PICTURES[name], 1, ON, FITNESS)[1] is C.NONE
 
 
 @pytest.mark.parametrize("name", ["river", "river_at_dusk"])
 @pytest.mark.parametrize("size_wh", [(320, 240), (480, 270), (640, 480)])
 @pytest.mark.parametrize("sense", [1, -1])
-def test_lines_of_a_wrong_length(name: str, size_wh: tuple[int, int], sense: int) -> None:
+def test_lines_of_a_wrong_length_are_skewed(name: str, size_wh: tuple[int, int], sense: int) -> None:
     """Each line begins 3/320 of the width further along than the one above, to either side."""
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_AREA)[:, ::sense]
     skewed, _ = spoilt("sheared", picture, np.zeros(size_wh[::-1], np.uint8), 5, np.random.default_rng(0))
@@ -67,15 +69,15 @@ def test_lines_of_a_wrong_length(name: str, size_wh: tuple[int, int], sense: int
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("severity", [3, 4, 5])
-def test_a_camera_that_turns_as_it_exposes_has_no_lines_of_a_wrong_length(severity: int, seed: int) -> None:
+def test_motion_blur_is_not_taken_for_lines_of_a_wrong_length(severity: int, seed: int) -> None:
     """Blurred aslant, lines are like those above them moved along; the segmenter still reaches 0.77 on these."""
     picture, _ = spoilt("motion_blur", river(), np.zeros((240, 320), np.uint8), severity, np.random.default_rng(seed))
     assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.NONE
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_only_the_net_knows(seed: int) -> None:
-    """These have sound statistics: only the net knows that no camera on a boat sees this."""
+def test_the_fitness_network_refuses_what_statistics_cannot_tell(seed: int) -> None:
+    """These have sound statistics; only the network knows that no camera on a boat sees this."""
     mask = np.zeros((240, 320), np.uint8)
     for name in ("shuffled", "drop_out", "drops", "false_colour"):
         picture, _ = spoilt(name, river(), mask, 5, np.random.default_rng(seed))
@@ -83,7 +85,7 @@ def test_what_only_the_net_knows(seed: int) -> None:
         assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
 
 
-def test_a_net_that_says_no_number_refuses() -> None:
+def test_a_fitness_that_is_no_number_is_unfit() -> None:
     assert check_image_quality(ImageQualityState(), river(), 1, ON, lambda _: float("nan"))[1] is C.UNFIT
 
 
@@ -98,7 +100,7 @@ def test_a_net_that_says_no_number_refuses() -> None:
     (0.80, float("nan"), C.UNFIT, 2),
     (0.05, 0.01, C.UNFIT, 1),
 ])  # fmt: skip
-def test_a_picture_of_doubt_is_looked_at_upside_down(
+def test_a_doubtful_picture_is_checked_upside_down(
     upright: float, on_its_head: float, cause: UnusableCause, looks: int
 ) -> None:
     shown = []
@@ -113,14 +115,14 @@ def test_a_picture_of_doubt_is_looked_at_upside_down(
 
 
 @pytest.mark.parametrize(("said", "cause"), [(0.98, C.NONE), (0.90, C.SKEWED), (0.05, C.SKEWED), (np.nan, C.SKEWED)])
-def test_the_net_speaks_for_lines_of_a_wrong_length_only_where_it_is_sure(said: float, cause: UnusableCause) -> None:
+def test_only_a_sure_fitness_accepts_lines_of_a_wrong_length(said: float, cause: UnusableCause) -> None:
     skewed, _ = spoilt("sheared", river(), np.zeros((240, 320), np.uint8), 5, np.random.default_rng(0))
     assert check_image_quality(ImageQualityState(), skewed, 1, ON, lambda _: said)[1] is cause
     high = msgspec.structs.replace(ON, min_fitness=0.99)
     assert check_image_quality(ImageQualityState(), skewed, 1, high, lambda _: said)[1] is C.SKEWED
 
 
-def test_wrong_size() -> None:
+def test_a_picture_below_the_least_size_is_refused() -> None:
     assert check_image_quality(ImageQualityState(), river()[:100], 1, ON)[1] is C.WRONG_SIZE
     assert check_image_quality(ImageQualityState(), river()[:, :150], 1, ON)[1] is C.WRONG_SIZE
 
@@ -149,14 +151,14 @@ def test_a_moored_camera_is_not_frozen() -> None:
         assert cause is C.NONE
 
 
-def test_the_paper_has_no_gate() -> None:
+def test_the_paper_checks_no_picture() -> None:
     """J19: black is accepted in the `paper` profile."""
     paper = load_config(profile="paper").perception.image_quality
     assert check_image_quality(ImageQualityState(), PICTURES["black"], 1, paper)[1] is C.NONE
 
 
 @pytest.mark.data
-def test_real_pictures_pass() -> None:
+def test_real_pictures_are_usable() -> None:
     """At most 0.2 % of the annotated real pictures, night included, are refused (every third is looked at)."""
     folder = DATA
     sources = sorted(p for p in folder.glob("*/images") if p.parent.name != "unlabelled")

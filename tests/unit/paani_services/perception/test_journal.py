@@ -9,12 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paani.logs.folder import NAME as RECORDING
-from paani_services.perception.journal import FOLDER, NAME, OLDER, Journal
+from paani_services.perception.journal import JOURNAL_FOLDER, NEWER_FILE, OLDER_FILE, Journal
 
 
 def lines(folder: Path) -> list[bytes]:
     """Oldest first."""
-    files = [folder / OLDER, folder / NAME]
+    files = [folder / OLDER_FILE, folder / NEWER_FILE]
     return [line for file in files if file.exists() for line in file.read_bytes().splitlines()]
 
 
@@ -26,7 +26,7 @@ def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
     """P2: perception has its own bounded observation journal."""
     journal = Journal(tmp_path / "journal", 1000)
     for number in range(500):
-        assert journal.add(json.dumps({"number": number}).encode())
+        assert journal.append(json.dumps({"number": number}).encode())
         assert size(tmp_path / "journal") <= 1000
     kept = [json.loads(line)["number"] for line in lines(tmp_path / "journal")]
     assert kept == list(range(500 - len(kept), 500))
@@ -38,10 +38,10 @@ def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
 def test_any_lines_in_any_bound(tmp_path: Path, written: list[bytes], max_bytes: int) -> None:
     """Property: the bound holds, and what is kept is the end of what was taken."""
     folder = tmp_path / "j"
-    for name in (NAME, OLDER):
+    for name in (NEWER_FILE, OLDER_FILE):
         (folder / name).unlink(missing_ok=True)
     journal = Journal(folder, max_bytes)
-    taken = [line for line in written if journal.add(line)]
+    taken = [line for line in written if journal.append(line)]
     if max_bytes // 2 == 0:
         assert not folder.exists() or size(folder) == 0
         return
@@ -51,20 +51,20 @@ def test_any_lines_in_any_bound(tmp_path: Path, written: list[bytes], max_bytes:
 
 
 def test_it_goes_on_after_a_crash_in_the_middle_of_a_line(tmp_path: Path) -> None:
-    (tmp_path / NAME).write_bytes(b'{"number": 1}\n{"num')
-    Journal(tmp_path, 1000).add(b'{"number": 3}')
+    (tmp_path / NEWER_FILE).write_bytes(b'{"number": 1}\n{"num')
+    Journal(tmp_path, 1000).append(b'{"number": 3}')
     assert lines(tmp_path) == [b'{"number": 1}', b'{"num', b'{"number": 3}']
 
 
 def test_a_disk_that_fails_costs_lines_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    assert not Journal(tmp_path / "file" / "journal", 1000).add(b"{}")
-    assert not Journal(tmp_path / "journal", 10).add(b"longer than the bound")
+    assert not Journal(tmp_path / "file" / "journal", 1000).append(b"{}")
+    assert not Journal(tmp_path / "journal", 10).append(b"longer than the bound")
 
 
 def test_its_name_is_its_own() -> None:
     """P5: journal, process logs, recordings and exported tables are not confused."""
-    assert FOLDER not in {"logs", "credentials"}
-    for name in (NAME, OLDER):
+    assert JOURNAL_FOLDER not in {"logs", "credentials"}
+    for name in (NEWER_FILE, OLDER_FILE):
         assert not RECORDING.fullmatch(name)
         assert not name.endswith((".log", ".csv", ".mcap"))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from paani_services.perception.picture_decoding import MAX_PIXELS, decoded, stated_pixels
+from paani_services.perception.picture_decoding import MAX_PIXELS, decode_picture, stated_pixel_count
 from tests.pictures import river
 
 pytestmark = pytest.mark.slow
@@ -41,7 +41,7 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_every_form_becomes_bgr(form: str) -> None:
-    bgr = decoded(FORMS[form])
+    bgr = decode_picture(FORMS[form])
     assert bgr is not None
     assert bgr.dtype == np.uint8
     assert bgr.shape == ((1, 1, 3) if form == "one pixel" else RIVER.shape)
@@ -62,18 +62,18 @@ def bomb(width: int, height: int) -> bytes:
 
 
 def test_a_picture_too_large_to_unpack_is_none() -> None:
-    assert stated_pixels(bomb(30_000, 30_000)) == 900_000_000 > MAX_PIXELS
-    assert decoded(bomb(30_000, 30_000)) is None
+    assert stated_pixel_count(bomb(30_000, 30_000)) == 900_000_000 > MAX_PIXELS
+    assert decode_picture(bomb(30_000, 30_000)) is None
     jpeg = bytearray(cv2.imencode(".jpg", RIVER)[1].tobytes())
-    assert stated_pixels(bytes(jpeg)) == RIVER.shape[0] * RIVER.shape[1]
+    assert stated_pixel_count(bytes(jpeg)) == RIVER.shape[0] * RIVER.shape[1]
     at = jpeg.index(b"\xff\xc0")
     jpeg[at + 5 : at + 9] = struct.pack(">HH", 60_000, 60_000)
-    assert decoded(bytes(jpeg)) is None
+    assert decode_picture(bytes(jpeg)) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"GIF89a", b"text" * 100])
 def test_what_is_no_picture(data: bytes) -> None:
-    assert decoded(data) is None
+    assert decode_picture(data) is None
 
 
 @settings(deadline=None, max_examples=50)
@@ -82,5 +82,5 @@ def test_damage_never_raises(noise: bytes, at: int, form: str) -> None:
     data = bytearray(FORMS[form])
     start = at % len(data)
     data[start : start + len(noise)] = noise
-    bgr = decoded(bytes(data))
+    bgr = decode_picture(bytes(data))
     assert bgr is None or (bgr.ndim == 3 and bgr.shape[2] == 3)

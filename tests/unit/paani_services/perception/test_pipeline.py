@@ -156,7 +156,7 @@ def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
 
 
 def test_j19_the_paper_accepts_black() -> None:
-    """J19: no gate in the `paper` profile, so black is evidence like any other picture."""
+    """J19: the `paper` profile checks no picture, so black is evidence like any other."""
     paper = load_config(profile="paper").perception
     evidence, _ = perceiver(paper).perceive(jpeg(PICTURES["black"]), HEADER, 0.0)
     assert evidence.usable
@@ -164,7 +164,7 @@ def test_j19_the_paper_accepts_black() -> None:
 
 
 def test_refused_pictures_leave_no_work_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One net begins beside the gate; however fast pictures are refused, one run at most is under way."""
+    """However fast pictures are refused, at most one run that started beside the check is under way."""
     eyes, begun = perceiver(), []
     submit = ThreadPoolExecutor.submit
 

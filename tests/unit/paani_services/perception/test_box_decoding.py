@@ -1,0 +1,92 @@
+"""Detector output to boxes, against numbers computed by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from paani.config import DetectorConfig
+from paani.messages import Label
+from paani_services.perception.box_decoding import decode_boxes, suppress_overlaps
+from paani_services.perception.preprocessing import (
+    LetterboxTransform,
+    build_lookup_tables,
+    letterbox_picture,
+    stretch_picture,
+)
+from tests.pictures import solid
+
+UNITY = build_lookup_tables((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+SAME = LetterboxTransform(1.0, 1.0, 0, 8, 320, 240)
+RULES = DetectorConfig()
+
+
+def output(*candidates: tuple[float, ...]) -> np.ndarray:
+    """Raw detector output [1, 8, 1680] with these columns and nothing else."""
+    raw = np.zeros((1, 8, 1680), np.float32)
+    for i, column in enumerate(candidates):
+        raw[0, :, i] = column
+    return raw
+
+
+def test_a_box_corner_and_a_mask_column_meet_at_the_same_source_pixel() -> None:
+    """Letterboxed boxes and stretched masks land on the same source pixel, within one."""
+    picture = solid(0, 0, 0)
+    picture[100:180, 120:200] = 255
+    boxed, place = letterbox_picture(picture, 256, 320, 114, UNITY)
+    bright = np.argwhere(boxed[0, 0] > 0.9)
+    (top, left), (bottom, right) = bright.min(axis=0), bright.max(axis=0) + 1
+    raw = output(((left + right) / 2, (top + bottom) / 2, right - left, bottom - top, 0.9, 0, 0, 0))
+    x1, y1, x2, y2 = decode_boxes(raw, place, RULES)[0].box_xyxy
+    columns = np.argwhere(stretch_picture(picture, 256, 320, UNITY)[0, 0] > 0.5)
+    mask_y, mask_x = columns.min(axis=0) / (256, 320)
+    assert (x1 * 320, y1 * 240, x2 * 320, y2 * 240) == pytest.approx((120, 100, 200, 180), abs=1.0)
+    assert (mask_x * 320, mask_y * 240) == pytest.approx((x1 * 320, y1 * 240), abs=1.0)
+
+
+def test_c5_non_finite_candidates_are_dropped() -> None:
+    """C5."""
+    good = (160.0, 128.0, 40.0, 40.0, 0.0, 0.9, 0.0, 0.0)
+    bad = [(*good[:i], value, *good[i + 1 :]) for i in range(8) for value in (math.nan, math.inf, -math.inf)]
+    found = decode_boxes(output(good, *bad), SAME, RULES)
+    assert [d.label for d in found] == [Label.VESSEL]
+
+
+@pytest.mark.parametrize(("score", "n"), [(0.40, 0), (0.4001, 1), (0.39, 0)])
+def test_c6_threshold_is_exclusive(score: float, n: int) -> None:
+    """C6: more than 0.40."""
+    exact = DetectorConfig(confidence=float(np.float32(0.4)))
+    assert len(decode_boxes(output((160, 128, 40, 40, score, 0, 0, 0)), SAME, exact)) == n
+
+
+def test_c2_class_order() -> None:
+    """C2: person, vessel, pier, buoy."""
+    rows = [(40.0 + 70 * i, 128.0, 30.0, 30.0, *np.eye(4)[i] * 0.9) for i in range(4)]
+    labels = {round(d.box_xyxy[0] * 320): d.label.value for d in decode_boxes(output(*rows), SAME, RULES)}
+    assert labels == {25: "person", 95: "vessel", 165: "pier", 235: "buoy"}
+
+
+def test_c8_suppression_ignores_the_class() -> None:
+    """C8: IoU above 0.45 keeps the better box whatever its class."""
+    boxes = np.array([[0, 0, 10, 10], [0, 3, 10, 13], [0, 4, 10, 14]], float).T  # IoU with the first .54, .43
+    assert suppress_overlaps(boxes, 0.45) == [0, 2]
+    found = decode_boxes(output((100, 100, 40, 40, 0.8, 0, 0, 0), (102, 100, 40, 40, 0, 0.9, 0, 0)), SAME, RULES)
+    assert [(d.label, round(d.confidence, 3)) for d in found] == [(Label.VESSEL, 0.9)]
+
+
+def test_c7_c9_caps() -> None:
+    """C7: 256 into suppression; C9: 24 out, the most confident first."""
+    grid = [(8.0 * (i % 40), 8.0 * (i // 40) + 12, 6.0, 6.0, 0.41 + i / 2000, 0, 0, 0) for i in range(800)]
+    found = decode_boxes(output(*grid), SAME, RULES)
+    assert len(found) == 24
+    assert [d.confidence for d in found] == sorted((d.confidence for d in found), reverse=True)
+    stacked = [(160.0, 128.0, 40.0, 40.0, 0.9, 0, 0, 0)] * 300 + [(40.0, 128.0, 20.0, 20.0, 0.5, 0, 0, 0)]
+    assert len(decode_boxes(output(*stacked), SAME, RULES)) == 1  # the 301st never reached suppression
+
+
+def test_c10_boxes_are_cut_at_the_picture() -> None:
+    """C10: normalised to the source; what lies in the grey bars is cut off, what lies in them whole is dropped."""
+    found = decode_boxes(output((0, 8, 100, 100, 0.9, 0, 0, 0), (200, 3, 20, 6, 0.9, 0, 0, 0)), SAME, RULES)
+    assert [d.box_xyxy for d in found] == [pytest.approx((0.0, 0.0, 50 / 320, 50 / 240))]

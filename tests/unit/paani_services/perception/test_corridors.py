@@ -1,0 +1,143 @@
+"""Class mask and corridors, against numbers computed by hand; and the water edge."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani.config import CorridorConfig
+from paani_services.perception.corridors import (
+    OBSTACLE,
+    SKY,
+    WATER,
+    classify_cells,
+    find_water_edge,
+    overlap_fractions,
+    summarise_corridors,
+)
+
+HEIGHT, WIDTH = 64, 80
+ALL = np.ones((HEIGHT, WIDTH), np.float32)  # every cell visible
+
+
+def test_e1_softmax() -> None:
+    """E1: scores 2, 1, 0: p = e^2 / (e^2 + e + 1) = 0.6652; a temperature flattens it."""
+    logits = np.zeros((1, 3, 256, 320), np.float32)
+    logits[0, 0], logits[0, 1] = 2.0, 1.0
+    mask, confidence = classify_cells(logits, 1.0)
+    assert mask.shape == (64, 80)
+    assert mask.dtype == np.uint8
+    assert mask.max() == 0
+    assert confidence == pytest.approx(math.e**2 / (math.e**2 + math.e + 1.0), abs=1e-6)
+    assert classify_cells(logits, 2.0)[1] == pytest.approx(math.e / (math.e + math.e**0.5 + 1.0), abs=1e-6)
+
+
+def test_d4_one_pixel_per_cell_represents_the_upscaled_output() -> None:
+    """D4: the paper's last step is a nearest resize by four, so argmax and confidence repeat exactly."""
+    small = np.random.default_rng(0).normal(size=(1, 3, 64, 80)).astype(np.float32)
+    large = small.repeat(4, axis=2).repeat(4, axis=3)
+    mask, confidence = classify_cells(large, 1.0)
+    exponentials = np.exp(large[0] - large[0].max(axis=0))
+    full = (exponentials / exponentials.sum(axis=0)).max(axis=0)
+    assert np.array_equal(mask.repeat(4, 0).repeat(4, 1), large[0].argmax(axis=0))
+    assert confidence.repeat(4, 0).repeat(4, 1) == pytest.approx(full, abs=1e-6)
+
+
+def test_e2_e3_cells_on_a_border_count_in_part() -> None:
+    """E2, E3: the shares of the cells add up to the exact size of the range."""
+    assert overlap_fractions(64, 0.30, 1.0).sum() / 64 == pytest.approx(0.70)
+    assert overlap_fractions(80, 0.31, 0.69).sum() / 80 == pytest.approx(0.38)
+    assert overlap_fractions(10, 0.25, 0.50) == pytest.approx([0, 0, 0.5, 1, 1, 0, 0, 0, 0, 0])
+
+
+def test_e4_e5_e6_by_hand() -> None:
+    """E4-E6: an obstacle in the right half, from the top of the region to the bottom."""
+    mask = np.zeros((64, 80), np.uint8)
+    mask[:, 40:] = 1
+    confidence = np.full((64, 80), 0.9, np.float32)
+    confidence[:, 40:] = 0.6
+    lanes = summarise_corridors(mask, confidence, CorridorConfig())
+    assert (lanes.left.non_water, lanes.right.non_water) == pytest.approx((0.0, 1.0))
+    assert lanes.center.non_water == pytest.approx(0.5)
+    assert lanes.center.uncertainty == pytest.approx(0.25, abs=1e-6)
+    assert lanes.left.uncertainty == pytest.approx(0.1, abs=1e-6)
+    assert (lanes.left.clear_width, lanes.center.clear_width, lanes.right.clear_width) == pytest.approx((1.0, 0.5, 0.0))
+
+
+def test_e2_nothing_above_the_region_counts() -> None:
+    mask = np.zeros((64, 80), np.uint8)
+    mask[:19] = 2  # 0.297 of the height
+    lanes = summarise_corridors(mask, np.ones((64, 80), np.float32), CorridorConfig())
+    assert [lane.non_water for lane in lanes] == pytest.approx([0.0] * 3)
+
+
+@pytest.mark.parametrize(("blocked_rows", "clear"), [(17, 1.0), (18, 0.0)])
+def test_e6_a_column_is_clear_at_sixty_percent(blocked_rows: int, clear: float) -> None:
+    """E6: of the region's 44.8 cell rows 40 % are 17.92."""
+    mask = np.zeros((64, 80), np.uint8)
+    mask[64 - blocked_rows :] = 1
+    lanes = summarise_corridors(mask, np.ones((64, 80), np.float32), CorridorConfig())
+    assert lanes.center.clear_width == pytest.approx(clear)
+
+
+def test_e6_the_longest_run_counts() -> None:
+    mask = np.zeros((64, 80), np.uint8)
+    mask[:, 45] = 1  # centre corridor: columns 24.8 to 55.2
+    lanes = summarise_corridors(mask, np.ones((64, 80), np.float32), CorridorConfig())
+    assert lanes.center.clear_width == pytest.approx((45 - 24.8) / 30.4)
+
+
+def test_the_water_edge_is_the_lowest_end_of_water_in_each_column() -> None:
+    """The lower edge of what lies lowest above the water, however much water shows again behind it."""
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[:16] = SKY
+    mask[32:40, 10] = OBSTACLE  # water again above it
+    mask[60:, 11] = OBSTACLE
+    mask[:, 12] = WATER
+    edge = find_water_edge(mask, ALL)
+    assert edge[:10] == (0.25,) * 10
+    assert edge[10:14] == (40 / 64, 1.0, 0.0, 0.25)
+
+
+def test_small_glints_near_the_boat_do_not_end_the_water() -> None:
+    """Up to three cells with water all round, in the lowest third; what is larger, higher up or reaches up ends it."""
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[:16] = SKY
+    mask[62, 5:8] = OBSTACLE
+    mask[50, 20] = mask[51, 21] = OBSTACLE
+    mask[60:, 30] = OBSTACLE  # four cells
+    mask[30, 40] = OBSTACLE  # far away, a swimmer's head
+    mask[16:64, 50] = OBSTACLE  # a pole
+    edge = find_water_edge(mask, ALL)
+    assert set(edge[5:8] + edge[20:22]) == {0.25}
+    assert (edge[30], edge[40], edge[50]) == (1.0, 31 / 64, 1.0)
+
+
+def test_the_own_hull_does_not_end_the_water() -> None:
+    """Skipped where it lies in front of water; a column of nothing else has no water."""
+    hull = np.ones((HEIGHT, WIDTH), np.float32)
+    hull[48:, 20:30], hull[:, 40] = 0.0, 0.0
+    mask = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    mask[hull == 0.0] = OBSTACLE
+    mask[40:48, 29] = OBSTACLE
+    edge = find_water_edge(mask, hull)
+    assert edge[20:29] == (0.0,) * 9
+    assert (edge[29], edge[40]) == (48 / 64, 1.0)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.floats(0.0, 1.0))
+def test_below_the_water_edge_is_nothing_but_water_and_own_hull(seed: int, bare: int, watery: float) -> None:
+    """Below its edge each column is water or own hull, and just above it is not. Cells in fours: none is a speck."""
+    random = np.random.default_rng(seed)
+    coarse = np.where(random.random((HEIGHT // 2, WIDTH // 2)) < watery, WATER, OBSTACLE).astype(np.uint8)
+    mask = coarse.repeat(2, axis=0).repeat(2, axis=1)
+    counts = np.ones((HEIGHT, WIDTH), np.float32)
+    counts[HEIGHT - 2 * bare :, ::4] = counts[HEIGHT - 2 * bare :, 1::4] = 0.0
+    for column, edge in enumerate(find_water_edge(mask, counts)):
+        row = round(edge * HEIGHT)
+        assert set(mask[row:, column][counts[row:, column] > 0].tolist()) <= {WATER}
+        assert row == 0 or mask[row - 1, column] != WATER or not counts[:, column].any()
