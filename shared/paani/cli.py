@@ -45,9 +45,9 @@ def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
             return int(commands[name].load()(rest))
         return run_service(name, _service_config(name, rest))
     except ModuleNotFoundError as error:
-        if (told := missing_module(name, error)) is None:
+        if (remedy := missing_module(name, error)) is None:
             raise
-        raise told from error
+        raise remedy from error
 
 
 def usage(commands: list[str], names: list[str]) -> str:

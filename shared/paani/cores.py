@@ -16,7 +16,7 @@ from paani.errors import UserError
 
 
 class Perceiving(Protocol):
-    """Both nets and the gate, as `paani_services.perception` has them."""
+    """Both networks and the image-quality check, as `paani_services.perception` has them."""
 
     def perceive(
         self, data: bytes | U8, header: m.PictureHeader, age_s: float, roll_rad: float = 0.0

@@ -127,7 +127,7 @@ IMU = Topic(
 )
 THRUST_APPLIED = Topic(
     name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
-    stance=Stance.STATE, summary="what the last gate applies, and why not",
+    stance=Stance.STATE, summary="what the thrust adapter applies, and why not",
 )
 TRUE_POSE = Topic(
     name="@truth/pose", type=m.TruePose, producer="plant", rate_hz=20.0, fresh_s=0.5,

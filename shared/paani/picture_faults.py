@@ -1,4 +1,4 @@
-"""What goes wrong with a camera's picture, in five severities: for measuring the gate and for simulated faults. Pure.
+"""What goes wrong with a camera's picture, in five severities: for measuring the image-quality check and for simulated faults. Pure.
 
 A fault is `fault(picture, severity, rng) -> picture`: BGR uint8 [H, W, 3] in and out, severity 1 to 5. Faults of
 geometry move what is seen, so they take a class mask along: `move(picture, mask, severity, rng)`.
@@ -240,7 +240,7 @@ def spoilt(name: str, picture: U8, mask: U8, severity: int, rng: np.random.Gener
 
 
 def due_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
-    """What the gate must do with pictures on which the segmenter reaches that mean IoU."""
+    """What the image-quality check must do with pictures on which the segmenter reaches that mean IoU."""
     if miou < MUST_REJECT or fault == DRY:
         return "reject"
     return "accept" if miou > MUST_ACCEPT else "free"

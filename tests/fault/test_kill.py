@@ -51,9 +51,9 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
         )  # fmt: skip
         try:
             deadline_ms = stopwatch_ms() + READY_S * 1e3
-            while "alive after" not in (told := (folder / "out").read_text()):
-                assert supervisor.poll() is None, told
-                assert stopwatch_ms() < deadline_ms, told
+            while "alive after" not in (found := (folder / "out").read_text()):
+                assert supervisor.poll() is None, found
+                assert stopwatch_ms() < deadline_ms, found
                 threading.Event().wait(0.1)
             yield Loop(supervisor, load_config(sets=sets).bus)
             assert supervisor.poll() is None, "the supervisor itself ended"
@@ -64,7 +64,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
 
 
 class Watch:
-    """What the last gate applied, by its own stamps, and which services are alive."""
+    """What the thrust adapter applied, by its own stamps, and which services are alive."""
 
     def __init__(self, bus: Bus) -> None:
         self.applied: list[m.ThrustApplied] = []
@@ -126,14 +126,14 @@ def settled(watch: Watch) -> bool:
 def stopped_after_s(service: str, applied: list[m.ThrustApplied], hit_us: int, back_us: int) -> float:
     """Seconds from the hit until no force was applied any more, while the process was away."""
     if service == "router":  # nobody hears the plant then: it tells afterwards when its zero began
-        told = next(r for r in applied if r.source_us > hit_us + ZERO_S * 1e6)
-        assert not moves(told)
-        return (told.since_us - hit_us) * 1e-6
+        found = next(r for r in applied if r.source_us > hit_us + ZERO_S * 1e6)
+        assert not moves(found)
+        return (found.since_us - hit_us) * 1e-6
     if service == "plant":  # a dead plant applies nothing
         return (max(r.source_us for r in applied if moves(r) and r.source_us <= back_us) - hit_us) * 1e-6
-    told = next(r for r in applied if r.source_us > hit_us and not moves(r))
-    assert not any(moves(r) for r in applied if told.source_us < r.source_us <= hit_us + ZERO_S * 1e6)
-    return (told.source_us - hit_us) * 1e-6
+    found = next(r for r in applied if r.source_us > hit_us and not moves(r))
+    assert not any(moves(r) for r in applied if found.source_us < r.source_us <= hit_us + ZERO_S * 1e6)
+    return (found.source_us - hit_us) * 1e-6
 
 
 @pytest.mark.parametrize("service", SERVICES)

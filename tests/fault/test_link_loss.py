@@ -51,9 +51,9 @@ def bus_config(tmp_path: Path) -> Iterator[BusConfig]:
         )  # fmt: skip
         try:
             deadline_ms = stopwatch_ms() + READY_S * 1e3
-            while "alive after" not in (told := (tmp_path / "out").read_text()):
-                assert supervisor.poll() is None, told
-                assert stopwatch_ms() < deadline_ms, told
+            while "alive after" not in (console := (tmp_path / "out").read_text()):
+                assert supervisor.poll() is None, console
+                assert stopwatch_ms() < deadline_ms, console
                 threading.Event().wait(0.1)
             yield load_config(sets=sets).bus
         finally:
@@ -63,7 +63,7 @@ def bus_config(tmp_path: Path) -> Iterator[BusConfig]:
 
 
 class Watch:
-    """What the last gate applies and what the board orders, by the plant's simulated time."""
+    """What the thrust adapter applies and what the board orders, by the plant's simulated time."""
 
     def __init__(self) -> None:
         self.applied: list[m.ThrustApplied] = []

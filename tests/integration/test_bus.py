@@ -30,9 +30,9 @@ async def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
             await asyncio.sleep(0.01)
 
 
-async def until_heard(own: Publisher[m.Thrust], heard: Latest[m.Thrust]) -> None:
+async def until_received(own: Publisher[m.Thrust], inbox: Latest[m.Thrust]) -> None:
     """A subscriber is known to its publisher only a moment after it was declared."""
-    while heard.value is None:
+    while inbox.value is None:
         own.put(thrust())
         await asyncio.sleep(0.02)
 
@@ -40,10 +40,10 @@ async def until_heard(own: Publisher[m.Thrust], heard: Latest[m.Thrust]) -> None
 async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:
     """B13, architecture 4: a service that is not the producer is not heard, wildcards included."""
     plant, controller, advisor = await open_as("plant"), await open_as("controller"), await open_as("advisor")
-    heard = plant.latest(keys.THRUST)
+    inbox = plant.latest(keys.THRUST)
     own, forged = controller.publisher(keys.THRUST), advisor.publisher(keys.THRUST)
-    await until_heard(own, heard)
-    before = heard.received
+    await until_received(own, inbox)
+    before = inbox.received
     for _ in range(5):
         forged.put(thrust(left=1.0))
         put_raw(advisor, "controller/thrust", b"{}")
@@ -51,23 +51,23 @@ async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:
         put_raw(advisor, "**", b"{}")
         put_raw(controller, "controller/*", b"{}")
     own.put(thrust(left=0.3))
-    await until(lambda: heard.value is not None and heard.value.left == 0.3)
-    assert heard.received == before + 1
+    await until(lambda: inbox.value is not None and inbox.value.left == 0.3)
+    assert inbox.received == before + 1
     assert not plant.drops
 
 
 async def test_what_is_refused_is_counted_by_cause(open_as: OpenAs) -> None:
     plant, controller = await open_as("plant"), await open_as("controller")
-    heard = plant.latest(keys.THRUST)
+    inbox = plant.latest(keys.THRUST)
     own = controller.publisher(keys.THRUST)
-    await until_heard(own, heard)
+    await until_received(own, inbox)
     sent = own.put(thrust())
     for data in (b"", b'{"left": NaN}', b"{}"):
         put_raw(controller, "controller/thrust", data)
     await until(lambda: sum(plant.drops.values()) == 3)
     assert dict(plant.drops) == {"undecodable": 1, "non_finite": 1, "wrong_type": 1}
-    assert heard.value is not None
-    assert heard.value.seq == sent.seq
+    assert inbox.value is not None
+    assert inbox.value.seq == sent.seq
 
 
 async def test_truth_is_for_its_readers_alone(open_as: OpenAs) -> None:
@@ -105,16 +105,16 @@ async def test_a_wrong_password_does_not_get_in(open_as: OpenAs, config: Config,
 
 async def test_newest_wins_and_the_rest_is_counted(open_as: OpenAs) -> None:
     plant, controller = await open_as("plant"), await open_as("controller")
-    heard = plant.latest(keys.THRUST)
+    inbox = plant.latest(keys.THRUST)
     own = controller.publisher(keys.THRUST)
-    await until_heard(own, heard)
-    await heard.next()
-    start = heard.received
+    await until_received(own, inbox)
+    await inbox.next()
+    start = inbox.received
     for index in range(20):
         own.put(thrust(left=index / 20))
-    await until(lambda: heard.received == start + 20)
-    assert (await heard.next()).left == 19 / 20
-    assert heard.superseded >= 19
+    await until(lambda: inbox.received == start + 20)
+    assert (await inbox.next()).left == 19 / 20
+    assert inbox.superseded >= 19
 
 
 async def test_pictures_are_pulled_one_at_a_time(open_as: OpenAs) -> None:
@@ -137,11 +137,11 @@ async def test_services_find_each_other_again_after_the_router_dies(config: Conf
     router = await open_router(config.bus)
     plant = await open_bus(config.bus, "plant", CLOCK)
     controller = await open_bus(config.bus, "controller", CLOCK)
-    heard, own = plant.latest(keys.THRUST), controller.publisher(keys.THRUST)
+    inbox, own = plant.latest(keys.THRUST), controller.publisher(keys.THRUST)
     for _ in range(2):
-        start = heard.received
+        start = inbox.received
         async with asyncio.timeout(5):
-            while heard.received == start:
+            while inbox.received == start:
                 own.put(thrust())
                 await asyncio.sleep(0.02)
         await asyncio.to_thread(router.close)

@@ -51,8 +51,8 @@ class Around:
         while True:
             now_us, self.sim_us = CLOCK.now_us(), self.sim_us + 50_000
             self.clock.put(m.SimTime(source_us=now_us, sim_us=self.sim_us, stamp_us=now_us))
-            said = m.Advisory(source_us=now_us, direction=m.Direction.STRAIGHT, reason=m.Reason.CENTER_CLEAR)
-            self.advisory.put(said)
+            advisory = m.Advisory(source_us=now_us, direction=m.Direction.STRAIGHT, reason=m.Reason.CENTER_CLEAR)
+            self.advisory.put(advisory)
             here = m.Odometry(source_us=now_us, x_m=1.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.0, healthy=True)
             self.odometry.put(here)
             self.arming.put(m.Arming(source_us=now_us, armed=True))

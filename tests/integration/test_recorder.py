@@ -169,11 +169,11 @@ async def test_a_full_disk_is_said_and_nothing_is_written(open_as: OpenAs, spawn
 async def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     (tmp_path / "file").touch()
     words = [word for setting in private_sets for word in ("--set", setting)]
-    for folder, told in ((tmp_path / "file" / "x", "Not a directory"), ("", "not set")):
+    for folder, expected in ((tmp_path / "file" / "x", "Not a directory"), ("", "not set")):
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "paani", "recorder", *words, "--set", f'recorder.folder="{folder}"',
             stderr=asyncio.subprocess.PIPE,
         )  # fmt: skip
         _, errors = await process.communicate()
         assert process.returncode == 2
-        assert told in errors.decode()
+        assert expected in errors.decode()

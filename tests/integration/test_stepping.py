@@ -46,9 +46,9 @@ async def test_a_ledger_of_steps_gives_the_same_thrust_again(open_as: OpenAs, co
         stepper.conclude(outputs if number % 3 else {})
     await asyncio.sleep(0.1)
 
-    heard = {name: inbox.drain() for name, inbox in log.items()}
-    found = {(name, item.epoch, item.seq): item for name, items in heard.items() for item in items}
-    steps: list[m.Step] = heard[keys.STEPS["controller"].name]
+    received = {name: inbox.drain() for name, inbox in log.items()}
+    found = {(name, item.epoch, item.seq): item for name, items in received.items() for item in items}
+    steps: list[m.Step] = received[keys.STEPS["controller"].name]
     assert len(steps) == STEPS
     state = msgspec.json.decode(steps[0].state, type=type(CONTROLLER.state()))
     assert all(not step.state for step in steps[1:])
@@ -71,5 +71,5 @@ async def test_a_ledger_of_steps_gives_the_same_thrust_again(open_as: OpenAs, co
             assert msgspec.json.encode(again) == msgspec.json.encode(recorded)
             compared += 1
             moving += recorded.left + recorded.right > 0.0
-    assert compared == len(heard[keys.THRUST.name]) == sum(1 for number in range(STEPS) if number % 3)
+    assert compared == len(received[keys.THRUST.name]) == sum(1 for number in range(STEPS) if number % 3)
     assert moving > 5

@@ -40,7 +40,7 @@ async def test_a_stop_is_not_lost_in_a_wake_up(
     bus = await open_as(service)
     running = asyncio.ensure_future(run(bus, WallClock(), config))
     await asyncio.sleep(0.15)
-    inbox = next(inbox for heard, inbox in bus.inputs if heard is topic)
+    inbox = next(inbox for each, inbox in bus.inputs if each is topic)
     inbox.offer(message)  # type: ignore[attr-defined]  # a `Latest`
     for _ in range(turns):
         await asyncio.sleep(0)

@@ -63,19 +63,19 @@ def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_is_gone_on_with(tmp_path: Path, number: signal.Signals) -> None:
     """Ctrl-C or a kill: what is done stays and is summed up, the processes end, and the line says how to go on."""
-    heard = signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell in the background ignores it, and so would a child
+    handler = signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell in the background ignores it, and so would a child
     run = subprocess.Popen(
         words(tmp_path, "--seeds", "1..40", "--jobs", "1"), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
-    signal.signal(signal.SIGINT, heard)
+    signal.signal(signal.SIGINT, handler)
     done = tmp_path / "run" / "trials"
     while run.poll() is None and len(list(done.glob("*.json"))) < 1:
         pass
     run.send_signal(number)
-    shown, said = run.communicate(timeout=60)
-    assert run.returncode == 130, said
-    assert "the same command goes on" in said
-    assert "no contact" in shown
+    output, errors = run.communicate(timeout=60)
+    assert run.returncode == 130, errors
+    assert "the same command goes on" in errors
+    assert "no contact" in output
     assert 1 <= len(list(done.glob("*.json"))) < 80
     assert not list(done.glob(".*"))
 

@@ -195,10 +195,10 @@ async def test_tuned_advice_is_computed_again_from_the_ledger(open_as: OpenAs, s
                 changes = (change,) if act is m.TuningAct.PROPOSE else ()
                 tuning.put(m.Tuning(source_us=now_us, act=act, request=request, proposal="a", changes=changes))
             await asyncio.sleep(0.1)
-    heard = {name: inbox.drain() for name, inbox in log.items()}
-    found = {(name, item.epoch, item.seq): item for name, items in heard.items() for item in items}
+    received = {name: inbox.drain() for name, inbox in log.items()}
+    found = {(name, item.epoch, item.seq): item for name, items in received.items() for item in items}
     config = load_config(sets=(FEW,))
-    steps: list[m.Step] = heard[keys.STEPS["advisor"].name]
+    steps: list[m.Step] = received[keys.STEPS["advisor"].name]
     state = msgspec.json.decode(steps[0].state, type=type(ADVISOR.state()))
     limits: list[float] = []
     for step in steps:

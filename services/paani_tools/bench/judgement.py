@@ -48,10 +48,10 @@ def step(config: Config, frames: int) -> FigureTable:
         for name in (FRAME, EXPLAINED, REPUBLISHED):
             if name == REPUBLISHED:
                 states[name] = states[EXPLAINED]
-            states[name], said, best_ms = _timed(decider, states[name], evidence, settings[name])
+            states[name], outputs_before, best_ms = _timed(decider, states[name], evidence, settings[name])
             if number >= WARM_FRAMES:
                 found[name].ms.append(best_ms)
-                found[name].judged.append(0 if name == REPUBLISHED else said.counterfactual.judged)
+                found[name].judged.append(0 if name == REPUBLISHED else outputs_before.counterfactual.judged)
     base_ms = median(found[FRAME].ms)
     return FigureTable(
         name=f"advisor step, {BOXES} boxes, {frames} frames",
@@ -169,12 +169,12 @@ def _timed(decider: Decider[Any], state: Any, evidence: m.Evidence, config: Conf
 def _messages(config: Config) -> tuple[m.Message, ...]:
     decider = decider_of("advisor")
     state: Any = decider.state()
-    said: tuple[m.Message, ...] = ()
+    outputs_before: tuple[m.Message, ...] = ()
     for evidence in crowded_evidence(STEADY_FRAMES):
         inputs = {topic.name: Input() for topic in decider.inputs} | {keys.EVIDENCE.name: Input(evidence)}
         state, outputs = decider.decide(state, inputs, evidence.source_us + AGE_US, config)
-        said = (evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name])
-    return said
+        outputs_before = (evidence, outputs[keys.TRACKS.name], outputs[keys.ADVISORY.name])
+    return outputs_before
 
 
 class _String(msgspec.Struct):

@@ -37,8 +37,8 @@ def figures(report: Report, info: LogInfo) -> FigureTable:
     own, router = report.services["recorder"], report.services["router"]
     topics = {topic.topic: topic for topic in info.topics}
     pictures = topics.get(keys.PICTURE.name)
-    heard = [topic for topic in info.topics if not topic.topic.startswith("viewer/")]
-    bus = sum(topic.rate_hz for topic in heard if not topic.topic.endswith(HEADER))
+    recorded = [topic for topic in info.topics if not topic.topic.startswith("viewer/")]
+    bus = sum(topic.rate_hz for topic in recorded if not topic.topic.endswith(HEADER))
     return FigureTable(
         name="recorder",
         columns=("figure", "value"),

@@ -35,9 +35,9 @@ def steadiness(drives: list[Path]) -> FigureTable:
     }
     rows = []
     for drive in drives:
-        heard = tuple(sorted(_heard(drive), key=lambda each: each[0]))
+        recorded = tuple(sorted(_recorded_inputs(drive), key=lambda each: each[0]))
         for name, config in settings.items():
-            found = dithering(advice(heard, config))
+            found = dithering(advice(recorded, config))
             rows.append((
                 drive.name, name, round(found.seconds), found.changes, found.interruptions, found.side_flips,
                 found.stop_go_flips, found.changes_per_min, found.side_flips_per_min, found.stop_go_flips_per_min,
@@ -62,13 +62,13 @@ def steadiness(drives: list[Path]) -> FigureTable:
     )
 
 
-def advice(heard: tuple[tuple[int, m.Message], ...], config: Config) -> Iterator[m.Advisory]:
+def advice(recorded: tuple[tuple[int, m.Message], ...], config: Config) -> Iterator[m.Advisory]:
     """What the advisor says at each new evidence and between, as the messages came [us]."""
     decider = decider_of("advisor")
     state: Any = decider.state()
     inputs = {topic.name: Input() for topic in decider.inputs}
-    due_us = heard[0][0] if heard else 0
-    for at_us, message in heard:
+    due_us = recorded[0][0] if recorded else 0
+    for at_us, message in recorded:
         steps = list(range(due_us, at_us, STEP_US))
         if isinstance(message, m.Evidence):
             steps.append(at_us)
@@ -84,7 +84,7 @@ def advice(heard: tuple[tuple[int, m.Message], ...], config: Config) -> Iterator
             inputs[keys.ODOMETRY.name] = Input(message, at_us)
 
 
-def _heard(drive: Path) -> Iterator[tuple[int, m.Message]]:
+def _recorded_inputs(drive: Path) -> Iterator[tuple[int, m.Message]]:
     decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in READ}
     for record in open_log(drive).records([topic.name for topic in READ]):
         try:

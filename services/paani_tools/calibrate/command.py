@@ -25,10 +25,10 @@ def main(argv: list[str]) -> int:
         if getattr(config.calibration, name) <= 0.0:
             raise UserError(f"calibration.{name} is not known (--set calibration.{name}=...)")
     if options.live is not None:
-        heard = asyncio.run(collect_live(config.bus, options.live))
+        collected = asyncio.run(collect_live(config.bus, options.live))
     else:
-        heard = collect_recorded(options.recording)
-    mount = estimate_mount(waterline_observations(*heard), config.calibration, options.shore_m)
+        collected = collect_recorded(options.recording)
+    mount = estimate_mount(waterline_observations(*collected), config.calibration, options.shore_m)
     sys.stdout.write(
         f"pitch_down_deg {mount.pitch_down_deg:.2f}, roll_deg {mount.roll_deg:.2f}; {mount.pictures} pictures,"
         f" {mount.spread_deg:.2f} degrees between them, {mount.residual_deg:.2f} between columns\n"

@@ -56,22 +56,22 @@ def collect_recorded(path: Path) -> Collected:
 async def collect_live(bus_config: BusConfig, seconds: float) -> Collected:
     """What comes over the bus in that time. Raises UserError where nothing listens or something does not come."""
     async with observer(bus_config) as bus:
-        heard: Collected = ([], [])
+        collected: Collected = ([], [])
         tasks = [
-            asyncio.create_task(_collect(bus.queue(keys.EVIDENCE, DEPTH), heard[0])),
-            asyncio.create_task(_collect(bus.queue(keys.ODOMETRY, DEPTH), heard[1])),
+            asyncio.create_task(_collect(bus.queue(keys.EVIDENCE, DEPTH), collected[0])),
+            asyncio.create_task(_collect(bus.queue(keys.ODOMETRY, DEPTH), collected[1])),
         ]
         steps = math.ceil(seconds / SHOW_S)
         with Progress("listening") as bar:
             for step in range(steps):
-                bar.at(step / steps, f"{len(heard[0])} pictures")
+                bar.at(step / steps, f"{len(collected[0])} pictures")
                 await asyncio.sleep(seconds / steps)
         for task in tasks:
             task.cancel()
-    for name, found in ((keys.EVIDENCE.name, heard[0]), (keys.ODOMETRY.name, heard[1])):
+    for name, found in ((keys.EVIDENCE.name, collected[0]), (keys.ODOMETRY.name, collected[1])):
         if not found:
             raise UserError(f"bus: no {name} came in {seconds:g} s")
-    return heard
+    return collected
 
 
 def waterline_observations(evidence: Iterable[Evidence], odometry: Iterable[Odometry]) -> list[WaterlineObservation]:

@@ -69,7 +69,7 @@ def moment_at(log: Log, at_us: int) -> Moment:
     order = _first(o for _, o in found[keys.COMMAND.name] if o.advisory_sent_us == advisory.sent_us)
     thrust = _first(t for _, t in found[keys.THRUST.name] if order and t.command_sent_us == order.sent_us)
     applied = _first(a for _, a in found[keys.THRUST_APPLIED.name] if thrust and a.command_sent_us == thrust.sent_us)
-    if applied is None:  # a gate that takes no order shows none
+    if applied is None:  # an adapter that takes no order shows none
         applied = _first(a for at, a in found[keys.THRUST_APPLIED.name] if at > log_us)
     pictures = list(_pictures(log, frame, log_us))
     return Moment(

@@ -32,7 +32,7 @@ INDENT = 12
 def narrative_of(moment: Moment, config: Config) -> str:
     """The whole story, one paragraph for each process."""
     lines = [_title(moment), ""]
-    for name, told in (
+    for name, sentences in (
         ("seen", _seen(moment)),
         ("tracks", _tracks(moment)),
         ("lanes", _lanes(moment.advisory, config)),
@@ -41,7 +41,7 @@ def narrative_of(moment: Moment, config: Config) -> str:
         ("controller", _controller(moment)),
         ("plant", _plant(moment)),
     ):
-        lines += [f"{name if number == 0 else '':<{INDENT}}{line}" for number, line in enumerate(told)]
+        lines += [f"{name if number == 0 else '':<{INDENT}}{line}" for number, line in enumerate(sentences)]
     return "\n".join(lines) + "\n"
 
 

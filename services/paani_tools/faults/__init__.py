@@ -1,1 +1,1 @@
-"""How well the gate knows a picture that cannot be used: every fault, every severity, against the segmenter's error."""
+"""How well the image-quality check knows unusable pictures: each fault and severity, against the segmenter's error."""

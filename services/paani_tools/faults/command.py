@@ -1,4 +1,4 @@
-"""`paani faults DATA`: what the gate refuses and what it lets through, beside what each fault does to the segmenter."""
+"""`paani faults DATA`: what the image-quality check refuses, beside what each fault does to the segmenter."""
 
 import argparse
 import sys
@@ -33,7 +33,7 @@ class FaultReport(msgspec.Struct, frozen=True):
 
 
 class PictureModels:
-    """The segmenter and the gate, each on one picture alone."""
+    """The segmenter and the image-quality check, each on one picture alone."""
 
     def __init__(self, config: PerceptionConfig) -> None:
         """Raises UserError for a model that cannot be used."""
@@ -50,7 +50,7 @@ class PictureModels:
         )[0]
 
     def judge(self, bgr: U8) -> UnusableCause:
-        """The gate's verdict, as on the first picture of a camera."""
+        """the image-quality verdict, as on the first picture of a camera."""
         return check_image_quality(ImageQualityState(), bgr, 0, self._config.image_quality, self._fitness)[1]
 
 

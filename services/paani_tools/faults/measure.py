@@ -1,4 +1,4 @@
-"""The gate's verdict and the segmenter's error on each fault and severity."""
+"""the image-quality verdict and the segmenter's error on each fault and severity."""
 
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,12 +28,12 @@ class LevelFigures(msgspec.Struct, frozen=True):
 
     @property
     def verdict(self) -> str:
-        """What the gate must do here: "reject", "accept", or "free"."""
+        """What the image-quality check must do here: "reject", "accept", or "free"."""
         return due_verdict(self.fault, self.miou)
 
 
 class CleanFigures(msgspec.Struct, frozen=True):
-    """Pictures of one source as they are, and how many of them the gate refused, by cause."""
+    """Pictures of one source as they are, and how many of them the image-quality check refused, by cause."""
 
     source: str
     n: int
@@ -75,7 +75,7 @@ def measure_clean(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFig
 
 
 def sum_up(cells: Sequence[LevelFigures], clean: Sequence[CleanFigures]) -> Totals:
-    """The three shares that the gate is held to."""
+    """The three shares that the image-quality check is held to."""
 
     def share(wrong: int, n: int) -> float:
         return wrong / n if n else 0.0

@@ -20,7 +20,7 @@ def draw_severity_curves(cells: Sequence[LevelFigures]) -> str:
     width, height = COLUMNS * PANEL_W, -(-len(names) // COLUMNS) * PANEL_H + 26
     parts = [
         element("rect", width=width, height=height, fill="#fff"),
-        element("text", "refused by the gate", x=LEFT, y=16, fill=REFUSED),
+        element("text", "refused by the image-quality check", x=LEFT, y=16, fill=REFUSED),
         element("text", "mIoU of the segmenter (dashed)", x=LEFT + 130, y=16, fill=MIOU),
         element("text", "band: either verdict will do; severity 1 to 5", x=LEFT + 330, y=16, fill=NOTE),
     ]

@@ -61,13 +61,13 @@ async def _live_rates(config: BusConfig) -> dict[str, float] | None:
 
 async def _echo(config: BusConfig, name: str, count: int | None) -> None:
     topic = topic_named(name)
-    shown = 0
+    printed = 0
     async with observer(config) as bus:
         async for message in messages(bus, topic):
             sys.stdout.write(msgspec.json.encode(message).decode() + "\n")
             sys.stdout.flush()
-            shown += 1
-            if count is not None and shown >= count:
+            printed += 1
+            if count is not None and printed >= count:
                 return
 
 

@@ -63,8 +63,8 @@ def _export(options: argparse.Namespace) -> int:
     log = open_log(options.path)
     for export, path in wanted:
         with Progress(path.name) as progress:
-            told = export(log, path, ReadProgress(log, progress))
-        sys.stdout.write(told + "\n")
+            summary = export(log, path, ReadProgress(log, progress))
+        sys.stdout.write(summary + "\n")
     for problem in log.problems:
         sys.stderr.write(f"{problem}\n")
     return 0

@@ -57,11 +57,11 @@ def main(argv: list[str]) -> int:
     sheet = ContactSheet()
     perceiver = Perceiver(config.perception, stopwatch_ms)
     taken: set[str] = set()
-    shown = 0
+    count = 0
     try:
         for index, path in enumerate(options.paths):
             for verdict in judge_path(path, index * EPOCHS_PER_PATH, perceiver, config):
-                shown += 1
+                count += 1
                 sys.stdout.write(json_line(verdict) if options.json else readable_line(verdict))
                 if (out or options.sheet) and verdict.bgr is not None:
                     picture = annotate_picture(
@@ -75,14 +75,14 @@ def main(argv: list[str]) -> int:
                         _save(out / file_name(verdict.name, taken), picture)
                     if options.sheet is not None:
                         sheet.add(picture)
-                _progress(f"{shown}  {verdict.advisory.direction:12}  {verdict.name[-60:]}")
+                _progress(f"{count}  {verdict.advisory.direction:12}  {verdict.name[-60:]}")
     finally:
         perceiver.close()
         _progress(None)
     if options.sheet is not None and (drawn := sheet.compose()) is not None:
         write_whole(options.sheet, cv2.imencode(options.sheet.suffix, drawn)[1].tobytes(), "--sheet")
     if out is not None and sys.stderr.isatty():
-        sys.stderr.write(f"{shown} judged, annotated pictures in {out}\n")
+        sys.stderr.write(f"{count} judged, annotated pictures in {out}\n")
     return 0
 
 
@@ -103,8 +103,8 @@ def readable_line(verdict: Verdict) -> str:
     advice, evidence = verdict.advisory, verdict.evidence
     reason = advice.reason.value if evidence.usable else f"{advice.reason.value} ({evidence.cause.value})"
     risks = " ".join(f"{lane.risk:.2f}" for lane in (advice.left, advice.center, advice.right))
-    shown = risks if evidence.usable else "-"
-    return f"{verdict.name}  {advice.direction.value:<12}  {reason}  risk {shown}  {advice.explanation}\n"
+    count = risks if evidence.usable else "-"
+    return f"{verdict.name}  {advice.direction.value:<12}  {reason}  risk {count}  {advice.explanation}\n"
 
 
 def json_line(verdict: Verdict) -> str:

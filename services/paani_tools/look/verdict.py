@@ -53,13 +53,13 @@ def judge_still(frame: Frame, epoch: int, perceiver: Perceiver, config: Config, 
     """One still on its own, looked at once and presented to a fresh advisor eight times."""
     evidence, mask = _perceive(perceiver, frame, epoch, number)
     state, advisory, tracks = advise(AdvisorState(), evidence, evidence.source_us, config)
-    for shown in range(1, PRESENTATIONS):
-        stamp_us = evidence.source_us + shown * PRESENTATION_US
+    for presentation in range(1, PRESENTATIONS):
+        stamp_us = evidence.source_us + presentation * PRESENTATION_US
         again = msgspec.structs.replace(
             evidence,
             source_us=stamp_us,
-            media_us=evidence.media_us + shown * PRESENTATION_US,
-            frame_seq=evidence.frame_seq + shown,
+            media_us=evidence.media_us + presentation * PRESENTATION_US,
+            frame_seq=evidence.frame_seq + presentation,
         )
         state, advisory, tracks = advise(state, again, stamp_us, config)
     return Verdict(frame.name, frame.bgr, mask, evidence, advisory, tracks, state)

@@ -65,8 +65,8 @@ class Ledger:
     def __init__(self, decider: Decider[Any], instead: Mapping[MessageId, bytes] = NO_PAYLOADS) -> None:
         self._instead = instead
         self.step_topic = keys.STEPS[decider.service].name
-        heard = (*decider.inputs, *decider.own)
-        self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in heard}
+        message_id = (*decider.inputs, *decider.own)
+        self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in message_id}
         self._empty = {topic.name: Input() for topic in decider.inputs}
         self._outputs = {topic.name for topic in decider.outputs}
         self.topics = frozenset((self.step_topic, *self._decoders, *self._outputs))
@@ -120,37 +120,37 @@ class Ledger:
             sent.append((message, None if held is None else held.data))
         inputs = dict(self._empty)
         lacks, absent, undecodable = "", [], False
-        for heard in step.heard:
-            if heard.topic not in self._decoders:
+        for message_id in step.heard:
+            if message_id.topic not in self._decoders:
                 continue  # of a version whose decider heard more
-            message, lack = self._message(heard)
+            message, lack = self._message(message_id)
             if not lack:
-                inputs[heard.topic] = Input(message, heard.received_us)
+                inputs[message_id.topic] = Input(message, message_id.received_us)
                 continue
             lacks = lacks or lack
-            if (heard.topic, heard.epoch, heard.seq) in self._messages:
+            if (message_id.topic, message_id.epoch, message_id.seq) in self._messages:
                 undecodable = True
-            elif not self.precedes(heard.topic, heard.epoch, heard.seq):
-                absent.append(heard.topic)
+            elif not self.precedes(message_id.topic, message_id.epoch, message_id.seq):
+                absent.append(message_id.topic)
         early = bool(lacks) and not absent and not undecodable
         return RecordedStep(
             log_us, step, None if lacks else inputs, lacks, () if undecodable else tuple(absent), early, tuple(sent)
         )
 
-    def _message(self, heard: m.InputMessage) -> tuple[Any, str]:
+    def _message(self, message_id: m.InputMessage) -> tuple[Any, str]:
         """The message that was heard, or why there is none."""
-        last = self._newest_heard.get(heard.topic)
-        if last is not None and last[:2] == (heard.epoch, heard.seq):
+        last = self._newest_heard.get(message_id.topic)
+        if last is not None and last[:2] == (message_id.epoch, message_id.seq):
             return last[2], ""
-        name = heard.topic, heard.epoch, heard.seq
+        name = message_id.topic, message_id.epoch, message_id.seq
         held = self._messages.get(name)
         if held is None:
-            return None, f"{heard.topic} it had heard is not in the log"
+            return None, f"{message_id.topic} it had heard is not in the log"
         try:
-            message = self._decoders[heard.topic].decode(self._instead.get(name, held.data))
+            message = self._decoders[message_id.topic].decode(self._instead.get(name, held.data))
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-            return None, f"{heard.topic} it had heard does not decode: {error}"
-        self._newest_heard[heard.topic] = heard.epoch, heard.seq, message
+            return None, f"{message_id.topic} it had heard does not decode: {error}"
+        self._newest_heard[message_id.topic] = message_id.epoch, message_id.seq, message
         return message, ""
 
     def _keep(self, name: MessageId, held: _StoredMessage) -> None:

@@ -7,8 +7,8 @@ Latencies are differences of the stamps that messages carry, all on this machine
     advisor            evidence sent -> first advisory from it sent (republished advice does not count)
     navigator          that advisory sent -> first order from it sent
     controller         that order sent -> first thrust from it sent
-    adapter            that thrust sent -> step at which the last gate put it in force (refused or zeroed: no sample)
-    capture_to_thrust  picture captured -> step at which the last gate put in force a thrust decided from it
+    adapter            that thrust sent -> step at which the adapter put it in force (refused or zeroed: no sample)
+    capture_to_thrust  picture captured -> step at which the thrust adapter put in force a thrust decided from it
     transport          capture_to_thrust less the inference on the same picture
 """
 

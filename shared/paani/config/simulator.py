@@ -37,7 +37,7 @@ class SensorsConfig(Section, frozen=True):
 
 
 class AdapterConfig(Section, frozen=True):
-    """The last gate before force. `astern`: the most that it lets a fan push astern."""
+    """The thrust adapter, the last decision before force. `astern`: the most that it lets a fan push astern."""
 
     force_per_unit_n: Positive = 75.0  # O1
     astern: Fraction = 0.10  # `controller.astern`

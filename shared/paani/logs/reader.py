@@ -149,9 +149,9 @@ def open_log(path: Path) -> Log:
 
 def _require_known_format(layout: Layout) -> None:
     """Later formats may say other things in the same words."""
-    told = layout.metadata.get(PROFILE, {}).get("format", "")
-    if told.isdecimal() and int(told) > FORMAT:
-        raise UserError(f"{layout.path}: recorded in format {told}; this program reads up to {FORMAT}")
+    version = layout.metadata.get(PROFILE, {}).get("format", "")
+    if version.isdecimal() and int(version) > FORMAT:
+        raise UserError(f"{layout.path}: recorded in format {version}; this program reads up to {FORMAT}")
 
 
 def _require_one_drive(path: Path, parts: list[Layout]) -> None:

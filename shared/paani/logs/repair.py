@@ -330,18 +330,18 @@ def _keep(path: Path, original: Path) -> None:
 
 def repair_all(folder: Path, told_to_stop: Callable[[], bool]) -> list[str]:
     """Repair every unfinished recording that nobody writes; a line for each that was mended or cannot be."""
-    told = []
+    reports = []
     for path in sorted(folder.glob("*.mcap")):
         with contextlib.suppress(OSError):
             if is_finished(path):
                 continue
         try:
             repaired = repair(path, told_to_stop)
-            told.append(f"{path.name}: repaired, {repaired.messages} messages")
+            reports.append(f"{path.name}: repaired, {repaired.messages} messages")
         except InUse:
             continue
         except UserError as error:
-            told.append(str(error))
+            reports.append(str(error))
         except Interrupted:
             break
-    return told
+    return reports

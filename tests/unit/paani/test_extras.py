@@ -39,8 +39,8 @@ def test_without_the_host_extra_a_command_is_one_line(words: list[str]) -> None:
     hidden = [module for module, extra in EXTRA_OF.items() if extra == "host"]
     hide = f"import sys\nfor name in {hidden}: sys.modules[name] = None\n"
     code = f"{hide}from paani.cli import main\nsys.exit(main({words}))"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
-    assert (told.returncode, told.stdout) == (2, ""), told.stderr
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
     assert re.fullmatch(
-        rf"paani: {words[0]} needs [\w, ]+, not installed here: pip install 'paani\[host\]'\n", told.stderr
+        rf"paani: {words[0]} needs [\w, ]+, not installed here: pip install 'paani\[host\]'\n", done.stderr
     )

@@ -33,7 +33,7 @@ RSS_BAR_MIB = 200.0
 class Eyes(msgspec.Struct, frozen=True):
     """What `--json` writes. `footprint` is of a process of its own; `count_work` is of pairs of nets, the first in use.
 
-    `refused`: pictures that the gate did not let through, and that were left out.
+    `refused`: pictures that the image-quality check did not let through, and that were left out.
     """
 
     cores: int
@@ -75,7 +75,7 @@ def main(argv: list[str]) -> int:
     given = len(pictures)
     pictures = usable_pictures(pictures, config.perception)
     if not pictures:
-        raise UserError("the gate refuses every picture, so there is nothing to time")
+        raise UserError("the image-quality check refuses every picture, so there is nothing to time")
     candidates = [_candidate(folder) for folder in options.others]
     held = _footprint(config)
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]

@@ -1,4 +1,4 @@
-"""Pictures that the gate lets through, drawn here, so that a measurement needs no others."""
+"""Pictures that the image-quality check lets through, drawn here, so that a measurement needs no others."""
 
 import cv2
 import numpy as np

@@ -58,7 +58,7 @@ class Candidate(msgspec.Struct, frozen=True):
 
 
 def usable_pictures(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
-    """Those that the gate lets through: the others would cost a pipeline nothing."""
+    """Those that the image-quality check lets through: the others would cost a pipeline nothing."""
     fitness = load_fitness(config.image_quality, 1)
     return [
         p

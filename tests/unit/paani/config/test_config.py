@@ -117,7 +117,7 @@ def test_the_paper_profile_carries_the_papers_constants() -> None:
     ],
 )
 def test_a_planner_that_turns_on_the_spot_needs_a_boat_that_can(sets: list[str], field: str) -> None:
-    """And the last gate must let through what the controller orders."""
+    """And the thrust adapter must let through what the controller orders."""
     with pytest.raises(UserError, match=field):
         load_config(sets=sets)
 

@@ -126,9 +126,9 @@ def test_cut_anywhere_what_lies_before_is_kept(tmp_path: Path, size: int) -> Non
     """Property: every chunk that is whole in the cut file is in the repaired one."""
     path = write(tmp_path, cut()[:size])
     kept = sum(chunk.end <= size for chunk in chunks(cut()))
-    told = refusal(lambda: repair(path))
-    if told:
-        assert NAME in told
+    message = refusal(lambda: repair(path))
+    if message:
+        assert NAME in message
         assert size < 8
         return
     assert poses(path) == list(range(kept * EVERY))
@@ -146,9 +146,9 @@ def test_flipped_bits_cost_only_the_chunks_they_hit(tmp_path: Path, flips: list[
     for original in tmp_path.glob("*.damaged"):
         original.unlink()
     assert NAME in (refusal(lambda: read(path)) or NAME)
-    told = refusal(lambda: repair(path)) or refusal(lambda: read(path))
-    if told:
-        assert NAME in told
+    message = refusal(lambda: repair(path)) or refusal(lambda: read(path))
+    if message:
+        assert NAME in message
         assert any(bit // 8 < 1000 for bit in flips), "only what says whose file it is can refuse it"
         return
     hit = {
@@ -183,7 +183,7 @@ def test_scan_finds_its_way_after_a_wrong_length() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "message"),
     [
         (b"", "empty file"),
         (b"not a log at all, but long enough to hold a magic number", "not an MCAP file"),
@@ -191,9 +191,9 @@ def test_scan_finds_its_way_after_a_wrong_length() -> None:
     ],
     ids=["empty", "text", "zeros"],
 )
-def test_what_is_no_log_is_named(tmp_path: Path, data: bytes, told: str) -> None:
+def test_what_is_no_log_is_named(tmp_path: Path, data: bytes, message: str) -> None:
     path = write(tmp_path, data)
-    with pytest.raises(UserError, match=rf"{NAME}: {told}"):
+    with pytest.raises(UserError, match=rf"{NAME}: {message}"):
         repair(path)
     assert path.read_bytes() == data
 
@@ -226,10 +226,10 @@ def test_all_of_a_folder_but_what_is_being_written(tmp_path: Path) -> None:
     torn = unfinished(tmp_path, name="20250101T000001Z-1.mcap")
     whole_one = finished(tmp_path, name="20250101T000002Z-1.mcap")
     foreign = write(tmp_path, b"something else")
-    told = repair_all(tmp_path, lambda: False)
-    assert len(told) == 2
-    assert foreign.name in told[0]
-    assert told[1].startswith(f"{torn.name}: repaired")
+    message = repair_all(tmp_path, lambda: False)
+    assert len(message) == 2
+    assert foreign.name in message[0]
+    assert message[1].startswith(f"{torn.name}: repaired")
     assert not is_finished(used.path)
     used.finish({})
     assert is_finished(used.path)

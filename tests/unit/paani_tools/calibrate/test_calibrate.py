@@ -49,8 +49,8 @@ def drawn(count: int, roll_off: float, pitch_off: float) -> Iterator[Pair]:
 
 def recording(folder: Path, pairs: Iterator[Pair]) -> Path:
     log = small_logs.begin(folder)
-    for number, (shown, lying) in enumerate(pairs):
-        for topic, message in ((keys.ODOMETRY, lying), (keys.EVIDENCE, shown)):
+    for number, (evidence_message, odometry_message) in enumerate(pairs):
+        for topic, message in ((keys.ODOMETRY, odometry_message), (keys.EVIDENCE, evidence_message)):
             sent = msgspec.structs.replace(message, seq=number, epoch=5, sent_us=message.source_us, producer="x")
             small_logs.put(log, topic, sent)
     log.finish({})
@@ -92,18 +92,18 @@ def test_a_recording_becomes_settings_that_can_be_used(tmp_path: Path, capsys: p
 
 
 def wavering(count: int) -> Iterator[Pair]:
-    for number, (shown, lying) in enumerate(drawn(count, 0.0, 0.0)):
-        yield shown, msgspec.structs.replace(lying, pitch_rad=0.1 * (-1) ** number)
+    for number, (evidence_message, odometry_message) in enumerate(drawn(count, 0.0, 0.0)):
+        yield evidence_message, msgspec.structs.replace(odometry_message, pitch_rad=0.1 * (-1) ** number)
 
 
 def level(pairs: Iterator[Pair]) -> Iterator[Pair]:
-    for shown, lying in pairs:
-        yield shown, msgspec.structs.replace(lying, roll_rad=0.0, pitch_rad=0.0)
+    for evidence_message, odometry_message in pairs:
+        yield evidence_message, msgspec.structs.replace(odometry_message, roll_rad=0.0, pitch_rad=0.0)
 
 
 def edgeless(pairs: Iterator[Pair]) -> Iterator[Pair]:
-    for shown, lying in pairs:
-        yield msgspec.structs.replace(shown, water_edge=(0.0,) * 80), lying
+    for evidence_message, odometry_message in pairs:
+        yield msgspec.structs.replace(evidence_message, water_edge=(0.0,) * 80), odometry_message
 
 
 def still(count: int) -> Iterator[Pair]:
@@ -113,7 +113,7 @@ def still(count: int) -> Iterator[Pair]:
 
 
 @pytest.mark.parametrize(
-    ("pairs", "said"),
+    ("pairs", "expected"),
     [
         (drawn(8, 0.0, 0.0), "8 pictures show a straight far waterline; at least 20"),
         (edgeless(drawn(30, 0.0, 0.0)), "0 pictures show a straight far waterline"),
@@ -123,18 +123,18 @@ def still(count: int) -> Iterator[Pair]:
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(
-    pairs: Iterator[Pair], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    pairs: Iterator[Pair], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = recording(tmp_path, pairs), tmp_path / "calibration.toml"
     assert paani(["calibrate", str(file), "--shore-m", "150", "--out", str(out), *KNOWN]) == 2
     error = capsys.readouterr().err
-    assert said in error
+    assert expected in error
     assert error.count("\n") == 1
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["no.mcap", "--shore-m", "150", *KNOWN], "no.mcap"),
         (["--shore-m", "150", *KNOWN], "name a recording, or --live"),
@@ -143,10 +143,10 @@ def test_bad_input_is_one_line_and_writes_nothing(
         (["--live", "2", "--shore-m", "150", *KNOWN, "--set", "bus.router=tcp/127.0.0.1:1"], "nothing listens there"),
     ],
 )
-def test_bad_words_are_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_words_are_one_line(words: list[str], expected: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert paani(["calibrate", *words]) == 2
     error = capsys.readouterr().err
-    assert said in error
+    assert expected in error
     assert error.count("\n") == 1
 
 
@@ -178,8 +178,8 @@ def test_rendered_pictures_give_the_mount_to_0_3_degrees(down_deg: float, roll_d
         for number, (at_us, roll, pitch) in enumerate(rocking(36)):
             boat = BoatPose(0.0, 0.0, 0.175 * number, 0.177, roll + math.radians(roll_deg), pitch)
             header = PictureHeader(source_us=at_us, frame_seq=number, frame_epoch=1, width_px=320, height_px=240)
-            shown, _ = perceiver.perceive(eye.render(boat, 0.2 * number).bgr, header, 0.0)
-            pairs.append((shown, odometry(at_us, BoatPose(0.0, 0.0, 0.0, roll_rad=roll, pitch_rad=pitch))))
+            evidence_message, _ = perceiver.perceive(eye.render(boat, 0.2 * number).bgr, header, 0.0)
+            pairs.append((evidence_message, odometry(at_us, BoatPose(0.0, 0.0, 0.0, roll_rad=roll, pitch_rad=pitch))))
     perceiver.close()
     mount = estimate_mount(waterline_observations(*zip(*pairs, strict=True)), config.calibration, 80.0)  # 63 to 106 m
     assert mount.pitch_down_deg == pytest.approx(down_deg, abs=0.3)

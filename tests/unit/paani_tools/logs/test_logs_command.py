@@ -21,7 +21,7 @@ from tests.unit.paani.logs.small_logs import NAME, START_US, about, finished, un
 ONE = "20231114T221320Z-1.mcap"
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+def output_of(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     """What the command prints when all is well."""
     assert main(["logs", *map(str, words)]) == 0
     return capsys.readouterr().out
@@ -36,12 +36,12 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 
 def test_info_tells_what_is_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = finished(tmp_path, 60)
-    text = told(capsys, "info", path)
+    text = output_of(capsys, "info", path)
     for words in ("2023-11-14 22:13:20 UTC, 3.0 s", "vessel otter", "profile paani", "paani 0"):
         assert words in text
     [line] = [line for line in text.splitlines() if line.startswith("localization/odometry")]
     assert line.split()[1:] == ["60", "20.00", "0.05", "0", "0"]
-    info = json.loads(told(capsys, "info", tmp_path, "--json"))
+    info = json.loads(output_of(capsys, "info", tmp_path, "--json"))
     assert info["start_us"] == START_US
     assert info["direction_changes_per_min"] is None
     assert {topic["topic"]: topic["messages"] for topic in info["topics"]}["camera/picture"] == 12
@@ -62,18 +62,18 @@ def test_an_unfinished_file_is_told_and_mended(tmp_path: Path, capsys: pytest.Ca
     printed = capsys.readouterr()
     assert "localization/odometry" in printed.out, "what can be read is told all the same"
     assert re.fullmatch(rf"paani: {path.name}: unfinished .*repair.*\n", printed.err)
-    assert "unfinished" in told(capsys, "list", tmp_path)
-    assert "messages kept" in told(capsys, "repair", path)
-    assert "nothing to repair" in told(capsys, "repair", path)
+    assert "unfinished" in output_of(capsys, "list", tmp_path)
+    assert "messages kept" in output_of(capsys, "repair", path)
+    assert "nothing to repair" in output_of(capsys, "repair", path)
     (tmp_path / f"{NAME}.keep").touch()
-    assert "finished, kept" in told(capsys, "list", tmp_path)
+    assert "finished, kept" in output_of(capsys, "list", tmp_path)
     assert open_log(path).problems == []
-    told(capsys, "info", path)
+    output_of(capsys, "info", path)
 
 
 def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = finished(tmp_path, 60), tmp_path / "tables"
-    assert "2 tables, 72 rows" in told(capsys, "export", path, "--csv", out)
+    assert "2 tables, 72 rows" in output_of(capsys, "export", path, "--csv", out)
     assert sorted(file.name for file in out.iterdir()) == ["camera_picture.csv", "localization_odometry.csv"]
     with (out / "localization_odometry.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -92,7 +92,7 @@ def test_tables_hold_nested_fields_and_lists(tmp_path: Path, capsys: pytest.Capt
     )  # fmt: skip
     put(log, keys.ADVISORY, advisory)
     log.finish({})
-    told(capsys, "export", log.path, "--csv", tmp_path / "t")
+    output_of(capsys, "export", log.path, "--csv", tmp_path / "t")
     with (tmp_path / "t" / "advisor_advisory.csv").open(encoding="utf-8", newline="") as file:
         [row] = csv.DictReader(file)
     assert (row["direction"], row["left.risk"], row["contributing_track_ids"]) == ("LEFT", "0.25", "[3,4]")
@@ -102,7 +102,7 @@ def test_tables_hold_nested_fields_and_lists(tmp_path: Path, capsys: pytest.Capt
 def test_tracks_for_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     gpxpy = pytest.importorskip("gpxpy")
     path = finished(tmp_path, 60)
-    told(capsys, "export", path, "--geojson", tmp_path / "t.geojson", "--gpx", tmp_path / "t.gpx")
+    output_of(capsys, "export", path, "--geojson", tmp_path / "t.geojson", "--gpx", tmp_path / "t.gpx")
     [feature] = json.loads((tmp_path / "t.geojson").read_text())["features"]
     assert feature["geometry"]["coordinates"][0] == [4.0, 52.0]
     assert len(feature["geometry"]["coordinates"]) == len(feature["properties"]["coordTimes"]) == 3

@@ -58,15 +58,15 @@ def test_readable_lines_and_annotated_pictures(
 ) -> None:
     """J12: advice and its explanation on one line; one annotated picture each, larger than the original."""
     assert main([str(folder), "--json"]) == 0
-    told = lines(capsys)
+    as_json = lines(capsys)
     out = tmp_path / "out"
     assert main([str(folder), "--out", str(out)]) == 0
     found = {Path(line.split("  ")[0]).stem: line for line in capsys.readouterr().out.splitlines()}
-    assert found.keys() == told.keys()
+    assert found.keys() == as_json.keys()
     for name, line in found.items():
-        assert str(told[name]["direction"]) in line
-        assert str(told[name]["reason"]) in line
-        assert line.endswith(str(told[name]["explanation"]))
+        assert str(as_json[name]["direction"]) in line
+        assert str(as_json[name]["reason"]) in line
+        assert line.endswith(str(as_json[name]["explanation"]))
     assert "UNUSABLE_IMAGE (black)  risk -" in found["black"]
     assert sorted(p.name for p in out.iterdir()) == ["black.jpg", "river.jpg", "white.jpg", "white_noise.jpg"]
     drawn = cv2.imread(str(out / "river.jpg"))
@@ -75,7 +75,7 @@ def test_readable_lines_and_annotated_pictures(
 
 
 def test_the_paper_goes_on_in_the_dark(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """J19: the `paper` profile has no gate, so black is judged by the nets."""
+    """J19: the `paper` profile has no image-quality check, so black is judged by the nets."""
     assert main([str(folder / "black.png"), "--json", "--profile", "paper"]) == 0
     assert lines(capsys)["black"]["usable"] is True
 
@@ -185,12 +185,12 @@ def test_a_sheet_of_many_is_spread_over_all_of_them() -> None:
     drawn = sheet.compose()
     assert drawn is not None
     rows = drawn.shape[0] // (THUMBNAIL_PX * 60 // 80 + GAP_PX)
-    shown = [
+    levels = [
         int(drawn[row * (THUMBNAIL_PX * 60 // 80 + GAP_PX) + 9, column * (THUMBNAIL_PX + GAP_PX) + 9, 0])
         for row in range(rows)
         for column in range(COLUMNS)
     ]
-    assert shown[:25] == list(range(0, 200, 8))
+    assert levels[:25] == list(range(0, 200, 8))
     assert rows * COLUMNS <= MOST
 
 

@@ -160,8 +160,8 @@ def _evidence(source_us: int, number: int, dice: random.Random) -> m.Evidence:
     seen = CLEAR
     if number % 25 > 12:
         x = 0.45 + 0.2 * math.sin(number / 40)
-        shown = (x, 0.35, min(1.0, x + 0.08), 0.45 + 0.02 * (number % 25 - 12))
-        seen = msgspec.structs.replace(CLEAR, detections=(msgspec.structs.replace(BUOY_AHEAD, box_xyxy=shown),))
+        box = (x, 0.35, min(1.0, x + 0.08), 0.45 + 0.02 * (number % 25 - 12))
+        seen = msgspec.structs.replace(CLEAR, detections=(msgspec.structs.replace(BUOY_AHEAD, box_xyxy=box),))
     elif number % 25 > 8:
         seen = water(0.1 + 0.3 * dice.random(), 0.3 + 0.4 * dice.random(), 0.1 + 0.5 * dice.random())
     if number % 60 == 59:

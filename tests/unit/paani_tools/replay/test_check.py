@@ -66,8 +66,8 @@ def test_every_decision_is_the_same_to_the_byte(service: str) -> None:
     assert result.decisions > 150
     assert result.steps >= result.decisions
     assert result.states >= 14  # recorded every two seconds, and the same as the one computed up to there
-    said = {topic.name for topic in decider_of(service).outputs}
-    recorded = [r for r in DRIVE if r.topic in said]
+    outputs = {topic.name for topic in decider_of(service).outputs}
+    recorded = [r for r in DRIVE if r.topic in outputs]
     assert result.messages == len(recorded)
     assert result.message_bytes == sum(len(r.data) for r in recorded)
 

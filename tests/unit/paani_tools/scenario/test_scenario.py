@@ -116,7 +116,7 @@ def test_a_single_picture_is_probed_five_times_too(folder: Path, capsys: pytest.
 
 
 def test_a_net_that_calls_black_water(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """J19, V15: without the gate the boat goes on into the dark; with it the same net cannot."""
+    """J19, V15: without the image-quality check the boat goes on into the dark; with it the same net cannot."""
     cv2.imwrite(str(tmp_path / "river.png"), river())
     net, out = tmp_path / "dark_is_water.onnx", tmp_path / "report.json"
     net.write_bytes(dark_is_water())
