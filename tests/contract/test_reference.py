@@ -66,6 +66,8 @@ def test_every_command_is_shown_with_its_options() -> None:
             assert f" paani {prefix}{point.name}\n" in page, point.name
     for command in commands():
         assert command.help.startswith(f"usage: {command.name}"), command.name
+    for sub_command in ("logs info", "route convert", "tune promote", "models train", "world render", "bench chain"):
+        assert f"\n### paani {sub_command}\n" in page
     for option in ("--sheet FILE", "--mission FILE", "--suite {", "--speed X"):
         assert option in page
 
