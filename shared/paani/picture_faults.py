@@ -1,4 +1,4 @@
-"""What goes wrong with a camera's picture, in five severities: for measuring the image-quality check and for simulated faults. Pure.
+"""What goes wrong with a camera's picture, in five severities: for measuring and for simulating faults. Pure.
 
 A fault is `fault(picture, severity, rng) -> picture`: BGR uint8 [H, W, 3] in and out, severity 1 to 5. Faults of
 geometry move what is seen, so they take a class mask along: `move(picture, mask, severity, rng)`.
