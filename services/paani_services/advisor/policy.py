@@ -285,8 +285,8 @@ def has_no_free_side(policy_input: PolicyInput) -> bool:
 def may_search(state: PolicyState, config: Config) -> bool:
     """Whether no way was free for `look_frames`, and the boat can turn on the spot by a map of what is around it."""
     needed = config.advisor.policy.look_frames
-    can_turn = _is_planner_active(config) and config.navigator.planner.turn_radius_m == 0.0
-    return can_turn and 0 < needed <= state.no_way_frames
+    can_search = config.is_planner_active and config.turns_on_the_spot
+    return can_search and 0 < needed <= state.no_way_frames
 
 
 def is_search_exhausted(state: PolicyState, config: Config) -> bool:
@@ -323,7 +323,7 @@ def fills_lane(obstacle: Obstacle, lane: str, config: Config) -> bool:
     if obstacle.box[3] < policy.occupancy_bottom:
         return False
     span = lane_span(lane, config.perception.corridors)
-    coverage = policy.planned_coverage if _is_planner_active(config) else policy.occupancy_coverage
+    coverage = policy.planned_coverage if config.is_planner_active else policy.occupancy_coverage
     return 0.0 < shared_width(obstacle.box, span) >= coverage * (span[1] - span[0])
 
 
@@ -340,7 +340,7 @@ def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
     if not obstacle.is_vessel or obstacle.presence < MIN_OCCUPYING_PRESENCE:
         return False
     policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
-    if _is_planner_active(config):
+    if config.is_planner_active:
         span = (policy.core_left, policy.core_right)
     return 0.0 < area(obstacle.box) * overlap(obstacle.box, span) >= policy.center_vessel_area
 
@@ -355,7 +355,7 @@ def reach_into_center(box: BoxXyxy, policy: PolicyConfig) -> str:
 def side_block_risk(config: Config) -> float:
     """The risk at which a side is blocked (J5); higher where the metric planner looks for a way between obstacles."""
     policy = config.advisor.policy
-    return policy.planned_side_block_risk if _is_planner_active(config) else policy.side_block_risk
+    return policy.planned_side_block_risk if config.is_planner_active else policy.side_block_risk
 
 
 def lane_risk_limit(lane: str, state: PolicyState, config: Config) -> float:
@@ -363,11 +363,6 @@ def lane_risk_limit(lane: str, state: PolicyState, config: Config) -> float:
     policy = config.advisor.policy
     limit = policy.center_block_risk if lane == "center" else side_block_risk(config)
     return max(0.0, limit - policy.release_margin) if state.blocked[LANES.index(lane)] else limit
-
-
-def _is_planner_active(config: Config) -> bool:
-    """Whether the metric planner acts, which finds out in metres whether there is room."""
-    return config.navigator.planner.acts_on(config.calibration)
 
 
 def _is_clear_gain(gain: Value, needed: float) -> Truth:

@@ -167,7 +167,7 @@ def obstacles_from_tracks(
     """
     settings = config.advisor.tracker
     open_lanes: tuple[str, ...] = ()
-    if config.navigator.planner.acts_on(config.calibration):
+    if config.is_planner_active:
         clear = 1.0 - config.advisor.policy.planned_coverage
         open_lanes = tuple(lane for lane in LANES if water[lane].clear_width > clear)
 
@@ -195,9 +195,7 @@ def lane_water(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
     if evidence.navigation_eligible and evidence.segmentation is SegmentationSource.LEARNED:
         found: LaneEvidence = getattr(evidence, lane)
         return found
-    return LaneEvidence(
-        non_water=config.perception.fallback_non_water, uncertainty=config.perception.fallback_uncertainty
-    )
+    return LaneEvidence(non_water=config.advisor.fallback_non_water, uncertainty=config.advisor.fallback_uncertainty)
 
 
 def lane_terms(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, config: Config) -> LaneTerms:

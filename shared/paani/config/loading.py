@@ -17,7 +17,11 @@ from paani.errors import UserError
 ENV_PREFIX = "PAANI_"
 NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
 # Earlier names of settings and sections, and their present ones: old files, `--set` paths and recordings still load.
-RENAMED_SETTINGS = {"perception.gate": "perception.image_quality"}
+RENAMED_SETTINGS = {
+    "perception.gate": "perception.image_quality",
+    "perception.fallback_non_water": "advisor.fallback_non_water",
+    "perception.fallback_uncertainty": "advisor.fallback_uncertainty",
+}
 
 
 def load_config(

@@ -9,12 +9,12 @@ PAPER: dict[str, object] = {
         "rate_hz": 0.5,  # J17
         "concurrent": False,  # B4
         "intra_op_threads": 2,  # C14, D11
-        "fallback_non_water": 0.5,  # F3, F4
-        "fallback_uncertainty": 0.5,
         "follow_roll": False,  # E3: corridors are fixed in the picture
         "image_quality": {"enabled": False},  # J19
     },
     "advisor": {
+        "fallback_non_water": 0.5,  # F3, F4
+        "fallback_uncertainty": 0.5,
         "evidence_max_age_s": 3.5,  # J16, M10: the advisory outlives its frame at 0.5 Hz
         "motion": {
             "follow_rate": False,  # I22
@@ -26,7 +26,7 @@ PAPER: dict[str, object] = {
         "risk": {"far_m": 0.0},  # J1: by the picture alone
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
         "policy": {
-            "side_change_margin": 0.0,  # J5, resolution 13: thresholds without memory
+            "side_change_margin": 0.0,  # J5: thresholds without memory
             "release_margin": 0.0,
             "dry": 1.0,  # J5: risk alone
             "look_frames": 0,  # J5: no side, no motion

@@ -65,6 +65,16 @@ class Config(Section, frozen=True):
             idle.add("recorder")
         return tuple(name for name in SERVICES if name not in idle)
 
+    @property
+    def is_planner_active(self) -> bool:
+        """Whether the metric planner chooses heading and speed: it is switched on, and the camera is calibrated."""
+        return self.navigator.planner.acts_on(self.calibration)
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Whether the boat can turn without making way: its turning radius is 0."""
+        return self.navigator.planner.turn_radius_m == 0.0
+
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)

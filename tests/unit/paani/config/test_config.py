@@ -62,6 +62,24 @@ def test_settings_under_an_earlier_name_still_load(tmp_path: Path) -> None:
         load_config(sets=["perception.gate.nothing=1"])
 
 
+RECORDED_BEFORE = b"""{"profile": "paper", "camera": {"rate_hz": 0.5},
+    "perception": {"rate_hz": 0.5, "fallback_non_water": 0.4, "fallback_uncertainty": 0.3, "gate": {"enabled": false}},
+    "advisor": {"evidence_max_age_s": 3.5, "motion": {"follow_rate": false, "history_s": 1.5, "min_duration_s": 0.4}},
+    "navigator": {"cruise_mps": 0.15, "planner": {"use": false}}, "controller": {"max_speed_mps": 0.3}}"""
+
+
+def test_the_water_of_an_ineligible_mask_loads_from_its_earlier_section(tmp_path: Path) -> None:
+    """It was a setting of perception, which never read it."""
+    recorded = decode_config(RECORDED_BEFORE)
+    assert (recorded.advisor.fallback_non_water, recorded.advisor.fallback_uncertainty) == (0.4, 0.3)
+    assert not recorded.perception.image_quality.enabled
+    assert not recorded.is_planner_active
+    file = tmp_path / "boat.toml"
+    file.write_text("[perception]\nfallback_non_water = 0.7\n")
+    loaded = load_config(file=file, profile="paper", sets=["perception.fallback_uncertainty=0.2"])
+    assert (loaded.advisor.fallback_non_water, loaded.advisor.fallback_uncertainty) == (0.7, 0.2)
+
+
 @pytest.mark.parametrize("content", ["[camera", "\x00", "camera = 3"])
 def test_a_bad_file_is_named(tmp_path: Path, content: str) -> None:
     file = tmp_path / "boat.toml"
