@@ -33,8 +33,8 @@ def settings(folder: Path, east_m: float) -> tuple[str, ...]:
     return tuple(f"navigator.{name}={folder / f'{name}.toml'}" for name in files)
 
 
-class Around:
-    """Everything the navigator hears, and what it says."""
+class NavigatorInputs:
+    """Publishes everything that the navigator receives, and collects its orders."""
 
     def __init__(self, buses: dict[str, Bus]) -> None:
         self.clock = buses["plant"].publisher(keys.SIM_TIME)
@@ -46,7 +46,7 @@ class Around:
         self.sim_us = 0
 
     async def until_under_way(self) -> list[int]:
-        """The leg of each order up to the first that moves."""
+        """The leg of each order, up to the first order that moves the boat."""
         legs: list[int] = []
         while True:
             now_us, self.sim_us = CLOCK.now_us(), self.sim_us + 50_000
@@ -67,31 +67,33 @@ class Around:
 BUSES = ("plant", "advisor", "localization", "dashboard", "observer")
 
 
-async def test_legs_follow_each_other_on_the_real_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
-    """Held for half a second of simulated time, then under way; the mission is on the bus for late joiners."""
-    around = Around({name: await open_as(name) for name in BUSES})
+async def test_legs_follow_each_other_on_the_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
+    """The boat holds its station for half a second of simulated time, then follows its route; both are published."""
+    inputs = NavigatorInputs({name: await open_as(name) for name in BUSES})
     async with spawn("navigator", *settings(tmp_path, 100.0)), asyncio.timeout(30):
-        legs = await around.until_under_way()
+        legs = await inputs.until_under_way()
     assert (legs[0], legs[-1]) == (0, 1)
-    mission = around.mission.value
+    mission = inputs.mission.value
     assert mission is not None
     assert [leg.kind for leg in mission.legs] == [m.LegKind.HOLD_STATION, m.LegKind.FOLLOW_ROUTE]
     assert len(mission.fence) == 1
 
 
-async def test_restarted_under_way_it_goes_on_with_its_leg(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
-    """The station is not held again; an operator whose own process is new has the mission from its beginning."""
+async def test_a_navigator_restarted_under_way_goes_on_with_its_leg(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path
+) -> None:
+    """The station is not held again; with a new run of the operator's process the mission begins anew."""
     buses = {name: await open_as(name) for name in BUSES}
-    around, sets = Around(buses), settings(tmp_path, 100.0)
+    inputs, sets = NavigatorInputs(buses), settings(tmp_path, 100.0)
     async with spawn("navigator", *sets), asyncio.timeout(30):
-        await around.until_under_way()
+        await inputs.until_under_way()
     await asyncio.sleep(0.6)
     async with spawn("navigator", *sets), asyncio.timeout(30):
-        assert set(await around.until_under_way()) == {1}
+        assert set(await inputs.until_under_way()) == {1}
     await buses["dashboard"].close()
     await asyncio.sleep(0.6)
-    anew = Around({**buses, "dashboard": await open_as("dashboard")})
-    anew.sim_us = around.sim_us
+    anew = NavigatorInputs({**buses, "dashboard": await open_as("dashboard")})
+    anew.sim_us = inputs.sim_us
     async with spawn("navigator", *sets), asyncio.timeout(30):
         assert (await anew.until_under_way())[0] == 0
 

@@ -1,4 +1,4 @@
-"""Wind and current on the whole guidance chain: plant, sensors, estimator, navigator, controller, adapter."""
+"""The guidance chain in wind and current: plant, sensors, estimator, navigator, controller, thrust adapter."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def windy_lake() -> World:
     )
 
 
-def off_m(boat: Lockstep) -> Iterator[float]:
+def cross_track_m(boat: Lockstep) -> Iterator[float]:
     boat.settle(60.0)
     for _ in boat.run(30.0):
         yield off_route_m(boat.world, boat.plant.position_m)
 
 
 def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None:
-    """The fence cuts the route: the plant's own position stays inside, whatever pushes, while the boat brakes."""
+    """The fence cuts the route: while the boat brakes, its true position stays inside in spite of wind and current."""
     boat = Lockstep(windy_lake, load_config(sets=PERFECT))
     start = boat.plant.position_m
     corners = [(start[0] + x, start[1] + y) for x, y in ((-18.0, -60.0), (40.0, -60.0), (40.0, 60.0), (-18.0, 60.0))]
@@ -50,13 +50,13 @@ def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None
     boat.plant.close()
 
 
-def test_wind_and_current_no_longer_push_the_boat_off_its_line(windy_lake: World) -> None:
-    """A minute after the start: without the integral the same boat is more than a metre off."""
+def test_the_integral_holds_the_line_against_wind_and_current(windy_lake: World) -> None:
+    """A minute after the start the boat is on its line; without the integral it is more than a metre off."""
     worst_m = {}
     for gain_mps in (0.0, 0.25):
         config = load_config(sets=(*PERFECT, f"navigator.crab_gain_mps={gain_mps}"))
         boat = Lockstep(windy_lake, config)
-        worst_m[gain_mps] = max(off_m(boat))
+        worst_m[gain_mps] = max(cross_track_m(boat))
         boat.plant.close()
     assert worst_m[0.25] < 0.25
     assert worst_m[0.0] > 1.0

@@ -58,9 +58,9 @@ class Lockstep:
         self.nav, self.ctl = NavigatorState(), ControllerState()
         self.adapter = ThrustAdapter(config.plant.adapter, DOMAIN)
         self.direction = Direction.STRAIGHT
-        self.advisory: Advisory | None = None  # said instead of a bare direction
-        self.heading_rad: float | None = None  # ordered instead of the navigator's
-        self.stands = False  # under orders
+        self.advisory: Advisory | None = None  # takes the place of `direction`
+        self.heading_rad: float | None = None  # takes the place of the navigator's
+        self.is_ordered_to_stand = False
         self.armed = True
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
@@ -97,7 +97,7 @@ class Lockstep:
     def _guide(self, now_us: int) -> None:
         arming = Arming(source_us=now_us, armed=self.armed)
         advisory = self.advisory or Advisory(source_us=now_us, direction=self.direction, reason=Reason.CENTER_CLEAR)
-        heard = NavigatorInputs(
+        inputs = NavigatorInputs(
             advisory=advisory,
             advisory_us=now_us,
             odometry=self.odometry,
@@ -107,10 +107,10 @@ class Lockstep:
             arming=arming,
             arming_us=now_us,
         )
-        self.nav, self.command = navigate(self.nav, heard, self.mission, now_us, DOMAIN, self.config.navigator)
+        self.nav, self.command = navigate(self.nav, inputs, self.mission, now_us, DOMAIN, self.config.navigator)
         if self.heading_rad is not None:
             self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)
-        if self.stands:
+        if self.is_ordered_to_stand:
             self.command = msgspec.structs.replace(self.command, speed_mps=0.0)
         self.ctl, thrust = compute_thrust(
             self.ctl,
@@ -141,12 +141,12 @@ def launch() -> Iterator[Launch]:
 
 
 def open_water(name: str) -> World:
-    """The world with nothing in the way: constant STRAIGHT advice would run into it."""
+    """The world without obstacles, which constant STRAIGHT advice would run into."""
     return dataclasses.replace(load_world(name), obstacles=(), actors=())
 
 
 def off_route_m(world: World, position_m: tuple[float, float]) -> float:
-    """True distance to the nearest leg."""
+    """Distance of the true position from the nearest leg."""
     here = np.array(position_m)
     legs = np.roll(world.route_m, -1, axis=0) - world.route_m
     part = ((here - world.route_m) * legs).sum(1) / (legs * legs).sum(1)
@@ -171,7 +171,7 @@ def test_l4_m3_follows_three_waypoints_of_the_lake(launch: Launch) -> None:
 
 
 @pytest.mark.parametrize("name", ["lake", "river"])
-def test_cruise_at_0_6_is_smooth_and_on_the_line(launch: Launch, name: str) -> None:
+def test_with_perfect_sensors_cruise_is_smooth_and_on_the_line(launch: Launch, name: str) -> None:
     """With a perfect GPS and compass the guidance itself stays within 0.15 m of the route."""
     perfect = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0")
     boat = launch(open_water(name), "paani", *perfect)
@@ -192,20 +192,20 @@ def mean_speed_mps(boat: Lockstep, settle_s: float, measure_s: float) -> float:
 
 
 def test_n3_paper_speed_loop_is_70_percent_off(launch: Launch) -> None:
-    """1a: with the paper's gains an order of 0.15 m/s gives 0.256 m/s."""
+    """N3: with the paper's gains an order of 0.15 m/s gives 0.256 m/s."""
     boat = launch(open_water("lake"), "paper")
     assert mean_speed_mps(boat, 30.0, 40.0) == pytest.approx(0.256, abs=0.006)
 
 
 @pytest.mark.parametrize("order_mps", [0.15, 0.3, 0.6, 0.9])
 def test_paani_holds_the_ordered_speed(launch: Launch, order_mps: float) -> None:
-    """1b #18: within 0.02 m/s of the order, estimator in the loop."""
+    """With our gains the speed is within 0.02 m/s of the order, with the estimator in the loop."""
     boat = launch(open_water("lake"), "paani", f"navigator.cruise_mps={order_mps}")
     assert mean_speed_mps(boat, 15.0, 40.0) == pytest.approx(order_mps, abs=0.02)
 
 
-def test_stuck_turn_ends_within_90_degrees_and_stops(launch: Launch) -> None:
-    """1b #15: constant LEFT from a moving boat; it comes to rest, and STRAIGHT sets it free."""
+def test_a_constant_left_ends_within_90_degrees_and_stops_the_boat(launch: Launch) -> None:
+    """The boat turns by 90 degrees and comes to rest; STRAIGHT lets it go on."""
     boat = launch(open_water("lake"))
     boat.settle(15.0)
     start_rad = boat.plant.attitude.yaw_rad
@@ -220,8 +220,8 @@ def test_stuck_turn_ends_within_90_degrees_and_stops(launch: Launch) -> None:
     assert boat.plant.velocity[0] > 0.5
 
 
-def test_m5_paper_turn_goes_round_and_round(launch: Launch) -> None:
-    """M5 as written: a constant LEFT turns the boat through more than a full circle."""
+def test_m5_a_constant_left_turns_the_paper_s_boat_in_circles(launch: Launch) -> None:
+    """M5: with the paper's profile a constant LEFT turns the boat through more than a full circle."""
     boat = launch(open_water("lake"), "paper")
     boat.settle(15.0)
     boat.direction = Direction.LEFT
@@ -243,8 +243,8 @@ def test_m8_advice_that_is_no_direction_stops_within_a_step(launch: Launch, advi
     assert abs(boat.plant.velocity[0]) < 0.02
 
 
-def test_a_boat_that_can_go_astern_turns_within_its_length(launch: Launch) -> None:
-    """Why it may: turned about before a quay, fans that only push carry it 2 m on."""
+def test_thrust_astern_turns_the_boat_within_its_length(launch: Launch) -> None:
+    """The reason for `controller.astern`: with fans that only push, the same turn carries the boat on."""
     ahead_m = {}
     for profile in ("paani", "fans"):
         boat = launch(open_water("lake"), profile, "navigator.cruise_mps=0.06")
@@ -262,26 +262,26 @@ def test_a_boat_that_can_go_astern_turns_within_its_length(launch: Launch) -> No
     assert ahead_m["fans"] > 1.3
 
 
-def test_a_boat_ordered_to_stand_takes_its_way_off(launch: Launch) -> None:
-    """Why `planner.brake_s`: zero thrust carries it on until drag has stopped it."""
+def test_thrust_astern_brakes_a_boat_that_is_ordered_to_stand(launch: Launch) -> None:
+    """The reason for `planner.brake_s`: with zero thrust only drag stops the boat, twice as far on."""
     way_m = {}
-    for stands in (True, False):
+    for is_ordered_to_stand in (True, False):
         boat = launch(open_water("lake"))
         boat.settle(15.0)
         start_m, brake_s = boat.plant.position_m, boat.config.navigator.planner.brake_s
-        boat.stands = stands
-        boat.direction = Direction.STRAIGHT if stands else Direction.STOP
+        boat.is_ordered_to_stand = is_ordered_to_stand
+        boat.direction = Direction.STRAIGHT if is_ordered_to_stand else Direction.STOP
         boat.settle(brake_s)
-        if stands:
+        if is_ordered_to_stand:
             assert boat.plant.velocity[0] < 0.1
         boat.direction = Direction.STOP
         boat.settle(10.0)
-        way_m[stands] = math.dist(start_m, boat.plant.position_m)
+        way_m[is_ordered_to_stand] = math.dist(start_m, boat.plant.position_m)
     assert way_m[True] < 0.5
     assert way_m[True] < 0.5 * way_m[False]
 
 
-def test_disarmed_boat_stays(launch: Launch) -> None:
+def test_a_disarmed_boat_does_not_move(launch: Launch) -> None:
     boat = launch(load_world("lake"))
     boat.armed = False
     boat.settle(20.0)

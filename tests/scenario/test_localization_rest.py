@@ -1,4 +1,4 @@
-"""L5: a receiver at a quay shows speed where there is none; a boat that leaves is not held."""
+"""L5: rest is detected although a receiver at a quay shows speed, and it ends when the boat leaves."""
 
 import itertools
 import math
@@ -15,23 +15,23 @@ from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.estimator import Estimator
 from paani_services.localization.nmea import fixes_from_sentences
 from tests.places import DATA
-from tests.unit.paani_services.localization.boat_ride import Ride, wandering
+from tests.unit.paani_services.localization.estimated_boat import EstimatedBoat, wandering
 
 LOGS = DATA / "logs"
 
 
-def speed_mps(said: Odometry) -> float:
-    return math.hypot(said.surge_mps, said.sway_mps)
+def speed_mps(estimate: Odometry) -> float:
+    return math.hypot(estimate.surge_mps, estimate.sway_mps)
 
 
 def longest(flags: list[bool]) -> int:
     return max((len(list(run)) for flag, run in itertools.groupby(flags) if flag), default=0)
 
 
-def at_quay(shown: list[GpsFix], *, tilt_mps2: float, seed: int = 1) -> Iterator[tuple[Odometry, GpsFix | None]]:
-    """The estimates of a boat whose IMU lies quiet, from the first fix on; and each fix when it comes."""
-    estimator, rng, waiting = Estimator(LocalizationConfig()), np.random.default_rng(seed), list(reversed(shown))
-    now_us = shown[0].source_us - 3_000_000
+def at_quay(fixes: list[GpsFix], *, tilt_mps2: float, seed: int = 1) -> Iterator[tuple[Odometry, GpsFix | None]]:
+    """Estimates from recorded fixes and a simulated IMU at rest, from the first fix on; and each fix in its turn."""
+    estimator, rng, waiting = Estimator(LocalizationConfig()), np.random.default_rng(seed), list(reversed(fixes))
+    now_us = fixes[0].source_us - 3_000_000
     while waiting:
         samples = []
         for noise in rng.standard_normal((5, 5)).tolist():
@@ -50,9 +50,9 @@ def at_quay(shown: list[GpsFix], *, tilt_mps2: float, seed: int = 1) -> Iterator
                 )
             )
         fix = waiting.pop() if waiting[-1].source_us <= now_us else None
-        _, said = estimator.step(samples, fix, now_us)
-        if fix is not None or len(waiting) < len(shown):
-            yield said, fix
+        _, estimate = estimator.step(samples, fix, now_us)
+        if fix is not None or len(waiting) < len(fixes):
+            yield estimate, fix
 
 
 @pytest.mark.data
@@ -62,15 +62,15 @@ def test_l5_a_recorded_moored_boat_is_not_read_as_motion() -> None:
 
     The IMU is mounted askew by 0.3 degrees.
     """
-    shown = list(fixes_from_sentences((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
-    assert sum(fix.sog_mps > 0.05 for fix in shown) > 0.9 * len(shown)
-    said = list(at_quay(shown, tilt_mps2=0.05))
-    moving = [speed_mps(each) > 0.05 for each, _ in said]
+    fixes = list(fixes_from_sentences((LOGS / "gps_moored.nmea").read_text("ascii").splitlines(), Counter()))
+    assert sum(fix.sog_mps > 0.05 for fix in fixes) > 0.9 * len(fixes)
+    estimates = list(at_quay(fixes, tilt_mps2=0.05))
+    moving = [speed_mps(each) > 0.05 for each, _ in estimates]
     assert sum(moving) < 0.02 * len(moving)
     assert longest(moving) < 6 * 20
-    assert sum(each.stopped for each, _ in said) > 0.97 * len(said)
+    assert sum(each.stopped for each, _ in estimates) > 0.97 * len(estimates)
     offs = []
-    for each, fix in said:
+    for each, fix in estimates:
         if fix is not None:
             x_m, y_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, each.latitude_deg, each.longitude_deg)
             offs.append(max(abs(x_m), abs(y_m)) / each.position_std_m)
@@ -78,9 +78,9 @@ def test_l5_a_recorded_moored_boat_is_not_read_as_motion() -> None:
     assert max(offs) < 3.5
 
 
-def noisy(std_m: float, speed_mps: float, seed: int = 1) -> Ride:
-    """A receiver of 1 Hz, as poor as it says."""
-    return Ride(
+def noisy(std_m: float, speed_mps: float, seed: int = 1) -> EstimatedBoat:
+    """A boat with a receiver of 1 Hz and this standard deviation."""
+    return EstimatedBoat(
         seed=seed,
         wander_m=std_m,
         fix_noise_m=0.1 * std_m,
@@ -91,66 +91,66 @@ def noisy(std_m: float, speed_mps: float, seed: int = 1) -> Ride:
 
 
 def test_l5_noise_of_gps_speed_is_no_motion_at_rest() -> None:
-    """L5: with 0.3 m/s of it the filter alone would never stop."""
+    """L5: with 0.3 m/s of noise the filter alone would never be at rest."""
     boat = noisy(5.0, 0.3)
-    said = boat.go(120.0)[200:]
-    assert all(each.stopped for each in said)
-    assert max(map(speed_mps, said)) < 0.05
+    estimates = boat.sail(120.0)[200:]
+    assert all(each.stopped for each in estimates)
+    assert max(map(speed_mps, estimates)) < 0.05
 
 
 def test_the_simulators_receiver_shows_no_motion_at_rest() -> None:
-    said = wandering().go(150.0)[200:]
-    moving = [speed_mps(each) > 0.05 for each in said]
+    estimates = wandering().sail(150.0)[200:]
+    moving = [speed_mps(each) > 0.05 for each in estimates]
     assert sum(moving) < 0.02 * len(moving)
     assert longest(moving) < 2 * 20
 
 
 @pytest.mark.parametrize("poor", [False, True])
 @pytest.mark.parametrize("surge_mps", [0.15, 0.6])
-def test_a_boat_that_casts_off_is_not_held(poor: bool, surge_mps: float) -> None:
-    """Its IMU feels it go: within 2 s it is under way, as slow as the paper's cruise."""
+def test_rest_ends_within_two_seconds_when_the_boat_sets_off(poor: bool, surge_mps: float) -> None:
+    """The IMU measures the start, even of a boat as slow as the paper's cruise."""
     boat = noisy(5.0, 0.3) if poor else wandering()
-    boat.go(30.0)
-    boat.go(2.0, surge_mps=surge_mps)
-    said = boat.go(20.0, surge_mps=surge_mps)
-    assert not any(each.stopped for each in said)
-    assert speed_mps(said[-1]) > 0.5 * surge_mps
+    boat.sail(30.0)
+    boat.sail(2.0, surge_mps=surge_mps)
+    estimates = boat.sail(20.0, surge_mps=surge_mps)
+    assert not any(each.stopped for each in estimates)
+    assert speed_mps(estimates[-1]) > 0.5 * surge_mps
 
 
-def test_a_boat_that_drifts_off_unfelt_is_not_held_by_a_good_receiver() -> None:
+def test_rest_ends_for_a_boat_that_drifts_off_too_slowly_for_its_imu() -> None:
     boat = wandering()
-    boat.go(30.0)
+    boat.sail(30.0)
     for step in range(1, 21):
-        boat.go(2.0, surge_mps=0.01 * step)  # 0.005 m/s^2
-    assert boat.glob.surge_mps > 0.1
-    assert not boat.glob.stopped
-    assert boat.off_m() < 3.0
+        boat.sail(2.0, surge_mps=0.01 * step)  # 0.005 m/s^2
+    assert boat.global_estimate.surge_mps > 0.1
+    assert not boat.global_estimate.stopped
+    assert boat.error_m() < 3.0
 
 
 def test_steady_slow_motion_is_never_taken_for_rest() -> None:
-    """Half the paper's cruise, in a calm, begun while the gyro was calibrated: nothing is felt for minutes."""
+    """Half the paper's cruise, begun during the calibration of the gyro: the IMU measures nothing for minutes."""
     boat = wandering()
-    boat.go(15.0, surge_mps=0.075)
-    said = boat.go(120.0, surge_mps=0.075)
-    assert sum(each.stopped for each in said) == 0
-    assert boat.off_m() < 2.5
+    boat.sail(15.0, surge_mps=0.075)
+    estimates = boat.sail(120.0, surge_mps=0.075)
+    assert sum(each.stopped for each in estimates) == 0
+    assert boat.error_m() < 2.5
 
 
 def test_rest_is_found_again_after_a_voyage() -> None:
     boat = wandering()
-    boat.go(20.0)
-    boat.go(60.0, surge_mps=0.6)
-    said = boat.go(30.0)
-    assert said[-1].stopped
-    assert sum(each.stopped for each in said) > 15 * 20
+    boat.sail(20.0)
+    boat.sail(60.0, surge_mps=0.6)
+    estimates = boat.sail(30.0)
+    assert estimates[-1].stopped
+    assert sum(each.stopped for each in estimates) > 15 * 20
 
 
-def test_an_imu_without_noise_is_no_proof_of_rest() -> None:
-    """One that repeats itself is broken: the receiver is believed."""
+def test_an_imu_without_noise_does_not_keep_rest() -> None:
+    """An IMU that repeats one sample is broken, so the receiver decides."""
     boat = wandering()
-    boat.go(30.0)
+    boat.sail(30.0)
     frozen = boat.sample(0.0, 0.0)
     boat.change = lambda samples: [msgspec.structs.replace(frozen, source_us=each.source_us) for each in samples]
-    boat.go(5.0, surge_mps=0.5)
-    said = boat.go(10.0, surge_mps=0.5)
-    assert not said[-1].stopped or not said[-1].healthy
+    boat.sail(5.0, surge_mps=0.5)
+    estimates = boat.sail(10.0, surge_mps=0.5)
+    assert not estimates[-1].stopped or not estimates[-1].healthy

@@ -91,7 +91,7 @@ class RestDetector:
         self._rest_position_m = (x_m + gain * (fix.x_m - x_m), y_m + gain * (fix.y_m - y_m))
 
     def _find_rest(self, recent: list[MapFix]) -> None:
-        """Begin rest if IMU and fixes allow it; a boat that its IMU never felt move needs less from the fixes."""
+        """Begin rest if IMU and fixes allow it; a boat whose IMU never measured motion needs less from the fixes."""
         fixes = self._fixes
         if self._motion[-1].at_us - self._motion[0].at_us < 0.9 * QUIET_S * 1e6:
             return

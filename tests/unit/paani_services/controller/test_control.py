@@ -1,4 +1,4 @@
-"""Heading and speed to thrust (N1-N8): order of operations, signs, limits, and what stops it."""
+"""From heading and speed to thrust (N1-N8): order of operations, signs, limits, and the reasons for zero."""
 
 import math
 
@@ -49,7 +49,7 @@ def run(
 
 
 def settle(config: ControllerConfig, order: NavCommand, pose: Odometry, steps: int = 60) -> Thrust:
-    """The same inputs again and again, so that slew no longer matters."""
+    """The thrust after the same inputs for so many steps that the slew limit no longer matters."""
     state, message = run(config, order, pose)
     for n in range(1, steps):
         now_us = NOW_US + n * 100_000
@@ -94,7 +94,7 @@ def test_n6_slew_limits_each_fan_both_ways() -> None:
     assert (thrust.left, thrust.right) == pytest.approx((0.035, 0.015))
 
 
-def test_a_stop_is_never_slewed() -> None:
+def test_a_stop_is_zero_at_once_without_slew_limit() -> None:
     start = ControllerState(left=0.08, right=0.08, integral=0.01, last_us=NOW_US - 100_000)
     state, thrust = run(PAPER, command(enable=False, inhibits=(Inhibit.ADVISED_STOP,)), odometry(), start)
     assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)
@@ -118,7 +118,9 @@ def test_a_stop_is_never_slewed() -> None:
         (command(domain=44), odometry(), Inhibit.WRONG_DOMAIN),
     ],
 )
-def test_b11_what_stops_it(given_command: NavCommand | None, given_odometry: Odometry | None, inhibit: Inhibit) -> None:
+def test_b11_an_invalid_order_or_estimate_gives_zero_thrust(
+    given_command: NavCommand | None, given_odometry: Odometry | None, inhibit: Inhibit
+) -> None:
     """B11: heading, speed, enable, frame and validity are checked together."""
     _, thrust = run(PAANI, given_command, given_odometry)
     assert inhibit in thrust.inhibits
@@ -133,15 +135,15 @@ def test_receipt_ages_are_bounded() -> None:
     assert thrust.inhibits == (Inhibit.STALE_ODOMETRY,)
 
 
-def test_stamps_pass_through() -> None:
-    """The plant judges age by the stamp it issued; latency is measured from the evidence."""
+def test_the_order_s_stamps_pass_through() -> None:
+    """The plant judges age by its own stamp; latency is measured from the evidence."""
     _, thrust = run(PAANI, command(), odometry())
     assert (thrust.echo_us, thrust.source_us) == (123, NOW_US - 300_000)
     assert thrust.command_sent_us == NOW_US - 20_000
 
 
 def test_l5_speed_noise_at_rest_turns_no_fan() -> None:
-    """L5: the stopped-speed guard; without it the noise would be pushed against."""
+    """L5: a boat that is stopped gets no thrust against the noise of its speed."""
     still = command(speed_mps=0.0)
     guarded = settle(PAPER, still, odometry(surge_mps=-0.04, stopped=True))
     unguarded = settle(PAPER, still, odometry(surge_mps=-0.04, stopped=False))
@@ -151,13 +153,13 @@ def test_l5_speed_noise_at_rest_turns_no_fan() -> None:
 
 @pytest.mark.parametrize("speed_mps", [0.15, 0.3, 0.6, 0.9])
 def test_drag_inverse_feed_forward(speed_mps: float) -> None:
-    """1b #18: at the ordered speed the fans give exactly the drag, (4 v + 20 v^2) / 150."""
+    """At the ordered speed the fans give exactly the drag of the hull, (4 v + 20 v^2) / 150."""
     thrust = settle(PAANI, command(speed_mps=speed_mps), odometry(surge_mps=speed_mps))
     assert thrust.left == pytest.approx((4.0 * speed_mps + 20.0 * speed_mps**2) / 150.0)
 
 
-def test_integral_does_not_wind_up() -> None:
-    """A boat held fast for a minute gets full forward thrust and leaves no debt to work off."""
+def test_the_integral_does_not_wind_up_while_saturated() -> None:
+    """A boat held fast for a minute has full forward thrust and an integral of zero."""
     state = REST
     for n in range(600):
         now_us = NOW_US + n * 100_000
@@ -201,13 +203,13 @@ def test_thrust_is_bounded_and_in_the_paper_never_astern(
 
 @pytest.mark.parametrize(("heading_rad", "fans"), [(1.5, (-0.10, 0.10)), (-1.5, (0.10, -0.10))])
 def test_a_turn_at_rest_is_a_pure_couple(heading_rad: float, fans: tuple[float, float]) -> None:
-    """As much astern as ahead: the boat turns where it lies."""
+    """One fan pushes as much astern as the other ahead: the boat turns on the spot."""
     thrust = settle(PAANI, command(heading_rad=heading_rad, speed_mps=0.0), odometry(surge_mps=0.0))
     assert (thrust.left, thrust.right) == pytest.approx(fans)
 
 
 def test_a_boat_faster_than_ordered_brakes() -> None:
-    """Astern on both sides, and no further than `astern`; fans that only push are off."""
+    """Both fans push astern, at most `astern`; fans that only push are off."""
     fast = odometry(surge_mps=0.9)
     braking = settle(PAANI, command(speed_mps=0.06), fast)
     assert -PAANI.astern <= braking.left == braking.right < 0.0
@@ -215,8 +217,8 @@ def test_a_boat_faster_than_ordered_brakes() -> None:
     assert (pushing.left, pushing.right) == (0.0, 0.0)
 
 
-def test_who_is_told_to_stop_is_not_driven_astern() -> None:
-    """A stop is zero thrust at once, whatever the fans did and however fast the boat is."""
+def test_a_disabled_order_is_not_driven_astern() -> None:
+    """A disabled order is zero thrust at once, whatever the fans did and however fast the boat is."""
     start = ControllerState(integral=-0.03, left=-0.1, right=-0.1, last_us=NOW_US - 100_000)
     _, thrust = run(PAANI, command(enable=False, speed_mps=0.0), odometry(surge_mps=0.9), start)
     assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)

@@ -33,7 +33,7 @@ def test_the_checksum_of_a_published_example() -> None:
     assert sentence("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,").strip().endswith("*47")
 
 
-def test_rmc_after_gga_is_a_fix_with_its_spread() -> None:
+def test_rmc_after_gga_is_a_fix_with_the_standard_deviation_of_its_hdop() -> None:
     (fix,), drops = all_fixes(GGA, RMC)
     assert fix.fix
     assert (fix.latitude_deg, fix.longitude_deg) == pytest.approx((48.1173, -11.516667), abs=1e-6)
@@ -44,7 +44,7 @@ def test_rmc_after_gga_is_a_fix_with_its_spread() -> None:
     assert not drops
 
 
-def test_without_hdop_the_spread_is_more_than_a_boat_may_sail_by() -> None:
+def test_without_hdop_the_standard_deviation_is_too_large_for_guidance() -> None:
     (fix,), _ = all_fixes(RMC)
     assert fix.position_std_m == UNKNOWN_STD_M > 8.0
 
@@ -90,7 +90,7 @@ def test_a_receiver_at_rest_that_shows_no_course_has_no_speed() -> None:
         sentence("GPRMC," + "1" * 300),
     ],
 )
-def test_a_damaged_sentence_is_counted_and_passed_over(line: str) -> None:
+def test_a_damaged_sentence_is_counted_and_skipped(line: str) -> None:
     found, drops = all_fixes(line, RMC)
     assert len(found) == 1
     assert drops == {"nmea_damaged": 1}
@@ -106,7 +106,7 @@ def test_time_goes_forward_past_midnight_and_never_back() -> None:
 
 
 @given(st.text(max_size=150) | st.builds(sentence, st.text(max_size=90).map(lambda text: "GPRMC," + text)))
-def test_whatever_a_wire_brings_is_none_or_a_value_error(line: str) -> None:
+def test_any_text_gives_no_fix_or_one_that_can_be_sent(line: str) -> None:
     found, _ = all_fixes(line)
     for fix in found:
         assert msgspec.json.decode(msgspec.json.encode(fix), type=GpsFix) == fix
@@ -139,7 +139,7 @@ def test_a_written_fix_is_read_back(
 @pytest.mark.data
 @pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
 @pytest.mark.parametrize(("name", "count", "top_mps"), [("gps_moored.nmea", 599, 2.0), ("plaka_sail.nmea", 3625, 5.0)])
-def test_recorded_logs_are_read_whole(name: str, count: int, top_mps: float) -> None:
+def test_recorded_logs_are_read_to_the_end(name: str, count: int, top_mps: float) -> None:
     """RMC with GGA from a USB receiver, and GLL with VTG from a yacht's instruments."""
     found, drops = all_fixes(*(LOGS / name).read_text("ascii").splitlines())
     assert len(found) == count

@@ -1,4 +1,4 @@
-"""A boat for guidance alone: it turns and gathers way with a lag, drifts with the water, and hears `navigate`."""
+"""A simulated boat for guidance alone: it turns and accelerates with a lag, drifts with the water, obeys `navigate`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ START_US = 1_000_000
 
 
 class DriftingBoat:
-    """`drift_mps` towards east and north moves it whatever it does. Position and speed are estimated without error."""
+    """`drift_mps` is the drift of the water, east and north. Position and speed are estimated without error."""
 
     def __init__(
         self,
@@ -46,21 +46,21 @@ class DriftingBoat:
         return self.x_m, self.y_m
 
     def run(self, seconds: float) -> Iterator[NavCommand]:
-        """Advance, yielding each order at 10 Hz."""
+        """Advance, and yield each order at 10 Hz."""
         for _ in range(round(seconds / STEP_S)):
             self.now_us += round(STEP_S * 1e6)
-            self.state, self.order = navigate(self.state, self._heard(), self.mission, self.now_us, 43, self.config)
+            self.state, self.order = navigate(self.state, self._inputs(), self.mission, self.now_us, 43, self.config)
             self._move(self.order)
             yield self.order
 
     def settle(self, seconds: float) -> NavCommand:
-        """Advance; the last order."""
+        """Advance, and return the last order."""
         for _ in self.run(seconds):
             pass
         assert self.order is not None
         return self.order
 
-    def _heard(self) -> NavigatorInputs:
+    def _inputs(self) -> NavigatorInputs:
         now_us, yaw_rad = self.now_us, self.yaw_rad
         east_mps, north_mps = self.drift_mps
         return NavigatorInputs(
@@ -86,7 +86,7 @@ class DriftingBoat:
         wanted_mps = order.speed_mps if order.enable else 0.0
         self.speed_mps += (wanted_mps - self.speed_mps) * STEP_S / SPEED_LAG_S
         if order.enable:
-            off_rad = wrap_rad(order.heading_rad - self.yaw_rad)
-            self.yaw_rad += clip(off_rad / TURN_LAG_S, -TURN_RADPS, TURN_RADPS) * STEP_S
+            error_rad = wrap_rad(order.heading_rad - self.yaw_rad)
+            self.yaw_rad += clip(error_rad / TURN_LAG_S, -TURN_RADPS, TURN_RADPS) * STEP_S
         self.x_m += (self.speed_mps * math.cos(self.yaw_rad) + self.drift_mps[0]) * STEP_S
         self.y_m += (self.speed_mps * math.sin(self.yaw_rad) + self.drift_mps[1]) * STEP_S

@@ -1,4 +1,4 @@
-"""Advice and route to one order (M1-M11)."""
+"""From advice and route to one order (M1-M11)."""
 
 import math
 
@@ -44,7 +44,7 @@ def at_waypoint(target: int, reached: int = 0) -> NavigatorState:
     )
 
 
-def heard(now_us: int = NOW_US, /, **changes: object) -> NavigatorInputs:
+def inputs(now_us: int = NOW_US, /, **changes: object) -> NavigatorInputs:
     message = NavigatorInputs(
         advisory=advice(Direction.STRAIGHT, now_us),
         advisory_us=now_us,
@@ -67,38 +67,38 @@ def pose(x_m: float, y_m: float, yaw_rad: float = 0.0, source_us: int = NOW_US) 
 
 
 def run(
-    config: NavigatorConfig, given_heard: NavigatorInputs, state: NavigatorState = RUNNING, now_us: int = NOW_US
+    config: NavigatorConfig, given_inputs: NavigatorInputs, state: NavigatorState = RUNNING, now_us: int = NOW_US
 ) -> tuple[NavigatorState, NavCommand]:
-    return navigate(state, given_heard, mission_of_route(SQUARE), now_us, 43, config)
+    return navigate(state, given_inputs, mission_of_route(SQUARE), now_us, 43, config)
 
 
-class Drill:
-    """Repeats `navigate` at 10 Hz while the simulated clock runs."""
+class GuidanceRun:
+    """Calls `navigate` at 10 Hz while the simulated clock runs."""
 
     def __init__(self, config: NavigatorConfig, state: NavigatorState = RUNNING) -> None:
         self.config, self.state, self.now_us = config, state, NOW_US
 
     def order(self, direction: Direction, at: Odometry, route: Route = SQUARE) -> NavCommand:
         self.now_us += 100_000
-        given_heard = heard(
+        given_inputs = inputs(
             self.now_us,
             advisory=advice(direction, self.now_us),
             odometry=msgspec.structs.replace(at, source_us=self.now_us),
         )
-        self.state, command = navigate(self.state, given_heard, mission_of_route(route), self.now_us, 43, self.config)
+        self.state, command = navigate(self.state, given_inputs, mission_of_route(route), self.now_us, 43, self.config)
         return command
 
 
 def test_m4_straight_is_the_waypoint_bearing() -> None:
     """M4: atan2(y_w - y, x_w - x), at cruise speed."""
-    _, order = run(PAPER, heard(odometry=pose(3.0, -2.0)))
+    _, order = run(PAPER, inputs(odometry=pose(3.0, -2.0)))
     assert order.heading_rad == pytest.approx(math.atan2(2.0, 7.0))
     assert (order.enable, order.speed_mps, order.inhibits) == (True, 0.15, ())
 
 
-def test_paani_steers_back_onto_the_leg() -> None:
+def test_line_of_sight_steers_back_onto_the_leg() -> None:
     """Line of sight: 2 m right of the leg with 4 m look-ahead steers atan(2/4) to the left."""
-    _, order = run(PAANI, heard(odometry=pose(3.0, -2.0)))
+    _, order = run(PAANI, inputs(odometry=pose(3.0, -2.0)))
     assert order.heading_rad == pytest.approx(math.atan2(2.0, 4.0))
     assert order.cross_track_m == pytest.approx(-2.0)
     assert order.speed_mps == 0.6
@@ -115,9 +115,9 @@ def test_paani_steers_back_onto_the_leg() -> None:
 )
 @pytest.mark.parametrize("config", [PAPER, PAANI])
 def test_m5_m6_m7_visual_turns(config: NavigatorConfig, direction: Direction, turn_deg: float) -> None:
-    """M5, M6: current yaw +/- 25 or 10 deg; M7, 1b #16: half of cruise, slight turns too."""
+    """M5, M6: current yaw +/- 25 or 10 deg; M7: half of cruise, in slight turns too."""
     at = pose(3.0, 0.0, yaw_rad=3.1)
-    _, order = run(config, heard(odometry=at, advisory=advice(direction)))
+    _, order = run(config, inputs(odometry=at, advisory=advice(direction)))
     wanted = 3.1 + math.radians(turn_deg)
     assert math.cos(order.heading_rad - wanted) == pytest.approx(1.0)
     assert -math.pi <= order.heading_rad < math.pi
@@ -125,131 +125,131 @@ def test_m5_m6_m7_visual_turns(config: NavigatorConfig, direction: Direction, tu
 
 
 def test_m5_paper_turns_are_continuous() -> None:
-    """1b #15: in the paper's profile the order moves on with the boat's yaw, without end."""
-    drill = Drill(PAPER)
+    """M5: in the paper's profile the ordered heading moves on with the boat's yaw, without end."""
+    run_10_hz = GuidanceRun(PAPER)
     for step in range(40):
         yaw_rad = 0.1 * step
-        order = drill.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad))
+        order = run_10_hz.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad))
         assert math.cos(order.heading_rad - yaw_rad) == pytest.approx(math.cos(math.radians(25.0)))
         assert order.enable
 
 
-def test_paani_turns_are_latched() -> None:
-    """1b #15: the heading stays while the boat comes round to it."""
-    drill = Drill(PAANI)
+def test_latched_turns_keep_their_heading() -> None:
+    """The ordered heading stays while the boat turns towards it."""
+    run_10_hz = GuidanceRun(PAANI)
     for step in range(4):
-        order = drill.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad=0.08 * step))
+        order = run_10_hz.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad=0.08 * step))
         assert order.heading_rad == pytest.approx(math.radians(25.0))
 
 
-def test_paani_adds_a_turn_only_after_holding_the_first() -> None:
-    drill = Drill(PAANI)
-    drill.order(Direction.LEFT, pose(3.0, 0.0))
+def test_latched_turns_add_the_next_turn_only_after_holding_the_first() -> None:
+    run_10_hz = GuidanceRun(PAANI)
+    run_10_hz.order(Direction.LEFT, pose(3.0, 0.0))
     on_heading = pose(3.0, 0.0, yaw_rad=math.radians(25.0))
-    orders = [drill.order(Direction.LEFT, on_heading) for _ in range(18)]
+    orders = [run_10_hz.order(Direction.LEFT, on_heading) for _ in range(18)]
     assert orders[14].heading_rad == pytest.approx(math.radians(25.0))
     assert orders[17].heading_rad == pytest.approx(math.radians(50.0))
 
 
 @pytest.mark.parametrize("direction", [Direction.LEFT, Direction.RIGHT, Direction.SLIGHT_RIGHT])
 def test_a_stuck_detection_cannot_spin_the_boat(direction: Direction) -> None:
-    """1b #15: no order lies more than 90 deg from where the run of turns began, then TURN_CAPPED."""
-    drill, yaw_rad, steps = Drill(PAANI), 2.0, 0
-    while (order := drill.order(direction, pose(3.0, 0.0, yaw_rad))).enable:
+    """No order lies more than 90 deg from the yaw at which the turn began; then TURN_CAPPED."""
+    run_10_hz, yaw_rad, steps = GuidanceRun(PAANI), 2.0, 0
+    while (order := run_10_hz.order(direction, pose(3.0, 0.0, yaw_rad))).enable:
         steps += 1
         assert steps < 600
         off = (order.heading_rad - 2.0 + math.pi) % (2.0 * math.pi) - math.pi
         assert abs(off) <= math.radians(90.0) + 1e-9
         yaw_rad = order.heading_rad
     assert order.inhibits == (Inhibit.TURN_CAPPED,)
-    assert drill.order(Direction.STOP, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.ADVISED_STOP,)
-    assert drill.order(direction, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.TURN_CAPPED,)
-    assert drill.order(Direction.STRAIGHT, pose(3.0, 0.0, yaw_rad)).enable
-    assert drill.order(direction, pose(3.0, 0.0, yaw_rad)).enable
+    assert run_10_hz.order(Direction.STOP, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.ADVISED_STOP,)
+    assert run_10_hz.order(direction, pose(3.0, 0.0, yaw_rad)).inhibits == (Inhibit.TURN_CAPPED,)
+    assert run_10_hz.order(Direction.STRAIGHT, pose(3.0, 0.0, yaw_rad)).enable
+    assert run_10_hz.order(direction, pose(3.0, 0.0, yaw_rad)).enable
 
 
-def test_turn_back_is_allowed_at_the_cap() -> None:
-    drill = Drill(PAANI)
-    drill.order(Direction.LEFT, pose(3.0, 0.0))
-    order = drill.order(Direction.RIGHT, pose(3.0, 0.0, yaw_rad=math.radians(88.0)))
+def test_a_turn_back_is_allowed_at_the_limit_of_the_turn() -> None:
+    run_10_hz = GuidanceRun(PAANI)
+    run_10_hz.order(Direction.LEFT, pose(3.0, 0.0))
+    order = run_10_hz.order(Direction.RIGHT, pose(3.0, 0.0, yaw_rad=math.radians(88.0)))
     assert order.enable
     assert order.heading_rad == pytest.approx(math.radians(63.0))
 
 
 @pytest.mark.parametrize("direction", [Direction.LEFT, Direction.SLIGHT_LEFT])
-def test_the_route_is_not_resumed_into_what_was_just_passed(direction: Direction) -> None:
-    """Turned left, away from something: the way back to the right waits until `clear_m` further on."""
-    drill, yaw_rad = Drill(PAANI), math.radians(30.0)
-    drill.order(direction, pose(3.0, 1.0, yaw_rad))
-    beside = drill.order(Direction.STRAIGHT, pose(4.0, 1.5, yaw_rad))
+def test_the_course_does_not_turn_back_towards_a_passed_obstacle(direction: Direction) -> None:
+    """After a turn to the left, away from an obstacle, the course turns right again only `clear_m` further on."""
+    run_10_hz, yaw_rad = GuidanceRun(PAANI), math.radians(30.0)
+    run_10_hz.order(direction, pose(3.0, 1.0, yaw_rad))
+    beside = run_10_hz.order(Direction.STRAIGHT, pose(4.0, 1.5, yaw_rad))
     assert beside.heading_rad == pytest.approx(yaw_rad)
-    past = drill.order(Direction.STRAIGHT, pose(3.0 + PAANI.clear_m, 3.0, yaw_rad))
+    past = run_10_hz.order(Direction.STRAIGHT, pose(3.0 + PAANI.clear_m, 3.0, yaw_rad))
     assert past.heading_rad < 0.0
 
 
-def test_an_occupied_side_is_kept_off_while_going_straight() -> None:
-    drill = Drill(PAANI)
+def test_the_course_does_not_turn_towards_an_occupied_side() -> None:
+    run_10_hz = GuidanceRun(PAANI)
     occupied = msgspec.structs.replace(advice(Direction.STRAIGHT), right=LaneRisk(occupied=True))
     at = pose(3.0, 2.0)
-    given_heard = heard(drill.now_us, advisory=occupied, odometry=at)
-    _, command = navigate(RUNNING, given_heard, mission_of_route(SQUARE), drill.now_us, 43, PAANI)
+    given_inputs = inputs(run_10_hz.now_us, advisory=occupied, odometry=at)
+    _, command = navigate(RUNNING, given_inputs, mission_of_route(SQUARE), run_10_hz.now_us, 43, PAANI)
     assert command.heading_rad == 0.0
-    open_water = heard(drill.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
-    assert navigate(RUNNING, open_water, mission_of_route(SQUARE), drill.now_us, 43, PAANI)[1].heading_rad < 0.0
-    assert navigate(RUNNING, given_heard, mission_of_route(SQUARE), drill.now_us, 43, PAPER)[1].heading_rad < 0.0
+    open_water = inputs(run_10_hz.now_us, advisory=advice(Direction.STRAIGHT), odometry=at)
+    assert navigate(RUNNING, open_water, mission_of_route(SQUARE), run_10_hz.now_us, 43, PAANI)[1].heading_rad < 0.0
+    assert navigate(RUNNING, given_inputs, mission_of_route(SQUARE), run_10_hz.now_us, 43, PAPER)[1].heading_rad < 0.0
 
 
 def test_m2_acceptance_radius_and_m3_repeat() -> None:
     """M2: 1 m; M3: after the last waypoint comes the first."""
-    drill = Drill(PAPER)
-    assert drill.order(Direction.STRAIGHT, pose(8.9, 0.0)).waypoint_index == 1
-    assert drill.order(Direction.STRAIGHT, pose(9.1, 0.0)).waypoint_index == 2
-    order = drill.order(Direction.STRAIGHT, pose(9.8, 9.8))
+    run_10_hz = GuidanceRun(PAPER)
+    assert run_10_hz.order(Direction.STRAIGHT, pose(8.9, 0.0)).waypoint_index == 1
+    assert run_10_hz.order(Direction.STRAIGHT, pose(9.1, 0.0)).waypoint_index == 2
+    order = run_10_hz.order(Direction.STRAIGHT, pose(9.8, 9.8))
     assert (order.waypoint_index, order.waypoints_reached) == (3, 2)
-    order = drill.order(Direction.STRAIGHT, pose(0.5, 10.0))
+    order = run_10_hz.order(Direction.STRAIGHT, pose(0.5, 10.0))
     assert (order.waypoint_index, order.waypoints_reached) == (0, 3)
 
 
-def test_m1_waypoint_is_kept_during_visual_turns() -> None:
+def test_m1_the_target_waypoint_is_kept_during_visual_turns() -> None:
     """M1: passing through the waypoint in a turn does not change the target."""
-    drill = Drill(PAANI)
-    assert drill.order(Direction.LEFT, pose(10.0, 0.0)).waypoint_index == 1
-    assert drill.order(Direction.STOP, pose(10.0, 0.0)).waypoint_index == 1
-    assert drill.order(Direction.STRAIGHT, pose(10.0, 0.0)).waypoint_index == 2
+    run_10_hz = GuidanceRun(PAANI)
+    assert run_10_hz.order(Direction.LEFT, pose(10.0, 0.0)).waypoint_index == 1
+    assert run_10_hz.order(Direction.STOP, pose(10.0, 0.0)).waypoint_index == 1
+    assert run_10_hz.order(Direction.STRAIGHT, pose(10.0, 0.0)).waypoint_index == 2
 
 
-def test_waypoint_left_abeam_counts_in_paani_only() -> None:
-    """A waypoint that an obstacle covers is passed, not orbited."""
-    assert Drill(PAANI).order(Direction.STRAIGHT, pose(8.0, 1.0)).waypoint_index == 1
+def test_a_waypoint_left_abeam_counts_as_reached_but_not_in_the_paper() -> None:
+    """A waypoint that an obstacle covers is passed, not circled."""
+    assert GuidanceRun(PAANI).order(Direction.STRAIGHT, pose(8.0, 1.0)).waypoint_index == 1
     past = pose(10.5, 3.0)
-    assert Drill(PAANI).order(Direction.STRAIGHT, past).waypoint_index == 2
-    assert Drill(PAPER).order(Direction.STRAIGHT, past).waypoint_index == 1
+    assert GuidanceRun(PAANI).order(Direction.STRAIGHT, past).waypoint_index == 2
+    assert GuidanceRun(PAPER).order(Direction.STRAIGHT, past).waypoint_index == 1
     far = pose(10.5, -7.0)
-    assert Drill(PAANI).order(Direction.STRAIGHT, far).waypoint_index == 1
+    assert GuidanceRun(PAANI).order(Direction.STRAIGHT, far).waypoint_index == 1
 
 
-def test_beyond_its_end_no_line_leads_the_boat_away() -> None:
+def test_past_the_end_of_a_leg_the_course_is_the_bearing_of_its_waypoint() -> None:
     """Far past the last waypoint of an open route the boat turns back to it."""
     route = msgspec.structs.replace(SQUARE, waypoints=SQUARE.waypoints[:2], repeat=False)
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
-    order = drill.order(Direction.STRAIGHT, pose(30.0, 0.0), route)
+    run_10_hz = GuidanceRun(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
+    order = run_10_hz.order(Direction.STRAIGHT, pose(30.0, 0.0), route)
     assert (order.enable, order.waypoints_reached) == (True, 0)
     assert abs(order.heading_rad) == pytest.approx(math.pi)
 
 
 def test_joins_the_route_at_the_nearest_leg() -> None:
     """A navigator that restarts goes on where the boat is; nothing counts as reached."""
-    drill = Drill(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
-    order = drill.order(Direction.STRAIGHT, pose(6.0, 9.5))
+    run_10_hz = GuidanceRun(PAANI, msgspec.structs.replace(RUNNING, progress=MissionProgress()))
+    order = run_10_hz.order(Direction.STRAIGHT, pose(6.0, 9.5))
     assert (order.waypoint_index, order.waypoints_reached) == (3, 0)
 
 
 def test_route_without_repeat_ends() -> None:
     route = msgspec.structs.replace(SQUARE, repeat=False)
-    drill = Drill(PAPER, at_waypoint(3))
-    order = drill.order(Direction.STRAIGHT, pose(0.2, 10.0), route)
+    run_10_hz = GuidanceRun(PAPER, at_waypoint(3))
+    order = run_10_hz.order(Direction.STRAIGHT, pose(0.2, 10.0), route)
     assert (order.inhibits, order.waypoints_reached) == ((Inhibit.ROUTE_FINISHED,), 1)
-    assert not drill.order(Direction.STRAIGHT, pose(5.0, 5.0), route).enable
+    assert not run_10_hz.order(Direction.STRAIGHT, pose(5.0, 5.0), route).enable
 
 
 OLD_US = NOW_US - 10_000_000
@@ -281,49 +281,49 @@ OLD_US = NOW_US - 10_000_000
     ],
 )
 @pytest.mark.parametrize("config", [PAPER, PAANI])
-def test_m8_m9_m10_m11_every_gate_is_named(
+def test_m8_m9_m10_m11_every_inhibit_is_named(
     config: NavigatorConfig, changes: dict[str, object], inhibit: Inhibit
 ) -> None:
-    _, order = run(config, heard(**changes))
+    _, order = run(config, inputs(**changes))
     assert inhibit in order.inhibits
     assert (order.enable, order.speed_mps) == (False, 0.0)
 
 
 def test_m10_advice_may_be_3_5_s_old_but_must_keep_coming() -> None:
-    """M10: the allowance counts from the picture; receipt is bounded apart."""
-    old = heard(advisory=advice(Direction.STRAIGHT, NOW_US - 3_400_000))
+    """M10: the age counts from the picture; the time since receipt is bounded separately."""
+    old = inputs(advisory=advice(Direction.STRAIGHT, NOW_US - 3_400_000))
     assert run(PAPER, old)[1].enable
 
 
-def test_no_route_no_motion() -> None:
-    _, order = navigate(RUNNING, heard(), None, NOW_US, 43, PAANI)
+def test_without_a_route_the_boat_does_not_move() -> None:
+    _, order = navigate(RUNNING, inputs(), None, NOW_US, 43, PAANI)
     assert order.inhibits == (Inhibit.NO_ROUTE,)
 
 
 def test_m9_m11_clock_must_advance_and_a_reset_must_advance_again() -> None:
-    """M9, M11: a paused clock stops the boat, and so does one that jumped back."""
+    """M9, M11: a paused clock stops the boat, and so does one that is set back, until it advances again."""
     state, now_us = NavigatorState(), NOW_US
     enabled = []
     for sim_us in (100, 150, 150, 150, 150, 150, 200, 10, 60):
         clock = SimTime(source_us=now_us, sim_us=sim_us, stamp_us=1)
-        state, order = run(PAANI, heard(now_us, clock=clock), state, now_us)
+        state, order = run(PAANI, inputs(now_us, clock=clock), state, now_us)
         enabled.append(order.enable)
         now_us += 110_000
     assert enabled == [False, True, True, True, True, False, True, False, True]
 
 
 def test_after_a_reset_the_boat_joins_the_route_anew() -> None:
-    drill = Drill(PAANI, at_waypoint(3, reached=8))
-    back = heard(clock=SimTime(source_us=NOW_US, sim_us=5, stamp_us=1))
-    drill.state, order = run(PAANI, back, drill.state)
+    run_10_hz = GuidanceRun(PAANI, at_waypoint(3, reached=8))
+    back = inputs(clock=SimTime(source_us=NOW_US, sim_us=5, stamp_us=1))
+    run_10_hz.state, order = run(PAANI, back, run_10_hz.state)
     assert order.inhibits == (Inhibit.CLOCK_STOPPED,)
-    order = drill.order(Direction.STRAIGHT, pose(3.0, 0.0))
+    order = run_10_hz.order(Direction.STRAIGHT, pose(3.0, 0.0))
     assert (order.waypoint_index, order.waypoints_reached, order.enable) == (1, 8, True)
 
 
 def test_evidence_and_plant_stamps_pass_through() -> None:
     stamped = msgspec.structs.replace(advice(Direction.STRAIGHT, NOW_US - 400_000), sent_us=NOW_US - 5)
-    _, order = run(PAANI, heard(advisory=stamped))
+    _, order = run(PAANI, inputs(advisory=stamped))
     assert (order.source_us, order.echo_us, order.advisory_sent_us) == (NOW_US - 400_000, 777, NOW_US - 5)
 
 
@@ -337,7 +337,7 @@ def test_evidence_and_plant_stamps_pass_through() -> None:
 def test_an_order_that_moves_has_no_inhibits_and_is_finite(
     x: float, y: float, yaw: float, direction: Direction, profile: NavigatorConfig
 ) -> None:
-    _, order = run(profile, heard(odometry=pose(x, y, yaw), advisory=advice(direction)))
+    _, order = run(profile, inputs(odometry=pose(x, y, yaw), advisory=advice(direction)))
     assert order.enable == (not order.inhibits)
     assert order.enable == (direction not in {Direction.STOP, Direction.NO_DATA})
     assert -math.pi <= order.heading_rad <= math.pi

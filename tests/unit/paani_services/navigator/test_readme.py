@@ -18,7 +18,7 @@ EXAMPLES = re.findall(r"```(\w+) (\w+)\n(.*?)```", README.read_text(encoding="ut
 ORIGIN = (47.6512, 9.4794)
 
 
-def test_there_is_one_of_each() -> None:
+def test_there_is_one_example_of_each_format() -> None:
     assert [(kind, what) for kind, what, _ in EXAMPLES] == [
         ("toml", "route"),
         ("toml", "mission"),
@@ -28,7 +28,7 @@ def test_there_is_one_of_each() -> None:
 
 
 @pytest.mark.parametrize("fence", [2, 3])
-def test_they_load_together(tmp_path: Path, fence: int) -> None:
+def test_the_examples_load_together(tmp_path: Path, fence: int) -> None:
     (tmp_path / "bay.toml").write_text(EXAMPLES[0][2])
     (tmp_path / "survey.toml").write_text(EXAMPLES[1][2])
     file = tmp_path / f"fence.{EXAMPLES[fence][0]}"

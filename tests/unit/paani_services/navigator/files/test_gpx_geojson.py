@@ -1,4 +1,4 @@
-"""Routes between GPX, GeoJSON and TOML, and what is said about files that are none."""
+"""Routes between GPX, GeoJSON and TOML, and the error for files that are no routes."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ BILLION_LAUGHS = '<!DOCTYPE gpx [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><gpx><
         ("a", "", "not a route file"),
     ],
 )
-def test_what_is_no_route_is_one_line_and_leaves_no_file(
+def test_a_file_that_is_no_route_gives_one_line_and_leaves_no_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str | bytes, named: str
 ) -> None:
     path = written(tmp_path, name, text)
@@ -161,7 +161,7 @@ def track(count: int) -> str:
     return f'<gpx version="1.1"><trk><trkseg>{points}</trkseg></trk></gpx>'
 
 
-def test_a_recorded_track_is_thinned_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_recorded_track_is_simplified_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = written(tmp_path, "t.gpx", track(20_000)), tmp_path / "t.toml"
     with pytest.raises(UserError, match=r"waypoints: has 20000, more than 10000; thin it with .*--thin"):
         load_route(path, (47.65, 9.48))
@@ -180,7 +180,7 @@ def test_more_points_than_any_route_has_are_refused_before_they_are_read(tmp_pat
 
 @given(st.lists(st.tuples(st.floats(-100, 100), st.floats(-100, 100)), min_size=2, max_size=60), st.floats(0.01, 20.0))
 @settings(deadline=None)
-def test_thinning_moves_the_line_by_no_more_than_the_tolerance(
+def test_simplification_moves_the_line_by_no_more_than_the_tolerance(
     points: list[tuple[float, float]], tolerance_m: float
 ) -> None:
     keep = simplify_line(tuple(points), tolerance_m)
@@ -195,7 +195,7 @@ def test_thinning_moves_the_line_by_no_more_than_the_tolerance(
             assert math.hypot(x - x1 - part * (x2 - x1), y - y1 - part * (y2 - y1)) <= tolerance_m + 1e-9
 
 
-def test_a_line_that_cannot_be_thinned_is_bounded_work() -> None:
+def test_a_line_that_cannot_be_simplified_costs_bounded_work() -> None:
     """A zigzag that grows keeps every point; each is still compared with at most 250 others, a few times."""
     zigzag = tuple((float(number), (-1.0) ** number * (1.0 + 0.01 * number)) for number in range(5000))
     assert len(simplify_line(zigzag, 0.5)) == 5000
@@ -233,14 +233,14 @@ def test_a_route_across_the_antimeridian_is_short(tmp_path: Path) -> None:
     assert last.x_m - first.x_m == pytest.approx(21.3, abs=0.1)
 
 
-def test_info(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_gives_the_points_and_the_place_of_a_route(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert paani(["route", "info", str(written(tmp_path, "a.geojson", GEOJSON))]) == 0
-    said = capsys.readouterr().out
-    assert "3, again and again" in said
-    assert "47.6500000, 9.4800000" in said
+    output = capsys.readouterr().out
+    assert "3, again and again" in output
+    assert "47.6500000, 9.4800000" in output
 
 
-def test_check_against_a_fence_and_a_world(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_refuses_a_route_outside_a_fence_or_a_world(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     corners = "{x_m = -9, y_m = -9}, {x_m = 9, y_m = -9}, {x_m = 9, y_m = FAR}, {x_m = -9, y_m = FAR}"
     fence = f'[[areas]]\nkeep = "in"\ncorners = [{corners}]\n'
     route = written(tmp_path, "a.toml", TOML)

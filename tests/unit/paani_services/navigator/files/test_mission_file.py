@@ -54,8 +54,8 @@ def until(ship: DriftingBoat, leg: int, limit_s: float = 300.0) -> float:
     raise AssertionError(f"leg {leg} was not reached in {limit_s} s")
 
 
-def test_out_stay_and_home() -> None:
-    """A whole mission: a route, half a minute on station, home, done; home is where the boat was first armed."""
+def test_a_mission_of_route_station_and_home_is_done_at_home() -> None:
+    """A route, half a minute on station, then home, which is where the boat was first armed; then nothing is left."""
     ship = boat(follow((0, 0), (20, 0)), hold(at(20, 10), duration_s=30.0), HOME, at_m=(-3.0, 1.0))
     until(ship, 1)
     assert math.dist(ship.position_m, (20.0, 0.0)) < 2.0
@@ -69,7 +69,7 @@ def test_out_stay_and_home() -> None:
 
 
 @pytest.mark.parametrize("direction", list(Direction))
-def test_done_is_done_whatever_is_advised(direction: Direction) -> None:
+def test_a_mission_that_is_done_stays_done_whatever_is_advised(direction: Direction) -> None:
     ship = boat(HOME)
     ship.settle(1.0)
     ship.direction = direction
@@ -77,7 +77,7 @@ def test_done_is_done_whatever_is_advised(direction: Direction) -> None:
 
 
 def test_m3_laps_of_a_route_that_repeats() -> None:
-    """M3: round and round, here twice: as many waypoints as two laps have, then the next leg."""
+    """M3: two laps reach as many waypoints as two laps have; then the next leg is due."""
     ship = boat(follow(*SQUARE, repeat=True, laps=2), STOP, at_m=(5.0, 0.0))
     ship.settle(1.0)
     assert ship.state.progress.leg_index == 0
@@ -86,7 +86,7 @@ def test_m3_laps_of_a_route_that_repeats() -> None:
     assert ship.settle(0.1).inhibits == (Inhibit.HOLDING,)
 
 
-def test_a_lap_is_told() -> None:
+def test_the_order_names_the_lap() -> None:
     ship = boat(follow(*SQUARE, repeat=True, laps=3), at_m=(5.0, 0.0))
     assert ship.settle(1.0).leg == "follow route, lap 1 of 3"
     ship.settle(100.0)
@@ -94,8 +94,8 @@ def test_a_lap_is_told() -> None:
     assert ship.order.leg == "follow route, lap 2 of 3"
 
 
-def test_no_thrust_on_station_and_back_when_adrift() -> None:
-    """Beyond the radius the boat comes back at half its speed until half the radius, then rests again."""
+def test_on_station_there_is_no_thrust_until_the_boat_leaves_the_radius() -> None:
+    """Beyond the radius the boat comes back at half its speed until half the radius, then has no thrust again."""
     ship = boat(hold(radius_m=4.0), drift_mps=(0.1, 0.05))
     ship.settle(0.2)
     moving, away_m = [], []
@@ -113,14 +113,14 @@ def test_no_thrust_on_station_and_back_when_adrift() -> None:
 
 
 @pytest.mark.parametrize("direction", [Direction.STOP, Direction.NO_DATA])
-def test_advice_is_the_veto_on_station_too(direction: Direction) -> None:
+def test_advice_is_a_veto_on_station_too(direction: Direction) -> None:
     ship = boat(hold(radius_m=4.0), drift_mps=(0.2, 0.0))
     ship.settle(1.0)
     ship.direction = direction
     assert not any(order.enable for order in ship.run(60.0))
 
 
-def test_until_the_operator_stops_the_boat_and_arms_it_again() -> None:
+def test_a_stop_leg_ends_when_the_boat_is_stopped_and_armed_again() -> None:
     ship = boat(STOP, follow((0, 0), (20, 0)))
     assert ship.settle(60.0).inhibits == (Inhibit.HOLDING,)
     ship.armed, ship.stopped = False, True
@@ -130,7 +130,7 @@ def test_until_the_operator_stops_the_boat_and_arms_it_again() -> None:
     assert (order.leg_index, order.enable) == (1, True)
 
 
-def test_a_restart_of_the_operator_s_process_is_no_word_to_go_on() -> None:
+def test_a_restart_of_the_operator_s_process_does_not_end_a_leg() -> None:
     ship = boat(hold(), follow((0, 0), (20, 0)))
     ship.settle(10.0)
     ship.armed, ship.epoch = False, 2
@@ -149,8 +149,8 @@ def test_a_stop_during_a_route_does_not_skip_a_leg() -> None:
     assert (order.leg_index, order.enable) == (0, True)
 
 
-def test_nothing_begins_before_the_boat_is_armed() -> None:
-    """Home is where it was armed, not where the process started: it may have been carried to the water."""
+def test_home_and_the_first_leg_begin_where_the_boat_is_armed() -> None:
+    """Home is where the boat was armed, not where the process started: it may have been carried to the water."""
     ship = boat(follow((0, 0), (20, 0)), HOME, at_m=(-50.0, -50.0))
     ship.armed = False
     ship.settle(5.0)
@@ -160,7 +160,7 @@ def test_nothing_begins_before_the_boat_is_armed() -> None:
     assert ship.state.progress.home == Waypoint(x_m=1.0, y_m=1.0)
 
 
-def test_home_at_once_where_the_boat_lies_at_home() -> None:
+def test_a_boat_at_home_returns_home_at_once() -> None:
     order = boat(HOME).settle(0.2)
     assert order.inhibits == (Inhibit.MISSION_DONE,)
 
@@ -243,7 +243,7 @@ def written(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def test_a_mission_file(tmp_path: Path) -> None:
+def test_a_mission_file_gives_its_legs_and_the_route_to_show(tmp_path: Path) -> None:
     route, mission = written(tmp_path, "r.toml", ROUTE_TOML), written(tmp_path, "m.toml", MISSION_TOML)
     config = msgspec.structs.replace(PAANI, route=str(route), mission=str(mission))
     shown, loaded = load_route_and_mission(config, None)

@@ -41,25 +41,25 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
-def test_metres(tmp_path: Path) -> None:
+def test_points_in_metres_are_taken_as_they_are(tmp_path: Path) -> None:
     route = load_route(written(tmp_path, METRES))
     assert [(w.x_m, w.y_m) for w in route.waypoints] == [(0.0, 0.0), (10.0, -2.0)]
     assert (route.name, route.repeat) == ("pond", True)
 
 
-def test_geodetic(tmp_path: Path) -> None:
+def test_latitudes_are_placed_on_the_map(tmp_path: Path) -> None:
     route = load_route(written(tmp_path, GEODETIC), (47.65, 9.48))
     assert route.waypoints[0].x_m == 0.0
     assert route.waypoints[1].y_m == pytest.approx(100.07, abs=0.1)
     assert not route.repeat
 
 
-def test_a_latitude_needs_to_know_where_the_map_lies(tmp_path: Path) -> None:
+def test_latitudes_need_the_origin_of_the_map(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"waypoints\[0\]: latitude_deg needs localization.origin_lat_lon_deg"):
         load_route(written(tmp_path, GEODETIC))
 
 
-def test_a_route_lies_where_it_says_whatever_the_origin_of_the_map(tmp_path: Path) -> None:
+def test_a_route_with_an_origin_is_moved_onto_a_map_with_another(tmp_path: Path) -> None:
     """Metres from the file's origin and latitudes alike are moved onto a map with another origin."""
     north_deg = (47.651, 9.48)
     in_metres = "origin = {latitude_deg = 47.65, longitude_deg = 9.48}\n" + METRES
@@ -108,6 +108,6 @@ def test_k2_route_of_each_world_is_a_route_file(tmp_path: Path, name: str) -> No
         assert length_m == pytest.approx(465.443, abs=0.01)
 
 
-def test_missing_file(tmp_path: Path) -> None:
+def test_a_missing_route_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="No such file"):
         load_route(tmp_path / "nowhere.toml")

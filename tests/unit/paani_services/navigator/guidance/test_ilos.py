@@ -1,4 +1,4 @@
-"""Line of sight against a drift that the compass does not show."""
+"""Integral line of sight: path following in a drift that the compass does not show."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
 PAANI = load_config().navigator
 PAPER = load_config(profile="paper").navigator
-PLAIN = msgspec.structs.replace(PAANI, crab_gain_mps=0.0)
+WITHOUT_INTEGRAL = msgspec.structs.replace(PAANI, crab_gain_mps=0.0)
 
 
 def route(*points: tuple[float, float], repeat: bool = False) -> Route:
@@ -30,8 +30,8 @@ def heading(yaw_rad: float) -> Odometry:
     return Odometry(source_us=0, x_m=0.0, y_m=0.0, yaw_rad=yaw_rad, surge_mps=0.6, healthy=True)
 
 
-def off_line_m(config: NavigatorConfig, drift_mps: tuple[float, float], settle_s: float = 90.0) -> float:
-    """Largest cross-track error over a minute after `settle_s`."""
+def max_cross_track_m(config: NavigatorConfig, drift_mps: tuple[float, float], settle_s: float = 90.0) -> float:
+    """Largest cross-path error over a minute after `settle_s`."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), config, drift_mps=drift_mps)
     boat.settle(settle_s)
     return max(abs(boat.y_m) for _ in boat.run(60.0))
@@ -39,17 +39,17 @@ def off_line_m(config: NavigatorConfig, drift_mps: tuple[float, float], settle_s
 
 @pytest.mark.parametrize("drift_mps", [(0.0, 0.15), (0.0, -0.2), (0.1, 0.2)])
 def test_a_steady_drift_leaves_no_cross_track_error(drift_mps: tuple[float, float]) -> None:
-    assert off_line_m(PLAIN, drift_mps) > 0.7
-    assert off_line_m(PAANI, drift_mps) < 0.05
+    assert max_cross_track_m(WITHOUT_INTEGRAL, drift_mps) > 0.7
+    assert max_cross_track_m(PAANI, drift_mps) < 0.05
 
 
-def test_without_drift_nothing_is_learned() -> None:
+def test_without_drift_the_integral_stays_zero() -> None:
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI)
     boat.settle(60.0)
     assert boat.state.ilos == IlosState(updated_us=boat.now_us)
 
 
-def test_m4_the_paper_s_heuristic_learns_nothing() -> None:
+def test_m4_the_paper_s_bearing_has_no_integral() -> None:
     """M4: the plain bearing of the waypoint, whatever drifts the boat."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAPER, drift_mps=(0.0, 0.05))
     order = boat.settle(60.0)
@@ -59,8 +59,8 @@ def test_m4_the_paper_s_heuristic_learns_nothing() -> None:
     assert boat.state.ilos.north_m == 0.0
 
 
-def test_what_was_learned_holds_on_the_way_back() -> None:
-    """What pushes comes from one side of the map: it turns its sign with the leg, and is no windup."""
+def test_the_integral_holds_on_a_leg_in_the_opposite_direction() -> None:
+    """A drift comes from one side of the map, so the integral changes its sign with the direction of the leg."""
     boat = DriftingBoat(mission_of_route(route((0, 0), (60, 0), (60, 3), (0, 3))), PAANI, drift_mps=(0.0, 0.15))
     worst_m = 0.0
     for order in boat.run(260.0):
@@ -71,30 +71,30 @@ def test_what_was_learned_holds_on_the_way_back() -> None:
 
 
 def test_the_crab_angle_is_bounded() -> None:
-    """A drift that the boat cannot hold against does not wind up without end."""
+    """In a drift that the boat cannot hold against, the integral does not wind up without end."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, drift_mps=(0.0, 0.9))
     boat.settle(300.0)
     most_m = PAANI.lookahead_m * math.tan(math.radians(PAANI.max_crab_deg))
     assert math.hypot(boat.state.ilos.east_m, boat.state.ilos.north_m) <= most_m + 1e-9
 
 
-def test_borhaug_s_integral_by_hand() -> None:
+def test_the_integral_grows_by_borhaug_s_equation() -> None:
     """y = 2 m left, s = 1 m, L = 4 m, sigma = 0.25 m/s: s grows by 0.25 * 4 * 2 / (9 + 16) m each second."""
-    track = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=0, y_m=50)))
-    crab = integrate(
-        IlosState(east_m=-1.0, updated_us=1_000_000), track, 1, 2.0, heading(0.5 * math.pi), 1_100_000, PAANI
+    path = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=0, y_m=50)))
+    ilos = integrate(
+        IlosState(east_m=-1.0, updated_us=1_000_000), path, 1, 2.0, heading(0.5 * math.pi), 1_100_000, PAANI
     )
-    assert integral_offset_m(crab, track, 1) == pytest.approx(1.0 + 0.1 * 0.25 * 4.0 * 2.0 / 25.0)
+    assert integral_offset_m(ilos, path, 1) == pytest.approx(1.0 + 0.1 * 0.25 * 4.0 * 2.0 / 25.0)
 
 
-def test_a_gap_in_time_teaches_little() -> None:
-    track = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=50, y_m=0)))
-    after_gap = integrate(IlosState(updated_us=1), track, 1, 1.0, heading(0.0), 60_000_000, PAANI)
+def test_a_gap_in_time_is_integrated_as_a_short_step() -> None:
+    path = WaypointPath((Waypoint(x_m=0, y_m=0), Waypoint(x_m=50, y_m=0)))
+    after_gap = integrate(IlosState(updated_us=1), path, 1, 1.0, heading(0.0), 60_000_000, PAANI)
     assert 0.0 < after_gap.north_m < 0.3 * 0.25
 
 
 @pytest.mark.parametrize("off_m", [2.0, 5.0, 10.0])
-def test_joining_the_line_teaches_nothing(off_m: float) -> None:
-    """A distance that is on its way out is no drift: the boat joins from afar and crosses by no more than 0.2 m."""
+def test_the_integral_is_held_while_the_boat_closes_in_on_its_leg(off_m: float) -> None:
+    """A cross-path error that shrinks is no drift: the boat joins from afar and overshoots by no more than 0.2 m."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, (0.0, off_m))
     assert min(boat.y_m for _ in boat.run(120.0)) > -0.2

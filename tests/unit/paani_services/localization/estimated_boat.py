@@ -1,4 +1,4 @@
-"""A boat on a plane, its sensors, and the estimator at 20 Hz."""
+"""A simulated boat on a plane with its sensors, and the estimator at 20 Hz."""
 
 import math
 from collections.abc import Callable
@@ -22,8 +22,8 @@ def unchanged(samples: list[ImuSample]) -> list[ImuSample]:
     return samples
 
 
-class Ride:
-    """`wander_m`: spread of a GPS error that forgets itself in a minute; `fix_noise_m`: of one drawn anew each time."""
+class EstimatedBoat:
+    """`wander_m`: standard deviation of the slow GPS error; `fix_noise_m`: of the error that is new with each fix."""
 
     def __init__(
         self,
@@ -43,29 +43,29 @@ class Ride:
         self.gps = self.imu = True
         self.fix_offset_m = self.compass_bias_rad = self.gyro_fault_radps = 0.0
         self.epoch = 0
-        self.local = self.glob = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
-        self.change: Callable[[list[ImuSample]], list[ImuSample]] = unchanged  # what befalls the samples on their way
+        self.local = self.global_estimate = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
+        self.change: Callable[[list[ImuSample]], list[ImuSample]] = unchanged  # a fault on the way to the estimator
         self.change_fix: Callable[[GpsFix], GpsFix] = lambda fix: fix
         self._wander_std_m, self._wander_m = wander_m, wander_m * self.rng.standard_normal(2)
         self._fix_noise_m, self._fix_speed_noise_mps, self._fix_std_m = fix_noise_m, fix_speed_noise_mps, fix_std_m
         self._steps_per_fix = steps_per_fix
 
-    def go(self, seconds: float, surge_mps: float = 0.0, yaw_rate_radps: float = 0.0) -> list[Odometry]:
-        """The global estimates of `seconds` that end at this speed."""
+    def sail(self, seconds: float, surge_mps: float = 0.0, yaw_rate_radps: float = 0.0) -> list[Odometry]:
+        """Advance by `seconds`, accelerating to this speed; returns the global estimates."""
         found = []
         for step in range(round(seconds * 20)):
             samples = self.change([self.sample(surge_mps, yaw_rate_radps) for _ in range(5)])
             fix = self.change_fix(self.fix()) if step % self._steps_per_fix == 0 and self.gps else None
-            self.local, self.glob = self.estimator.step(samples if self.imu else [], fix, self.now_us)
-            found.append(self.glob)
+            self.local, self.global_estimate = self.estimator.step(samples if self.imu else [], fix, self.now_us)
+            found.append(self.global_estimate)
         return found
 
-    def off_m(self) -> float:
-        """How far the global estimate is from the boat."""
-        return math.hypot(self.glob.x_m - self.x_m, self.glob.y_m - self.y_m)
+    def error_m(self) -> float:
+        """Distance of the global estimate from the true position."""
+        return math.hypot(self.global_estimate.x_m - self.x_m, self.global_estimate.y_m - self.y_m)
 
     def sample(self, surge_mps: float, yaw_rate_radps: float) -> ImuSample:
-        """The next 10 ms of the boat, picking up to that speed."""
+        """Advance the boat by 10 ms, accelerating to that speed; returns the IMU sample."""
         self.now_us += 10_000
         change = PICK_UP_MPS2 * 0.01
         gained_mps = min(max(surge_mps - self.surge_mps, -change), change)
@@ -88,7 +88,7 @@ class Ride:
         )
 
     def fix(self) -> GpsFix:
-        """What the receiver says of here and now."""
+        """The fix that the receiver gives now."""
         keep = math.exp(-self._steps_per_fix / 20.0 / 60.0)
         renew_m = self._wander_std_m * math.sqrt(1.0 - keep * keep)
         self._wander_m = keep * self._wander_m + renew_m * self.rng.standard_normal(2)
@@ -110,9 +110,9 @@ class Ride:
         )
 
 
-def wandering(seed: int = 1, config: LocalizationConfig = CONFIG) -> Ride:
-    """The receiver of the simulator: 0.8 m of wander, 0.05 m of noise."""
-    return Ride(config, seed, wander_m=0.8, fix_noise_m=0.05)
+def wandering(seed: int = 1, config: LocalizationConfig = CONFIG) -> EstimatedBoat:
+    """A boat with the simulator's receiver: 0.8 m of slow error, 0.05 m of noise."""
+    return EstimatedBoat(config, seed, wander_m=0.8, fix_noise_m=0.05)
 
 
 def shifted(sample: ImuSample, by_us: int) -> ImuSample:
