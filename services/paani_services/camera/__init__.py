@@ -1,1 +1,1 @@
-"""Pictures of the world, real or rendered, onto the bus."""
+"""Camera: pictures of the simulator, a webcam or a recording, published on the bus."""

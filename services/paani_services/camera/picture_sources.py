@@ -1,6 +1,6 @@
-"""Where pictures come from besides the simulator: pictures, folders and videos on disk, and webcams.
+"""Sources of pictures other than the simulator: picture files, folders and videos on disk, and webcams.
 
-All calls may block; run them off the event loop.
+All calls may block, so they belong into a thread beside the event loop.
 """
 
 import itertools
@@ -18,16 +18,16 @@ from paani.messages import TimeBase
 
 PICTURE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"})
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mjpeg", ".mjpg"})
-MIN_LONG_SIDE_PX = 480
-MAX_RATE_HZ = 1000.0
+MIN_LONG_SIDE_PX = 480  # pictures are not scaled down below this
+MAX_RATE_HZ = 1000.0  # a video that states more states no usable rate
 
 
 class Frame(NamedTuple):
     """One picture of a recording.
 
     bgr: uint8 [H, W, 3], None where the file is no picture. name: of the file or frame. `media_us` is its time in the
-    recording as `time_base` says; `wait_s` how long after the frame before it is due; `restarted` marks the first
-    frame after the recording began again.
+    recording as `time_base` says; `wait_s` the time from the frame before it until it is due; `restarted` marks the
+    first frame of each later pass.
     """
 
     bgr: U8 | None
@@ -38,17 +38,17 @@ class Frame(NamedTuple):
     restarted: bool = False
 
 
-def play(path: Path, config: CameraConfig) -> Iterator[Frame]:
-    """Frames of a picture, a folder of pictures (by name) or a video; for ever if `loop`.
+def play_frames(path: Path, config: CameraConfig) -> Iterator[Frame]:
+    """Frames of a picture, a folder of pictures (by name) or a video; endlessly with `loop`.
 
-    `timing` "fixed" gives every frame at `rate_hz`; "original" keeps a video's own times, leaving out frames that come
-    faster than `rate_hz`. A single picture never begins again: it is a camera that always shows the same.
-    Raises UserError naming a path that is missing, empty or unreadable, before the first frame; a spoilt picture
+    `timing` "fixed" yields every frame at `rate_hz`; "original" keeps a video's own times, leaving out frames that come
+    faster than `rate_hz`. A single picture never restarts: it stands for a camera that always shows the same.
+    Raises UserError naming a path that is missing, empty or unreadable, before the first frame; a damaged picture
     among others is a frame without a picture.
     """
     still = path.is_file() and path.suffix.lower() not in VIDEO_SUFFIXES
     for number in itertools.count() if config.loop else range(1):
-        for index, frame in enumerate(recording(path, config)):
+        for index, frame in enumerate(read_frames(path, config)):
             began = index == 0 and number == 0
             yield frame._replace(
                 wait_s=0.0 if began else frame.wait_s,
@@ -57,22 +57,22 @@ def play(path: Path, config: CameraConfig) -> Iterator[Frame]:
             )
 
 
-def recording(path: Path, config: CameraConfig) -> Iterator[Frame]:
-    """The frames of one pass. Raises UserError as `play` does."""
+def read_frames(path: Path, config: CameraConfig) -> Iterator[Frame]:
+    """The frames of one pass. Raises UserError as `play_frames` does."""
     if not path.exists():
         raise UserError(f"{path}: no such file or folder")
     if path.is_dir():
-        files = pictures_in(path)
+        files = list_pictures(path)
         if not files:
             raise UserError(f"{path}: holds no pictures")
-        yield from _pictures(files, config)
+        yield from _read_pictures(files, config)
     elif path.suffix.lower() in VIDEO_SUFFIXES:
-        yield from _video(path, config)
+        yield from _read_video(path, config)
     else:
-        yield from _pictures([path], config)
+        yield from _read_pictures([path], config)
 
 
-def pictures_in(folder: Path) -> list[Path]:
+def list_pictures(folder: Path) -> list[Path]:
     """Picture files of a folder and those below, by path. Raises UserError naming a folder that cannot be read."""
     try:
         return sorted(file for file in folder.rglob("*") if file.suffix.lower() in PICTURE_SUFFIXES and file.is_file())
@@ -93,8 +93,8 @@ def read_picture(file: Path) -> U8 | None:
     return None if bgr is None else np.asarray(bgr, np.uint8)
 
 
-def fitted(bgr: U8, width_px: int) -> U8:
-    """Smaller if its long side exceeds max(`width_px`, 480), aspect kept."""
+def shrink_to_fit(bgr: U8, width_px: int) -> U8:
+    """Scaled down until its long side is at most max(`width_px`, 480), with its aspect kept."""
     height, width = bgr.shape[:2]
     scale = max(width_px, MIN_LONG_SIDE_PX) / max(height, width)
     if scale >= 1.0:
@@ -120,16 +120,16 @@ class Webcam:
             raise UserError(f"camera.source webcam:{index}: {device} gives no pictures")
 
     def read(self) -> U8 | None:
-        """The next picture, BGR uint8 [H, W, 3]; waits for it. None when the camera has gone."""
-        there, bgr = self._capture.read()
-        return np.asarray(bgr, np.uint8) if there else None
+        """Wait for the next picture, BGR uint8 [H, W, 3]; None when the camera does not answer any more."""
+        ok, bgr = self._capture.read()
+        return np.asarray(bgr, np.uint8) if ok else None
 
     def close(self) -> None:
         self._capture.release()
 
 
-def webcam_index(source: str) -> int | None:
-    """N of `webcam` (0) or `webcam:N`; None for any other source. Raises UserError for a bad N."""
+def parse_webcam_index(source: str) -> int | None:
+    """N of `webcam:N`, 0 of `webcam`, None of any other source. Raises UserError for an N that is no number."""
     name, _, number = source.partition(":")
     if name != "webcam":
         return None
@@ -138,13 +138,13 @@ def webcam_index(source: str) -> int | None:
     return int(number or 0)
 
 
-def _pictures(files: list[Path], config: CameraConfig) -> Iterator[Frame]:
+def _read_pictures(files: list[Path], config: CameraConfig) -> Iterator[Frame]:
     for index, file in enumerate(files):
         bgr = read_picture(file)
         if bgr is None and len(files) == 1:
             raise UserError(f"{file}: not a picture")
         yield Frame(
-            None if bgr is None else fitted(bgr, config.width_px),
+            None if bgr is None else shrink_to_fit(bgr, config.width_px),
             str(file),
             round(index / config.rate_hz * 1e6),
             TimeBase.FRAME_INDEX,
@@ -152,15 +152,15 @@ def _pictures(files: list[Path], config: CameraConfig) -> Iterator[Frame]:
         )
 
 
-def _video(path: Path, config: CameraConfig) -> Iterator[Frame]:
+def _read_video(path: Path, config: CameraConfig) -> Iterator[Frame]:
     capture = cv2.VideoCapture(str(path))
     try:
         rate_hz = capture.get(cv2.CAP_PROP_FPS)
         rate_hz = rate_hz if 0.0 < rate_hz <= MAX_RATE_HZ else config.rate_hz
         last_us, index, base = -1, 0, TimeBase.MEDIA
         while True:
-            there, bgr = capture.read()
-            if not there:
+            ok, bgr = capture.read()
+            if not ok:
                 break
             media_us = round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1e3) if base is TimeBase.MEDIA else 0
             if base is TimeBase.FRAME_INDEX or media_us < 0 or (index > 0 and media_us <= last_us):
@@ -171,7 +171,7 @@ def _video(path: Path, config: CameraConfig) -> Iterator[Frame]:
                 continue
             wait_s = 1.0 / config.rate_hz if config.timing == "fixed" else max(0, media_us - max(last_us, 0)) * 1e-6
             yield Frame(
-                fitted(np.asarray(bgr, np.uint8), config.width_px), f"{path}#{index - 1}", media_us, base, wait_s
+                shrink_to_fit(np.asarray(bgr, np.uint8), config.width_px), f"{path}#{index - 1}", media_us, base, wait_s
             )
             last_us = media_us
         if index == 0:

@@ -1,4 +1,4 @@
-"""Camera process: whatever `camera.source` names, as pictures on the bus."""
+"""Camera process: publishes the pictures of the source that `camera.source` names."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,25 +15,25 @@ from paani.arrays import U8
 from paani.bus import Bus
 from paani.clock import Clock, patience_us
 from paani.config import CameraConfig, Config
-from paani_services.camera.picture_sources import Frame, Webcam, fitted, play, webcam_index
+from paani_services.camera.picture_sources import Frame, Webcam, parse_webcam_index, play_frames, shrink_to_fit
 
 T = TypeVar("T")
 
 
-class Output:
-    """Numbers the pictures and publishes them; every picture is a distinct frame."""
+class PicturePublisher:
+    """Numbers the pictures and publishes them; each picture is a distinct frame."""
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._publisher, self._clock = bus.picture_publisher(keys.PICTURE), clock
         self._epoch, self._seq = clock.now_us() // 1000, -1
 
-    def begin_again(self) -> None:
-        """The source began again: nothing before compares with what follows."""
+    def start_new_epoch(self) -> None:
+        """The source started again: frame numbers and stamps before do not compare with those that follow."""
         self._publisher.new_epoch()
         self._epoch, self._seq = max(self._epoch + 1, self._clock.now_us() // 1000), -1
 
     def put(self, data: bytes, header: m.PictureHeader) -> None:
-        """Publish; the frame's number and epoch are filled here."""
+        """Publish one picture; its frame number and epoch are set here."""
         self._seq += 1
         numbered = msgspec.structs.replace(header, frame_seq=self._seq, frame_epoch=self._epoch)
         self._publisher.put_picture(numbered, data)
@@ -41,22 +41,22 @@ class Output:
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Publish at most `camera.rate_hz` pictures a second."""
-    settings, index = config.camera, webcam_index(config.camera.source)
-    output = Output(bus, clock)
+    settings, index = config.camera, parse_webcam_index(config.camera.source)
+    output = PicturePublisher(bus, clock)
     worker = ThreadPoolExecutor(1, "camera")
     try:
         if settings.source == "sim":
-            await _relay(bus, clock, settings, output)
+            await _relay_simulator(bus, clock, settings, output)
         elif index is not None:
-            await _watch(bus, clock, settings, output, worker, index)
+            await _publish_webcam(bus, clock, settings, output, worker, index)
         else:
-            await _replay(bus, clock, settings, output, worker)
+            await _play_recording(bus, clock, settings, output, worker)
     finally:
         worker.shutdown(wait=False)
 
 
-async def _relay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output) -> None:
-    """The simulator's pictures as they are, dated by the pose they show."""
+async def _relay_simulator(bus: Bus, clock: Clock, settings: CameraConfig, output: PicturePublisher) -> None:
+    """Publish the simulator's pictures unchanged, with the time of the pose they show."""
     rendered = bus.pull_picture(keys.RENDERED)
     period_us = patience_us(settings.rate_hz)
     origin, due_us = None, 0
@@ -65,65 +65,69 @@ async def _relay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output)
             await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
             picture = await rendered.next()
             due_us = clock.now_us() + period_us
-            came_from = (picture.header.epoch, picture.header.frame_epoch)
-            if origin not in {None, came_from}:
-                output.begin_again()
-            origin = came_from
+            source_epoch = (picture.header.epoch, picture.header.frame_epoch)
+            if origin not in {None, source_epoch}:
+                output.start_new_epoch()
+            origin = source_epoch
             output.put(picture.data, picture.header)
 
 
-async def _watch(
-    bus: Bus, clock: Clock, settings: CameraConfig, output: Output, worker: ThreadPoolExecutor, index: int
+async def _publish_webcam(
+    bus: Bus, clock: Clock, settings: CameraConfig, output: PicturePublisher, worker: ThreadPoolExecutor, index: int
 ) -> None:
-    """The webcam's newest picture: every one is taken from the camera, those that are due are published."""
-    camera = await _off_loop(worker, Webcam, index, settings.width_px, settings.height_px)
+    """Publish the webcam's newest picture: all are read, so that none waits in the driver; those due go out."""
+    camera = await _run_in_worker(worker, Webcam, index, settings.width_px, settings.height_px)
     period_us, due_us = patience_us(settings.rate_hz), 0
     try:
         with bus.alive():
             while True:
-                bgr = await _off_loop(worker, camera.read)
+                bgr = await _run_in_worker(worker, camera.read)
                 now_us = clock.now_us()
                 if bgr is None:
-                    raise RuntimeError(f"camera.source {settings.source}: the camera has gone")
+                    raise RuntimeError(
+                        f"camera.source {settings.source}: the camera does not answer any more; check its cable"
+                    )
                 if now_us >= due_us:
                     due_us = now_us + period_us
-                    small = await _off_loop(worker, fitted, bgr, settings.width_px)
-                    data = await _off_loop(worker, jpeg, small, settings.jpeg_quality)
-                    output.put(data, _header(small, now_us))
+                    small = await _run_in_worker(worker, shrink_to_fit, bgr, settings.width_px)
+                    data = await _run_in_worker(worker, encode_jpeg, small, settings.jpeg_quality)
+                    output.put(data, _make_header(small, now_us))
     finally:
         worker.submit(camera.close)
 
 
-async def _replay(bus: Bus, clock: Clock, settings: CameraConfig, output: Output, worker: ThreadPoolExecutor) -> None:
-    """A recording in its own order; a file that is no picture goes out as it is, to be refused by perception."""
-    frames = play(Path(settings.source), settings)
-    frame = await _off_loop(worker, next, frames, None)
+async def _play_recording(
+    bus: Bus, clock: Clock, settings: CameraConfig, output: PicturePublisher, worker: ThreadPoolExecutor
+) -> None:
+    """Publish the frames of a recording in order; a file that is no picture goes out unchanged."""
+    frames = play_frames(Path(settings.source), settings)
+    frame = await _run_in_worker(worker, next, frames, None)
     with bus.alive():
         due_us = clock.now_us()
         while frame is not None:
             if frame.restarted:
-                output.begin_again()
-            data = await _off_loop(worker, _encoded, frame, settings.jpeg_quality)
+                output.start_new_epoch()
+            data = await _run_in_worker(worker, _encode_frame, frame, settings.jpeg_quality)
             due_us = max(due_us + round(frame.wait_s * 1e6), clock.now_us() - round(1e6 / settings.rate_hz))
             await asyncio.sleep(max(due_us - clock.now_us(), 0) * 1e-6)
-            output.put(data, _header(frame.bgr, clock.now_us(), frame))
+            output.put(data, _make_header(frame.bgr, clock.now_us(), frame))
             bus.note(frame.name)
-            frame = await _off_loop(worker, next, frames, None)
-        bus.note(f"{settings.source}: played to its end")
+            frame = await _run_in_worker(worker, next, frames, None)
+        bus.note(f"{settings.source}: played to the end")
         await asyncio.Event().wait()
 
 
-def jpeg(bgr: U8, quality: int) -> bytes:
-    """One encoded picture."""
+def encode_jpeg(bgr: U8, quality: int) -> bytes:
+    """The picture as JPEG."""
     _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, min(quality, 100)])
     return data.tobytes()
 
 
-def _encoded(frame: Frame, quality: int) -> bytes:
-    return Path(frame.name).read_bytes() if frame.bgr is None else jpeg(frame.bgr, quality)
+def _encode_frame(frame: Frame, quality: int) -> bytes:
+    return Path(frame.name).read_bytes() if frame.bgr is None else encode_jpeg(frame.bgr, quality)
 
 
-def _header(bgr: U8 | None, source_us: int, frame: Frame | None = None) -> m.PictureHeader:
+def _make_header(bgr: U8 | None, source_us: int, frame: Frame | None = None) -> m.PictureHeader:
     height, width = bgr.shape[:2] if bgr is not None else (0, 0)
     return m.PictureHeader(
         source_us=source_us,
@@ -136,5 +140,5 @@ def _header(bgr: U8 | None, source_us: int, frame: Frame | None = None) -> m.Pic
     )
 
 
-async def _off_loop(worker: ThreadPoolExecutor, call: Callable[..., T], *arguments: Any) -> T:
+async def _run_in_worker(worker: ThreadPoolExecutor, call: Callable[..., T], *arguments: Any) -> T:
     return await asyncio.get_running_loop().run_in_executor(worker, call, *arguments)

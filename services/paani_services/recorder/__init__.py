@@ -1,1 +1,1 @@
-"""Recorder: everything on the bus, into files that survive a crash."""
+"""Recorder: every message on the bus, in MCAP files that survive a crash."""

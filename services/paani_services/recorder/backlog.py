@@ -1,4 +1,4 @@
-"""What waits to be written: bounded by count and bytes; pictures go first when it is too much."""
+"""Queue between the bus and the writer, bounded by messages and bytes; when it is full, pictures are dropped first."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from paani import keys
 from paani.logs.writer import Head
 
 
-class Heard(NamedTuple):
-    """One message as it came, when [us], and its bytes."""
+class QueuedMessage(NamedTuple):
+    """One message as received: its topic, the time of receipt [us], its header where it has one, and its bytes."""
 
     topic: keys.Topic[Any]
     log_us: int
@@ -25,40 +25,40 @@ class Heard(NamedTuple):
 
 
 class Backlog:
-    """Filled on the event loop, drained for the writer's thread."""
+    """Filled by the event loop, drained by the writer's thread."""
 
     def __init__(self, max_messages: int, max_bytes: int) -> None:
         self._max_messages, self._max_bytes = max_messages, max_bytes
         self._lock = threading.Lock()
-        self._pictures: collections.deque[Heard] = collections.deque()
-        self._others: collections.deque[Heard] = collections.deque()
+        self._pictures: collections.deque[QueuedMessage] = collections.deque()
+        self._others: collections.deque[QueuedMessage] = collections.deque()
         self._size_bytes = 0
 
     def __len__(self) -> int:
         return len(self._pictures) + len(self._others)
 
-    def put(self, heard: Heard) -> list[Heard]:
-        """Take one; returns those that had to go for it: the oldest pictures, then the oldest of the rest."""
+    def put(self, message: QueuedMessage) -> list[QueuedMessage]:
+        """Queue one message; returns those dropped for it: the oldest pictures first, then the oldest of the rest."""
         with self._lock:
-            of_its_kind = self._pictures if heard.topic.stance is keys.Stance.PICTURE else self._others
-            of_its_kind.append(heard)
-            self._size_bytes += heard.size_bytes
-            gone = []
+            queue = self._pictures if message.topic.stance is keys.Stance.PICTURE else self._others
+            queue.append(message)
+            self._size_bytes += message.size_bytes
+            evicted = []
             while len(self) > self._max_messages or self._size_bytes > self._max_bytes:
-                gone.append((self._pictures or self._others).popleft())
-                self._size_bytes -= gone[-1].size_bytes
-            return gone
+                evicted.append((self._pictures or self._others).popleft())
+                self._size_bytes -= evicted[-1].size_bytes
+            return evicted
 
-    def drain(self) -> list[Heard]:
-        """All that waits, by the time it came."""
+    def drain(self) -> list[QueuedMessage]:
+        """Take all messages that wait, in order of receipt."""
         with self._lock:
-            heard = [*self._pictures, *self._others]
+            messages = [*self._pictures, *self._others]
             self._pictures.clear()
             self._others.clear()
             self._size_bytes = 0
-        heard.sort(key=_log_us)
-        return heard
+        messages.sort(key=_log_us)
+        return messages
 
 
-def _log_us(heard: Heard) -> int:
-    return heard.log_us
+def _log_us(message: QueuedMessage) -> int:
+    return message.log_us

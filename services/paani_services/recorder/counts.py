@@ -1,4 +1,4 @@
-"""What became of every message: written, dropped here, or never heard. Pure."""
+"""Message counts of each topic: received, written, dropped here, or missing before they arrived. Pure."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from paani import messages as m
 from paani.logs.writer import Head
 
 
-class Tally(msgspec.Struct):
-    """One topic. Of the numbers its producer gave out, each is heard or missing; of those heard, each is
-    written, dropped or still waiting.
+class TopicCounts(msgspec.Struct):
+    """One topic. Each sequence number of its producer is received or missing; each message received is written,
+    dropped or still queued.
     """
 
-    heard: int = 0
+    received: int = 0
     written: int = 0
     dropped: int = 0
     missing: int = 0
@@ -25,52 +25,52 @@ class Tally(msgspec.Struct):
     seq: int = -1
 
 
-class Counts:
-    """All topics. Safe to call from the event loop and the writer's thread."""
+class MessageCounts:
+    """Counts of all topics. Safe to call from the event loop and the writer's thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._tallies: dict[str, Tally] = {}
+        self._topics: dict[str, TopicCounts] = {}
 
-    def heard(self, topic: str, head: Head | None) -> None:
-        """A message came. A gap in its producer's numbers is missing; a new epoch counts from zero."""
+    def count_received(self, topic: str, head: Head | None) -> None:
+        """Count one message. Numbers skipped by its sequence are missing; a new epoch starts at zero."""
         with self._lock:
-            tally = self._of(topic)
-            tally.heard += 1
+            counts = self._of(topic)
+            counts.received += 1
             if head is None:
-                tally.unreadable += 1
+                counts.unreadable += 1
                 return
-            if tally.epoch >= 0:
-                before = tally.seq if head.epoch == tally.epoch else -1
-                if head.epoch >= tally.epoch and head.seq > before + 1:
-                    tally.missing += head.seq - before - 1
-            tally.epoch, tally.seq = max((tally.epoch, tally.seq), (head.epoch, head.seq))
+            if counts.epoch >= 0:
+                before = counts.seq if head.epoch == counts.epoch else -1
+                if head.epoch >= counts.epoch and head.seq > before + 1:
+                    counts.missing += head.seq - before - 1
+            counts.epoch, counts.seq = max((counts.epoch, counts.seq), (head.epoch, head.seq))
 
-    def dropped(self, topic: str, n: int = 1) -> None:
+    def count_dropped(self, topic: str, n: int = 1) -> None:
         with self._lock:
             self._of(topic).dropped += n
 
-    def written(self, topics: Iterable[str]) -> None:
+    def count_written(self, topics: Iterable[str]) -> None:
         with self._lock:
             for topic in topics:
                 self._of(topic).written += 1
 
     def topics(self) -> tuple[m.RecordedTopic, ...]:
-        """As they are now, by name."""
+        """The counts now, by name of the topic."""
         with self._lock:
             return tuple(
                 m.RecordedTopic(
                     topic=name, written=t.written, dropped=t.dropped, missing=t.missing, unreadable=t.unreadable
                 )
-                for name, t in sorted(self._tallies.items())
+                for name, t in sorted(self._topics.items())
             )
 
-    def _of(self, topic: str) -> Tally:
-        return self._tallies.setdefault(topic, Tally())
+    def _of(self, topic: str) -> TopicCounts:
+        return self._topics.setdefault(topic, TopicCounts())
 
 
-def for_file(now: Iterable[m.RecordedTopic], before: Iterable[m.RecordedTopic]) -> dict[str, str]:
-    """What a file's metadata says of each topic: the counts since those taken before."""
+def file_counts(now: Iterable[m.RecordedTopic], before: Iterable[m.RecordedTopic]) -> dict[str, str]:
+    """Metadata of a file, one line per topic: the counts since those taken before."""
     old = {topic.topic: topic for topic in before}
     lines = {}
     for topic in now:

@@ -1,4 +1,4 @@
-"""Recorder process: everything on the bus, into files. Nothing waits for it, and nothing stops with it."""
+"""Recorder process: every message on the bus, into files. No other process waits for it or stops with it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from paani.errors import UserError
 from paani.logs.folder import require_folder
 from paani.logs.repair import repair_all
 from paani.logs.writer import read_head
-from paani_services.recorder.about import make_about
-from paani_services.recorder.backlog import Backlog, Heard
-from paani_services.recorder.recording import MIB, Recording, remove_empty
+from paani_services.recorder.backlog import Backlog, QueuedMessage
+from paani_services.recorder.recording import MIB, Recording, remove_empty_files
+from paani_services.recorder.system_description import describe_system
 
 LOG = logging.getLogger(__name__)
-LISTEN_S, WRITE_S = 0.1, 0.2
-SYNC_S = 5.0  # a loss of power costs at most this
-HELD_S, SPARE = 10.0, 32  # what Zenoh keeps of a topic between two looks
+POLL_PERIOD_S, WRITE_PERIOD_S = 0.1, 0.2
+SYNC_PERIOD_S = 5.0  # a loss of power loses at most this much of a recording
+INBOX_S, INBOX_EXTRA = 10.0, 32  # depth of an inbox: messages of this time at the nominal rate, and some more
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -34,9 +34,9 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     if not settings.folder:
         raise UserError("recorder.folder: not set (`paani up --record DIR` sets it)")
     await asyncio.to_thread(require_folder, folder)
-    await asyncio.to_thread(remove_empty, folder)
+    await asyncio.to_thread(remove_empty_files, folder)
     topics = [topic for topic in keys.every_topic() if topic.name not in settings.leave_out]
-    recording = Recording(settings, await asyncio.to_thread(make_about, config), topics)
+    recording = Recording(settings, await asyncio.to_thread(describe_system, config), topics)
     backlog = Backlog(settings.queue_messages, round(settings.queue_mib * MIB))
     loop, worker, stop = asyncio.get_running_loop(), ThreadPoolExecutor(1, "write"), threading.Event()
     await loop.run_in_executor(worker, recording.write, (), clock.now_us())
@@ -45,46 +45,46 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     try:
         with bus.alive():
             async with asyncio.TaskGroup() as group:
-                group.create_task(tell(bus, clock, state, recording, backlog))
-                group.create_task(mend(folder, stop))
+                group.create_task(publish_state(bus, clock, state, recording, backlog))
+                group.create_task(repair_unfinished(folder, stop))
                 group.create_task(listener.listen())
-                group.create_task(sync(recording))
+                group.create_task(sync_to_disk(recording))
                 while True:
                     await loop.run_in_executor(worker, recording.write, backlog.drain(), clock.now_us())
-                    await asyncio.sleep(WRITE_S)
+                    await asyncio.sleep(WRITE_PERIOD_S)
     finally:
         stop.set()
-        listener.take()
+        listener.poll()
         await loop.run_in_executor(worker, recording.close, backlog.drain(), clock.now_us())
         worker.shutdown(wait=False)
 
 
 class Listener:
-    """Whatever comes on these topics waits in the backlog."""
+    """Counts the messages of these topics and queues them in the backlog."""
 
     def __init__(self, bus: Bus, topics: list[keys.Topic[Any]], recording: Recording, backlog: Backlog) -> None:
         self._counts, self._backlog = recording.counts, backlog
-        self._inboxes = [(topic, bus.raw(topic, round(HELD_S * topic.rate_hz) + SPARE)) for topic in topics]
+        self._inboxes = [(topic, bus.raw(topic, round(INBOX_S * topic.rate_hz) + INBOX_EXTRA)) for topic in topics]
 
     async def listen(self) -> None:
         while True:
-            self.take()
-            await asyncio.sleep(LISTEN_S)
+            self.poll()
+            await asyncio.sleep(POLL_PERIOD_S)
 
-    def take(self) -> None:
-        """Count and keep what has come since the last time."""
+    def poll(self) -> None:
+        """Count and queue what has been received since the last call."""
         for topic, inbox in self._inboxes:
             for log_us, data, attachment in inbox.drain():
                 head = read_head(attachment if topic.stance is keys.Stance.PICTURE else data)
-                self._counts.heard(topic.name, head)
-                for gone in self._backlog.put(Heard(topic, log_us, head, data, attachment)):
-                    self._counts.dropped(gone.topic.name)
+                self._counts.count_received(topic.name, head)
+                for evicted in self._backlog.put(QueuedMessage(topic, log_us, head, data, attachment)):
+                    self._counts.count_dropped(evicted.topic.name)
 
 
-async def tell(
+async def publish_state(
     bus: Bus, clock: Clock, state: Publisher[m.RecorderState], recording: Recording, backlog: Backlog
 ) -> None:
-    """The state of the recording on the bus, and in one line for the health report."""
+    """Publish the state of the recording, and one line of it for the health report."""
     while True:
         now = recorder_state(recording, len(backlog), clock.now_us())
         state.put(now)
@@ -92,21 +92,21 @@ async def tell(
         await asyncio.sleep(1.0 / keys.RECORDER_STATE.rate_hz)
 
 
-async def sync(recording: Recording) -> None:
-    """Beside the writing, which a slow disk must not hold up."""
+async def sync_to_disk(recording: Recording) -> None:
+    """Put the files on the disk in a thread of its own, since a slow disk must not hold up the writing."""
     while True:
-        await asyncio.sleep(SYNC_S)
-        await asyncio.to_thread(recording.sync)
+        await asyncio.sleep(SYNC_PERIOD_S)
+        await asyncio.to_thread(recording.sync_to_disk)
 
 
-async def mend(folder: Path, stop: threading.Event) -> None:
-    """Repair what earlier recorders left unfinished, while this one already records."""
+async def repair_unfinished(folder: Path, stop: threading.Event) -> None:
+    """Repair the files that earlier recorders left unfinished, while this one already records."""
     for line in await asyncio.to_thread(repair_all, folder, stop.is_set):
         LOG.warning("%s", line)
 
 
 def recorder_state(recording: Recording, waiting: int, now_us: int) -> m.RecorderState:
-    """What the recorder says of itself."""
+    """The message on the state of the recording."""
     topics, path = recording.counts.topics(), recording.path
     return m.RecorderState(
         source_us=now_us,

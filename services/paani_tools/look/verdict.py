@@ -10,7 +10,7 @@ from paani.arrays import U8
 from paani.config import Config
 from paani.messages import Advisory, Evidence, PictureHeader, Tracks
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, recording
+from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, read_frames
 from paani_services.perception.pipeline import Perceiver
 
 PRESENTATIONS, PRESENTATION_US = 8, 100_000  # U8: a still is shown eight times at 10 Hz
@@ -35,12 +35,12 @@ def judge_path(path: Path, epoch: int, perceiver: Perceiver, config: Config) -> 
     epoch: the first of this path's; every still has its own, a video one. A still is looked at once and
     presented to a fresh advisor eight times, 0.1 s apart, so that tracks confirm and occupancy persists; no still
     knows of another. A video is one sequence on its own time, at no more than `camera.rate_hz`.
-    Raises UserError as `camera.sources.recording` does.
+    Raises UserError as `camera.picture_sources.read_frames` does.
     """
     settings = msgspec.structs.replace(config.camera, timing="original", loop=False)
     state = AdvisorState()
     moving = path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()
-    for number, frame in enumerate(recording(path, settings)):
+    for number, frame in enumerate(read_frames(path, settings)):
         if moving:
             evidence, mask = _perceive(perceiver, frame, epoch, number)
             state, advisory, tracks = advise(state, evidence, evidence.source_us, config)

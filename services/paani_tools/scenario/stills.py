@@ -21,7 +21,7 @@ from paani.messages import (
     UnusableCause,
 )
 from paani_services.advisor.advise import advise
-from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, pictures_in
+from paani_services.camera.picture_sources import VIDEO_SUFFIXES, Frame, list_pictures
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.verdict import Verdict, judge_path, judge_still
 
@@ -76,7 +76,7 @@ def stills_of(paths: list[Path]) -> list[tuple[Path, bool]]:
         if not path.exists():
             raise UserError(f"{path}: no such file or folder")
         if path.is_dir():
-            pictures = pictures_in(path)
+            pictures = list_pictures(path)
             if not pictures:
                 raise UserError(f"{path}: holds no pictures")
             found += [(file, False) for file in pictures]

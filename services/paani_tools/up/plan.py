@@ -17,7 +17,7 @@ from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
 from paani.extras import require_modules
 from paani.runtime import runtime_dir
-from paani_services.camera.picture_sources import recording
+from paani_services.camera.picture_sources import read_frames
 from paani_services.navigator.files.mission_file import load_route_and_mission
 
 EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
@@ -76,7 +76,7 @@ def _require_source(camera: CameraConfig) -> None:
     if camera.source == "sim" or camera.source.startswith("webcam"):
         return
     try:
-        next(recording(Path(camera.source), camera), None)
+        next(read_frames(Path(camera.source), camera), None)
     except UserError as error:
         raise UserError(f"camera.source {error}") from error
 

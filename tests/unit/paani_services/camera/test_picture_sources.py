@@ -13,8 +13,8 @@ from paani.clock import patience_us
 from paani.config import CameraConfig
 from paani.errors import UserError
 from paani.messages import TimeBase
-from paani_services.camera.picture_sources import Webcam, fitted, play, webcam_index
-from paani_services.camera.service import jpeg
+from paani_services.camera.picture_sources import Webcam, parse_webcam_index, play_frames, shrink_to_fit
+from paani_services.camera.service import encode_jpeg
 from tests.pictures import river
 
 FIXED = CameraConfig(rate_hz=5.0, loop=False)
@@ -23,7 +23,7 @@ FIXED = CameraConfig(rate_hz=5.0, loop=False)
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name in ("b", "a", "c"):
-        (tmp_path / f"{name}.jpg").write_bytes(jpeg(river(ord(name)), 85))
+        (tmp_path / f"{name}.jpg").write_bytes(encode_jpeg(river(ord(name)), 85))
     (tmp_path / "notes.txt").write_text("no picture")
     return tmp_path
 
@@ -41,7 +41,7 @@ def video(tmp_path: Path) -> Path:
 
 def test_a_folder_plays_by_name(folder: Path) -> None:
     """A8, I17: pictures have no time of their own; their index over the rate is labelled as such."""
-    frames = list(play(folder, FIXED))
+    frames = list(play_frames(folder, FIXED))
     assert [Path(f.name).name for f in frames] == ["a.jpg", "b.jpg", "c.jpg"]
     assert [f.media_us for f in frames] == [0, 200_000, 400_000]
     assert {f.time_base for f in frames} == {TimeBase.FRAME_INDEX}
@@ -52,24 +52,24 @@ def test_a_folder_plays_by_name(folder: Path) -> None:
 def test_folders_below_are_played_too(folder: Path) -> None:
     (folder / "below").mkdir()
     (folder / "a.jpg").rename(folder / "below" / "a.jpg")
-    assert [Path(f.name).name for f in play(folder, FIXED)] == ["b.jpg", "a.jpg", "c.jpg"]
+    assert [Path(f.name).name for f in play_frames(folder, FIXED)] == ["b.jpg", "a.jpg", "c.jpg"]
 
 
 def test_a_loop_says_where_it_begins_again(folder: Path) -> None:
     """B2: the first frame of each later pass."""
-    frames = list(itertools.islice(play(folder, CameraConfig(loop=True)), 7))
+    frames = list(itertools.islice(play_frames(folder, CameraConfig(loop=True)), 7))
     assert [f.restarted for f in frames] == [False, False, False, True, False, False, True]
 
 
 def test_a_single_picture_is_a_camera_that_shows_the_same(folder: Path) -> None:
-    frames = list(itertools.islice(play(folder / "a.jpg", CameraConfig(loop=True)), 4))
+    frames = list(itertools.islice(play_frames(folder / "a.jpg", CameraConfig(loop=True)), 4))
     assert not any(f.restarted for f in frames)
     assert [f.media_us for f in frames] == [0, 200_000, 400_000, 600_000]
 
 
 def test_a_video_at_a_fixed_rate_keeps_its_media_time(video: Path) -> None:
     """I17: every frame, 0.2 s apart on the bus, 1/15 s apart in the recording."""
-    frames = list(play(video, FIXED))
+    frames = list(play_frames(video, FIXED))
     assert len(frames) == 30
     assert {f.time_base for f in frames} == {TimeBase.MEDIA}
     assert {f.wait_s for f in frames[1:]} == {0.2}
@@ -79,7 +79,7 @@ def test_a_video_at_a_fixed_rate_keeps_its_media_time(video: Path) -> None:
 
 
 def test_a_video_at_its_own_times_leaves_out_what_is_too_fast(video: Path) -> None:
-    frames = list(play(video, CameraConfig(rate_hz=5.0, loop=False, timing="original")))
+    frames = list(play_frames(video, CameraConfig(rate_hz=5.0, loop=False, timing="original")))
     assert len(frames) == 10
     assert sum(f.wait_s for f in frames) == pytest.approx(27 / 15, abs=0.01)
     assert [f.wait_s for f in frames[1:]] == pytest.approx([0.2] * 9, abs=0.002)
@@ -89,13 +89,13 @@ def test_a_video_at_its_own_times_leaves_out_what_is_too_fast(video: Path) -> No
     ("size_wh", "expected_wh"), [((1920, 1080), (480, 270)), ((320, 240), (320, 240)), ((600, 1200), (240, 480))]
 )
 def test_large_pictures_are_made_smaller_not_narrower(size_wh: tuple[int, int], expected_wh: tuple[int, int]) -> None:
-    small = fitted(np.zeros((size_wh[1], size_wh[0], 3), np.uint8), 320)
+    small = shrink_to_fit(np.zeros((size_wh[1], size_wh[0], 3), np.uint8), 320)
     assert (small.shape[1], small.shape[0]) == expected_wh
 
 
 def test_a_spoilt_file_in_a_folder_is_a_frame_without_a_picture(folder: Path) -> None:
     (folder / "b.jpg").write_bytes(b"spoilt")
-    assert [f.bgr is None for f in play(folder, FIXED)] == [False, True, False]
+    assert [f.bgr is None for f in play_frames(folder, FIXED)] == [False, True, False]
 
 
 def test_mistakes_name_the_path(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_mistakes_name_the_path(tmp_path: Path) -> None:
     empty.mkdir()
     for path in (tmp_path / "missing.jpg", spoilt, empty, movie):
         with pytest.raises(UserError, match=str(path)):
-            next(play(path, FIXED))
+            next(play_frames(path, FIXED))
 
 
 def test_a_missing_webcam_is_named() -> None:
@@ -114,9 +114,9 @@ def test_a_missing_webcam_is_named() -> None:
 
 
 def test_webcam_names() -> None:
-    assert [webcam_index(s) for s in ("webcam", "webcam:2", "sim", "webcams/film.mp4")] == [0, 2, None, None]
+    assert [parse_webcam_index(s) for s in ("webcam", "webcam:2", "sim", "webcams/film.mp4")] == [0, 2, None, None]
     with pytest.raises(UserError, match="webcam:x"):
-        webcam_index("webcam:x")
+        parse_webcam_index("webcam:x")
 
 
 @pytest.mark.parametrize(("rate_hz", "patience_s"), [(0.5, 1.98), (5.0, 0.18), (50.0, 0.01)])

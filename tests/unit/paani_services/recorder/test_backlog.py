@@ -8,22 +8,22 @@ from hypothesis import strategies as st
 from paani import keys
 from paani import messages as m
 from paani.logs.writer import Head
-from paani_services.recorder.backlog import Backlog, Heard
-from paani_services.recorder.counts import Counts, for_file
+from paani_services.recorder.backlog import Backlog, QueuedMessage
+from paani_services.recorder.counts import MessageCounts, file_counts
 
 
-def heard(number: int, *, picture: bool, size: int = 10) -> Heard:
+def heard(number: int, *, picture: bool, size: int = 10) -> QueuedMessage:
     topic = keys.PICTURE if picture else keys.IMU
-    return Heard(topic, number, Head(source_us=0, seq=number), b"x" * size, b"")
+    return QueuedMessage(topic, number, Head(source_us=0, seq=number), b"x" * size, b"")
 
 
 def test_pictures_go_first_the_oldest_of_them_first() -> None:
     """P3: a bounded queue."""
     backlog = Backlog(max_messages=4, max_bytes=1000)
-    gone = []
+    evicted = []
     for number, picture in enumerate((False, True, True, False, False, False, False)):
-        gone += backlog.put(heard(number, picture=picture))
-    assert [one.log_us for one in gone] == [1, 2, 0]
+        evicted += backlog.put(heard(number, picture=picture))
+    assert [one.log_us for one in evicted] == [1, 2, 0]
     assert [one.log_us for one in backlog.drain()] == [3, 4, 5, 6]
     assert len(backlog) == 0
 
@@ -44,19 +44,19 @@ def test_bytes_are_bounded_too() -> None:
 def test_nothing_is_lost_without_being_named(messages: list[tuple[bool, int]], count: int, size: int) -> None:
     """Property: what comes in is drained in order or handed back, and the bounds hold all the time."""
     backlog = Backlog(count, size)
-    gone = []
+    evicted = []
     for number, (picture, length) in enumerate(messages):
-        gone += backlog.put(heard(number, picture=picture, size=length))
+        evicted += backlog.put(heard(number, picture=picture, size=length))
         assert len(backlog) <= count
     kept = [one.log_us for one in backlog.drain()]
     assert kept == sorted(kept)
-    assert sorted(kept + [one.log_us for one in gone]) == list(range(len(messages)))
+    assert sorted(kept + [one.log_us for one in evicted]) == list(range(len(messages)))
 
 
 def test_gaps_in_the_numbers_are_missing() -> None:
-    counts = Counts()
+    counts = MessageCounts()
     for epoch, seq in ((1, 7), (1, 8), (1, 11), (1, 11), (1, 9), (2, 0), (3, 2), (1, 50), (3, 3)):
-        counts.heard("a", Head(source_us=0, seq=seq, epoch=epoch))
+        counts.count_received("a", Head(source_us=0, seq=seq, epoch=epoch))
     [topic] = counts.topics()
     assert topic.missing == 2 + 2, "9 and 10 of epoch 1, 0 and 1 of epoch 3; nothing before the first"
 
@@ -64,7 +64,7 @@ def test_gaps_in_the_numbers_are_missing() -> None:
 @given(st.lists(st.sampled_from(("lost", "dropped", "written")), min_size=1, max_size=200), st.data())
 def test_produced_is_written_plus_dropped_plus_missing(fates: list[str], data: st.DataObject) -> None:
     """P3, property: every number that a producer gave out between the first and last heard is accounted for."""
-    counts = Counts()
+    counts = MessageCounts()
     restarts = data.draw(st.sets(st.integers(1, len(fates))))
     epoch, seq, first, produced, produced_when_heard = 1, -1, True, 0, 0
     for number, fate in enumerate(fates):
@@ -77,11 +77,11 @@ def test_produced_is_written_plus_dropped_plus_missing(fates: list[str], data: s
             continue
         first = False
         produced_when_heard = produced
-        counts.heard("a", Head(source_us=0, seq=seq, epoch=epoch))
+        counts.count_received("a", Head(source_us=0, seq=seq, epoch=epoch))
         if fate == "dropped":
-            counts.dropped("a")
+            counts.count_dropped("a")
         else:
-            counts.written(["a"])
+            counts.count_written(["a"])
     for topic in counts.topics():
         assert topic.written + topic.dropped + topic.missing == produced_when_heard
 
@@ -92,15 +92,15 @@ def test_a_file_has_its_own_counts() -> None:
         m.RecordedTopic(topic="a", written=15, dropped=3, missing=2, unreadable=1),
         m.RecordedTopic(topic="b", written=4),
     )
-    assert for_file(now, before) == {
+    assert file_counts(now, before) == {
         "a": "written=5 dropped=2 missing=0 unreadable=0",
         "b": "written=4 dropped=0 missing=0 unreadable=0",
     }
 
 
 def test_a_message_without_a_header_is_counted() -> None:
-    counts = Counts()
-    counts.heard("a", None)
-    counts.heard("a", Head(source_us=0, seq=5))
+    counts = MessageCounts()
+    counts.count_received("a", None)
+    counts.count_received("a", Head(source_us=0, seq=5))
     [topic] = counts.topics()
     assert (topic.unreadable, topic.missing) == (1, 0)

@@ -23,9 +23,9 @@ from paani.logs.folder import free_path, recordings, require_folder, too_old
 from paani.logs.reader import open_log
 from paani.logs.repair import is_finished, repair
 from paani.logs.writer import read_head
-from paani_services.recorder.about import make_about
-from paani_services.recorder.backlog import Heard
-from paani_services.recorder.recording import Recording, remove_empty
+from paani_services.recorder.backlog import QueuedMessage
+from paani_services.recorder.recording import Recording, remove_empty_files
+from paani_services.recorder.system_description import describe_system
 from tests.unit.paani.logs.small_logs import START_US, STEP_US, finished, odometry
 
 TOPICS = (keys.ODOMETRY, keys.PICTURE)
@@ -36,9 +36,9 @@ def settings(folder: Path, **changes: Any) -> RecorderConfig:
     return RecorderConfig(**(values | changes))
 
 
-def heard(number: int, padding: int = 0) -> Heard:
+def heard(number: int, padding: int = 0) -> QueuedMessage:
     data = msgspec.json.encode(odometry(number)) + b" " * padding
-    return Heard(keys.ODOMETRY, START_US + number * STEP_US, read_head(data), data, b"")
+    return QueuedMessage(keys.ODOMETRY, START_US + number * STEP_US, read_head(data), data, b"")
 
 
 def now_us(number: int) -> int:
@@ -48,7 +48,7 @@ def now_us(number: int) -> int:
 def record(recording: Recording, numbers: range) -> None:
     for number in numbers:
         one = heard(number)
-        recording.counts.heard(one.topic.name, one.head)
+        recording.counts.count_received(one.topic.name, one.head)
         recording.write([one], now_us(number))
 
 
@@ -66,7 +66,7 @@ def counted(recording: Recording) -> tuple[int, int]:
 
 
 def test_parts_follow_one_another_without_a_gap(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path, part_s=2.0), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, part_s=2.0), describe_system(Config()), TOPICS)
     record(recording, range(100))
     recording.close([], now_us(100))
     assert names(tmp_path) == ["20231114T221320Z-1.mcap", "20231114T221322Z-2.mcap", "20231114T221324Z-3.mcap"]
@@ -82,7 +82,7 @@ def test_parts_follow_one_another_without_a_gap(tmp_path: Path) -> None:
 
 
 def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path, part_mib=0.06, flush_s=0.1), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, part_mib=0.06, flush_s=0.1), describe_system(Config()), TOPICS)
     record(recording, range(1500))
     recording.close([], now_us(1500))
     sizes = [path.stat().st_size for path in tmp_path.iterdir()]
@@ -92,7 +92,7 @@ def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
 
 
 def test_a_crash_costs_at_most_what_was_not_flushed(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path, flush_s=0.5), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, flush_s=0.5), describe_system(Config()), TOPICS)
     record(recording, range(95))
     path = recording.path
     assert path is not None
@@ -117,7 +117,7 @@ def test_the_oldest_goes_when_the_budget_is_spent_unless_it_is_kept(tmp_path: Pa
     (tmp_path / "20200101T000000Z-1.mcap.keep").touch()
     (tmp_path / "notes.mcap").write_bytes(b"x" * 10 * size)
     budget_mib = 2.5 * size / 2**20
-    recording = Recording(settings(tmp_path, budget_mib=budget_mib), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, budget_mib=budget_mib), describe_system(Config()), TOPICS)
     record(recording, range(1))
     assert "20210101T000000Z-1.mcap" not in names(tmp_path)
     assert "20200101T000000Z-1.mcap" in names(tmp_path)
@@ -129,7 +129,7 @@ def test_the_oldest_goes_when_the_budget_is_spent_unless_it_is_kept(tmp_path: Pa
 def test_kept_recordings_that_fill_the_budget_end_the_recording(tmp_path: Path) -> None:
     size = finished(tmp_path, name="20200101T000000Z-1.mcap").stat().st_size
     (tmp_path / "20200101T000000Z-1.mcap.keep").touch()
-    recording = Recording(settings(tmp_path, budget_mib=0.9 * size / 2**20), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, budget_mib=0.9 * size / 2**20), describe_system(Config()), TOPICS)
     record(recording, range(5))
     assert recording.path is None
     assert "recorder.budget_mib" in recording.problem
@@ -145,7 +145,7 @@ def test_too_old_takes_no_more_than_it_must() -> None:
 
 
 def test_a_disk_nearly_full_is_a_state_and_no_file(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path, min_free_mib=1e9), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, min_free_mib=1e9), describe_system(Config()), TOPICS)
     record(recording, range(10))
     assert recording.path is None
     assert "recorder.min_free_mib" in recording.problem
@@ -168,7 +168,7 @@ def small_files() -> Iterator[None]:
 
 
 def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path, flush_s=0.1), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, flush_s=0.1), describe_system(Config()), TOPICS)
     with small_files():
         record(recording, range(1200))
         recording.close([], now_us(1200))
@@ -186,7 +186,7 @@ def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
 def test_a_folder_that_goes_away_is_a_state(tmp_path: Path) -> None:
     folder = tmp_path / "r"
     folder.mkdir()
-    recording = Recording(settings(folder), make_about(Config()), TOPICS)
+    recording = Recording(settings(folder), describe_system(Config()), TOPICS)
     record(recording, range(20))
     for path in folder.iterdir():
         path.unlink()
@@ -208,7 +208,7 @@ def test_names_never_meet(tmp_path: Path) -> None:
     for part in (2, 10, 9):
         (tmp_path / f"20231114T221320Z-{part}.mcap").touch()
     assert [file.path.name[17:-5] for file in recordings(tmp_path)] == ["1", "2", "9", "10"]
-    remove_empty(tmp_path)
+    remove_empty_files(tmp_path)
     assert recordings(tmp_path) == []
 
 
@@ -222,7 +222,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 
 def test_what_made_it_is_known() -> None:
     """A10: the recording names profile, settings, models and versions."""
-    about = make_about(Config())
+    about = describe_system(Config())
     versions = msgspec.json.decode(about.attachments["versions.json"])
     assert versions["paani"] == about.version
     assert versions["numpy"]
@@ -232,7 +232,7 @@ def test_what_made_it_is_known() -> None:
 
 
 def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
-    recording = Recording(settings(tmp_path), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path), describe_system(Config()), TOPICS)
     record(recording, range(30))
     recording.close([heard(30)], now_us(30))
     [path] = tmp_path.iterdir()
@@ -245,11 +245,11 @@ def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
 def test_what_is_finished_and_what_is_open_goes_to_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[str] = []
     monkeypatch.setattr(os, "fdatasync", lambda fd: synced.append(Path(f"/proc/self/fd/{fd}").resolve().name))
-    recording = Recording(settings(tmp_path, part_s=1.0), make_about(Config()), TOPICS)
+    recording = Recording(settings(tmp_path, part_s=1.0), describe_system(Config()), TOPICS)
     record(recording, range(30))
-    recording.sync()
+    recording.sync_to_disk()
     assert sorted(synced) == names(tmp_path)
     recording.close([], now_us(30))
     synced.clear()
-    recording.sync()
+    recording.sync_to_disk()
     assert synced == [names(tmp_path)[-1]], "the last, now that it is finished; the others are on the disk"

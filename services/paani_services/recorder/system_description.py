@@ -1,4 +1,4 @@
-"""What a recording says of the system that made it: settings, models, versions."""
+"""Description of the recorded system, attached to every recording: settings, model checksums, versions."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from paani.logs.writer import About
 from paani_models.catalogue import MANIFEST, WEIGHTS
 
 PACKAGES = ("paani", "numpy", "onnxruntime", "eclipse-zenoh", "msgspec", "mcap", "opencv-python-headless")
-GIT_S = 5.0
+GIT_TIMEOUT_S = 5.0  # a checkout on a slow disk must not delay the start further
 
 
-def make_about(config: Config) -> About:
-    """Reads the manifest of the models and asks Git; what is not there is left empty."""
+def describe_system(config: Config) -> About:
+    """Settings, the models' manifest and the versions of this system; what cannot be read is left empty."""
     manifest = WEIGHTS / MANIFEST
     attachments = {
         "config.json": encode_config(config),
@@ -32,7 +32,7 @@ def make_about(config: Config) -> About:
 
 
 def versions() -> dict[str, str]:
-    """Of this program and of what it computes with."""
+    """Versions of PAANI, its commit, and the packages, interpreter and platform it runs on."""
     return {
         **{package: _version(package) for package in PACKAGES},
         "python": platform.python_version(),
@@ -54,6 +54,8 @@ def _commit(checkout: Path) -> str:
         return ""
     command = [git, "-C", str(checkout), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=False).stdout.strip()
+        return subprocess.run(
+            command, capture_output=True, text=True, timeout=GIT_TIMEOUT_S, check=False
+        ).stdout.strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""
