@@ -21,7 +21,7 @@ from paani.messages import (
     Odometry,
     SimTime,
 )
-from paani_services.navigator.avoidance.fence import is_allowed, limit_speed
+from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
 from paani_services.navigator.avoidance.replanning import (
     COURSE_TOLERANCE_RAD,
     PlannerState,
@@ -149,12 +149,10 @@ def navigate(
         planner_setpoint = GuidanceSetpoint(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=_is_turn_to_look(advisory)
         )
-        planner_state, plan = replan(
-            state.planner_state, odometry, planner_setpoint, now_us, camera, config.planner, mission.fence
+        state, heading_rad, speed_mps, is_path_free = _steer_planned(
+            state, odometry, planner_setpoint, now_us, camera, config, mission.fence
         )
-        state = msgspec.structs.replace(state, planner_state=planner_state)
-        heading_rad, speed_mps = plan.heading_rad, plan.speed_mps
-        if speed_mps <= 0.0 and not is_braking(planner_state, odometry, now_us, config.planner):
+        if not is_path_free:
             inhibits.append(Inhibit.NO_FREE_PATH)
     if direction not in TURN_DIRECTIONS:
         is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= COURSE_TOLERANCE_RAD
@@ -184,6 +182,22 @@ def _steer_visual_turn(
         return state, constant_rate_heading_rad(direction, yaw_rad, config), False
     turn, is_capped = latch_heading(state.turn, direction, yaw_rad, now_us, config)
     return msgspec.structs.replace(state, turn=turn), turn.heading_rad, is_capped
+
+
+def _steer_planned(
+    state: NavigatorState,
+    odometry: Odometry,
+    setpoint: GuidanceSetpoint,
+    now_us: int,
+    camera: Camera,
+    config: NavigatorConfig,
+    fence: Fence,
+) -> tuple[NavigatorState, float, float, bool]:
+    """The state, the planner's heading and speed, and whether it has a path or is still braking for want of one."""
+    planner_state, plan = replan(state.planner_state, odometry, setpoint, now_us, camera, config.planner, fence)
+    state = msgspec.structs.replace(state, planner_state=planner_state)
+    is_path_free = plan.speed_mps > 0.0 or is_braking(planner_state, odometry, now_us, config.planner)
+    return state, plan.heading_rad, plan.speed_mps, is_path_free
 
 
 def _is_turn_to_look(advisory: Advisory | None) -> bool:

@@ -139,16 +139,18 @@ def _metres(text: str) -> float:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani route", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    convert = commands.add_parser("convert", help="between .gpx, .geojson and .toml")
+    convert = commands.add_parser("convert", help="convert a route between .gpx, .geojson and .toml")
     convert.add_argument("source", type=input_file(), metavar="IN")
     convert.add_argument("target", type=output_file(""), metavar="OUT")
-    convert.add_argument("--thin", type=_metres, metavar="M", help="leave out points that bend the line by less")
+    convert.add_argument(
+        "--thin", type=_metres, metavar="M", help="leave out points that lie less than M metres off the line"
+    )
     convert.add_argument("--repeat", action="store_true", help="the last waypoint leads back to the first")
-    convert.add_argument("--origin", type=_origin, metavar="LAT,LON", help="of metres that have none")
-    info = commands.add_parser("info", help="length, legs, bounds, origin")
+    convert.add_argument("--origin", type=_origin, metavar="LAT,LON", help="origin of a route in metres that has none")
+    info = commands.add_parser("info", help="print length, legs, bounds and origin")
     info.add_argument("source", type=input_file(), metavar="FILE")
-    check = commands.add_parser("check", help="whether the navigator can follow it")
+    check = commands.add_parser("check", help="check that the navigator can follow a route")
     check.add_argument("source", type=input_file(), metavar="FILE")
-    check.add_argument("--fence", type=input_file("--fence"), metavar="FILE", help="which it may not leave")
-    check.add_argument("--world", metavar="NAME", help="whose water it may not leave")
+    check.add_argument("--fence", type=input_file("--fence"), metavar="FILE", help="fence that the route may not leave")
+    check.add_argument("--world", metavar="NAME", help="world whose water the route may not leave")
     return parser
