@@ -144,7 +144,7 @@ def test_after_a_gap_of_the_imu_the_estimate_is_unhealthy_until_fixes_agree() ->
 
 def test_repeated_and_late_samples_are_counted_and_change_nothing() -> None:
     clean, disturbed = wandering(), wandering()
-    disturbed.change = lambda samples: [*samples, samples[0], shifted(samples[2], -300_000)]
+    disturbed.change_samples = lambda samples: [*samples, samples[0], shifted(samples[2], -300_000)]
     assert clean.sail(30.0, surge_mps=0.5) == disturbed.sail(30.0, surge_mps=0.5)
     assert disturbed.estimator.drops == {"imu_late": 2 * 600}
 
@@ -166,7 +166,7 @@ def test_a_late_or_repeated_fix_is_counted_and_changes_nothing() -> None:
 def test_impossible_numbers_are_counted_and_change_nothing(value: float) -> None:
     clean, disturbed = wandering(), wandering()
     names = [name for name in ImuSample.__struct_fields__ if name.endswith(("_radps", "_mps2", "_rad"))]
-    disturbed.change = lambda samples: [
+    disturbed.change_samples = lambda samples: [
         *samples,
         *(msgspec.structs.replace(shifted(samples[-1], 1), **{name: value}) for name in names),
     ]
@@ -197,10 +197,10 @@ def test_a_fix_far_from_the_origin_is_refused() -> None:
 
 def test_stamps_from_the_future_do_not_keep_the_estimate_healthy() -> None:
     boat = ready()
-    boat.change = lambda samples: [shifted(each, 3_600_000_000) for each in samples]
+    boat.change_samples = lambda samples: [shifted(each, 3_600_000_000) for each in samples]
     assert not boat.sail(1.0)[-1].healthy
-    assert not boat.local.healthy
-    boat.change = lambda samples: samples
+    assert not boat.local_estimate.healthy
+    boat.change_samples = lambda samples: samples
     assert boat.sail(5.0)[-1].healthy
 
 

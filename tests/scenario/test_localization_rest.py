@@ -150,7 +150,9 @@ def test_an_imu_without_noise_does_not_keep_rest() -> None:
     boat = wandering()
     boat.sail(30.0)
     frozen = boat.sample(0.0, 0.0)
-    boat.change = lambda samples: [msgspec.structs.replace(frozen, source_us=each.source_us) for each in samples]
+    boat.change_samples = lambda samples: [
+        msgspec.structs.replace(frozen, source_us=each.source_us) for each in samples
+    ]
     boat.sail(5.0, surge_mps=0.5)
     estimates = boat.sail(10.0, surge_mps=0.5)
     assert not estimates[-1].stopped or not estimates[-1].healthy

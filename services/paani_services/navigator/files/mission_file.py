@@ -18,9 +18,8 @@ from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame
 from paani_services.navigator.files.route_file import MAX_WAYPOINTS, load_route
 from paani_services.navigator.guidance.mission_progress import mission_of_route
 
-Radius = Annotated[
-    float, msgspec.Meta(ge=1.0, le=1e3)
-]  # [m]; within less than its own length the boat would never rest
+# Of a station [m]; the boat would never rest within a radius below its own length.
+Radius = Annotated[float, msgspec.Meta(ge=1.0, le=1e3)]
 
 
 class _OptionalPoint(FilePoint, frozen=True):

@@ -14,8 +14,8 @@ from paani_services.localization.estimator import Estimator
 ORIGIN_DEG = (50.0, 8.0)
 CONFIG = LocalizationConfig(origin_lat_lon_deg=ORIGIN_DEG)
 START_US = 5_000_000
-BIAS_RADPS = 0.004
-PICK_UP_MPS2 = 0.5
+BIAS_RADPS = 0.004  # of the gyro
+MAX_ACCEL_MPS2 = 0.5
 
 
 def unchanged(samples: list[ImuSample]) -> list[ImuSample]:
@@ -43,8 +43,10 @@ class EstimatedBoat:
         self.gps = self.imu = True
         self.fix_offset_m = self.compass_bias_rad = self.gyro_fault_radps = 0.0
         self.epoch = 0
-        self.local = self.global_estimate = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
-        self.change: Callable[[list[ImuSample]], list[ImuSample]] = unchanged  # a fault on the way to the estimator
+        self.local_estimate = self.global_estimate = Odometry(source_us=0, x_m=0, y_m=0, yaw_rad=0, surge_mps=0)
+        self.change_samples: Callable[[list[ImuSample]], list[ImuSample]] = (
+            unchanged  # a fault on the way to the estimator
+        )
         self.change_fix: Callable[[GpsFix], GpsFix] = lambda fix: fix
         self._wander_std_m, self._wander_m = wander_m, wander_m * self.rng.standard_normal(2)
         self._fix_noise_m, self._fix_speed_noise_mps, self._fix_std_m = fix_noise_m, fix_speed_noise_mps, fix_std_m
@@ -52,13 +54,15 @@ class EstimatedBoat:
 
     def sail(self, seconds: float, surge_mps: float = 0.0, yaw_rate_radps: float = 0.0) -> list[Odometry]:
         """Advance by `seconds`, accelerating to this speed; returns the global estimates."""
-        found = []
+        estimates = []
         for step in range(round(seconds * 20)):
-            samples = self.change([self.sample(surge_mps, yaw_rate_radps) for _ in range(5)])
+            samples = self.change_samples([self.sample(surge_mps, yaw_rate_radps) for _ in range(5)])
             fix = self.change_fix(self.fix()) if step % self._steps_per_fix == 0 and self.gps else None
-            self.local, self.global_estimate = self.estimator.step(samples if self.imu else [], fix, self.now_us)
-            found.append(self.global_estimate)
-        return found
+            self.local_estimate, self.global_estimate = self.estimator.step(
+                samples if self.imu else [], fix, self.now_us
+            )
+            estimates.append(self.global_estimate)
+        return estimates
 
     def error_m(self) -> float:
         """Distance of the global estimate from the true position."""
@@ -67,7 +71,7 @@ class EstimatedBoat:
     def sample(self, surge_mps: float, yaw_rate_radps: float) -> ImuSample:
         """Advance the boat by 10 ms, accelerating to that speed; returns the IMU sample."""
         self.now_us += 10_000
-        change = PICK_UP_MPS2 * 0.01
+        change = MAX_ACCEL_MPS2 * 0.01
         gained_mps = min(max(surge_mps - self.surge_mps, -change), change)
         self.surge_mps += gained_mps
         self.yaw_rad += yaw_rate_radps * 0.01

@@ -8,8 +8,13 @@ import pytest
 
 from paani.config import LocalizationConfig
 from paani.geometry import geodetic_from_enu
+from paani.messages import ImuSample
 from paani_services.localization.gyro_bias import UNCALIBRATED_STD_RADPS, estimate_gyro_bias
 from tests.unit.paani_services.localization.estimated_boat import BIAS_RADPS, ORIGIN_DEG, EstimatedBoat
+
+
+def without_orientation(samples: list[ImuSample]) -> list[ImuSample]:
+    return [msgspec.structs.replace(sample, orientation_available=False) for sample in samples]
 
 
 @pytest.fixture
@@ -33,12 +38,12 @@ def test_l2_l3_follows_the_boat_in_the_map(boat: EstimatedBoat) -> None:
 
 def test_l1_local_estimate_is_smooth_and_ignores_gps(boat: EstimatedBoat) -> None:
     """L1: a jump of the receiver does not reach the local frame."""
-    before = boat.local
+    before = boat.local_estimate
     boat.fix_offset_m = 3.0
     boat.sail(2.0)
-    assert math.hypot(boat.local.x_m - before.x_m, boat.local.y_m - before.y_m) < 0.2
-    assert boat.local.healthy
-    assert boat.local.yaw_rad == pytest.approx(boat.yaw_rad, abs=0.03)
+    assert math.hypot(boat.local_estimate.x_m - before.x_m, boat.local_estimate.y_m - before.y_m) < 0.2
+    assert boat.local_estimate.healthy
+    assert boat.local_estimate.yaw_rad == pytest.approx(boat.yaw_rad, abs=0.03)
 
 
 def test_unhealthy_until_calibrated_and_converged() -> None:
@@ -67,7 +72,7 @@ def test_stale_gps_and_stale_imu_are_unhealthy_and_recover(boat: EstimatedBoat) 
     boat.imu = False
     boat.sail(0.4)
     assert not boat.global_estimate.healthy
-    assert not boat.local.healthy
+    assert not boat.local_estimate.healthy
 
 
 def test_a_new_imu_epoch_starts_anew(boat: EstimatedBoat) -> None:
@@ -127,7 +132,9 @@ def test_the_gyro_bias_is_not_taken_from_a_boat_that_turns() -> None:
 def test_a12_without_heading_there_is_no_health() -> None:
     """A12: an IMU that marks its orientation unavailable gives no yaw to steer by."""
     boat = EstimatedBoat()
-    boat.change = lambda samples: [msgspec.structs.replace(each, orientation_available=False) for each in samples]
+    boat.change_samples = lambda samples: [
+        msgspec.structs.replace(each, orientation_available=False) for each in samples
+    ]
     assert not any(one.healthy for one in boat.sail(6.0))
     assert not any(one.healthy for one in boat.sail(60.0, surge_mps=0.6))
 
@@ -135,7 +142,9 @@ def test_a12_without_heading_there_is_no_health() -> None:
 def test_a12_a_compass_that_falls_silent_ends_health(boat: EstimatedBoat) -> None:
     """A12: the gyro keeps the heading for 3 s, no longer."""
     boat.sail(10.0, surge_mps=0.6)
-    boat.change = lambda samples: [msgspec.structs.replace(each, orientation_available=False) for each in samples]
+    boat.change_samples = lambda samples: [
+        msgspec.structs.replace(each, orientation_available=False) for each in samples
+    ]
     estimates = boat.sail(5.0, surge_mps=0.6)
     assert estimates[50].healthy
     assert not any(one.healthy for one in estimates[62:])
