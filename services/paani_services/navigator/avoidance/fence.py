@@ -87,7 +87,8 @@ def limit_speed(
     """The speed at which the ordered heading may be sailed, or None where the boat may not move.
 
     Towards the edge the speed falls so that `fence_margin_m` and the way to stop (`fence_stop_s` times the speed)
-    always fit before it; a boat whose course over ground no longer leaves room for the way to stop gets no thrust.
+    always fit before it; a boat whose velocity, with what it may gain until the next order, no longer leaves room for
+    the way to stop gets no thrust.
     Outside, nothing moves, unless `fence_return` and the heading leads to the nearest way in.
     """
     if not fence:
@@ -95,11 +96,10 @@ def limit_speed(
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _limit_speed_outside(fence, here, heading_rad, speed_mps, config)
-    east_mps, north_mps = velocity_over_ground_mps(odometry)
-    if math.hypot(east_mps, north_mps) > MIN_COURSE_SPEED_MPS:
-        stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
-        if allowed_distance_m(fence, here, stops_at) < math.inf:
-            return None
+    east_mps, north_mps = _velocity_at_next_order(odometry, config)
+    stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
+    if allowed_distance_m(fence, here, stops_at) < math.inf:
+        return None
     reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
     ahead = (here[0] + reach_m * portable.cos(heading_rad), here[1] + reach_m * portable.sin(heading_rad))
     allowed_mps = (allowed_distance_m(fence, here, ahead) - config.fence_margin_m) / config.fence_stop_s
@@ -127,6 +127,20 @@ def find_route_violation(
 def do_segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     """Whether two pieces of line touch or cross."""
     return _may_be_within(one, other, 0.0) and _segment_distance_m(one, other) == 0.0
+
+
+def _velocity_at_next_order(odometry: Odometry, config: NavigatorConfig) -> tuple[float, float]:
+    """East and north velocity that the boat may have by the next order [m/s].
+
+    Thrust drives the boat along its present heading, whatever heading is ordered, until it has turned. A velocity whose
+    direction is noise counts as its part ahead.
+    """
+    east_mps, north_mps = velocity_over_ground_mps(odometry)
+    gain_mps = config.planner.accel_mps2 / config.rate_hz
+    if math.hypot(east_mps, north_mps) <= MIN_COURSE_SPEED_MPS:
+        east_mps, north_mps, gain_mps = 0.0, 0.0, gain_mps + max(odometry.surge_mps, 0.0)
+    ahead = (portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad))
+    return east_mps + gain_mps * ahead[0], north_mps + gain_mps * ahead[1]
 
 
 def _limit_speed_outside(

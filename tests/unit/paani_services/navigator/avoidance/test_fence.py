@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from paani.config import load_config
@@ -135,6 +135,7 @@ def test_outside_nothing_moves_unless_the_way_back_is_allowed() -> None:
         max_size=3,
     ),
 )
+@example(yaw_deg=53.0, x_m=4.0, y_m=14.0, advice=[Direction.LEFT, Direction.LEFT, Direction.STRAIGHT])
 @settings(max_examples=8, deadline=None)
 def test_no_advice_carries_the_boat_over_the_edge(
     yaw_deg: float, x_m: float, y_m: float, advice: list[Direction]
