@@ -1,4 +1,4 @@
-"""Distances on the grid. Pure."""
+"""Euclidean distance fields on the grid, one axis after the other. Pure."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from paani.arrays import F64, Bools
 from paani_services.navigator.mapping.observed_cells import CELL_M
 
-MAX_DISTANCE_CELLS = 20  # distances are known up to 4 m
+MAX_DISTANCE_CELLS = 20  # distances are computed up to 4 m and are 4 m beyond [cells]
 
 
 def distance_field_m(cells: Bools) -> F64:
-    """From the middle of each cell to the middle of the nearest of these, at most 4 m; of the mask's shape."""
+    """Distance from the middle of each cell to the middle of the nearest cell of the mask, at most 4 m."""
     far_squared = MAX_DISTANCE_CELLS * MAX_DISTANCE_CELLS
     found: NDArray[np.int16] = np.where(cells, 0, far_squared).astype(np.int16)
     for axis in (0, 1):
@@ -24,5 +24,5 @@ def distance_field_m(cells: Bools) -> F64:
 
 
 def signed_distance_field_m(cells: Bools) -> F64:
-    """As `distance_m` outside, inside the negative of what leads out, at least -4 m."""
+    """Signed distance: `distance_field_m` outside the mask; inside, minus the distance to leave it, at least -4 m."""
     return np.asarray(distance_field_m(cells) - distance_field_m(~cells))

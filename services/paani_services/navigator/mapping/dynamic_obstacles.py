@@ -1,6 +1,7 @@
-"""What moves on the water, and how fast: from where boxes stood in the pictures remembered. Pure.
+"""Dynamic obstacles: tracks of detected boxes on the water, and their velocities. Pure.
 
-A thing's places are fitted with a constant velocity. What cannot be told from standing stands.
+A constant velocity is fitted to the positions of each track by weighted least squares. An obstacle whose velocity does
+not differ significantly from rest is static.
 """
 
 import math
@@ -22,80 +23,35 @@ from paani_services.navigator.mapping.projection import (
     ranges_to_water_m,
     stack_cameras,
 )
-
-BOX_EDGE_DEVIATION = 1.0 / 240.0  # of the picture's height: how exactly a box's lower end is known
-HULL_EDGE_FACTOR = (
-    2.0  # and a hull's, which the mask ends: half a row of 64, and so for as long as it takes to the next
+from paani_services.navigator.mapping.velocity_fit import (
+    PositionMeasurement,
+    Velocity,
+    VelocityEstimate,
+    estimate_velocity,
+    fit_velocity,
+    velocity_if_significant,
 )
-POSITION_DEVIATION_M, CROSS_RANGE_FACTOR = 0.05, 2.3  # and everything else of its place, near and far
-WIDTH_DEVIATION_FRACTION = 0.03  # what shows of a thing changes with the side it shows
-MIN_SIGNIFICANCE = 4.0  # standard deviations of a velocity that is no chance
-MIN_SPEED_MPS = 0.08  # slower things stand: Q6's drift covers them
-DRIFT_FIT_S, MAX_DRIFT_MPS = 8.0, 0.3  # what drifts goes a metre meanwhile, and no faster
+
+BOX_EDGE_DEVIATION = 1.0 / 240.0  # standard deviation of a box's lower end, of the picture's height
+# The waterline of a hull, where the mask ends the water, is that much less exact: half a row of 64, which persists
+# until the hull has moved to the next row.
+HULL_EDGE_FACTOR = 2.0
+POSITION_DEVIATION_M = 0.05  # all other errors of a position near the camera
+CROSS_RANGE_FACTOR = 2.3  # and across the ray, in units of the angle of BOX_EDGE_DEVIATION
+WIDTH_DEVIATION_FRAC = 0.03  # of an obstacle's width: its visible middle moves with the side that it shows
+DRIFT_FIT_S = 8.0  # a vessel adrift moves a metre in this time
+MAX_DRIFT_MPS = 0.3  # vessels adrift are slower than this
 MIN_DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
-MIN_MEASUREMENTS, MIN_SPAN_S = 3, 0.7  # fewer or shorter say nothing
-INDEPENDENT_RATE_HZ = 5.0  # errors of pictures that follow faster are the same
 MIN_UNSEEN_S = 1.0  # five pictures
-PRIOR_DEGREES_OF_FREEDOM = 5.0  # degrees of freedom
-PRIOR_SPEED_DEVIATION_MPS = 0.7  # of what moves: how far the fit goes from rest without evidence
-GATE_M, GATE_MPS = 0.5, 1.2  # between two places of one thing: its size, and how fast it may be
+GATE_M, GATE_MPS = 0.5, 1.2  # validation gate between two measurements: an obstacle's size, and its highest speed
 BORDER_STEPS = 4  # a box that comes this near to the picture's sides [1/512] may go on beyond
-
-SymmetricMatrix = tuple[float, float, float]  # a 2 x 2 matrix: east-east, east-north, north-north
-PlaneVector = tuple[float, float]
-
-
-class PositionMeasurement(NamedTuple):
-    """Where a thing stood in one picture, east and north [m], and what that is worth: the inverse of its covariance.
-
-    box: which, as in `Moving` of the grid. at_s: from now, negative. along_m: standard deviation of its range.
-    outline: points where it meets the water, from left to right. ends: whether the picture shows its left, its right
-    one; whole: both.
-    """
-
-    box_id: tuple[int, int]
-    label: Label
-    time_s: float
-    position_m: PlaneVector
-    information_matrix: SymmetricMatrix
-    range_deviation_m: float
-    outline: tuple[F64, F64]
-    shows_ends: tuple[bool, bool]
-
-    @property
-    def is_whole(self) -> bool:
-        """Not cut by the picture's sides."""
-        return all(self.shows_ends)
-
-
-class Velocity(NamedTuple):
-    """Velocity, and its standard deviation in the direction in which that is larger."""
-
-    east_mps: float
-    north_mps: float
-    deviation_mps: float
-
-
-class VelocityEstimate(NamedTuple):
-    """A velocity, and the inverse of its covariance times it, which says how far from chance it is.
-
-    deviation_mps: as in `Motion`.
-    """
-
-    velocity_mps: PlaneVector
-    information_vector: PlaneVector
-    deviation_mps: float
-
-    @property
-    def squared_significance(self) -> float:
-        """Standard deviations between it and rest, squared."""
-        return self.velocity_mps[0] * self.information_vector[0] + self.velocity_mps[1] * self.information_vector[1]
 
 
 class DynamicObstacle(NamedTuple):
-    """A thing that moves: its outline now [n], the room to keep around it, its motion, when last seen, whole or adrift.
+    """A tracked obstacle with a velocity: its outline now [n], when it was last seen, and the room kept around it.
 
-    boxes: what it has left behind; where it was within `free_s` of when it was last seen stays occupied.
+    vacated_boxes: boxes that show it where it is no more. Where it was within `free_s` of when it was last seen stays
+    occupied.
     """
 
     east_m: F64
@@ -107,20 +63,21 @@ class DynamicObstacle(NamedTuple):
 
     @property
     def is_moving(self) -> bool:
-        """It moves for certain; a person who may swim has a deviation alone."""
+        """Whether it moves for certain; a person who may swim has a standard deviation alone."""
         return any(self.velocity[:2])
 
 
 def find_dynamic_obstacles(
     observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
 ) -> tuple[DynamicObstacle, ...]:
-    """Everything that moved for certain when it was last seen whole, vessels adrift, and people in sight.
+    """Track obstacles through the observations, oldest first, and estimate their velocities.
 
-    sights: oldest first.
+    Dynamic are obstacles that moved significantly when last seen whole, vessels adrift, and people in sight, who may
+    begin to swim. Everything else is static and stays on the grid.
     """
     found = []
     for track in _associate_measurements(observations, now_us, camera, config):
-        complete = [measurement for measurement in track if measurement.is_whole]
+        complete = [each for each in track if each.is_whole]
         velocity, last = estimate_velocity(complete, config.fit_s), complete[-1] if complete else track[-1]
         if velocity is None and track[-1].label is Label.VESSEL:
             velocity, last = _estimate_drift(track, complete), track[-1]
@@ -135,51 +92,50 @@ def find_dynamic_obstacles(
                 config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
                 velocity,
                 -last.time_s,
-                frozenset(
-                    measurement.box_id for measurement in track if measurement.time_s < track[-1].time_s - config.free_s
-                ),
+                frozenset(each.box_id for each in track if each.time_s < track[-1].time_s - config.free_s),
             )
         )
     return tuple(found)
 
 
 def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMeasurement]) -> Velocity | None:
-    """Of a vessel, over `DRIFT_FIT_S`: of its middle; of the surer end where too few pictures show it whole."""
+    """The velocity of a vessel adrift, estimated over `DRIFT_FIT_S`.
+
+    It is that of its middle, or of the more certain end where too few pictures show the vessel whole.
+    """
     estimate = _fit_recent(complete, track[-1].time_s)
     if estimate is None:
-        shows_ends = [_fit_recent(_measurements_of_end(track, end), track[-1].time_s) for end in (0, 1)]
-        estimate = max(
-            (end for end in shows_ends if end is not None), key=lambda end: end.squared_significance, default=None
-        )
-    velocity = _velocity_if_significant(estimate)
+        ends = [_fit_recent(_measurements_of_end(track, end), track[-1].time_s) for end in (0, 1)]
+        estimate = max((end for end in ends if end is not None), key=lambda end: end.squared_significance, default=None)
+    velocity = velocity_if_significant(estimate)
     if velocity is None or math.hypot(*velocity[:2]) > MAX_DRIFT_MPS:
         return None
     return velocity._replace(deviation_mps=max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS))
 
 
 def _fit_recent(measurements: list[PositionMeasurement], last_s: float) -> VelocityEstimate | None:
-    return (
-        _fit_velocity(measurements, DRIFT_FIT_S)
-        if measurements and last_s - measurements[-1].time_s <= DRIFT_FIT_S
-        else None
-    )
+    """The velocity over `DRIFT_FIT_S`, if the newest measurement is that recent."""
+    if not measurements or last_s - measurements[-1].time_s > DRIFT_FIT_S:
+        return None
+    return fit_velocity(measurements, DRIFT_FIT_S)
 
 
 def _measurements_of_end(track: list[PositionMeasurement], end: int) -> list[PositionMeasurement]:
-    """The fixes that show its left end, 0, or its right one, 1: placed there."""
+    """The measurements that show the left end (0) or the right end (1), with that end as their position."""
     return [
-        measurement._replace(position_m=(float(measurement.outline[0][-end]), float(measurement.outline[1][-end])))
-        for measurement in track
-        if measurement.shows_ends[end]
+        each._replace(position_m=(float(each.outline[0][-end]), float(each.outline[1][-end])))
+        for each in track
+        if each.shows_ends[end]
     ]
 
 
 def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -> DynamicObstacle:
-    """A person seen more than once, who may stand or swim anywhere: as fast as the fixes do not rule out, cut ones too.
+    """A person seen more than once, who may stand, or swim in any direction.
 
-    Where they are stays occupied.
+    The speed is as high as the measurements do not rule out, those cut by the picture's sides included. The cells where
+    the person is seen stay occupied.
     """
-    estimate, last = _fit_velocity(track, config.fit_s), track[-1]
+    estimate, last = fit_velocity(track, config.fit_s), track[-1]
     fastest_mps = config.person_mps
     if estimate is not None:
         fastest_mps = min(fastest_mps, math.hypot(*estimate.velocity_mps) + estimate.deviation_mps)
@@ -189,7 +145,10 @@ def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -
 
 
 def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
-    """Out of sight for `LOST_S`, and the last pictures show water all over where it should be: it did not go on."""
+    """Whether the pictures show water everywhere an obstacle should be that is out of sight: it did not go on.
+
+    That counts after `MIN_UNSEEN_S` out of sight.
+    """
     if obstacle.age_s < MIN_UNSEEN_S:
         return False
     column = np.floor((obstacle.east_m - grid.west_m) / CELL_M).astype(np.int64)
@@ -198,95 +157,14 @@ def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
     return bool(on_grid.all() and grid.free[row, column].all())
 
 
-def estimate_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Velocity | None:
-    """The velocity over the last `fit_s`; None where it may be chance."""
-    return _velocity_if_significant(_fit_velocity(measurements, fit_s))
-
-
-def _velocity_if_significant(estimate: VelocityEstimate | None) -> Velocity | None:
-    if (
-        estimate is None
-        or estimate.squared_significance < MIN_SIGNIFICANCE * MIN_SIGNIFICANCE
-        or math.hypot(*estimate.velocity_mps) < MIN_SPEED_MPS
-    ):
-        return None
-    return Velocity(*estimate.velocity_mps, estimate.deviation_mps)
-
-
-def _fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> VelocityEstimate | None:
-    """The weighted least squares' velocity over the last `fit_s`, drawn towards rest; None of too few fixes.
-
-    With place and velocity as unknowns the normal equations are [W, T; T, S] [p; v] = [a; b], each a 2 x 2 matrix:
-    (S - T W^-1 T) v = b - T W^-1 a.
-    """
-    measurements = [
-        measurement for measurement in measurements if measurements[-1].time_s - measurement.time_s <= fit_s
-    ]
-    span_s = measurements[-1].time_s - measurements[0].time_s if measurements else 0.0
-    if len(measurements) < MIN_MEASUREMENTS or span_s < MIN_SPAN_S:
-        return None
-    weight_sum = time_sum = square_sum = (0.0, 0.0, 0.0)
-    position_sum = moment_sum = (0.0, 0.0)
-    first = measurements[0]
-    for measurement in measurements:
-        t_s = measurement.time_s - first.time_s
-        information_vector = _multiply(
-            measurement.information_matrix,
-            (measurement.position_m[0] - first.position_m[0], measurement.position_m[1] - first.position_m[1]),
-        )
-        weight_sum, time_sum = (
-            _add_scaled(weight_sum, 1.0, measurement.information_matrix),
-            _add_scaled(time_sum, t_s, measurement.information_matrix),
-        )
-        square_sum = _add_scaled(square_sum, t_s * t_s, measurement.information_matrix)
-        position_sum = (position_sum[0] + information_vector[0], position_sum[1] + information_vector[1])
-        moment_sum = (moment_sum[0] + t_s * information_vector[0], moment_sum[1] + t_s * information_vector[1])
-    inverse = _invert(weight_sum)
-    reduced = _multiply(time_sum, _multiply(inverse, position_sum))
-    information_vector = (moment_sum[0] - reduced[0], moment_sum[1] - reduced[1])
-    information_matrix = _add_scaled(square_sum, -1.0, _congruence(time_sum, inverse))
-    # Pictures that follow fast, and places that lie further off the line than they should, tell less; others more.
-    fast = min(1.0, (1.0 + INDEPENDENT_RATE_HZ * span_s) / len(measurements))
-    share = fast / _reduced_chi_squared(
-        measurements, _multiply(_invert(information_matrix), information_vector), inverse, position_sum, time_sum
-    )
-    rest = 1.0 / (PRIOR_SPEED_DEVIATION_MPS * PRIOR_SPEED_DEVIATION_MPS)
-    covariance = _invert(_add_scaled((rest, 0.0, rest), share, information_matrix))
-    information_vector = (share * information_vector[0], share * information_vector[1])
-    return VelocityEstimate(
-        _multiply(covariance, information_vector), information_vector, math.sqrt(max(covariance[0], covariance[2]))
-    )
-
-
-def _reduced_chi_squared(
-    measurements: list[PositionMeasurement],
-    velocity: PlaneVector,
-    inverse: SymmetricMatrix,
-    position_sum: PlaneVector,
-    time_sum: SymmetricMatrix,
-) -> float:
-    """Squared residuals over variances, for each degree of freedom: 1 where the errors are as expected.
-
-    `EXPECTED` more that are so keep it from what a few fixes show by chance.
-    """
-    moved = _multiply(time_sum, velocity)
-    start = _multiply(inverse, (position_sum[0] - moved[0], position_sum[1] - moved[1]))
-    total, first = 0.0, measurements[0]
-    for measurement in measurements:
-        t_s = measurement.time_s - first.time_s
-        off = (
-            measurement.position_m[0] - first.position_m[0] - start[0] - t_s * velocity[0],
-            measurement.position_m[1] - first.position_m[1] - start[1] - t_s * velocity[1],
-        )
-        information_vector = _multiply(measurement.information_matrix, off)
-        total += off[0] * information_vector[0] + off[1] * information_vector[1]
-    return (total + PRIOR_DEGREES_OF_FREEDOM) / (2 * len(measurements) - 4 + PRIOR_DEGREES_OF_FREEDOM)
-
-
 def _associate_measurements(
     observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
 ) -> list[list[PositionMeasurement]]:
-    """The fixes of each thing, oldest first: of one kind, the nearest to the nearest within a gate."""
+    """The measurements of each obstacle, oldest first.
+
+    Association is greedy nearest neighbour within a validation gate (Bar-Shalom, Li, Kirubarajan: "Estimation with
+    Applications to Tracking and Navigation", 2001), among obstacles of one label.
+    """
     tracks: list[list[PositionMeasurement]] = []
     for measurements in _measure_positions(observations, now_us, camera, config):
         pairs = sorted(
@@ -316,7 +194,7 @@ def _associate_measurements(
 def _measure_positions(
     observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
 ) -> Iterator[list[PositionMeasurement]]:
-    """Of each picture with boxes, where those stand whose whole outline is within reach."""
+    """For each picture with boxes, the positions of obstacles whose whole outline is within range."""
     with_boxes = [observation for observation in observations if observation.boxes and observation.stamp_us <= now_us]
     if not with_boxes:
         return
@@ -324,38 +202,41 @@ def _measure_positions(
         pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio) for observation in with_boxes
     ]
     camera_model = stack_cameras(
-        [own for observation, own in zip(with_boxes, camera_models, strict=True) for _ in observation.boxes]
+        [model for observation, model in zip(with_boxes, camera_models, strict=True) for _ in observation.boxes]
     )
     boxes = [box for observation in with_boxes for box in observation.boxes]
     left, right = (np.array(sides)[:, None] for sides in ([box.left for box in boxes], [box.right for box in boxes]))
     u = (left + (right - left) * ((np.arange(OUTLINE_POINTS) + 0.5) / OUTLINE_POINTS)) / BOX_STEPS
     v = np.array([box.waterline for box in boxes]) / BOX_STEPS
-    given = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
-    range_m = ranges_to_water_m(camera_model, given, config.mover_range_m)
-    east_m: F64 = camera_model.position_m[0] + range_m * given.east
-    north_m: F64 = camera_model.position_m[1] + range_m * given.north
-    reached = set(np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist())
+    rays = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
+    range_m = ranges_to_water_m(camera_model, rays, config.mover_range_m)
+    east_m: F64 = camera_model.position_m[0] + range_m * rays.east
+    north_m: F64 = camera_model.position_m[1] + range_m * rays.north
+    in_range = set(np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist())
     row = 0
-    for observation, own in zip(with_boxes, camera_models, strict=True):
+    for observation, model in zip(with_boxes, camera_models, strict=True):
         time_s = (observation.stamp_us - now_us) * 1e-6
-        found = []
+        measured = []
         for number, box in enumerate(observation.boxes, row):
-            if number in reached:
-                key, outline = (observation.stamp_us, number - row), (east_m[number], north_m[number])
-                found.append(_measure_position(key, box, time_s, own, camera.calibration.height_m, outline))
+            if number in in_range:
+                box_id, outline = (observation.stamp_us, number - row), (east_m[number], north_m[number])
+                measured.append(_measure_position(box_id, box, time_s, model, camera.calibration.height_m, outline))
         row += len(observation.boxes)
-        yield found
+        yield measured
 
 
 def _measure_position(
-    key: tuple[int, int],
+    box_id: tuple[int, int],
     box: ObstacleBox,
     time_s: float,
     camera_model: PinholeCamera,
     height_m: float,
     outline: tuple[F64, F64],
 ) -> PositionMeasurement:
-    """One row of the picture is range^2 / height times its angle along the ray; across, much less."""
+    """The position and its covariance, along and across the ray from the camera.
+
+    One row of the picture is range^2 / height times its angle along the ray; across, much less.
+    """
     camera_m, row_rad = (
         (float(camera_model.position_m[0]), float(camera_model.position_m[1])),
         BOX_EDGE_DEVIATION / float(camera_model.focal[1]),
@@ -363,7 +244,7 @@ def _measure_position(
     easts, norths = (axis.tolist() for axis in outline)
     position_m = (sum(easts) / OUTLINE_POINTS, sum(norths) / OUTLINE_POINTS)
     distance_m = max(math.dist(position_m, camera_m), POSITION_DEVIATION_M)
-    wide_m = WIDTH_DEVIATION_FRACTION * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
+    wide_m = WIDTH_DEVIATION_FRAC * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
     end_rad = row_rad if box.is_small else HULL_EDGE_FACTOR * row_rad
     range_deviation_m = POSITION_DEVIATION_M + wide_m + end_rad * distance_m * distance_m / height_m
     across_m = POSITION_DEVIATION_M + wide_m + CROSS_RANGE_FACTOR * row_rad * distance_m
@@ -377,24 +258,5 @@ def _measure_position(
     foot = box.bottom < BOX_STEPS - BORDER_STEPS
     shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)
     return PositionMeasurement(
-        key, box.label, time_s, position_m, information_matrix, range_deviation_m, outline, shows_ends
+        box_id, box.label, time_s, position_m, information_matrix, range_deviation_m, outline, shows_ends
     )
-
-
-def _multiply(a: SymmetricMatrix, b: PlaneVector) -> PlaneVector:
-    return (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[2] * b[1])
-
-
-def _add_scaled(a: SymmetricMatrix, scale: float, b: SymmetricMatrix) -> SymmetricMatrix:
-    return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
-
-
-def _invert(a: SymmetricMatrix) -> SymmetricMatrix:
-    scale = 1.0 / (a[0] * a[2] - a[1] * a[1])
-    return (scale * a[2], -scale * a[1], scale * a[0])
-
-
-def _congruence(a: SymmetricMatrix, b: SymmetricMatrix) -> SymmetricMatrix:
-    """The symmetric a b a."""
-    first, second = _multiply(b, (a[0], a[1])), _multiply(b, (a[1], a[2]))
-    return (a[0] * first[0] + a[1] * first[1], a[0] * second[0] + a[1] * second[1], a[1] * second[0] + a[2] * second[1])

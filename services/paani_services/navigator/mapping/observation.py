@@ -1,4 +1,8 @@
-"""What the last pictures showed of the water, and where each was taken. Pure; small enough to be state."""
+"""Observations of the water from the last pictures, and the poses from which they were taken. Pure.
+
+An observation is what a picture shows, still in the picture: it is small enough to be part of the recorded state, and
+is projected to the map only when it is used.
+"""
 
 import itertools
 import math
@@ -12,26 +16,25 @@ from paani.geometry import wrap_rad
 from paani.messages import Detection, Evidence, Label, Odometry, TimeBase
 from paani_services.navigator.mapping.projection import Pose
 
-EDGE_STEPS = 128  # of the picture's height: two for each row of the mask
-BOX_STEPS = 512
-POSE_SPACING_US = 90_000
-MAX_POSES = 14  # 1.2 s: longer than a picture is under way
-OBSERVATION_SPACING_US = 100_000
+EDGE_STEPS = 128  # of the picture's height, in which the water edge is stored: two for each row of the mask
+BOX_STEPS = 512  # of the picture's width and height, in which boxes are stored
+POSE_SPACING_US = 90_000  # between two remembered poses, at least
+MAX_POSES = 14  # they span 1.2 s, which is longer than a picture takes to become evidence
+OBSERVATION_SPACING_US = 100_000  # between two remembered observations, at least
 OLD_OBSERVATION_SPACING_US = 800_000  # between those kept for what is out of sight
-MAX_OBSERVATIONS = 224
 BOX_SPACING_US = 190_000  # between those kept for their boxes alone
-OUTLINE_POINTS = 9
-SMALL_LABELS = frozenset({Label.PERSON, Label.BUOY})
+MAX_OBSERVATIONS = 224
+OUTLINE_POINTS = 9  # of a box's waterline
+SMALL_LABELS = frozenset({Label.PERSON, Label.BUOY})  # the lower end of the box is where these stand
 MOVABLE_LABELS = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
-CARRIER_LABELS = frozenset({Label.VESSEL, Label.PIER})
-MASK_ROW_FRAC = 1.0 / 64.0
-MIN_ASHORE_ROWS = (
-    3.0  # of the mask, between where the water ends and a person's foot beyond it: metres, not a reflection
-)
+CARRIER_LABELS = frozenset({Label.VESSEL, Label.PIER})  # a person may stand on these
+MASK_ROW_FRAC = 1.0 / 64.0  # a row of the mask, of the picture's height
+# Rows of the mask between the end of the water and the foot of a person ashore: less may be a reflection.
+MIN_ASHORE_ROWS = 3.0
 
 
 class StampedPose(msgspec.Struct, frozen=True, rename={"stamp_us": "at_us"}):
-    """Where the boat was, reckoned, and how it lay."""
+    """Dead-reckoned position and attitude of the boat at one time. It is recorded under the field names of `rename`."""
 
     stamp_us: int
     x_m: float
@@ -42,7 +45,7 @@ class StampedPose(msgspec.Struct, frozen=True, rename={"stamp_us": "at_us"}):
 
 
 class FootLine(msgspec.Struct, frozen=True, array_like=True):
-    """Left, right and lower end of a thing, in 1/512 of the picture, rounded outwards."""
+    """Where an obstacle stands: left, right and lower end in 1/512 of the picture, rounded outwards."""
 
     left: int
     right: int
@@ -53,7 +56,7 @@ class FootLine(msgspec.Struct, frozen=True, array_like=True):
 class ObstacleBox(msgspec.Struct, frozen=True, array_like=True):
     """A detection of something that may move: its sides in 1/512 of the picture, rounded outwards.
 
-    ends: where it meets the water, at `BOX_COLUMNS` places from left to right.
+    waterline: the height at which it meets the water, at `OUTLINE_POINTS` places from left to right.
     """
 
     left: int
@@ -65,7 +68,7 @@ class ObstacleBox(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def is_small(self) -> bool:
-        """Its lower end is its foot."""
+        """Whether its lower end is where it stands on the water."""
         return self.label in SMALL_LABELS
 
 
@@ -74,10 +77,12 @@ class Observation(
     frozen=True,
     rename={"stamp_us": "at_us", "aspect_ratio": "aspect", "water_edge": "edge"},
 ):
-    """One picture: where it was taken, its width over height, where the water ends, where things stand in it.
+    """What one picture shows of the water, and the pose it was taken from. Recorded under the names of `rename`.
 
-    edge: for each column, left to right, in 1/128 of the height from the top, rounded towards the boat.
-    feet: where things stand. boxes: what may move. Of older sights the boxes alone are kept.
+    aspect_ratio: picture width over height.
+    water_edge: where the water ends in each column, left to right, in 1/128 of the height from the top, rounded towards
+    the boat.
+    feet: where obstacles stand. boxes: what may move. Of old observations the boxes alone are kept.
     """
 
     stamp_us: int
@@ -93,7 +98,7 @@ class Observation(
 
     @property
     def pose(self) -> Pose:
-        """Where the boat was, and how it lay."""
+        """The pose of the boat when the picture was taken."""
         return Pose(self.x_m, self.y_m, self.yaw_rad, self.roll_rad, self.pitch_rad)
 
 
@@ -102,10 +107,11 @@ class ObservationMemory(
     frozen=True,
     rename={"odom_pose": "here", "observations": "sights", "frame_id": "frame"},
 ):
-    """Poses and sights, oldest first; the newest frame heard of (epoch, sequence); the odometry's epoch.
+    """The remembered poses and observations, oldest first. It is recorded under the field names of `rename`.
 
-    here: where the boat is by its way over ground since the memory began, in the map's axes. What was seen lies where
-    it was seen from there: a position that follows the wandering of GPS would carry it about (REP-105's `odom` frame).
+    odom_pose: the position by dead reckoning since the memory began, with the map's axes: REP-105's `odom` frame. All
+    observations lie in it, because the GPS position wanders and would carry them about.
+    frame_id: epoch and sequence of the newest frame. epoch: of the odometry.
     """
 
     odom_pose: StampedPose | None = None
@@ -118,7 +124,10 @@ class ObservationMemory(
 def update_memory(
     memory: ObservationMemory, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig
 ) -> ObservationMemory:
-    """The memory with what is new. Another odometry epoch, or none for `max_reckon_s`, forgets everything seen."""
+    """Add the newest odometry and evidence.
+
+    Another odometry epoch, or no odometry for `max_reckon_s`, forgets all observations.
+    """
     if odometry is not None and odometry.healthy:
         memory = _add_pose(memory, odometry, config)
     if evidence is None or (evidence.frame_epoch, evidence.frame_seq) == memory.frame_id:
@@ -136,7 +145,7 @@ def update_memory(
 
 
 def is_free_space_evidence(evidence: Evidence) -> bool:
-    """Is it free-space evidence: a live, usable picture, segmented by the learned net (F2)?"""
+    """Whether evidence may free cells: a live, usable picture, segmented by the trained network (F2)."""
     return (
         evidence.usable
         and evidence.navigation_eligible
@@ -148,7 +157,7 @@ def is_free_space_evidence(evidence: Evidence) -> bool:
 
 
 def interpolate_pose(poses: tuple[StampedPose, ...], stamp_us: int, max_gap_s: float) -> StampedPose | None:
-    """The pose then, between the two around it, or the nearest; None if that one is further off than `max_gap_s`."""
+    """The pose at a time, between the two around it, or the nearest; None if that is more than `max_gap_s` off."""
     if not poses:
         return None
     nearest = min(poses, key=lambda pose: abs(pose.stamp_us - stamp_us))
@@ -169,6 +178,7 @@ def interpolate_pose(poses: tuple[StampedPose, ...], stamp_us: int, max_gap_s: f
 
 
 def _add_pose(memory: ObservationMemory, odometry: Odometry, config: PlannerConfig) -> ObservationMemory:
+    """Dead-reckon the odometry's step: its velocity over ground, times its time since the step before."""
     numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.roll_rad, odometry.pitch_rad)
     if not all(map(math.isfinite, (*numbers, odometry.surge_mps, odometry.sway_mps))):
         return memory
@@ -191,7 +201,7 @@ def _add_pose(memory: ObservationMemory, odometry: Odometry, config: PlannerConf
 
 
 def _restart_memory(memory: ObservationMemory, odometry: Odometry) -> ObservationMemory:
-    """Nothing seen, at the odometry's position."""
+    """A memory without observations, at the odometry's position."""
     odom_pose = StampedPose(
         odometry.source_us, odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.roll_rad, odometry.pitch_rad
     )
@@ -220,9 +230,9 @@ def _make_observation(evidence: Evidence, pose: StampedPose) -> Observation:
 
 
 def _is_aboard(rider: Detection, carriers: Sequence[Detection], water_edge: tuple[float, ...]) -> bool:
-    """A person on a vessel or a pier, whose foot is not on the water: what carries it is nearer, and counts instead.
+    """Whether a person stands on a vessel or a pier. Then that is nearer than the person, and counts instead.
 
-    It stands within the other's box, and most of the water before it ends lower than its foot.
+    The person's foot lies within the other's box, and most of the water before the person ends below the foot.
     """
     if rider.label is not Label.PERSON or _land_below_foot(rider, water_edge) <= MASK_ROW_FRAC:
         return False
@@ -234,7 +244,7 @@ def _is_aboard(rider: Detection, carriers: Sequence[Detection], water_edge: tupl
 
 
 def _may_move(detection: Detection, water_edge: tuple[float, ...]) -> bool:
-    """Whether it may move on the water: people ashore do not."""
+    """Whether the detection may move on the water; people ashore do not."""
     is_ashore = (
         detection.label is Label.PERSON and _land_below_foot(detection, water_edge) > MIN_ASHORE_ROWS * MASK_ROW_FRAC
     )
@@ -242,13 +252,16 @@ def _may_move(detection: Detection, water_edge: tuple[float, ...]) -> bool:
 
 
 def _land_below_foot(detection: Detection, water_edge: tuple[float, ...]) -> float:
-    """How far below its foot most of the water before it ends, of the picture; 0 or less: it stands in it."""
+    """How far most of the water before a box ends below its foot, of the picture's height; at most 0 in the water."""
     edges = sorted(water_edge[column] for column in _covered_columns(detection, water_edge))
     return edges[len(edges) // 2] - detection.box_xyxy[3] if edges else 0.0
 
 
 def _make_box(detection: Detection, water_edge: tuple[float, ...]) -> ObstacleBox:
-    """It meets the water at its lower end; a hull where the mask ends the water, if in the box's lower half."""
+    """The box of what may move, with its waterline.
+
+    It meets the water at its lower end; a hull does where the mask ends the water, if that is in the box's lower half.
+    """
     x1, y1, x2, y2 = detection.box_xyxy
     left, top, right, bottom = (BOX_STEPS * side for side in detection.box_xyxy)
     waterline = [math.ceil(bottom)] * OUTLINE_POINTS
@@ -264,11 +277,11 @@ def _make_box(detection: Detection, water_edge: tuple[float, ...]) -> ObstacleBo
 
 
 def _find_feet(detection: Detection, water_edge: tuple[float, ...]) -> Iterator[FootLine]:
-    """Where a box stands on the water.
+    """The places where a detection stands on the water.
 
-    A small thing's lower end is its foot. A long hull or pier that lies aslant reaches that low at one end only: it
-    stands where the mask ends the water, and on the box's lower end in columns where the mask looks through it. A
-    column that the box covers in part is no such: there the mask looks past it.
+    The lower end of a small obstacle is where it stands. A long hull or pier that lies aslant reaches that low at one
+    end only: it stands where the mask ends the water, and at its box's lower end where the mask misses it. Columns that
+    the box covers in part do not count, because there the mask shows the water beside it.
     """
     x1, y1, x2, y2 = detection.box_xyxy
     bottom = math.ceil(y2 * BOX_STEPS)
@@ -285,13 +298,17 @@ def _find_feet(detection: Detection, water_edge: tuple[float, ...]) -> Iterator[
 
 
 def _covered_columns(detection: Detection, water_edge: tuple[float, ...]) -> range:
-    """The mask's columns that its box covers."""
+    """The mask's columns that the detection's box covers."""
     x1, _, x2, _ = detection.box_xyxy
     return range(math.floor(x1 * len(water_edge)), min(math.ceil(x2 * len(water_edge)), len(water_edge)))
 
 
 def _prune_observations(observations: tuple[Observation, ...], config: PlannerConfig) -> tuple[Observation, ...]:
-    """All those within the lifetimes of Q3, a few older ones for what is out of sight, and the boxes of more."""
+    """Keep what is still of use.
+
+    That is every observation within the lifetimes of Q3, a few older ones for what is out of sight, and the boxes of
+    more for the velocities of dynamic obstacles.
+    """
     newest_us = observations[-1].stamp_us
     kept: list[Observation] = []
     old_us = last_us = -OLD_OBSERVATION_SPACING_US

@@ -1,6 +1,6 @@
-"""What one picture shows of the water: cells of the map that are free, and cells that are occupied. Pure.
+"""Projection of one observation to free and occupied cells of the map. Pure.
 
-A sight never changes, so each is worked out once.
+An observation never changes, so each is projected once and cached.
 """
 
 import functools
@@ -24,37 +24,37 @@ from paani_services.navigator.mapping.observation import (
 )
 from paani_services.navigator.mapping.projection import PinholeCamera, Rays, pinhole_at, pixel_rays, ranges_to_water_m
 
-CELL_M = 0.2  # Q2
-FOOT_SAMPLES = 24
-MAX_FOOT_DEPTH_M = 1.5  # a thing is as deep as it is wide, but no deeper
-MAX_HULL_DEPTH_M, MAX_HULL_LENGTH_M = 2.5, 6.0  # nor is a vessel: beam and length of most
-CUT_OFF_FRAC = 0.99  # a box that reaches this low goes on below the picture
-CUT_OFF_ALLOWANCE_M = 0.8
-BOX_EDGE_TOLERANCE_FRAC = 2.0 * MASK_ROW_FRAC  # how far its edge is off a box's
+CELL_M = 0.2  # side of a cell [m] (Q2)
+FOOT_SAMPLES = 24  # rays through the lower end of a box
+MAX_FOOT_DEPTH_M = 1.5  # a small obstacle is taken to be as deep as it is wide, up to this
+MAX_HULL_DEPTH_M, MAX_HULL_LENGTH_M = 2.5, 6.0  # a vessel too: beam and length of most small craft
+CUT_OFF_FRAC = 0.99  # of the picture's height; a box that reaches this low goes on below the picture
+CUT_OFF_ALLOWANCE_M = 0.8  # how much nearer than the picture shows such an obstacle is taken to stand
+BOX_EDGE_TOLERANCE_FRAC = 2.0 * MASK_ROW_FRAC  # difference between the mask's edge and a box's, of the picture's height
 CACHED_OBSERVATIONS = 512
-MAP_COLUMNS = 1 << 24  # columns of the map: 3,355 km
+MAP_COLUMNS = 1 << 24  # of cells in the map: 3,355 km
 
 Polygon = tuple[tuple[float, float], ...]
 
 
 class Camera(NamedTuple):
-    """The calibrated camera, and the own hull in its picture as in `perception.ego_polygon`."""
+    """The calibrated camera, and the own hull in its picture (`perception.ego_polygon`)."""
 
     calibration: CalibrationConfig = CalibrationConfig()
     ego_polygon: Polygon = ()
 
 
 class CellIndices(NamedTuple):
-    """Cells of the map [n], each once; cell (0, 0) has its south-west corner in the map's origin."""
+    """Cells of the map [n], each once; cell (0, 0) has its south-west corner at the map's origin."""
 
     column: I64
     row: I64
 
 
 class ObservedCells(NamedTuple):
-    """What one picture shows; a cell may be both. people: where they are, without the room that is kept round them.
+    """The cells that one picture shows; a cell may be free and occupied at once.
 
-    vessels: occupied by one.
+    people: cells where people are, without the room kept around them. vessels: cells occupied by one.
     """
 
     free: CellIndices
@@ -72,8 +72,11 @@ def project_to_cells(
     *,
     column_step: int,
 ) -> ObservedCells:
-    """The cells of a sight with an edge. moving: its boxes that occupy nothing. every: columns from one taken for free
-    water to the next.
+    """Project an observation with a water edge to cells of the map.
+
+    Each column of the mask frees the cells up to where its water ends, and occupies those beyond as deep as the
+    obstacle is taken to be. `moving_boxes` are those of dynamic obstacles, which occupy nothing. Only every
+    `column_step`th column frees cells.
     """
     camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
     edge = np.frombuffer(observation.water_edge, np.uint8).astype(np.float64) / EDGE_STEPS
@@ -82,7 +85,7 @@ def project_to_cells(
     near_m = ranges_to_water_m(camera_model, pixel_rays(camera_model, u, top), config.max_range_m)
     ends = pixel_rays(camera_model, u, np.minimum(edge, top))
     far_m = ranges_to_water_m(camera_model, ends, config.max_range_m)
-    water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # higher up there is none
+    water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # no water is seen higher up
     open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
     open_m[np.arange(edge.size) % column_step > 0] = 0.0
     is_moving = np.zeros(u.shape, np.bool_)
@@ -112,11 +115,11 @@ def project_to_cells(
 def _complete_hull(
     box: ObstacleBox, camera_model: PinholeCamera, u: F64, ends: Rays, far_m: F64, depth_m: F64, config: PlannerConfig
 ) -> I64:
-    """Complete a vessel in `far_m`, and how deep each column is in `deep_m`: it hides what of it lies behind.
+    """Complete a vessel in `far_m` and its depth in `depth_m`; return the columns that are its own.
 
-    Where the mask looks through part of it (a white bow is taken for water), that is as far away as the part beside
-    it; where through all of it, the box's lower end counts. What stands before it is not part of it. The columns that
-    are its own.
+    A hull hides its far side, so it is taken to be as deep as it is wide. Where the mask misses part of it, as a white
+    bow taken for water, that part is as far away as the part beside it; where the mask misses all of it, the lower end
+    of the box counts. What stands before the hull is not part of it.
     """
     across = np.flatnonzero((u > box.left / BOX_STEPS) & (u < box.right / BOX_STEPS))
     low_m, least_m = (
@@ -139,7 +142,7 @@ def _complete_hull(
 
 
 def own_hull_top(ego_polygon: Polygon, u: F64) -> F64:
-    """The highest edge of the own hull at each of these columns, 1 where there is none [n] in [0, 1]."""
+    """The highest edge of the own hull in each of these columns, 1 where there is none [n] in [0, 1]."""
     top = np.ones_like(u)
     for (x1, y1), (x2, y2) in zip(ego_polygon, (*ego_polygon[1:], *ego_polygon[:1]), strict=True):
         bottom, high = min(x1, x2), max(x1, x2)
@@ -150,7 +153,10 @@ def own_hull_top(ego_polygon: Polygon, u: F64) -> F64:
 
 
 def _is_water_ended_by(box: ObstacleBox, u: F64, edge: F64) -> Bools:
-    """Columns where it is this thing that ends the water: near its foot; a hull's lies as high as half its box."""
+    """Whether it is this obstacle that ends the water in each column [n].
+
+    Then the water ends near its foot, or for a hull in the lower half of its box.
+    """
     left, top, right, bottom = (side / BOX_STEPS for side in (box.left, box.top, box.right, box.bottom))
     width = 1.0 / len(u)
     high = bottom - BOX_EDGE_TOLERANCE_FRAC if box.is_small else 0.5 * (top + bottom)
@@ -160,7 +166,7 @@ def _is_water_ended_by(box: ObstacleBox, u: F64, edge: F64) -> Bools:
 
 
 def _is_static(foot: FootLine, moving_boxes: tuple[ObstacleBox, ...]) -> bool:
-    """It belongs to none of these."""
+    """Whether the foot belongs to none of these boxes."""
     width = BOX_STEPS // 64  # a column of the mask
     return all(
         foot.bottom != box.bottom or foot.left < box.left - width or foot.right > box.right + width
@@ -169,7 +175,7 @@ def _is_static(foot: FootLine, moving_boxes: tuple[ObstacleBox, ...]) -> bool:
 
 
 def _foot_points(camera_model: PinholeCamera, foot: FootLine, camera: Camera, config: PlannerConfig) -> tuple[F64, F64]:
-    """Points on the water under a box: along its lower end, as far behind as it is wide; more round people."""
+    """Points on the water that an obstacle covers: along its foot, as deep as it is wide, with more around people."""
     left, right, bottom = (end / BOX_STEPS for end in (foot.left, foot.right, foot.bottom))
     given, range_m = _foot_rays(camera_model, left, right, bottom, camera, config)
     if not np.isfinite(range_m).all():
@@ -191,19 +197,20 @@ def _foot_points(camera_model: PinholeCamera, foot: FootLine, camera: Camera, co
 def _foot_rays(
     camera_model: PinholeCamera, left: float, right: float, bottom: float, camera: Camera, config: PlannerConfig
 ) -> tuple[Rays, F64]:
-    """Rays through the lower end of a box, and how far along each the water lies."""
+    """Rays through the lower end of a box, and the distance along each to the water."""
     u = left + (right - left) * (np.arange(FOOT_SAMPLES) + 0.5) / FOOT_SAMPLES
     given = pixel_rays(camera_model, u, np.minimum(bottom, own_hull_top(camera.ego_polygon, u)))
     return given, ranges_to_water_m(camera_model, given, config.max_range_m)
 
 
 def _width_m(given: Rays, range_m: F64) -> float:
+    """Distance between the first and the last point."""
     east_m, north_m = range_m * given.east, range_m * given.north
     return math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
 
 
 def _points_along_rays(camera_model: PinholeCamera, given: Rays, first_m: F64, counts: F64) -> tuple[F64, F64]:
-    """East and north of so many places on each ray, a cell apart, from that far on; all arrays of the rays' shape."""
+    """East and north of `counts` points on each ray, a cell apart, beginning at `first_m`."""
     times = np.maximum(counts, 0.0).astype(np.int64)
     ray = np.repeat(np.arange(times.size), times)
     place = np.arange(ray.size) - np.repeat(np.cumsum(times) - times, times)
@@ -214,11 +221,13 @@ def _points_along_rays(camera_model: PinholeCamera, given: Rays, first_m: F64, c
 
 
 def _cells_of_all(points: list[tuple[F64, F64]]) -> CellIndices:
+    """The cells of all these points, each once."""
     east_m, north_m = zip(*points, strict=True) if points else ((), ())
     return _cells_at(np.concatenate([np.empty(0), *east_m]), np.concatenate([np.empty(0), *north_m]))
 
 
 def _cells_at(east_m: F64, north_m: F64) -> CellIndices:
+    """The cells of points, each once."""
     column, row = (np.floor(axis / CELL_M).astype(np.int64) for axis in (east_m, north_m))
     each_once = np.unique(row * MAP_COLUMNS + column)
     row = (each_once + MAP_COLUMNS // 2) // MAP_COLUMNS

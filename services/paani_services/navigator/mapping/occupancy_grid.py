@@ -1,6 +1,6 @@
-"""What is known of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (Q2). Pure.
+"""Occupancy grid of the water around the boat: 100 x 100 cells of 0.2 m, unknown by default (Q2). Pure.
 
-The grid lies in the map's axes and is laid anew around the boat from the sights of the last seconds.
+The grid has the map's axes and is built anew around the boat from the observations of the last seconds.
 """
 
 import math
@@ -22,21 +22,22 @@ from paani_services.navigator.mapping.observed_cells import (
 )
 from paani_services.navigator.mapping.projection import Pose, pinhole_at, pixel_rays, ranges_to_water_m
 
-GRID_CELLS = 100  # Q2
+GRID_CELLS = 100  # cells along each side of the grid (Q2)
 LEVEL_POSE = Pose(0.0, 0.0, 0.0, 0.0, 0.0)
-OLD_COLUMN_STEP = 2  # columns of a picture that is too old to free a cell, and only says what is gone
+OLD_COLUMN_STEP = 2  # every second column of a picture that is too old to free cells, and only shows what has gone
 
-BoxIds = frozenset[tuple[int, int]]  # boxes of what moves: the sight's stamp and the box's number in it
+BoxIds = frozenset[tuple[int, int]]  # of boxes: the observation's stamp, and the box's number in it
 NO_BOXES: BoxIds = frozenset()
 UNCALIBRATED_CAMERA = Camera()
 
 
 class OccupancyGrid(NamedTuple):
-    """Cells [north, east]. A cell is occupied, free, beside the boat where no picture shows it, or unknown.
+    """The grid [north, east]. A cell is occupied, free, in the blind zone beside the boat, or unknown.
 
-    west_m, south_m: the corner. hidden: occupied, but last seen more than `occupied_s` ago. people: those of them where
-    a person is, without the room round them. strayed: where a person or a vessel out of sight may have got to, and no
-    picture shows water now.
+    west_m, south_m: the corner of the grid.
+    occluded: occupied, but last seen more than `occupied_s` ago.
+    people: occupied by a person, without the room kept around them.
+    reachable_unseen: a person or a vessel out of sight may have got there, and no picture shows water there now.
     """
 
     west_m: float
@@ -50,7 +51,7 @@ class OccupancyGrid(NamedTuple):
 
     @property
     def unknown(self) -> Bools:
-        """Nothing is known."""
+        """Nothing is known of the cell."""
         return ~(self.occupied | self.free | self.blind_zone)
 
 
@@ -62,12 +63,16 @@ def build_occupancy_grid(
     config: PlannerConfig,
     moving_boxes: BoxIds = NO_BOXES,
 ) -> OccupancyGrid:
-    """The grid around the boat. sights: oldest first. moving: what moves occupies no cell.
+    """Build the grid around the boat from remembered observations, oldest first.
 
-    Free: seen free within `free_s`; occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen
-    free since. Occupied wins, but for what one picture alone shows and `outvoted_by` later ones deny. Beside: what the
-    picture does not show because it is too near, given that there is a picture: whoever arms the boat answers for it at
-    the start, and what drifts in from astern no camera sees anyway.
+    It is not a Bayesian grid (Thrun, Burgard, Fox: "Probabilistic Robotics", 2005, chapter 9): a cell is what it was
+    last seen to be, for a lifetime.
+      * Occupied: seen occupied within `occupied_s` (Q3), or within `hidden_s` and not seen free since.
+      * Free: seen free within `free_s` (Q3), and not occupied.
+      * Occupied wins, except for what one picture alone shows and `outvoted_by` later ones show free: a glint.
+      * Blind zone: nearer than the camera sees, as long as there is a picture. Whoever arms the boat answers for it at
+        the start, and no camera sees what drifts in from astern.
+    Boxes of dynamic obstacles (`moving_boxes`) occupy no cell.
     """
     west, south = (math.floor(at_m / CELL_M) - GRID_CELLS // 2 for at_m in position_m)
     longest_us, free_us, occupied_us = (
@@ -99,7 +104,7 @@ def build_occupancy_grid(
         for last_of in (people_of, vessels_of)
     )
     free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
-    ages_s = np.zeros(len(recent) + 1)  # of what was lately in sight, or, at last, never
+    ages_s = np.zeros(len(recent) + 1)  # zero for what is in sight now and, in the last place, for what never was
     ages_s[:first_occupied] = [(now_us - observation.stamp_us) * 1e-6 for observation in recent[:first_occupied]]
     swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
     drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
@@ -122,7 +127,7 @@ def build_occupancy_grid(
 
 
 def blind_zone_radius_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
-    """How far from the boat the water begins that a picture shows, boat at rest; 0 if that is beyond `blind_m`."""
+    """Distance from a level boat to the nearest water that its camera sees; 0 if that is beyond `blind_m`."""
     camera_model = pinhole_at(LEVEL_POSE, camera.calibration, aspect)
     u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
     given = pixel_rays(camera_model, u, own_hull_top(camera.ego_polygon, u))
@@ -138,7 +143,7 @@ def blind_zone_radius_m(aspect: float, camera: Camera, config: PlannerConfig) ->
 
 
 def _dilate(cells: Bools, reach_m: F64) -> Bools:
-    """Cells that lie within the reach of these, each of its own [100 * 100]: in [100, 100]."""
+    """Cells that lie within the reach of the given cells, each cell with a reach of its own [100 * 100]; [100, 100]."""
     found = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     steps = np.ceil(reach_m / CELL_M) * cells
     for reach in np.unique(steps[steps > 0.0]):
@@ -149,9 +154,9 @@ def _dilate(cells: Bools, reach_m: F64) -> Bools:
 def _is_outvoted(
     pictures: list[ObservedCells], occupied_of: I64, west: int, south: int, config: PlannerConfig
 ) -> Bools:
-    """Cells that one of these pictures alone shows occupied, they and all around them, and enough later ones free.
+    """Cells that one picture alone shows occupied, with all cells around them, and that enough later ones show free.
 
-    occupied_of: the number of the last of them that shows each cell occupied.
+    occupied_of: the number of the last picture that shows each cell occupied.
     """
     number, cell = _all_observed([picture.occupied for picture in pictures], west, south)
     first = np.full(GRID_CELLS * GRID_CELLS, len(pictures), np.int64)
@@ -164,7 +169,7 @@ def _is_outvoted(
 
 
 def _extreme_of_neighbours(values: I64, extreme: np.ufunc) -> I64:
-    """The best of each cell and the eight around it."""
+    """The smallest or largest value of each cell and the eight around it."""
     for _ in range(2):
         found = values.copy()
         extreme(found[1:], values[:-1], out=found[1:])
@@ -193,7 +198,7 @@ def _all_observed(pictures: list[CellIndices], west: int, south: int) -> tuple[I
 
 
 def _cells_within(grid: OccupancyGrid, position_m: tuple[float, float], reach_m: float) -> Bools:
-    """Cells whose middle lies within reach."""
+    """Cells whose middle lies within reach of the position."""
     middle = (np.arange(GRID_CELLS) + 0.5) * CELL_M
     east_m, north_m = grid.west_m + middle - position_m[0], grid.south_m + middle - position_m[1]
     return np.asarray((east_m * east_m)[None, :] + (north_m * north_m)[:, None] <= reach_m * reach_m)

@@ -1,7 +1,8 @@
-"""From the picture to the water: a pinhole's rays meet the surface (Q1). Pure, the same bits everywhere.
+"""Inverse perspective projection: the rays of a pinhole camera meet the water surface (Q1). Pure.
 
-Body is x forward, y left, z up with its origin on the water; positive pitch lowers the bow, positive roll starboard.
-Elementary arithmetic alone, element by element: no reduction whose order could differ.
+The body frame is x forward, y left, z up (REP-103) with its origin on the water; positive pitch lowers the bow and
+positive roll lowers the starboard side. Only elementary arithmetic is used, element by element, so that every machine
+computes the same bits: there is no reduction whose order could differ.
 """
 
 import functools
@@ -18,11 +19,11 @@ from paani.config import CalibrationConfig
 Number = float | F64
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]  # by rows
-MIN_DESCENT = 1e-6  # a ray that falls less than this per unit meets no water
+MIN_DESCENT = 1e-6  # tangent below the horizontal; a flatter ray does not meet the water
 
 
 class Pose(NamedTuple):
-    """Where the boat is in the map, and how it lies."""
+    """Position of the boat in the map, and its attitude."""
 
     x_m: float
     y_m: float
@@ -32,9 +33,10 @@ class Pose(NamedTuple):
 
 
 class PinholeCamera(NamedTuple):
-    """Map-from-camera rotation (camera axes: out, right, down), where the camera is [m], focal lengths and centre.
+    """A pinhole camera in the map: map-from-camera rotation, position [m], focal lengths and principal point.
 
-    Focal lengths and centre are in picture widths and heights. Of several pictures at once, each number is a column.
+    Camera axes are outward, right and down. Focal lengths and principal point are fractions of the picture's width and
+    height. For several pictures at once each number is a column (`stack_cameras`).
     """
 
     rotation: Matrix
@@ -44,7 +46,7 @@ class PinholeCamera(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Unit directions along the water in the map, and how far below the horizontal each ray leads (its tangent)."""
+    """Rays as unit directions along the water, east and north, and the tangent of their angle below the horizontal."""
 
     east: F64
     north: F64
@@ -53,7 +55,7 @@ class Rays(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def pinhole_at(pose: Pose, calibration: CalibrationConfig, aspect: float) -> PinholeCamera:
-    """The calibrated camera of a boat that lies so. aspect: picture width over height, pixels square."""
+    """The calibrated camera of a boat with this pose. aspect: picture width over height; pixels are square."""
     body = rotation_matrix(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
     mount = rotation_matrix(*map(math.radians, (calibration.roll_deg, calibration.pitch_down_deg, calibration.yaw_deg)))
     rotation = _product(_product(body, mount), ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)))
@@ -65,7 +67,7 @@ def pinhole_at(pose: Pose, calibration: CalibrationConfig, aspect: float) -> Pin
 
 
 def stack_cameras(cameras: Sequence[PinholeCamera]) -> PinholeCamera:
-    """The lenses of several pictures as one, its numbers [pictures, 1]; they share the centre."""
+    """The cameras of several pictures as one, with numbers [pictures, 1]; they share one principal point."""
 
     def column(numbers: Iterable[Number]) -> F64:
         return np.array(list(numbers))[:, None]
@@ -84,7 +86,7 @@ def stack_cameras(cameras: Sequence[PinholeCamera]) -> PinholeCamera:
 
 
 def rotation_matrix(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
-    """Yaw about z, then pitch about y, then roll about x."""
+    """The rotation matrix of yaw about z, then pitch about y, then roll about x, by rows."""
     cr, sr = portable.cos(roll_rad), portable.sin(roll_rad)
     cp, sp = portable.cos(pitch_rad), portable.sin(pitch_rad)
     cy, sy = portable.cos(yaw_rad), portable.sin(yaw_rad)
@@ -96,9 +98,9 @@ def rotation_matrix(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix
 
 
 def pixel_rays(camera: PinholeCamera, u: F64, v: F64) -> Rays:
-    """The rays r = R K^-1 [u, v, 1] of points of the picture, Q1's first half.
+    """The rays r = R K^-1 [u, v, 1] of points of the picture (Q1).
 
-    u, v: fractions of width and height, [n] or [pictures, n].
+    u, v: fractions of the picture's width and height, [n] or [pictures, n].
     """
     right = (u - camera.centre[0]) / camera.focal[0]
     down = (v - camera.centre[1]) / camera.focal[1]
@@ -108,13 +110,13 @@ def pixel_rays(camera: PinholeCamera, u: F64, v: F64) -> Rays:
     return Rays(east / along, north / along, -up / along)
 
 
-def ranges_to_water_m(camera: PinholeCamera, given: Rays, max_range_m: float) -> F64:
-    """How far along the water from below the camera each ray meets it, Q1's second half; infinity where it does not.
+def ranges_to_water_m(camera: PinholeCamera, rays: Rays, max_range_m: float) -> F64:
+    """Distance along the water from below the camera to where each ray meets it (Q1).
 
-    Rejected are rays at or above the horizon, and those that meet the water beyond `max_range_m`.
+    It is infinite for rays at or above the horizon and for rays that meet the water beyond `max_range_m`.
     """
-    meets = given.descent > MIN_DESCENT
-    range_m = camera.position_m[2] / np.where(meets, given.descent, 1.0)
+    meets = rays.descent > MIN_DESCENT
+    range_m = camera.position_m[2] / np.where(meets, rays.descent, 1.0)
     return np.where(meets & (range_m > 0.0) & (range_m <= max_range_m), range_m, np.inf)
 
 

@@ -23,12 +23,12 @@ from paani_services.navigator.avoidance.rollout import (
 )
 from paani_services.navigator.mapping.dynamic_obstacles import (
     DynamicObstacle,
-    Velocity,
     find_dynamic_obstacles,
     is_refuted,
 )
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose, project
 from tests.synthetic_water import (
     AT_REST,

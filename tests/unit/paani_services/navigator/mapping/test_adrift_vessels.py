@@ -10,10 +10,11 @@ from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m, predicted_clearance_m
 from paani_services.navigator.avoidance.planner import ESCAPE_TOLERANCE_M, plan_motion
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, roll_out
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, Velocity, find_dynamic_obstacles
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import (
     AT_REST,

@@ -1,0 +1,163 @@
+"""Weighted least-squares fit of a constant velocity to the measured positions of one obstacle. Pure."""
+
+import math
+from typing import NamedTuple
+
+from paani.arrays import F64
+from paani.messages import Label
+
+MIN_SIGNIFICANCE = 4.0  # standard deviations between rest and a velocity that is not chance
+MIN_SPEED_MPS = 0.08  # slower obstacles are static: the drift of Q6 covers them
+MIN_MEASUREMENTS, MIN_SPAN_S = 3, 0.7  # fewer measurements, or over a shorter time, give no velocity
+INDEPENDENT_RATE_HZ = 5.0  # measurements that follow faster have the same errors
+PRIOR_DEGREES_OF_FREEDOM = 5.0  # of the reduced chi-squared
+PRIOR_SPEED_DEVIATION_MPS = 0.7  # standard deviation of the velocity of obstacles, without any measurement
+
+SymmetricMatrix = tuple[float, float, float]  # a 2 x 2 matrix: east-east, east-north, north-north
+PlaneVector = tuple[float, float]
+
+
+class PositionMeasurement(NamedTuple):
+    """The position of an obstacle in one picture, east and north [m], with the inverse of its covariance.
+
+    box_id: as in `BoxIds`. time_s: from now, negative. range_deviation_m: standard deviation of its range.
+    outline: points where it meets the water, from left to right.
+    shows_ends: whether the picture shows its left and its right end.
+    """
+
+    box_id: tuple[int, int]
+    label: Label
+    time_s: float
+    position_m: PlaneVector
+    information_matrix: SymmetricMatrix
+    range_deviation_m: float
+    outline: tuple[F64, F64]
+    shows_ends: tuple[bool, bool]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the picture's sides do not cut it."""
+        return all(self.shows_ends)
+
+
+class Velocity(NamedTuple):
+    """A velocity, and its standard deviation in the direction in which that is larger."""
+
+    east_mps: float
+    north_mps: float
+    deviation_mps: float
+
+
+class VelocityEstimate(NamedTuple):
+    """A velocity, and the information vector: the inverse of its covariance times the velocity.
+
+    deviation_mps: standard deviation in the direction in which that is larger.
+    """
+
+    velocity_mps: PlaneVector
+    information_vector: PlaneVector
+    deviation_mps: float
+
+    @property
+    def squared_significance(self) -> float:
+        """Squared Mahalanobis distance between the velocity and rest."""
+        return self.velocity_mps[0] * self.information_vector[0] + self.velocity_mps[1] * self.information_vector[1]
+
+
+def estimate_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Velocity | None:
+    """The velocity over the last `fit_s`; None where it may be chance."""
+    return velocity_if_significant(fit_velocity(measurements, fit_s))
+
+
+def velocity_if_significant(estimate: VelocityEstimate | None) -> Velocity | None:
+    """The velocity, unless it may be chance or is that of a static obstacle."""
+    if (
+        estimate is None
+        or estimate.squared_significance < MIN_SIGNIFICANCE * MIN_SIGNIFICANCE
+        or math.hypot(*estimate.velocity_mps) < MIN_SPEED_MPS
+    ):
+        return None
+    return Velocity(*estimate.velocity_mps, estimate.deviation_mps)
+
+
+def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> VelocityEstimate | None:
+    """Fit a constant velocity to the positions of the last `fit_s` by weighted least squares; None of too few.
+
+    With position and velocity as unknowns the normal equations are [W, T; T, S] [p; v] = [a; b], each a 2 x 2 matrix,
+    and (S - T W^-1 T) v = b - T W^-1 a. A prior of zero mean draws the velocity towards rest. Information is scaled
+    down for pictures that follow fast, whose errors are the same, and by the reduced chi-squared of the residuals.
+    """
+    measurements = [each for each in measurements if measurements[-1].time_s - each.time_s <= fit_s]
+    span_s = measurements[-1].time_s - measurements[0].time_s if measurements else 0.0
+    if len(measurements) < MIN_MEASUREMENTS or span_s < MIN_SPAN_S:
+        return None
+    weight_sum = time_sum = square_sum = (0.0, 0.0, 0.0)
+    position_sum = moment_sum = (0.0, 0.0)
+    first = measurements[0]
+    for each in measurements:
+        t_s = each.time_s - first.time_s
+        offset_m = (each.position_m[0] - first.position_m[0], each.position_m[1] - first.position_m[1])
+        weighted = _multiply(each.information_matrix, offset_m)
+        weight_sum = _add_scaled(weight_sum, 1.0, each.information_matrix)
+        time_sum = _add_scaled(time_sum, t_s, each.information_matrix)
+        square_sum = _add_scaled(square_sum, t_s * t_s, each.information_matrix)
+        position_sum = (position_sum[0] + weighted[0], position_sum[1] + weighted[1])
+        moment_sum = (moment_sum[0] + t_s * weighted[0], moment_sum[1] + t_s * weighted[1])
+    inverse = _invert(weight_sum)
+    reduced = _multiply(time_sum, _multiply(inverse, position_sum))
+    information_vector = (moment_sum[0] - reduced[0], moment_sum[1] - reduced[1])
+    information_matrix = _add_scaled(square_sum, -1.0, _congruence(time_sum, inverse))
+    independent = min(1.0, (1.0 + INDEPENDENT_RATE_HZ * span_s) / len(measurements))
+    scale = independent / _reduced_chi_squared(
+        measurements, _multiply(_invert(information_matrix), information_vector), inverse, position_sum, time_sum
+    )
+    rest = 1.0 / (PRIOR_SPEED_DEVIATION_MPS * PRIOR_SPEED_DEVIATION_MPS)
+    covariance = _invert(_add_scaled((rest, 0.0, rest), scale, information_matrix))
+    information_vector = (scale * information_vector[0], scale * information_vector[1])
+    return VelocityEstimate(
+        _multiply(covariance, information_vector), information_vector, math.sqrt(max(covariance[0], covariance[2]))
+    )
+
+
+def _reduced_chi_squared(
+    measurements: list[PositionMeasurement],
+    velocity: PlaneVector,
+    inverse: SymmetricMatrix,
+    position_sum: PlaneVector,
+    time_sum: SymmetricMatrix,
+) -> float:
+    """Squared residuals over variances for each degree of freedom: 1 where the errors are as expected.
+
+    `PRIOR_DEGREES_OF_FREEDOM` more that are as expected keep a few measurements from showing much by chance.
+    """
+    moved = _multiply(time_sum, velocity)
+    start = _multiply(inverse, (position_sum[0] - moved[0], position_sum[1] - moved[1]))
+    total, first = 0.0, measurements[0]
+    for each in measurements:
+        t_s = each.time_s - first.time_s
+        residual_m = (
+            each.position_m[0] - first.position_m[0] - start[0] - t_s * velocity[0],
+            each.position_m[1] - first.position_m[1] - start[1] - t_s * velocity[1],
+        )
+        weighted = _multiply(each.information_matrix, residual_m)
+        total += residual_m[0] * weighted[0] + residual_m[1] * weighted[1]
+    return (total + PRIOR_DEGREES_OF_FREEDOM) / (2 * len(measurements) - 4 + PRIOR_DEGREES_OF_FREEDOM)
+
+
+def _multiply(a: SymmetricMatrix, b: PlaneVector) -> PlaneVector:
+    return (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[2] * b[1])
+
+
+def _add_scaled(a: SymmetricMatrix, scale: float, b: SymmetricMatrix) -> SymmetricMatrix:
+    return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
+
+
+def _invert(a: SymmetricMatrix) -> SymmetricMatrix:
+    scale = 1.0 / (a[0] * a[2] - a[1] * a[1])
+    return (scale * a[2], -scale * a[1], scale * a[0])
+
+
+def _congruence(a: SymmetricMatrix, b: SymmetricMatrix) -> SymmetricMatrix:
+    """The symmetric a b a."""
+    first, second = _multiply(b, (a[0], a[1])), _multiply(b, (a[1], a[2]))
+    return (a[0] * first[0] + a[1] * first[1], a[0] * second[0] + a[1] * second[1], a[1] * second[0] + a[2] * second[1])
