@@ -1,1 +1,1 @@
-"""The two nets: what they are, how they were trained and measured, and the catalogue the board loads them by."""
+"""The two networks: what they are, how they were trained and measured, and the catalogue the board loads them by."""

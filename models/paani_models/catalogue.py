@@ -1,4 +1,4 @@
-"""What the board knows about a model file: its contract, its checksum, where it came from, what was measured."""
+"""The manifest of a weights folder: each model file's contract, checksum, provenance and measured figures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tensor(Record, frozen=True):
-    """One input or output of a net: static shape. A uint8 input is RGB bytes [1, H, W, 3], which the net scales."""
+    """One input or output of a net: static shape. A uint8 input is RGB bytes [1, H, W, 3], which the network scales."""
 
     name: str
     shape: tuple[int, ...]
@@ -82,10 +82,10 @@ class Model(Record, frozen=True):
         height, width = self.input.shape[1:3] if self.input.dtype == "uint8" else self.input.shape[2:]
         return height, width
 
-    def rows_of(self, classes: tuple[str, ...]) -> list[int] | None:
-        """Where each of the classes stands in the output, as far as it is there; None when all stand in that order."""
-        stated = self.classes
-        return None if stated == classes else [stated.index(name) for name in classes if name in stated]
+    def class_rows(self, classes: tuple[str, ...]) -> list[int] | None:
+        """Output rows of the given classes that the model has; None where it has exactly these in this order."""
+        declared = self.classes
+        return None if declared == classes else [declared.index(name) for name in classes if name in declared]
 
 
 class _Manifest(Record, frozen=True):
@@ -116,11 +116,11 @@ def save_catalogue(catalogue: dict[str, Model], folder: Path) -> None:
     beside.replace(folder / MANIFEST)
 
 
-IGNORED_CLASS = "-"
+IGNORED_CLASS = "-"  # in a detector's manifest: a class of the model that is left out
 
 
 def read_contract(file: Path, role: str) -> Model:
-    """The contract of a user's model file: what a manifest beside it says of it, else that of the role's shipped model.
+    """Read the contract of a user's model file from a manifest beside it, else take that of the role's shipped model.
 
     A segmenter names the shipped one's classes in any order; a detector names any of them in any order, and "-" for
     each of its classes that is to be left out. Raises UserError naming the manifest and its field.
@@ -129,26 +129,26 @@ def read_contract(file: Path, role: str) -> Model:
     manifest = file.parent / MANIFEST
     if not manifest.is_file():
         return shipped
-    stated = next((m for m in load_catalogue(file.parent).values() if m.file == file.name), None)
-    if stated is None:
+    declared = next((m for m in load_catalogue(file.parent).values() if m.file == file.name), None)
+    if declared is None:
         return shipped
-    names = [name for name in stated.classes if name != IGNORED_CLASS]
+    names = [name for name in declared.classes if name != IGNORED_CLASS]
     unknown = sorted(set(names) - set(shipped.classes))
     if unknown:
         raise UserError(f"{manifest}: {file.name}: classes: {unknown[0]!r} is not one of {', '.join(shipped.classes)}")
-    whole = role == "detector" or sorted(stated.classes) == sorted(shipped.classes)
-    if not names or len(set(names)) != len(names) or not whole:
+    is_complete = role == "detector" or sorted(declared.classes) == sorted(shipped.classes)
+    if not names or len(set(names)) != len(names) or not is_complete:
         raise UserError(f"{manifest}: {file.name}: classes: a {role} has {', '.join(shipped.classes)}, each once")
-    if stated.preprocessing.resize != shipped.preprocessing.resize:
+    if declared.preprocessing.resize != shipped.preprocessing.resize:
         raise UserError(f"{manifest}: {file.name}: preprocessing.resize: a {role} has {shipped.preprocessing.resize}")
-    shape, wanted = stated.input.shape, "[1, H, W, 3]" if stated.input.dtype == "uint8" else "[1, 3, H, W]"
-    if len(shape) != 4 or (shape[0], shape[3 if stated.input.dtype == "uint8" else 1]) != (1, 3):
+    shape, wanted = declared.input.shape, "[1, H, W, 3]" if declared.input.dtype == "uint8" else "[1, 3, H, W]"
+    if len(shape) != 4 or (shape[0], shape[3 if declared.input.dtype == "uint8" else 1]) != (1, 3):
         raise UserError(f"{manifest}: {file.name}: input.shape: {list(shape)} is not {wanted}")
-    return stated
+    return declared
 
 
 def choose_model(role: str, path: str) -> tuple[Model, Path]:
-    """Contract and file of a user's model, or, without a path, of the role's shipped one, its checksum compared."""
+    """Contract and file of a user's model; without a path, of the role's shipped model, whose checksum is compared."""
     return (read_contract(Path(path), role), Path(path)) if path else (load_catalogue()[role], verified_path(role))
 
 

@@ -1,4 +1,4 @@
-"""Picture -> net input, as the board does it (C3, D7, D8). Pictures are RGB uint8 [H,W,3]."""
+"""Preprocessing: picture to network input, as the board does it (C3, D7, D8). Pictures are RGB uint8 [H,W,3]."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from paani.arrays import F32, U8
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # D7
 STD = np.array([0.229, 0.224, 0.225], np.float32)
 SIZE_WH = (320, 256)  # C1, D5
-PAD_GREY = 114
+PAD_GREY = 114  # grey level around a letterboxed picture, as YOLOX trains with
 IMAGE_QUALITY_MIDDLE_WH, IMAGE_QUALITY_WH = (320, 240), (160, 120)
 
 
 def segmenter_batch(pictures: U8) -> F32:
-    """Net-sized pictures [N,H,W,3] -> float32 [N,3,H,W], normalised."""
+    """Network-sized pictures [N,H,W,3] -> float32 [N,3,H,W], normalised."""
     scaled = (pictures.astype(np.float32) / 255.0 - MEAN) / STD
     return np.ascontiguousarray(scaled.transpose(0, 3, 1, 2))
 
 
 def detector_batch(pictures: U8) -> F32:
-    """Net-sized pictures [N,H,W,3] -> float32 [N,3,H,W] in 0..1."""
+    """Network-sized pictures [N,H,W,3] -> float32 [N,3,H,W] in 0..1."""
     return np.ascontiguousarray((pictures.astype(np.float32) / 255.0).transpose(0, 3, 1, 2))
 
 
@@ -31,21 +31,21 @@ def segmenter_input(picture: U8) -> F32:
 
 
 def image_quality_input(picture: U8) -> F32:
-    """Any picture, averaged down in two steps as the board's gate does it -> [1,3,120,160]."""
+    """Any picture, averaged down in two steps as the board's image-quality check does it -> [1,3,120,160]."""
     middle = cv2.resize(picture, IMAGE_QUALITY_MIDDLE_WH, interpolation=cv2.INTER_AREA)
     small = np.asarray(cv2.resize(middle, IMAGE_QUALITY_WH, interpolation=cv2.INTER_AREA), np.uint8)
     return detector_batch(small[None])
 
 
 def letterbox_affine(source_wh: tuple[int, int], target_wh: tuple[int, int]) -> F32:
-    """Source pixels -> net pixels, float32 [2,3]: aspect kept, centred (C3)."""
+    """Source pixels -> network pixels, float32 [2,3]: aspect kept, centred (C3)."""
     scale = min(target_wh[0] / source_wh[0], target_wh[1] / source_wh[1])
     x, y = ((t - s * scale) / 2 for s, t in zip(source_wh, target_wh, strict=True))
     return np.array([[scale, 0, x], [0, scale, y]], np.float32)
 
 
 def letterbox_picture(picture: U8) -> U8:
-    """Any picture, resized bilinearly into the middle of a grey net-sized one."""
+    """Any picture, resized bilinearly into the middle of a grey network-sized one."""
     height, width = picture.shape[:2]
     scale = min(SIZE_WH[0] / width, SIZE_WH[1] / height)
     inner = (max(1, round(width * scale)), max(1, round(height * scale)))

@@ -1,10 +1,10 @@
-"""Do FP32 and INT8 nets say on the board's processor what they say here? Under emulation: answers, not speed.
+"""Do FP32 and INT8 networks say on the board's processor what they say here? Under emulation: answers, not speed.
 
     tests/bench/aarch64_root.sh runs/aarch64
     .venv/bin/python tests/bench/aarch64_networks.py runs/aarch64 segmenter runs/int8/segmenter-equalised.onnx
 
-Prints one JSON object: the score (mIoU, AP50) of both nets here and there on the same held-out pictures, and how far
-the answers lie apart.
+Prints one JSON object: the score (mIoU, AP50) of both networks here and there on the same held-out pictures, and how
+far the answers lie apart.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The semantic protocol of the LaRS benchmark: mIoU, mu, Pr, Re, F1 and Q, and its formats.
+"""Semantic protocol of the LaRS benchmark (Zust et al. 2023): mIoU, mu, Pr, Re, F1 and Q, and its formats.
 
 Written from the description of the protocol. Classes here are LaRS's: obstacle 0, water 1, sky 2, 255 ignored.
 

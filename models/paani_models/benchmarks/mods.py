@@ -1,4 +1,4 @@
-"""The segmentation protocol of the MODS benchmark: water edge within 20 px, obstacle F1 overall and in the danger zone.
+"""Segmentation protocol of the MODS benchmark (Bovcon et al. 2021): water edge, obstacle F1, also in the danger zone.
 
 Written from the description of the protocol. Masks hold MODS's classes: obstacle 0, water 1, sky 2.
 """

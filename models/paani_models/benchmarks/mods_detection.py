@@ -1,4 +1,4 @@
-"""The detection side of MODS: the results file and the F-scores of its three set-ups."""
+"""Detection protocol of MODS (Bovcon et al. 2021): the results file and the F-scores of its three set-ups."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nets on data sets in the layouts of LaRS and MODS, scored by those protocols and written in their formats.
+"""The networks on data sets in the layouts of LaRS and MODS, scored by those protocols and written in their formats.
 
 LARS/image_list.txt, images/NAME.jpg, semantic_masks/, panoptic_masks/, panoptic_annotations.json
 MODS/mods.json, sequences/NAME/frames/FILE, calibration/calibration-BASE.yaml
@@ -96,7 +96,7 @@ def score_mods(
 
 
 def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> F32:
-    """Net output [8,A] -> class and corners in picture pixels [n,5], above the board's threshold."""
+    """Network output [8,A] -> class and corners in picture pixels [n,5], above the board's threshold."""
     boxes = decode_boxes(output, CONFIDENCE)
     affine = letterbox_affine(size_wh, SIZE_WH)
     corners = (boxes.boxes.reshape(-1, 2, 2) - affine[:, 2]) / (affine[0, 0], affine[1, 1])

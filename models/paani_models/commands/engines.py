@@ -1,4 +1,4 @@
-"""`paani models convert` and `paani models bench`: another engine for the same nets, and whether it pays here."""
+"""`paani models convert` and `paani models bench`: another engine for the same networks, and whether it pays here."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paani.option_paths import output_file
 from paani.whole_file import write_whole
 from paani_models.catalogue import read_contract, verified_path
 from paani_models.datasets.selection import PictureSelection
-from paani_models.engines import benchmark as engine_bench
+from paani_models.engines import benchmark
 from paani_models.engines.contract_check import MAX_DIFFERENCE, infer_role
 from paani_models.engines.ncnn_runner import NOT_INSTALLED, ncnn_files, ncnn_version, verified_ncnn_files
 from paani_models.engines.parity import prepare_inputs
@@ -35,7 +35,7 @@ def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `paani models bench`."""
-    parser.add_argument("--engine", choices=("all", *engine_bench.ENGINES), default="all")
+    parser.add_argument("--engine", choices=("all", *benchmark.ENGINES), default="all")
     parser.add_argument("--threads", type=_parse_thread_counts, default=(1, 2), metavar="N,N", help="default: 1,2")
     parser.add_argument("--rounds", type=_parse_count, default=30, metavar="N", help="runs of each (default: 30)")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
@@ -67,45 +67,45 @@ def convert(arguments: argparse.Namespace) -> int:
 
 def bench(arguments: argparse.Namespace) -> int:
     """Measure, print, write. Raises UserError where an engine that was asked for by name cannot run."""
-    nets = engine_bench.load_networks(arguments.weights)
-    engines = list(engine_bench.ENGINES) if arguments.engine == "all" else [arguments.engine]
-    left_out = {}
+    nets = benchmark.load_networks(arguments.weights)
+    engines = list(benchmark.ENGINES) if arguments.engine == "all" else [arguments.engine]
+    excluded = {}
     if "ncnn" in engines and (reason := _reason_against_ncnn(nets)):
         if arguments.engine == "ncnn":
             raise UserError(reason)
         engines.remove("ncnn")
-        left_out["ncnn"] = reason
-    agreements: tuple[engine_bench.Agreement, ...] = ()
+        excluded["ncnn"] = reason
+    agreements: tuple[benchmark.Agreement, ...] = ()
     if "ncnn" in engines:
         pictures = _held_out_pictures(arguments)
         inputs = {role: prepare_inputs(net.contract, pictures) for role, net in nets.items()}
-        agreements = engine_bench.measure_agreements(nets, inputs)
-    ready, load_before = engine_bench.prepare_cases(nets, engines, arguments.threads), os.getloadavg()[0]
-    taken: dict[engine_bench.Case, list[float]] = {}
-    for turn, taken in engine_bench.measure_rounds(  # noqa: B007 - the last one is the result
+        agreements = benchmark.measure_agreements(nets, inputs)
+    ready, load_before = benchmark.prepare_cases(nets, engines, arguments.threads), os.getloadavg()[0]
+    times_ms: dict[benchmark.Case, list[float]] = {}
+    for turn, times_ms in benchmark.measure_rounds(  # noqa: B007 - the last one is the result
         ready, arguments.rounds, stopwatch_ms
     ):
         if sys.stderr.isatty():
             sys.stderr.write(f"\r{max(0, turn):4} of {arguments.rounds} rounds\r")
-    found = engine_bench.summarise_times(taken)
-    report = engine_bench.EngineReport(
+    rows = benchmark.summarise_times(times_ms)
+    report = benchmark.EngineReport(
         machine=f"{platform.machine()} {platform.system()}",
         cores=os.cpu_count() or 1,
         load_before=round(load_before, 2),
         load_after=round(os.getloadavg()[0], 2),
-        rows=found,
-        costs=engine_bench.measure_costs(nets),
+        rows=rows,
+        costs=benchmark.measure_costs(nets),
         agreements=agreements,
-        left_out=left_out,
-        choice=engine_bench.choose_engine(found, agreements, MAX_DIFFERENCE),
+        left_out=excluded,
+        choice=benchmark.choose_engine(rows, agreements, MAX_DIFFERENCE),
     )
-    sys.stdout.write(engine_bench.format_report(report))
+    sys.stdout.write(benchmark.format_report(report))
     if arguments.json:
         write_whole(arguments.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
     return 0
 
 
-def _reason_against_ncnn(nets: Mapping[str, engine_bench.NetworkFile]) -> str:
+def _reason_against_ncnn(nets: Mapping[str, benchmark.NetworkFile]) -> str:
     """Why ncnn cannot be timed; empty where it can."""
     if ncnn_version() is None:
         return NOT_INSTALLED

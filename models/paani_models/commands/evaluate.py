@@ -13,12 +13,11 @@ import msgspec
 from paani.errors import UserError
 from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_whole
-from paani_models.benchmarks import score_networks as benchmarks
+from paani_models.benchmarks.score_networks import score_lars, score_mods
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import DETECTOR_CLASSES
 from paani_models.detector.scores import ScoredBoxes, count_false_alarms, score_boxes
-from paani_models.report import manifest_figures as evaluate
 from paani_models.report.estimates import (
     Evaluation,
     MeasuredModel,
@@ -29,6 +28,7 @@ from paani_models.report.estimates import (
     tabulate_box_confusion,
     tabulate_mask_confusions,
 )
+from paani_models.report.manifest_figures import measure_detector, measure_false_alarms, measure_segmenter
 from paani_models.report.records import image_quality_figures, read_faults
 from paani_models.segmenter.scores import ScoredMask, score_masks
 
@@ -38,7 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("nets", nargs="*", default=[], help="names of the manifest; all if not given")
     parser.add_argument("--record", action="store_true", help="write the figures into the manifest")
     parser.add_argument(
-        "--faults", type=input_file("--faults"), metavar="FILE", help="the gate's figures, from `paani faults --json`"
+        "--faults",
+        type=input_file("--faults"),
+        metavar="FILE",
+        help="image-quality figures, from `paani faults --json`",
     )
     parser.add_argument(
         "--lars", type=input_folder("--lars"), metavar="ROOT", help="score the segmenter by LaRS's protocol instead"
@@ -93,10 +96,10 @@ def run_benchmark(arguments: argparse.Namespace) -> int:
     """Print one JSON object per benchmark. Exit 0, or raise UserError."""
     segmenter_net = verified_path("segmenter", arguments.weights)
     if arguments.lars:
-        _print_rounded(benchmarks.score_lars(segmenter_net, arguments.lars, arguments.predictions))
+        _print_rounded(score_lars(segmenter_net, arguments.lars, arguments.predictions))
     if arguments.mods:
         detector_net = verified_path("detector", arguments.weights)
-        _print_rounded(benchmarks.score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
+        _print_rounded(score_mods(segmenter_net, detector_net, arguments.mods, arguments.predictions))
     return 0
 
 
@@ -106,7 +109,7 @@ def _print_rounded(figures: dict[str, float]) -> None:
 
 
 def is_scored(classes: tuple[str, ...]) -> bool:
-    """Whether a model of the manifest marks water or boxes: others are no matter of labelled pictures."""
+    """Whether a model of the manifest is a segmenter or a detector, which labelled pictures can score."""
     return "water" in classes or classes == DETECTOR_CLASSES
 
 
@@ -114,10 +117,10 @@ def measure_network(net: str, weights: Path, pictures: PictureSelection) -> list
     """The manifest's figures of one net."""
     path = verified_path(net, weights)
     if "water" in load_catalogue(weights)[net].classes:
-        return evaluate.measure_segmenter(path, pictures.segmented_samples(held_out=True))
+        return measure_segmenter(path, pictures.segmented_samples(held_out=True))
     return [
-        *evaluate.measure_detector(path, pictures.boxed_samples(held_out=True)),
-        *evaluate.measure_false_alarms(path, pictures.segmented_samples(held_out=True)),
+        *measure_detector(path, pictures.boxed_samples(held_out=True)),
+        *measure_false_alarms(path, pictures.segmented_samples(held_out=True)),
     ]
 
 

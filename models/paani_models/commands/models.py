@@ -14,17 +14,17 @@ from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
-from paani_models.commands import prepare as data_command
+from paani_models.commands import prepare as prepare_command
 from paani_models.commands import report as report_command
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import list_pictures_without_water
-from paani_models.engines import contract_check
-from paani_models.report import manifest_figures as evaluate
+from paani_models.engines.contract_check import infer_role, inspect_model
+from paani_models.report.manifest_figures import measure_detector, measure_segmenter
 from paani_models.report.model_card import render_model_card
 
 DATA_VARIABLE = "PAANI_DATA"
-NETS = ("segmenter", "detector")
-TRAINED = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
+PAIR = ("segmenter", "detector")
+TRAINABLE = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
 
 
 def data_folder() -> Path:
@@ -38,24 +38,24 @@ def main(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     try:
         if arguments.command == "check":
-            return _check_file(arguments) if arguments.model else _check(arguments.weights)
+            return _check_file(arguments) if arguments.model else _check_weights(arguments.weights)
         if arguments.command == "card":
             sys.stdout.write(render_model_card(load_catalogue(arguments.weights)))
             return 0
         if arguments.command == "prepare":
             if arguments.set != "own":
-                return data_command.prepare_public(arguments)
-            return data_command.prepare_own(_pictures(arguments), arguments.manifest)
+                return prepare_command.prepare_public(arguments)
+            return prepare_command.prepare_own(_select_pictures(arguments), arguments.manifest)
         if arguments.command == "held-out":
-            return _held_out(_pictures(arguments), arguments.without_water)
+            return _list_held_out(_select_pictures(arguments), arguments.without_water)
         if arguments.command == "pack":
-            return data_command.make_bundle(arguments, _pictures(arguments))
+            return prepare_command.make_bundle(arguments, _select_pictures(arguments))
         if arguments.command == "evaluate":
             if arguments.lars or arguments.mods:
                 return evaluate_command.run_benchmark(arguments)
-            return evaluate_command.run(arguments, _pictures(arguments))
+            return evaluate_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "report":
-            return report_command.run(arguments, _pictures(arguments))
+            return report_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "quantise":
             return _quantise(arguments)
         if arguments.command == "convert":
@@ -63,8 +63,8 @@ def main(argv: list[str]) -> int:
         if arguments.command == "bench":
             return engine_command.bench(arguments)
         if arguments.command == "variant":
-            return _variant(arguments.weights, arguments.out)
-        return _needs_torch(arguments)
+            return _write_variants(arguments.weights, arguments.out)
+        return _train_or_export(arguments)
     except UserError as error:
         sys.stderr.write(f"paani models: {error}\n")
         return 2
@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="compare the shipped files with their manifest, or judge a file of yours")
     check.add_argument("model", type=Path, nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
-    check.add_argument("--role", choices=NETS, help="told from the output if not given")
+    check.add_argument("--role", choices=PAIR, help="told from the output if not given")
     check.add_argument("--score", action="store_true", help="also its figures on the held-out pictures of --data")
     check.add_argument("--weights", type=Path, default=WEIGHTS)
 
@@ -90,16 +90,16 @@ def _parser() -> argparse.ArgumentParser:
     held_out = commands.add_parser("held-out", help="list the held-out pictures, for `paani faults --pictures`")
     held_out.add_argument("--without-water", action="store_true", help="only those that show no water; else all others")
     check_data = commands.add_parser("prepare", help="check and count the pictures; or prepare a public set")
-    data_command.add_prepare_arguments(check_data)
+    prepare_command.add_prepare_arguments(check_data)
     pack = commands.add_parser("pack", help="a training bundle of bounded size, as one tar")
-    data_command.add_pack_arguments(pack)
+    prepare_command.add_pack_arguments(pack)
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
-    train.add_argument("net", choices=TRAINED)
+    train.add_argument("net", choices=TRAINABLE)
     train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
     train.add_argument(
         "--start",
         type=Path,
-        help="checkpoint, or exported ONNX file, to begin from; for the gate: the segmenter that it guards",
+        help="checkpoint, or exported ONNX file, to begin from; for gate: the segmenter whose errors it learns",
     )
     train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
     train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
@@ -109,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
-    export.add_argument("net", choices=TRAINED)
+    export.add_argument("net", choices=TRAINABLE)
     exported = export.add_mutually_exclusive_group(required=True)
     exported.add_argument("--checkpoint", type=Path)
     exported.add_argument("--untrained", action="store_true", help="random weights, to measure the speed of its shape")
@@ -128,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     engine_command.add_bench_arguments(bench)
     bench.add_argument("--weights", type=Path, default=WEIGHTS)
     quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
-    quantise.add_argument("net", choices=NETS)
+    quantise.add_argument("net", choices=PAIR)
     quantise.add_argument("--recipe", choices=("paper", "equalised"), default="equalised")
     quantise.add_argument("--model", type=Path, metavar="FILE", help="FP32 ONNX file; the shipped one if not given")
     quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
@@ -141,9 +141,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _held_out(pictures: PictureSelection, dry: bool) -> int:
-    """dry: also pictures that show no water and belong to no source."""
-    if dry:
+def _list_held_out(pictures: PictureSelection, without_water: bool) -> int:
+    """without_water: also pictures that show no water and belong to no source."""
+    if without_water:
         trained = {sample.picture for sample in pictures.training_samples()}
         listed = {pictures.data / name for name in list_pictures_without_water()}
         held = {picture for picture in listed - trained if picture.is_file()}
@@ -153,7 +153,7 @@ def _held_out(pictures: PictureSelection, dry: bool) -> int:
     return 0
 
 
-def _check(weights: Path) -> int:
+def _check_weights(weights: Path) -> int:
     for name, model in load_catalogue(weights).items():
         verified_path(name, weights)
         sys.stdout.write(f"{name}: {model.file} {model.size_bytes} bytes, {model.parameters} parameters, ok\n")
@@ -162,17 +162,17 @@ def _check(weights: Path) -> int:
 
 def _check_file(arguments: argparse.Namespace) -> int:
     """0 where the model can be used, 1 where it cannot."""
-    role = contract_check.infer_role(arguments.model, arguments.role)
-    findings = contract_check.inspect_model(arguments.model, role)
+    role = infer_role(arguments.model, arguments.role)
+    findings = inspect_model(arguments.model, role)
     for finding in findings:
         sys.stdout.write(f"{finding.level:8} {finding.text}\n")
     usable = all(finding.level != "error" for finding in findings)
     if usable and arguments.score:
-        pictures = _pictures(arguments)
+        pictures = _select_pictures(arguments)
         if role == "segmenter":
-            figures = evaluate.measure_segmenter(arguments.model, pictures.segmented_samples(held_out=True))
+            figures = measure_segmenter(arguments.model, pictures.segmented_samples(held_out=True))
         else:
-            figures = evaluate.measure_detector(arguments.model, pictures.boxed_samples(held_out=True))
+            figures = measure_detector(arguments.model, pictures.boxed_samples(held_out=True))
         for figure in figures:
             sys.stdout.write(f"{'score':8} {figure.metric} on {figure.source}: {figure.value:.3f} (n {figure.n})\n")
     use = f"paani up --set perception.{role}={arguments.model}"
@@ -180,17 +180,17 @@ def _check_file(arguments: argparse.Namespace) -> int:
     return 0 if usable else 1
 
 
-def _pictures(arguments: argparse.Namespace) -> PictureSelection:
+def _select_pictures(arguments: argparse.Namespace) -> PictureSelection:
     names = [name for name in arguments.sources.split(",") if name]
     return PictureSelection(arguments.data, names, arguments.rendered)
 
 
-def _variant(weights: Path, out: Path) -> int:
+def _write_variants(weights: Path, out: Path) -> int:
     try:
         from paani_models.engines.runtime_variant import write_variant  # noqa: PLC0415 - onnx is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
-    for name in NETS:
+    for name in PAIR:
         model = write_variant(name, load_catalogue(weights)[name], verified_path(name, weights), out)
         sys.stdout.write(f"--set perception.{name}={out / model.file}\n")
     return 0
@@ -201,19 +201,19 @@ def _quantise(arguments: argparse.Namespace) -> int:
         from paani_models.commands import quantise as quantise_command  # noqa: PLC0415 - onnx is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
-    return quantise_command.run(arguments, _pictures(arguments))
+    return quantise_command.run(arguments, _select_pictures(arguments))
 
 
-def _needs_torch(arguments: argparse.Namespace) -> int:
+def _train_or_export(arguments: argparse.Namespace) -> int:
     try:
-        from paani_models.recipes import train_and_export as pipeline  # noqa: PLC0415 - PyTorch is not on the board
+        from paani_models.recipes import train_and_export  # noqa: PLC0415 - PyTorch is not on the board
     except ModuleNotFoundError as error:
         raise UserError(f"{error.name} is not installed; install the extra paani[train]") from error
     if arguments.command == "export" and arguments.untrained:
-        return pipeline.export_untrained_network(arguments.net, arguments.weights)
-    pictures = _pictures(arguments)
+        return train_and_export.export_untrained_network(arguments.net, arguments.weights)
+    pictures = _select_pictures(arguments)
     if arguments.command == "train":
-        plan = pipeline.TrainingOptions(
+        options = train_and_export.TrainingOptions(
             folder=arguments.folder,
             start=arguments.start,
             teacher=arguments.teacher,
@@ -223,7 +223,7 @@ def _needs_torch(arguments: argparse.Namespace) -> int:
             peak_rate=arguments.peak_rate,
             unchecked=arguments.unchecked,
         )
-        pipeline.train_network(arguments.net, pictures, plan, arguments.threads)
+        train_and_export.train_network(arguments.net, pictures, options, arguments.threads)
     else:
-        pipeline.export_checkpoint(arguments.net, arguments.checkpoint, arguments.weights, pictures)
+        train_and_export.export_checkpoint(arguments.net, arguments.checkpoint, arguments.weights, pictures)
     return 0

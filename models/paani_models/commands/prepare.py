@@ -1,4 +1,4 @@
-"""`paani models prepare` and `pack`: what can be done with pictures where PyTorch is not installed."""
+"""`paani models prepare` and `pack`: check, prepare and bundle pictures; neither needs PyTorch."""
 
 from __future__ import annotations
 

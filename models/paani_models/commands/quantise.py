@@ -1,4 +1,4 @@
-"""`paani models quantise`: an INT8 net, the record of how it came about, and whether it may take FP32's place."""
+"""`paani models quantise`: an INT8 network, the record of how it came about, and whether it may take FP32's place."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from paani_models.catalogue import file_sha256, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.network_input import detector_input, segmenter_input
-from paani_models.quantisation import acceptance as precision_gate
+from paani_models.quantisation import acceptance
 from paani_models.quantisation.acceptance import QuantisationRecord
 from paani_models.quantisation.calibration_pictures import choose_calibration_samples, hash_sample_names
 from paani_models.quantisation.quantise import RECIPES, quantise_network
 
 
 def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
-    """Write <net>-<recipe>.onnx and .json into --out. 0 where the gate accepts, 1 where it rejects."""
+    """Write <network>-<recipe>.onnx and .json into --out.
+
+    Returns 0 where the acceptance test passes, 1 where it fails.
+    """
     net, recipe = arguments.net, RECIPES[arguments.recipe][arguments.net]
     source = arguments.model or verified_path(net)
     is_segmenter = net == "segmenter"
@@ -32,13 +35,13 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     inputs = [prepare(read_picture(sample.picture)) for sample in chosen]
     target = arguments.out / f"{net}-{recipe.name}.onnx"
     quantise_network(source, target, recipe, inputs)
-    score = precision_gate.score_segmenter if is_segmenter else precision_gate.score_detector
+    score = acceptance.score_segmenter if is_segmenter else acceptance.score_detector
     (float_score, float_figures), (int8_score, figures) = score(source, held_out), score(target, held_out)
-    best = None if is_segmenter else precision_gate.largest_score(target, inputs)
-    float_best = None if is_segmenter else precision_gate.largest_score(source, inputs)
-    timing = precision_gate.time_networks(source, target, inputs[0])
+    best = None if is_segmenter else acceptance.largest_score(target, inputs)
+    float_best = None if is_segmenter else acceptance.largest_score(source, inputs)
+    timing = acceptance.time_networks(source, target, inputs[0])
     metric = "mIoU" if is_segmenter else "AP50"
-    verdict = precision_gate.decide_acceptance(
+    verdict = acceptance.decide_acceptance(
         100.0 * (float_score - int8_score),
         timing.ratio,
         for_size=arguments.for_size,
@@ -64,8 +67,8 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         best_score=best,
         float_best_score=float_best,
         timing=timing,
-        threads=precision_gate.THREADS,
-        machine=precision_gate.describe_machine(),
+        threads=acceptance.THREADS,
+        machine=acceptance.describe_machine(),
         for_size=arguments.for_size,
         verdict=verdict,
     )

@@ -1,4 +1,4 @@
-"""Reading files that others made: whole, of a known kind, or refused by name."""
+"""Read files from outside: complete and well-formed, or refused by name."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from paani.arrays import U8
 from paani.errors import UserError
 
-MIN_SIDE_PX = 16  # below the deepest stride of either net there is nothing to learn from
-EDGE_SLACK = 0.01  # makers round to pixels; a box that passes the picture's edge by this share of it is clipped
-MIN_SIDE_FRAC = 1e-4  # a fifth of a pixel of a wide picture; less is a slip of the maker
+MIN_SIDE_PX = 16  # of a picture; less than the deepest stride of either network holds nothing to learn
+EDGE_SLACK = 0.01  # share of the picture by which a box may pass its edge, as annotators round; it is clipped
+MIN_SIDE_FRAC = 1e-4  # of a box: a fifth of a pixel of a wide picture; less is a mistake of the annotator
 _ENDINGS = {b"\xff\xd8": (b"\xff\xd9", 1024), b"\x89P": (b"IEND\xaeB`\x82", 16)}
 
 

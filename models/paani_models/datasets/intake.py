@@ -1,4 +1,4 @@
-"""Taking pictures into a prepared folder, which appears whole or not at all."""
+"""Add checked pictures to a new prepared folder, which appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def link_or_copy(source: Path, target: Path) -> None:
 
 @dataclass
 class Intake:
-    """Collects what is taken and what is refused, so that one run names every mistake of a set."""
+    """Collects the pictures added and the mistakes found, so that one run reports every mistake of a set."""
 
     out: Path
     source: str
     entries: list[Entry] = field(default_factory=list)
-    prints: list[Fingerprint] = field(default_factory=list)
+    fingerprints: list[Fingerprint] = field(default_factory=list)
     mistakes: list[str] = field(default_factory=list)
 
     def add(
@@ -95,25 +95,25 @@ class Intake:
             (self.out / "masks").mkdir(exist_ok=True)
             cv2.imwrite(str(self.out / entry.mask), mask)
         self.entries.append(entry)
-        self.prints.append(
+        self.fingerprints.append(
             fingerprint_picture(
                 picture,
                 source=self.source,
                 identity=path.stem,
                 sequence=sequence,
                 split=split,
-                place=str(path),
+                location=str(path),
                 sha256=entry.sha256,
             )
         )
 
-    def close(self, terms: SourceManifest, *, strict: bool) -> tuple[SourceManifest, list[Leak]]:
+    def write_manifest(self, terms: SourceManifest, *, strict: bool) -> tuple[SourceManifest, list[Leak]]:
         """Write the manifest: `terms` with what was taken.
 
         Returns it and the leaks that were let pass. Raises UserError for mistakes so far; and for leaks, if strict.
         """
         raise_first_mistake(self.mistakes)
-        leaks = find_leaks(self.prints)
+        leaks = find_leaks(self.fingerprints)
         if strict:
             refuse_leaks(leaks)
         manifest = msgspec.structs.replace(terms, items=tuple(self.entries))

@@ -1,4 +1,4 @@
-"""Reading everything that training will read, once: counted, checked, and searched for leaks between the splits."""
+"""Read every training and held-out file once: count and check them, and search for leaks between the splits."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ FolderOf = Callable[[Source], Path]
 
 @dataclass(frozen=True)
 class ReadSample:
-    """One sample as it was read."""
+    """A sample, its manifest entry, and its fingerprint."""
 
     sample: Sample
     entry: Entry
-    print: Fingerprint
+    fingerprint: Fingerprint
 
 
 class _Terms(msgspec.Struct, frozen=True):
@@ -61,7 +61,7 @@ def read_all_samples(samples: Sequence[Sample], folder_of: FolderOf) -> list[Rea
 
 def find_segmenter_leaks(seen: Sequence[ReadSample]) -> list[Leak]:
     """Between the pictures whose masks the segmenter learns and those that it is scored on."""
-    return find_leaks([item.print for item in seen if item.sample.mask])
+    return find_leaks([item.fingerprint for item in seen if item.sample.mask])
 
 
 def find_detector_leaks(seen: Sequence[ReadSample]) -> list[Leak]:
@@ -69,9 +69,9 @@ def find_detector_leaks(seen: Sequence[ReadSample]) -> list[Leak]:
 
     A picture that is held out for its boxes counts as held out, whatever its mask is used for.
     """
-    boxed = [item.print for item in seen if item.sample.held_out and item.sample.label]
+    boxed = [item.fingerprint for item in seen if item.sample.held_out and item.sample.label]
     kept = {item.identity for item in boxed}
-    learnt = [item.print for item in seen if not item.sample.held_out and item.print.identity not in kept]
+    learnt = [item.fingerprint for item in seen if not item.sample.held_out and item.fingerprint.identity not in kept]
     return find_leaks([*learnt, *boxed])
 
 
@@ -175,7 +175,7 @@ def _read_sample(sample: Sample, folder: Path) -> ReadSample:
         identity=str(sample.picture),
         sequence=sample.sequence,
         split="held out" if sample.held_out else "train",
-        place=str(sample.picture),
+        location=str(sample.picture),
         sha256=entry.sha256,
     )
     return ReadSample(sample, entry, seen)

@@ -1,4 +1,8 @@
-"""Pictures that stand on both sides of a split: the same id, sequence or file, or all but the same view."""
+"""Search for leaks: pictures of different splits that share an id, a sequence, a file, or almost the same view.
+
+Views are compared by a 64-bit perceptual hash of low DCT frequencies (Zauner 2010) and by their thumbnails'
+correlation.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +29,16 @@ _HASH_SIDE, _THUMBNAIL_SIDE = 8, 32
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """A picture as the check sees it. `bits`: perceptual hash; `thumbnail`: float32 [1024], zero mean, unit length."""
+    """What the search knows of a picture.
+
+    `bits`: perceptual hash; `thumbnail`: float32 [1024], zero mean, unit length.
+    """
 
     source: str
     identity: str
     sequence: str
     split: str
-    place: str
+    location: str
     sha256: str
     bits: int
     thumbnail: NDArray[np.float32]
@@ -52,18 +59,19 @@ class Leak:
             "file": "the same bytes",
             "view": "all but the same view",
         }[self.cause]
-        return f"{self.first.place} ({self.first.split}) and {self.second.place} ({self.second.split}) share {shared}"
+        first, second = (f"{each.location} ({each.split})" for each in (self.first, self.second))
+        return f"{first} and {second} share {shared}"
 
 
 def fingerprint_picture(
-    picture: NDArray[np.uint8], *, source: str, identity: str, sequence: str, split: str, place: str, sha256: str
+    picture: NDArray[np.uint8], *, source: str, identity: str, sequence: str, split: str, location: str, sha256: str
 ) -> Fingerprint:
-    """Of a picture RGB or grey, any size. `place` is how a message names it."""
+    """Of a picture RGB or grey, any size. `location` is how a message names it."""
     grey = picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
     small = cv2.resize(grey, (_THUMBNAIL_SIDE, _THUMBNAIL_SIDE), interpolation=cv2.INTER_AREA).astype(np.float32)
     centred = (small - small.mean()).ravel()
     thumbnail = centred / max(float(np.linalg.norm(centred)), 1e-6)
-    return Fingerprint(source, identity, sequence, split, place, sha256, perceptual_hash(small), thumbnail)
+    return Fingerprint(source, identity, sequence, split, location, sha256, perceptual_hash(small), thumbnail)
 
 
 def perceptual_hash(small: NDArray[np.float32]) -> int:
@@ -85,7 +93,7 @@ def find_leaks(pictures: Sequence[Fingerprint], near_bits: int = MAX_HASH_DISTAN
     """
     found: dict[tuple[str, str], Leak] = {}
     for leak in (*_find_shared_values(pictures), *_find_shared_views(pictures, near_bits)):
-        found.setdefault((leak.first.place, leak.second.place), leak)
+        found.setdefault((leak.first.location, leak.second.location), leak)
     return list(found.values())
 
 

@@ -1,4 +1,4 @@
-"""What a folder of prepared pictures says of itself: each file, its checksum, its split, its terms."""
+"""Manifest of a folder of prepared pictures: each file, its checksum and split, and the source's terms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MaSTr1325 in its official layout -> pictures and masks of three classes (R9 - R11).
+"""Prepare MaSTr1325 (Bovcon et al. 2019) from its official layout: pictures and masks of three classes (R9 - R11).
 
 ROOT/MaSTr1325_images_512x384/0001.jpg      or ROOT/images/
 ROOT/MaSTr1325_masks_512x384/0001m.png      or ROOT/masks/     0 obstacle, 1 water, 2 sky, 4 unknown
@@ -134,7 +134,7 @@ def prepare_mastr1325(
             provenance=f"official pictures and masks; split by {by}, seed {seed}",
             mask=TERMS.mask,
         )
-        return intake.close(terms, strict=by == "sequence")
+        return intake.write_manifest(terms, strict=by == "sequence")
 
 
 def _find_folder(root: Path, kind: str) -> Path:
@@ -151,6 +151,6 @@ def _read_pair(picture: Path, mask: Path) -> tuple[NDArray[np.uint8], Fingerprin
         raise UserError(f"{picture}: {rgb.shape[1]}x{rgb.shape[0]}, not {SIZE_WH[0]}x{SIZE_WH[1]}")
     codes = decode_mask(read_whole_file(mask), mask, CODES, SIZE_WH)
     seen = fingerprint_picture(
-        rgb, source="", identity=picture.stem, sequence="", split="", place=str(picture), sha256=sha256_hex(data)
+        rgb, source="", identity=picture.stem, sequence="", split="", location=str(picture), sha256=sha256_hex(data)
     )
     return codes, seen

@@ -1,4 +1,4 @@
-"""A training bundle: every picture at the size that the nets see, in one tar of bounded size.
+"""Pack a training bundle: every picture at the size of the networks' input, in one tar of bounded size.
 
 Unpacked, it is a data folder: `PAANI_DATA=FOLDER paani models train ...` gives the same splits as the folder it was
 packed from. The same input gives the same bytes.
@@ -78,7 +78,7 @@ def pack_bundle(
 ) -> PackedBundle:
     """Write `out`, a tar, gzipped where its name says so: pictures with all of their masks and labels, and weights.
 
-    Pictures shrink, aspect kept, until they just cover the nets' input, and share the best JPEG quality that fits.
+    Pictures shrink, aspect kept, until they just cover the networks' input, and share the best JPEG quality that fits.
     Raises UserError, leaving nothing behind, for an unreadable file, and where even the lowest quality does not fit.
     """
     folders = {source.folder: folder_of(source) for source in dict.fromkeys(s.source for s in samples)}
@@ -113,7 +113,7 @@ def pack_bundle(
 
 
 def shrink_to_cover(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Shrink, aspect kept, until the picture just covers the nets' input; never enlarge."""
+    """Shrink, aspect kept, until the picture just covers the networks' input; never enlarge."""
     wh = cover_size_wh((picture.shape[1], picture.shape[0]))
     if wh == (picture.shape[1], picture.shape[0]):
         return picture

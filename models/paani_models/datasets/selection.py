@@ -1,4 +1,4 @@
-"""Which annotated pictures a command works on, and on which side of the split each stands."""
+"""Select the annotated pictures that a command works on, by source and by side of the split."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class PictureSelection:
         """
         if held_out:
             return [s for s in self.samples if s.held_out and s.label]
-        kept = {s.picture for s in self.samples if s.held_out and s.label}
-        return [s for s in self.samples if not s.held_out and s.picture not in kept]
+        held_out_pictures = {s.picture for s in self.samples if s.held_out and s.label}
+        return [s for s in self.samples if not s.held_out and s.picture not in held_out_pictures]
 
     def training_samples(self) -> list[Sample]:
         """Every picture that no source holds out, once."""
-        kept = {s.picture for s in self.samples if s.held_out}
-        return list({s.picture: s for s in self.samples if s.picture not in kept}.values())
+        held_out_pictures = {s.picture for s in self.samples if s.held_out}
+        return list({s.picture: s for s in self.samples if s.picture not in held_out_pictures}.values())
 
     def unsegmented_samples(self) -> list[Sample]:
         """Training samples of the sources that have boxes and no masks, each picture once."""

@@ -36,9 +36,9 @@ class Source:
 
     masks: subfolder of three-class masks, "" if none. water_only: people marked only water, in WATER_MASKS, and that
     is what is scored. soft_edges: its masks leave a band between classes undecided, so edges are not scored.
-    annotated: detector classes whose every instance is boxed; only those may be punished on background. empty_of:
+    annotated: detector classes whose every instance is boxed; only for those may background be penalised. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
-    drawn: boxes are in ANNOTATIONS, and its sequences go past several places, so ten frame numbers count as one.
+    drawn: boxes are in ANNOTATIONS; its sequences pass several places, so ten consecutive frames count as one sequence.
     held_out: sequences for validation; empty means one in eight by name. twins: pictures
     that show what a picture of the other side shows; they are left out. splits: of a prepared public set, which name
     their split in the manifest, the splits that are read; all but "train" are held out.
@@ -207,7 +207,7 @@ def read_samples(data: Path, sources: Iterable[Source], rendered: Path | None = 
 
 @cache
 def list_pictures_without_water() -> frozenset[str]:
-    """Pictures that show no water, as looked at: paths below the data folder, of sources and of other folders."""
+    """List pictures that show no water, by hand: paths below the data folder, of sources and of other folders."""
     return frozenset(WITHOUT_WATER.read_text().split())
 
 
@@ -237,8 +237,8 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
                 continue
             label = None
         held_out = item.split != "train" if source.splits else is_held_out(source, sequence)
-        dry = f"{source.folder}/{item.file}" in list_pictures_without_water()
-        samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label, dry))
+        without_water = f"{source.folder}/{item.file}" in list_pictures_without_water()
+        samples.append(Sample(source, sequence, held_out, folder / item.file, mask, label, without_water))
     return samples
 
 

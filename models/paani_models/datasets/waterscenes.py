@@ -1,4 +1,4 @@
-"""WaterScenes in its official layout -> pictures and boxes of four classes (R1 - R8).
+"""Prepare WaterScenes (Yao et al. 2023) from its official layout: pictures and boxes of four classes (R1 - R8).
 
     ROOT/image/000001.jpg
     ROOT/detection/yolo/000001.txt      class cx cy width height
@@ -131,4 +131,4 @@ def prepare_waterscenes(
         places = [(split, identity) for split in SPLITS for identity in chosen[split]]
         for split, identity in tqdm(places, "pictures", unit="picture", mininterval=2.0):
             intake.add(images / f"{identity}.jpg", split=split, boxes=map_classes(boxes[identity]))
-        return intake.close(TERMS, strict=strict)
+        return intake.write_manifest(TERMS, strict=strict)

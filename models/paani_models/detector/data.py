@@ -1,4 +1,8 @@
-"""Training pictures of the detector: letterbox, mosaic, and the map of where each class may be exhaustive_mask."""
+"""Training pictures of the detector: letterbox, mosaic (Bochkovskiy et al. 2020), close-ups, and exhaustive masks.
+
+Ours: no source boxes every class. The exhaustive mask says for each class where everything of it is boxed, and only
+there may a background candidate be penalised for that class.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +19,19 @@ from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, Source, read
 from paani_models.network_input import PAD_GREY, letterbox_affine
 from paani_models.training.augment import GLARE_FRAC, Rng, add_glare, degrade_picture, jitter_colour
 
-LONG_SIDE_PX = 480
+LONG_SIDE_PX = 480  # to which larger pictures are shrunk in memory
 CELL_PX = 8  # the finest stride of the detector
-MIN_SIDE_PX = 3.0
-MIN_VISIBLE_FRAC = 0.35
-PSEUDO_PERSON_MIN_SCORE = 0.5
-SMALL_PX, SMALL_FRAC, CLOSE_UP_PX, CLOSE_UP_ZOOM = 12.0, 0.4, (5.0, 24.0), 4.0
+MIN_SIDE_PX = 3.0  # a box with a shorter side after the warp is dropped
+MIN_VISIBLE_FRAC = 0.35  # and one of which less remains in view
+PSEUDO_PERSON_MIN_SCORE = 0.5  # of persons that another detector boxed
+SMALL_PX, SMALL_FRAC = 12.0, 0.4  # shorter side of a small object; share of pictures that zoom in on one
+CLOSE_UP_PX, CLOSE_UP_ZOOM = (5.0, 24.0), 4.0  # shorter side that it is brought to; the largest zoom
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
 
 
 @dataclass(frozen=True)
 class BoxedPicture:
-    """RGB picture [H,W,3]; boxes float32 [n,5] (class, corners, normalised); judged uint8 [4] or [4,H,W]."""
+    """RGB picture [H,W,3]; boxes float32 [n,5] (class, corners, normalised); exhaustive_mask uint8 [4] or [4,H,W]."""
 
     source: str
     picture: NDArray[np.uint8]
@@ -36,7 +41,7 @@ class BoxedPicture:
 
 @dataclass(frozen=True)
 class TrainingExample:
-    """Net-sized: RGB [H,W,3], boxes float32 [n,5] (class, corners in pixels), judged bool [4, H/8, W/8]."""
+    """RGB [H,W,3], boxes float32 [n,5] (class, corners in pixels), exhaustive_mask bool [4, H/8, W/8]."""
 
     picture: NDArray[np.uint8]
     boxes: NDArray[np.float32]
@@ -44,7 +49,7 @@ class TrainingExample:
 
 
 def read_boxed(sample: Sample) -> BoxedPicture:
-    """Read a labelled picture, or one with only a mask, which tells where nothing is.
+    """Read a labelled picture, or one with only a mask, which says where nothing floats.
 
     Raises UserError naming an unreadable file.
     """
@@ -69,9 +74,10 @@ def read_boxed(sample: Sample) -> BoxedPicture:
 def exhaustive_mask_from_classes(
     source: Source, mask: NDArray[np.uint8], picture: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Where a picture without boxes is known to show nothing of a class: uint8 [4,H,W] of the picture's size.
+    """Build the exhaustive mask of a picture without boxes: uint8 [4,H,W] of its size, 1 where it shows no such class.
 
-    Nothing floats in water or sky, a little inside their edge; nor on the own hull; nor anywhere, of `source.empty_of`.
+    Nothing of any class is in water or sky, a little inside their edge, nor on the boat's own hull; nothing of the
+    classes in `source.empty_of` is anywhere.
     """
     size = (picture.shape[1], picture.shape[0])
     labels = np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
@@ -86,7 +92,7 @@ def exhaustive_mask_from_classes(
 
 
 def read_boxed_pictures(samples: list[Sample]) -> list[BoxedPicture]:
-    """Decode once and keep: 2,500 pictures take about 1 GB."""
+    """Read all samples into memory: 2,500 pictures take about 1 GB."""
     return [read_boxed(sample) for sample in tqdm(samples, desc="decoding", unit="picture", mininterval=2.0)]
 
 
@@ -100,7 +106,7 @@ def _pseudo_persons(sample: Sample) -> NDArray[np.float32]:
 
 
 def letterbox_example(item: BoxedPicture, target_wh: tuple[int, int]) -> TrainingExample:
-    """As the runtime sees it."""
+    """Letterbox a picture as perception does, without augmentation."""
     height, width = item.picture.shape[:2]
     return warp_example(item, letterbox_affine((width, height), target_wh), target_wh)
 
@@ -159,7 +165,7 @@ def random_letterbox_affine(
 
 
 def close_up_affine(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) -> F32 | None:
-    """Zoom in on one small object, so that its shorter side gets CLOSE_UP_PX pixels; None where none is small."""
+    """Zoom in on one small object so that its shorter side has CLOSE_UP_PX pixels; None where no object is small."""
     source = np.array(item.picture.shape[1::-1], np.float64)
     fit = float((target_wh / source).min())
     corners = item.boxes[:, 1:].reshape(-1, 2, 2) * source
@@ -179,7 +185,7 @@ def close_up_affine(rng: Rng, item: BoxedPicture, target_wh: tuple[int, int]) ->
 
 
 def augment_example(rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int]) -> TrainingExample:
-    """One training example: of one picture, or a two by two mosaic of four."""
+    """Augment one picture, or a two by two mosaic of four, into a training example."""
     if len(items) == 4:
         example = _mosaic(rng, items, target_wh)
     else:

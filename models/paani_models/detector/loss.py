@@ -1,8 +1,11 @@
-"""Detector loss: SimOTA assignment (Ge et al. 2021), GIoU, and joint scores judged only where the source annotates.
+"""Detector loss: SimOTA assignment (Ge et al. 2021, YOLOX), GIoU (Rezatofighi et al. 2019), joint cross-entropy.
+
+Ours: the score is objectness times class, trained towards the square root of the IoU, and background is penalised for
+a class only where the source boxes everything of it.
 
 Targets of one picture are boxes float32 [n,5] (class, x1, y1, x2, y2 in input pixels) and a map `judged`
 bool [4, H/8, W/8]: whether a stride-8 cell holds nothing unannotated of that class. A candidate without an object
-is punished for a class only where every cell under it is judged.
+is penalised for a class only where the mask holds for every cell under it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Average precision by the 101-point rule (U1, U2), and recall and false alarms at the board's threshold."""
+"""Average precision by COCO's 101-point rule (Lin et al.
+
+2014; U1, U2), and recall and precision at the board's threshold.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ NEAR_SIDE_PX = 16.0  # an object whose shorter side is at least this counts as n
 
 @dataclass(frozen=True)
 class Detections:
-    """What was found in one picture: corner boxes [n,4], scores [n], class ids [n]."""
+    """Detections in one picture: corner boxes [n,4], scores [n], class ids [n]."""
 
     boxes: F32
     scores: F32
@@ -31,7 +34,7 @@ class Detections:
 
 @dataclass(frozen=True)
 class ClassMatches:
-    """One class in one picture: what was found, best first, and which of it hits.
+    """Detections of one class in one picture, best score first, matched with the true boxes.
 
     hits: [10, n], by IOU_STEPS. near_found and near: true boxes of NEAR_SIDE_PX and more, found at CONFIDENCE and all.
     """
@@ -44,7 +47,7 @@ class ClassMatches:
 
 
 def decode_boxes(output: F32, confidence: float, limit: int = MAX_BOXES) -> Detections:
-    """One picture's net output [8,A] -> boxes in input pixels: finite, best class, class-agnostic NMS."""
+    """Decode one picture's output [8,A] into boxes in input pixels: finite, best class, class-agnostic NMS."""
     output = output[:, np.isfinite(output).all(0)]
     best = output[4:].argmax(0)
     score = output[4:].max(0, initial=0.0)
@@ -108,7 +111,7 @@ def average_precision(scores: F32, hits: Bools, positives: int) -> float:
 
 
 def match_class(found: Detections, truth: F32, kind: int) -> ClassMatches:
-    """One class of one picture. truth: [n,5], class and corners."""
+    """Match one class of one picture. truth: [n,5], class and corners."""
     mine = found.classes == kind
     boxes, scores = found.boxes[mine], found.scores[mine]
     order = np.argsort(-scores, kind="stable")

@@ -2,7 +2,7 @@
 2020), distribution focal loss (Li et al. 2020, GFL) and cross-entropy on the aligned scores.
 
 Targets as in `paani_models.detector.loss`: boxes float32 [n,5] (class, corners in input pixels) per picture, and a map
-of where a background candidate may be punished for a class.
+of where a background candidate may be penalised for a class.
 """
 
 from __future__ import annotations

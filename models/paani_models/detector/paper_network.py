@@ -1,4 +1,4 @@
-"""A detector of YOLO11n's published shape: 2,582,932 parameters once batch norm is folded (C12).
+"""The paper's detector: YOLO11n's published architecture, 2,582,932 parameters once batch norm is folded (C12).
 
 Written from the architecture's description, with no code or weights of its authors. Same contract as
 `paani_models.detector.shipped_network`: RGB 0..1 float32 [N,3,H,W] (H, W multiples of 32) -> float32 [N,8,A], rows
@@ -20,9 +20,9 @@ from paani_models.detector.shipped_network import cell_corners
 
 STRIDES = (8, 16, 32)
 FUSED_PARAMETERS = 2_582_932  # C12
-BINS = 16  # of the distribution over each distance, in strides
+BINS = 16  # of the distribution over each side's distance, one stride each (Li et al. 2020, GFL)
 HEAD_CHANNELS = 64
-SCORE_PRIOR = 0.01  # of an untrained net, so that background does not swamp the first steps
+SCORE_PRIOR = 0.01  # of an untrained network, so that background does not swamp the first steps
 
 
 class Conv(nn.Module):

@@ -1,4 +1,4 @@
-"""The exported detector on annotated pictures: what was found in each, beside what people boxed."""
+"""Score the exported detector on annotated pictures: its detections beside the boxes that people drew."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from paani_models.detector.metrics import CONFIDENCE, ClassMatches, Detections, 
 from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import SIZE_WH, detector_input
 
-SCORED_CONFIDENCE = 0.01  # a curve needs what lies below the board's threshold too
+SCORED_CONFIDENCE = 0.01  # lower than the board's threshold, as a precision-recall curve needs
 SCORED_BOXES = 100
 BACKGROUND = len(DETECTOR_CLASSES)  # last row and column of the confusion matrix
 
@@ -30,7 +30,7 @@ class ScoredBoxes:
     truth: NDArray[np.float32]
 
     def class_matches(self, kind: int) -> ClassMatches:
-        """One class of it."""
+        """Match the detections of one class."""
         return match_class(self.detections, self.truth, kind)
 
     @property
@@ -41,7 +41,7 @@ class ScoredBoxes:
 
 
 def score_boxes(net: Path, samples: Sequence[Sample]) -> list[ScoredBoxes]:
-    """Run the net over samples with boxes. Raises UserError naming a file that cannot be read."""
+    """Run the network over samples with boxes. Raises UserError naming a file that cannot be read."""
     run = open_network(net)
     scored = []
     for sample in tqdm(samples, "detector", unit="picture", mininterval=2.0):
@@ -56,7 +56,7 @@ def score_boxes(net: Path, samples: Sequence[Sample]) -> list[ScoredBoxes]:
 
 
 def count_false_alarms(net: Path, samples: Sequence[Sample]) -> list[int]:
-    """Per picture, boxes above CONFIDENCE of classes that its source does not show."""
+    """Count per picture the boxes above CONFIDENCE of classes that its source does not show."""
     run = open_network(net)
     alarms = []
     for sample in tqdm(samples, "false alarms", unit="picture", mininterval=2.0):
@@ -67,12 +67,13 @@ def count_false_alarms(net: Path, samples: Sequence[Sample]) -> list[int]:
 
 
 def select_annotated(scored: Sequence[ScoredBoxes], kind: int) -> list[ScoredBoxes]:
-    """Pictures whose source boxes every instance of a class."""
+    """Select the pictures whose source boxes every instance of a class."""
     return [item for item in scored if DETECTOR_CLASSES[kind] in item.sample.source.annotated]
 
 
 def confusion_counts(scored: Sequence[ScoredBoxes]) -> NDArray[np.int64]:
-    """At CONFIDENCE and IoU 0.5, whatever the class: int64 [5,5], rows truth, columns found; last: nothing.
+    """Confusion matrix at CONFIDENCE and IoU 0.5, whatever the class: int64 [5,5], rows truth, columns detections, last
+    background.
 
     Best score first, each box takes the free object that it overlaps most. Classes that a source does not annotate
     are left out of its pictures.

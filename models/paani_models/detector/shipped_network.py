@@ -1,4 +1,4 @@
-"""The detector: YOLOX-nano's shape (Ge et al. 2021) with batch norm folded away, four classes, joint scores.
+"""The shipped detector: YOLOX-nano (Ge et al. 2021) with batch norm folded away, four classes, joint scores.
 
 Input RGB 0..1 float32 [N,3,256,320]; output float32 [N,8,1680]: cx, cy, w, h in input pixels, then the scores
 of person, vessel, pier, buoy, each objectness times class, in 0..1 (C1, C2, C4). Candidates run over

@@ -45,7 +45,7 @@ DRAWS_PER_EPOCH = {
     "oasis": 40,
     "rendered": 700,
 }
-NULL_DRAWS = 60
+NULL_DRAWS = 60  # pictures per epoch that show nothing
 
 Batch = tuple[Tensor, list[Tensor], Tensor]
 
@@ -92,23 +92,23 @@ class DetectorTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model = model
-        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
+        self.state = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
         recipe = asdict(self.recipe)
-        self.progress.resume(self.folder, recipe)
-        while self.progress.epoch < (self.recipe.epochs if until is None else until):
+        self.state.resume(self.folder, recipe)
+        while self.state.epoch < (self.recipe.epochs if until is None else until):
             box_loss, score_loss = self._train_epoch()
-            figures = figures_by_class(self.progress.average.model, self.held_out)
+            figures = figures_by_class(self.state.average.model, self.held_out)
             losses = {"box_loss": box_loss, "score_loss": score_loss}
-            record = {"epoch": self.progress.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
+            record = {"epoch": self.state.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
             append_record(self.folder / "epochs.jsonl", record)
             ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
-            self.progress.finish_epoch(self.folder, recipe, float(np.mean(ap50)) if ap50 else 0.0)
+            self.state.finish_epoch(self.folder, recipe, float(np.mean(ap50)) if ap50 else 0.0)
 
     def _train_epoch(self) -> tuple[float, float]:
-        recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
+        recipe, state, epoch = self.recipe, self.state, self.state.epoch
         order = draw_epoch(self.train, recipe, epoch)
         steps = len(order) // recipe.batch
         total = steps * recipe.epochs
@@ -123,8 +123,8 @@ class DetectorTraining:
             boxes, logits = self.model.raw(to_device(pictures))
             known = [truth.to(training_device()) for truth in truths]
             box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
-            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps)
-            progress.update(box_loss + score_loss, rate, clip_norm=10.0)
+            rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps)
+            state.update(box_loss + score_loss, rate, clip_norm=10.0)
             losses.append((box_loss.item(), score_loss.item()))
         box_mean, score_mean = np.mean(losses, 0)
         return round(float(box_mean), 4), round(float(score_mean), 4)

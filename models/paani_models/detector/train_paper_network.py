@@ -69,38 +69,38 @@ class Yolo11nTraining:
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model = model
-        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
-        self.progress.optimiser = torch.optim.AdamW(
+        self.state = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
+        self.state.optimiser = torch.optim.AdamW(
             _parameter_groups(model, recipe), recipe.peak_rate, betas=(recipe.momentum, 0.999)
         )
 
     def run(self, until: int | None = None) -> None:
         """Train to the end, to epoch `until`, or until the figures no longer rise; Ctrl-C loses no finished epoch."""
         recipe = asdict(self.recipe)
-        self.progress.resume(self.folder, recipe)
+        self.state.resume(self.folder, recipe)
         last = self.recipe.epochs if until is None else until
-        while self.progress.epoch < last and self._since_best() < self.recipe.patience:
+        while self.state.epoch < last and self._since_best() < self.recipe.patience:
             losses = self._train_epoch()
-            figures = figures_by_class(self.progress.average.model, self.held_out)
+            figures = figures_by_class(self.state.average.model, self.held_out)
             ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
             score = round(float(np.mean(ap50)), 4) if ap50 else 0.0
-            row = {"epoch": self.progress.epoch + 1, "score": score, **losses, **figures}
+            row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
             append_record(self._records(), row)
-            self.progress.finish_epoch(self.folder, recipe, score)
+            self.state.finish_epoch(self.folder, recipe, score)
 
     def _records(self) -> Path:
         return self.folder / "epochs.jsonl"
 
     def _since_best(self) -> int:
         """Finished epochs since the first of the best."""
-        if self.progress.epoch == 0:
+        if self.state.epoch == 0:
             return 0
         rows = [msgspec.json.decode(line, type=_Row) for line in self._records().read_bytes().splitlines()]
-        scores = {row.epoch: row.score for row in rows if row.epoch <= self.progress.epoch}
-        return self.progress.epoch - max(scores, key=lambda epoch: (scores[epoch], -epoch))
+        scores = {row.epoch: row.score for row in rows if row.epoch <= self.state.epoch}
+        return self.state.epoch - max(scores, key=lambda epoch: (scores[epoch], -epoch))
 
     def _train_epoch(self) -> dict[str, float]:
-        recipe, epoch = self.recipe, self.progress.epoch
+        recipe, epoch = self.recipe, self.state.epoch
         order = np.random.default_rng((recipe.seed, epoch)).permutation(len(self.train)).tolist()
         steps = max(1, len(order) // recipe.batch)
         warmup_steps = max(1, round(recipe.warmup_epochs * steps))
@@ -121,22 +121,22 @@ class Yolo11nTraining:
 
     def _update(self, loss: Tensor, is_last: bool, total_steps: int, warmup_steps: int) -> None:
         """Add gradients up; step when about `nominal_batch` pictures are in, more often while warming up."""
-        recipe, progress = self.recipe, self.progress
-        warm = min(1.0, progress.step / warmup_steps)
-        rate = learning_rate(recipe.peak_rate, progress.step, total_steps, warmup_steps)
-        for group in progress.optimiser.param_groups:
+        recipe, state = self.recipe, self.state
+        warm = min(1.0, state.step / warmup_steps)
+        rate = learning_rate(recipe.peak_rate, state.step, total_steps, warmup_steps)
+        for group in state.optimiser.param_groups:
             bias = group["kind"] == "bias"
             group["lr"] = (1.0 - warm) * recipe.warmup_bias_rate + warm * rate if bias else rate
             group["betas"] = (recipe.warmup_momentum + warm * (recipe.momentum - recipe.warmup_momentum), 0.999)
         every = max(1, round(1.0 + warm * (recipe.nominal_batch / recipe.batch - 1.0)))
         torch.autograd.backward(loss)
-        progress.step += 1
-        if progress.step % every and not is_last:
+        state.step += 1
+        if state.step % every and not is_last:
             return
         nn.utils.clip_grad_norm_(self.model.parameters(), 10.0)
-        progress.optimiser.step()
-        progress.optimiser.zero_grad(set_to_none=True)
-        progress.average.update(self.model)
+        state.optimiser.step()
+        state.optimiser.zero_grad(set_to_none=True)
+        state.average.update(self.model)
 
     def _batch(self, order: list[int], index: int, seed: tuple[int, int]) -> Batch:
         slots = range(index * self.recipe.batch, (index + 1) * self.recipe.batch)
@@ -150,7 +150,7 @@ class Yolo11nTraining:
     def _example(self, rng: np.random.Generator, order: list[int], slot: int) -> TrainingExample:
         recipe = self.recipe
         chosen = [order[slot % len(order)]]
-        late = self.progress.epoch >= recipe.epochs - recipe.plain_epochs
+        late = self.state.epoch >= recipe.epochs - recipe.plain_epochs
         if not late and rng.random() < recipe.augmentation.mosaic_frac:
             chosen += [order[int(i)] for i in rng.integers(len(order), size=3)]
         pictures = [self.train[i] for i in chosen]

@@ -1,4 +1,4 @@
-"""Which engine is faster on this machine: both nets by every engine and number of threads, run in turn."""
+"""Time both networks by every engine and number of threads, in turn, and choose the faster engine for this machine."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class NetworkFile(NamedTuple):
 
 
 class Case(NamedTuple):
-    """One net, run one way."""
+    """One network, run one way."""
 
     engine: str
     net: str
@@ -39,7 +39,7 @@ class Case(NamedTuple):
 
 
 class TimingRow(msgspec.Struct, frozen=True):
-    """Least, median and 95th percentile (nearest rank) of `n` runs of one net, [ms]."""
+    """Least, median and 95th percentile (nearest rank) of `n` runs of one network, [ms]."""
 
     engine: str
     net: str
@@ -51,7 +51,10 @@ class TimingRow(msgspec.Struct, frozen=True):
 
 
 class NetCost(msgspec.Struct, frozen=True):
-    """What a net weighs, and costs per frame. multiply_adds: None where onnx, which tells them, is not installed."""
+    """What a network weighs, and costs per frame.
+
+    multiply_adds: None where onnx, which tells them, is not installed.
+    """
 
     net: str
     onnx_bytes: int
@@ -90,7 +93,7 @@ class EngineReport(msgspec.Struct, frozen=True):
 
 
 def load_networks(weights: Path) -> dict[str, NetworkFile]:
-    """Both nets of a weights folder. Raises UserError naming a file that is missing or corrupt."""
+    """Both networks of a weights folder. Raises UserError naming a file that is missing or corrupt."""
     return {
         role: NetworkFile(load_catalogue(weights)[role], verified_path(role, weights)) for role in PAPER_MULTIPLY_ADDS
     }
@@ -99,7 +102,7 @@ def load_networks(weights: Path) -> dict[str, NetworkFile]:
 def prepare_cases(
     nets: Mapping[str, NetworkFile], engines: Sequence[str], threads: Sequence[int]
 ) -> dict[Case, Callable[[], object]]:
-    """Each net ready to run on a drawn scene. Raises UserError for an engine or a file that cannot be used."""
+    """Each network ready to run on a drawn scene. Raises UserError for an engine or a file that cannot be used."""
     return {
         Case(engine, role, count): _bind_input(net, open_ncnn(verified_ncnn_files(net.file), count))
         if engine == "ncnn"
@@ -119,21 +122,21 @@ def measure_rounds(
     ready: Mapping[Case, Callable[[], object]], rounds: int, stopwatch_ms: Callable[[], float]
 ) -> Iterator[tuple[int, dict[Case, list[float]]]]:
     """Run all cases in turn; yields the round and all times so far, [ms]. A few rounds warm up."""
-    taken: dict[Case, list[float]] = {case: [] for case in ready}
+    times_ms: dict[Case, list[float]] = {case: [] for case in ready}
     for turn in range(-WARM_ROUNDS, rounds):
         for case, run in ready.items():
             start_ms = stopwatch_ms()
             run()
             if turn >= 0:
-                taken[case].append(stopwatch_ms() - start_ms)
-        yield turn + 1, taken
+                times_ms[case].append(stopwatch_ms() - start_ms)
+        yield turn + 1, times_ms
 
 
-def summarise_times(taken: Mapping[Case, list[float]]) -> tuple[TimingRow, ...]:
-    """In the order of the cases."""
+def summarise_times(times_ms: Mapping[Case, list[float]]) -> tuple[TimingRow, ...]:
+    """Least, median and 95th percentile of each case, in the order of the cases."""
     return tuple(
         TimingRow(*case, round(min(t), 3), round(median(t), 3), round(nearest_rank(t, 95), 3), len(t))
-        for case, t in taken.items()
+        for case, t in times_ms.items()
         if t
     )
 
@@ -141,7 +144,8 @@ def summarise_times(taken: Mapping[Case, list[float]]) -> tuple[TimingRow, ...]:
 def choose_engine(found: Sequence[TimingRow], agreements: Sequence[Agreement], max_difference: float) -> Choice:
     """The engine whose fastest number of threads runs the pair in the least time, by medians.
 
-    ncnn only where it answers as onnxruntime does, and ran every net that onnxruntime ran; onnxruntime where they draw.
+    ncnn only where it answers as onnxruntime does, and ran every network that onnxruntime ran; onnxruntime where they
+    draw.
     """
     for agreement in agreements:
         if not agreement.max_difference <= max_difference:
@@ -155,8 +159,8 @@ def choose_engine(found: Sequence[TimingRow], agreements: Sequence[Agreement], m
             best[engine] = min(best.get(engine, sum(took.values())), sum(took.values()))
     if set(best) != set(ENGINES):
         return Choice("onnxruntime", "the default; nothing was compared")
-    ours, other = sorted(ENGINES, key=lambda engine: best[engine])
-    return Choice(ours, f"the pair takes {best[ours]:.1f} ms, by {other} {best[other]:.1f} ms: medians")
+    fastest, other = sorted(ENGINES, key=lambda engine: best[engine])
+    return Choice(fastest, f"the pair takes {best[fastest]:.1f} ms, by {other} {best[other]:.1f} ms: medians")
 
 
 def measure_costs(nets: Mapping[str, NetworkFile]) -> tuple[NetCost, ...]:
@@ -185,7 +189,7 @@ def measure_agreements(nets: Mapping[str, NetworkFile], inputs: Mapping[str, Inp
 
 
 def format_report(report: EngineReport) -> str:
-    """Two tables, and what follows from them."""
+    """Format the report as two tables and the choice."""
     lines = [
         f"{'engine':12} {'net':10} {'threads':>7} {'least [ms]':>11} {'median [ms]':>12} {'p95 [ms]':>10} {'n':>5}"
     ]

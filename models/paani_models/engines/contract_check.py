@@ -1,4 +1,4 @@
-"""What a user's model file lacks to be run here: shapes, classes, ranges, repeatability, behaviour on nothing."""
+"""Check a user's model file against its contract: shapes, classes, ranges, repeatability, and null pictures."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _check_segmenter_scores(outputs: dict[str, F32], contract: Model) -> Iterato
 
 
 def _image_quality_note(level: str) -> str:
-    return "" if level == "ok" else ": only the gate then stands between this picture and motion"
+    return "" if level == "ok" else ": only the image-quality check then stands between this picture and motion"
 
 
 def _check_detector_output(outputs: dict[str, F32], contract: Model) -> Iterator[Finding]:
@@ -136,16 +136,16 @@ def _check_detector_output(outputs: dict[str, F32], contract: Model) -> Iterator
 
 
 def largest_output_difference(one: F32, other: F32, role: str, contract: Model) -> float:
-    """The largest difference of two answers; of a detector's boxes in shares of the input's sides."""
-    apart = np.abs(one - other)
+    """Largest absolute difference of two outputs; a detector's boxes count as fractions of the input's sides."""
+    differences = np.abs(one - other)
     if role == "detector":
         height, width = contract.size_hw
-        apart[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
-    return float(apart.max())
+        differences[:, :4] /= np.array([width, height, width, height], np.float32)[:, None]
+    return float(differences.max())
 
 
 def synthetic_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
-    """Drawn pictures as net inputs: nothing in three forms, and a simple river."""
+    """Synthetic pictures as network inputs: black, white, noise, and a simple river."""
     height, width = contract.size_hw
     rng = np.random.default_rng(0)
     river = np.full((height, width, 3), (200, 190, 180), np.uint8)
@@ -162,7 +162,7 @@ def synthetic_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
 
 
 def to_network_input(picture: NDArray[np.uint8], contract: Model) -> F32 | NDArray[np.uint8]:
-    """A net-sized RGB picture [H,W,3] as the net takes it."""
+    """A network-sized RGB picture [H,W,3] as the network takes it."""
     if contract.input.dtype == "uint8":
         return picture[None]
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))

@@ -1,6 +1,6 @@
-"""A net without a last step that only resizes its answer. Works on the file's bytes, as the board has no onnx.
+"""Drop a last node that only resizes the output. Works on the file's bytes, as the board has no onnx package.
 
-A protocol buffer is a row of fields, each with its number before it; the numbers here are those of onnx.proto.
+A protocol buffer is a sequence of fields, each preceded by its number; the numbers here are those of onnx.proto.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 _GRAPH = 7  # of a model
 _NODE, _OUTPUT = 1, 12  # of a graph
-_TAKES, _GIVES, _KIND, _ATTRIBUTE = 1, 2, 4, 5  # of a node
+_INPUT_NAME, _OUTPUT_NAME, _OP_TYPE, _ATTRIBUTE = 1, 2, 4, 5  # of a node
 _NAME, _TEXT = 1, 4  # of an attribute; a value begins with its name as well
 _FLOAT32 = b"\x12\x04\x0a\x02\x08\x01"  # a value's type: a tensor of float32, its shape for the reader to infer
 _VARINT, _EIGHT_BYTES, _LENGTH_FIRST, _FOUR_BYTES = 0, 1, 2, 5
@@ -23,10 +23,10 @@ class _Field(NamedTuple):
 
 
 def drop_last_resize(model: bytes) -> bytes | None:
-    """The net that answers what its last step would have resized; None where the last step is no such resize.
+    """The network that answers what its last step would have resized; None where the last step is no such resize.
 
-    That is one to the nearest or linear, which leaves the middles of the cells where they are; one that keeps the
-    corners in place does not. Bytes that are no ONNX model have no such step.
+    A nearest or linear resize qualifies, as it leaves the cells' centres in place; one that aligns corners does not.
+    None also for bytes that are no ONNX model.
     """
     try:
         return _drop_last_resize(model)
@@ -38,17 +38,17 @@ def _drop_last_resize(model: bytes) -> bytes | None:
     outer = list(_read_fields(memoryview(model)))
     graph = [field for part in outer if part.number == _GRAPH for field in _read_fields(part.content)]
     answers = [_first_content(field.content, _NAME) for field in graph if field.number == _OUTPUT]
-    last = next((f for f in graph if f.number == _NODE and _first_content(f.content, _GIVES) in answers), None)
+    last = next((f for f in graph if f.number == _NODE and _first_content(f.content, _OUTPUT_NAME) in answers), None)
     if len(answers) != 1 or last is None or not _is_plain_resize(last.content):
         return None
-    answer = _encode_field(_NAME, _first_content(last.content, _TAKES)) + _FLOAT32
+    answer = _encode_field(_NAME, _first_content(last.content, _INPUT_NAME)) + _FLOAT32
     kept = [field.whole for field in graph if field is not last and field.number != _OUTPUT]
     rest = [part.whole for part in outer if part.number != _GRAPH]
     return b"".join((*rest, _encode_field(_GRAPH, b"".join((*kept, _encode_field(_OUTPUT, answer))))))
 
 
 def _is_plain_resize(node: memoryview) -> bool:
-    if _first_content(node, _KIND) != b"Resize":
+    if _first_content(node, _OP_TYPE) != b"Resize":
         return False
     settings = {
         _first_content(field.content, _NAME): _first_content(field.content, _TEXT)

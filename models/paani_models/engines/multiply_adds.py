@@ -1,4 +1,4 @@
-"""How much arithmetic a net costs, read from its graph."""
+"""Count the multiply-adds of a network from its ONNX graph."""
 
 from __future__ import annotations
 

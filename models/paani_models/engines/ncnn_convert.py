@@ -1,4 +1,4 @@
-"""ONNX -> ncnn by pnnx, and whether both give the same answers. Runs on the host: it needs onnx, ncnn and pnnx."""
+"""Convert ONNX to ncnn by pnnx, and check that both give the same outputs. Host only: needs onnx, ncnn and pnnx."""
 
 from __future__ import annotations
 
@@ -40,36 +40,40 @@ def convert_to_ncnn(source: Path, role: str, folder: Path, pnnx: Path | None, in
     if contract.input.dtype != "float32":
         raise UserError(f"{source}: takes {contract.input.dtype}; ncnn gets the float32 model that it was made from")
     with tempfile.TemporaryDirectory() as scratch:
-        made = _run_pnnx(program, source, contract, Path(scratch))
-        diff = measure_difference(source, made, role, contract, inputs)
+        produced = _run_pnnx(program, source, contract, Path(scratch))
+        diff = measure_difference(source, produced, role, contract, inputs)
         if not diff <= MAX_DIFFERENCE:
             raise UserError(f"{source}: ncnn's answers differ by {diff:.1e} (at most {MAX_DIFFERENCE:.0e})")
         record = Conversion(
             source_sha256=file_sha256(source),
-            param_sha256=file_sha256(made.param),
-            bin_sha256=file_sha256(made.bin),
+            param_sha256=file_sha256(produced.param),
+            bin_sha256=file_sha256(produced.bin),
             max_difference=diff,
             inputs=len(inputs),
         )
-        made.record.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
+        produced.record.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
         try:
-            _install_files(source, msgspec.structs.replace(contract, name=role, file=source.name), made, folder)
+            _install_files(source, msgspec.structs.replace(contract, name=role, file=source.name), produced, folder)
         except OSError as error:
             raise UserError(f"{folder}: {error.strerror}") from error
     return record
 
 
-def _install_files(source: Path, entry: Model, made: NcnnFiles, folder: Path) -> None:
-    """The record last: without it the files are not used."""
+def _install_files(source: Path, entry: Model, produced: NcnnFiles, folder: Path) -> None:
+    """Copy the files into place, the record last: without it the files are not used."""
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / source.name
-    wanted = ncnn_files(target)
+    targets = ncnn_files(target)
     if target.resolve() != source.resolve():
         _copy_whole(source, target)
         known = load_catalogue(folder) if (folder / MANIFEST).exists() else {}
         entry = msgspec.structs.replace(entry, sha256=file_sha256(target), size_bytes=target.stat().st_size)
         save_catalogue({**known, entry.name: entry}, folder)
-    for have, place in ((made.param, wanted.param), (made.bin, wanted.bin), (made.record, wanted.record)):
+    for have, place in (
+        (produced.param, targets.param),
+        (produced.bin, targets.bin),
+        (produced.record, targets.record),
+    ):
         _copy_whole(have, place)
 
 
@@ -80,7 +84,7 @@ def _copy_whole(have: Path, place: Path) -> None:
 
 
 def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> NcnnFiles:
-    """pnnx litters, so it works in a folder of its own."""
+    """Run pnnx in a folder of its own, as it leaves files behind."""
     try:
         model = onnx.load(str(source))
     except Exception as error:
@@ -95,14 +99,14 @@ def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> Ncn
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise UserError(f"{program}: {error}") from error
-    made = ncnn_files(net)
-    if done.returncode != 0 or not (made.param.is_file() and made.bin.is_file()):
+    produced = ncnn_files(net)
+    if done.returncode != 0 or not (produced.param.is_file() and produced.bin.is_file()):
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         raise UserError(f"{program}: failed on {source.name}: {said[-1].strip() if said else 'without a word'}")
-    unknown = find_untranslated_layers(made.param.read_text(encoding="utf-8"))
+    unknown = find_untranslated_layers(produced.param.read_text(encoding="utf-8"))
     if unknown:
         raise UserError(f"{source}: ncnn has no {', '.join(unknown)}")
-    return made
+    return produced
 
 
 def find_untranslated_layers(param: str) -> list[str]:
@@ -112,7 +116,8 @@ def find_untranslated_layers(param: str) -> list[str]:
 
 
 def replace_strided_slices(model: onnx.ModelProto) -> onnx.ModelProto:
-    """The same net with every "each second row and column, side by side" as one convolution: ncnn slices without steps.
+    """The same network with every "each second row and column, side by side" as one convolution: ncnn slices without
+    steps.
 
     Exact: each weight is 0 or 1. Changes and returns the model.
     """
@@ -166,9 +171,9 @@ def _read_strided_slice(
 
 
 def _drop_unused_nodes(graph: onnx.GraphProto) -> None:
-    wanted = {value.name for value in graph.output}
+    used_names = {value.name for value in graph.output}
     for node in reversed(list(graph.node)):
-        if wanted.isdisjoint(node.output):
+        if used_names.isdisjoint(node.output):
             graph.node.remove(node)
         else:
-            wanted.update(node.input)
+            used_names.update(node.input)

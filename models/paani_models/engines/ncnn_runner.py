@@ -1,4 +1,4 @@
-"""Run a net that was converted for ncnn: the one place that imports ncnn, and what stands beside the files it runs.
+"""Run a network by ncnn (the only importer of it), and verify the converted files beside the model.
 
 `NET.onnx` has `NET.ncnn.param`, `NET.ncnn.bin` and `NET.ncnn.json` beside it; `paani models convert` writes them.
 """

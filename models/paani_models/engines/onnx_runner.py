@@ -1,4 +1,4 @@
-"""Run an exported net for checks and figures: the one place here that imports onnxruntime."""
+"""Run an exported network by onnxruntime for checks and figures: the only importer of it among the models."""
 
 from __future__ import annotations
 

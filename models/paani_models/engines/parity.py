@@ -1,4 +1,4 @@
-"""Do onnxruntime and ncnn give the same answers?"""
+"""Parity of the engines: how far the outputs of onnxruntime and ncnn differ."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HELD_OUT_PICTURES = 8
 def prepare_inputs(contract: Model, pictures: Sequence[Path]) -> Inputs:
     """Drawn pictures, and some of the given ones, evenly, as inputs of a float32 net.
 
-    They fill the input whatever the net's rule for resizing: both engines get the same. Raises UserError naming a
+    They fill the input whatever the network's rule for resizing: both engines get the same. Raises UserError naming a
     picture that cannot be read.
     """
     height, width = contract.size_hw

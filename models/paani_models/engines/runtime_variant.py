@@ -1,8 +1,8 @@
-"""The same net with less around it: picture in as bytes, scores out once per cell.
+"""Write a variant of a network that takes the picture as bytes and gives scores once per cell of 4x4 pixels.
 
 The float32 contract costs a look-up per pixel before each run, and the segmenter's last step makes sixteen scores of
 each. A variant takes RGB bytes [1,H,W,3], scales them itself, and leaves that last step out, as perception does. Its
-answers are the shipped net's to rounding; a manifest beside it states what it takes and gives.
+answers are the shipped network's to rounding; a manifest beside it states what it takes and gives.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def write_variant(name: str, contract: Model, net: Path, folder: Path) -> Model:
 
 
 def _accept_bytes(model: onnx.ModelProto, contract: Model) -> None:
-    """RGB bytes [1,H,W,3] -> what the net took."""
+    """RGB bytes [1,H,W,3] -> what the network took."""
     graph = model.graph
     taken = graph.input[0].name
     _, channels, height, width = contract.input.shape

@@ -1,1 +1,1 @@
-"""The network that says whether a picture is fit to be evidence: its shape, data and training."""
+"""The image-quality network, which estimates whether a picture is fit to be evidence: architecture, data, training."""

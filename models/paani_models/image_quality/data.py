@@ -1,4 +1,8 @@
-"""Pictures for the gate: scenes to spoil, and what each fault does to the segmenter on them."""
+"""Training pictures of the image-quality network, and the segmenter's error on each fault, which is its target.
+
+The target of a corrupted picture is not labelled by hand: the segmenter's mean IoU on every fault and severity is
+measured, and mapped linearly from MUST_REJECT..MUST_ACCEPT to 0..1.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +23,16 @@ from paani_models.training.augment import OBSTACLE
 
 Segment = Callable[[U8], U8]  # BGR uint8 [240,320,3] -> classes uint8 [240,320]
 MIDDLE_WH = (320, 240)
-TRAINING_MIOU_BIAS = 0.05  # the segmenter was trained on these pictures: on others its mIoU is lower
-PREDICTED_WATER_MARGIN_PX = 9  # around water that the segmenter found, what is above it may be water too
-# Whole sequences are not trained on and choose the threshold: of each source this share, and never more than so much.
+TRAINING_MIOU_BIAS = (
+    0.05  # mIoU by which the segmenter scores better on these pictures, which trained it, than on others
+)
+PREDICTED_WATER_MARGIN_PX = 9  # side of the square by which predicted water grows, as its edge is uncertain
+# Share of each source's pictures whose sequences are kept for validation, and the most that it may become.
 VALIDATION_FRAC, MAX_VALIDATION_FRAC = 0.1, 0.2
 
 
 class FaultLevel(msgspec.Struct, frozen=True):
-    """One fault in one severity: the segmenter's mIoU on it over n pictures."""
+    """One fault at one severity, and the mean IoU that the segmenter reaches on it over n pictures."""
 
     fault: str
     severity: int
@@ -35,58 +41,61 @@ class FaultLevel(msgspec.Struct, frozen=True):
 
     @property
     def target(self) -> float:
-        """What the net should say: 0 and 1 where the verdict is settled, and in between what lies in between."""
+        """Fitness that the network should estimate: 0 below MUST_REJECT, 1 above MUST_ACCEPT, linear in between."""
         return float(np.clip((self.miou - TRAINING_MIOU_BIAS - MUST_REJECT) / (MUST_ACCEPT - MUST_REJECT), 0.0, 1.0))
 
 
 class Scene(msgspec.Struct, frozen=True):
-    """A picture that is fit as it is, or dry: without water, never fit.
+    """A picture that is fit as it is; or, without water, never fit.
 
-    picture: BGR uint8 [240,320,3]. mask: classes uint8 [240,320]. drawn: the classes are people's. checked: it is not
-    trained on.
+    picture: BGR uint8 [240,320,3]. mask: classes uint8 [240,320]. is_hand_drawn: people drew the mask. is_validation:
+    it chooses the threshold and is not trained on.
     """
 
     picture: U8
     mask: U8
-    drawn: bool
-    validation: bool
-    without_water: bool = False
+    is_hand_drawn: bool
+    is_validation: bool
+    is_without_water: bool = False
 
 
 def read_scenes(samples: Sequence[Sample], segment: Segment) -> list[Scene]:
-    """Samples at the gate's size, without rendered ones on which the segmenter fails.
+    """Read samples at 320x240. Rendered pictures on which the segmenter fails are left out.
 
-    What nobody segmented has the segmenter's own mask. Raises UserError naming an unreadable file.
+    A picture that nobody segmented gets the segmenter's own mask. Raises UserError naming an unreadable file.
     """
-    found = []
-    held_back = choose_validation_sequences(samples)
+    scenes = []
+    validation_sequences = choose_validation_sequences(samples)
     for sample in tqdm(samples, desc="reading", unit="picture"):
         picture = resize_bgr(read_picture(sample.picture))
-        rendered = sample.source.name == RENDERED
+        is_rendered = sample.source.name == RENDERED
         if sample.without_water:
             mask = np.full(picture.shape[:2], OBSTACLE, np.uint8)
         elif sample.mask is None:
             mask = _widen_predicted_water(segment(picture))
         else:
             mask = np.asarray(cv2.resize(read_mask(sample.mask), MIDDLE_WH, interpolation=cv2.INTER_NEAREST), np.uint8)
-            if rendered and mean_iou(segment(picture), mask) <= MUST_ACCEPT:
+            if is_rendered and mean_iou(segment(picture), mask) <= MUST_ACCEPT:
                 continue
-        checked = (sample.source.name, sample.sequence) in held_back
-        drawn = sample.mask is not None and not rendered
-        found.append(Scene(picture, mask, drawn, checked, sample.without_water))
-    return found
+        is_validation = (sample.source.name, sample.sequence) in validation_sequences
+        is_hand_drawn = sample.mask is not None and not is_rendered
+        scenes.append(Scene(picture, mask, is_hand_drawn, is_validation, sample.without_water))
+    return scenes
 
 
 def choose_validation_sequences(samples: Sequence[Sample]) -> set[tuple[str, str]]:
-    """Source and name of the sequences that are not trained on; none of a source whose sequences are all too long."""
+    """Choose the validation sequences, as (source, name): none of a source whose sequences are all too long."""
     lengths = Counter((sample.source.name, sample.sequence) for sample in samples)
     totals = Counter(sample.source.name for sample in samples)
-    taken: Counter[str] = Counter()
+    taken_counts: Counter[str] = Counter()
     chosen = set()
     for source, sequence in sorted(lengths, key=lambda pair: zlib.crc32("gate {} {}".format(*pair).encode())):
-        grown = taken[source] + lengths[source, sequence]
-        if taken[source] < VALIDATION_FRAC * totals[source] and grown <= MAX_VALIDATION_FRAC * totals[source]:
-            taken[source] = grown
+        new_count = taken_counts[source] + lengths[source, sequence]
+        if (
+            taken_counts[source] < VALIDATION_FRAC * totals[source]
+            and new_count <= MAX_VALIDATION_FRAC * totals[source]
+        ):
+            taken_counts[source] = new_count
             chosen.add((source, sequence))
     return chosen
 

@@ -1,4 +1,7 @@
-"""What the gate's training shows: every epoch draws its pictures anew from the scenes and the faults."""
+"""Training examples of the image-quality network: every epoch corrupts the scenes anew, by faults drawn at random.
+
+Faults are drawn in proportion to the network's recent error on them (hard example mining).
+"""
 
 from __future__ import annotations
 
@@ -15,51 +18,54 @@ from paani_models.image_quality.data import MIDDLE_WH, FaultLevel, Scene
 from paani_models.image_quality.network import INPUT_HEIGHT_PX, INPUT_WIDTH_PX
 from paani_models.training.augment import crop_land
 
-CLEAN, DRY = -1, -2  # beside the numbers of cells
-CROPPED_FRAC, MIN_CROP_FRAC, MIN_VIEW_FRAC = 0.6, 0.8, 0.5
+CLEAN, WITHOUT_WATER = -1, -2  # in place of the index of a fault level
+CROPPED_FRAC, MIN_CROP_FRAC = 0.6, 0.8  # share of scenes that are cropped, and the least that a crop keeps of each side
+MIN_VIEW_FRAC = 0.5  # the least that a crop of a view without water keeps of each side
 Rng = np.random.Generator
 
 
 class FitnessExample(NamedTuple):
-    """Net input uint8 [3,120,160], what the net should say of it, and what it shows: a cell's number, CLEAN or DRY."""
+    """Network input uint8 [3,120,160], target fitness, and content: a fault level's index, CLEAN or WITHOUT_WATER."""
 
     picture: U8
     target: float
-    shown: int
+    content: int
 
 
 def draw_epoch_plan(count: int, weights: NDArray[np.float64], per_scene: int, rng: Rng) -> NDArray[np.int64]:
-    """What one epoch shows of `count` scenes, shuffled: int64 [N,2], scene and cell.
+    """Draw the content of one epoch of `count` scenes, shuffled: int64 [N,2], scene index and content.
 
-    Each scene once as it is, once without water, and in `per_scene` cells, drawn by their weights.
+    Each scene is content once as it is, once in a view without water, and with `per_scene` faults, drawn by weight.
     """
     rows = []
     for index in range(count):
         drawn = rng.choice(len(weights), per_scene, replace=False, p=weights / weights.sum())
-        rows += [(index, CLEAN), (index, DRY), *((index, int(cell)) for cell in drawn)]
+        rows += [(index, CLEAN), (index, WITHOUT_WATER), *((index, int(level)) for level in drawn)]
     return rng.permutation(np.array(rows, np.int64))
 
 
-def draw_example(scene: Scene, shown: int, cells: Sequence[FaultLevel], rng: Rng, vary: bool = True) -> FitnessExample:
-    """One picture. A scene without any dry view shows a fault instead. vary: mirrored, cropped, brighter or darker.
+def draw_example(
+    scene: Scene, content: int, levels: Sequence[FaultLevel], rng: Rng, vary: bool = True
+) -> FitnessExample:
+    """Make one example. A scene that allows no view without water shows a fault instead.
 
-    A dry scene is unfit as it is, and with any fault.
+    vary: mirror, crop and brighten or darken it at random. A scene without water is unfit as it is and with any fault.
     """
     picture, mask = _vary_scene(scene, rng) if vary else (scene.picture, scene.mask)
-    if scene.without_water:
-        if shown >= 0:
-            picture, _ = spoilt(cells[shown].fault, picture, mask, cells[shown].severity, rng)
-        return FitnessExample(to_network_planes(picture), 0.0, DRY)
-    if shown == DRY:
-        dry = _crop_without_water(picture, mask, rng)
-        if dry is not None:
-            return FitnessExample(to_network_planes(dry), 0.0, DRY)
-        shown = int(rng.integers(len(cells)))
-    if shown == CLEAN:
+    if scene.is_without_water:
+        if content >= 0:
+            picture, _ = spoilt(levels[content].fault, picture, mask, levels[content].severity, rng)
+        return FitnessExample(to_network_planes(picture), 0.0, WITHOUT_WATER)
+    if content == WITHOUT_WATER:
+        view = _crop_without_water(picture, mask, rng)
+        if view is not None:
+            return FitnessExample(to_network_planes(view), 0.0, WITHOUT_WATER)
+        content = int(rng.integers(len(levels)))
+    if content == CLEAN:
         return FitnessExample(to_network_planes(picture), 1.0, CLEAN)
-    cell = cells[shown]
+    level = levels[content]
     return FitnessExample(
-        to_network_planes(spoilt(cell.fault, picture, mask, cell.severity, rng)[0]), cell.target, shown
+        to_network_planes(spoilt(level.fault, picture, mask, level.severity, rng)[0]), level.target, content
     )
 
 

@@ -1,4 +1,7 @@
-"""A small net that says whether a picture is fit to be evidence: 1 where the segmenter can be trusted on it."""
+"""The image-quality network: MobileNetV2 (Sandler et al. 2018) down to stride 16, then two dense layers.
+
+It estimates a picture's fitness to be evidence: 1 where the segmenter can be trusted on it.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,14 @@ INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
 FRONT_STAGES, FRONT_CHANNELS = 4, 64  # of MobileNetV2, down to stride 16
 MIXED_CHANNELS, HIDDEN = 48, 48
 ROWS, COLUMNS = 3, 5  # of the last map, after pooling
-FROZEN_STAGES = 2  # as in the segmenter: general, and the dearest to train
+FROZEN_STAGES = 2  # not trained, as in the segmenter: the most general features, and the costliest to train
 
 
 class ImageQualityNetwork(nn.Module):
     """RGB / 255 [N,3,120,160] -> fitness [N,1] in 0..1.
 
-    The last map keeps its place in the picture: sky belongs above water, so a picture upside down is not fit.
+    The dense layers see where in the picture each feature lies: sky belongs above water, so a picture upside down is
+    unfit. Attribute names are those of stored checkpoints.
     """
 
     def __init__(self) -> None:
@@ -46,11 +50,14 @@ class ImageQualityNetwork(nn.Module):
         return torch.sigmoid(self.logit(x))
 
 
-def start_from_imagenet(gate: ImageQualityNetwork, path: Path) -> None:
-    """Fill the front and freeze its first stages. Raises UserError where the file does not fit."""
+def start_from_imagenet(network: ImageQualityNetwork, path: Path) -> None:
+    """Fill the convolutional front from ImageNet weights and freeze its first stages.
+
+    Raises UserError where the file does not fit.
+    """
     whole = ShippedSegmenter()
     load_imagenet_encoder(whole, path)
-    for own, given in zip(gate.front, (whole.stem, *whole.stages), strict=False):
-        own.load_state_dict(given.state_dict())
-    for frozen in list(gate.front)[: 1 + FROZEN_STAGES]:
-        frozen.requires_grad_(False)
+    for layer, pretrained_layer in zip(network.front, (whole.stem, *whole.stages), strict=False):
+        layer.load_state_dict(pretrained_layer.state_dict())
+    for frozen_layer in list(network.front)[: 1 + FROZEN_STAGES]:
+        frozen_layer.requires_grad_(False)

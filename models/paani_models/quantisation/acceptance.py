@@ -1,4 +1,4 @@
-"""Does an INT8 net take the FP32 net's place? Decided by rule, and why in words (T5)."""
+"""Acceptance test of an INT8 network: whether it may take the FP32 network's place, by rule, with the reason (T5)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from paani_models.detector.scores import score_boxes, select_annotated
 from paani_models.engines.onnx_runner import open_network
 from paani_models.segmenter.scores import mask_measures, score_masks, scored_classes, sum_counts
 
-MAX_LOSS_POINTS = 1.0
-MAX_TIME_RATIO = 1.0
-MIN_SCORE_RATIO = 0.5  # of the best score that FP32 gives: below it the net is blind
-MAX_SCORE = 1.001
+MAX_LOSS_POINTS = 1.0  # percentage points of mIoU or AP50
+MAX_TIME_RATIO = 1.0  # INT8 over FP32
+MIN_SCORE_RATIO = 0.5  # of the largest score that FP32 gives; below it the network counts as blind
+MAX_SCORE = 1.001  # a larger score is no probability
 SCORE_ROWS = 4  # of a detector's output, where the scores begin
 TIMED_RUNS, WARM_UP_RUNS = 60, 5
 THREADS = 2
@@ -45,7 +45,7 @@ class Timing(msgspec.Struct, frozen=True):
 
 
 class Verdict(msgspec.Struct, frozen=True):
-    """What the gate says, and why."""
+    """Result of the acceptance test, and why."""
 
     accepted: bool
     reason: str
@@ -53,7 +53,7 @@ class Verdict(msgspec.Struct, frozen=True):
 
 
 class QuantisationRecord(msgspec.Struct, frozen=True):
-    """Everything that one quantisation was decided on. Figures are of held-out pictures; scores are shares of 1."""
+    """Everything that one acceptance was decided on. Figures are of held-out pictures; scores are shares of 1."""
 
     net: str
     recipe: str
@@ -138,7 +138,7 @@ def largest_score(net: Path, inputs: Sequence[F32]) -> float:
 def time_networks(
     float_net: Path, int8_net: Path, x: F32, stopwatch: Callable[[], float] = stopwatch_ms, threads: int = THREADS
 ) -> Timing:
-    """Both nets in turn on one input, so that whatever else the machine does meets both."""
+    """Time both networks in turn on one input, so that other load on the machine meets both."""
     runs = [open_network(net, threads) for net in (float_net, int8_net)]
     taken: tuple[list[float], list[float]] = ([], [])
     for turn in range(WARM_UP_RUNS + TIMED_RUNS):

@@ -1,4 +1,4 @@
-"""Pictures that an INT8 net is calibrated on: never those that decide about it (T4, T6)."""
+"""Calibration pictures of an INT8 network: never those that its acceptance test is decided on (T4, T6)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Cross-layer equalisation (Nagel et al. 2019): channels rescaled between layers so that one scale suits them all.
+"""Cross-layer equalisation (Nagel et al. 2019): channels are rescaled between layers so that one scale suits all.
 
 ReLU, addition, nearest and linear resizing and pooling commute with a positive factor per channel. So whatever such
 steps connect, the convolutions that write into it may be divided, and those that read from it multiplied, by any
-factors: the net computes the same. Batch norm must be folded already, as export does. Graphs are changed in place.
+factors: the network computes the same. Batch norm must be folded already, as export does. Graphs are changed in place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from onnx import numpy_helper
 from paani.arrays import F32
 
 MAX_ROUNDS = 30
-CONVERGED_LOG_FACTOR = 1e-3  # largest logarithm of a factor that still counts as a change
+CONVERGED_LOG_FACTOR = 1e-3  # iteration ends when no factor's logarithm is larger
 # Steps that keep channels apart and commute with a positive factor, and which of their inputs carry the picture.
 _COMMUTING = {"Relu": 1, "Resize": 1, "MaxPool": 1, "AveragePool": 1, "GlobalAveragePool": 1, "ReduceMean": 1, "Add": 2}
 
@@ -32,7 +32,7 @@ class _ChannelGroup:
 
 
 def equalise_layers(model: onnx.ModelProto) -> int:
-    """Equalise all groups of channels that can be; how many there are. The outputs change by rounding alone."""
+    """Equalise every closed group of channels and return their number. The outputs change by rounding alone."""
     weights = {t.name: numpy_helper.to_array(t).astype(np.float32) for t in model.graph.initializer}
     groups = [group for group in _find_groups(model.graph, weights) if group.closed and group.writers and group.readers]
     for _ in range(MAX_ROUNDS):
@@ -95,7 +95,7 @@ def _is_depthwise(conv: onnx.NodeProto, weights: dict[str, F32]) -> bool:
 
 
 def _equalise_group(group: _ChannelGroup, weights: dict[str, F32]) -> float:
-    """One step; the largest logarithm of a factor."""
+    """Equalise one group once and return the largest logarithm of a factor."""
     written = np.max([_channel_ranges(weights[conv.input[1]], 0) for conv in group.writers], 0)
     read = np.max([_channel_ranges(weights[conv.input[1]], _input_axis(conv, weights)) for conv in group.readers], 0)
     usable = (written > 0) & (read > 0)

@@ -1,4 +1,4 @@
-"""Checkpoint -> static FP32 ONNX of opset 17, compared with the PyTorch net on real pictures (T1, T2)."""
+"""Checkpoint -> static FP32 ONNX of opset 17, compared with the PyTorch network on real pictures (T1, T2)."""
 
 from __future__ import annotations
 
@@ -24,19 +24,17 @@ from paani_models.catalogue import (
     save_catalogue,
 )
 from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
-from paani_models.detector import shipped_network as detector
 from paani_models.detector.paper_network import FUSED_PARAMETERS, Yolo11n
-from paani_models.detector.shipped_network import Detector
+from paani_models.detector.shipped_network import CANDIDATES, Detector
 from paani_models.engines.onnx_runner import open_network
-from paani_models.image_quality import network as gate
 from paani_models.image_quality.network import ImageQualityNetwork
-from paani_models.segmenter import paper_network as segmenter
+from paani_models.network_input import IMAGE_QUALITY_WH, SIZE_WH
 from paani_models.segmenter.paper_network import PaperSegmenter, parameter_count
 from paani_models.segmenter.shipped_network import ShippedSegmenter
 from paani_models.training.training_state import load_averaged_weights, load_checkpoint
 
 OPSET = 17  # T1
-MAX_EXPORT_DIFFERENCE = 1e-3  # T2
+MAX_EXPORT_DIFFERENCE = 1e-3  # T2; in logits, scores, and boxes as fractions of the input
 
 _UNCHANGED: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -48,8 +46,8 @@ CONTRACTS = {
         size_bytes=0,
         parameters=0,
         opset=OPSET,
-        input=Tensor("input", (1, 3, segmenter.INPUT_HEIGHT_PX, segmenter.INPUT_WIDTH_PX)),
-        output=Tensor("logits", (1, 3, segmenter.INPUT_HEIGHT_PX, segmenter.INPUT_WIDTH_PX)),
+        input=Tensor("input", (1, 3, SIZE_WH[1], SIZE_WH[0])),
+        output=Tensor("logits", (1, 3, SIZE_WH[1], SIZE_WH[0])),
         classes=SEGMENTER_CLASSES,
         preprocessing=Preprocessing("stretch", (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)),
         architecture="MobileNetV2 encoder at 11/16 size, 48-channel separable top-down decoder",
@@ -62,8 +60,8 @@ CONTRACTS = {
         size_bytes=0,
         parameters=0,
         opset=OPSET,
-        input=Tensor("input", (1, 3, detector.INPUT_HEIGHT_PX, detector.INPUT_WIDTH_PX)),
-        output=Tensor("candidates", (1, 8, detector.CANDIDATES)),
+        input=Tensor("input", (1, 3, SIZE_WH[1], SIZE_WH[0])),
+        output=Tensor("candidates", (1, 8, CANDIDATES)),
         classes=DETECTOR_CLASSES,
         preprocessing=Preprocessing("letterbox", _UNCHANGED, (1.0, 1.0, 1.0), pad_grey=114),
         architecture="YOLOX-nano shape, joint objectness and class scores",
@@ -79,7 +77,7 @@ CONTRACTS["gate"] = Model(
     size_bytes=0,
     parameters=0,
     opset=OPSET,
-    input=Tensor("input", (1, 3, gate.INPUT_HEIGHT_PX, gate.INPUT_WIDTH_PX)),
+    input=Tensor("input", (1, 3, IMAGE_QUALITY_WH[1], IMAGE_QUALITY_WH[0])),
     output=Tensor("fitness", (1, 1)),
     classes=("fit",),
     preprocessing=Preprocessing("stretch", _UNCHANGED, (1.0, 1.0, 1.0)),
@@ -101,7 +99,7 @@ CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
 
 
 def build_network(name: str) -> nn.Module:
-    """An untrained net of a contract."""
+    """An untrained network of a contract."""
     nets = {
         "segmenter": ShippedSegmenter,
         "paper-segmenter": PaperSegmenter,
@@ -130,7 +128,7 @@ def export_network(
 
 
 def export_untrained(name: str, folder: Path) -> Model:
-    """Write a net of random weights and its manifest entry: as fast as a trained one, and good for nothing else."""
+    """Write a network of random weights and its manifest entry: as fast as a trained one, and good for nothing else."""
     seed = 42
     torch.manual_seed(seed)
     shape = CONTRACTS[name].input.shape
@@ -194,7 +192,7 @@ def write_onnx(net: nn.Module, contract: Model, path: Path) -> None:
 
 @torch.no_grad()
 def largest_export_difference(net: nn.Module, path: Path, inputs: Sequence[NDArray[np.float32]]) -> float:
-    """Largest absolute difference between the PyTorch net and the ONNX file over the inputs.
+    """Largest absolute difference between the PyTorch network and the ONNX file over the inputs.
 
     The detector's box rows are compared as fractions of the input's size: in pixels, the exponential that makes a
     side of 300 px turns single-precision rounding of either engine into some 1e-3.

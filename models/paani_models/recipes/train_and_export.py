@@ -1,4 +1,4 @@
-"""The training commands: which pictures go into which net, with which recipe."""
+"""Train and export each network: which pictures, which starting weights, which recipe."""
 
 from __future__ import annotations
 
@@ -14,36 +14,32 @@ from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
-from paani_models.detector import data as detector_data
-from paani_models.detector import train as train_detector
-from paani_models.detector import train_paper_network as train_yolo11n
+from paani_models.detector.data import read_boxed_pictures
 from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.shipped_network import Detector, load_yolox_weights
-from paani_models.detector.train import DetectorTraining
-from paani_models.detector.train_paper_network import Yolo11nTraining
-from paani_models.image_quality import train as train_gate
-from paani_models.image_quality.train import ImageQualityTraining
+from paani_models.detector.train import DetectorRecipe, DetectorTraining
+from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
+from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
 from paani_models.network_input import SIZE_WH, detector_input, image_quality_input, segmenter_batch, segmenter_input
-from paani_models.recipes import onnx_export as export
+from paani_models.recipes.onnx_export import export_network, export_untrained, read_origin
 from paani_models.recipes.warm_start import load_exported
-from paani_models.segmenter import train as train_segmenter
 from paani_models.segmenter.distillation import Distillation
 from paani_models.segmenter.paper_network import PaperSegmenter
 from paani_models.segmenter.pseudo_labels import pseudo_label_pictures
 from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
-from paani_models.segmenter.train import SegmenterTraining
+from paani_models.segmenter.train import PAPER_RECIPE, SegmenterRecipe, SegmenterTraining, cache_pictures
 from paani_models.training.training_state import Stage, load_averaged_weights
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
-COMPARED_PICTURES = 8
+COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
-IMAGENET_RECIPE = train_segmenter.SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
+IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """What the command line says about one training."""
+    """Options of one training on the command line; None and () stand for the recipe's own."""
 
     folder: Path
     start: Path | None = None
@@ -55,17 +51,17 @@ class TrainingOptions:
     unchecked: bool = False
 
 
-def train_network(net: str, pictures: PictureSelection, plan: TrainingOptions, threads: int) -> None:
-    """Train a net into `plan.folder`, from its last finished epoch if there is one."""
+def train_network(net: str, pictures: PictureSelection, options: TrainingOptions, threads: int) -> None:
+    """Train a network into `options.folder`, from its last finished epoch if there is one."""
     torch.set_num_threads(threads)
     if net == "detector":
-        _train_detector(pictures, plan)
+        _train_detector(pictures, options)
     elif net == "yolo11n":
-        _train_yolo11n(pictures, plan)
+        _train_yolo11n(pictures, options)
     elif net == "gate":
-        _train_image_quality(pictures, plan)
+        _train_image_quality(pictures, options)
     else:
-        _train_segmenter(net, pictures, plan)
+        _train_segmenter(net, pictures, options)
 
 
 def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
@@ -82,12 +78,12 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
     return tuple(parsed)
 
 
-def _train_segmenter(net: str, pictures: PictureSelection, plan: TrainingOptions) -> None:
-    recipe = IMAGENET_RECIPE if net == "segmenter" else train_segmenter.PAPER_RECIPE
+def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
+    recipe = IMAGENET_RECIPE if net == "segmenter" else PAPER_RECIPE
     recipe = replace(
         recipe,
-        stages=parse_stages(plan.stages) or recipe.stages,
-        peak_rate=plan.peak_rate or recipe.peak_rate,
+        stages=parse_stages(options.stages) or recipe.stages,
+        peak_rate=options.peak_rate or recipe.peak_rate,
     )
     torch.manual_seed(recipe.seed)
     model: ShippedSegmenter | PaperSegmenter = PaperSegmenter()
@@ -95,74 +91,74 @@ def _train_segmenter(net: str, pictures: PictureSelection, plan: TrainingOptions
         model = ShippedSegmenter()
         load_imagenet_encoder(model, pictures.data / IMAGENET_FILE)
     samples, distillation = pictures.segmented_samples(held_out=False), None
-    if plan.teacher is not None:
+    if options.teacher is not None:
         teacher = ShippedSegmenter()
-        load_averaged_weights(teacher, plan.teacher)
+        load_averaged_weights(teacher, options.teacher)
         distillation = Distillation(teacher)
-    if plan.teacher is not None or plan.labels_from is not None:
+    if options.teacher is not None or options.labels_from is not None:
         samples += pictures.unsegmented_samples()
-    held_out = train_segmenter.cache_pictures(pictures.segmented_samples(held_out=True))
-    cached = train_segmenter.cache_pictures(samples)
-    if plan.labels_from is not None:
+    held_out = cache_pictures(pictures.segmented_samples(held_out=True))
+    cached = cache_pictures(samples)
+    if options.labels_from is not None:
         labeller = ShippedSegmenter()
-        load_averaged_weights(labeller, plan.labels_from)
+        load_averaged_weights(labeller, options.labels_from)
         cached = pseudo_label_pictures(labeller, cached, samples)
-    training = SegmenterTraining(model, recipe, plan.folder, cached, held_out, distillation)
-    if plan.start is not None and plan.start.suffix == ".onnx":
+    training = SegmenterTraining(model, recipe, options.folder, cached, held_out, distillation)
+    if options.start is not None and options.start.suffix == ".onnx":
         shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
-        load_exported(model, plan.start, torch.from_numpy(segmenter_batch(shown)))
-        training.progress.average_from_model()
-    elif plan.start is not None:
-        training.progress.start_from(plan.start)
+        load_exported(model, options.start, torch.from_numpy(segmenter_batch(shown)))
+        training.state.average_from_model()
+    elif options.start is not None:
+        training.state.start_from(options.start)
     training.run()
 
 
-def _train_detector(pictures: PictureSelection, plan: TrainingOptions) -> None:
-    recipe = train_detector.DetectorRecipe()
-    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
+    recipe = DetectorRecipe()
+    recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
     torch.manual_seed(recipe.seed)
     model = Detector()
-    if plan.start is None:
+    if options.start is None:
         load_yolox_weights(model, pictures.data / COCO_FILE)
-    elif plan.start.suffix == ".onnx":
-        load_exported(model, plan.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
+    elif options.start.suffix == ".onnx":
+        load_exported(model, options.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
     else:
-        load_averaged_weights(model, plan.start)
-    cached = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=False))
-    held_out = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=True))
-    DetectorTraining(model, recipe, plan.folder, cached, held_out).run()
+        load_averaged_weights(model, options.start)
+    cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
+    held_out = read_boxed_pictures(pictures.boxed_samples(held_out=True))
+    DetectorTraining(model, recipe, options.folder, cached, held_out).run()
 
 
-def _train_yolo11n(pictures: PictureSelection, plan: TrainingOptions) -> None:
-    recipe = train_yolo11n.Yolo11nRecipe()
-    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None:
+    recipe = Yolo11nRecipe()
+    recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
     torch.manual_seed(recipe.seed)
     model = Yolo11n()
-    if plan.start is not None:
-        load_averaged_weights(model, plan.start)
-    cached = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=False))
-    held_out = detector_data.read_boxed_pictures(pictures.boxed_samples(held_out=True))
-    Yolo11nTraining(model, recipe, plan.folder, cached, held_out).run()
+    if options.start is not None:
+        load_averaged_weights(model, options.start)
+    cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
+    held_out = read_boxed_pictures(pictures.boxed_samples(held_out=True))
+    Yolo11nTraining(model, recipe, options.folder, cached, held_out).run()
 
 
-def _train_image_quality(pictures: PictureSelection, plan: TrainingOptions) -> None:
-    """`plan.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
-    recipe = train_gate.ImageQualityRecipe(checked=not plan.unchecked)
-    recipe = replace(recipe, epochs=plan.epochs or recipe.epochs, peak_rate=plan.peak_rate or recipe.peak_rate)
+def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -> None:
+    """`options.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
+    recipe = ImageQualityRecipe(checked=not options.unchecked)
+    recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
     never = {sample.picture: sample for sample in pictures.training_samples()}
     masked = {
         sample.picture: sample for sample in pictures.segmented_samples(held_out=False) if sample.picture in never
     }
     samples = list({**never, **masked}.values())
-    segmenter = plan.start or verified_path("segmenter")
-    ImageQualityTraining(plan.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
+    segmenter = options.start or verified_path("segmenter")
+    ImageQualityTraining(options.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
 
 
 def export_untrained_network(net: str, weights: Path) -> int:
     """Write the ONNX file and its manifest entry. Raises UserError rather than write among the shipped weights."""
     if weights.resolve() == WEIGHTS.resolve():
         raise UserError("--untrained: name a folder with --weights; the shipped nets stay")
-    model = export.export_untrained(net, weights)
+    model = export_untrained(net, weights)
     sys.stdout.write(f"{weights / model.file}: {model.size_bytes} bytes, random weights\n")
     return 0
 
@@ -175,15 +171,15 @@ def export_checkpoint(net: str, checkpoint: Path, weights: Path, pictures: Pictu
         else pictures.segmented_samples(held_out=True)
     )
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepared = {"detector": detector_input, "yolo11n": detector_input, "gate": image_quality_input}.get(
+    prepare = {"detector": detector_input, "yolo11n": detector_input, "gate": image_quality_input}.get(
         net, segmenter_input
     )
-    inputs = [prepared(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
+    inputs = [prepare(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")
     used = {sample.source.name for sample in pictures.samples}
-    origins = tuple(export.read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
-    model = export.export_network(net, checkpoint, weights, inputs, origins)
+    origins = tuple(read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
+    model = export_network(net, checkpoint, weights, inputs, origins)
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )

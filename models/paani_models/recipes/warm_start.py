@@ -1,4 +1,4 @@
-"""An exported net back into PyTorch, so that training can go on from weights of which no checkpoint is left.
+"""An exported network back into PyTorch, so that training can go on from weights of which no checkpoint is left.
 
 Export folds batch norm into the convolutions. Here each normalisation is given the statistics that its convolution
 shows on pictures, and the scale and offset that undo them: evaluation equals the exported file, and training, which
@@ -22,7 +22,7 @@ from paani.errors import UserError
 def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
     """Fill `model` with the weights of its own export.
 
-    pictures: float32 [N,3,H,W] as the net gets them, whose statistics the normalisations take.
+    pictures: float32 [N,3,H,W] as the network gets them, whose statistics the normalisations take.
     Raises UserError where the file is no export of this net.
     """
     stored = _read_convolutions(path)

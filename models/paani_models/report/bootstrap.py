@@ -1,4 +1,4 @@
-"""Intervals by drawing sequences again: frames of one sequence are no independent evidence, so they stay together."""
+"""Block bootstrap (Efron 1979; Davison and Hinkley 1997) over whole sequences, as frames of one are not independent."""
 
 from __future__ import annotations
 

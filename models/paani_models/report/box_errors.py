@@ -1,4 +1,4 @@
-"""What keeps a detector from the truth: the height of what it misses, what becomes of each object, and its scores."""
+"""Error analysis of the detector: recall by object height, outcome of each true object, and scores of its boxes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bars, what was tried for them, and what limits each net, as HTML."""
+"""Requirements, earlier experiments, and the error analysis of each network, as HTML."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ POOLED_SOURCES = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a fig
 _TICKS = 4  # a chart's axis has this many steps, so that each trial stands on a whole number
 
 
-def render_requirements(found: Sequence[RequirementResult], tried: Sequence[Experiment]) -> str:
+def render_requirements(found: Sequence[RequirementResult], experiments: Sequence[Experiment]) -> str:
     """What is to be reached, what is, why not; then how each figure moved from recipe to recipe."""
     rows = [
         f'<tr class="{"met" if each.is_met else "missed"}"><th>{escape(_requirement_name(each.requirement))}</th>'
@@ -38,7 +38,7 @@ def render_requirements(found: Sequence[RequirementResult], tried: Sequence[Expe
     ]
     for net in dict.fromkeys(each.requirement.net for each in found):
         now = [each for each in found if each.requirement.net == net]
-        mine = [row for row in tried if row.net == net]
+        mine = [row for row in experiments if row.net == net]
         charts = "".join(f"<figure>{_experiments_chart(each, mine)}</figure>" for each in now)
         parts.append(f'<h3>{net.capitalize()}: what was tried</h3><div class="side">{charts}</div>')
         parts.append(_experiments_table(now, mine))
@@ -46,7 +46,7 @@ def render_requirements(found: Sequence[RequirementResult], tried: Sequence[Expe
 
 
 def render_mask_errors(limits: Sequence[MaskErrors]) -> str:
-    """Where mistakes lie, and the best that the net's cells allow."""
+    """Where mistakes lie, and the best that the network's cells allow."""
     near = "".join(f"<th>within {reach} px</th>" for reach in EDGE_DISTANCES_PX)
     head = (
         "<th>source</th><th>pictures</th><th>wrong</th><th>taken for water</th><th>water missed</th>"
@@ -103,26 +103,26 @@ def render_box_errors(limits: Sequence[BoxErrors]) -> str:
     return "".join(parts)
 
 
-def _experiments_chart(now: RequirementResult, tried: Sequence[Experiment]) -> str:
-    bar = now.requirement
-    values = [row.value(bar.metric, bar.source, now.n) for row in tried]
+def _experiments_chart(now: RequirementResult, experiments: Sequence[Experiment]) -> str:
+    requirement = now.requirement
+    values = [row.value(requirement.metric, requirement.source, now.n) for row in experiments]
     points: Points = [(number, value) for number, value in enumerate(values, 1) if value is not None]
-    asked = {number for number, row in enumerate(tried, 1) if row.inference}
-    last = 1.0 + _TICKS * math.ceil(max(1, len(tried) - 1) / _TICKS)
-    heights = [bar.bound, *(value for _, value in points)]
-    ends = (0.0, math.ceil(max(heights) * 50) / 50) if bar.at_most else (math.floor(min(heights) * 5) / 5, 1.0)
+    other_inference = {number for number, row in enumerate(experiments, 1) if row.inference}
+    last = 1.0 + _TICKS * math.ceil(max(1, len(experiments) - 1) / _TICKS)
+    heights = [requirement.bound, *(value for _, value in points)]
+    ends = (0.0, math.ceil(max(heights) * 50) / 50) if requirement.at_most else (math.floor(min(heights) * 5) / 5, 1.0)
     series: dict[str, Points] = {
-        "bar": [(1.0, bar.bound), (last, bar.bound)],
-        "weights": [point for point in points if point[0] not in asked],
-        "asked otherwise": [point for point in points if point[0] in asked],
+        "bar": [(1.0, requirement.bound), (last, requirement.bound)],
+        "weights": [point for point in points if point[0] not in other_inference],
+        "asked otherwise": [point for point in points if point[0] in other_inference],
     }
-    return lines(series, "recipe", _requirement_name(bar), (1.0, last), ends)
+    return lines(series, "recipe", _requirement_name(requirement), (1.0, last), ends)
 
 
-def _experiments_table(now: Sequence[RequirementResult], tried: Sequence[Experiment]) -> str:
+def _experiments_table(now: Sequence[RequirementResult], experiments: Sequence[Experiment]) -> str:
     head = "".join(f"<th>{escape(_requirement_name(each.requirement))}</th>" for each in now)
     rows = []
-    for number, row in enumerate(tried, 1):
+    for number, row in enumerate(experiments, 1):
         values = [row.value(each.requirement.metric, each.requirement.source, each.n) for each in now]
         cells = "".join(
             "<td></td>" if value is None else f"<td>{value:.{_decimals(each.requirement)}f}</td>"
@@ -155,18 +155,18 @@ def _score_chart(limits: BoxErrors) -> str:
     return lines(series, "score", f"{limits.kind} boxes", (0.0, 1.0), (0.0, top))
 
 
-def _requirement_name(bar: Requirement) -> str:
-    metric = TITLES.get(bar.metric) or bar.metric.replace("_ap50", " AP50")
-    return metric if bar.source in POOLED_SOURCES else f"{metric}, {bar.source}"
+def _requirement_name(requirement: Requirement) -> str:
+    metric = TITLES.get(requirement.metric) or requirement.metric.replace("_ap50", " AP50")
+    return metric if requirement.source in POOLED_SOURCES else f"{metric}, {requirement.source}"
 
 
-def _format_bound(bar: Requirement) -> str:
-    return f"{'at most ' if bar.at_most else ''}{bar.bound:.{_decimals(bar)}f}"
+def _format_bound(requirement: Requirement) -> str:
+    return f"{'at most ' if requirement.at_most else ''}{requirement.bound:.{_decimals(requirement)}f}"
 
 
-def _decimals(bar: Requirement) -> int:
+def _decimals(requirement: Requirement) -> int:
     """Decimals of what stands near 0 and of what stands near 1."""
-    return 4 if bar.at_most else 3
+    return 4 if requirement.at_most else 3
 
 
 def _format_height_range(low: float, high: float) -> str:

@@ -1,4 +1,4 @@
-"""Every figure with its interval, per source and per sequence: what `paani models evaluate --json` writes."""
+"""Figures with bootstrap intervals, per source and per sequence: what `paani models evaluate --json` writes."""
 
 from __future__ import annotations
 

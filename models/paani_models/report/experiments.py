@@ -1,4 +1,4 @@
-"""What was tried for the figures that have a bar: weights of before and how they were made, beside the present ones."""
+"""Record of experiments: earlier weights, the recipe of each, and what they reached of the required figures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PRESENT_WEIGHTS = "these weights"
 class Experiment(Record, frozen=True):
     """One recipe in words, and what it reached on held-out sequences of real pictures.
 
-    sha256: of the file that was measured. asked: in what way, where otherwise than the board does it.
+    sha256: of the file that was measured. inference: how it was run, where otherwise than on the board.
     """
 
     net: str
@@ -53,7 +53,7 @@ def read_experiments(weights: Path) -> tuple[Experiment, ...]:
 def with_present_weights(
     experiments: Sequence[Experiment], catalogue: dict[str, Model], results: Sequence[RequirementResult]
 ) -> tuple[Experiment, ...]:
-    """The record with the present weights as measured now, in their place, or as the last where it lacks them."""
+    """Put the present weights, as measured now, into the record: in their place, or as its last row."""
     rows = list(experiments)
     for net in dict.fromkeys(each.requirement.net for each in results):
         figures = tuple(

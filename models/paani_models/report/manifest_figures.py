@@ -1,4 +1,4 @@
-"""Figures of the exported nets on held-out sequences, per source (T3, U1 - U4)."""
+"""Measure the figures of the exported networks on held-out sequences that the manifest records (T3, U1 - U4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What keeps a segmenter from the truth: where its mistakes lie, and what answers of its size could reach at best."""
+"""Error analysis of the segmenter: where its wrong pixels lie, and the best that its output grid allows."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def count_mask_errors(label: U8, truth: U8) -> tuple[I64, ...]:
 
 
 def fill_undecided(truth: U8) -> U8:
-    """Undecided pixels take the class of the nearest decided one; a mask without any stays as it is."""
+    """Give undecided pixels the class of the nearest decided one; a mask without any stays as it is."""
     undecided = truth == IGNORE
     if undecided.all() or not undecided.any():
         return truth
@@ -100,7 +100,7 @@ def fill_undecided(truth: U8) -> U8:
 
 
 def round_to_cells(truth: U8) -> U8:
-    """Each of CELLS_HW takes the class that fills most of it: what a net with so many answers could say at best."""
+    """Give each cell of CELLS_HW the class that fills most of it: the best possible output on that grid."""
     size_wh = CELLS_HW[::-1]
     shares = [
         cv2.resize((truth == kind).astype(np.float32), size_wh, interpolation=cv2.INTER_AREA)

@@ -1,4 +1,4 @@
-"""The best and the worst pictures, drawn: they go beside the page and nowhere else."""
+"""Draw the best and the worst pictures with predictions and truth. They go beside the page and nowhere else."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def draw_masks(
 
 
 def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture]:
-    """As the net sees them: true boxes thin green, found boxes thick orange with class and score."""
+    """As the network sees them: true boxes thin green, found boxes thick orange with class and score."""
     drawn = []
     for index, item in enumerate(scored):
         shown = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)

@@ -92,10 +92,10 @@ def _render_labelled(content: PageContent) -> str:
     if alarms:
         parts.append("<h3>Detector: boxes per picture on rivers that show no craft</h3>" + render_rate_table(alarms))
     if content.faults:
-        parts.append("<h3>Gate: pictures that cannot be used</h3>")
+        parts.append("<h3>Image-quality check: pictures that cannot be used</h3>")
         parts.append(
             "<p>Share of pictures refused, and the segmenter's mean IoU on all of them, over the severity of the "
-            "fault. Below 0.60 the gate must refuse, above 0.75 it must not.</p>"
+            "fault. Below 0.60 the check must refuse, above 0.75 it must not.</p>"
         )
         parts.append(render_fault_charts(content.faults))
     for name, rows in content.runs.items():

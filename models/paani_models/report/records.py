@@ -1,4 +1,4 @@
-"""Training records and fault measurements, as other commands write them."""
+"""Read training records and fault reports that other commands wrote, and draw their charts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RECORDS = ("epochs.jsonl", "log.jsonl")
 
 
 class FaultCell(msgspec.Struct, frozen=True):
-    """One fault at one severity: of n pictures, how many the gate refused; what the segmenter still reaches."""
+    """One fault at one severity: of n pictures, how many the check refused, and the segmenter's mean IoU."""
 
     fault: str
     severity: int
@@ -26,7 +26,7 @@ class FaultCell(msgspec.Struct, frozen=True):
 
     @property
     def verdict(self) -> str:
-        """What the gate must do here: "reject", "accept", or "free"."""
+        """What the image-quality check must do here: "reject", "accept", or "free"."""
         return due_verdict(self.fault, self.miou)
 
 
@@ -39,7 +39,7 @@ class FaultTotals(msgspec.Struct, frozen=True):
 
 
 class CleanSource(msgspec.Struct, frozen=True):
-    """n pictures of a source as they are, and how many of them the gate refused."""
+    """n pictures of a source as they are, and how many of them the image-quality check refused."""
 
     source: str
     n: int
@@ -64,7 +64,7 @@ def read_faults(path: Path) -> FaultReport:
 
 
 def image_quality_figures(report: FaultReport) -> list[Figure]:
-    """The manifest's figures of the gate; n counts pictures."""
+    """The manifest's figures of the image-quality check; n counts pictures."""
     figures = [
         Figure("clean_refused_frac", source.source, round(source.rejected / source.n, 4), source.n)
         for source in report.clean
@@ -129,7 +129,7 @@ def render_training_charts(rows: Sequence[dict[str, float]]) -> str:
 
 
 def render_fault_charts(report: FaultReport) -> str:
-    """Per fault: share refused by the gate, and the segmenter's mean IoU, over severity."""
+    """Per fault: share refused by the image-quality check, and the segmenter's mean IoU, over severity."""
     charts = []
     for fault in dict.fromkeys(cell.fault for cell in report.cells):
         cells = [cell for cell in report.cells if cell.fault == fault]

@@ -1,4 +1,4 @@
-"""Figures that the models are to reach, what they reach, and the measured reason where they do not."""
+"""Required figures of the models, what they reach, and the measured reason where they miss."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MASK_FIGURES = {"iou_water": water_iou, "miou": mean_iou}
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a figure should be at least, or at most, on held-out sequences of real pictures."""
+    """Bound of a figure on held-out sequences of real pictures: a least value, or with `at_most` a largest."""
 
     net: str
     metric: str
@@ -48,7 +48,7 @@ _WORST_CELLS = 5
 
 @dataclass(frozen=True)
 class RequirementResult:
-    """One bar and what was measured; n counts pictures, or true boxes. limit: the reason, empty where it is met."""
+    """A requirement and what was measured; n counts pictures, or true boxes. limit: why it is missed, else empty."""
 
     requirement: Requirement
     value: float
@@ -57,35 +57,41 @@ class RequirementResult:
 
     @property
     def is_met(self) -> bool:
-        """Whether the figure keeps its bar."""
+        """Whether the figure satisfies its requirement."""
         return self.requirement.is_met_by(self.value)
 
 
 def compare_with_requirements(
     masks: Sequence[MaskErrors], boxes: Sequence[BoxErrors], faults: FaultReport | None = None
 ) -> list[RequirementResult]:
-    """Every bar whose measurement is at hand."""
-    of_gate = {(figure.metric, figure.source): figure for figure in image_quality_figures(faults)} if faults else {}
+    """Compare every requirement whose measurement is at hand."""
+    check_figures = (
+        {(figure.metric, figure.source): figure for figure in image_quality_figures(faults)} if faults else {}
+    )
     by_source = {limits.source.name: limits for limits in masks}
     by_kind = {f"{limits.kind}_ap50": limits for limits in boxes}
     found = []
-    for bar in REQUIREMENTS:
-        if bar.net == "segmenter" and bar.source in by_source:
-            found.append(_compare_masks(bar, by_source[bar.source]))
-        elif bar.net == "detector" and bar.metric in by_kind:
-            found.append(_compare_boxes(bar, by_kind[bar.metric]))
-        elif bar.net == "gate" and faults and (figure := of_gate.get((bar.metric, bar.source))):
-            limit = "" if bar.is_met_by(figure.value) else _describe_wrong_verdicts(bar, faults)
-            found.append(RequirementResult(bar, figure.value, figure.n, limit))
+    for requirement in REQUIREMENTS:
+        if requirement.net == "segmenter" and requirement.source in by_source:
+            found.append(_compare_masks(requirement, by_source[requirement.source]))
+        elif requirement.net == "detector" and requirement.metric in by_kind:
+            found.append(_compare_boxes(requirement, by_kind[requirement.metric]))
+        elif (
+            requirement.net == "gate"
+            and faults
+            and (figure := check_figures.get((requirement.metric, requirement.source)))
+        ):
+            limit = "" if requirement.is_met_by(figure.value) else _describe_wrong_verdicts(requirement, faults)
+            found.append(RequirementResult(requirement, figure.value, figure.n, limit))
     return found
 
 
-def _describe_wrong_verdicts(bar: Requirement, faults: FaultReport) -> str:
-    """Where the gate is wrong most often."""
-    if bar.source == "all":
+def _describe_wrong_verdicts(requirement: Requirement, faults: FaultReport) -> str:
+    """Name the fault levels or sources on which the image-quality check is wrong most often."""
+    if requirement.source == "all":
         wrong = [(source.rejected, source.n, source.source) for source in faults.clean]
     else:
-        verdict = "reject" if bar.metric == "unfit_accepted_frac" else "accept"
+        verdict = "reject" if requirement.metric == "unfit_accepted_frac" else "accept"
         wrong = [
             (
                 cell.n - cell.rejected if verdict == "reject" else cell.rejected,
@@ -99,15 +105,18 @@ def _describe_wrong_verdicts(bar: Requirement, faults: FaultReport) -> str:
     return f"Wrong most often: {'; '.join(f'{count} of {n} in {name}' for count, n, name in worst)}."
 
 
-def _compare_masks(bar: Requirement, limits: MaskErrors) -> RequirementResult:
-    if bar.metric == "edge_f1":
+def _compare_masks(requirement: Requirement, limits: MaskErrors) -> RequirementResult:
+    if requirement.metric == "edge_f1":
         value, best = edge_f1(limits.edges), edge_f1(limits.best_edges)
     else:
-        value, best = (_MASK_FIGURES[bar.metric](counts) for counts in (limits.counts, limits.best_counts))
-    if bar.is_met_by(value):
-        return RequirementResult(bar, value, limits.n, "")
+        value, best = (_MASK_FIGURES[requirement.metric](counts) for counts in (limits.counts, limits.best_counts))
+    if requirement.is_met_by(value):
+        return RequirementResult(requirement, value, limits.n, "")
     return RequirementResult(
-        bar, value, limits.n, f"{_describe_mask_errors(limits)} The best answer of the net's cells reaches {best:.3f}."
+        requirement,
+        value,
+        limits.n,
+        f"{_describe_mask_errors(limits)} The best answer of the net's cells reaches {best:.3f}.",
     )
 
 
@@ -123,16 +132,16 @@ def _describe_mask_errors(limits: MaskErrors) -> str:
     )
 
 
-def _compare_boxes(bar: Requirement, limits: BoxErrors) -> RequirementResult:
-    if bar.is_met_by(limits.ap50):
-        return RequirementResult(bar, limits.ap50, limits.n, "")
-    small, smalls = limits.count_found_between(0.0, SMALL_PX)
-    near, nears = limits.count_found_between(NEAR_PX, float("inf"))
+def _compare_boxes(requirement: Requirement, limits: BoxErrors) -> RequirementResult:
+    if requirement.is_met_by(limits.ap50):
+        return RequirementResult(requirement, limits.ap50, limits.n, "")
+    small, small_count = limits.count_found_between(0.0, SMALL_PX)
+    near, near_count = limits.count_found_between(NEAR_PX, float("inf"))
     fates = ", ".join(f"{count} {fate}" for fate, count in zip(OUTCOMES[1:], limits.outcomes[1:], strict=True))
     return RequirementResult(
-        bar,
+        requirement,
         limits.ap50,
         limits.n,
-        f"Of {smalls} objects under {SMALL_PX:g} px high {small} are found, of {nears} of {NEAR_PX:g} px and more "
-        f"{near}. What is not found: {fates}.",
+        f"Of {small_count} objects under {SMALL_PX:g} px high {small} are found, of {near_count} of {NEAR_PX:g} px and "
+        f"more {near}. What is not found: {fates}.",
     )

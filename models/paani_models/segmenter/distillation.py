@@ -1,4 +1,7 @@
-"""A small segmenter learns from a large one: its softened answer per pixel, and its features at three scales."""
+"""Knowledge distillation (Hinton et al. 2015) with feature hints (Romero et al. 2015, FitNets).
+
+The small segmenter learns the teacher's class probabilities per pixel, and its standardised features at three scales.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from paani_models.segmenter.shipped_network import ShippedSegmenter
 from paani_models.training.training_state import training_device
 
 LOGIT_GAIN, FEATURE_GAIN = 1.0, 0.5
-FIRST_TAP = 1  # strides 8, 16, 32; at stride 4 both nets see edges anyway
+FIRST_TAP = 1  # features at strides 8, 16 and 32 are compared; at stride 4 both networks see edges anyway
 
 
 class Distillation(nn.Module):
@@ -28,14 +31,14 @@ class Distillation(nn.Module):
         self.teacher = [teacher.to(training_device())]  # in a list: the teacher is no part of this module's state
 
     def forward(self, pictures: Tensor, student: PaperSegmenter) -> tuple[Tensor, Tensor]:
-        """Logits of the student for the pictures [N,3,H,W], and how far it is from the teacher (a scalar)."""
+        """The student's logits for pictures [N,3,H,W], and the distillation loss (a scalar)."""
         with torch.no_grad():
-            taught = self.teacher[0].taps(pictures)
-            answer = self.teacher[0].decode(taught, pictures)
+            teacher_taps = self.teacher[0].taps(pictures)
+            teacher_logits = self.teacher[0].decode(teacher_taps, pictures)
         taps = student.taps(pictures)
         logits = student.decode(taps)
-        loss = LOGIT_GAIN * kl_divergence(logits, answer)
-        for adapter, ours, theirs in zip(self.adapters, taps[FIRST_TAP:], taught[FIRST_TAP:], strict=True):
+        loss = LOGIT_GAIN * kl_divergence(logits, teacher_logits)
+        for adapter, ours, theirs in zip(self.adapters, taps[FIRST_TAP:], teacher_taps[FIRST_TAP:], strict=True):
             goal = F.interpolate(
                 standardise_channels(theirs), size=ours.shape[2:], mode="bilinear", align_corners=False
             )
@@ -43,9 +46,9 @@ class Distillation(nn.Module):
         return logits, loss
 
 
-def kl_divergence(logits: Tensor, answer: Tensor) -> Tensor:
-    """Kullback-Leibler divergence from the teacher's class shares, mean over pixels."""
-    ours, theirs = (torch.log_softmax(x, 1) for x in (logits, answer))
+def kl_divergence(logits: Tensor, teacher_logits: Tensor) -> Tensor:
+    """Kullback-Leibler divergence from the teacher's class probabilities, mean over pixels."""
+    ours, theirs = (torch.log_softmax(x, 1) for x in (logits, teacher_logits))
     return F.kl_div(ours, theirs, reduction="none", log_target=True).sum(1).mean()
 
 

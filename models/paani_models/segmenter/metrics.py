@@ -1,4 +1,4 @@
-"""Segmentation figures: intersection over union with ignored pixels, and boundary F1 (U3, U4)."""
+"""Segmentation metrics: intersection over union with ignored pixels (U3), and boundary F1 (Csurka et al. 2013; U4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The segmenter: MobileNetV3-Small encoder, 64-channel top-down decoder (D1-D5).
+"""The paper's segmenter: MobileNetV3-Small encoder (Howard et al. 2019), 64-channel top-down decoder (D1-D5).
 
 Parameter names of the encoder follow torchvision's `mobilenet_v3_small().features`, so weights saved under
 those names load unchanged.
@@ -60,7 +60,7 @@ def _conv_norm(
 
 
 class SqueezeExcite(nn.Module):
-    """Channel attention: x scaled by a hard-sigmoid gate of its spatial mean."""
+    """Squeeze-and-excitation (Hu et al. 2018): each channel is scaled by a hard sigmoid of all channels' means."""
 
     def __init__(self, channels: int, squeezed: int) -> None:
         super().__init__()
@@ -68,8 +68,8 @@ class SqueezeExcite(nn.Module):
         self.fc2 = nn.Conv2d(squeezed, channels, 1)
 
     def forward(self, x: Tensor) -> Tensor:
-        gate = F.relu(self.fc1(F.adaptive_avg_pool2d(x, 1)))
-        return x * F.hardsigmoid(self.fc2(gate))
+        squeezed = F.relu(self.fc1(F.adaptive_avg_pool2d(x, 1)))
+        return x * F.hardsigmoid(self.fc2(squeezed))
 
 
 class InvertedResidual(nn.Module):
@@ -136,7 +136,7 @@ class PaperSegmenter(nn.Module):
         return outputs
 
     def decode(self, taps: list[Tensor]) -> Tensor:
-        """What `taps` gave -> logits at the input's size."""
+        """Encoder outputs, as `taps` gives them -> logits at the input's size."""
         *shallow, deepest = taps
         y = self.project(deepest)
         for lateral, refine, tap in zip(self.laterals, self.refines, reversed(shallow), strict=True):
@@ -153,7 +153,7 @@ def parameter_count(model: nn.Module) -> int:
 
 
 def segmenter_loss(logits: Tensor, target: Tensor) -> Tensor:
-    """Cross-entropy plus Dice, coefficient 1 each (S7).
+    """Cross-entropy plus Dice loss (Milletari et al. 2016), coefficient 1 each (S7).
 
     logits: float32 [N,3,H,W]. target: int64 [N,H,W], classes 0..2, 255 ignored by both terms.
     """

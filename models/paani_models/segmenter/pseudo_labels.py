@@ -1,4 +1,7 @@
-"""Masks for pictures that nobody segmented: what a trained segmenter is sure of; everything else is ignored."""
+"""Pseudo-labels (Lee 2013) for pictures that nobody segmented: confident predictions become masks, the rest is ignored.
+
+Ours: predictions are averaged with those of the mirrored picture, and water or sky in the core of a box is ignored.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +19,16 @@ from paani_models.network_input import SIZE_WH, segmenter_batch
 from paani_models.segmenter.train import UNSEGMENTED, CachedPicture
 from paani_models.training.training_state import to_device, training_device
 
-MIN_PROBABILITY = 0.9
+MIN_PROBABILITY = 0.9  # mean class probability from which a prediction becomes a label
 OBSTACLE = 1
 BOX_CORE_HALF_FRAC = 0.3  # half side of the part of a box, as a share of its sides, that is surely the boxed thing
 
 
 @torch.no_grad()
 def pseudo_label_pictures(net: nn.Module, pictures: list[CachedPicture], samples: list[Sample]) -> list[CachedPicture]:
-    """The same pictures in the same order, those of UNSEGMENTED with masks of the net's sure answers.
+    """Give the pictures of UNSEGMENTED masks of the network's confident predictions; the others stay as they are.
 
-    pictures[i] was made of samples[i]. Each is shown as it is and mirrored. In the core of a box nothing but obstacle
-    is taken for sure.
+    pictures[i] was made of samples[i]; the order stays. In the core of a box only obstacle is accepted.
     """
     net.eval().to(training_device())
     labelled = []

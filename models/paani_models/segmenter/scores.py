@@ -1,4 +1,4 @@
-"""The exported segmenter on annotated pictures: counts per picture, from which every figure is added up."""
+"""Score the exported segmenter on annotated pictures: counts per picture, from which every figure is summed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ScoredMask:
 
 
 def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
-    """Run the net over samples with masks. Raises UserError naming a file that cannot be read."""
+    """Run the network over samples with masks. Raises UserError naming a file that cannot be read."""
     segment = open_segmenter(net)
     scored = []
     for sample in tqdm(samples, "segmenter", unit="picture", mininterval=2.0):
@@ -49,9 +49,9 @@ def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
 
 
 def open_segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], U8]:
-    """A function from an RGB picture and a shape (H, W, ...) to segmenter classes uint8 [H,W].
+    """Open a segmenter as a function from an RGB picture and a shape (H, W, ...) to classes uint8 [H,W].
 
-    Size, preprocessing and order of classes are those of the net's contract.
+    Size, preprocessing and order of classes are those of the network's contract.
     """
     run, contract = open_network(net), read_contract(net, "segmenter")
     size_wh = contract.input.shape[:1:-1]
@@ -72,7 +72,7 @@ def label_from_logits(logits: F32, shape: tuple[int, ...]) -> U8:
 
 
 def read_truth(sample: Sample) -> U8:
-    """Read what people drew, in segmenter classes; where they drew only water, the rest is obstacle."""
+    """Read the mask that people drew, in segmenter classes; where they drew only water, the rest is obstacle."""
     if sample.mask is None:
         raise UserError(f"{sample.picture}: has no mask")
     drawn = sample.mask.parent.parent / WATER_MASKS / sample.mask.name if sample.source.water_only else sample.mask
@@ -80,7 +80,7 @@ def read_truth(sample: Sample) -> U8:
 
 
 def merge_undrawn_sky(label: U8, source: Source) -> U8:
-    """Sky counts as obstacle where people told only water from the rest."""
+    """Count sky as obstacle in sources whose masks distinguish only water."""
     return np.minimum(label, OBSTACLE) if source.water_only else label
 
 

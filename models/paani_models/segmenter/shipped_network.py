@@ -1,4 +1,6 @@
-"""The shipped segmenter: MobileNetV2 encoder that starts from ImageNet, separable decoder.
+"""The shipped segmenter: MobileNetV2 encoder (Sandler et al. 2018) from ImageNet, top-down decoder, detail branch.
+
+Ours: the encoder sees the picture at 11/16 size, and a thin branch at full size keeps the edges.
 
 The encoder's weights come with batch norm folded in (`convNN.weight`, `convNN.bias` in running order), for RGB in -1..1
 and padding on the bottom and right only before a stride.
@@ -28,8 +30,8 @@ _STAGES = (
 )
 _TAPS = (1, 2, 4, 5)  # stages at strides 4, 8, 16, 32
 TAP_CHANNELS = (24, 32, 96, 160)
-_FROZEN_STAGES = 2  # the first stages are general and the dearest to train
-ENCODER_SCALE = 11 / 16  # of the input's sides: as fast as the net of `paani_models.segmenter.paper_network`
+_FROZEN_STAGES = 2  # not trained: the most general features, and the costliest to train
+ENCODER_SCALE = 11 / 16  # of the input's sides: as fast as the network of `paani_models.segmenter.paper_network`
 DECODER_CHANNELS = 48
 DETAIL_CHANNELS = 16
 
@@ -148,7 +150,7 @@ class ShippedSegmenter(nn.Module):
         return taps
 
     def decode(self, taps: list[Tensor], x: Tensor) -> Tensor:
-        """What `taps` gave for an input -> logits at the input's size."""
+        """Encoder outputs, as `taps` gives them, and the input itself -> logits at the input's size."""
         *shallow, deepest = taps
         y = self.project(deepest) + F.relu(self.scene(deepest.mean((2, 3), keepdim=True)))
         for lateral, refine, tap in zip(self.laterals, self.refines, reversed(shallow), strict=True):

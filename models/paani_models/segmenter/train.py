@@ -1,4 +1,8 @@
-"""Train the segmenter from scratch, or go on from a checkpoint; resumable after any epoch."""
+"""Train a segmenter by cross-entropy plus Dice, with AdamW, a cosine schedule and averaged weights.
+
+Ours: draws balanced by source, pictures that show nothing labelled obstacle, and pasted walls and banks, so that an
+unusable picture or a wall does not read as open water. A run resumes after any epoch with the same result.
+"""
 
 from __future__ import annotations
 
@@ -38,10 +42,10 @@ from paani_models.training.training_state import (
     to_device,
 )
 
-CACHE_WH = (384, 288)
-NULL_FRAC = 0.12
-PASTE_ATTEMPT_FRAC = 0.9  # tries; about one donor in four has a patch to give
-UNSEGMENTED = "unsegmented"  # pictures of all sources without masks: only a teacher says what they show
+CACHE_WH = (384, 288)  # size at which pictures and masks are kept in memory [px]
+NULL_FRAC = 0.12  # share of pictures that show nothing
+PASTE_ATTEMPT_FRAC = 0.9  # share of pictures for which a patch is sought; about one donor in four has one
+UNSEGMENTED = "unsegmented"  # name of the pictures of all sources without masks, which a teacher or pseudo-labels label
 
 # Pictures drawn per epoch and source: sources with three human classes weigh more than their number.
 DRAWS_PER_EPOCH = {
@@ -88,7 +92,7 @@ class CachedPicture:
 
 
 def cache_pictures(samples: list[Sample]) -> list[CachedPicture]:
-    """Decode once, keep small: 3,000 pictures take about 1.5 GB. A picture without a mask is ignored everywhere."""
+    """Decode pictures and masks once, at CACHE_WH: 3,000 take about 1.5 GB. Without a mask, every pixel is ignored."""
     cached = []
     for sample in tqdm(samples, desc="decoding", unit="picture", mininterval=2.0):
         picture = cv2.resize(read_picture(sample.picture), CACHE_WH, interpolation=cv2.INTER_AREA)
@@ -137,21 +141,21 @@ class SegmenterTraining:
         folder.mkdir(parents=True, exist_ok=True)
         self.model, self.distillation = model, distillation
         gentle = model.encoder() if isinstance(model, ShippedSegmenter) else None
-        self.progress = TrainingState(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
+        self.state = TrainingState(model, recipe.peak_rate, recipe.weight_decay, distillation, gentle)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
         recipe = asdict(self.recipe)
-        self.progress.resume(self.folder, recipe)
-        while self.progress.epoch < (self.recipe.epochs if until is None else until):
+        self.state.resume(self.folder, recipe)
+        while self.state.epoch < (self.recipe.epochs if until is None else until):
             loss = self._train_epoch()
             figures = self.validate()
-            record = {"epoch": self.progress.epoch + 1, "seed": self.recipe.seed, "loss": round(loss, 4), **figures}
+            record = {"epoch": self.state.epoch + 1, "seed": self.recipe.seed, "loss": round(loss, 4), **figures}
             append_record(self.folder / "epochs.jsonl", record)
-            self.progress.finish_epoch(self.folder, recipe, figures["miou"])
+            self.state.finish_epoch(self.folder, recipe, figures["miou"])
 
     def _train_epoch(self) -> float:
-        recipe, progress, epoch = self.recipe, self.progress, self.progress.epoch
+        recipe, state, epoch = self.recipe, self.state, self.state.epoch
         stage = stage_at_epoch(recipe.stages, epoch)
         order = draw_epoch(self.train, recipe, epoch)
         steps = len(order) // recipe.batch
@@ -165,8 +169,8 @@ class SegmenterTraining:
         title = f"epoch {epoch + 1}/{recipe.epochs} {stage.width_px}x{stage.height_px}"
         for pictures, masks in tqdm(Prefetch[tuple[Tensor, Tensor]]()(make, steps), title, steps, mininterval=5.0):
             loss = self._loss(to_device(pictures), to_device(masks))
-            rate = learning_rate(recipe.peak_rate, progress.step, total, recipe.warmup_steps, recipe.final_frac)
-            progress.update(loss, rate, clip_norm=5.0)
+            rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps, recipe.final_frac)
+            state.update(loss, rate, clip_norm=5.0)
             losses.append(loss.item())
         return float(np.mean(losses))
 
@@ -185,10 +189,10 @@ class SegmenterTraining:
                 pairs.append(draw_null_pair(rng, size))
             else:
                 item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
-                shown = crop_land(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
-                picture, mask = shown or (item.picture, item.mask)
-                wanted = rng.random() < PASTE_ATTEMPT_FRAC
-                patch = crop_obstacle(rng, donor.picture, donor.mask) if wanted else None
+                land = crop_land(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None
+                picture, mask = land or (item.picture, item.mask)
+                seeks_patch = rng.random() < PASTE_ATTEMPT_FRAC
+                patch = crop_obstacle(rng, donor.picture, donor.mask) if seeks_patch else None
                 patch = draw_concrete(rng) if rng.random() < CONCRETE_FRAC else patch
                 pairs.append(augment_segmenter_pair(rng, picture, mask, size, patch))
         pictures = torch.from_numpy(segmenter_batch(np.stack([picture for picture, _ in pairs])))
@@ -197,13 +201,13 @@ class SegmenterTraining:
     @torch.no_grad()
     def validate(self) -> dict[str, float]:
         """IoU of the averaged weights on the held-out pictures at the current input size."""
-        stage = stage_at_epoch(self.recipe.stages, min(self.progress.epoch, self.recipe.epochs - 1))
+        stage = stage_at_epoch(self.recipe.stages, min(self.state.epoch, self.recipe.epochs - 1))
         size = (stage.width_px, stage.height_px)
         counts = np.zeros((len(SEGMENTER_CLASSES), len(SEGMENTER_CLASSES)), np.int64)
         for start in range(0, len(self.held_out), 16):
             chunk = self.held_out[start : start + 16]
             resized = np.stack([np.asarray(cv2.resize(p.picture, size), np.uint8) for p in chunk])
-            logits = self.progress.average.model(to_device(torch.from_numpy(segmenter_batch(resized))))
+            logits = self.state.average.model(to_device(torch.from_numpy(segmenter_batch(resized))))
             labels = logits.argmax(1).cpu().numpy().astype(np.uint8)
             for item, label in zip(chunk, labels, strict=True):
                 truth = np.asarray(cv2.resize(item.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)

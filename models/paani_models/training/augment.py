@@ -13,11 +13,11 @@ from paani_models.datasets.sources import IGNORE
 
 Rng = np.random.Generator
 
-# S8.
+# S8: share of pictures with glare, and shares of those with a soft blob and with glitter.
 GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC = 0.35, 0.7, 0.6
-MIRROR_FRAC = 0.3
-CONCRETE_FRAC = 0.12
-LAND_FRAC = 0.15  # tries; about one in three pictures has such a part
+MIRROR_FRAC = 0.3  # share of pictures with banks mirrored in the water
+CONCRETE_FRAC = 0.12  # share of pictures into which synthetic concrete is pasted
+LAND_FRAC = 0.15  # share of pictures for which a crop without water is sought; about one in three has one
 
 WATER, OBSTACLE = 0, 1
 
@@ -80,7 +80,7 @@ def jitter_colour(rng: Rng, picture: U8) -> U8:
 
 
 def add_glare(rng: Rng, picture: U8) -> U8:
-    """Sun on the water: a soft bright blob, and glitter of small strokes in the lower half (S8, S12)."""
+    """Add sun on the water: a soft bright blob, and glitter of small strokes in the lower half (S8, S12)."""
     height, width = picture.shape[:2]
     light = np.zeros((height, width), np.float32)
     if rng.random() < BLOB_FRAC:
@@ -112,7 +112,7 @@ def add_glare(rng: Rng, picture: U8) -> U8:
 
 
 def mirror_banks_in_water(rng: Rng, picture: U8, mask: U8) -> U8:
-    """Calm water: what stands above its far edge is mirrored in it, rippled, stretched and dimmed."""
+    """Mirror what stands above the water's far edge in it, rippled, stretched and dimmed, as in calm water."""
     height, width = mask.shape
     water = mask == WATER
     edge = np.where(water.any(0), water.argmax(0), 0).astype(np.float32)
@@ -127,7 +127,7 @@ def mirror_banks_in_water(rng: Rng, picture: U8, mask: U8) -> U8:
 
 
 def degrade_picture(rng: Rng, picture: U8) -> U8:
-    """Lens and sensor: blur, haze, noise, JPEG blocks; each sometimes."""
+    """Degrade as lens and sensor do: blur, haze, noise and JPEG blocks, each sometimes."""
     if rng.random() < 0.15:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.4, 1.8)).astype(np.uint8, copy=False)
     if rng.random() < 0.12:
@@ -160,9 +160,9 @@ def cover_rectangle(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8]:
 
 
 def crop_land(rng: Rng, picture: U8, mask: U8) -> tuple[U8, U8] | None:
-    """A part of the picture without any water, at least 60 % obstacle; None where eight tries find none.
+    """Crop a part without any water, at least 60 % obstacle; None where eight tries find none.
 
-    What a boat against a bank sees: land down to the bottom of the picture.
+    It stands for the view of a boat against a bank: land down to the bottom of the picture.
     """
     height, width = mask.shape
     for _ in range(8):
@@ -190,7 +190,7 @@ def crop_obstacle(rng: Rng, picture: U8, mask: U8) -> U8 | None:
 
 
 def draw_concrete(rng: Rng) -> U8:
-    """A smooth wall: one grey, stained in streaks that run down, sometimes with joints and a wet foot."""
+    """Draw a smooth wall: one grey, stained in vertical streaks, sometimes with joints and a wet foot."""
     height, width = 120, 240
     wall = np.full((height, width, 3), rng.uniform(50, 215), np.float32) + rng.normal(0, 6, 3).astype(np.float32)
     streaks = rng.standard_normal((int(rng.integers(1, 4)), int(rng.integers(10, 80))), dtype=np.float32)
@@ -209,7 +209,7 @@ def draw_concrete(rng: Rng) -> U8:
 def paste_obstacle(rng: Rng, picture: U8, mask: U8, patch: U8) -> tuple[U8, U8]:
     """Stand a patch in the picture: as a wall along one side, receding, or as a block; what it covers is obstacle.
 
-    It breaks the habit of rivers that whatever is at the bottom is water.
+    On rivers the bottom of the picture is otherwise always water, and the network would learn just that.
     """
     height, width = mask.shape
     if rng.random() < 0.7:
@@ -235,7 +235,7 @@ def paste_obstacle(rng: Rng, picture: U8, mask: U8, patch: U8) -> tuple[U8, U8]:
 
 
 def draw_null_picture(rng: Rng, target_wh: tuple[int, int]) -> U8:
-    """A picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, each with sensor noise."""
+    """Draw a picture that shows nothing: dark, bright, flat, gradient, covered lens or noise, with sensor noise."""
     width, height = target_wh
     kind = int(rng.integers(7))
     flat = np.zeros((height, width, 3), np.float32)
@@ -292,5 +292,5 @@ def augment_segmenter_pair(
 
 
 def draw_null_pair(rng: Rng, target_wh: tuple[int, int]) -> tuple[U8, U8]:
-    """A picture that shows nothing is all obstacle, so an unusable picture can never read as open water."""
+    """Draw a picture that shows nothing, labelled all obstacle, so that an unusable picture does not read as water."""
     return draw_null_picture(rng, target_wh), np.full((target_wh[1], target_wh[0]), OBSTACLE, np.uint8)

@@ -1,4 +1,4 @@
-"""What both trainings share: schedule, averaged weights, batches ahead of time, checkpoints, records."""
+"""State of a training run: schedule, averaged weights (Polyak and Juditsky 1992), prefetch, checkpoints, records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from paani.errors import UserError
 
 Batch = TypeVar("Batch")
 
-PRETRAINED_RATE_FACTOR = 0.3
+PRETRAINED_RATE_FACTOR = 0.3  # of the learning rate, for a part that starts from pretrained weights
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Stage:
 
 
 def stage_at_epoch(stages: tuple[Stage, ...], epoch: int) -> Stage:
-    """The stage that a zero-based epoch falls into."""
+    """Stage that a zero-based epoch belongs to."""
     for stage in stages:
         if epoch < stage.epochs:
             return stage
@@ -41,7 +41,7 @@ def stage_at_epoch(stages: tuple[Stage, ...], epoch: int) -> Stage:
 
 
 def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int, final_frac: float = 0.01) -> float:
-    """Linear warm-up, then cosine down to a share of the peak: one hundredth (S3) unless told."""
+    """Linear warm-up, then a cosine (Loshchilov and Hutter 2017) down to `final_frac` of the peak, by default S3's."""
     if step < warmup_steps:
         return peak * (step + 1) / warmup_steps
     progress = (step - warmup_steps) / max(1, total_steps - warmup_steps)
@@ -58,7 +58,7 @@ class AveragedWeights:
 
     @torch.no_grad()
     def update(self, model: nn.Module) -> None:
-        """Blend the model in; early updates weigh more, so the average never drags the random start along."""
+        """Blend the model in. Early updates weigh more, so that the random start is soon forgotten."""
         self.updates += 1
         keep = min(self.decay, self.updates / (self.updates + 10.0))
         current = model.state_dict()
@@ -70,7 +70,7 @@ class AveragedWeights:
 
 
 class Prefetch(Generic[Batch]):
-    """Batches in order, `ahead` of them being made in `workers` threads while the net trains."""
+    """Batches in order, `ahead` of them being made in `workers` threads while the network trains."""
 
     def __init__(self, workers: int = 2, ahead: int = 4) -> None:
         self.workers, self.ahead = workers, ahead
@@ -106,10 +106,10 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
 
 
 class TrainingState:
-    """Everything of a run that a checkpoint keeps, so that a resumed run equals an unbroken one (S11).
+    """Everything of a run that a checkpoint keeps, so that a resumed run equals an uninterrupted one (S11).
 
     extra: parameters that are trained along with the model and are not part of it.
-    gentle: a part of the model that is well trained already and learns at GENTLE_GAIN times the rate.
+    pretrained: a part of the model that learns at PRETRAINED_RATE_FACTOR times the rate.
     """
 
     def __init__(
@@ -127,13 +127,13 @@ class TrainingState:
         self.average = AveragedWeights(self.model)
         self.extra = extra.to(training_device()) if extra is not None else nn.Module()
         trained = [p for net in (self.model, self.extra) for p in net.parameters() if p.requires_grad]
-        slow = {id(p) for p in pretrained.parameters()} if pretrained is not None else set()
+        pretrained_ids = {id(p) for p in pretrained.parameters()} if pretrained is not None else set()
         groups = [
             {
-                "params": [p for p in trained if (id(p) in slow) == gently],
-                "gain": PRETRAINED_RATE_FACTOR if gently else 1.0,
+                "params": [p for p in trained if (id(p) in pretrained_ids) == is_pretrained],
+                "gain": PRETRAINED_RATE_FACTOR if is_pretrained else 1.0,
             }
-            for gently in (False, True)
+            for is_pretrained in (False, True)
         ]
         self.optimiser = torch.optim.AdamW([g for g in groups if g["params"]], peak_rate, weight_decay=weight_decay)
         self.epoch = 0
@@ -200,7 +200,7 @@ class TrainingState:
 
 
 def load_averaged_weights(model: nn.Module, checkpoint: Path) -> None:
-    """Fill a net with a checkpoint's averaged weights. Raises UserError naming a checkpoint that does not fit."""
+    """Fill a network with a checkpoint's averaged weights. Raises UserError naming a checkpoint that does not fit."""
     try:
         model.load_state_dict(load_checkpoint(checkpoint)["average"])
     except (KeyError, RuntimeError) as error:

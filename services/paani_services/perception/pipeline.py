@@ -179,7 +179,7 @@ class Perceiver:
             return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
         height, width = self._segmenter.contract.size_hw
         logits = self._segmenter.run(stretch_picture(bgr, height, width, self._tables[1]))
-        rows = self._segmenter.contract.rows_of(SEGMENTER_CLASSES)
+        rows = self._segmenter.contract.class_rows(SEGMENTER_CLASSES)
         return classify_cells(logits if rows is None else logits[:, rows], self._config.temperature)
 
     def _build_evidence(

@@ -1,1 +1,1 @@
-"""How well the image-quality check knows unusable pictures: each fault and severity, against the segmenter's error."""
+"""Measure the image-quality check on synthetic picture faults, against the segmenter's error on the same pictures."""

@@ -1,4 +1,4 @@
-"""`paani faults DATA`: what the image-quality check refuses, beside what each fault does to the segmenter."""
+"""`paani faults DATA`: what the image-quality check refuses, beside the segmenter's error on each fault."""
 
 import argparse
 import sys
@@ -50,7 +50,7 @@ class PictureModels:
         )[0]
 
     def judge(self, bgr: U8) -> UnusableCause:
-        """the image-quality verdict, as on the first picture of a camera."""
+        """Verdict of the image-quality check, as on the first picture of a camera."""
         return check_image_quality(ImageQualityState(), bgr, 0, self._config.image_quality, self._fitness)[1]
 
 

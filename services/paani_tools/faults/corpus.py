@@ -91,7 +91,7 @@ def read_scenes(source: Path, at_most: int, only: frozenset[str] | None = None) 
 
 
 def spread_evenly(items: list[T], at_most: int) -> list[T]:
-    """At most so many, at even distances."""
+    """Take at most so many items, at even distances."""
     if len(items) <= at_most:
         return items
     return [items[round(i * (len(items) - 1) / max(1, at_most - 1))] for i in range(at_most)]

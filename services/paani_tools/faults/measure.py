@@ -1,4 +1,4 @@
-"""the image-quality verdict and the segmenter's error on each fault and severity."""
+"""Measure the image-quality check's verdict and the segmenter's error on each fault and severity."""
 
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -50,7 +50,7 @@ class Totals(msgspec.Struct, frozen=True):
 
 
 def measure_levels(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> Iterator[LevelFigures]:
-    """Every cell in turn; the last is views without water.
+    """Measure every fault level in turn; the last row is views without water.
 
     segment: BGR uint8 [H, W, 3] to classes uint8 [h, w]. judge: one picture, as the first of a new camera.
     """
@@ -68,14 +68,14 @@ def measure_levels(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> I
 
 
 def measure_clean(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFigures:
-    """Pictures that nothing was done to."""
+    """Measure pictures without a fault."""
     causes = [judge(picture) for picture in pictures]
     refused = sorted(str(cause) for cause in causes if cause is not UnusableCause.NONE)
     return CleanFigures(source, len(causes), len(refused), tuple(dict.fromkeys(refused)))
 
 
 def sum_up(cells: Sequence[LevelFigures], clean: Sequence[CleanFigures]) -> Totals:
-    """The three shares that the image-quality check is held to."""
+    """Compute the three shares that are required of the image-quality check."""
 
     def share(wrong: int, n: int) -> float:
         return wrong / n if n else 0.0

@@ -27,7 +27,7 @@ HEADER = m.PictureHeader(source_us=1_000_000, frame_seq=7, frame_epoch=3, width_
 
 
 def foreign_segmenter(path: Path, order: tuple[str, ...], bias: float = 0.0) -> None:
-    """A net that calls the lower part of any picture water and the upper part sky, rows in `order`."""
+    """A network that calls the lower part of any picture water and the upper part sky, rows in `order`."""
     height, width = SIZE
     rows = np.arange(height, dtype=np.float32)[:, None] * np.ones(width, np.float32)
     scores = {"water": (rows - 45.0) / 4.0, "sky": (40.0 - rows) / 4.0, "obstacle": np.zeros_like(rows) + bias}
@@ -36,7 +36,7 @@ def foreign_segmenter(path: Path, order: tuple[str, ...], bias: float = 0.0) -> 
 
 
 def save(path: Path, answer: np.ndarray, input_shape: list[Any], kind: int = TensorProto.FLOAT) -> None:
-    """A net whose answer hardly depends on its input."""
+    """A network whose answer hardly depends on its input."""
     nodes = [
         helper.make_node("ReduceMean", ["input"], ["mean"], keepdims=0),
         helper.make_node("Mul", ["mean", "little"], ["nudge"]),
@@ -82,7 +82,7 @@ def test_a_foreign_segmenter_is_checked_and_used(foreign: Path, capsys: pytest.C
     said = capsys.readouterr().out
     assert "input [1, 3, 96, 160] float32" in said
     assert "classes sky, obstacle, water" in said
-    assert "warning" in said  # it calls black water, so only the gate stands before motion
+    assert "warning" in said  # it calls black water, so only the image-quality check stands before motion
     assert f"--set perception.segmenter={foreign}" in said
     evidence, mask = Perceiver(PerceptionConfig(segmenter=str(foreign)), stopwatch_ms).perceive(river(), HEADER, 0.0)
     assert mask is not None

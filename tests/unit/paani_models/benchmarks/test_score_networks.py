@@ -1,4 +1,4 @@
-"""The nets on miniatures of LaRS and MODS: read, scored, and written in the formats that the benchmarks take."""
+"""The networks on miniatures of LaRS and MODS: read, scored, and written in the formats that the benchmarks take."""
 
 from __future__ import annotations
 

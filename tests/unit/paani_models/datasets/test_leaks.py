@@ -19,7 +19,13 @@ from tests.unit.paani_models.datasets.public_sets import scene
 
 def printed(picture: NDArray[np.uint8], name: str, split: str, sequence: str = "", sha: str = "") -> Fingerprint:
     return fingerprint_picture(
-        picture, source="river", identity=name, sequence=sequence, split=split, place=f"{name}.jpg", sha256=sha or name
+        picture,
+        source="river",
+        identity=name,
+        sequence=sequence,
+        split=split,
+        location=f"{name}.jpg",
+        sha256=sha or name,
     )
 
 
@@ -67,9 +73,9 @@ def test_ids_sequences_and_bytes_are_certain() -> None:
         printed(scene(3), "c", "train", sha="x"),
         printed(scene(4), "d", "test", sha="x"),
         printed(scene(5), "e", "train"),
-        replace(printed(scene(6), "e", "val"), place="other/e.jpg"),
+        replace(printed(scene(6), "e", "val"), location="other/e.jpg"),
     ]
-    causes = {(leak.first.place, leak.second.place): leak.cause for leak in find_leaks(pictures)}
+    causes = {(leak.first.location, leak.second.location): leak.cause for leak in find_leaks(pictures)}
     assert causes == {
         ("a.jpg", "b.jpg"): "sequence",
         ("c.jpg", "d.jpg"): "file",

@@ -15,7 +15,7 @@ from paani.clock import stopwatch_ms  # noqa: E402
 from paani.config import DetectorConfig, PerceptionConfig  # noqa: E402
 from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import load_catalogue  # noqa: E402
-from paani_models.detector import train as train_detector  # noqa: E402
+from paani_models.detector import train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.paper_data import Augmentation, augment_paper_example, jitter_hsv  # noqa: E402
 from paani_models.detector.paper_loss import assign_task_aligned, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
@@ -47,7 +47,7 @@ def picture(kind: int, seed: int, width: int = 160, height: int = 128) -> BoxedP
 
 
 def with_statistics() -> Yolo11n:
-    """A net whose normalisations have seen something, so that folding them changes the weights."""
+    """A network whose normalisations have seen something, so that folding them changes the weights."""
     torch.manual_seed(1)
     net = Yolo11n()
     net.train()
@@ -204,12 +204,12 @@ def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
         if isinstance(module, torch.nn.BatchNorm2d):
             module.momentum = 0.3
     run = Yolo11nTraining(net, recipe, folder, items * 4, items)
-    run.progress.average.decay = 0.8
+    run.state.average.decay = 0.8
     return run
 
 
 def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
     small_run(tmp_path, 12).run()
     rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
     totals = [sum(row[part] for part in ("box_loss", "score_loss", "bins_loss")) for row in rows]
@@ -219,7 +219,7 @@ def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
     small_run(tmp_path / "whole", 2).run()
     small_run(tmp_path / "broken", 2).run(until=1)
     torch.manual_seed(999)
@@ -231,11 +231,11 @@ def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytes
 
 
 def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train_detector, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
     run = small_run(tmp_path, 5)
     run.recipe = replace(run.recipe, peak_rate=0.0, warmup_bias_rate=0.0, patience=1)
     run.run()
-    assert run.progress.epoch == 2
+    assert run.state.epoch == 2
 
 
 def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:

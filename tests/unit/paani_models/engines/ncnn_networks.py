@@ -1,4 +1,4 @@
-"""Small nets in both forms, their converted files, and a program with the converter's manners."""
+"""Small networks in both forms, their converted files, and a program with the converter's manners."""
 
 from __future__ import annotations
 

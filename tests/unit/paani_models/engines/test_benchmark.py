@@ -52,7 +52,7 @@ def test_multiply_adds_need_a_readable_static_net(tmp_path: Path) -> None:
 
 
 def timed(**pair_ms: float) -> list[TimingRow]:
-    """`ncnn_2=40`: both nets by ncnn with two threads, half of it each."""
+    """`ncnn_2=40`: both networks by ncnn with two threads, half of it each."""
     return [
         TimingRow(engine, net, int(threads), took / 2, took / 2, took, 9)
         for name, took in pair_ms.items()

@@ -1,4 +1,4 @@
-"""A net without its last resize: which resizes are left out, and what perception then reads of a user's own net."""
+"""A network without its last resize: which resizes are left out, and what perception then reads of a user's own net."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HALF_PIXEL, ASYMMETRIC, CORNERS = "half_pixel", "asymmetric", "align_corners"
 
 
 def ends_with(factor: int, *, mode: str = "nearest", place: str = ASYMMETRIC, after: str | None = None) -> bytes:
-    """A net that averages its picture over cells, and resizes that; then `after`, if there is such a step."""
+    """A network that averages its picture over cells, and resizes that; then `after`, if there is such a step."""
     pads = {"coordinate_transformation_mode": place, "mode": mode, "nearest_mode": "floor"}
     last = "resized" if after else "logits"
     nodes = [

@@ -1,4 +1,4 @@
-"""Nets that take pictures as bytes and answer once per cell: the same evidence as the float contract."""
+"""Networks that take pictures as bytes and answer once per cell: the same evidence as the float contract."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""INT8: what equalisation mends, what calibration may see, what goes blind, and the gate's rule (T4 - T6, V10)."""
+"""INT8: what equalisation mends, what calibration may see, what goes blind, and the acceptance rule (T4 - T6, V10)."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_equalisation_changes_no_answer_and_evens_the_channels(tmp_path: Path) -
 
 
 def test_equalisation_leaves_what_a_factor_cannot_pass(tmp_path: Path) -> None:
-    """A sigmoid between two convolutions closes the group; so does the net's own output."""
+    """A sigmoid between two convolutions closes the group; so does the network's own output."""
     small_net(tmp_path / "net.onnx", spread=16.0)
     model = onnx.load(str(tmp_path / "net.onnx"))
     for node in model.graph.node:
@@ -238,7 +238,7 @@ def test_decoding_reaches_past_the_expected_distance_to_the_last_convolutions(tm
         (24.5, 1.53, False, False, "loses 24.50 points"),  # the paper's own: .9750 -> .7303, 6.969 -> 10.651 ms
     ],
 )
-def test_the_gate_decides_by_rule_and_says_why_t5(
+def test_acceptance_decides_by_rule_and_says_why_t5(
     loss: float, ratio: float, for_size: bool, accepted: bool, word: str
 ) -> None:
     said = decide_acceptance(loss, ratio, for_size=for_size)

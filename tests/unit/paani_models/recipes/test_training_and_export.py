@@ -11,12 +11,12 @@ torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 from paani.errors import UserError  # noqa: E402
 from paani_models.commands.models import main  # noqa: E402
-from paani_models.detector import train as train_detector  # noqa: E402
+from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, build_network, largest_export_difference, write_onnx  # noqa: E402
 from paani_models.recipes.train_and_export import parse_stages  # noqa: E402
-from paani_models.segmenter import train as train_segmenter  # noqa: E402
+from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
 from paani_models.training.training_state import (  # noqa: E402
@@ -31,13 +31,13 @@ from paani_models.training.training_state import (  # noqa: E402
 
 pytestmark = pytest.mark.train
 
-SMALL = train_segmenter.SegmenterRecipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
+SMALL = segmenter_train.SegmenterRecipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
 
 
 @pytest.fixture
 def river(monkeypatch: pytest.MonkeyPatch) -> list[CachedPicture]:
     """Six striped pictures: sky above bank above water."""
-    monkeypatch.setitem(train_segmenter.DRAWS_PER_EPOCH, "river", 7)
+    monkeypatch.setitem(segmenter_train.DRAWS_PER_EPOCH, "river", 7)
     rng = np.random.default_rng(0)
     pictures = []
     for _ in range(6):
@@ -85,14 +85,14 @@ def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPictur
 
 @pytest.mark.train
 def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train_detector, "NULL_DRAWS", 1)
+    monkeypatch.setattr(detector_train, "NULL_DRAWS", 1)
     picture = np.full((256, 320, 3), 90, np.uint8)
     picture[100:150, 100:200] = (200, 30, 30)
     box = np.array([[1, 100 / 320, 100 / 256, 200 / 320, 150 / 256]], np.float32)
     item = BoxedPicture("mcoe_boats", picture, box, np.array([0, 1, 0, 1], np.uint8))
-    recipe = train_detector.DetectorRecipe(epochs=2, batch=4, warmup_steps=1)
+    recipe = detector_train.DetectorRecipe(epochs=2, batch=4, warmup_steps=1)
     torch.manual_seed(0)
-    run = train_detector.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item])
+    run = detector_train.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item])
     run.run()
     rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
     assert rows[0]["vessel"]["n"] == 1
@@ -103,14 +103,14 @@ def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.Monk
 def test_epoch_order_depends_on_seed_and_epoch_only_and_holds_the_nulls(
     river: list[CachedPicture],
 ) -> None:
-    orders = [train_segmenter.draw_epoch(river, SMALL, epoch) for epoch in (0, 0, 1)]
+    orders = [segmenter_train.draw_epoch(river, SMALL, epoch) for epoch in (0, 0, 1)]
     assert orders[0] == orders[1] != orders[2]
     assert orders[0].count(-1) == round(7 * 0.12 / 0.88)
 
 
 def test_rendered_pictures_are_two_in_ten_of_the_shown_ones(river: list[CachedPicture]) -> None:
     rendered = [replace(item, source="rendered") for item in river]
-    order = train_segmenter.draw_epoch(river + rendered, SMALL, 0)
+    order = segmenter_train.draw_epoch(river + rendered, SMALL, 0)
     shown = [i for i in order if i >= 0]
     assert sum(i >= len(river) for i in shown) == 2
     assert len(shown) == 9
@@ -125,7 +125,7 @@ def test_learning_rate_warms_up_and_ends_at_one_hundredth_s3() -> None:
 
 def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
     """50 epochs, batch 16, 320x256; AdamW at 3e-4, decay 1e-4, cosine over all 50 epochs to zero; seed 42."""
-    recipe = train_segmenter.PAPER_RECIPE
+    recipe = segmenter_train.PAPER_RECIPE
     assert recipe.stages == (Stage(50, 256, 320),)
     assert (recipe.epochs, recipe.batch, recipe.seed) == (50, 16, 42)
     assert (recipe.peak_rate, recipe.weight_decay) == (3e-4, 1e-4)

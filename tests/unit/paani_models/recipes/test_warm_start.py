@@ -1,4 +1,4 @@
-"""An exported net goes back into PyTorch and answers as before."""
+"""An exported network goes back into PyTorch and answers as before."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_a_loaded_export_answers_like_the_file(make: type[nn.Module], tmp_path: 
 
 
 def test_batch_statistics_start_close_to_the_stored_ones(tmp_path: Path) -> None:
-    """In training the net normalises by the batch; on the pictures of the statistics that changes nothing."""
+    """In training the network normalises by the batch; on the pictures of the statistics that changes nothing."""
     torch.manual_seed(0)
     path = tmp_path / "net.onnx"
     write_onnx(trained(PaperSegmenter()), CONTRACTS["segmenter"], path)

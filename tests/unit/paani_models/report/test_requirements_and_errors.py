@@ -1,4 +1,4 @@
-"""What limits the nets: where mistakes lie, what becomes of each object, and how figures stand against their bars."""
+"""Error analysis of both networks, and how figures compare with their requirements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes, sizes and orders of the two nets (C1, C2, C4, D2 - D6, D9)."""
+"""Shapes, sizes and orders of the two networks (C1, C2, C4, D2 - D6, D9)."""
 
 import numpy as np
 import pytest

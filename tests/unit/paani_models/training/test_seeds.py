@@ -9,12 +9,12 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
-from paani_models.segmenter import train as train_segmenter  # noqa: E402
+from paani_models.segmenter import train  # noqa: E402
 from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
 from paani_models.training.training_state import Stage  # noqa: E402
 
-RECIPE = train_segmenter.SegmenterRecipe(stages=(Stage(3, 64, 64),), batch=4, warmup_steps=2)
+RECIPE = train.SegmenterRecipe(stages=(Stage(3, 64, 64),), batch=4, warmup_steps=2)
 
 
 def striped(rng: np.random.Generator) -> CachedPicture:
@@ -28,8 +28,8 @@ def striped(rng: np.random.Generator) -> CachedPicture:
 @pytest.mark.train
 @pytest.mark.slow
 def test_w8_every_seed_learns_and_none_like_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """W8: the seed is the recipe's; three give three nets, whose loss falls, and one seed gives its net again."""
-    monkeypatch.setitem(train_segmenter.DRAWS_PER_EPOCH, "river", 7)
+    """W8: the seed is the recipe's. Three seeds give three networks whose loss falls; one seed repeats its network."""
+    monkeypatch.setitem(train.DRAWS_PER_EPOCH, "river", 7)
     pictures = [striped(np.random.default_rng(k)) for k in range(6)]
 
     def losses(name: str, seed: int) -> list[float]:
