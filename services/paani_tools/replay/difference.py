@@ -40,6 +40,28 @@ def first_difference(at_us: int, sent: m.OutputMessage, recorded: bytes, compute
     )
 
 
+def as_recorded(computed: bytes, recorded: bytes | None) -> bytes:
+    """The computed payload without the fields that the version which recorded did not have.
+
+    Messages and states are closed structures that only ever gain fields, so that an absent field is an added one.
+    """
+    if recorded is None or computed == recorded:
+        return computed
+    try:
+        before, now = msgspec.json.decode(recorded), msgspec.json.decode(computed)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        return computed
+    return msgspec.json.encode(_without_added(before, now))
+
+
+def _without_added(before: Any, now: Any) -> Any:
+    if isinstance(before, dict) and isinstance(now, dict):
+        return {name: _without_added(before[name], value) for name, value in now.items() if name in before}
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        return [_without_added(one, other) for one, other in zip(before, now, strict=True)]
+    return now
+
+
 def differing_fields(recorded: bytes, computed: bytes) -> Iterator[tuple[str, Any, Any]]:
     """(path, recorded value, computed value) of every leaf that differs; nothing where either is not JSON."""
     try:

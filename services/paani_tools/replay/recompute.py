@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
+from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import LATE_US, NO_PAYLOADS, Ledger, MessageId, RecordedStep
 
 
@@ -129,7 +130,8 @@ class Recomputation:
                 self._lose(SkipReason.STATE_UNREADABLE, None)
                 return RecomputedStep(given, skip=SkipReason.STATE_UNREADABLE, detail=str(error))
             if self._state is not None and not self._evolve:
-                same = self._encoder.encode(self._state).decode() == step.state
+                state = step.state.encode()
+                same = as_recorded(self._encoder.encode(self._state), state) == state
             if self._state is None or not self._evolve:
                 self._state = recorded
         if self._state is None:
@@ -143,7 +145,8 @@ class Recomputation:
         try:
             self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
             compared = tuple(
-                (sent, recorded, self._encoded(sent, outputs[sent.topic])) for sent, recorded in given.sent
+                (sent, recorded, as_recorded(self._encoded(sent, outputs[sent.topic]), recorded))
+                for sent, recorded in given.sent
             )
         except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
             self._lose(SkipReason.AFTER_BREAK, None)

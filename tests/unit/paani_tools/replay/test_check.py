@@ -14,6 +14,7 @@ from paani.config import with_settings
 from paani.decider import decider_of
 from paani.logs.reader import Record
 from paani_tools.replay.check import ServiceCheck, check_service
+from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Losses
 from paani_tools.replay.whatif import changes_of
@@ -290,3 +291,13 @@ def test_a_recorder_that_began_again_leaves_an_explained_gap(service: str) -> No
     result = check(service, records, None, recordings)
     assert result.is_exact, result.unexplained
     assert result.decisions > 80
+
+
+def test_a_field_added_since_the_recording_is_left_out_and_a_changed_one_is_not() -> None:
+    recorded = b'{"seq":1,"left":{"risk":0.5},"tracks":[{"id":1}]}'
+    computed = b'{"seq":1,"left":{"risk":0.5,"limit":0.58},"tracks":[{"id":1,"urgency":0.0}],"purpose":"PASS"}'
+    assert as_recorded(computed, recorded) == recorded
+    assert as_recorded(computed.replace(b"0.5,", b"0.25,"), recorded) != recorded
+    assert as_recorded(b'{"seq":1}', recorded) != recorded
+    assert as_recorded(computed, None) == computed
+    assert as_recorded(computed, b"{") == computed
