@@ -11,13 +11,15 @@ from paani.messages import (
     Direction,
     Evidence,
     Odometry,
+    Purpose,
     Reason,
     Tracks,
     UnusableCause,
 )
 from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
-from paani_services.advisor.policy import Decision, PolicyState, decide, frame_components, frame_facts, side_block_risk
+from paani_services.advisor.frame_facts import PolicyState, frame_facts, side_block_risk
+from paani_services.advisor.policy import Decision, advised_purpose, decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
     TrackerState,
@@ -65,6 +67,7 @@ def advise(
             direction=Direction.NO_DATA,
             reason=Reason.NO_EVIDENCE,
             counterfactual=NEEDS_NEW_EVIDENCE,
+            purpose=Purpose.PASS,
         )
         tracks = Tracks(source_us=now_us, frame_seq=0, frame_epoch=0)
     else:
@@ -145,4 +148,5 @@ def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, confi
         frame_epoch=evidence.frame_epoch,
         evidence_sent_us=evidence.sent_us,
         counterfactual=decision.counterfactual,
+        purpose=advised_purpose(decision),
     )

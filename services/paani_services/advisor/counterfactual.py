@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from paani.arrays import F64, Bools
 from paani.config import Config
 from paani.messages import ChangedBy, Counterfactual, Direction, Lane, Limit, Reason, Removal
+from paani_services.advisor.frame_facts import OPPOSITE_SIDE, FrameFacts
 from paani_services.advisor.policy import (
-    OPPOSITE_SIDE,
     Decision,
     Evaluation,
-    FrameFacts,
     PolicyInput,
     evaluate,
     frame_components,

@@ -19,6 +19,7 @@ from paani.messages import (
     Mission,
     NavCommand,
     Odometry,
+    Purpose,
     SimTime,
 )
 from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
@@ -201,9 +202,18 @@ def _steer_planned(
 
 
 def _is_turn_to_look(advisory: Advisory | None) -> bool:
-    """Whether a turn is advised towards a side that is blocked: to look there, not to go there."""
-    side = TURN_SIDE.get(advisory.direction, 0.0) if advisory is not None else 0.0
-    return advisory is not None and ((side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked))
+    """Whether the advised turn is to look for a way, not to go there."""
+    if advisory is None:
+        return False
+    purpose = _infer_purpose(advisory) if advisory.purpose is Purpose.UNSAID else advisory.purpose
+    return purpose is Purpose.LOOK
+
+
+def _infer_purpose(advisory: Advisory) -> Purpose:
+    """The purpose of a recorded advisory that does not say it: a turn towards a side that is blocked is to look."""
+    side = TURN_SIDE.get(advisory.direction, 0.0)
+    is_blocked = (side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked)
+    return Purpose.LOOK if is_blocked else Purpose.PASS
 
 
 def _integrate_cross_track(

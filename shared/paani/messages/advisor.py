@@ -148,6 +148,18 @@ class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
     limit: Unit = 0.0
 
 
+class Purpose(StrEnum):
+    """What an advised direction is for.
+
+    PASS: to go there. LOOK: to turn towards a side that is blocked, on the spot, and look for a way. UNSAID: the
+    advisory was recorded before advisories said their purpose.
+    """
+
+    PASS = "PASS"
+    LOOK = "LOOK"
+    UNSAID = "UNSAID"
+
+
 class Lane(StrEnum):
     """A corridor of the picture."""
 
@@ -226,3 +238,4 @@ class Advisory(Message, frozen=True, kw_only=True):
     evidence_sent_us: Stamp = 0
     explanation: Text = ""
     counterfactual: Counterfactual = Counterfactual()
+    purpose: Purpose = Purpose.UNSAID

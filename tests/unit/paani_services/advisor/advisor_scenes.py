@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config
-from paani_services.advisor.policy import Decision, FrameFacts, PolicyState, decide, frame_components, frame_facts
+from paani_services.advisor.frame_facts import FrameFacts, PolicyState, frame_facts
+from paani_services.advisor.policy import Decision, decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, Obstacle, severity
 
 SIZES = (0.02, 0.08, 0.15, 0.3, 0.6)

@@ -14,7 +14,8 @@ from paani.config import Config, load_config
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.advisor.counterfactual import find_counterfactual, nearest_limit
 from paani_services.advisor.explanation import explain_advisory
-from paani_services.advisor.policy import PolicyState, decide, frame_components, frame_facts
+from paani_services.advisor.frame_facts import PolicyState, frame_facts
+from paani_services.advisor.policy import decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES
 from tests.unit.paani_services.advisor.advisor_evidence import (
     CALIBRATED,

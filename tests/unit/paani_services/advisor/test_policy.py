@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import msgspec
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config, load_config
-from paani_services.advisor.advise import advise
+from paani_services.advisor.advise import AdvisorState, advise
+from paani_services.advisor.policy import advised_purpose
 from tests.unit.paani_services.advisor.advisor_evidence import (
     CALIBRATED,
     CLEAR,
@@ -20,6 +23,7 @@ from tests.unit.paani_services.advisor.advisor_evidence import (
     seeing,
     water,
 )
+from tests.unit.paani_services.advisor.advisor_scenes import Scene, scenes
 
 D, R = m.Direction, m.Reason
 VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
@@ -40,9 +44,9 @@ def test_table_of_scenarios(
 ) -> None:
     """V11, V12, V13, V15, J5: the lanes' published risks give the published advice, frame after frame (U8: 8)."""
     _, advice, _ = play([water(*risks)] * 8, config, period_s=0.1)
-    for given in advice:
-        assert (given.direction, given.reason) == (direction, reason)
-        assert (given.left.risk, given.center.risk, given.right.risk) == pytest.approx(risks)
+    for advised in advice:
+        assert (advised.direction, advised.reason) == (direction, reason)
+        assert (advised.left.risk, advised.center.risk, advised.right.risk) == pytest.approx(risks)
 
 
 def test_v14_a_side_below_its_limit_may_still_be_occupied() -> None:
@@ -243,8 +247,8 @@ def test_occupancy_does_not_count_republishes() -> None:
     evidence = state.evidence
     assert evidence is not None
     for repeat in range(5):
-        state, given, _ = advise(state, evidence, evidence.source_us + 1000 * repeat, PAANI)
-        assert not given.center.occupied
+        state, advised, _ = advise(state, evidence, evidence.source_us + 1000 * repeat, PAANI)
+        assert not advised.center.occupied
 
 
 def test_j7_center_vessel() -> None:
@@ -267,8 +271,8 @@ def test_j10_a_turn_is_kept_until_two_distinct_clear_frames() -> None:
     evidence = state.evidence
     assert evidence is not None
     for repeat in range(5):
-        state, given, _ = advise(state, evidence, evidence.source_us + 10_000 * repeat, PAANI)
-        assert given.reason is R.TURN_RETAINED
+        state, advised, _ = advise(state, evidence, evidence.source_us + 10_000 * repeat, PAANI)
+        assert advised.reason is R.TURN_RETAINED
     _, advice, _ = play([clear], state=state, first_seq=2)
     assert (advice[0].direction, advice[0].reason) == (D.STRAIGHT, R.CENTER_CLEAR)
 
@@ -306,3 +310,21 @@ def test_no_turn_into_a_lane_without_water(shown: float) -> None:
     assert advice[0].direction is D.LEFT
     _, advice, _ = play([beach], PAPER)
     assert advice[0].direction is D.RIGHT
+
+
+@settings(max_examples=300, deadline=None)
+@given(scenes(6), st.sampled_from((PAANI, PAPER, CALIBRATED)))
+def test_only_a_turn_to_a_blocked_side_is_to_look(given_scene: Scene, config: Config) -> None:
+    """Every other advice is to pass; a search is advised with NO_SIDE_FOR_LONG alone."""
+    decision = given_scene.decided(config)
+    side = m.SIDE_OF.get(decision.direction)
+    looks = side is not None and getattr(decision, side).blocked
+    assert advised_purpose(decision) is (m.Purpose.LOOK if looks else m.Purpose.PASS)
+    assert looks is (decision.reason is R.NO_SIDE_FOR_LONG)
+
+
+def test_the_advisory_says_its_purpose() -> None:
+    _, advice, _ = play([BLOCKED_ALL_ROUND] * 42, CALIBRATED)
+    assert [a.purpose for a in advice] == [m.Purpose.PASS] * 40 + [m.Purpose.LOOK] * 2
+    _, advisory, _ = advise(AdvisorState(), None, 1_000_000, PAANI)
+    assert advisory.purpose is m.Purpose.PASS

@@ -12,15 +12,8 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, load_config
 from paani.statistics.dithering import Dithering, dithering
-from paani_services.advisor.policy import (
-    OPPOSITE_SIDE,
-    PolicyState,
-    frame_components,
-    frame_facts,
-    held_side,
-    lane_risk_limit,
-    preferred_side,
-)
+from paani_services.advisor.frame_facts import OPPOSITE_SIDE, PolicyState, frame_facts, held_side, lane_risk_limit
+from paani_services.advisor.policy import frame_components, preferred_side
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, severity
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, PAANI, PAPER, murky, play, water
 from tests.unit.paani_services.advisor.advisor_scenes import Scene, scene, scenes
