@@ -1,1 +1,1 @@
-"""The operator's page: what the boat sees, thinks and does; one STOP."""
+"""Dashboard: the operator's page with its STOP, and the operator's messages on the bus."""

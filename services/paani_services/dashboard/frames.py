@@ -11,7 +11,7 @@ MAX_KEY_BYTES, MAX_HEADER_BYTES = 0xFF, 0xFFFF
 
 
 class FrameHeader(msgspec.Struct, frozen=True, omit_defaults=True):
-    """`age_ms` is how long the message had lain here when the frame was made; `picture` describes a picture's body."""
+    """`age_ms`: time from the message's receipt until the frame was made. `picture`: a picture's header."""
 
     age_ms: int
     picture: msgspec.Raw = msgspec.Raw()

@@ -1,4 +1,4 @@
-"""The page's files, read once, and the headers that keep a browser to this server alone."""
+"""The page's static files, read once, and the headers that restrict a browser to this server."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MEDIA_TYPES = {
     ".css": "text/css",
     ".svg": "image/svg+xml",
 }
-TOKEN_MARK = "{{arm-token}}"
+TOKEN_PLACEHOLDER = "{{arm-token}}"
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
         "default-src 'self'; img-src 'self' blob: data:; base-uri 'none'; form-action 'none';"
@@ -28,17 +28,17 @@ SECURITY_HEADERS = {
 }
 
 
-class Page(msgspec.Struct, frozen=True):
+class StaticFile(msgspec.Struct, frozen=True):
     media_type: str
     body: bytes
 
 
-def load_pages(token: str) -> dict[str, Page]:
+def load_static_files(token: str) -> dict[str, StaticFile]:
     """Every file of the page by name; the arm token is written into `index.html`."""
     pages = {}
     for path in sorted(STATIC.iterdir()):
         media_type = MEDIA_TYPES.get(path.suffix)
         if media_type is not None:
-            text = path.read_text(encoding="utf-8").replace(TOKEN_MARK, token)
-            pages[path.name] = Page(media_type, text.encode())
+            text = path.read_text(encoding="utf-8").replace(TOKEN_PLACEHOLDER, token)
+            pages[path.name] = StaticFile(media_type, text.encode())
     return pages

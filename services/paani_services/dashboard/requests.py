@@ -1,4 +1,4 @@
-"""What may be asked of the page's server, and by which page. Pure."""
+"""Requests that the dashboard's server accepts, and from which pages. Pure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class BadRequestError(Exception):
-    """One line and the field at fault."""
+    """A malformed request: one line that says why, and the field at fault."""
 
     def __init__(self, text: str, field: str) -> None:
         super().__init__(text)
@@ -22,7 +22,7 @@ class BadRequestError(Exception):
 
 
 class ArmRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Arming takes a control held for a second and let go before it expires."""
+    """Arming needs a button held for at least a second and released within five."""
 
     held_ms: Annotated[int, msgspec.Meta(ge=HOLD_MIN_MS, le=HOLD_MAX_MS)]
 
@@ -34,31 +34,31 @@ class SnapshotQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class NoQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Requests that take nothing."""
+    """A request without parameters."""
 
 
-def read_body(body: bytes, kind: type[T]) -> T:
-    """Raises BadRequestError naming the field."""
+def decode_body(body: bytes, kind: type[T]) -> T:
+    """The body as this type. Raises BadRequestError naming the field."""
     try:
         return msgspec.json.decode(body, type=kind)
     except msgspec.MsgspecError as error:
-        raise _bad(error, "body") from error
+        raise _bad_request(error, "body") from error
     except UnicodeDecodeError as error:
         raise BadRequestError("body: not UTF-8", "body") from error
 
 
-def read_query(query: dict[str, str], kind: type[T]) -> T:
-    """Raises BadRequestError naming the parameter."""
+def decode_query(query: dict[str, str], kind: type[T]) -> T:
+    """The query as this type. Raises BadRequestError naming the parameter."""
     try:
         return msgspec.convert(query, kind, strict=False)
     except msgspec.ValidationError as error:
-        raise _bad(error, "query") from error
+        raise _bad_request(error, "query") from error
 
 
-def is_our_host(host_header: str, bound_host: str) -> bool:
+def is_own_host(host_header: str, bound_host: str) -> bool:
     """Whether a Host header names this server by address, as localhost, or as configured.
 
-    Any other name is a page elsewhere that had its own name resolve to us.
+    Any other name may belong to a foreign page whose name was made to resolve to this machine (DNS rebinding).
     """
     name = urlsplit(f"//{host_header}").hostname or ""
     if name in {"localhost", bound_host.lower()}:
@@ -71,11 +71,11 @@ def is_our_host(host_header: str, bound_host: str) -> bool:
 
 
 def is_same_origin(origin: str | None, host_header: str) -> bool:
-    """Whether a page served by this very server sent the request."""
+    """Whether the page that sent the request was served by this server."""
     return origin in {f"http://{host_header}", f"https://{host_header}"}
 
 
-def _bad(error: Exception, whole: str) -> BadRequestError:
+def _bad_request(error: Exception, whole: str) -> BadRequestError:
     text, _, path = str(error).partition(" - at ")
     field = path.strip("`").removeprefix("$").lstrip(".") or whole
     for marker in ("missing required field `", "unknown field `"):

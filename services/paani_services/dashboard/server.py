@@ -1,4 +1,4 @@
-"""The web server: the page, its socket, STOP and arm."""
+"""Web server of the dashboard: the page, its WebSocket, and the requests to stop, arm and tune."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from paani.config import DashboardConfig
 from paani.errors import UserError
 from paani_services.dashboard.console import Console
 from paani_services.dashboard.hub import Client, Event, Hub
-from paani_services.dashboard.pages import SECURITY_HEADERS, Page
+from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
 from paani_services.dashboard.requests import (
     ArmRequest,
     BadRequestError,
     NoQuery,
     SnapshotQuery,
-    is_our_host,
+    decode_body,
+    decode_query,
+    is_own_host,
     is_same_origin,
-    read_body,
-    read_query,
 )
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
@@ -42,7 +42,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """HTTP in front of the hub and the console."""
+    """HTTP routes to the hub, the console and the tuner."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Server:
         tuner: Tuner,
         clock: Clock,
         config: DashboardConfig,
-        pages: dict[str, Page],
+        pages: dict[str, StaticFile],
         token: str,
     ) -> None:
         self._hub, self._console, self._tuner = hub, console, tuner
@@ -79,16 +79,16 @@ class Server:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse strangers, answer errors in JSON, send the security headers with everything."""
+        """Refuse foreign hosts, answer errors in JSON, and add the security headers to every response."""
         try:
-            if request.path != STOP_PATH and not is_our_host(request.host, self._config.host):
-                response: web.StreamResponse = refusal(403, "Host: not a name of this server", "Host")
+            if request.path != STOP_PATH and not is_own_host(request.host, self._config.host):
+                response: web.StreamResponse = error_response(403, "Host: not a name of this server", "Host")
             else:
                 response = await handler(request)
         except BadRequestError as error:
-            response = refusal(400, str(error), error.field)
+            response = error_response(400, str(error), error.field)
         except web.HTTPException as error:
-            response = refusal(error.status, error.reason, request.path)
+            response = error_response(error.status, error.reason, request.path)
         if not response.prepared:
             response.headers.update(SECURITY_HEADERS)
         return response
@@ -100,100 +100,115 @@ class Server:
         return web.Response(body=page.body, content_type=page.media_type, charset="utf-8")
 
     async def _stop(self, request: web.Request) -> web.Response:
-        """Whoever asks, whatever they send: the boat stops."""
+        """Latch a STOP, whoever asks and whatever the request holds."""
         kept = await self._console.stop()
-        self._hub.tell(
-            Event(self._clock.now_us(), "stop", "STOP asked" + ("" if kept else "; the disk did not keep it"))
+        self._hub.publish_event(
+            Event(
+                self._clock.now_us(),
+                "stop",
+                "STOP requested"
+                + ("" if kept else "; it could not be written to disk and will not outlive this process"),
+            )
         )
-        return answer({"stopped": True, "kept": kept})
+        return json_response({"stopped": True, "kept": kept})
 
     async def _arm(self, request: web.Request) -> web.Response:
-        if (stranger := self._stranger(request, "arm")) is not None:
-            return stranger
-        read_body(await request.read(), ArmRequest)
-        if self._tuner.is_asking:
-            return refusal(409, "not armed: a tuning request waits for the advisor", "armed")
+        if (refused := self._refuse_other_page(request, "arm")) is not None:
+            return refused
+        decode_body(await request.read(), ArmRequest)
+        if self._tuner.is_waiting:
+            return error_response(409, "not armed: a tuning request waits for the advisor", "armed")
         if not await self._console.arm():
-            return refusal(409, "not armed: a STOP came meanwhile, or the latch could not be released on disk", "armed")
-        self._hub.tell(Event(self._clock.now_us(), "warn", "armed"))
-        return answer({"armed": True})
+            return error_response(
+                409, "not armed: a STOP came meanwhile, or the latch could not be released on disk", "armed"
+            )
+        self._hub.publish_event(Event(self._clock.now_us(), "warn", "armed"))
+        return json_response({"armed": True})
 
-    def _stranger(self, request: web.Request, deed: str) -> web.Response | None:
-        """The refusal for a request that is not of this server's own page, with its token."""
+    def _refuse_other_page(self, request: web.Request, action: str) -> web.Response | None:
+        """The error response to a request that does not come from this server's own page with its token, else None."""
         if not is_same_origin(request.headers.get("Origin"), request.host):
-            return refusal(403, f"Origin: only this server's own page may {deed}", "Origin")
+            return error_response(403, f"Origin: only this server's own page may {action}", "Origin")
         if not hmac.compare_digest(request.headers.get(TOKEN_HEADER, "").encode(), self._token.encode()):
-            return refusal(403, f"{TOKEN_HEADER}: not the token of this page; load it again", TOKEN_HEADER)
+            return error_response(403, f"{TOKEN_HEADER}: not the token of this page; load it again", TOKEN_HEADER)
         return None
 
     async def _propose(self, request: web.Request) -> web.Response:
-        if (stranger := self._stranger(request, "tune")) is not None:
-            return stranger
-        return tuning_answer(await self._tuner.propose(read_body(await request.read(), ProposeRequest).changes))
+        if (refused := self._refuse_other_page(request, "tune")) is not None:
+            return refused
+        return tuning_response(await self._tuner.propose(decode_body(await request.read(), ProposeRequest).changes))
 
     async def _promote(self, request: web.Request) -> web.Response:
-        return await self._name(request, m.TuningAct.PROMOTE)
+        return await self._send_act(request, m.TuningAct.PROMOTE)
 
     async def _rollback(self, request: web.Request) -> web.Response:
-        return await self._name(request, m.TuningAct.ROLLBACK)
+        return await self._send_act(request, m.TuningAct.ROLLBACK)
 
-    async def _name(self, request: web.Request, act: m.TuningAct) -> web.Response:
-        if (stranger := self._stranger(request, "tune")) is not None:
-            return stranger
-        return tuning_answer(await self._tuner.name(act, read_body(await request.read(), ProposalRequest).proposal))
+    async def _send_act(self, request: web.Request, act: m.TuningAct) -> web.Response:
+        if (refused := self._refuse_other_page(request, "tune")) is not None:
+            return refused
+        return tuning_response(
+            await self._tuner.send_act(act, decode_body(await request.read(), ProposalRequest).proposal)
+        )
 
     async def _tuning(self, request: web.Request) -> web.Response:
-        read_query(dict(request.query), NoQuery)
+        decode_query(dict(request.query), NoQuery)
         shadow, received_us = self._hub.newest(keys.SHADOW.name) or (None, 0)
         if shadow is None or (self._clock.now_us() - received_us) * 1e-6 > MAX_REPORT_AGE_S:
-            return refusal(503, "the advisor does not report", keys.SHADOW.name)
-        return answer(shadow)
+            return error_response(503, "the advisor has sent no report within the last seconds", keys.SHADOW.name)
+        return json_response(shadow)
 
     async def _snapshot(self, request: web.Request) -> web.Response:
-        wanted = read_query(dict(request.query), SnapshotQuery)
+        wanted = decode_query(dict(request.query), SnapshotQuery)
         value, received_us = self._hub.newest(keys.PICTURE.name) or (None, 0)
         age_s = (self._clock.now_us() - received_us) * 1e-6
         if not isinstance(value, Picture) or age_s > wanted.max_age_s:
-            return refusal(503, f"{keys.PICTURE.name}: no picture younger than {wanted.max_age_s:g} s", "max_age_s")
+            return error_response(
+                503, f"{keys.PICTURE.name}: no picture younger than {wanted.max_age_s:g} s", "max_age_s"
+            )
         headers = {"X-Age-S": f"{age_s:.3f}", "X-Frame-Id": f"{value.header.frame_epoch}.{value.header.frame_seq}"}
         return web.Response(body=value.data, content_type=value.header.media_type, headers=headers)
 
     async def _healthz(self, request: web.Request) -> web.Response:
-        read_query(dict(request.query), NoQuery)
+        decode_query(dict(request.query), NoQuery)
         state = self._console.state
-        return answer({"ok": True, "clients": len(self._hub.clients), "armed": state.armed, "stopped": state.stopped})
+        return json_response(
+            {"ok": True, "clients": len(self._hub.clients), "armed": state.armed, "stopped": state.stopped}
+        )
 
     async def _topics(self, request: web.Request) -> web.Response:
-        read_query(dict(request.query), NoQuery)
-        return answer([topic_row(topic) for topic in keys.TOPICS])
+        decode_query(dict(request.query), NoQuery)
+        return json_response([topic_row(topic) for topic in keys.TOPICS])
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):
-            return refusal(403, "Origin: only this server's own page may watch", "Origin")
+            return error_response(403, "Origin: only this server's own page may watch", "Origin")
         if len(self._hub.clients) >= MAX_CLIENTS:
-            return refusal(503, f"{MAX_CLIENTS} pages watch already", "clients")
+            return error_response(
+                503, f"{MAX_CLIENTS} pages are connected already; close one and load this again", "clients"
+            )
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, compress=False, max_msg_size=1024)
         socket.headers.update(SECURITY_HEADERS)
         await socket.prepare(request)
-        client = self._hub.join(self._clock.now_us())
+        client = self._hub.add_client(self._clock.now_us())
         sender = asyncio.create_task(send_all(socket, client))
         try:
             async for message in socket:
                 if message.type in {WSMsgType.TEXT, WSMsgType.BINARY}:
-                    await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"this socket only speaks")
+                    await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"this socket accepts no messages")
         finally:
-            self._hub.leave(client)
+            self._hub.remove_client(client)
             sender.cancel()
         return socket
 
 
 async def send_all(socket: web.WebSocketResponse, client: Client) -> None:
-    """Send what waits, newest wins; a client that takes nothing for `SEND_TIMEOUT_S` is let go."""
+    """Send the queued frames; a client that takes nothing for `SEND_TIMEOUT_S` is disconnected."""
     try:
         while True:
-            await client.bell.wait()
-            client.bell.clear()
-            while (frame := client.slots.pop()) is not None:
+            await client.frames_ready.wait()
+            client.frames_ready.clear()
+            while (frame := client.queue.pop()) is not None:
                 async with asyncio.timeout(SEND_TIMEOUT_S):
                     await socket.send_bytes(frame)
     except (ConnectionError, TimeoutError):
@@ -201,7 +216,7 @@ async def send_all(socket: web.WebSocketResponse, client: Client) -> None:
 
 
 async def start_server(app: web.Application, config: DashboardConfig) -> web.AppRunner:
-    """Listen on the configured host alone. Raises UserError naming `dashboard.port` or `dashboard.host`."""
+    """Listen on the configured host only. Raises UserError naming `dashboard.port` or `dashboard.host`."""
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     try:
@@ -214,7 +229,7 @@ async def start_server(app: web.Application, config: DashboardConfig) -> web.App
 
 
 def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:
-    """A row of the table of keys, for the page."""
+    """One row of the table of topics."""
     return {
         "name": topic.name,
         "type": topic.type.__name__,
@@ -226,16 +241,16 @@ def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:
     }
 
 
-def tuning_answer(shadow: m.Shadow | None) -> web.Response:
-    """The advisor's report as it answered; 409 where it refused, 503 where it was not heard."""
+def tuning_response(shadow: m.Shadow | None) -> web.Response:
+    """The advisor's report; status 409 where it refused the request, 503 where it did not answer."""
     if shadow is None:
-        return refusal(503, "the advisor did not answer", keys.SHADOW.name)
-    return answer(shadow, 200 if shadow.refusal is m.TuningRefusal.NONE else 409)
+        return error_response(503, "the advisor did not answer", keys.SHADOW.name)
+    return json_response(shadow, 200 if shadow.refusal is m.TuningRefusal.NONE else 409)
 
 
-def answer(value: object, status: int = 200) -> web.Response:
+def json_response(value: object, status: int = 200) -> web.Response:
     return web.Response(status=status, body=msgspec.json.encode(value), content_type="application/json")
 
 
-def refusal(status: int, text: str, field: str) -> web.Response:
-    return answer({"error": text, "field": field}, status)
+def error_response(status: int, text: str, field: str) -> web.Response:
+    return json_response({"error": text, "field": field}, status)

@@ -10,12 +10,12 @@ from paani.bus import Picture
 from paani.config import load_config
 from paani_services.dashboard.frames import decode_frame
 from paani_services.dashboard.hub import EVENT_KEY, Client, Event, Hub
-from paani_services.dashboard.settings import Lives, page_settings
+from paani_services.dashboard.page_state import ServiceLiveness, page_settings
 
 
 def taken(client: Client) -> dict[str, tuple[int, bytes]]:
     found = {}
-    while (frame := client.slots.pop()) is not None:
+    while (frame := client.queue.pop()) is not None:
         key, header, body = decode_frame(frame)
         found[key] = (header.age_ms, body)
     return found
@@ -29,8 +29,8 @@ async def test_a_late_joiner_gets_the_newest_with_its_age() -> None:
     hub = Hub()
     hub.put("operator/arming", arming(1), 1_000_000, 1_000_000)
     hub.put("operator/arming", arming(2), 2_000_000, 2_000_000)
-    hub.tell(Event(2_500_000, "warn", "eye is gone"))
-    got = taken(hub.join(5_000_000))
+    hub.publish_event(Event(2_500_000, "warn", "eye is gone"))
+    got = taken(hub.add_client(5_000_000))
     age_ms, body = got["operator/arming"]
     assert age_ms == 3000
     assert msgspec.json.decode(body, type=m.Arming).seq == 2
@@ -39,31 +39,31 @@ async def test_a_late_joiner_gets_the_newest_with_its_age() -> None:
 
 async def test_a_stalled_client_keeps_one_frame_per_key_and_the_other_gets_all() -> None:
     hub = Hub()
-    stalled, healthy = hub.join(0), hub.join(0)
+    stalled, healthy = hub.add_client(0), hub.add_client(0)
     for seq in range(100):
         hub.put("operator/arming", arming(seq), 0, 0)
         got = taken(healthy)
         assert msgspec.json.decode(got["operator/arming"][1], type=m.Arming).seq == seq
-    assert len(stalled.slots) == 1
-    assert stalled.slots.superseded == 99
+    assert len(stalled.queue) == 1
+    assert stalled.queue.superseded == 99
 
 
 async def test_nothing_is_encoded_while_nobody_watches() -> None:
     hub = Hub()
-    client = hub.join(0)
-    assert hub.watched.is_set()
-    hub.leave(client)
+    client = hub.add_client(0)
+    assert hub.has_clients.is_set()
+    hub.remove_client(client)
     hub.put("operator/arming", arming(1), 0, 0)
-    assert not hub.watched.is_set()
-    assert len(client.slots) == 0
+    assert not hub.has_clients.is_set()
+    assert len(client.queue) == 0
 
 
 async def test_a_picture_travels_as_its_bytes_with_its_header_beside() -> None:
     hub = Hub()
-    client = hub.join(0)
+    client = hub.add_client(0)
     header = m.PictureHeader(source_us=1, frame_seq=7, frame_epoch=3, width_px=4, height_px=2)
     hub.put(keys.PICTURE.name, Picture(header, b"\xff\xd8jpeg"), 0, 40_000)
-    frame = client.slots.pop()
+    frame = client.queue.pop()
     assert frame is not None
     key, head, body = decode_frame(frame)
     assert (key, head.age_ms, body) == ("camera/picture", 40, b"\xff\xd8jpeg")
@@ -71,8 +71,8 @@ async def test_a_picture_travels_as_its_bytes_with_its_header_beside() -> None:
 
 
 def test_restarts_are_counted() -> None:
-    lives = Lives()
-    known = [lives.hear("eye", alive=alive) for alive in (True, True, False, True)][-1]
+    lives = ServiceLiveness()
+    known = [lives.update("eye", alive=alive) for alive in (True, True, False, True)][-1]
     assert {life.service: life.starts for life in known.services}["eye"] == 2
 
 

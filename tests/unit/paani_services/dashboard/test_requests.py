@@ -9,10 +9,10 @@ from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
     SnapshotQuery,
-    is_our_host,
+    decode_body,
+    decode_query,
+    is_own_host,
     is_same_origin,
-    read_body,
-    read_query,
 )
 
 
@@ -33,12 +33,12 @@ from paani_services.dashboard.requests import (
 )
 def test_a_bad_arm_request_names_its_field(body: bytes, field: str) -> None:
     with pytest.raises(BadRequestError) as caught:
-        read_body(body, ArmRequest)
+        decode_body(body, ArmRequest)
     assert caught.value.field == field
 
 
 def test_a_held_control_is_enough() -> None:
-    assert read_body(b'{"held_ms":1000}', ArmRequest).held_ms == 1000
+    assert decode_body(b'{"held_ms":1000}', ArmRequest).held_ms == 1000
 
 
 @pytest.mark.parametrize(
@@ -46,13 +46,13 @@ def test_a_held_control_is_enough() -> None:
 )
 def test_a_bad_query_names_its_parameter(query: dict[str, str], field: str) -> None:
     with pytest.raises(BadRequestError) as caught:
-        read_query(query, SnapshotQuery)
+        decode_query(query, SnapshotQuery)
     assert caught.value.field == field
 
 
 def test_good_queries() -> None:
-    assert read_query({"max_age_s": "2.5"}, SnapshotQuery).max_age_s == 2.5
-    assert read_query({}, NoQuery) == NoQuery()
+    assert decode_query({"max_age_s": "2.5"}, SnapshotQuery).max_age_s == 2.5
+    assert decode_query({}, NoQuery) == NoQuery()
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_good_queries() -> None:
     ],
 )
 def test_a_name_that_is_not_ours_is_refused(host: str, ours: bool) -> None:
-    assert is_our_host(host, "otter.lan") is ours
+    assert is_own_host(host, "otter.lan") is ours
 
 
 def test_same_origin_is_exact() -> None:

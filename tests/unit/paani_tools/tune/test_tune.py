@@ -9,8 +9,8 @@ from paani import messages as m
 from paani.cli import main as paani
 from paani.config import load_config
 from paani.errors import UserError
-from paani_services.dashboard.requests import BadRequestError, read_body
-from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, event_of, is_answer
+from paani_services.dashboard.requests import BadRequestError, decode_body
+from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, describe_change, is_answer
 from paani_tools.tune.command import changes_from
 from paani_tools.tune.shadow_text import REFUSED, refusal_text, status_text
 from tests.conftest import find_free_port
@@ -115,7 +115,7 @@ def test_an_answer_is_to_this_request() -> None:
 def test_what_changes_is_told(before: dict[str, object] | None, now: dict[str, object], text: str | None) -> None:
     plain = m.Shadow(source_us=0, epoch=1)
     was = None if before is None else msgspec.structs.replace(plain, **before)
-    event = event_of(was, msgspec.structs.replace(plain, **now), 9)
+    event = describe_change(was, msgspec.structs.replace(plain, **now), 9)
     assert (event.text if event else None) == text
 
 
@@ -133,4 +133,4 @@ def test_what_changes_is_told(before: dict[str, object] | None, now: dict[str, o
 )
 def test_a_request_is_whole(body: bytes, kind: type[ProposeRequest | ProposalRequest]) -> None:
     with pytest.raises(BadRequestError):
-        read_body(body, kind)
+        decode_body(body, kind)

@@ -10,7 +10,7 @@ import pytest
 
 from paani import messages as m
 from paani.clock import ManualClock
-from paani_services.dashboard import operator as op
+from paani_services.dashboard import operator_state as op
 from paani_services.dashboard.console import LATCH_FILE, Console, read_latch, write_latch
 
 
@@ -50,32 +50,32 @@ def console(folder: Path) -> tuple[Console, Heard]:
     ],
 )
 def test_start(latch: str | None, arm_at_start: bool, armed: bool, stopped: bool) -> None:
-    state = op.at_start(latch, arm_at_start=arm_at_start)
+    state = op.initial_state(latch, arm_at_start=arm_at_start)
     assert (state.armed, state.stopped) == (armed, stopped)
-    word = op.arming(state, 5)
+    word = op.arming_message(state, 5)
     assert (word.armed, word.stopped) == (armed, stopped)
 
 
 def test_stop_holds_until_armed_again() -> None:
-    state = op.stop(op.arm(op.Operator()), 10)
-    assert (op.arming(state, 11).armed, op.arming(state, 11).stopped) == (False, True)
-    state = op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 12)
-    assert op.arming(state, 13).stopped
-    assert op.arming(op.arm(state), 14).armed
+    state = op.latch_stop(op.arm(op.OperatorState()), 10)
+    assert (op.arming_message(state, 11).armed, op.arming_message(state, 11).stopped) == (False, True)
+    state = op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 12)
+    assert op.arming_message(state, 13).stopped
+    assert op.arming_message(op.arm(state), 14).armed
 
 
 def test_a_stop_is_confirmed_only_by_zero_for_want_of_arming() -> None:
-    state = op.stop(op.Operator(armed=True), 1_000)
+    state = op.latch_stop(op.OperatorState(armed=True), 1_000)
     for cause, thrust in ((m.ZeroCause.NONE, 0.1), (m.ZeroCause.TIMEOUT, 0.0), (m.ZeroCause.PULSE_LOST, 0.0)):
-        state = op.hear_applied(state, applied(cause, thrust), 20_000)
+        state = op.confirm_stop(state, applied(cause, thrust), 20_000)
         assert state.confirmed_us == 0
-    state = op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 51_000)
+    state = op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 51_000)
     assert state.confirmed_us - state.asked_us == 50_000
-    assert op.hear_applied(state, applied(m.ZeroCause.NOT_ARMED), 90_000) == state
+    assert op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 90_000) == state
 
 
 def test_pressing_again_does_not_shorten_the_measured_time() -> None:
-    state = op.stop(op.stop(op.Operator(armed=True), 1_000), 40_000)
+    state = op.latch_stop(op.latch_stop(op.OperatorState(armed=True), 1_000), 40_000)
     assert (state.asked_us, state.stops) == (1_000, 2)
 
 
@@ -125,7 +125,7 @@ async def test_a_disk_that_refuses_stops_and_does_not_arm(tmp_path: Path) -> Non
 async def test_the_last_word_is_that_nobody_arms(tmp_path: Path) -> None:
     first, heard = console(tmp_path)
     await first.restore(arm_at_start=True)
-    speaking = asyncio.create_task(first.speak_always())
+    speaking = asyncio.create_task(first.publish_forever())
     await asyncio.sleep(0.01)
     assert heard.words[-1].armed
     speaking.cancel()
@@ -144,7 +144,7 @@ def test_the_latch_file_is_private_and_whole(tmp_path: Path) -> None:
 def test_an_unreadable_latch_is_a_stop(tmp_path: Path) -> None:
     path = tmp_path / LATCH_FILE
     path.write_bytes(b"\xff\xfe")
-    assert op.at_start(read_latch(path), arm_at_start=True).stopped
+    assert op.initial_state(read_latch(path), arm_at_start=True).stopped
     path.unlink()
     path.mkdir()
-    assert op.at_start(read_latch(path), arm_at_start=True).stopped
+    assert op.initial_state(read_latch(path), arm_at_start=True).stopped

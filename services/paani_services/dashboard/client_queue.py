@@ -1,12 +1,12 @@
-"""What waits for one client: the newest frame of each state, and a short ring of events. Pure."""
+"""Queue of frames for one client: the newest frame of each key, and a short ring of events. Pure."""
 
 from __future__ import annotations
 
 from collections import deque
 
 
-class Slots:
-    """A slow client loses old states and old events, both counted, and never holds anybody else up."""
+class ClientQueue:
+    """A slow client loses old states and old events, both counted, and never delays another client."""
 
     def __init__(self, event_depth: int = 32) -> None:
         self._states: dict[str, bytes] = {}
@@ -15,12 +15,12 @@ class Slots:
         self.dropped_events = 0
 
     def put_state(self, key: str, frame: bytes) -> None:
-        """The newest frame of a key replaces the one that waits, in its place in the row."""
+        """Queue the newest frame of a key; it replaces one that waits, in its place in the queue."""
         self.superseded += key in self._states
         self._states[key] = frame
 
     def put_event(self, frame: bytes) -> None:
-        """Events queue; a full ring drops its oldest."""
+        """Queue an event; a full ring drops its oldest."""
         self.dropped_events += len(self._events) == self._events.maxlen
         self._events.append(frame)
 

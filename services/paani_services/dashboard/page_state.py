@@ -1,4 +1,4 @@
-"""What the page needs to know of the configuration and of this process. Pure."""
+"""Messages of the dashboard to its page: settings, operator, and which services are alive. Pure."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import msgspec
 
 from paani import keys
 from paani.config import Config, CorridorConfig, RiskConfig
-from paani_services.dashboard.operator import Operator
+from paani_services.dashboard.operator_state import OperatorState
 
 
-class Freshness(msgspec.Struct, frozen=True):
+class TopicFreshness(msgspec.Struct, frozen=True):
     name: str
     producer: str
     rate_hz: float
@@ -17,7 +17,7 @@ class Freshness(msgspec.Struct, frozen=True):
 
 
 class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """Constant while the process lives."""
+    """Settings that the page shows or draws with; constant while the process runs."""
 
     vessel: str
     domain: int
@@ -27,12 +27,12 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     corridors: CorridorConfig
     weights: RiskConfig
     acceptance_m: float
-    topics: tuple[Freshness, ...]
+    topics: tuple[TopicFreshness, ...]
     services: tuple[str, ...]
 
 
 class PageOperator(msgspec.Struct, frozen=True, kw_only=True):
-    """The operator's word as the page shows it; `confirmed_ms` is None until the plant holds zero."""
+    """The operator's state; `confirmed_ms` is the time from a STOP to zero thrust, None until the plant reports it."""
 
     armed: bool
     stopped: bool
@@ -47,7 +47,7 @@ class ServiceLife(msgspec.Struct, frozen=True):
 
 
 class PageServices(msgspec.Struct, frozen=True):
-    """Liveliness as this process saw it; every start after the first is a restart."""
+    """Which services are alive; every start after the first is a restart."""
 
     services: tuple[ServiceLife, ...]
 
@@ -63,23 +63,23 @@ def page_settings(config: Config) -> PageSettings:
         corridors=config.perception.corridors,
         weights=config.advisor.risk,
         acceptance_m=config.navigator.acceptance_m,
-        topics=tuple(Freshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.TOPICS),
+        topics=tuple(TopicFreshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.TOPICS),
         services=config.services,
     )
 
 
-def page_operator(state: Operator) -> PageOperator:
+def page_operator(state: OperatorState) -> PageOperator:
     confirmed_ms = (state.confirmed_us - state.asked_us) * 1e-3 if state.confirmed_us else None
     return PageOperator(armed=state.armed, stopped=state.stopped, asked=state.asked_us > 0, confirmed_ms=confirmed_ms)
 
 
-class Lives:
-    """Counts starts of each service from liveliness events."""
+class ServiceLiveness:
+    """Counts the starts of each service from its liveliness events."""
 
     def __init__(self) -> None:
         self._lives = {name: ServiceLife(name, alive=False, starts=0) for name in keys.SERVICES}
 
-    def hear(self, service: str, alive: bool) -> PageServices:
+    def update(self, service: str, alive: bool) -> PageServices:
         before = self._lives.get(service, ServiceLife(service, alive=False, starts=0))
         starts = before.starts + (alive and not before.alive)
         self._lives[service] = ServiceLife(service, alive, starts)
