@@ -16,7 +16,7 @@ import numpy as np
 
 from paani.config import EyeConfig
 from paani_sim.eye.camera import BoatPose
-from paani_sim.eye.mounted import open_eye
+from paani_sim.eye.configured_camera import open_eye
 from paani_sim.worlds.load import load_scenario
 
 JPEG_QUALITY = 85

@@ -10,13 +10,13 @@ from paani_services.navigator.avoidance.rollout import Trajectories
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
-from paani_sim.eye.camera import BoatPose, look_from, project
-from paani_sim.eye.mounted import camera_of
+from paani_sim.eye.camera import BoatPose, camera_pose, project
+from paani_sim.eye.configured_camera import build_camera
 
 CONFIG = load_config()
 CAMERA = Camera(calibration_of(CONFIG.eye))
 PLANNER = CONFIG.navigator.planner
-EYE = camera_of(CONFIG.eye)
+EYE = build_camera(CONFIG.eye)
 ROWS, COLUMNS = 64, 80
 START_US = 5_000_000
 Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
@@ -27,7 +27,7 @@ ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
 
 def water_edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
     """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
-    position, turn = look_from(boat, EYE)
+    position, turn = camera_pose(boat, EYE)
     right = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * EYE.width_px
     up = (0.5 - (np.arange(ROWS) + 0.5) / ROWS) * EYE.height_px
     pixels = np.stack(np.broadcast_arrays(right[None, :], up[:, None], -EYE.focal_px))

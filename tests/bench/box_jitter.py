@@ -92,7 +92,7 @@ def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Genera
     target = Obstacle(
         "thing", kind, observation, turned._replace(x_m=x_m, y_m=y_m), long, wide, tall, variant=number % 12
     )
-    eye.place([target])
+    eye.place_obstacles([target])
     sights = []
     for k in range(int((from_m - LAST_M) / SPEED_MPS * RATE_HZ)):
         at_s = k / RATE_HZ

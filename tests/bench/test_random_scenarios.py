@@ -3,7 +3,7 @@
 import pytest
 
 from paani_sim.worlds import WORLDS
-from paani_sim.worlds.generate import random_scenario
+from paani_sim.worlds.generate import draw_random_scenario
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 
@@ -11,4 +11,4 @@ from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 @pytest.mark.parametrize("name", sorted(WORLDS))
 def test_fifty_scenarios_of_each_world_are_fair(name: str) -> None:
     for seed in range(50):
-        check_is_fair(random_scenario(name, seed))
+        check_is_fair(draw_random_scenario(name, seed))

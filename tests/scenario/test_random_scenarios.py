@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_sim.worlds import WORLDS, Scenario, actor_pose, load_world
-from paani_sim.worlds.generate import random_scenario
-from paani_sim.worlds.room import HEADROOM_M, footprint_gap_m
+from paani_sim.worlds import WORLDS, Scenario, actor_pose_at, load_world
+from paani_sim.worlds.generate import draw_random_scenario
+from paani_sim.worlds.passability import HEADROOM_M, footprint_distance_m
 from paani_sim.worlds.spec import build_spec
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair, fine
 
@@ -17,7 +17,7 @@ SEEDS = 4
 
 @pytest.fixture(scope="module", params=sorted(WORLDS))
 def scenarios(request: pytest.FixtureRequest) -> tuple[Scenario, ...]:
-    return tuple(random_scenario(request.param, seed) for seed in range(SEEDS))
+    return tuple(draw_random_scenario(request.param, seed) for seed in range(SEEDS))
 
 
 def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
@@ -28,7 +28,7 @@ def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
 
 def test_the_same_seed_gives_the_same_scenario(scenarios: tuple[Scenario, ...]) -> None:
     first = scenarios[2]
-    again = random_scenario(first.world.name, 2)
+    again = draw_random_scenario(first.world.name, 2)
     assert _plain(again) == _plain(first)
     assert _plain(scenarios[3]) != _plain(first)
 
@@ -55,7 +55,8 @@ def test_moving_things_come_near_the_boat(scenarios: tuple[Scenario, ...]) -> No
         line_m = fine(scenario.world.route_m, 0.6)
         for actor in scenario.world.actors:
             gaps_m = [
-                footprint_gap_m(actor, actor_pose(actor, float(t_s)), here[None])[0] for t_s, here in enumerate(line_m)
+                footprint_distance_m(actor, actor_pose_at(actor, float(t_s)), here[None])[0]
+                for t_s, here in enumerate(line_m)
             ]
             assert min(gaps_m) < 5.0, (scenario.name, actor.id)
 
@@ -71,4 +72,4 @@ def test_bridges_do_not_block() -> None:
 
 def test_unknown_worlds_are_named() -> None:
     with pytest.raises(UserError, match="'pond'"):
-        random_scenario("pond", 1)
+        draw_random_scenario("pond", 1)

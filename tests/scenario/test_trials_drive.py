@@ -10,8 +10,8 @@ import pytest
 
 from paani import messages as m
 from paani.config import Config
+from paani_sim.eye.configured_camera import boat_pose, build_camera
 from paani_sim.eye.labels import WATER_CODE
-from paani_sim.eye.mounted import camera_of, pose_of
 from paani_sim.eye.renderer import Eye
 from paani_sim.trials.drive import Drive
 from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
@@ -174,7 +174,7 @@ def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float)
 def test_oracle_water_is_the_rendered_water(name: str) -> None:
     """Mask against the label picture along the route: 0.95 of intersection over union on average."""
     world, config = load_world(name), load_policy_config(Policy.ORACLE)
-    oracle, camera = GroundTruthEvidenceSource(world, (), config), Eye(world, camera_of(config.eye))
+    oracle, camera = GroundTruthEvidenceSource(world, (), config), Eye(world, build_camera(config.eye))
     found = []
     for k in range(0, len(world.route_m), 12):
         here, there = world.route_m[k], world.route_m[(k + 1) % len(world.route_m)]
@@ -182,7 +182,7 @@ def test_oracle_water_is_the_rendered_water(name: str) -> None:
             source_us=0, sim_us=0, x_m=here[0], y_m=here[1], z_m=0.177, roll_rad=0.04, pitch_rad=0.02,
             yaw_rad=float(np.arctan2(*(there - here)[::-1])), surge_mps=0.0, sway_mps=0.0, yaw_rate_radps=0.0,
         )  # fmt: skip
-        drawn = camera.render_labelled(pose_of(truth), 0.0).mask == WATER_CODE
+        drawn = camera.render_labelled(boat_pose(truth), 0.0).mask == WATER_CODE
         rows = ((np.arange(64) + 0.5) / 64 * drawn.shape[0]).astype(int)
         columns = ((np.arange(80) + 0.5) / 80 * drawn.shape[1]).astype(int)
         water = drawn[rows[:, None], columns[None, :]]

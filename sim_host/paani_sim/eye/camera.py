@@ -53,7 +53,7 @@ class Camera:
         return 0.5 * self.width_px / float(np.tan(0.5 * np.radians(self.hfov_deg)))
 
 
-def look_from(pose: BoatPose, camera: Camera) -> tuple[F64, F64]:
+def camera_pose(pose: BoatPose, camera: Camera) -> tuple[F64, F64]:
     """Position `(3,)` and map-from-camera rotation `(3, 3)` (columns right, up, backward)."""
     body = rotation(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
     mount = rotation(0.0, np.radians(camera.down_deg), 0.0)
@@ -65,7 +65,7 @@ def look_from(pose: BoatPose, camera: Camera) -> tuple[F64, F64]:
 
 def view_projection(pose: BoatPose, camera: Camera) -> F64:
     """Clip-from-map `(4, 4)`, OpenGL convention."""
-    position, turn = look_from(pose, camera)
+    position, turn = camera_pose(pose, camera)
     view = np.eye(4)
     view[:3, :3] = turn.T
     view[:3, 3] = -turn.T @ position
@@ -98,7 +98,7 @@ def project(points_m: F64, pose: BoatPose, camera: Camera) -> F64:
     return seen
 
 
-def metres(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def linear_depth_m(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Distance along the optical axis of values of the depth buffer (0 near, 1 far); infinite for the far end."""
     ahead = 2.0 * FAR_M * NEAR_M / (FAR_M + NEAR_M - (2.0 * depth.astype(np.float64) - 1.0) * (FAR_M - NEAR_M))
     return np.where(depth >= 1.0, np.inf, ahead).astype(np.float32)

@@ -7,7 +7,7 @@ import numpy as np
 
 from paani.arrays import U8
 from paani.picture_faults import black
-from paani_sim.worlds.faults import Fault, FaultKind, active, is_linked
+from paani_sim.worlds.faults import Fault, FaultKind, find_active_fault, is_linked
 
 BLUR_PX = 8.0  # of a blur whose amount is not named: severity 3 of `paani.picture_faults.blur`
 DARK_SEVERITY = 3
@@ -25,15 +25,15 @@ class CameraFaults:
 
         A camera that is frozen from its first picture on shows that one.
         """
-        if active(self._faults, FaultKind.CAMERA_DROPPED, t_s) or not is_linked(self._faults, t_s):
+        if find_active_fault(self._faults, FaultKind.CAMERA_DROPPED, t_s) or not is_linked(self._faults, t_s):
             return None
-        if self._kept is None or not active(self._faults, FaultKind.CAMERA_FROZEN, t_s):
+        if self._kept is None or not find_active_fault(self._faults, FaultKind.CAMERA_FROZEN, t_s):
             self._kept = bgr.copy()
         shown = self._kept
-        blurred = active(self._faults, FaultKind.CAMERA_BLURRED, t_s)
+        blurred = find_active_fault(self._faults, FaultKind.CAMERA_BLURRED, t_s)
         if blurred:
             sigma_px = (blurred.amount or BLUR_PX) * bgr.shape[1] / 320.0
             shown = np.asarray(cv2.GaussianBlur(shown, (0, 0), sigma_px), np.uint8)
-        if active(self._faults, FaultKind.CAMERA_BLACK, t_s):
+        if find_active_fault(self._faults, FaultKind.CAMERA_BLACK, t_s):
             shown = black(shown, DARK_SEVERITY, np.random.default_rng(round(t_s * 1e6)))
         return shown

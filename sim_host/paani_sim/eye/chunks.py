@@ -41,7 +41,7 @@ def make_chunks(place_m: F64, order: U32, reach_m: F64) -> Chunks:
     return Chunks(corners.reshape(-1).astype(np.uint32), 3 * first, 3 * count, 0.5 * (low + high), 0.5 * (high - low))
 
 
-def in_view(middle_m: F64, half_m: F64, clip_from_map: F64) -> npt.NDArray[np.bool_]:
+def is_in_view(middle_m: F64, half_m: F64, clip_from_map: F64) -> npt.NDArray[np.bool_]:
     """Whether any of a box `middle_m` +/- `half_m` `(n, 3)` can be inside the four sides of the picture."""
     inside = np.ones(len(middle_m), bool)
     for axis in (0, 1):
@@ -51,9 +51,9 @@ def in_view(middle_m: F64, half_m: F64, clip_from_map: F64) -> npt.NDArray[np.bo
     return inside
 
 
-def visible(chunks: Chunks, clip_from_map: F64, eye_m: F64, within_m: float = np.inf) -> npt.NDArray[np.int64]:
+def find_visible(chunks: Chunks, clip_from_map: F64, eye_m: F64, within_m: float = np.inf) -> npt.NDArray[np.int64]:
     """Numbers of the chunks that can be in the picture and are nearer along the ground, nearest first."""
     away = np.maximum(np.abs(chunks.middle_m[:, :2] - eye_m[:2]) - chunks.half_m[:, :2], 0.0)
     range_m = np.hypot(away[:, 0], away[:, 1])
-    found = np.flatnonzero(in_view(chunks.middle_m, chunks.half_m, clip_from_map) & (range_m < within_m))
+    found = np.flatnonzero(is_in_view(chunks.middle_m, chunks.half_m, clip_from_map) & (range_m < within_m))
     return np.asarray(found[np.argsort(range_m[found], kind="stable")])

@@ -17,7 +17,7 @@ MIN_SIDE_PX = 3
 MIN_PIXELS = 10
 MIN_CONTRAST = 9.0  # of 255: below it neither colour nor brightness tells a thing from what is around it
 MIN_FILLED = 0.06  # of a box: less are specks behind leaves and railings
-AROUND_PX = 3
+SURROUND_PX = 3
 
 
 class VisibleBox(NamedTuple):
@@ -74,19 +74,19 @@ def read_labels(bgr: U8, labels: U8, depth_m: F32, things: Sequence[Thing]) -> L
     return Labelled(bgr, mask, tuple(boxes), depth_m)
 
 
-def seen_boxes(view: Labelled) -> tuple[VisibleBox, ...]:
+def select_visible_boxes(view: Labelled) -> tuple[VisibleBox, ...]:
     """The boxes of things that stand out from what is around them: fog, dusk, rain and reeds hide the others."""
-    return tuple(box for box in view.boxes if box.contrast >= MIN_CONTRAST and _filled(box) >= MIN_FILLED)
+    return tuple(box for box in view.boxes if box.contrast >= MIN_CONTRAST and _filled_frac(box) >= MIN_FILLED)
 
 
-def _filled(box: VisibleBox) -> float:
+def _filled_frac(box: VisibleBox) -> float:
     return box.visible_px / ((box.x1_px - box.x0_px) * (box.y1_px - box.y0_px))
 
 
 def _contrast(bgr: U8, own: npt.NDArray[np.bool_], edges: tuple[int, int, int, int]) -> float:
     height, width = own.shape
-    x0, y0 = max(0, edges[0] - AROUND_PX), max(0, edges[1] - AROUND_PX)
-    x1, y1 = min(width, edges[2] + AROUND_PX), min(height, edges[3] + AROUND_PX)
+    x0, y0 = max(0, edges[0] - SURROUND_PX), max(0, edges[1] - SURROUND_PX)
+    x1, y1 = min(width, edges[2] + SURROUND_PX), min(height, edges[3] + SURROUND_PX)
     there, pixels = own[y0:y1, x0:x1], bgr[y0:y1, x0:x1].astype(np.float32)
     inside, around = pixels[there], pixels[~there]
     if len(around) == 0:

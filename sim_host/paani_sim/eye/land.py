@@ -35,7 +35,7 @@ class Land:
 def make_land(world: World) -> Land:
     """The land of a world, the same for the same seed."""
     rng = np.random.default_rng([world.seed, 1])
-    field = _Field(rng, world.bank)
+    field = _NoiseField(rng, world.bank)
     edge_rng = np.random.default_rng([world.seed, 4])
     quayed = world.bank is Bank.QUAY
     edge = quay(world, edge_rng) if quayed else _shore_strip(world, field)
@@ -47,7 +47,7 @@ def make_land(world: World) -> Land:
     )
 
 
-class _Field:
+class _NoiseField:
     """Smooth noise of position, about -1..1, from a handful of waves; and what the land's edge is made of."""
 
     def __init__(self, rng: np.random.Generator, bank: Bank) -> None:
@@ -64,7 +64,7 @@ class _Field:
         return total / 3.0
 
 
-def ground_height_m(field: _Field, xy_m: F64, clear_m: F64) -> F64:
+def ground_height_m(field: _NoiseField, xy_m: F64, clear_m: F64) -> F64:
     """Height of the ground `clear_m` from the shore: a steep foot or a wall, a gentle bank, hills far off."""
     quayed = field.bank is Bank.QUAY
     clear = clear_m if quayed else clear_m + 0.25 * field.at(xy_m, 5.0)
@@ -79,7 +79,7 @@ def ground_height_m(field: _Field, xy_m: F64, clear_m: F64) -> F64:
     return np.where(clear > 0.0, np.maximum(-0.45 * clear, -2.0), dry)
 
 
-def _ground_rgb(field: _Field, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
+def _ground_rgb(field: _NoiseField, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
     """Mud and stones by the water, then grass in patches, then woodland."""
     dry = 0.5 + 0.5 * np.clip(field.at(xy_m, 30.0, 2), -1.0, 1.0)
     grass = np.array([0.28, 0.32, 0.15]) + dry[:, None] * np.array([0.14, 0.08, 0.05])
@@ -93,7 +93,7 @@ def _ground_rgb(field: _Field, xy_m: F64, z_m: F64, inland_m: F64) -> F64:
     return lit
 
 
-def _surface(field: _Field, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
+def _surface(field: _NoiseField, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
     """Ground over a grid `(rows, columns, 2)` of known clearance, `sink_m` lower than it is."""
     rows, columns = grid_xy.shape[:2]
     flat = grid_xy.reshape(-1, 2)
@@ -103,7 +103,7 @@ def _surface(field: _Field, grid_xy: F64, clear: F64, sink_m: float) -> Mesh:
     return loft(points, rgb.reshape(rows, columns, 3), LAND)
 
 
-def _shore_strip(world: World, field: _Field) -> Mesh:
+def _shore_strip(world: World, field: _NoiseField) -> Mesh:
     shore = resample_closed(world.shore_m, int(len(world.shore_m) * 1.3))
     outward = -normals_left(shore, closed=True)
     ring = np.vstack([shore, shore[:1]])
@@ -112,7 +112,7 @@ def _shore_strip(world: World, field: _Field) -> Mesh:
     return _surface(field, grid, clearance_m(world.shore_m, grid.reshape(-1, 2)), 0.0)
 
 
-def _far_ground(world: World, field: _Field) -> tuple[Mesh, Mesh]:
+def _far_ground(world: World, field: _NoiseField) -> tuple[Mesh, Mesh]:
     """Ground behind the banks on a grid, coarser far from the water."""
     low, high = world.shore_m.min(axis=0) - REACH_M, world.shore_m.max(axis=0) + REACH_M
     count = np.ceil((high - low) / (COARSE_M * FAR_CELLS)).astype(int) * FAR_CELLS + 1
@@ -134,7 +134,7 @@ def _far_ground(world: World, field: _Field) -> tuple[Mesh, Mesh]:
     )
 
 
-def _hills(world: World, field: _Field) -> Mesh:
+def _hills(world: World, field: _NoiseField) -> Mesh:
     """A ring of wooded hills that closes every view."""
     middle = 0.5 * (world.shore_m.min(axis=0) + world.shore_m.max(axis=0))
     half = 0.5 * np.ptp(world.shore_m, axis=0)
@@ -150,7 +150,7 @@ def _hills(world: World, field: _Field) -> Mesh:
     return loft(points, rgb, LAND)
 
 
-def _houses(world: World, field: _Field, rng: np.random.Generator) -> tuple[Mesh, ...]:
+def _houses(world: World, field: _NoiseField, rng: np.random.Generator) -> tuple[Mesh, ...]:
     shore = resample_closed(world.shore_m, 400)
     outward = -normals_left(shore, closed=True)
     found: list[Mesh] = []
@@ -181,7 +181,7 @@ def _houses(world: World, field: _Field, rng: np.random.Generator) -> tuple[Mesh
     return tuple(found)
 
 
-class _Sown(NamedTuple):
+class _PlantKind(NamedTuple):
     """Plants of one sort: how many, how far inland, in patches of what size and how sparse."""
 
     layers: tuple[int, ...]
@@ -194,20 +194,20 @@ class _Sown(NamedTuple):
     free_m: float
 
 
-_SOWN = (
-    _Sown(sprites.REED, 420, (-0.5, 0.5), 24.0, 0.25, (1.5, 2.6), (1.2, 2.2), 2.0),
-    _Sown(sprites.REED, 1500, (0.3, 5.0), 30.0, -0.6, (0.7, 1.5), (0.25, 0.6), 1.0),
-    _Sown(sprites.BUSH, 700, (0.9, 6.0), 18.0, -0.1, (1.8, 4.2), (1.2, 3.0), 3.0),
-    _Sown(sprites.WILLOW, 46, (2.2, 6.0), 40.0, 0.1, (7.0, 10.0), (7.0, 10.0), 6.0),
-    _Sown(sprites.BROADLEAF, 700, (5.0, 34.0), 55.0, -0.25, (7.0, 12.0), (8.0, 14.0), 5.0),
-    _Sown(sprites.POPLAR, 60, (8.0, 30.0), 60.0, 0.0, (6.0, 9.0), (12.0, 17.0), 5.0),
-    _Sown(sprites.CONIFER, 160, (12.0, 60.0), 80.0, 0.1, (5.0, 7.5), (10.0, 17.0), 5.0),
-    _Sown(sprites.WOOD_EDGE, 260, (40.0, 130.0), 90.0, -0.5, (22.0, 32.0), (11.0, 16.0), 5.0),
-    _Sown(sprites.WOOD_EDGE, 320, (120.0, 380.0), 200.0, -0.9, (34.0, 52.0), (14.0, 20.0), 5.0),
+_PLANT_KINDS = (
+    _PlantKind(sprites.REED, 420, (-0.5, 0.5), 24.0, 0.25, (1.5, 2.6), (1.2, 2.2), 2.0),
+    _PlantKind(sprites.REED, 1500, (0.3, 5.0), 30.0, -0.6, (0.7, 1.5), (0.25, 0.6), 1.0),
+    _PlantKind(sprites.BUSH, 700, (0.9, 6.0), 18.0, -0.1, (1.8, 4.2), (1.2, 3.0), 3.0),
+    _PlantKind(sprites.WILLOW, 46, (2.2, 6.0), 40.0, 0.1, (7.0, 10.0), (7.0, 10.0), 6.0),
+    _PlantKind(sprites.BROADLEAF, 700, (5.0, 34.0), 55.0, -0.25, (7.0, 12.0), (8.0, 14.0), 5.0),
+    _PlantKind(sprites.POPLAR, 60, (8.0, 30.0), 60.0, 0.0, (6.0, 9.0), (12.0, 17.0), 5.0),
+    _PlantKind(sprites.CONIFER, 160, (12.0, 60.0), 80.0, 0.1, (5.0, 7.5), (10.0, 17.0), 5.0),
+    _PlantKind(sprites.WOOD_EDGE, 260, (40.0, 130.0), 90.0, -0.5, (22.0, 32.0), (11.0, 16.0), 5.0),
+    _PlantKind(sprites.WOOD_EDGE, 320, (120.0, 380.0), 200.0, -0.9, (34.0, 52.0), (14.0, 20.0), 5.0),
 )
 
 
-def _plants(world: World, field: _Field, rng: np.random.Generator) -> npt.NDArray[np.float32]:
+def _plants(world: World, field: _NoiseField, rng: np.random.Generator) -> npt.NDArray[np.float32]:
     """Reeds and bushes at the edge, trees behind, woodland to the hills; open meadows between."""
     shore = resample_closed(world.shore_m, 4000)
     outward = -normals_left(shore, closed=True)
@@ -215,30 +215,30 @@ def _plants(world: World, field: _Field, rng: np.random.Generator) -> npt.NDArra
     keep_free = np.array([o.pose[:2] for o in world.obstacles if o.kind in open_kinds]).reshape(-1, 2)
     rows = []
     quayed = world.bank is Bank.QUAY
-    for sown in _SOWN:
-        near, far = sown.inland_m
+    for kind in _PLANT_KINDS:
+        near, far = kind.inland_m
         if quayed:
             if far <= PAVED_M:
                 continue
             near = max(near, PAVED_M + 1.0)
-        index = rng.integers(len(shore), size=sown.plants * 2)
+        index = rng.integers(len(shore), size=kind.plants * 2)
         xy = shore[index] + outward[index] * rng.uniform(near, far, len(index))[:, None]
-        xy = xy[field.at(xy, sown.patch_m, sown.layers[0] % 3) > sown.bar]
+        xy = xy[field.at(xy, kind.patch_m, kind.layers[0] % 3) > kind.bar]
         gap = np.linalg.norm(xy[:, None] - keep_free[None], axis=2)
-        xy = xy[(gap > sown.free_m).all(axis=1)]
+        xy = xy[(gap > kind.free_m).all(axis=1)]
         clear = clearance_m(world.shore_m, xy)
         fits = (clear < -0.8 * near) if near > 0.0 else (np.abs(clear) < 0.8)
-        xy, clear = xy[fits][: sown.plants], clear[fits][: sown.plants]
-        width, height = rng.uniform(*sown.width_m, len(xy)), rng.uniform(*sown.height_m, len(xy))
+        xy, clear = xy[fits][: kind.plants], clear[fits][: kind.plants]
+        width, height = rng.uniform(*kind.width_m, len(xy)), rng.uniform(*kind.height_m, len(xy))
         z = ground_height_m(field, xy, clear) - 0.03 * height
-        layer = rng.choice(np.asarray(sown.layers), len(xy))
+        layer = rng.choice(np.asarray(kind.layers), len(xy))
         shade = rng.uniform(0.8, 1.15, len(xy))
         rows.append(np.column_stack([xy, z, width, height, layer, shade]))
     found = np.concatenate(rows).astype(np.float32)
-    return found[~_on_a_bridge(world, found[:, :2])]
+    return found[~_is_on_bridge(world, found[:, :2])]
 
 
-def _on_a_bridge(world: World, xy_m: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+def _is_on_bridge(world: World, xy_m: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
     """Where the road of a bridge, or a ramp up to it, lies over the ground."""
     under = np.zeros(len(xy_m), np.bool_)
     for thing in (o for o in world.obstacles if o.look == "bridge"):

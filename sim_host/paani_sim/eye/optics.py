@@ -11,7 +11,7 @@ from paani.errors import UserError
 from paani_sim.eye.camera import Camera
 
 STEPS = 40
-WIDEST = 4.0  # times the picture's corner: no farther than this does a lens reach
+MAX_SCALE = 4.0  # times the picture's corner: no farther than this does a lens reach
 
 
 class Optics:
@@ -32,7 +32,7 @@ class Optics:
             return
         seen = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
         middle = 0.5 * np.array(self._size)
-        straight = _undistorted((seen - middle) / camera.focal_px, camera)
+        straight = _undistort((seen - middle) / camera.focal_px, camera)
         edge = np.vstack([np.abs(straight).max(axis=0), [0.5 * s / camera.focal_px for s in self._size]])
         wider = max(1.0, float((edge[0] / edge[1]).max()))
         half = wider * np.tan(0.5 * np.radians(camera.hfov_deg))
@@ -64,10 +64,10 @@ class Optics:
         return drawn[self._rows, self._columns]
 
 
-def _undistorted(seen: F64, camera: Camera) -> F64:
+def _undistort(seen: F64, camera: Camera) -> F64:
     """Where a pinhole sees `(n, 2)` what the lens shows at `seen`; both from the middle, over focal length."""
     radius = np.maximum(np.hypot(seen[:, 0], seen[:, 1]), 1e-12)
-    low, high = np.zeros_like(radius), np.full_like(radius, WIDEST * radius.max())
+    low, high = np.zeros_like(radius), np.full_like(radius, MAX_SCALE * radius.max())
     k1, k2 = camera.k1, camera.k2
     grid = np.linspace(0.0, high[0], 2000)
     rising = 1.0 + 3.0 * k1 * grid**2 + 5.0 * k2 * grid**4 > 0.0

@@ -15,26 +15,36 @@ import numpy.typing as npt
 
 from paani.arrays import F32, F64
 from paani_sim.eye import gl as g
-from paani_sim.eye import ripples, shaders
-from paani_sim.eye.afloat import ride, sea_of
-from paani_sim.eye.camera import BoatPose, Camera, look_from, metres, view_projection
-from paani_sim.eye.chunks import Chunks, in_view, make_chunks, visible
+from paani_sim.eye import shaders, water_patches
+from paani_sim.eye.camera import BoatPose, Camera, camera_pose, linear_depth_m, view_projection
+from paani_sim.eye.chunks import Chunks, find_visible, is_in_view, make_chunks
 from paani_sim.eye.labels import Labelled, read_labels
 from paani_sim.eye.lens import NEUTRAL, Lens
 from paani_sim.eye.mesh import rotation
 from paani_sim.eye.optics import Optics
 from paani_sim.eye.rain import Rain
-from paani_sim.eye.scene import FIRST_THING, PLANT_WIDTHS, ROW_WIDTHS, Own, Rows, Scene, Thing, make_scene, place
+from paani_sim.eye.scene import (
+    FIRST_THING,
+    PLANT_WIDTHS,
+    ROW_WIDTHS,
+    MovableRows,
+    Rows,
+    Scene,
+    Thing,
+    make_scene,
+    place_obstacles,
+)
 from paani_sim.eye.sky import Sky, paint_sky
 from paani_sim.eye.sprites import paint_sprites
 from paani_sim.eye.surfaces import surface_tiles
+from paani_sim.eye.wave_motion import compute_wave_motion, wind_sea_state
 from paani_sim.eye.wave_textures import noise_tile, slope_tile
 from paani_sim.eye.weather import Uniforms, uniforms
-from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_at, along_at
+from paani_sim.worlds.world import Actor, Light, Obstacle, Pose2, Wind, World, actor_distance_along_m, actor_pose_along
 
 _NOISE, _SKY, _SPRITES, _SLOPES, _MIRROR, _STIRRED, _SURFACES, _MAIN = range(8)  # texture units; _MAIN takes two
 DETAILS_WITHIN_M = 80.0
-SHADES_WITHIN_M = 40.0
+SHADOWS_WITHIN_M = 40.0
 SAME_SURFACE_FRAC = 0.05
 MIRRORED_WITHIN_M = 120.0
 _FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
@@ -58,7 +68,7 @@ class _Solid:
         self.batch = g.make_batch(gl, rows.rows, widths, self.chunks.order)
 
 
-class _Afloat(NamedTuple):
+class _Movable(NamedTuple):
     """A thing that moves; `reach_m` is how far it extends from its origin, any way."""
 
     thing: Obstacle | Actor
@@ -89,7 +99,7 @@ class Eye:
         self._scale = supersample
         self.exposure = exposure
         self._optics = Optics(self.camera, supersample)
-        self._optics_of = self.camera
+        self._optics_camera = self.camera
         self._owned = context is None
         self._context = context or g.Context()
         self._gl = gl = self._context.gl
@@ -135,17 +145,17 @@ class Eye:
         self._details = _Solid(gl, scene.details, ROW_WIDTHS)
         wide_m, tall_m = scene.plants.rows[:, 3:5].astype(float).T
         self._plants = _Solid(gl, scene.plants, PLANT_WIDTHS, np.stack([wide_m, wide_m, tall_m], axis=1))
-        self._afloat, self._actors = self._bring(scene.afloat), self._bring(scene.actors)
+        self._afloat, self._actors = self._upload_movables(scene.afloat), self._upload_movables(scene.actors)
         self._screen = g.make_batch(gl, _FLAT, (2,), _QUAD)
-        self._shades: _Solid | None = None
+        self._shadows: _Solid | None = None
         self._extra: tuple[Obstacle, ...] = ()
         self._extra_still: g.Batch | None = None
-        self._extra_afloat: list[_Afloat] = []
+        self._extra_afloat: list[_Movable] = []
         self._sky_texture: int | None = None
 
-    def _bring(self, owned: Sequence[Own]) -> list[_Afloat]:
+    def _upload_movables(self, owned: Sequence[MovableRows]) -> list[_Movable]:
         return [
-            _Afloat(
+            _Movable(
                 o.thing,
                 g.make_batch(self._gl, o.rows.rows, ROW_WIDTHS, o.rows.order),
                 float(np.linalg.norm(o.rows.rows[:, :3], axis=1).max(initial=0.0)),
@@ -161,31 +171,31 @@ class Eye:
             self._gl.glDeleteTextures(1, [self._sky_texture])
         self._sky_texture = g.make_texture(self._gl, self._sky.panorama, _SKY, wrap_v=False, between_levels=False)
         self._light = light
-        self._sea = sea_of(wind, self.world.waves)
+        self._sea = wind_sea_state(wind, self.world.waves)
         self._weather: Uniforms = uniforms(self.world, light, wind, self._sky)
-        self._cast = ripples.cast_by(self._sky.sun_direction)
-        self._lay_shades()
+        self._cast = water_patches.shadow_cast_per_m(self._sky.sun_direction)
+        self._update_shadows()
 
-    def _lay_shades(self) -> None:
-        if self._shades is not None:
-            g.drop_batch(self._gl, self._shades.batch)
-        standing = ripples.standing_shadows((*self.world.obstacles, *self._extra), self._cast)
-        rows = np.concatenate([ripples.tree_shadows(self.scene.grown, self._cast), standing]).astype(np.float32)
-        patches = Rows(rows, ripples.patch_order(len(rows)))
-        self._shades = _Solid(self._gl, patches, ripples.PATCH_WIDTHS)
+    def _update_shadows(self) -> None:
+        if self._shadows is not None:
+            g.drop_batch(self._gl, self._shadows.batch)
+        standing = water_patches.standing_shadows((*self.world.obstacles, *self._extra), self._cast)
+        rows = np.concatenate([water_patches.tree_shadows(self.scene.grown, self._cast), standing]).astype(np.float32)
+        patches = Rows(rows, water_patches.patch_order(len(rows)))
+        self._shadows = _Solid(self._gl, patches, water_patches.PATCH_WIDTHS)
 
-    def place(self, obstacles: Sequence[Obstacle]) -> None:
+    def place_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Add obstacles to those of the world, in place of any added before."""
         self._context.make_current()
         for batch in [self._extra_still, *(a.batch for a in self._extra_afloat)]:
             if batch is not None:
                 g.drop_batch(self._gl, batch)
-        new = place(obstacles, FIRST_THING + len(self.scene.things))
+        new = place_obstacles(obstacles, FIRST_THING + len(self.scene.things))
         self._extra = tuple(obstacles)
         self._extra_still = g.make_batch(self._gl, new.still.rows, ROW_WIDTHS, new.still.order)
-        self._extra_afloat = self._bring(new.afloat)
+        self._extra_afloat = self._upload_movables(new.afloat)
         self.things = (*self.scene.things, *new.things)
-        self._lay_shades()
+        self._update_shadows()
 
     def render(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Picture:
         """The picture at simulated time `t_s`, waves included.
@@ -193,24 +203,24 @@ class Eye:
         Actors are `actors_along_m` down their paths, in the world's order; empty: as far as time says.
         """
         self._draw(pose, t_s, actors_along_m, slots=1)
-        return Picture(self._develop(pose, t_s))
+        return Picture(self._apply_camera_effects(pose, t_s))
 
     def render_labelled(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float] = ()) -> Labelled:
         """The picture with its class mask, the boxes of what is visible, and depth."""
         self._draw(pose, t_s, actors_along_m, slots=2)
         labels = np.asarray(self._optics.nearest(g.read_target(self._gl, self._main, 1)), np.uint8)
-        return read_labels(self._develop(pose, t_s), labels, self._depth_m(), self.things)
+        return read_labels(self._apply_camera_effects(pose, t_s), labels, self._depth_m(), self.things)
 
     def _depth_m(self) -> F32:
         """Depth at the middle of each pixel: the buffer is linear across a plane; at edges what is there counts."""
         depth = np.ascontiguousarray(g.read_depth(self._gl, self._main))
-        there = metres(np.asarray(self._optics.nearest(depth), np.float32))
-        between = metres(self._optics.middle(depth))
+        there = linear_depth_m(np.asarray(self._optics.nearest(depth), np.float32))
+        between = linear_depth_m(self._optics.middle(depth))
         with np.errstate(invalid="ignore"):
             same = np.abs(between - there) < SAME_SURFACE_FRAC * there
         return np.where(same, between, there)
 
-    def _develop(self, pose: BoatPose, t_s: float) -> npt.NDArray[np.uint8]:
+    def _apply_camera_effects(self, pose: BoatPose, t_s: float) -> npt.NDArray[np.uint8]:
         raw = g.read_target(self._gl, self._main, 0)
         bgr = self._optics.picture(np.asarray(cv2.cvtColor(raw, cv2.COLOR_BGRA2BGR), np.uint8))
         bgr = self._rain.apply(bgr, self._light.rain_mmph, t_s)
@@ -218,11 +228,11 @@ class Eye:
         return self._lens.apply(bgr, round(t_s * 1000.0), smear_px=smear_px)
 
     def _draw(self, pose: BoatPose, t_s: float, actors_along_m: Sequence[float], slots: int) -> None:
-        if self._optics_of != self.camera:
-            self._optics, self._optics_of = Optics(self.camera, self._scale), self.camera
+        if self._optics_camera != self.camera:
+            self._optics, self._optics_camera = Optics(self.camera, self._scale), self.camera
         gl, camera = self._gl, self._optics.pinhole
         self._context.make_current()
-        position, _ = look_from(pose, camera)
+        position, _ = camera_pose(pose, camera)
         clip = view_projection(pose, camera)
         shared: Uniforms = {
             **self._weather,
@@ -233,7 +243,7 @@ class Eye:
             "time": float(t_s),
             "screen": np.array([self._main.width_px, self._main.height_px], np.float32),
         }
-        moved, stir = self._moved(t_s, actors_along_m, position, clip)
+        moved, stir = self._place_movables(t_s, actors_along_m, position, clip)
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthFunc(gl.GL_LEQUAL)
         gl.glEnable(gl.GL_CLIP_DISTANCE0)
@@ -243,7 +253,7 @@ class Eye:
         gl.glBindTexture(gl.GL_TEXTURE_2D, self._mirror.colour)
         gl.glGenerateMipmap(gl.GL_TEXTURE_2D)
         gl.glDisable(gl.GL_CLIP_DISTANCE0)
-        self._draw_stir(shared, stir)
+        self._draw_water_patches(shared, stir)
         g.begin_target(gl, self._main, slots)
         self._draw_solids(shared, clip, moved, slots)
         self._programs["water"].use(**shared)
@@ -251,34 +261,34 @@ class Eye:
         self._programs["sky"].use(**shared)
         g.draw(gl, self._screen)
 
-    def _moved(
+    def _place_movables(
         self, t_s: float, actors_along_m: Sequence[float], eye_m: F64, clip: F64
     ) -> tuple[list[tuple[F32, g.Batch]], F32]:
         """Where every floating thing in the picture is now, and the patches those near leave on the water."""
         found: list[tuple[F32, g.Batch]] = []
-        patches = [np.zeros((0, ripples.COLUMNS))]
-        along_m = actors_along_m or [along_at(actor, t_s) for actor in self.world.actors]
+        patches = [np.zeros((0, water_patches.COLUMNS))]
+        along_m = actors_along_m or [actor_distance_along_m(actor, t_s) for actor in self.world.actors]
         places = [(a, a.thing.pose) for a in (*self._afloat, *self._extra_afloat) if isinstance(a.thing, Obstacle)]
         for a, m in zip(self._actors, along_m, strict=True):
             if isinstance(a.thing, Actor):
-                places.append((a, actor_at(a.thing, m)))
-                patches.append(ripples.wake(a.thing, m))
+                places.append((a, actor_pose_along(a.thing, m)))
+                patches.append(water_patches.wake(a.thing, m))
         middle_m = np.array([[pose.x_m, pose.y_m, 0.0] for _, pose in places]).reshape(-1, 3)
         reach_m = np.array([[a.reach_m, a.reach_m, a.reach_m + self._sea.height_m] for a, _ in places]).reshape(-1, 3)
-        seen = in_view(middle_m, reach_m, clip)
+        seen = is_in_view(middle_m, reach_m, clip)
         for (a, pose), drawn in zip(places, seen.tolist(), strict=True):
             if drawn:
-                found.append((_model(pose, *ride(self._sea, a.thing, pose, t_s)), a.batch))
+                found.append((_model(pose, *compute_wave_motion(self._sea, a.thing, pose, t_s)), a.batch))
             if np.hypot(pose.x_m - eye_m[0], pose.y_m - eye_m[1]) < DETAILS_WITHIN_M:
-                patches.append(ripples.floating_shadow(a.thing, pose, self._cast))
+                patches.append(water_patches.floating_shadow(a.thing, pose, self._cast))
         return found, np.concatenate(patches).astype(np.float32)
 
-    def _draw_stir(self, shared: Uniforms, patches: F32) -> None:
+    def _draw_water_patches(self, shared: Uniforms, patches: F32) -> None:
         gl = self._gl
         g.begin_target(gl, self._stirred, 1)
         if len(patches) == 0:
             return
-        batch = g.make_batch(gl, patches, ripples.PATCH_WIDTHS, ripples.patch_order(len(patches)))
+        batch = g.make_batch(gl, patches, water_patches.PATCH_WIDTHS, water_patches.patch_order(len(patches)))
         gl.glDisable(gl.GL_DEPTH_TEST)
         gl.glEnable(gl.GL_BLEND)
         gl.glBlendFunc(gl.GL_ONE, gl.GL_ONE)
@@ -302,24 +312,24 @@ class Eye:
         solid.use(mapFromModel=_IDENTITY)
         if self._extra_still is not None:
             g.draw(gl, self._extra_still)
-        self._draw_seen(self._details, clip, eye_m, DETAILS_WITHIN_M)
-        self._draw_seen(self._still, clip, eye_m, MIRRORED_WITHIN_M if mirrored else np.inf)
-        if not mirrored and self._shades is not None:
+        self._draw_visible(self._details, clip, eye_m, DETAILS_WITHIN_M)
+        self._draw_visible(self._still, clip, eye_m, MIRRORED_WITHIN_M if mirrored else np.inf)
+        if not mirrored and self._shadows is not None:
             gl.glEnable(gl.GL_BLEND)
             gl.glBlendFunc(gl.GL_ZERO, gl.GL_ONE_MINUS_SRC_ALPHA)
             gl.glDepthMask(False)
             g.aim_target(gl, 1)  # shades darken the ground; its labels stay
             self._programs["shade"].use(**shared)
-            self._draw_seen(self._shades, clip, eye_m, SHADES_WITHIN_M)
+            self._draw_visible(self._shadows, clip, eye_m, SHADOWS_WITHIN_M)
             g.aim_target(gl, slots)
             gl.glDepthMask(True)
             gl.glDisable(gl.GL_BLEND)
         self._programs["plant"].use(**shared, flip=flip)
-        self._draw_seen(self._plants, clip, eye_m, np.inf)
+        self._draw_visible(self._plants, clip, eye_m, np.inf)
 
-    def _draw_seen(self, solid: _Solid, clip: F64, eye_m: F64, within_m: float) -> None:
+    def _draw_visible(self, solid: _Solid, clip: F64, eye_m: F64, within_m: float) -> None:
         """What of a batch can be in the picture."""
-        found = visible(solid.chunks, clip, eye_m, within_m)
+        found = find_visible(solid.chunks, clip, eye_m, within_m)
         g.draw_chunks(self._gl, solid.batch, solid.chunks.first[found], solid.chunks.count[found])
 
     def close(self) -> None:

@@ -116,7 +116,7 @@ class _Scatter:
             float(self._pose.y_m + range_m * np.sin(bearing)),
         )
 
-    def _try(self, thing: Obstacle, *, clear_m: float | None, on: Obstacle | None = None) -> bool:
+    def _try_placing(self, thing: Obstacle, *, clear_m: float | None, on: Obstacle | None = None) -> bool:
         place = np.array([thing.pose[:2]])
         if clear_m is not None and clearance_m(self._world.shore_m, place)[0] < clear_m:
             return False
@@ -156,7 +156,7 @@ class _Scatter:
                 tall,
                 variant=int(rng.integers(24)),
             )
-            if self._try(thing, clear_m=0.35 * length):
+            if self._try_placing(thing, clear_m=0.35 * length):
                 return
 
     def buoy(self) -> None:
@@ -178,7 +178,7 @@ class _Scatter:
                 tall,
                 variant=int(rng.integers(12)),
             )
-            if self._try(thing, clear_m=0.8):
+            if self._try_placing(thing, clear_m=0.8):
                 return
 
     def swimmer(self) -> None:
@@ -196,7 +196,7 @@ class _Scatter:
                 0.4,
                 variant=int(self._rng.integers(42)),
             )
-            if self._try(thing, clear_m=0.6):
+            if self._try_placing(thing, clear_m=0.6):
                 return
 
     def walker(self) -> None:
@@ -229,7 +229,7 @@ class _Scatter:
             base_m,
             int(rng.integers(42)),
         )
-        return self._try(thing, clear_m=None, on=on)
+        return self._try_placing(thing, clear_m=None, on=on)
 
     def pier(self) -> None:
         """A jetty out from the bank, or a pontoon or quay along it, perhaps with people on it."""
@@ -268,7 +268,7 @@ class _Scatter:
                 tall,
                 variant=int(rng.integers(6)),
             )
-            if not self._try(thing, clear_m=None):
+            if not self._try_placing(thing, clear_m=None):
                 continue
             for _ in range(0 if look == "quay_steps" else int(rng.integers(0, 4))):
                 part = float(rng.uniform(-0.3, 0.45)) * length

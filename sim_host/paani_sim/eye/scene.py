@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from paani.arrays import F32, U32
-from paani_sim.eye.afloat import floats
 from paani_sim.eye.boats import boat
 from paani_sim.eye.buildings import crane, warehouse
 from paani_sim.eye.land import make_land
 from paani_sim.eye.mesh import Mesh, placed
 from paani_sim.eye.people import person
 from paani_sim.eye.structures import bridge, buoy, pier
+from paani_sim.eye.wave_motion import is_floating
 from paani_sim.worlds.world import Actor, Kind, Obstacle, World
 
 SKY, WATER, LAND, FIRST_THING = 0, 1, 2, 3
@@ -37,7 +37,7 @@ class Rows(NamedTuple):
     order: U32
 
 
-class Own(NamedTuple):
+class MovableRows(NamedTuple):
     """A thing that moves, and its rows in its own frame."""
 
     thing: Obstacle | Actor
@@ -45,11 +45,11 @@ class Own(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedObstacles:
     """Obstacles: what stands still, in the map; what floats; and their numbers."""
 
     still: Rows
-    afloat: tuple[Own, ...]
+    afloat: tuple[MovableRows, ...]
     things: tuple[Thing, ...]
 
 
@@ -62,8 +62,8 @@ class Scene:
 
     still: Rows
     details: Rows
-    afloat: tuple[Own, ...]
-    actors: tuple[Own, ...]
+    afloat: tuple[MovableRows, ...]
+    actors: tuple[MovableRows, ...]
     plants: Rows
     grown: F32
     things: tuple[Thing, ...]
@@ -73,13 +73,13 @@ def make_scene(world: World) -> Scene:
     """Build the scene of a world. Numbers follow the order of obstacles, then actors."""
     land = make_land(world)
     ground = [numbered(part, LAND) for part in (land.ground, *land.houses)]
-    stands = place(world.obstacles, FIRST_THING)
+    stands = place_obstacles(world.obstacles, FIRST_THING)
     things = list(stands.things)
     actors = []
     for actor in world.actors:
         parts = _build(actor)
         new = _things(actor, len(parts), FIRST_THING + len(things))
-        actors.append(Own(actor, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
+        actors.append(MovableRows(actor, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
         things += new
     details = join(numbered(part, LAND) for part in land.details)
     return Scene(
@@ -93,24 +93,24 @@ def make_scene(world: World) -> Scene:
     )
 
 
-def place(obstacles: Iterable[Obstacle], first: int) -> Placed:
+def place_obstacles(obstacles: Iterable[Obstacle], first: int) -> PlacedObstacles:
     """Rows of obstacles where they stand or float, numbered from `first`."""
     still: list[Rows] = []
-    afloat: list[Own] = []
+    afloat: list[MovableRows] = []
     things: list[Thing] = []
     for obstacle in obstacles:
         parts = _build(obstacle)
         new = _things(obstacle, len(parts), first + len(things))
         things += new
-        if floats(obstacle):
-            afloat.append(Own(obstacle, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
+        if is_floating(obstacle):
+            afloat.append(MovableRows(obstacle, join(numbered(p, t.number) for p, t in zip(parts, new, strict=True))))
             continue
         pose = obstacle.pose
         foot_m = 0.0 if obstacle.look == "bridge" else obstacle.base_z_m
         for part, thing in zip(parts, new, strict=True):
             there = placed(part, (pose.x_m, pose.y_m, foot_m), yaw_rad=pose.yaw_rad)
             still.append(numbered(there, thing.number))
-    return Placed(join(still), tuple(afloat), tuple(things))
+    return PlacedObstacles(join(still), tuple(afloat), tuple(things))
 
 
 def numbered(part: Mesh, number: int) -> Rows:

@@ -17,7 +17,7 @@ from paani.clock import Clock
 from paani.config import Config
 from paani_sim.eye.camera import BoatPose
 from paani_sim.eye.camera_faults import CameraFaults
-from paani_sim.eye.mounted import open_eye, pose_of
+from paani_sim.eye.configured_camera import boat_pose, open_eye
 from paani_sim.eye.renderer import Eye
 from paani_sim.worlds.load import configured_scenario
 
@@ -28,7 +28,7 @@ def open_camera(config: Config) -> tuple[Eye, CameraFaults]:
     return open_eye(scenario.world, config.eye), CameraFaults(scenario.faults)
 
 
-def jpeg(
+def render_jpeg(
     eye: Eye, faults: CameraFaults, pose: BoatPose, t_s: float, quality: int, actors_along_m: tuple[float, ...] = ()
 ) -> bytes | None:
     """One encoded picture; None where the camera drops it."""
@@ -48,7 +48,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     eye, faults = await loop.run_in_executor(gl_thread, open_camera, config)
     try:
         start = BoatPose(*eye.world.start)
-        await loop.run_in_executor(gl_thread, jpeg, eye, CameraFaults(()), start, 0.0, settings.jpeg_quality)
+        await loop.run_in_executor(gl_thread, render_jpeg, eye, CameraFaults(()), start, 0.0, settings.jpeg_quality)
         with bus.alive():
             due_us, frame_seq, epoch = clock.now_us(), 0, None
             while True:
@@ -60,10 +60,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 epoch = truth.epoch
                 data = await loop.run_in_executor(
                     gl_thread,
-                    jpeg,
+                    render_jpeg,
                     eye,
                     faults,
-                    pose_of(truth),
+                    boat_pose(truth),
                     truth.sim_us * 1e-6,
                     settings.jpeg_quality,
                     truth.actors_along_m,

@@ -4,10 +4,10 @@ import numpy as np
 import numpy.typing as npt
 
 from paani.arrays import F32
-from paani_sim.eye.afloat import Sea, sea_of
 from paani_sim.eye.rain import extinction_per_m
 from paani_sim.eye.sky import Sky
 from paani_sim.eye.surfaces import SPAN_M
+from paani_sim.eye.wave_motion import SeaState, wind_sea_state
 from paani_sim.eye.wave_textures import mean_square_slope
 from paani_sim.worlds.world import Light, Wind, World
 
@@ -21,7 +21,7 @@ RAIN_SLOPE = 0.0012  # mean square slope that rings of rain add per root of mm/h
 
 def uniforms(world: World, light: Light, wind: Wind, sky: Sky) -> Uniforms:
     """Everything that stays the same from picture to picture."""
-    sea = sea_of(wind, world.waves)
+    sea = wind_sea_state(wind, world.waves)
     square = mean_square_slope(wind.speed_mps) + RAIN_SLOPE * light.rain_mmph**0.5
     return {
         "sun": sky.sun_direction,
@@ -45,7 +45,7 @@ def sun_share(sky: Sky) -> float:
     return direct / (direct + float(sky.ambient_rgb.max()))
 
 
-def _swell_share(sea: Sea) -> npt.NDArray[np.float64]:
+def _swell_share(sea: SeaState) -> npt.NDArray[np.float64]:
     """The longer the waves, the more of the slope is in the large tiles; the sum of squares stays."""
     tilt = np.clip(sea.wave_m / OPEN_WAVE_M, 0.35, 2.5) ** np.array([0.6, 0.2, -0.3])
     share = SWELL_SHARE * tilt

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paani_sim.worlds.world import Actor, Behaviour, Kind, Pose2, along_at
+from paani_sim.worlds.world import Actor, Behaviour, Kind, Pose2, actor_distance_along_m
 
 VESSEL_KEEPS_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 SWIMMER_KEEPS_CLEAR_M = 1.0
@@ -83,7 +83,7 @@ class Actors:
         self._paths = [ActorPath(actor) for actor in actors]
         self._every_s = every_s
         self._boat_reach_m = boat_reach_m
-        self.along_m = tuple(along_at(actor, 0.0) for actor in actors)
+        self.along_m = tuple(actor_distance_along_m(actor, 0.0) for actor in actors)
         self._waited_s = [0.0] * len(self._actors)
         self.speeds_mps = tuple(0.0 for _ in actors)
         self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, self.along_m, strict=True)]
@@ -97,7 +97,7 @@ class Actors:
                 speed = yielding_speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
                 speed = self._apply_patience(number, speed, pose, boat_xy_m)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
-            along.append(along_at(actor, t_s) if holds_on else along_m + speed * self._every_s)
+            along.append(actor_distance_along_m(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
         self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, along, strict=True)]

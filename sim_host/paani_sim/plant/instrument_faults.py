@@ -3,28 +3,28 @@
 from paani.geometry import wrap_rad
 from paani_sim.plant.dynamics import Fans
 from paani_sim.plant.sensors import GpsReading, ImuReading, Truth
-from paani_sim.worlds.faults import Fault, FaultKind, active
+from paani_sim.worlds.faults import Fault, FaultKind, find_active_fault
 
 Faults = tuple[Fault, ...]
 
 
 def apply_gps_jump(truth: Truth, faults: Faults, t_s: float) -> Truth:
     """Where a GPS that has jumped believes to be."""
-    jump = active(faults, FaultKind.GPS_JUMP, t_s)
+    jump = find_active_fault(faults, FaultKind.GPS_JUMP, t_s)
     return truth._replace(x_m=truth.x_m + jump.amount) if jump else truth
 
 
 def apply_gps_outage(reading: GpsReading, last: GpsReading, faults: Faults, t_s: float) -> GpsReading:
     """In an outage: no fix, no speed, and the `last` position that there was."""
-    if active(faults, FaultKind.GPS_OUTAGE, t_s) is None:
+    if find_active_fault(faults, FaultKind.GPS_OUTAGE, t_s) is None:
         return reading
     return last._replace(sog_mps=0.0, cog_rad=0.0, fix=False)
 
 
 def apply_imu_bias(reading: ImuReading, faults: Faults, t_s: float) -> ImuReading:
     """With the faults of compass and gyro."""
-    compass = active(faults, FaultKind.COMPASS_BIAS, t_s)
-    gyro = active(faults, FaultKind.GYRO_BIAS, t_s)
+    compass = find_active_fault(faults, FaultKind.COMPASS_BIAS, t_s)
+    gyro = find_active_fault(faults, FaultKind.GYRO_BIAS, t_s)
     if compass:
         reading = reading._replace(yaw_rad=wrap_rad(reading.yaw_rad + compass.amount))
     if gyro:
@@ -35,7 +35,7 @@ def apply_imu_bias(reading: ImuReading, faults: Faults, t_s: float) -> ImuReadin
 
 def apply_thruster_loss(fans: Fans, faults: Faults, t_s: float) -> Fans:
     """With the force that a thruster has lost."""
-    loss = active(faults, FaultKind.THRUSTER_LOSS, t_s)
+    loss = find_active_fault(faults, FaultKind.THRUSTER_LOSS, t_s)
     if loss is None:
         return fans
     left, right = max(loss.amount, 0.0), max(-loss.amount, 0.0)

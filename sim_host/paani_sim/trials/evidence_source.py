@@ -11,7 +11,7 @@ from paani.arrays import U8
 from paani.config import Config
 from paani.cores import perceiver_of
 from paani_sim.eye.camera_faults import CameraFaults
-from paani_sim.eye.mounted import open_eye, pose_of
+from paani_sim.eye.configured_camera import boat_pose, open_eye
 from paani_sim.worlds import Fault, World
 
 
@@ -47,7 +47,7 @@ class CameraEvidenceSource:
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
         """See `Eyes`."""
         t_s = truth.sim_us * 1e-6
-        bgr = self._faults.apply(self._renderer.render(pose_of(truth), t_s, truth.actors_along_m).bgr, t_s)
+        bgr = self._faults.apply(self._renderer.render(boat_pose(truth), t_s, truth.actors_along_m).bgr, t_s)
         if bgr is None:
             return None
         evidence, mask = self._perceiver.perceive(bgr, header, 0.0, roll_rad)

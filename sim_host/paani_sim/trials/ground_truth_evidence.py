@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from paani import messages as m
 from paani.arrays import F64, Bools
 from paani.config import Config, CorridorConfig
-from paani_sim.eye.camera import look_from, view_projection
-from paani_sim.eye.mounted import camera_of, pose_of
+from paani_sim.eye.camera import camera_pose, view_projection
+from paani_sim.eye.configured_camera import boat_pose, build_camera
 from paani_sim.trials.evidence_source import EvidenceFrame
 from paani_sim.trials.silhouettes import height_span_m, project_silhouettes
-from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_at, along_at
-from paani_sim.worlds.faults import active
-from paani_sim.worlds.footprint import placed, shape_of
+from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_distance_along_m, actor_pose_along
+from paani_sim.worlds.faults import find_active_fault
+from paani_sim.worlds.footprint import build_outline, place_outline
 
 MASK_ROWS, MASK_COLUMNS = 64, 80  # of the mask, as the segmenter's
 MAX_RANGE_M = 90.0  # farther things are smaller than a box can be
@@ -54,11 +54,11 @@ class GroundTruthEvidenceSource:
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
         self._world, self._faults, self._config = world, tuple(faults), config
-        self._camera = camera_of(config.eye)
+        self._camera = build_camera(config.eye)
         self._things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
-        self._shapes = [shape_of(thing) for thing in self._things]
+        self._shapes = [build_outline(thing) for thing in self._things]
         self._heights_m = np.array([height_span_m(thing) for thing in self._things]).reshape(-1, 2)
-        self._still_m = [placed(s, o.pose) for s, o in zip(self._shapes, world.obstacles, strict=False)]
+        self._still_m = [place_outline(s, o.pose) for s, o in zip(self._shapes, world.obstacles, strict=False)]
         self._shore_m = world.shore_m
         self._shore_legs = np.roll(world.shore_m, -1, axis=0) - world.shore_m
         self._shore_reach_m = np.hypot(self._shore_legs[:, 0], self._shore_legs[:, 1])
@@ -67,9 +67,11 @@ class GroundTruthEvidenceSource:
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
         """See `Eyes`."""
         t_s = truth.sim_us * 1e-6
-        if active(self._faults, FaultKind.CAMERA_DROPPED, t_s):
+        if find_active_fault(self._faults, FaultKind.CAMERA_DROPPED, t_s):
             return None
-        cause = next((cause for kind, cause in CAUSE_OF_FAULT.items() if active(self._faults, kind, t_s)), None)
+        cause = next(
+            (cause for kind, cause in CAUSE_OF_FAULT.items() if find_active_fault(self._faults, kind, t_s)), None
+        )
         evidence = m.Evidence(
             source_us=header.source_us,
             frame_seq=header.frame_seq,
@@ -89,8 +91,8 @@ class GroundTruthEvidenceSource:
 
     def compute_visible_scene(self, truth: m.TruePose) -> VisibleScene:
         """What would be in the picture."""
-        pose, t_s = pose_of(truth), truth.sim_us * 1e-6
-        camera_m, map_from_camera = look_from(pose, self._camera)
+        pose, t_s = boat_pose(truth), truth.sim_us * 1e-6
+        camera_m, map_from_camera = camera_pose(pose, self._camera)
         clip_from_map = view_projection(pose, self._camera)
         ranges_m, directions = self._shore_ranges_m(camera_m, map_from_camera)
         ends = np.column_stack(
@@ -116,9 +118,9 @@ class GroundTruthEvidenceSource:
         return VisibleScene(water & (covered == 0), tuple(boxes))
 
     def _update_outlines(self, truth: m.TruePose, t_s: float) -> F64:
-        alongs = truth.actors_along_m or tuple(along_at(actor, t_s) for actor in self._world.actors)
+        alongs = truth.actors_along_m or tuple(actor_distance_along_m(actor, t_s) for actor in self._world.actors)
         moving = [
-            placed(shape, actor_at(actor, along_m))
+            place_outline(shape, actor_pose_along(actor, along_m))
             for shape, actor, along_m in zip(
                 self._shapes[len(self._still_m) :], self._world.actors, alongs, strict=True
             )

@@ -15,7 +15,7 @@ from paani.arrays import F64
 from paani_sim.trials.silhouettes import MAX_FLOATING_BASE_M
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Actor, Obstacle, Pose2, World
-from paani_sim.worlds.footprint import is_round, placed, shape_of
+from paani_sim.worlds.footprint import build_outline, is_round, place_outline
 
 MAX_CLEARANCE_M = 12.0  # what is farther counts as this far
 BANK = "bank"
@@ -101,9 +101,9 @@ def was_visible(
         for thing in things:
             if isinstance(thing, Actor):
                 at = compute_actor_poses(thing, hull_path.along_m[k : k + 1, actors.index(thing.id)])[0]
-                outlines[thing.id] = placed(shape_of(thing), Pose2(*at.tolist()))
+                outlines[thing.id] = place_outline(build_outline(thing), Pose2(*at.tolist()))
             else:
-                outlines[thing.id] = placed(shape_of(thing), thing.pose)
+                outlines[thing.id] = place_outline(build_outline(thing), thing.pose)
         if what == BANK:
             end = np.array([hull_path.x_m[last], hull_path.y_m[last]])
             targets = _find_nearest_on_edges(world.shore_m, end)[None, :]
@@ -137,7 +137,7 @@ def _distance_to_thing_m(thing: Obstacle | Actor, poses: F64, hull_path: HullPat
     if is_round(thing):
         gap = _distance_to_core_m(rel, hull_path.core_m)[:, 0] - 0.5 * thing.width_m
     else:
-        shape = shape_of(thing)
+        shape = build_outline(thing)
         turn = poses[near, 2] - hull_path.yaw_rad[near]
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         corners = rel + np.stack(

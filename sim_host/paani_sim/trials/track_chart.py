@@ -10,8 +10,8 @@ from paani.arrays import F64
 from paani.statistics.charts import Axes, circle, drawing, element, polygon, polyline
 from paani_sim.trials.result import Closeness, TrialResult
 from paani_sim.trials.silhouettes import MAX_FLOATING_BASE_M
-from paani_sim.worlds import World, actor_at, along_at
-from paani_sim.worlds.footprint import placed, shape_of
+from paani_sim.worlds import World, actor_distance_along_m, actor_pose_along
+from paani_sim.worlds.footprint import build_outline, place_outline
 
 WIDTH_PX = 520.0
 MAX_HEIGHT_FRAC = 1.4  # of the width
@@ -46,14 +46,19 @@ def draw_track_chart(world: World, result: TrialResult) -> str:
         line("route", np.vstack([world.route_m, world.route_m[:1]]) if world.route_closed else world.route_m),
     ]
     parts += [
-        area(each.kind.value, placed(shape_of(each), each.pose))
+        area(each.kind.value, place_outline(build_outline(each), each.pose))
         for each in world.obstacles
         if each.base_z_m < MAX_FLOATING_BASE_M
     ]
     at_s = find_worst_moment_s(result)
     for actor in world.actors:
         parts.append(line("way", np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m))
-        parts.append(area(actor.kind.value, placed(shape_of(actor), actor_at(actor, along_at(actor, at_s)))))
+        parts.append(
+            area(
+                actor.kind.value,
+                place_outline(build_outline(actor), actor_pose_along(actor, actor_distance_along_m(actor, at_s))),
+            )
+        )
     parts.append(line("track", track))
     parts += dots("start", track[:1].tolist())
     parts += dots(

@@ -13,7 +13,7 @@ import numpy as np
 from paani.errors import UserError
 from paani_sim.trials.policies import Policy
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
-from paani_sim.worlds.generate import random_scenario
+from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
 FIELD_SEPARATOR, FAULT_SEPARATOR = ":", "+"
@@ -130,7 +130,7 @@ def build_scenario(case: TrialCase) -> Scenario:
     if is_fixed_scenario(case.world):
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
-        scenario = random_scenario(case.world, case.seed)
+        scenario = draw_random_scenario(case.world, case.seed)
     if not case.fault:
         return scenario
     kind = FaultKind(case.fault)

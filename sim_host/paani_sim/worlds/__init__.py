@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 from paani.errors import UserError
-from paani_sim.worlds.canal import canal
+from paani_sim.worlds.canal import build_canal
 from paani_sim.worlds.faults import Fault, FaultKind
-from paani_sim.worlds.harbour import harbour
-from paani_sim.worlds.lake import lake
-from paani_sim.worlds.river import river
+from paani_sim.worlds.harbour import build_harbour
+from paani_sim.worlds.lake import build_lake
+from paani_sim.worlds.river import build_river
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.world import (
     Actor,
@@ -21,12 +21,17 @@ from paani_sim.worlds.world import (
     Waves,
     Wind,
     World,
-    actor_at,
-    actor_pose,
-    along_at,
+    actor_distance_along_m,
+    actor_pose_along,
+    actor_pose_at,
 )
 
-WORLDS: dict[str, Callable[[], World]] = {"lake": lake, "river": river, "canal": canal, "harbour": harbour}
+WORLDS: dict[str, Callable[[], World]] = {
+    "lake": build_lake,
+    "river": build_river,
+    "canal": build_canal,
+    "harbour": build_harbour,
+}
 
 
 def load_world(name: str) -> World:
@@ -53,8 +58,8 @@ __all__ = [
     "Waves",
     "Wind",
     "World",
-    "actor_at",
-    "actor_pose",
-    "along_at",
+    "actor_distance_along_m",
+    "actor_pose_along",
+    "actor_pose_at",
     "load_world",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from paani_sim.worlds.channel import Channel
 from paani_sim.worlds.curves import closed_length_m, resample_closed
-from paani_sim.worlds.way import start_of
+from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
 
 ROUTE_START_M = 24.0
@@ -56,7 +56,7 @@ HALF_WIDTH_M = (
 )
 
 
-def canal() -> World:
+def build_canal() -> World:
     """Build the canal."""
     channel = _channel()
     loop_m = channel.loop_m(ROUTE_START_M, ROUTE_END_M, LANE_M)
@@ -68,7 +68,7 @@ def canal() -> World:
         origin_lon_deg=5.1202,
         shore_m=channel.shore_m(),
         route_m=route_m,
-        start=start_of(route_m),
+        start=start_pose(route_m),
         obstacles=_obstacles(channel),
         actors=_actors(channel),
         wind=Wind(speed_mps=1.5, toward_rad=0.2),
@@ -90,7 +90,7 @@ def _channel() -> Channel:
 
 
 def _obstacles(channel: Channel) -> tuple[Obstacle, ...]:
-    at, half, bank = channel.at, channel.half_width_m, channel.bank
+    at, half, bank = channel.pose_at, channel.half_width_m, channel.bank
 
     def off_lane(along_m: float, side: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
         """`left_m` to the left of the route's lane on that side of the centre line."""

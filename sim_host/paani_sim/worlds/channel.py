@@ -21,7 +21,7 @@ class Channel:
         """Half of the channel's width there."""
         return float(np.interp(along_m, self._along_m, self._half_width_m))
 
-    def at(self, along_m: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
+    def pose_at(self, along_m: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
         """Pose in the map, heading down the channel plus `turn_rad`."""
         centre = [np.interp(along_m, self._along_m, self.centre_m[:, k]) for k in (0, 1)]
         left = np.array([np.interp(along_m, self._along_m, self._left[:, k]) for k in (0, 1)])
@@ -32,7 +32,7 @@ class Channel:
 
     def bank(self, along_m: float, side: float, out_m: float, turn_rad: float = 0.0) -> Pose2:
         """`out_m` beyond the water's edge on the `side` (+1 left, -1 right; negative: afloat)."""
-        return self.at(along_m, side * (self.half_width_m(along_m) + out_m), turn_rad)
+        return self.pose_at(along_m, side * (self.half_width_m(along_m) + out_m), turn_rad)
 
     def shore_m(self) -> F64:
         """The water's edge as one closed polygon, counter-clockwise, every third sample."""
@@ -46,7 +46,7 @@ class Channel:
         step = 1.0 if last_m > first_m else -1.0
         return np.array(
             [
-                self.at(along_m, 2.0 * lane_frac * self.half_width_m(along_m))[:2]
+                self.pose_at(along_m, 2.0 * lane_frac * self.half_width_m(along_m))[:2]
                 for along_m in np.arange(first_m, last_m + 0.5 * step, step)
             ]
         )
@@ -58,7 +58,10 @@ class Channel:
         def half_turn(along_m: float, toward: float) -> F64:
             reach_m = 2.0 * lane_frac * self.half_width_m(along_m)
             return np.array(
-                [self.at(along_m + toward * 0.8 * reach_m * np.cos(a), toward * reach_m * np.sin(a))[:2] for a in turn]
+                [
+                    self.pose_at(along_m + toward * 0.8 * reach_m * np.cos(a), toward * reach_m * np.sin(a))[:2]
+                    for a in turn
+                ]
             )
 
         return np.vstack(

@@ -55,7 +55,7 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from paani_sim.worlds.sheet import VIEWS, sheet  # noqa: PLC0415  the rest needs no OpenGL
+    from paani_sim.worlds.scenario_sheet import VIEWS, render_sheet  # noqa: PLC0415  the rest needs no OpenGL
 
     out: Path = options.out
     if out.suffix.lower() != ".png":
@@ -63,7 +63,7 @@ def _render(options: argparse.Namespace) -> int:
     _require_folder(out)
     picture = None
     with tqdm(total=VIEWS, unit="view", desc=str(options.scenario), disable=None) as progress:
-        for picture in sheet(load_scenario(options.scenario), *options.size):
+        for picture in render_sheet(load_scenario(options.scenario), *options.size):
             progress.update(picture is None)
     _, data = cv2.imencode(".png", picture)
     write_whole(out, data.tobytes(), "--out")

@@ -64,14 +64,14 @@ def normals_left(points_m: F64, *, closed: bool) -> F64:
     return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
-def corners(points_m: F64, within_m: float) -> F64:
+def simplify_polygon(points_m: F64, within_m: float) -> F64:
     """The closed polygon without the points that lie within `within_m` of the straight line past them."""
     kept = [0]
     first = 0
     count = len(points_m)
     while first < count:
         last = first + 1
-        while last < count and _straight(points_m, first, last + 1, within_m):
+        while last < count and _is_straight(points_m, first, last + 1, within_m):
             last += 1
         if last >= count:
             break
@@ -80,7 +80,7 @@ def corners(points_m: F64, within_m: float) -> F64:
     return points_m[kept]
 
 
-def _straight(points_m: F64, first: int, last: int, within_m: float) -> bool:
+def _is_straight(points_m: F64, first: int, last: int, within_m: float) -> bool:
     """Whether everything between two points of the closed polygon lies close to the line from one to the other."""
     between = points_m[first + 1 : last] - points_m[first]
     way = points_m[last % len(points_m)] - points_m[first]
@@ -91,7 +91,7 @@ def _straight(points_m: F64, first: int, last: int, within_m: float) -> bool:
     return bool(off_m.max() <= within_m)
 
 
-def inside(polygon_m: F64, points_m: F64) -> npt.NDArray[np.bool_]:
+def is_inside(polygon_m: F64, points_m: F64) -> npt.NDArray[np.bool_]:
     """Even-odd test of `(m, 2)` points against the closed polygon `(n, 2)`."""
     x, y = points_m[:, 0, None], points_m[:, 1, None]
     x0, y0 = polygon_m[None, :, 0], polygon_m[None, :, 1]
@@ -116,5 +116,5 @@ def distance_to_edges_m(polygon_m: F64, points_m: F64) -> npt.NDArray[np.float64
 
 def clearance_m(polygon_m: F64, points_m: F64) -> npt.NDArray[np.float64]:
     """Signed distance `(m,)` to the shore: positive in the water, negative on land."""
-    sign = np.where(inside(polygon_m, points_m), 1.0, -1.0)
+    sign = np.where(is_inside(polygon_m, points_m), 1.0, -1.0)
     return sign * distance_to_edges_m(polygon_m, points_m)

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from paani.arrays import U8
 from paani.errors import UserError
 from paani_sim.eye.camera import Camera
-from paani_sim.eye.labels import CLASSES, Labelled, seen_boxes
+from paani_sim.eye.labels import CLASSES, Labelled, select_visible_boxes
 from paani_sim.eye.renderer import Eye
 from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.sky import SKIES
@@ -90,13 +90,13 @@ def write_dataset(
         session = 0
         while len(items) < n:
             rng = np.random.default_rng([seed, session])
-            world = _vary(places[session % len(places)], rng)
+            world = _vary_world(places[session % len(places)], rng)
             seq = f"{world.name}_{seed}_{session:03d}"
             height = round(height_px * FLATTER) if rng.random() < FLAT_FRAC else height_px
             with Eye(world, Camera(width_px=width_px, height_px=height), supersample=2) as eye:
                 for k in range(min(PICTURES_PER_SESSION, n - len(items))):
-                    view = _one(eye, k, rng)
-                    items.append(_write(beside, seq, k, view, rng))
+                    view = _render_picture(eye, k, rng)
+                    items.append(_write_picture(beside, seq, k, view, rng))
                     for box in view.boxes:
                         boxes[str(box.kind)] += 1
                     progress.update()
@@ -114,7 +114,7 @@ def write_dataset(
     return manifest
 
 
-def _vary(world: World, rng: np.random.Generator) -> World:
+def _vary_world(world: World, rng: np.random.Generator) -> World:
     """The same shore with other land, plants, season and water."""
     return dataclasses.replace(
         world,
@@ -124,7 +124,7 @@ def _vary(world: World, rng: np.random.Generator) -> World:
     )
 
 
-def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
+def _render_picture(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
     """One picture with its own pose, camera and things, and now and then another sky."""
     pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))
     if k % PICTURES_PER_SKY == 0:
@@ -155,17 +155,17 @@ def _one(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
         k1=float(bend * rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
         shutter_s=float(rng.uniform(0.0, 0.03)),
     )
-    eye.place(scatter(eye.world, pose, rng))
+    eye.place_obstacles(scatter(eye.world, pose, rng))
     view = eye.render_labelled(pose, float(rng.uniform(0.0, 600.0)))
-    return dataclasses.replace(view, boxes=seen_boxes(view))
+    return dataclasses.replace(view, boxes=select_visible_boxes(view))
 
 
-def _write(folder: Path, seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:
+def _write_picture(folder: Path, seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:
     height, width = view.mask.shape
     stem = f"{seq}_{k:02d}"
     quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(72, 96))]
-    _save(folder / f"images/{stem}.jpg", _tinted(view.bgr, rng), quality)
-    _save(folder / f"masks/{stem}.png", view.mask, [])
+    _save_image(folder / f"images/{stem}.jpg", _vary_colours(view.bgr, rng), quality)
+    _save_image(folder / f"masks/{stem}.png", view.mask, [])
     lines = []
     for box in view.boxes:
         centre = (0.5 * (box.x0_px + box.x1_px) / width, 0.5 * (box.y0_px + box.y1_px) / height)
@@ -176,7 +176,7 @@ def _write(folder: Path, seq: str, k: int, view: Labelled, rng: np.random.Genera
     return Item(f"images/{stem}.jpg", seq, (width, height), f"masks/{stem}.png", f"labels/{stem}.txt")
 
 
-def _tinted(bgr: U8, rng: np.random.Generator) -> U8:
+def _vary_colours(bgr: U8, rng: np.random.Generator) -> U8:
     """Another camera's white balance, contrast, saturation and softness."""
     grey = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)[..., None]
     colour = grey + (bgr.astype(np.float32) - grey) * rng.uniform(0.45, 1.15)
@@ -189,6 +189,6 @@ def _tinted(bgr: U8, rng: np.random.Generator) -> U8:
     return np.asarray(np.clip(colour, 0.0, 255.0), np.uint8)
 
 
-def _save(path: Path, picture: U8, options: list[int]) -> None:
+def _save_image(path: Path, picture: U8, options: list[int]) -> None:
     if not cv2.imwrite(str(path), picture, options):
         raise UserError(f"dataset: cannot write {path}")

@@ -24,7 +24,7 @@ def fence_toml(world: World, areas: Iterable[FenceArea]) -> str:
     return head + "".join(parts)
 
 
-def water(world: World) -> FenceArea:
+def water_area(world: World) -> FenceArea:
     """The water's edge as an area that keeps in."""
     corners = tuple(Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in world.shore_m.tolist())
     return FenceArea(keep=Keep.IN, corners=corners, name="water")
@@ -34,7 +34,7 @@ def main(name: str, file: str) -> int:
     """Write the file whole or not at all. Exit code 2, with one line, for a user's mistake."""
     try:
         world = load_scenario(name).world
-        write_whole(Path(file), fence_toml(world, [water(world)]).encode())
+        write_whole(Path(file), fence_toml(world, [water_area(world)]).encode())
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         return 2

@@ -28,16 +28,16 @@ class Fault(NamedTuple):
     duration_s: float = float("inf")
     amount: float = 0.0
 
-    def is_on(self, t_s: float) -> bool:
+    def is_active(self, t_s: float) -> bool:
         """Whether it acts at `t_s`."""
         return self.start_s <= t_s < self.start_s + self.duration_s
 
 
-def active(faults: Iterable[Fault], kind: FaultKind, t_s: float) -> Fault | None:
+def find_active_fault(faults: Iterable[Fault], kind: FaultKind, t_s: float) -> Fault | None:
     """The first fault of this kind that acts at `t_s`."""
-    return next((fault for fault in faults if fault.kind is kind and fault.is_on(t_s)), None)
+    return next((fault for fault in faults if fault.kind is kind and fault.is_active(t_s)), None)
 
 
 def is_linked(faults: Iterable[Fault], t_s: float) -> bool:
     """Whether board and host hear each other at `t_s`."""
-    return active(faults, FaultKind.LINK_LOSS, t_s) is None
+    return find_active_fault(faults, FaultKind.LINK_LOSS, t_s) is None

@@ -15,7 +15,7 @@ _ANGLES = np.arange(CORNERS) * 2.0 * np.pi / CORNERS
 _ROUND = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 
 
-class Bow(NamedTuple):
+class BowShape(NamedTuple):
     """How a hull narrows, in shares of its half length and width: full to `from_x`, `at_y` at `at_x`, then `tip_y`.
 
     About the least such outline that holds the hull as the eye draws it, rake included.
@@ -28,15 +28,15 @@ class Bow(NamedTuple):
 
 
 BOWS = {
-    "rowboat": Bow(-0.16, 0.62, 0.86, 0.02),
-    "dinghy": Bow(0.42, 0.82, 0.69, 0.24),
-    "kayak": Bow(0.40, 0.84, 0.65, 0.02),
-    "cruiser": Bow(-0.04, 0.50, 0.81, 0.03),
-    "sailboat": Bow(-0.08, 0.50, 0.82, 0.02),
-    "workboat": Bow(0.02, 0.56, 1.00, 0.02),
-    "barge": Bow(0.38, 0.74, 0.79, 0.02),
-    "narrowboat": Bow(0.58, 0.82, 0.68, 0.02),
-    "tug": Bow(0.26, 0.40, 0.95, 0.43),
+    "rowboat": BowShape(-0.16, 0.62, 0.86, 0.02),
+    "dinghy": BowShape(0.42, 0.82, 0.69, 0.24),
+    "kayak": BowShape(0.40, 0.84, 0.65, 0.02),
+    "cruiser": BowShape(-0.04, 0.50, 0.81, 0.03),
+    "sailboat": BowShape(-0.08, 0.50, 0.82, 0.02),
+    "workboat": BowShape(0.02, 0.56, 1.00, 0.02),
+    "barge": BowShape(0.38, 0.74, 0.79, 0.02),
+    "narrowboat": BowShape(0.58, 0.82, 0.68, 0.02),
+    "tug": BowShape(0.26, 0.40, 0.95, 0.43),
 }
 
 
@@ -45,19 +45,19 @@ def is_round(thing: Obstacle | Actor) -> bool:
     return thing.length_m == thing.width_m
 
 
-def shape_of(thing: Obstacle | Actor) -> F64:
+def build_outline(thing: Obstacle | Actor) -> F64:
     """Its outline about its own middle, bow along x, `(8, 2)`, convex and counter-clockwise."""
-    unit = _ROUND if is_round(thing) else _pointed(BOWS[thing.look]) if thing.look in BOWS else _BOX
+    unit = _ROUND if is_round(thing) else _build_pointed_outline(BOWS[thing.look]) if thing.look in BOWS else _BOX
     return unit * [0.5 * thing.length_m, 0.5 * thing.width_m]
 
 
-def placed(shape_m: F64, pose: Pose2) -> F64:
+def place_outline(shape_m: F64, pose: Pose2) -> F64:
     """The outline `(8, 2)` in the map."""
     cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
     x, y = shape_m[:, 0], shape_m[:, 1]
     return np.column_stack([pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y])
 
 
-def _pointed(bow: Bow) -> F64:
+def _build_pointed_outline(bow: BowShape) -> F64:
     port = np.array([[1.0, bow.tip_y], [bow.at_x, bow.at_y], [bow.from_x, 1.0], [-1.0, 1.0]])
     return np.vstack([port, port[::-1] * [1.0, -1.0]])

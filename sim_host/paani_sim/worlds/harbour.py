@@ -4,7 +4,7 @@ import numpy as np
 
 from paani.arrays import F64
 from paani_sim.worlds.curves import closed_length_m, resample_closed
-from paani_sim.worlds.way import start_of
+from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.world import Actor, Bank, Behaviour, Kind, Light, Obstacle, Pose2, Waves, Wind, World
 
 LEG_M = 7.5
@@ -66,7 +66,7 @@ ROUTE_M = (
 )
 
 
-def harbour() -> World:
+def build_harbour() -> World:
     """Build the harbour."""
     route_m = _route()
     return World(
@@ -76,7 +76,7 @@ def harbour() -> World:
         origin_lon_deg=5.3652,
         shore_m=np.array(CORNERS_M),
         route_m=route_m,
-        start=start_of(route_m),
+        start=start_pose(route_m),
         obstacles=(*_berths(), *_obstacles()),
         actors=_actors(),
         wind=Wind(speed_mps=2.5, toward_rad=1.2),

@@ -4,7 +4,7 @@ import numpy as np
 
 from paani.arrays import F64
 from paani_sim.worlds.curves import closed_length_m, normals_left, point_along_closed, resample_closed
-from paani_sim.worlds.way import start_of
+from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 EXTENT_X_M = 208.699  # K1
@@ -14,7 +14,7 @@ ROUTE_LENGTH_M = 465.443  # K2
 SHORE_COUNT = 240
 
 
-def lake() -> World:
+def build_lake() -> World:
     """Build the lake."""
     shore_m = _shore()
     route_m = _route(shore_m)
@@ -25,7 +25,7 @@ def lake() -> World:
         origin_lon_deg=9.4794,
         shore_m=shore_m,
         route_m=route_m,
-        start=start_of(route_m),
+        start=start_pose(route_m),
         obstacles=_obstacles(shore_m),
         actors=_actors(),
         wind=Wind(speed_mps=3.0, toward_rad=0.9),

@@ -8,7 +8,7 @@ import numpy as np
 from paani.arrays import F64
 from paani_sim.worlds.channel import Channel
 from paani_sim.worlds.curves import resample_closed
-from paani_sim.worlds.way import start_of
+from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.world import Actor, Behaviour, Kind, Light, Obstacle, Pose2, Wind, World
 
 CHANNEL_START_M = -150.0
@@ -20,7 +20,7 @@ LEG_M = 7.5
 BRIDGE_ALONG_M = 196.0
 
 
-def river() -> World:
+def build_river() -> World:
     """Build the river."""
     channel = _channel()
     route_m = _route(channel)
@@ -31,7 +31,7 @@ def river() -> World:
         origin_lon_deg=8.6928,
         shore_m=channel.shore_m(),
         route_m=route_m,
-        start=start_of(route_m),
+        start=start_pose(route_m),
         obstacles=_obstacles(channel),
         actors=_actors(channel),
         wind=Wind(speed_mps=1.8, toward_rad=0.5),
@@ -59,7 +59,7 @@ def _route(channel: Channel) -> F64:
 
 
 def _obstacles(channel: Channel) -> tuple[Obstacle, ...]:
-    at, half, bank = channel.at, channel.half_width_m, channel.bank
+    at, half, bank = channel.pose_at, channel.half_width_m, channel.bank
 
     def off_lane(along_m: float, side: float, left_m: float, turn_rad: float = 0.0) -> Pose2:
         """`left_m` to the left of the route's lane on that side of the centre line."""

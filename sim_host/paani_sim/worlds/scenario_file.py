@@ -12,8 +12,8 @@ import msgspec
 
 from paani.config.section import Fraction, Section
 from paani.errors import UserError
+from paani_sim.worlds.encounter_paths import Encounter
 from paani_sim.worlds.faults import FaultKind
-from paani_sim.worlds.meetings import Encounter
 from paani_sim.worlds.world import Behaviour
 
 MAX_BYTES = 256 * 1024

@@ -8,9 +8,9 @@ import numpy as np
 
 from paani.arrays import F64
 from paani_sim.vessels import Vessel, load_vessel
-from paani_sim.worlds.curves import corners
-from paani_sim.worlds.footprint import BOWS, CORNERS, is_round, shape_of
-from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose
+from paani_sim.worlds.curves import simplify_polygon
+from paani_sim.worlds.footprint import BOWS, CORNERS, build_outline, is_round
+from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose_at
 
 TIMESTEP_S = 0.01
 
@@ -24,8 +24,8 @@ _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SITE = mujoco.mjtObj.mjOBJ_SITE
 
-_SUNK_M = 1.0  # solids reach this far under water
-_STRAIGHT_M = 0.02  # a shore that bends less is straight
+_SUBMERGED_M = 1.0  # solids reach this far under water
+_MAX_DEVIATION_M = 0.02  # a shore that bends less is straight
 _BANK_HALF_HEIGHT_M = 1.2
 _BANK_HALF_THICKNESS_M = 0.6
 
@@ -52,7 +52,7 @@ def build_spec(world: World, vessel: Vessel | None = None, *, visual: bool = Fal
     for actor in world.actors:
         _add_actor(spec, actor)
     if visual:
-        _add_looks(spec)
+        _add_visuals(spec)
     return spec
 
 
@@ -93,7 +93,7 @@ def _add_boat(spec: mujoco.MjSpec, world: World, vessel: Vessel) -> None:
 
 def _add_banks(spec: mujoco.MjSpec, shore_m: F64) -> None:
     """One box behind each straight stretch of the shore, overlapping its neighbours."""
-    starts_m = corners(shore_m, _STRAIGHT_M)
+    starts_m = simplify_polygon(shore_m, _MAX_DEVIATION_M)
     ends_m = np.roll(starts_m, -1, axis=0)
     for number, (start, end) in enumerate(zip(starts_m, ends_m, strict=True)):
         along = end - start
@@ -115,7 +115,7 @@ def _add_banks(spec: mujoco.MjSpec, shore_m: F64) -> None:
 
 def _add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> None:
     pose = obstacle.pose
-    low_m = obstacle.base_z_m if obstacle.base_z_m > 2.0 else -_SUNK_M
+    low_m = obstacle.base_z_m if obstacle.base_z_m > 2.0 else -_SUBMERGED_M
     high_m = obstacle.base_z_m + obstacle.height_m
     _add_solid(
         spec,
@@ -128,7 +128,7 @@ def _add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> None:
 
 
 def _add_actor(spec: mujoco.MjSpec, actor: Actor) -> None:
-    pose = actor_pose(actor, 0.0)
+    pose = actor_pose_at(actor, 0.0)
     yaw = pose.yaw_rad
     body = spec.worldbody.add_body(
         name=actor.id,
@@ -140,9 +140,9 @@ def _add_actor(spec: mujoco.MjSpec, actor: Actor) -> None:
         spec,
         body,
         actor,
-        pos=[0.0, 0.0, 0.5 * (actor.height_m - _SUNK_M)],
+        pos=[0.0, 0.0, 0.5 * (actor.height_m - _SUBMERGED_M)],
         yaw_rad=0.0,
-        half_height_m=0.5 * (actor.height_m + _SUNK_M),
+        half_height_m=0.5 * (actor.height_m + _SUBMERGED_M),
     )
 
 
@@ -162,7 +162,7 @@ def _add_solid(
         kind, size = _CYLINDER, [half_width_m, half_height_m, 0.0]
     elif thing.look in BOWS:
         kind = _MESH
-        around = shape_of(thing)
+        around = build_outline(thing)
         walls = [np.column_stack([around, np.full(CORNERS, z_m)]) for z_m in (-half_height_m, half_height_m)]
         spec.add_mesh(name=thing.id, uservert=np.concatenate(walls).ravel())
     parent.add_geom(
@@ -178,7 +178,7 @@ def _add_solid(
     )
 
 
-def _add_looks(spec: mujoco.MjSpec) -> None:
+def _add_visuals(spec: mujoco.MjSpec) -> None:
     spec.worldbody.add_light(name="sun", pos=[0.0, 0.0, 100.0], dir=[0.3, 0.2, -1.0])
     spec.worldbody.add_geom(
         name="water",

@@ -168,12 +168,12 @@ class World:
         return closed_length_m(self.route_m) if self.route_closed else open_length_m(self.route_m)
 
 
-def along_at(actor: Actor, t_s: float) -> float:
+def actor_distance_along_m(actor: Actor, t_s: float) -> float:
     """How far along its path the actor is at simulated time `t_s` if nothing holds it up [m]."""
     return actor.start_m + actor.speed_mps * max(0.0, t_s - actor.start_s)
 
 
-def actor_at(actor: Actor, along_m: float) -> Pose2:
+def actor_pose_along(actor: Actor, along_m: float) -> Pose2:
     """Where the actor is `along_m` down its path; heading along the path, turned smoothly."""
     at = point_along_closed if actor.closed else point_along_open
     x_m, y_m, yaw_rad = at(actor.path_m, along_m)
@@ -183,6 +183,6 @@ def actor_at(actor: Actor, along_m: float) -> Pose2:
     return Pose2(x_m, y_m, float(np.arctan2(north_m, east_m)) if east_m or north_m else yaw_rad)
 
 
-def actor_pose(actor: Actor, t_s: float) -> Pose2:
+def actor_pose_at(actor: Actor, t_s: float) -> Pose2:
     """Where the actor is at simulated time `t_s` if nothing holds it up."""
-    return actor_at(actor, along_at(actor, t_s))
+    return actor_pose_along(actor, actor_distance_along_m(actor, t_s))

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from paani_sim.eye import BoatPose, Camera, project
-from paani_sim.eye.camera import look_from
-from paani_sim.eye.labels import read_labels, seen_boxes
+from paani_sim.eye.camera import camera_pose
+from paani_sim.eye.labels import read_labels, select_visible_boxes
 from paani_sim.eye.mesh import box, ellipsoid, rotation
 from paani_sim.eye.scatter import random_pose, scatter
-from paani_sim.eye.scene import FIRST_THING, Thing, make_scene, place
+from paani_sim.eye.scene import FIRST_THING, Thing, make_scene, place_obstacles
 from paani_sim.eye.sky import SKIES, paint_sky
 from paani_sim.eye.sprites import paint_sprites
 from paani_sim.eye.wave_textures import SLOPE_RANGE, mean_square_slope, slope_tile
@@ -20,7 +20,7 @@ CAMERA = Camera()
 
 
 def test_camera_is_0_9_m_above_the_water_at_rest() -> None:
-    position, _ = look_from(BoatPose(0.0, 0.0, 0.0), CAMERA)
+    position, _ = camera_pose(BoatPose(0.0, 0.0, 0.0), CAMERA)
     assert position == pytest.approx([0.55, 0.0, 0.9])
 
 
@@ -73,7 +73,7 @@ def test_solid_shapes_have_their_size() -> None:
 def test_every_obstacle_has_a_body_of_its_stated_size(name: str) -> None:
     world = load_world(name)
     for obstacle in world.obstacles:
-        stands = place([obstacle], FIRST_THING)
+        stands = place_obstacles([obstacle], FIRST_THING)
         assert stands.things[0].id == obstacle.id
         afloat = [own.rows.rows for own in stands.afloat]
         rows = afloat[0] if afloat else stands.still.rows - [*obstacle.pose[:2], *[0.0] * 9]
@@ -171,7 +171,7 @@ def test_what_does_not_stand_out_is_not_labelled(shade: int, seen: bool) -> None
     bgr[15:25, 10:30] = shade
     view = read_labels(bgr, picture, np.ones((40, 60), np.float32), [Thing(FIRST_THING, "boat", Kind.VESSEL, "")])
     assert len(view.boxes) == 1
-    assert (len(seen_boxes(view)) == 1) is seen
+    assert (len(select_visible_boxes(view)) == 1) is seen
 
 
 def test_specks_of_a_hidden_person_are_not_labelled() -> None:
@@ -181,4 +181,4 @@ def test_specks_of_a_hidden_person_are_not_labelled() -> None:
     bgr = np.where(number[..., None] == FIRST_THING, 250, 60).astype(np.uint8).repeat(3, axis=2)
     view = read_labels(bgr, picture, np.ones((60, 60), np.float32), [Thing(FIRST_THING, "p", Kind.PERSON, "")])
     assert view.boxes[0].contrast > 100.0
-    assert seen_boxes(view) == ()
+    assert select_visible_boxes(view) == ()

@@ -5,7 +5,7 @@ import pytest
 
 from paani.arrays import F64, U32
 from paani_sim.eye.camera import BoatPose, Camera, project, view_projection
-from paani_sim.eye.chunks import in_view, make_chunks, visible
+from paani_sim.eye.chunks import find_visible, is_in_view, make_chunks
 
 CAMERA = Camera()
 
@@ -32,7 +32,7 @@ def test_nothing_in_the_picture_is_left_out(field: tuple[F64, U32], heading_rad:
     place_m, order = field
     chunks = make_chunks(place_m, order, np.zeros_like(place_m))
     pose = BoatPose(10.0, -20.0, heading_rad, roll_rad=roll_rad, pitch_rad=0.1)
-    found = visible(chunks, view_projection(pose, CAMERA), np.array([10.0, -20.0, 0.9]))
+    found = find_visible(chunks, view_projection(pose, CAMERA), np.array([10.0, -20.0, 0.9]))
     drawn = {int(i) for k in found for i in chunks.order[chunks.first[k] : chunks.first[k] + chunks.count[k]]}
     pixels = project(place_m, pose, CAMERA)
     seen = (pixels >= 0.0).all(axis=1) & (pixels <= (CAMERA.width_px, CAMERA.height_px)).all(axis=1)
@@ -45,8 +45,8 @@ def test_nearest_first_and_none_beyond_the_limit() -> None:
     place_m = np.repeat(np.array([[300.0, 0.0, 0.0], [20.0, 0.0, 0.0], [150.0, 0.0, 0.0]]), 3, axis=0)
     chunks = make_chunks(place_m, np.arange(9, dtype=np.uint32), np.zeros((9, 3)))
     clip = view_projection(BoatPose(0.0, 0.0, 0.0), CAMERA)
-    assert chunks.middle_m[visible(chunks, clip, np.zeros(3)), 0].tolist() == [20.0, 150.0, 300.0]
-    assert chunks.middle_m[visible(chunks, clip, np.zeros(3), 151.0), 0].tolist() == [20.0, 150.0]
+    assert chunks.middle_m[find_visible(chunks, clip, np.zeros(3)), 0].tolist() == [20.0, 150.0, 300.0]
+    assert chunks.middle_m[find_visible(chunks, clip, np.zeros(3), 151.0), 0].tolist() == [20.0, 150.0]
 
 
 def test_reach_widens_a_chunk() -> None:
@@ -56,12 +56,12 @@ def test_reach_widens_a_chunk() -> None:
     bare = make_chunks(place_m, order, np.zeros((3, 3)))
     wide = make_chunks(place_m, order, np.full((3, 3), 9.0))
     clip = view_projection(BoatPose(0.0, 0.0, 0.0), CAMERA)
-    assert len(visible(bare, clip, np.zeros(3))) == 0
-    assert len(visible(wide, clip, np.zeros(3))) == 1
+    assert len(find_visible(bare, clip, np.zeros(3))) == 0
+    assert len(find_visible(wide, clip, np.zeros(3))) == 1
 
 
 def test_a_box_is_in_view_while_a_part_of_it_is() -> None:
     clip = view_projection(BoatPose(0.0, 0.0, 0.0), CAMERA)
     middle_m = np.array([[20.0, 0.0, 0.0], [-20.0, 0.0, 0.0], [20.0, 18.0, 0.0], [20.0, 18.0, 0.0]])
     half_m = np.array([[1.0], [1.0], [1.0], [5.0]]) * np.ones(3)
-    assert in_view(middle_m, half_m, clip).tolist() == [True, False, False, True]
+    assert is_in_view(middle_m, half_m, clip).tolist() == [True, False, False, True]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from paani.errors import UserError
 from paani_sim.eye import BoatPose, Camera, project
-from paani_sim.eye.camera import FAR_M, NEAR_M, metres
+from paani_sim.eye.camera import FAR_M, NEAR_M, linear_depth_m
 from paani_sim.eye.lens import Lens
 from paani_sim.eye.optics import Optics
 from paani_sim.eye.rain import Rain, extinction_per_m
@@ -53,8 +53,8 @@ def test_a_lens_that_folds_is_refused() -> None:
 def test_depth_values_become_metres() -> None:
     for ahead in (0.5, 3.0, 80.0):
         ndc = (FAR_M + NEAR_M - 2.0 * FAR_M * NEAR_M / ahead) / (FAR_M - NEAR_M)
-        assert metres(np.array([0.5 + 0.5 * ndc], np.float32))[0] == pytest.approx(ahead, rel=2e-3)
-    assert np.isinf(metres(np.array([1.0], np.float32)))[0]
+        assert linear_depth_m(np.array([0.5 + 0.5 * ndc], np.float32))[0] == pytest.approx(ahead, rel=2e-3)
+    assert np.isinf(linear_depth_m(np.array([1.0], np.float32)))[0]
 
 
 def test_a_turn_smears_sideways_only() -> None:

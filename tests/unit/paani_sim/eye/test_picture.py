@@ -14,9 +14,19 @@ import pytest
 
 from paani.errors import UserError
 from paani_sim.eye import BoatPose, Camera, Eye, Labelled, project
-from paani_sim.eye.camera import look_from
+from paani_sim.eye.camera import camera_pose
 from paani_sim.eye.gl import Context
-from paani_sim.worlds import Kind, Light, Obstacle, Pose2, Wind, World, actor_at, along_at, load_world
+from paani_sim.worlds import (
+    Kind,
+    Light,
+    Obstacle,
+    Pose2,
+    Wind,
+    World,
+    actor_distance_along_m,
+    actor_pose_along,
+    load_world,
+)
 from paani_sim.worlds.dataset import Manifest, write_dataset
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(120)]
@@ -115,7 +125,7 @@ def test_buoy_lands_where_the_projection_says(eye: Eye, river: World) -> None:
     ahead = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
     spot = np.array([x_m, y_m]) + 6.0 * ahead
     can = Obstacle("known", Kind.BUOY, "can", Pose2(float(spot[0]), float(spot[1]), 0.0), 0.8, 0.8, 1.2)
-    eye.place([can])
+    eye.place_obstacles([can])
     try:
         for roll_rad in (0.0, 0.08):
             pose = dataclasses.replace(at_start(river), roll_rad=roll_rad)
@@ -127,7 +137,7 @@ def test_buoy_lands_where_the_projection_says(eye: Eye, river: World) -> None:
             expected = (*pixels.min(axis=0), *pixels.max(axis=0))
             assert box[2:6] == pytest.approx(expected, abs=3.0)
     finally:
-        eye.place([])
+        eye.place_obstacles([])
     assert "known" not in {b.id for b in view(eye, at_start(river)).boxes}
 
 
@@ -141,11 +151,11 @@ def test_hidden_things_have_no_box(eye: Eye, river: World) -> None:
             f"n{number}", Kind.BUOY, "can", Pose2(float(spot[0]), float(spot[1]), 0.0), size_m, size_m, size_m
         )
 
-    eye.place([place(0, 4.0, 2.0), place(1, 8.0, 0.6)])
+    eye.place_obstacles([place(0, 4.0, 2.0), place(1, 8.0, 0.6)])
     try:
         names = {b.id for b in view(eye, at_start(river)).boxes}
     finally:
-        eye.place([])
+        eye.place_obstacles([])
     assert "n0" in names
     assert "n1" not in names
 
@@ -162,7 +172,7 @@ def test_actor_moves_through_the_picture(eye: Eye, river: World) -> None:
 def test_actors_are_drawn_where_the_plant_says(eye: Eye, river: World) -> None:
     """`actors_along_m` overrides time; what time says gives the same picture."""
     pose = BoatPose(60.0, float(river.route_m[6, 1]), 0.3)
-    by_time = [along_at(actor, 40.0) for actor in river.actors]
+    by_time = [actor_distance_along_m(actor, 40.0) for actor in river.actors]
     assert np.array_equal(eye.render(pose, 40.0).bgr, eye.render(pose, 40.0, by_time).bgr)
     boat = next(k for k, actor in enumerate(river.actors) if actor.id == "boat_under_way")
     seen = set()
@@ -186,7 +196,7 @@ def test_depth_of_water_is_that_of_the_plane(
     with Eye(river, supersample=supersample) as looking:
         seen = view(looking, pose)
         camera = looking.camera
-    position, turn = look_from(pose, camera)
+    position, turn = camera_pose(pose, camera)
     columns, rows = np.meshgrid(np.arange(320) + 0.5, np.arange(240) + 0.5)
     ray = np.stack([(columns - 160.0) / camera.focal_px, (120.0 - rows) / camera.focal_px, -np.ones_like(rows)], -1)
     down = ray @ turn.T[:, 2]
@@ -209,7 +219,7 @@ def test_a_lens_bends_picture_mask_and_boxes_alike(river: World) -> None:
     middles = {}
     for camera in (Camera(), Camera(k1=-0.12)):
         with Eye(river, camera) as looking:
-            looking.place([can])
+            looking.place_obstacles([can])
             box = next(b for b in view(looking, at_start(river)).boxes if b.id == "known")
             middles[camera.k1] = 0.5 * (box.x0_px + box.x1_px)
             middle = project(np.array([[*spot, 0.6]]), at_start(river), camera)[0]
@@ -223,7 +233,7 @@ def test_a_moving_boat_leaves_a_wake(river: World) -> None:
     boat = river.actors[0]
     moving = dataclasses.replace(river, actors=(dataclasses.replace(boat, speed_mps=2.0),))
     at_rest = dataclasses.replace(river, actors=(dataclasses.replace(boat, speed_mps=0.0),))
-    here = actor_at(boat, 200.0)
+    here = actor_pose_along(boat, 200.0)
     pose = BoatPose(here.x_m - 9.0 * np.cos(here.yaw_rad), here.y_m - 9.0 * np.sin(here.yaw_rad), here.yaw_rad)
     pictures = []
     for world in (moving, at_rest):

@@ -16,9 +16,9 @@ from paani.config import Config, load_config
 from paani.errors import UserError
 from paani_sim.eye.camera import BoatPose
 from paani_sim.eye.camera_faults import CameraFaults
+from paani_sim.eye.configured_camera import boat_pose
 from paani_sim.eye.gl import Context
-from paani_sim.eye.mounted import pose_of
-from paani_sim.eye.service import jpeg, open_camera, run
+from paani_sim.eye.service import open_camera, render_jpeg, run
 from paani_sim.worlds import Fault, FaultKind
 from paani_sim.worlds.load import configured_scenario
 
@@ -40,7 +40,7 @@ def require_gl() -> None:
 
 
 def test_pose_keeps_every_axis() -> None:
-    pose = pose_of(truth(1))
+    pose = boat_pose(truth(1))
     assert (pose.x_m, pose.y_m, pose.z_m) == (20.0, 0.0, 0.177)
     assert (pose.roll_rad, pose.pitch_rad, pose.yaw_rad) == (0.02, -0.01, 0.4)
 
@@ -72,12 +72,12 @@ def test_a_scenarios_camera_faults_reach_its_pictures() -> None:
         pose = BoatPose(*eye.world.start)
         means = []
         for t_s in (fault.start_s - 0.1, fault.start_s + 0.1):
-            data = jpeg(eye, faults, pose, t_s, 85)
+            data = render_jpeg(eye, faults, pose, t_s, 85)
             assert data is not None
             means.append(np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)).mean())
         assert means[0] > 50.0
         assert means[1] < 15.0
-        assert jpeg(eye, CameraFaults([Fault(FaultKind.CAMERA_DROPPED, 0.0)]), pose, 1.0, 85) is None
+        assert render_jpeg(eye, CameraFaults([Fault(FaultKind.CAMERA_DROPPED, 0.0)]), pose, 1.0, 85) is None
 
 
 async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], config: Config) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
 from paani_sim.plant.actors import SWIMMER_KEEPS_CLEAR_M, VESSEL_KEEPS_CLEAR_M, ActorPath, Actors, yielding_speed_mps
-from paani_sim.worlds import Actor, Behaviour, Kind, Pose2, actor_at, load_world
+from paani_sim.worlds import Actor, Behaviour, Kind, Pose2, actor_pose_along, load_world
 
 BOAT_REACH_M = 0.65
 FAR_M = (1e3, 1e3)
@@ -30,7 +30,7 @@ def test_track_is_the_path(name: str) -> None:
     for actor in load_world(name).actors:
         track = ActorPath(actor)
         for along_m in np.linspace(-20.0, 400.0, 211):
-            exact, quick = actor_at(actor, float(along_m)), track.pose_at(float(along_m))
+            exact, quick = actor_pose_along(actor, float(along_m)), track.pose_at(float(along_m))
             assert math.hypot(exact.x_m - quick.x_m, exact.y_m - quick.y_m) < 1e-9
             assert abs(wrap_rad(exact.yaw_rad - quick.yaw_rad)) < 1e-6
 

@@ -31,7 +31,7 @@ from paani_sim.trials.scoring import (
     summarise_stops,
 )
 from paani_sim.vessels import load_vessel
-from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, Pose2, World, actor_at
+from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, Pose2, World, actor_pose_along
 
 HULL = load_vessel("paper").hull
 HALF_LENGTH_M, HALF_WIDTH_M = 0.5 * HULL.length_m, 0.5 * HULL.spacing_m + HULL.radius_m
@@ -120,13 +120,13 @@ def test_actors_lie_beyond_their_path_s_end_as_they_came(along_m: float) -> None
     """A boat that has arrived does not swing round to the east."""
     path_m = np.array([[0.0, 0.0], [0.0, 10.0], [-8.0, 14.0]])
     boat = dataclasses.replace(SWIMMER, closed=False, path_m=path_m, length_m=6.2)
-    assert compute_actor_poses(boat, np.array([along_m]))[0] == pytest.approx(actor_at(boat, along_m), abs=1e-9)
+    assert compute_actor_poses(boat, np.array([along_m]))[0] == pytest.approx(actor_pose_along(boat, along_m), abs=1e-9)
 
 
 @given(along_m=st.floats(-5.0, 60.0))
 def test_actors_are_where_the_world_says(along_m: float) -> None:
     x, y, yaw = compute_actor_poses(SWIMMER, np.array([along_m]))[0]
-    expected = actor_at(SWIMMER, along_m)
+    expected = actor_pose_along(SWIMMER, along_m)
     assert (x, y) == pytest.approx(expected[:2], abs=1e-9)
     if 1.0 < along_m % 20.0 < 19.0:  # at an end the path turns back on itself
         assert yaw == pytest.approx(expected.yaw_rad)

@@ -5,11 +5,11 @@ import pytest
 from scipy import ndimage
 
 from paani.arrays import F64
-from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose
+from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose_at
 from paani_sim.worlds.curves import clearance_m, open_length_m
-from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
+from paani_sim.worlds.passability import footprint_distance_m, obstacle_distance_m
 
-BOAT_MPS = 0.6
+NOMINAL_BOAT_MPS = 0.6
 GRID_M = 0.7
 
 
@@ -33,16 +33,16 @@ def check_is_fair(scenario: Scenario) -> None:
     assert clearance_m(world.shore_m, fine(world.route_m)).min() >= 1.5
     assert 30.0 < task.distance_m < 60.1
     assert task.distance_m == pytest.approx(open_length_m(world.route_m))
-    assert task.time_limit_s == pytest.approx(3.0 * task.distance_m / BOAT_MPS + 60.0)
+    assert task.time_limit_s == pytest.approx(3.0 * task.distance_m / NOMINAL_BOAT_MPS + 60.0)
     assert 1 <= len(met(scenario)) <= 4
     start_m = np.array([world.start[:2]])
-    assert fixed_gap_m(world.obstacles, start_m)[0] > 2.0
-    assert fixed_gap_m(world.obstacles, world.route_m[-1:])[0] > 2.0
+    assert obstacle_distance_m(world.obstacles, start_m)[0] > 2.0
+    assert obstacle_distance_m(world.obstacles, world.route_m[-1:])[0] > 2.0
     for actor in world.actors:
-        assert footprint_gap_m(actor, actor_pose(actor, 0.0), start_m)[0] > 2.0, actor.id
+        assert footprint_distance_m(actor, actor_pose_at(actor, 0.0), start_m)[0] > 2.0, actor.id
         track_m = fine(actor.path_m)
         assert clearance_m(world.shore_m, track_m).min() > 0.5 * actor.width_m, actor.id
-        assert fixed_gap_m(world.obstacles, track_m).min() > 0.5 * actor.width_m, actor.id
+        assert obstacle_distance_m(world.obstacles, track_m).min() > 0.5 * actor.width_m, actor.id
         adrift = actor.kind is Kind.VESSEL and actor.speed_mps <= 0.19
         assert (actor.behaviour is Behaviour.HOLDS_ON) is adrift, actor.id
     for obstacle in world.obstacles:
@@ -57,9 +57,9 @@ def has_room(scenario: Scenario) -> bool:
     low, high = world.route_m.min(axis=0) - 16.0, world.route_m.max(axis=0) + 16.0
     x_m, y_m = np.arange(low[0], high[0], GRID_M), np.arange(low[1], high[1], GRID_M)
     points_m = np.stack(np.meshgrid(x_m, y_m, indexing="ij"), axis=-1).reshape(-1, 2)
-    gap_m = np.minimum(clearance_m(world.shore_m, points_m), fixed_gap_m(world.obstacles, points_m))
+    gap_m = np.minimum(clearance_m(world.shore_m, points_m), obstacle_distance_m(world.obstacles, points_m))
     for actor in world.actors:
-        gap_m = np.minimum(gap_m, footprint_gap_m(actor, actor_pose(actor, 1e5), points_m))
+        gap_m = np.minimum(gap_m, footprint_distance_m(actor, actor_pose_at(actor, 1e5), points_m))
     area, _ = ndimage.label((gap_m > 1.3).reshape(len(x_m), len(y_m)))
     start, goal = (
         area[int(np.argmin(np.abs(x_m - end[0]))), int(np.argmin(np.abs(y_m - end[1])))]

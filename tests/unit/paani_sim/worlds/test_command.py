@@ -11,7 +11,7 @@ from paani.cli import main as paani
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.command import main
 from paani_sim.worlds.load import SCENARIOS, load_scenario
-from paani_sim.worlds.plan_view import KINDS, LAND, ROUTE, WATER, plan_view
+from paani_sim.worlds.plan_view import KINDS, LAND, ROUTE, WATER, draw_plan_view
 from paani_sim.worlds.world import Kind
 
 
@@ -80,7 +80,7 @@ def test_impossible_numbers_are_refused(option: str, tmp_path: Path, capsys: pyt
 @pytest.mark.parametrize("name", ["lake", "harbour_crossing"])
 def test_the_plan_shows_water_land_route_and_things(name: str) -> None:
     scenario = load_scenario(name)
-    plan = plan_view(scenario, 600, 400)
+    plan = draw_plan_view(scenario, 600, 400)
     assert plan.shape == (400, 600, 3)
     for bgr in (WATER, LAND[scenario.world.bank], ROUTE, KINDS[Kind.VESSEL], KINDS[Kind.BUOY]):
         assert (plan == np.array(bgr, np.uint8)).all(axis=2).sum() > 5

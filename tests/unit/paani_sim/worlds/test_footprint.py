@@ -8,7 +8,7 @@ from paani.arrays import F64
 from paani_sim.eye.boats import boat
 from paani_sim.eye.hull import HULLS
 from paani_sim.worlds import Obstacle, Pose2, load_world
-from paani_sim.worlds.footprint import BOWS, placed, shape_of
+from paani_sim.worlds.footprint import BOWS, build_outline, place_outline
 from paani_sim.worlds.sizes import SIZES
 from paani_sim.worlds.spec import build_spec
 from paani_sim.worlds.world import World
@@ -32,7 +32,7 @@ def _beyond_m(outline: F64, points: F64) -> F64:
 @pytest.mark.parametrize("look", sorted(BOWS))
 def test_the_drawn_boat_lies_within_its_outline_and_fills_it(look: str) -> None:
     vessel = _vessel(look)
-    outline = shape_of(vessel)
+    outline = build_outline(vessel)
     drawn = [
         boat(look, vessel.length_m, vessel.width_m, vessel.height_m, variant)[0].vertices[:, :2].astype(np.float64)
         for variant in range(len(HULLS))
@@ -47,7 +47,7 @@ def test_the_drawn_boat_lies_within_its_outline_and_fills_it(look: str) -> None:
 
 def test_outlines_are_convex_and_counter_clockwise() -> None:
     for look in SIZES:
-        leg = np.diff(np.vstack([shape_of(_vessel(look)), shape_of(_vessel(look))[:2]]), axis=0)
+        leg = np.diff(np.vstack([build_outline(_vessel(look)), build_outline(_vessel(look))[:2]]), axis=0)
         assert (leg[:-1, 0] * leg[1:, 1] - leg[:-1, 1] * leg[1:, 0] >= -1e-9).all(), look
 
 
@@ -68,7 +68,7 @@ def test_what_is_run_into_is_the_outline(canal: World) -> None:
         first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
         own = model.mesh_vert[first : first + count]
         corners = own @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-        expected = placed(shape_of(each), each.pose)
+        expected = place_outline(build_outline(each), each.pose)
         away = np.hypot(*(corners[:, None, :2] - expected[None]).transpose(2, 0, 1))
         assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 1e-5
         assert corners[:, 2].min() == pytest.approx(-1.0, abs=1e-5)

@@ -14,12 +14,12 @@ from paani.config import WorldConfig
 from paani.errors import UserError
 from paani.messages import Keep
 from paani_services.navigator.files.route_file import load_route
-from paani_sim.worlds import WORLDS, Behaviour, FaultKind, Kind, Scenario, actor_pose, load_world
+from paani_sim.worlds import WORLDS, Behaviour, FaultKind, Kind, Scenario, actor_pose_at, load_world
 from paani_sim.worlds.curves import open_length_m
+from paani_sim.worlds.encounter_paths import is_path_clear
 from paani_sim.worlds.export_route import main as export_route
 from paani_sim.worlds.load import SCENARIOS, configured_scenario, load_scenario
-from paani_sim.worlds.meetings import is_free_path
-from paani_sim.worlds.room import footprint_gap_m
+from paani_sim.worlds.passability import footprint_distance_m
 from paani_sim.worlds.scenario_file import MAX_ACTORS, MAX_BYTES
 from paani_sim.worlds.spec import build_spec
 from tests.places import ROOT
@@ -95,7 +95,7 @@ def test_what_ships_loads_by_name_and_is_sound(name: str) -> None:
     assert scenario.name == name
     assert scenario.task.time_limit_s > scenario.world.route_length_m / 0.6
     for actor in scenario.world.actors:
-        assert is_free_path(scenario.world, actor), actor.id
+        assert is_path_clear(scenario.world, actor), actor.id
     assert build_spec(scenario.world).compile().nmocap == len(scenario.world.actors)
 
 
@@ -162,8 +162,8 @@ def test_an_encounter_meets_a_boat_at_0_6_metres_a_second(tmp_path: Path, encoun
     world = scenario.world
     arc_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(world.route_m, axis=0), axis=1))])
     here = np.array([[np.interp(30.0, arc_m, world.route_m[:, k]) for k in (0, 1)]])
-    assert footprint_gap_m(actor, actor_pose(actor, 30.0 / 0.6), here)[0] < 0.8
-    assert footprint_gap_m(actor, actor_pose(actor, 0.0), np.array([world.start[:2]]))[0] > 2.0
+    assert footprint_distance_m(actor, actor_pose_at(actor, 30.0 / 0.6), here)[0] < 0.8
+    assert footprint_distance_m(actor, actor_pose_at(actor, 0.0), np.array([world.start[:2]]))[0] > 2.0
 
 
 def test_part_of_the_world_s_route(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import pytest
 
 from paani.arrays import F64
 from paani.errors import UserError
-from paani_sim.worlds import WORLDS, Kind, World, actor_pose, load_world
-from paani_sim.worlds.curves import clearance_m, closed_length_m, inside, point_along_closed, resample_closed
-from paani_sim.worlds.room import footprint_gap_m
+from paani_sim.worlds import WORLDS, Kind, World, actor_pose_at, load_world
+from paani_sim.worlds.curves import clearance_m, closed_length_m, is_inside, point_along_closed, resample_closed
+from paani_sim.worlds.passability import footprint_distance_m
 
 pytestmark = pytest.mark.slow
 
@@ -80,7 +80,7 @@ def test_route_keeps_off_what_is_not_meant_to_be_in_the_way(name: str) -> None:
     world = load_world(name)
     fine_m = resample_closed(world.route_m, 2000)
     for obstacle in world.obstacles:
-        gap_m = footprint_gap_m(obstacle, obstacle.pose, fine_m).min()
+        gap_m = footprint_distance_m(obstacle, obstacle.pose, fine_m).min()
         assert obstacle.look == "bridge" or gap_m < 1.0 or gap_m > 2.5, (obstacle.id, gap_m)
 
 
@@ -104,18 +104,18 @@ def test_actors_stay_in_the_water_and_off_fixed_things(world: World) -> None:
     assert world.actors
     for actor in world.actors:
         lap_s = closed_length_m(actor.path_m) / actor.speed_mps
-        track_m = np.array([actor_pose(actor, t)[:2] for t in np.linspace(0.0, lap_s, 400)])
+        track_m = np.array([actor_pose_at(actor, t)[:2] for t in np.linspace(0.0, lap_s, 400)])
         assert clearance_m(world.shore_m, track_m).min() > 0.5 * actor.width_m + 0.3, actor.id
         for obstacle in world.obstacles:
             if obstacle.look != "bridge":
-                gap_m = footprint_gap_m(obstacle, obstacle.pose, track_m).min()
+                gap_m = footprint_distance_m(obstacle, obstacle.pose, track_m).min()
                 assert gap_m > 0.5 * actor.width_m, (actor.id, obstacle.id)
 
 
 def test_actor_runs_at_its_speed_along_its_heading(world: World) -> None:
     for actor in world.actors:
         t_s = actor.start_s + 20.0
-        now, soon = actor_pose(actor, t_s), actor_pose(actor, t_s + 0.5)
+        now, soon = actor_pose_at(actor, t_s), actor_pose_at(actor, t_s + 0.5)
         step_m = np.array([soon.x_m - now.x_m, soon.y_m - now.y_m])
         assert np.linalg.norm(step_m) == pytest.approx(0.5 * actor.speed_mps, rel=0.05)
         ahead = np.array([np.cos(now.yaw_rad), np.sin(now.yaw_rad)])
@@ -127,7 +127,7 @@ def test_something_stands_in_the_way_and_leaves_room(world: World) -> None:
     near = [
         o
         for o in world.obstacles
-        if o.look != "bridge" and footprint_gap_m(o, o.pose, resample_closed(world.route_m, 2000)).min() < 1.0
+        if o.look != "bridge" and footprint_distance_m(o, o.pose, resample_closed(world.route_m, 2000)).min() < 1.0
     ]
     assert near
     afloat = [o for o in world.obstacles if o.look != "bridge"]
@@ -136,7 +136,7 @@ def test_something_stands_in_the_way_and_leaves_room(world: World) -> None:
         for side in np.arange(-24.0, 24.0, 0.5):
             nearest = _across_route(world, obstacle.pose[:2], side)
             clear = clearance_m(world.shore_m, nearest[None])[0] > 1.0 and all(
-                footprint_gap_m(o, o.pose, nearest[None])[0] > 0.8 for o in afloat
+                footprint_distance_m(o, o.pose, nearest[None])[0] > 0.8 for o in afloat
             )
             free_m.append(clear)
         assert _longest_run(free_m) * 0.5 >= 4.0, obstacle.id
@@ -180,4 +180,4 @@ def test_point_along_closed_wraps() -> None:
 def test_clearance_is_signed() -> None:
     points_m = np.array([[2.0, 2.0], [1.0, 2.0], [6.0, 2.0]])
     assert clearance_m(SQUARE_M, points_m) == pytest.approx([2.0, 1.0, -2.0])
-    assert inside(SQUARE_M, points_m).tolist() == [True, True, False]
+    assert is_inside(SQUARE_M, points_m).tolist() == [True, True, False]

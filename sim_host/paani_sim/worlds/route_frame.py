@@ -11,7 +11,7 @@ from paani_sim.worlds.world import Pose2, World
 LEG_M = 7.5
 
 
-class Way:
+class RouteFrame:
     """`along_m` 0 is the boat's start. Around an open route's ends it goes straight on."""
 
     def __init__(self, route_m: F64, *, closed: bool, first_m: float = 0.0) -> None:
@@ -20,7 +20,7 @@ class Way:
         self._first_m = first_m
         self._length_m = float(np.linalg.norm(np.diff(route_m, axis=0), axis=1).sum())
 
-    def at(self, along_m: float, left_m: float = 0.0, turn_rad: float = 0.0) -> Pose2:
+    def pose_at(self, along_m: float, left_m: float = 0.0, turn_rad: float = 0.0) -> Pose2:
         """Pose in the map, heading along the way plus `turn_rad`."""
         distance_m = self._first_m + along_m
         if self._closed:
@@ -39,18 +39,18 @@ class Way:
     def line_m(self, first_m: float, last_m: float, left_m: float = 0.0) -> F64:
         """Points about every metre from `first_m` to `last_m`, either way, `left_m` to the left of the way."""
         count = max(2, round(abs(last_m - first_m)) + 1)
-        return np.array([self.at(float(along_m), left_m)[:2] for along_m in np.linspace(first_m, last_m, count)])
+        return np.array([self.pose_at(float(along_m), left_m)[:2] for along_m in np.linspace(first_m, last_m, count)])
 
 
-def stretch(world: World, from_m: float, length_m: float) -> World:
+def cut_route(world: World, from_m: float, length_m: float) -> World:
     """The world with an open route: `length_m` of its own from `from_m` on, the boat at its beginning."""
-    way = Way(world.route_m, closed=world.route_closed, first_m=from_m)
+    way = RouteFrame(world.route_m, closed=world.route_closed, first_m=from_m)
     legs = max(1, int(np.ceil(length_m / LEG_M)))
-    route_m = np.array([way.at(float(along_m))[:2] for along_m in np.linspace(0.0, length_m, legs + 1)])
-    return dataclasses.replace(world, route_m=route_m, route_closed=False, start=start_of(route_m))
+    route_m = np.array([way.pose_at(float(along_m))[:2] for along_m in np.linspace(0.0, length_m, legs + 1)])
+    return dataclasses.replace(world, route_m=route_m, route_closed=False, start=start_pose(route_m))
 
 
-def start_of(route_m: F64) -> Pose2:
+def start_pose(route_m: F64) -> Pose2:
     """The pose on the first waypoint, heading for the second."""
     (x_m, y_m), (east_m, north_m) = route_m[0], route_m[1] - route_m[0]
     return Pose2(float(x_m), float(y_m), float(np.arctan2(north_m, east_m)))

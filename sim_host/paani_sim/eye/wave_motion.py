@@ -7,14 +7,14 @@ import numpy as np
 from paani_sim.water.waves import GRAVITY_MPS2, peak_omega_radps, significant_height_m
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2, Waves, Wind
 
-SLOWEST_MPS = 0.3  # of a wind that moves the water at all
-OWN_FETCH_M = 40.0  # of a world that names none: the eye's ripples need some water to grow on
-ROCK_RAD = 0.012  # how far a small boat is rocked by its own mooring and crew, standard deviation
+MIN_SPEED_MPS = 0.3  # of a wind that moves the water at all
+DEFAULT_FETCH_M = 40.0  # of a world that names none: the eye's ripples need some water to grow on
+ROCKING_STD_RAD = 0.012  # how far a small boat is rocked by its own mooring and crew, standard deviation
 
 FLOATING_PIERS = ("pontoon", "finger")
 
 
-class Sea(NamedTuple):
+class SeaState(NamedTuple):
     """Significant height, peak period and the way the waves run."""
 
     height_m: float
@@ -27,7 +27,7 @@ class Sea(NamedTuple):
         return GRAVITY_MPS2 * self.period_s**2 / (2.0 * np.pi)
 
 
-class Ride(NamedTuple):
+class WaveMotion(NamedTuple):
     """How far a thing is off its rest."""
 
     up_m: float
@@ -35,14 +35,14 @@ class Ride(NamedTuple):
     pitch_rad: float
 
 
-def sea_of(wind: Wind, waves: Waves) -> Sea:
+def wind_sea_state(wind: Wind, waves: Waves) -> SeaState:
     """The wind sea of a world."""
-    speed_mps, fetch_m = max(wind.speed_mps, SLOWEST_MPS), max(waves.fetch_m or OWN_FETCH_M, 1.0)
+    speed_mps, fetch_m = max(wind.speed_mps, MIN_SPEED_MPS), max(waves.fetch_m or DEFAULT_FETCH_M, 1.0)
     period_s = 2.0 * np.pi / peak_omega_radps(speed_mps, fetch_m)
-    return Sea(significant_height_m(speed_mps, fetch_m), period_s, wind.toward_rad)
+    return SeaState(significant_height_m(speed_mps, fetch_m), period_s, wind.toward_rad)
 
 
-def floats(thing: Obstacle | Actor) -> bool:
+def is_floating(thing: Obstacle | Actor) -> bool:
     """Whether it moves with the water."""
     return (
         isinstance(thing, Actor)
@@ -52,7 +52,7 @@ def floats(thing: Obstacle | Actor) -> bool:
     )
 
 
-def ride(sea: Sea, thing: Obstacle | Actor, pose: Pose2, t_s: float) -> Ride:
+def compute_wave_motion(sea: SeaState, thing: Obstacle | Actor, pose: Pose2, t_s: float) -> WaveMotion:
     """A long wave through the thing's middle, taken less seriously the longer the thing is; and its own rocking."""
     k_radpm = 2.0 * np.pi / sea.wave_m
     omega = 2.0 * np.pi / sea.period_s
@@ -65,9 +65,9 @@ def ride(sea: Sea, thing: Obstacle | Actor, pose: Pose2, t_s: float) -> Ride:
     amplitude = 0.5 * sea.height_m * beat
     slope = k_radpm * amplitude
     moored = thing.kind is Kind.PIER
-    rock = 0.0 if moored else ROCK_RAD * min(1.5, 2.0 / max(thing.width_m, 0.3))
+    rock = 0.0 if moored else ROCKING_STD_RAD * min(1.5, 2.0 / max(thing.width_m, 0.3))
     own = np.sin(2.1 * t_s / np.sqrt(max(thing.width_m, 0.4)) + 1.7 * pose.x_m + 0.9 * pose.y_m)
-    return Ride(
+    return WaveMotion(
         float(amplitude * fore * side * np.sin(phase)),
         float(np.clip(slope * fore * side * np.cos(phase) * np.sin(off), -0.15, 0.15) + rock * own),
         float(np.clip(-slope * fore * side * np.cos(phase) * np.cos(off), -0.1, 0.1)),

@@ -8,12 +8,12 @@ import numpy as np
 from paani.arrays import U8
 from paani_sim.eye.camera import BoatPose, Camera
 from paani_sim.eye.renderer import Eye
-from paani_sim.worlds.casting import route_way
-from paani_sim.worlds.meetings import BOAT_MPS
-from paani_sim.worlds.plan_view import FONT, INK, plan_view
-from paani_sim.worlds.room import fixed_gap_m
+from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS
+from paani_sim.worlds.passability import obstacle_distance_m
+from paani_sim.worlds.plan_view import FONT, INK, draw_plan_view
+from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.scenario import Scenario
-from paani_sim.worlds.way import Way
+from paani_sim.worlds.scenario_things import world_route_frame
 from paani_sim.worlds.world import Pose2
 
 COLUMNS = 4
@@ -22,40 +22,40 @@ CLEAR_M = 1.5
 TITLE_PX, CAPTION_PX = 56, 22
 
 
-def sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[U8 | None]:
+def render_sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[U8 | None]:
     """Yields None as each of the `VIEWS` views of this size is drawn, then the sheet. Raises UserError without OpenGL.
 
     A view is what a boat sees that moves along the route at 0.6 m/s and gets there in time.
     """
-    length_m, way = scenario.world.route_length_m, route_way(scenario.world)
+    length_m, way = scenario.world.route_length_m, world_route_frame(scenario.world)
     span_m = length_m if scenario.world.route_closed else 0.94 * length_m
     along_m = np.linspace(0.0, span_m, VIEWS, endpoint=not scenario.world.route_closed)
-    along_m = np.array([_in_the_clear(scenario, way, float(distance_m)) for distance_m in along_m])
-    poses = [way.at(float(distance_m)) for distance_m in along_m]
+    along_m = np.array([_advance_to_clear(scenario, way, float(distance_m)) for distance_m in along_m])
+    poses = [way.pose_at(float(distance_m)) for distance_m in along_m]
     pictures = []
     with Eye(scenario.world, Camera(width_px=width_px, height_px=height_px)) as eye:
         for number, (distance_m, pose) in enumerate(zip(along_m, poses, strict=True), start=1):
-            t_s = float(distance_m) / BOAT_MPS
+            t_s = float(distance_m) / NOMINAL_BOAT_MPS
             picture = eye.render(BoatPose(*pose), t_s).bgr
-            pictures.append(_captioned(picture, f"{number}   {distance_m:.0f} m   {t_s:.0f} s"))
+            pictures.append(_add_caption(picture, f"{number}   {distance_m:.0f} m   {t_s:.0f} s"))
             yield None
-    yield _laid_out(scenario, poses, pictures)
+    yield _compose_sheet(scenario, poses, pictures)
 
 
-def _in_the_clear(scenario: Scenario, way: Way, along_m: float) -> float:
+def _advance_to_clear(scenario: Scenario, way: RouteFrame, along_m: float) -> float:
     """There, or as much further on as it takes for the camera not to be in something that stands in the way."""
     for further_m in np.arange(0.0, 12.0, 1.0):
-        here = np.array([way.at(along_m + float(further_m))[:2]])
-        if fixed_gap_m(scenario.world.obstacles, here)[0] > CLEAR_M:
+        here = np.array([way.pose_at(along_m + float(further_m))[:2]])
+        if obstacle_distance_m(scenario.world.obstacles, here)[0] > CLEAR_M:
             return along_m + float(further_m)
     return along_m
 
 
-def _laid_out(scenario: Scenario, poses: list[Pose2], pictures: list[U8]) -> U8:
+def _compose_sheet(scenario: Scenario, poses: list[Pose2], pictures: list[U8]) -> U8:
     rows = [np.hstack(pictures[first : first + COLUMNS]) for first in range(0, len(pictures), COLUMNS)]
     width_px = rows[0].shape[1]
-    plan = plan_view(scenario, width_px, _plan_height_px(scenario, width_px), poses)
-    return np.vstack([_title(scenario, width_px), plan, *rows])
+    plan = draw_plan_view(scenario, width_px, _plan_height_px(scenario, width_px), poses)
+    return np.vstack([_render_title(scenario, width_px), plan, *rows])
 
 
 def _plan_height_px(scenario: Scenario, width_px: int) -> int:
@@ -65,7 +65,7 @@ def _plan_height_px(scenario: Scenario, width_px: int) -> int:
     return round(width_px * min(0.45, max(0.25, float(y_m / x_m))))
 
 
-def _title(scenario: Scenario, width_px: int) -> U8:
+def _render_title(scenario: Scenario, width_px: int) -> U8:
     world = scenario.world
     wind, light = world.wind, world.light
     first = (
@@ -84,7 +84,7 @@ def _title(scenario: Scenario, width_px: int) -> U8:
     return band
 
 
-def _captioned(picture: U8, caption: str) -> U8:
+def _add_caption(picture: U8, caption: str) -> U8:
     band = np.full((CAPTION_PX, picture.shape[1], 3), 250, np.uint8)
     cv2.putText(band, caption, (8, 16), FONT, 0.5, INK, 1, cv2.LINE_AA)
     return np.vstack([picture, band])

@@ -6,16 +6,16 @@ import numpy as np
 
 from paani.arrays import F64
 from paani.errors import UserError
-from paani_sim.worlds import meetings
-from paani_sim.worlds.meetings import BOAT_MPS, Encounter, Run
+from paani_sim.worlds import encounter_paths
+from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS, Encounter, TimedPath
+from paani_sim.worlds.route_frame import RouteFrame
+from paani_sim.worlds.scenario_check import check_legs
 from paani_sim.worlds.scenario_file import ActorPart
 from paani_sim.worlds.sizes import SIZES, Size
-from paani_sim.worlds.soundness import check_legs
-from paani_sim.worlds.way import Way
 from paani_sim.worlds.world import Actor, Obstacle, Pose2, World
 
 
-def cast(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacle | Actor:
+def build_thing(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacle | Actor:
     """The thing as it stands or runs in the world. `where` names the file and the part in a UserError."""
     if part.look not in SIZES:
         raise UserError(f"{where}.look: unknown {part.look!r} (known: {', '.join(SIZES)})")
@@ -25,11 +25,11 @@ def cast(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacl
     )
     match part:
         case ActorPart(at_m=tuple(), path_m=None, encounter=None):
-            return _standing(part, size, world, where, fallback_id)
+            return _build_obstacle(part, size, world, where, fallback_id)
         case ActorPart(at_m=None, path_m=tuple(), encounter=None):
-            run = Run(_path_m(part, world, where), part.start_m, part.start_s)
+            timed_path = TimedPath(_path_m(part, world, where), part.start_m, part.start_s)
         case ActorPart(at_m=None, path_m=None, encounter=Encounter()):
-            run = _meeting(part, size, world, where)
+            timed_path = _plan_encounter(part, size, world, where)
         case _:
             raise UserError(f"{where}: needs one of at_m, path_m and encounter")
     if part.speed_mps is None:
@@ -38,21 +38,21 @@ def cast(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacl
         part.id or fallback_id,
         size.kind,
         part.look,
-        run.path_m,
+        timed_path.path_m,
         part.speed_mps,
         size.length_m,
         size.width_m,
         size.height_m,
-        run.start_m,
+        timed_path.start_m,
         part.variant,
         closed=part.closed and part.encounter is None,
-        start_s=run.start_s,
+        start_s=timed_path.start_s,
         behaviour=part.behaviour,
     )
 
 
-def _standing(part: ActorPart, size: Size, world: World, where: str, fallback_id: str) -> Obstacle:
-    pose = _placed(part, world, where, part.at_m or (0.0, 0.0), math.radians(part.heading_deg or 0.0))
+def _build_obstacle(part: ActorPart, size: Size, world: World, where: str, fallback_id: str) -> Obstacle:
+    pose = _locate(part, world, where, part.at_m or (0.0, 0.0), math.radians(part.heading_deg or 0.0))
     return Obstacle(
         part.id or fallback_id,
         size.kind,
@@ -68,51 +68,65 @@ def _standing(part: ActorPart, size: Size, world: World, where: str, fallback_id
 
 def _path_m(part: ActorPart, world: World, where: str) -> F64:
     points = part.path_m or ()
-    path_m = np.array([_placed(part, world, where, point, 0.0)[:2] for point in points])
+    path_m = np.array([_locate(part, world, where, point, 0.0)[:2] for point in points])
     check_legs(path_m, closed=part.closed, where=f"{where}.path_m")
     return path_m
 
 
-def _placed(part: ActorPart, world: World, where: str, point: tuple[float, float], turn_rad: float) -> Pose2:
+def _locate(part: ActorPart, world: World, where: str, point: tuple[float, float], turn_rad: float) -> Pose2:
     if part.frame == "map":
         return Pose2(*point, turn_rad)
     if part.frame == "route":
-        return route_way(world).at(*point, turn_rad)
+        return world_route_frame(world).pose_at(*point, turn_rad)
     if world.channel_m is None:
         raise UserError(f"{where}.frame: the {world.name} has no channel")
-    return Way(world.channel_m, closed=False).at(*point, turn_rad)
+    return RouteFrame(world.channel_m, closed=False).pose_at(*point, turn_rad)
 
 
-def route_way(world: World) -> Way:
+def world_route_frame(world: World) -> RouteFrame:
     """The world's route as a way."""
-    return Way(world.route_m, closed=world.route_closed)
+    return RouteFrame(world.route_m, closed=world.route_closed)
 
 
-def _meeting(part: ActorPart, size: Size, world: World, where: str) -> Run:
+def _plan_encounter(part: ActorPart, size: Size, world: World, where: str) -> TimedPath:
     if part.meets_at_m is None or part.speed_mps is None:
         raise UserError(f"{where}: an encounter needs meets_at_m and speed_mps")
     if part.meets_at_m > world.route_length_m:
         raise UserError(f"{where}.meets_at_m: beyond the route's {world.route_length_m:.0f} m")
-    way, at_m, speed_mps = route_way(world), part.meets_at_m, part.speed_mps
+    route, at_m, speed_mps = world_route_frame(world), part.meets_at_m, part.speed_mps
     heading_rad = None if part.heading_deg is None else math.radians(part.heading_deg)
-    run: Run | None
+    timed_path: TimedPath | None
     match part.encounter:
         case Encounter.CROSSING:
             turn_rad = 0.5 * math.pi if heading_rad is None else heading_rad
-            run = meetings.crossing(
-                world, way, at_m, speed_mps=speed_mps, length_m=size.length_m, turn_rad=turn_rad, boat_mps=BOAT_MPS
+            timed_path = encounter_paths.plan_crossing(
+                world,
+                route,
+                at_m,
+                speed_mps=speed_mps,
+                length_m=size.length_m,
+                turn_rad=turn_rad,
+                boat_mps=NOMINAL_BOAT_MPS,
             )
         case Encounter.HEAD_ON:
-            run = meetings.head_on(way, at_m, speed_mps=speed_mps, left_m=part.left_m, boat_mps=BOAT_MPS)
+            timed_path = encounter_paths.plan_head_on(
+                route, at_m, speed_mps=speed_mps, left_m=part.left_m, boat_mps=NOMINAL_BOAT_MPS
+            )
         case Encounter.OVERTAKING:
-            run = meetings.overtaking(
-                way, at_m, world.route_length_m, speed_mps=speed_mps, left_m=part.left_m, boat_mps=BOAT_MPS
+            timed_path = encounter_paths.plan_overtaking(
+                route, at_m, world.route_length_m, speed_mps=speed_mps, left_m=part.left_m, boat_mps=NOMINAL_BOAT_MPS
             )
         case _:
-            toward_rad = world.wind.toward_rad if heading_rad is None else way.at(at_m).yaw_rad + heading_rad
-            run = meetings.drifting(
-                world, way, at_m, speed_mps=speed_mps, toward_rad=toward_rad, left_m=part.left_m, boat_mps=BOAT_MPS
+            toward_rad = world.wind.toward_rad if heading_rad is None else route.pose_at(at_m).yaw_rad + heading_rad
+            timed_path = encounter_paths.plan_drifting(
+                world,
+                route,
+                at_m,
+                speed_mps=speed_mps,
+                toward_rad=toward_rad,
+                left_m=part.left_m,
+                boat_mps=NOMINAL_BOAT_MPS,
             )
-    if run is None:
+    if timed_path is None:
         raise UserError(f"{where}.meets_at_m: no open water across the route there")
-    return run
+    return timed_path

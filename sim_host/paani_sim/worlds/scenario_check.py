@@ -7,10 +7,10 @@ import numpy as np
 from paani.arrays import F64
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
-from paani_sim.worlds.curves import clearance_m, inside, sampled_legs
-from paani_sim.worlds.room import fixed_gap_m, footprint_gap_m
+from paani_sim.worlds.curves import clearance_m, is_inside, sampled_legs
+from paani_sim.worlds.passability import footprint_distance_m, obstacle_distance_m
 from paani_sim.worlds.scenario import Scenario
-from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose
+from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose_at
 
 HULL_RADIUS_M = 0.75  # half the diagonal of a 1.3 x 0.75 m hull
 HALF_BEAM_M = 0.375
@@ -18,7 +18,7 @@ SAMPLE_M = 0.5
 MIN_LEG_M = 0.05
 
 
-def check(scenario: Scenario, where: str, names: dict[str, str]) -> None:
+def check_scenario(scenario: Scenario, where: str, names: dict[str, str]) -> None:
     """Raises UserError. `where` names the file, `names` the field that a thing's id stands for."""
     world = scenario.world
     things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
@@ -46,10 +46,12 @@ def _check_route(world: World, fence: tuple[FenceArea, ...], where: str) -> None
     for number, points_m in enumerate(sampled_legs(world.route_m, SAMPLE_M, closed=world.route_closed)):
         on_land = clearance_m(world.shore_m, points_m) < HALF_BEAM_M
         if on_land.any():
-            raise UserError(f"{where}: route: leg {number} runs over land at {_at(points_m[int(np.argmax(on_land))])}")
-        outside = ~_allowed(fence, points_m)
+            raise UserError(
+                f"{where}: route: leg {number} runs over land at {_format_point(points_m[int(np.argmax(on_land))])}"
+            )
+        outside = ~_is_allowed(fence, points_m)
         if outside.any():
-            at = _at(points_m[int(np.argmax(outside))])
+            at = _format_point(points_m[int(np.argmax(outside))])
             raise UserError(f"{where}: route: leg {number} is outside the fence at {at}")
 
 
@@ -57,23 +59,23 @@ def _check_start(world: World, where: str) -> None:
     here = np.array([world.start[:2]])
     things: tuple[Obstacle | Actor, ...] = (*world.obstacles, *world.actors)
     for thing in things:
-        pose = thing.pose if isinstance(thing, Obstacle) else actor_pose(thing, 0.0)
-        over = isinstance(thing, Obstacle) and not np.isfinite(fixed_gap_m((thing,), here)[0])
-        if not over and footprint_gap_m(thing, pose, here)[0] < HULL_RADIUS_M:
+        pose = thing.pose if isinstance(thing, Obstacle) else actor_pose_at(thing, 0.0)
+        over = isinstance(thing, Obstacle) and not np.isfinite(obstacle_distance_m((thing,), here)[0])
+        if not over and footprint_distance_m(thing, pose, here)[0] < HULL_RADIUS_M:
             raise UserError(f"{where}: route: the boat starts inside {thing.id!r}")
 
 
 def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
     if isinstance(thing, Obstacle):
-        if _floats(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
+        if _is_floating(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
             raise UserError(f"{where}.at_m: {thing.look} on land")
         return
-    if not _floats(thing):
+    if not _is_floating(thing):
         return
     for number, points_m in enumerate(sampled_legs(thing.path_m, SAMPLE_M, closed=thing.closed)):
         on_land = clearance_m(world.shore_m, points_m) < 0.0
         if on_land.any():
-            at = _at(points_m[int(np.argmax(on_land))])
+            at = _format_point(points_m[int(np.argmax(on_land))])
             raise UserError(f"{where}: its way runs over land at {at} (leg {number})")
 
 
@@ -98,15 +100,15 @@ def _check_area(corners_m: F64, where: str) -> None:
         raise UserError(f"{where}: the edges from corners {one} and {other} meet")
 
 
-def _floats(thing: Obstacle | Actor) -> bool:
+def _is_floating(thing: Obstacle | Actor) -> bool:
     return thing.kind in {Kind.VESSEL, Kind.BUOY} or thing.look == "swimming"
 
 
-def _allowed(fence: tuple[FenceArea, ...], points_m: F64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _is_allowed(fence: tuple[FenceArea, ...], points_m: F64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     within = np.zeros(len(points_m), np.bool_)
     allowed = np.ones(len(points_m), np.bool_)
     for area in fence:
-        found = inside(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), points_m)
+        found = is_inside(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), points_m)
         if area.keep is Keep.IN:
             within |= found
         else:
@@ -114,5 +116,5 @@ def _allowed(fence: tuple[FenceArea, ...], points_m: F64) -> np.ndarray[tuple[in
     return allowed & within if any(area.keep is Keep.IN for area in fence) else allowed
 
 
-def _at(point: F64) -> str:
+def _format_point(point: F64) -> str:
     return f"({point[0]:.1f}, {point[1]:.1f}) m"

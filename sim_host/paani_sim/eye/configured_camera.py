@@ -7,7 +7,7 @@ from paani_sim.eye.renderer import Eye
 from paani_sim.worlds.world import World
 
 
-def camera_of(settings: EyeConfig) -> Camera:
+def build_camera(settings: EyeConfig) -> Camera:
     """The configured camera."""
     return Camera(
         width_px=settings.width_px,
@@ -22,7 +22,7 @@ def camera_of(settings: EyeConfig) -> Camera:
     )
 
 
-def pose_of(truth: TruePose) -> BoatPose:
+def boat_pose(truth: TruePose) -> BoatPose:
     """Where the boat is, how it lies and how fast it turns."""
     lies = (truth.z_m, truth.roll_rad, truth.pitch_rad)
     return BoatPose(truth.x_m, truth.y_m, truth.yaw_rad, *lies, truth.yaw_rate_radps)
@@ -31,6 +31,6 @@ def pose_of(truth: TruePose) -> BoatPose:
 def open_eye(world: World, settings: EyeConfig) -> Eye:
     """The eye of the configured camera. Raises `UserError` as `Eye` does."""
     balance = (settings.blue_gain, 1.0, settings.red_gain)
-    eye = Eye(world, camera_of(settings), balance=balance)
+    eye = Eye(world, build_camera(settings), balance=balance)
     eye.exposure *= settings.exposure_frac
     return eye

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from paani.arrays import F32, F64
-from paani_sim.eye.afloat import floats
+from paani_sim.eye.wave_motion import is_floating
 from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2
 
@@ -19,13 +19,13 @@ PATCH_WIDTHS = (3, 2, 4, 2)
 COLUMNS = sum(PATCH_WIDTHS)
 KELVIN = 0.354  # tangent of the wake's half angle, 19.47 degrees (Kelvin, 1887)
 TRAIL_M, TRAIL_STEPS = 22.0, 16
-SLOWEST_MPS = 0.2
+MIN_SPEED_MPS = 0.2
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
 SHADOW, WAKE = 0.0, 1.0
 
 
-def cast_by(sun_direction: F32) -> F64:
+def shadow_cast_per_m(sun_direction: F32) -> F64:
     """How far the shadow of a metre's height reaches over level ground `(2,)`."""
     return np.asarray(-sun_direction[:2] / max(float(sun_direction[2]), 0.35), float)
 
@@ -56,7 +56,7 @@ def standing_shadows(obstacles: Iterable[Obstacle], cast: F64) -> F64:
     """Shadows `(4 n, COLUMNS)` of people and buildings on the ground or deck under them."""
     rows = [np.zeros((0, COLUMNS))]
     for o in obstacles:
-        if floats(o) or o.look == "bridge":
+        if is_floating(o) or o.look == "bridge":
             continue
         if o.kind is Kind.PERSON:
             rows.append(shadow(o.pose, o.base_z_m + 0.03, (0.5, 0.42, 0.8 * o.height_m), 0.75, cast))
@@ -87,7 +87,7 @@ def floating_shadow(thing: Obstacle | Actor, pose: Pose2, cast: F64) -> F64:
 
 def wake(actor: Actor, along_m: float) -> F64:
     """Patches `(4 n, COLUMNS)` of the wake that a moving actor trails down its path; none while it is slow."""
-    if actor.speed_mps < SLOWEST_MPS or (not actor.closed and along_m >= _length_m(actor)):
+    if actor.speed_mps < MIN_SPEED_MPS or (not actor.closed and along_m >= _length_m(actor)):
         return np.zeros((0, COLUMNS))
     behind = np.linspace(0.0, TRAIL_M, TRAIL_STEPS + 1)
     bow_m = along_m + 0.45 * actor.length_m

@@ -7,8 +7,14 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from paani_sim.worlds import Kind, Obstacle, Pose2, load_world
-from paani_sim.worlds.room import Lattice, _leads_on, _spread, fixed_gap_m, footprint_gap_m
-from paani_sim.worlds.way import Way, stretch
+from paani_sim.worlds.passability import (
+    PassabilityGrid,
+    _flood_row,
+    _is_connected,
+    footprint_distance_m,
+    obstacle_distance_m,
+)
+from paani_sim.worlds.route_frame import RouteFrame, cut_route
 
 BARGE = Obstacle("barge", Kind.VESSEL, "barge", Pose2(0.0, 0.0, 0.5 * np.pi), 10.0, 2.0, 2.0)
 
@@ -20,7 +26,7 @@ def test_spreading_fills_the_runs_that_hold_a_seed(row: int, seeds: int) -> None
     label, _ = ndimage.label(flags)
     held = {int(label[k]) for k in range(57) if seeds >> k & 1}
     expected = sum(1 << k for k in range(57) if flags[k] and int(label[k]) in held)
-    assert _spread(seeds, row) == expected
+    assert _flood_row(seeds, row) == expected
 
 
 @pytest.mark.parametrize(
@@ -34,20 +40,20 @@ def test_spreading_fills_the_runs_that_hold_a_seed(row: int, seeds: int) -> None
 )
 def test_a_way_leads_on_or_not(rows: list[str], leads: bool) -> None:
     free = np.array([[cell == "." for cell in row] for row in rows])
-    assert _leads_on(free, np.ones(5, np.bool_)) is leads
+    assert _is_connected(free, np.ones(5, np.bool_)) is leads
 
 
 def test_gaps_are_to_the_footprint() -> None:
     points_m = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 8.0], [4.0, 9.0]])
-    assert footprint_gap_m(BARGE, BARGE.pose, points_m) == pytest.approx([0.0, 2.0, 3.0, 5.0])
-    assert fixed_gap_m((), points_m).tolist() == [np.inf] * 4
+    assert footprint_distance_m(BARGE, BARGE.pose, points_m) == pytest.approx([0.0, 2.0, 3.0, 5.0])
+    assert obstacle_distance_m((), points_m).tolist() == [np.inf] * 4
 
 
 def test_a_barge_across_the_canal_blocks_it_and_one_along_does_not() -> None:
-    world = stretch(load_world("canal"), 20.0, 40.0)
-    way = Way(world.route_m, closed=False)
-    lattice = Lattice(world, way, 40.0)
-    middle = way.at(20.0, 2.0)
+    world = cut_route(load_world("canal"), 20.0, 40.0)
+    route = RouteFrame(world.route_m, closed=False)
+    lattice = PassabilityGrid(world, route, 40.0)
+    middle = route.pose_at(20.0, 2.0)
 
     def barge(turn_rad: float) -> Obstacle:
         pose = middle._replace(yaw_rad=middle.yaw_rad + turn_rad)

@@ -1,0 +1,137 @@
+"""Moving things that meet a boat on its way: where they go and when they start.
+
+The boat is taken to move along its way at `boat_mps`, so that it is at `meets_at_m` when they are.
+"""
+
+import math
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from paani.arrays import F64
+from paani_sim.worlds.curves import clearance_m, sampled_legs
+from paani_sim.worlds.passability import obstacle_distance_m
+from paani_sim.worlds.route_frame import RouteFrame
+from paani_sim.worlds.world import Actor, Pose2, World
+
+NOMINAL_BOAT_MPS = 0.6
+MAX_LEAD_M = 60.0  # as far as this before the meeting, at most
+OVERRUN_M = 25.0  # past the boat's start, or past the way's end
+PATH_MARGIN_M = 0.4
+
+
+class Encounter(StrEnum):
+    """How a moving thing meets the boat."""
+
+    CROSSING = "crossing"
+    HEAD_ON = "head_on"
+    OVERTAKING = "overtaking"
+    DRIFTING = "drifting"
+
+
+class TimedPath(NamedTuple):
+    """An open path, and when and from how far along it a thing sets out."""
+
+    path_m: F64
+    start_m: float
+    start_s: float
+
+
+def plan_crossing(
+    world: World,
+    route: RouteFrame,
+    meets_at_m: float,
+    *,
+    speed_mps: float,
+    length_m: float,
+    turn_rad: float,
+    boat_mps: float,
+) -> TimedPath | None:
+    """Straight across the way, `turn_rad` to the left of its heading, from water's edge to water's edge.
+
+    None where something stands in its way within half its length of the boat's.
+    """
+    middle = route.pose_at(meets_at_m, 0.0, turn_rad)
+    before_m = _open_water_ahead_m(world, middle, -1.0, length_m)
+    after_m = _open_water_ahead_m(world, middle, 1.0, length_m)
+    if min(before_m, after_m) < 0.5 * length_m:
+        return None
+    ends = [_point_ahead(middle, -before_m), _point_ahead(middle, after_m)]
+    return _time_path(np.array(ends), before_m, meets_at_m / boat_mps, speed_mps)
+
+
+def plan_head_on(
+    route: RouteFrame, meets_at_m: float, *, speed_mps: float, left_m: float, boat_mps: float
+) -> TimedPath:
+    """Down the boat's way against it, `left_m` to the left of the way, until it is past the boat's start."""
+    at_s = meets_at_m / boat_mps
+    first_m = meets_at_m + min(MAX_LEAD_M, max(speed_mps * at_s, 1.0))
+    return _time_path(route.line_m(first_m, -OVERRUN_M, left_m), first_m - meets_at_m, at_s, speed_mps)
+
+
+def plan_overtaking(
+    route: RouteFrame, meets_at_m: float, length_m: float, *, speed_mps: float, left_m: float, boat_mps: float
+) -> TimedPath:
+    """Up the boat's way with it, beside it at the meeting; `length_m` is the way's. Faster or slower than the boat."""
+    at_s = meets_at_m / boat_mps
+    first_m = meets_at_m - speed_mps * at_s
+    line_m = route.line_m(first_m, max(length_m, meets_at_m) + OVERRUN_M, left_m)
+    return TimedPath(line_m, 0.0, 0.0)
+
+
+def plan_drifting(
+    world: World,
+    route: RouteFrame,
+    meets_at_m: float,
+    *,
+    speed_mps: float,
+    toward_rad: float,
+    left_m: float,
+    boat_mps: float,
+) -> TimedPath | None:
+    """Straight with wind or current through a point beside the way; None where that point is not afloat."""
+    x_m, y_m, _ = route.pose_at(meets_at_m, left_m)
+    middle = Pose2(x_m, y_m, toward_rad)
+    if _open_water_ahead_m(world, middle, 1.0, 4.0) <= 0.0:
+        return None
+    at_s = meets_at_m / boat_mps
+    before_m = min(_open_water_ahead_m(world, middle, -1.0, 4.0), speed_mps * at_s)
+    after_m = min(_open_water_ahead_m(world, middle, 1.0, 4.0), speed_mps * 3.0 * at_s + 2.0)
+    return _time_path(
+        np.array([_point_ahead(middle, -before_m), _point_ahead(middle, after_m)]), before_m, at_s, speed_mps
+    )
+
+
+def is_path_clear(world: World, actor: Actor) -> bool:
+    """Whether the actor keeps off the banks and the obstacles all along its path."""
+    points_m = np.concatenate(sampled_legs(actor.path_m, 1.0, closed=actor.closed))
+    half_m = 0.5 * actor.width_m + PATH_MARGIN_M
+    return bool(
+        (clearance_m(world.shore_m, points_m) > half_m).all()
+        and (obstacle_distance_m(world.obstacles, points_m) > half_m).all()
+    )
+
+
+def is_afloat(world: World, points_m: F64, room_m: float) -> bool:
+    """Whether all points are in the water and this far from its edge."""
+    return bool((clearance_m(world.shore_m, points_m) > room_m).all())
+
+
+def _time_path(path_m: F64, before_m: float, at_s: float, speed_mps: float) -> TimedPath:
+    """Along the path so that `before_m` of it is done at `at_s`: later, or already some way down it."""
+    start_s = at_s - before_m / speed_mps
+    return TimedPath(path_m, max(0.0, -start_s) * speed_mps, max(0.0, start_s))
+
+
+def _open_water_ahead_m(world: World, pose: Pose2, sense: float, length_m: float) -> float:
+    """How far a thing of this length can go ahead (or astern) of the pose, `LEAD_M` at most."""
+    reach_m = np.arange(0.0, MAX_LEAD_M + 0.5 * length_m, 0.5)
+    points_m = np.array([_point_ahead(pose, sense * float(distance_m)) for distance_m in reach_m])
+    free = (clearance_m(world.shore_m, points_m) > 1.0) & (obstacle_distance_m(world.obstacles, points_m) > 1.0)
+    reached = len(reach_m) if free.all() else int(np.argmin(free))
+    return max(0.0, 0.5 * (reached - 1) - 0.5 * length_m)
+
+
+def _point_ahead(pose: Pose2, distance_m: float) -> tuple[float, float]:
+    return (pose.x_m + distance_m * math.cos(pose.yaw_rad), pose.y_m + distance_m * math.sin(pose.yaw_rad))
