@@ -124,11 +124,11 @@ def test_a_written_fix_is_read_back(
         return f"{int(minutes // 60):0{digits}d}{minutes % 60:08.5f}"
 
     clock = f"{second // 3600:02d}{second // 60 % 60:02d}{second % 60:02d}"
-    words = (
+    body = (
         f"GPRMC,{clock},A,{angle(latitude_deg, 2)},{'N' if latitude_deg >= 0 else 'S'},"
         f"{angle(longitude_deg, 3)},{'E' if longitude_deg >= 0 else 'W'},{knots:.2f},{course_deg:.2f},010124,,"
     )
-    (fix,), drops = all_fixes(sentence(words))
+    (fix,), drops = all_fixes(sentence(body))
     assert not drops
     assert fix.latitude_deg == pytest.approx(latitude_deg, abs=2e-7)
     assert fix.longitude_deg == pytest.approx(longitude_deg, abs=2e-7)

@@ -64,16 +64,16 @@ def test_round_trips_within_a_centimetre(
     tmp_path_factory: pytest.TempPathFactory, line: RouteLine, centre: tuple[float, float], order: list[str]
 ) -> None:
     """Through every format in any order: name, repetition and each point to less than 1 cm."""
-    spots = tuple(
+    points = tuple(
         FilePoint(
-            latitude_deg=round(centre[0] + (spot.latitude_deg or 0.0), 9),
-            longitude_deg=round(centre[1] + (spot.longitude_deg or 0.0), 9),
+            latitude_deg=round(centre[0] + (point.latitude_deg or 0.0), 9),
+            longitude_deg=round(centre[1] + (point.longitude_deg or 0.0), 9),
         )
-        for spot in line.points
+        for point in line.points
     )
-    if any(one == other for one, other in itertools.pairwise((*spots, spots[0]))):
+    if any(one == other for one, other in itertools.pairwise((*points, points[0]))):
         return
-    before = RouteLine(line.name, spots, line.repeat)
+    before = RouteLine(line.name, points, line.repeat)
     folder, now = tmp_path_factory.mktemp("trip"), before
     for number, suffix in enumerate(order):
         path = written(folder, f"{number}{suffix}", encode_route(now, suffix, "test"))
@@ -87,7 +87,7 @@ def test_gpx_route_before_track_before_waypoints(tmp_path: Path) -> None:
     whole = read_route(written(tmp_path, "a.gpx", GPX), "test")
     assert (whole.name, len(whole.points), whole.repeat) == ("bay", 3, False)
     track = read_route(written(tmp_path, "b.gpx", GPX.replace("rte>", "x>").replace("rtept", "xpt")), "test")
-    assert [spot.latitude_deg for spot in track.points] == [47.1, 47.2]
+    assert [point.latitude_deg for point in track.points] == [47.1, 47.2]
 
 
 def test_geojson_with_heights_in_a_ring_beside_other_things(tmp_path: Path) -> None:
