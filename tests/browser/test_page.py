@@ -168,8 +168,8 @@ async def test_the_choice_of_frame(browser: Any, boat: Boat, spawn: Spawn, confi
     async with spawn("dashboard"):
         page = (await watch(browser, config)).page
         choose = """async ([pictures, evidence, masks]) => {
-          const { choose } = await import("/static/match.js");
-          const c = choose(pictures, (id) => evidence.includes(id), (id) => masks.includes(id));
+          const { chooseFrame } = await import("/static/frame_matching.js");
+          const c = chooseFrame(pictures, (id) => evidence.includes(id), (id) => masks.includes(id));
           return [c.id, c.evidence, c.mask];
         }"""
         cases: list[tuple[list[str], list[str], list[str], list[object]]] = [

@@ -1,10 +1,10 @@
 // @ts-check
-// One row per process: is it there, how fast, how old its report, what it costs, what it dropped.
+// The health panel: one row per process with its state, rate, age of its report, load and dropped messages.
 
 import { ageText, byId, fixed, make, setText } from "./text.js";
 
-/** The topic whose rate speaks for a process. @type {Record<string, string>} */
-const SPEAKS = {
+/** The main output of each process; its rate is shown. @type {Record<string, string>} */
+const MAIN_TOPIC = {
   plant: "plant/thrust_applied", eye: "eye/picture", camera: "camera/picture", perception: "perception/evidence",
   advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
   localization: "localization/odometry", dashboard: "operator/arming", recorder: "recorder/state",
@@ -17,20 +17,20 @@ const cells = new Map();
 export function renderHealth(store, open, now) {
   const settings = store.get("dashboard/settings");
   if (!settings) return;
-  const lives = new Map((store.get("dashboard/services")?.services ?? []).map((/** @type {any} */ life) => [life.service, life]));
+  const liveness = new Map((store.get("dashboard/services")?.services ?? []).map((/** @type {any} */ life) => [life.service, life]));
   const rates = new Map();
   for (const name of settings.services) {
     for (const input of store.get(`health/${name}`)?.inputs ?? []) rates.set(input.topic, input);
   }
   let ready = 0, cpu = 0;
   for (const name of settings.services) {
-    const report = store.get(`health/${name}`), life = lives.get(name), fresh = open && store.isFresh(`health/${name}`, now);
-    const alive = Boolean(open && life?.alive && fresh), input = rates.get(SPEAKS[name]);
+    const report = store.get(`health/${name}`), life = liveness.get(name), fresh = open && store.isFresh(`health/${name}`, now);
+    const alive = Boolean(open && life?.alive && fresh), input = rates.get(MAIN_TOPIC[name]);
     const drops = (report?.drops ?? []).reduce((/** @type {number} */ sum, /** @type {any} */ drop) => sum + drop.count, 0);
     ready += alive ? 1 : 0;
     cpu += alive ? report.cpu_cores : 0;
-    const [service, state, rate, age, cores, memory, dropped, starts] = row(name);
-    const [word, kind] = alive ? ["ready", "good"] : life?.alive && open ? ["silent", "bad"] : life?.starts ? ["gone", "bad"] : ["absent", "warn"];
+    const [service, state, rate, age, cores, memory, dropped, starts] = rowCells(name);
+    const [word, kind] = alive ? ["ready", "good"] : life?.alive && open ? ["no report", "bad"] : life?.starts ? ["stopped", "bad"] : ["not started", "warn"];
     setText(service, name);
     setText(state, word);
     state.className = kind;
@@ -51,7 +51,7 @@ export function renderHealth(store, open, now) {
 }
 
 /** @param {string} name */
-function row(name) {
+function rowCells(name) {
   let found = cells.get(name);
   if (!found) {
     found = Array.from({ length: COLUMNS }, () => make("td"));

@@ -1,10 +1,10 @@
 // @ts-check
-// The newest lines first: what the server tells, and each change of advice.
+// The log panel, newest line first: events of the dashboard, and each change of advice.
 
 import { byId, make, reasonText } from "./text.js";
 
-const KEPT = 60;
-let advice = "";
+const MAX_LINES = 60;
+let lastAdvice = "";
 
 /** @param {{at_us: number, level: string, text: string}} event */
 export function addLine(event) {
@@ -13,14 +13,14 @@ export function addLine(event) {
   line.append(at, make("span", "", event.text));
   const list = byId("log");
   list.prepend(line);
-  while (list.children.length > KEPT) list.lastChild.remove();
+  while (list.children.length > MAX_LINES) list.lastChild.remove();
 }
 
 /** @param {any} advisory */
-export function noteAdvice(advisory) {
+export function logAdvice(advisory) {
   const now = `${advisory.direction} ${advisory.reason}`;
-  if (now === advice) return;
-  advice = now;
+  if (now === lastAdvice) return;
+  lastAdvice = now;
   const level = advisory.direction === "STOP" || advisory.direction === "NO_DATA" ? "stop" : "info";
   addLine({ at_us: advisory.sent_us, level, text: `${advisory.direction.replaceAll("_", " ")}: ${reasonText(advisory.reason)}` });
 }

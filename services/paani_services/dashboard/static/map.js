@@ -1,12 +1,12 @@
 // @ts-check
-// The map panel: local metres, north up, on a canvas.
+// The map panel: route, estimated and true track in local metres, north up.
 
 import { byId, fixed, headingDeg, setText } from "./text.js";
 
-const TRAIL = 4000, STEP_M = 0.15;
-const NICE_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
+const MAX_TRACK_POINTS = 4000, TRACK_STEP_M = 0.15;
+const ROUND_LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 
-export class ChartMap {
+export class MapPanel {
   constructor() {
     this.canvas = /** @type {HTMLCanvasElement} */ (byId("map"));
     this.ctx = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
@@ -14,11 +14,11 @@ export class ChartMap {
     this.pxPerM = 6;
     this.follow = true;
     /** @type {Record<string, {x: number, y: number}[]>} */
-    this.trails = { "localization/odometry": [], "@truth/pose": [] };
-    this.bind();
+    this.tracks = { "localization/odometry": [], "@truth/pose": [] };
+    this.bindControls();
   }
 
-  bind() {
+  bindControls() {
     byId("map-follow").addEventListener("click", () => this.setFollow(!this.follow));
     byId("map-in").addEventListener("click", () => this.zoom(1.4));
     byId("map-out").addEventListener("click", () => this.zoom(1 / 1.4));
@@ -44,70 +44,70 @@ export class ChartMap {
   }
 
   /** @param {string} key @param {any} pose */
-  take(key, pose) {
-    const trail = this.trails[key], last = trail.at(-1);
-    if (last && Math.hypot(last.x - pose.x_m, last.y - pose.y_m) < STEP_M) return;
-    trail.push({ x: pose.x_m, y: pose.y_m });
-    if (trail.length > TRAIL) trail.splice(0, TRAIL / 4);
+  addPose(key, pose) {
+    const track = this.tracks[key], last = track.at(-1);
+    if (last && Math.hypot(last.x - pose.x_m, last.y - pose.y_m) < TRACK_STEP_M) return;
+    track.push({ x: pose.x_m, y: pose.y_m });
+    if (track.length > MAX_TRACK_POINTS) track.splice(0, MAX_TRACK_POINTS / 4);
   }
 
   /** @param {import("./store.js").Store} store @param {number} now */
   render(store, now) {
     const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
     const odometry = store.get("localization/odometry"), truth = store.get("@truth/pose"), route = store.get("navigator/route");
-    const ratio = Math.min(devicePixelRatio || 1, 2), wide = this.canvas.clientWidth, high = this.canvas.clientHeight;
-    if (!wide || !high) return;
-    if (this.canvas.width !== Math.round(wide * ratio) || this.canvas.height !== Math.round(high * ratio)) {
-      this.canvas.width = Math.round(wide * ratio);
-      this.canvas.height = Math.round(high * ratio);
+    const ratio = Math.min(devicePixelRatio || 1, 2), width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!width || !height) return;
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
+      this.canvas.width = Math.round(width * ratio);
+      this.canvas.height = Math.round(height * ratio);
     }
-    if (this.fitRoute && route) this.fit(route.waypoints, wide, high);
+    if (this.fitRoute && route) this.fitTo(route.waypoints, width, height);
     const pose = odometry ?? truth;
     if (this.follow && pose) this.centre = { x: pose.x_m, y: pose.y_m };
     const { ctx } = this;
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.clearRect(0, 0, wide, high);
-    const at = (/** @type {number} */ x, /** @type {number} */ y) =>
-      /** @type {[number, number]} */ ([wide / 2 + (x - this.centre.x) * this.pxPerM, high / 2 - (y - this.centre.y) * this.pxPerM]);
-    this.grid(wide, high, at, colour("--line"));
-    if (route) this.route(route, store, at, colour("--route"), colour("--quiet"));
-    this.trail(this.trails["@truth/pose"], at, colour("--text"), 1.5, [2, 4]);
-    this.trail(this.trails["localization/odometry"], at, colour("--cyan"), 2, []);
-    if (truth) this.boat(truth, at, colour("--text"), false, store.isFresh("@truth/pose", now));
-    if (odometry) this.boat(odometry, at, colour("--cyan"), true, store.isFresh("localization/odometry", now));
-    this.furniture(wide, high, colour("--text"), colour("--quiet"));
+    ctx.clearRect(0, 0, width, height);
+    const toScreen = (/** @type {number} */ x, /** @type {number} */ y) =>
+      /** @type {[number, number]} */ ([width / 2 + (x - this.centre.x) * this.pxPerM, height / 2 - (y - this.centre.y) * this.pxPerM]);
+    this.drawGrid(width, height, toScreen, colour("--line"));
+    if (route) this.drawRoute(route, store, toScreen, colour("--route"), colour("--quiet"));
+    this.drawTrack(this.tracks["@truth/pose"], toScreen, colour("--text"), 1.5, [2, 4]);
+    this.drawTrack(this.tracks["localization/odometry"], toScreen, colour("--cyan"), 2, []);
+    if (truth) this.drawBoat(truth, toScreen, colour("--text"), false, store.isFresh("@truth/pose", now));
+    if (odometry) this.drawBoat(odometry, toScreen, colour("--cyan"), true, store.isFresh("localization/odometry", now));
+    this.drawScaleAndNorth(width, height, colour("--text"), colour("--quiet"));
     setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");
     const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;
-    setText(byId("map-error"), Number.isFinite(error) ? `estimate off by ${fixed(error, 1)} m` : "");
+    setText(byId("map-error"), Number.isFinite(error) ? `position error ${fixed(error, 1)} m` : "");
   }
 
-  /** @param {{x_m: number, y_m: number}[]} points @param {number} wide @param {number} high */
-  fit(points, wide, high) {
+  /** @param {{x_m: number, y_m: number}[]} points @param {number} width @param {number} height */
+  fitTo(points, width, height) {
     const xs = points.map((p) => p.x_m), ys = points.map((p) => p.y_m);
     const [x1, x2, y1, y2] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     this.centre = { x: (x1 + x2) / 2, y: (y1 + y2) / 2 };
-    this.pxPerM = Math.min(wide / (x2 - x1 + 12), high / (y2 - y1 + 12));
+    this.pxPerM = Math.min(width / (x2 - x1 + 12), height / (y2 - y1 + 12));
     this.fitRoute = false;
   }
 
-  /** @typedef {(x: number, y: number) => [number, number]} At */
+  /** Metres east and north to pixels. @typedef {(x: number, y: number) => [number, number]} ToScreen */
 
-  /** @param {number} wide @param {number} high @param {At} at @param {string} colour */
-  grid(wide, high, at, colour) {
-    const step = NICE_M.find((m) => m * this.pxPerM >= 56) ?? 500;
-    const { ctx } = this, [x0, y0] = at(0, 0), px = step * this.pxPerM;
+  /** @param {number} width @param {number} height @param {ToScreen} toScreen @param {string} colour */
+  drawGrid(width, height, toScreen, colour) {
+    const step = ROUND_LENGTHS_M.find((m) => m * this.pxPerM >= 56) ?? 500;
+    const { ctx } = this, [x0, y0] = toScreen(0, 0), px = step * this.pxPerM;
     ctx.strokeStyle = colour;
     ctx.lineWidth = 1;
     ctx.globalAlpha = 0.55;
     ctx.beginPath();
-    for (let x = ((x0 % px) + px) % px; x < wide; x += px) { ctx.moveTo(Math.round(x) + 0.5, 0); ctx.lineTo(Math.round(x) + 0.5, high); }
-    for (let y = ((y0 % px) + px) % px; y < high; y += px) { ctx.moveTo(0, Math.round(y) + 0.5); ctx.lineTo(wide, Math.round(y) + 0.5); }
+    for (let x = ((x0 % px) + px) % px; x < width; x += px) { ctx.moveTo(Math.round(x) + 0.5, 0); ctx.lineTo(Math.round(x) + 0.5, height); }
+    for (let y = ((y0 % px) + px) % px; y < height; y += px) { ctx.moveTo(0, Math.round(y) + 0.5); ctx.lineTo(width, Math.round(y) + 0.5); }
     ctx.stroke();
     ctx.globalAlpha = 1;
   }
 
-  /** @param {any} route @param {import("./store.js").Store} store @param {At} at @param {string} colour @param {string} quiet */
-  route(route, store, at, colour, quiet) {
+  /** @param {any} route @param {import("./store.js").Store} store @param {ToScreen} toScreen @param {string} colour @param {string} quiet */
+  drawRoute(route, store, toScreen, colour, quiet) {
     const { ctx } = this, next = store.get("navigator/command")?.waypoint_index ?? -1;
     const acceptancePx = (store.get("dashboard/settings")?.acceptance_m ?? 1) * this.pxPerM;
     ctx.strokeStyle = colour;
@@ -117,7 +117,7 @@ export class ChartMap {
     if (route.repeat) ctx.closePath();
     ctx.stroke();
     route.waypoints.forEach((/** @type {any} */ point, /** @type {number} */ index) => {
-      const [x, y] = at(point.x_m, point.y_m), isNext = index === next;
+      const [x, y] = toScreen(point.x_m, point.y_m), isNext = index === next;
       ctx.fillStyle = ctx.strokeStyle = colour;
       ctx.beginPath();
       ctx.arc(x, y, isNext ? 4 : 2.5, 0, 7);
@@ -135,8 +135,8 @@ export class ChartMap {
     });
   }
 
-  /** @param {{x: number, y: number}[]} points @param {At} at @param {string} colour @param {number} thick @param {number[]} dash */
-  trail(points, at, colour, thick, dash) {
+  /** @param {{x: number, y: number}[]} points @param {ToScreen} toScreen @param {string} colour @param {number} thick @param {number[]} dash */
+  drawTrack(points, toScreen, colour, thick, dash) {
     const { ctx } = this;
     ctx.strokeStyle = colour;
     ctx.lineWidth = thick;
@@ -149,9 +149,9 @@ export class ChartMap {
     ctx.globalAlpha = 1;
   }
 
-  /** @param {any} pose @param {At} at @param {string} colour @param {boolean} filled @param {boolean} fresh */
-  boat(pose, at, colour, filled, fresh) {
-    const { ctx } = this, [x, y] = at(pose.x_m, pose.y_m), size = Math.max(9, 0.9 * this.pxPerM);
+  /** @param {any} pose @param {ToScreen} toScreen @param {string} colour @param {boolean} filled @param {boolean} fresh */
+  drawBoat(pose, toScreen, colour, filled, fresh) {
+    const { ctx } = this, [x, y] = toScreen(pose.x_m, pose.y_m), size = Math.max(9, 0.9 * this.pxPerM);
     ctx.save();
     ctx.globalAlpha = fresh ? 1 : 0.35;
     ctx.translate(x, y);
@@ -177,20 +177,20 @@ export class ChartMap {
     ctx.restore();
   }
 
-  /** Scale bar and north. @param {number} wide @param {number} high @param {string} colour @param {string} quiet */
-  furniture(wide, high, colour, quiet) {
-    const { ctx } = this, metres = NICE_M.find((m) => m * this.pxPerM >= 60) ?? 500, px = metres * this.pxPerM;
+  /** Scale bar and north. @param {number} width @param {number} height @param {string} colour @param {string} quiet */
+  drawScaleAndNorth(width, height, colour, quiet) {
+    const { ctx } = this, metres = ROUND_LENGTHS_M.find((m) => m * this.pxPerM >= 60) ?? 500, px = metres * this.pxPerM;
     ctx.strokeStyle = ctx.fillStyle = quiet;
     ctx.lineWidth = 2;
     ctx.beginPath();
-    ctx.moveTo(12, high - 18); ctx.lineTo(12, high - 12); ctx.lineTo(12 + px, high - 12); ctx.lineTo(12 + px, high - 18);
+    ctx.moveTo(12, height - 18); ctx.lineTo(12, height - 12); ctx.lineTo(12 + px, height - 12); ctx.lineTo(12 + px, height - 18);
     ctx.stroke();
     ctx.font = "12px system-ui, sans-serif";
-    ctx.fillText(`${metres} m`, 12, high - 24);
+    ctx.fillText(`${metres} m`, 12, height - 24);
     ctx.fillStyle = colour;
     ctx.beginPath();
-    ctx.moveTo(wide - 20, 12); ctx.lineTo(wide - 14, 30); ctx.lineTo(wide - 20, 26); ctx.lineTo(wide - 26, 30);
+    ctx.moveTo(width - 20, 12); ctx.lineTo(width - 14, 30); ctx.lineTo(width - 20, 26); ctx.lineTo(width - 26, 30);
     ctx.fill();
-    ctx.fillText("N", wide - 24, 44);
+    ctx.fillText("N", width - 24, 44);
   }
 }

@@ -1,9 +1,9 @@
 // @ts-check
-// What the fans do, and every reason why the boat does not move.
+// The motion panel: thrust of the fans, the command in force, and every reason why the boat does not move.
 
-import { WHY_STILL, byId, fixed, headingDeg, make, sentence, setFacts, setText, words } from "./text.js";
+import { STOP_REASONS, byId, fixed, headingDeg, make, sentence, setFacts, setText, words } from "./text.js";
 
-const FULL_SCALE = 0.25; // the controller orders no more than this of the fans
+const FULL_SCALE = 0.25; // of full thrust, drawn as a full bar; the controller commands less in normal driving
 
 /** @param {import("./store.js").Store} store @param {number} now */
 export function renderMotion(store, now) {
@@ -15,11 +15,11 @@ export function renderMotion(store, now) {
     setText(byId(`fan-${side}-n`), applied ? `${fixed(applied[`${side}_n`], 1)} N` : "–");
   }
   document.querySelector(".fans")?.classList.toggle("stale", !fresh);
-  renderOrder(store, now, applied);
-  const reasons = whyStill(store, now);
+  renderCommand(store, now, applied);
+  const reasons = findStopReasons(store, now);
   const moving = fresh && applied?.zero_cause === "none";
-  setText(byId("motion-word"), moving ? "under way" : fresh ? "held at zero thrust" : "plant not heard");
-  const lines = reasons.length ? reasons : [["plant", "nothing holds it back"]];
+  setText(byId("motion-word"), moving ? "thrust applied" : fresh ? "zero thrust" : "no data from the plant");
+  const lines = reasons.length ? reasons : [["plant", "nothing inhibits thrust"]];
   const items = lines.map(([who, text]) => {
     const item = make("li");
     item.append(make("span", "", sentence(who)), make("span", reasons.length ? "" : "clear", text));
@@ -33,31 +33,31 @@ export function renderMotion(store, now) {
 }
 
 /** @param {import("./store.js").Store} store @param {number} now @param {any} applied */
-function renderOrder(store, now, applied) {
+function renderCommand(store, now, applied) {
   const command = store.get("navigator/command");
   const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
   setFacts(byId("order"), [
-    ["Ordered", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
-    ["Heading", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
-    ["Off track", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
-    ["Order age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
+    ["Speed command", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
+    ["Heading command", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
+    ["Cross-track error", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
+    ["Command age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
   ]);
   byId("order").classList.toggle("stale", !store.isFresh("navigator/command", now));
 }
 
-/** Who holds the boat, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */
-function whyStill(store, now) {
+/** Which process keeps the boat from moving, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */
+function findStopReasons(store, now) {
   /** @type {[string, string][]} */
-  const found = [];
+  const reasons = [];
   const applied = store.get("plant/thrust_applied");
-  if (!store.isFresh("plant/thrust_applied", now)) found.push(["plant", "not heard"]);
+  if (!store.isFresh("plant/thrust_applied", now)) reasons.push(["plant", "no recent message"]);
   else if (applied.zero_cause !== "none") {
     const detail = applied.lost_pulse ? `: ${applied.lost_pulse}` : "";
-    found.push(["plant", (WHY_STILL[applied.zero_cause] ?? words(applied.zero_cause)) + detail]);
+    reasons.push(["plant", (STOP_REASONS[applied.zero_cause] ?? words(applied.zero_cause)) + detail]);
   }
   for (const [who, key] of [["navigator", "navigator/command"], ["controller", "controller/thrust"]]) {
-    if (!store.isFresh(key, now)) found.push([who, "not heard"]);
-    else for (const inhibit of store.get(key).inhibits) found.push([who, WHY_STILL[inhibit] ?? words(inhibit)]);
+    if (!store.isFresh(key, now)) reasons.push([who, "no recent message"]);
+    else for (const inhibit of store.get(key).inhibits) reasons.push([who, STOP_REASONS[inhibit] ?? words(inhibit)]);
   }
-  return found;
+  return reasons;
 }

@@ -1,5 +1,5 @@
 // @ts-check
-// Draws what perception and the advisor say about one picture, in the picture's own normalised coordinates.
+// Draws the results of perception and advisor over the picture they belong to, in its normalised coordinates.
 
 import { fixed, words } from "./text.js";
 
@@ -32,25 +32,25 @@ export function drawMask({ ctx, width, height }, mask) {
 }
 
 /** @param {Pane} pane @param {string} text @param {number} x @param {number} y @param {string} colour @param {CanvasTextAlign} align */
-function label({ ctx, unit, width }, text, x, y, colour, align = "left") {
+function drawLabel({ ctx, unit, width }, text, x, y, colour, align = "left") {
   ctx.font = `600 ${12 * unit}px system-ui, sans-serif`;
   ctx.textBaseline = "middle";
-  const wide = ctx.measureText(text).width + 8 * unit, high = 18 * unit;
-  let left = align === "center" ? x - wide / 2 : x;
-  left = Math.min(Math.max(0, left), width - wide);
+  const labelWidth = ctx.measureText(text).width + 8 * unit, labelHeight = 18 * unit;
+  let left = align === "center" ? x - labelWidth / 2 : x;
+  left = Math.min(Math.max(0, left), width - labelWidth);
   const top = Math.max(0, y);
   ctx.fillStyle = "rgb(8 11 14 / .78)";
-  ctx.fillRect(left, top, wide, high);
+  ctx.fillRect(left, top, labelWidth, labelHeight);
   ctx.fillStyle = colour;
   ctx.textAlign = "left";
-  ctx.fillText(text, left + 4 * unit, top + high / 2 + unit);
+  ctx.fillText(text, left + 4 * unit, top + labelHeight / 2 + unit);
 }
 
-/** @param {Pane} pane @param {number[]} box @param {string} colour @param {number} thick @param {number[]} dash */
-function outline({ ctx, width, height, unit }, box, colour, thick, dash) {
+/** @param {Pane} pane @param {number[]} box @param {string} colour @param {number} lineWidth @param {number[]} dash */
+function drawBox({ ctx, width, height, unit }, box, colour, lineWidth, dash) {
   const [x1, y1, x2, y2] = box;
   ctx.setLineDash(dash.map((part) => part * unit));
-  ctx.lineWidth = thick * unit;
+  ctx.lineWidth = lineWidth * unit;
   ctx.strokeStyle = colour;
   ctx.strokeRect(x1 * width, y1 * height, (x2 - x1) * width, (y2 - y1) * height);
   ctx.setLineDash([]);
@@ -58,37 +58,37 @@ function outline({ ctx, width, height, unit }, box, colour, thick, dash) {
 
 /** @param {Pane} pane @param {any} evidence @param {any} tracks of the same frame, or undefined */
 export function drawBoxes(pane, evidence, tracks) {
-  const named = [];
+  const labels = [];
   if (tracks) {
     for (const track of tracks.tracks) {
       const colour = track.immediate_danger ? IMMEDIATE : track.accepted ? ACCEPTED : TENTATIVE;
-      if (track.held && !track.accepted) continue; // neither seen now nor counted
-      outline(pane, track.box_xyxy, colour, track.immediate_danger ? 3 : 2, track.held ? [6, 4] : []);
-      if (track.held) continue; // its dashes say so; a name for each would bury the picture
+      if (track.held && !track.accepted) continue; // neither seen in this picture nor counted by the advisor
+      drawBox(pane, track.box_xyxy, colour, track.immediate_danger ? 3 : 2, track.held ? [6, 4] : []);
+      if (track.held) continue; // no label: the dashed box says enough, and labels would cover the picture
       const state = track.immediate_danger ? " immediate" : track.accepted ? "" : " tentative";
-      named.push([`#${track.id} ${track.label} ${fixed(track.confidence)}${state}`, track.box_xyxy, colour]);
+      labels.push([`#${track.id} ${track.label} ${fixed(track.confidence)}${state}`, track.box_xyxy, colour]);
     }
   } else {
     for (const found of evidence.detections) {
-      outline(pane, found.box_xyxy, TENTATIVE, 1.5, []);
-      named.push([`${found.label} ${fixed(found.confidence)}`, found.box_xyxy, TENTATIVE]);
+      drawBox(pane, found.box_xyxy, TENTATIVE, 1.5, []);
+      labels.push([`${found.label} ${fixed(found.confidence)}`, found.box_xyxy, TENTATIVE]);
     }
   }
-  for (const [text, box, colour] of named) {
+  for (const [text, box, colour] of labels) {
     const y = box[1] * pane.height - 19 * pane.unit;
-    label(pane, text, box[0] * pane.width - pane.unit, y < 0 ? box[1] * pane.height + 2 * pane.unit : y, colour);
+    drawLabel(pane, text, box[0] * pane.width - pane.unit, y < 0 ? box[1] * pane.height + 2 * pane.unit : y, colour);
   }
 }
 
 /** Corridor brackets along the bottom. @param {Pane} pane @param {any} corridors @param {any} advisory of the same frame, or undefined */
-export function drawLanes(pane, corridors, advisory) {
+export function drawCorridors(pane, corridors, advisory) {
   const { ctx, width, height, unit } = pane;
   for (const [index, name] of ["left", "center", "right"].entries()) {
     const [from, to] = corridors[name];
     const lane = advisory?.[name];
     const colour = lane ? (lane.blocked ? BLOCKED : CLEAR) : UNKNOWN;
     const x1 = from * width, x2 = to * width, top = corridors.top * height;
-    const foot = height - (index === 1 ? 4 : 9) * unit;
+    const base = height - (index === 1 ? 4 : 9) * unit;
     const fade = ctx.createLinearGradient(0, top, 0, height);
     fade.addColorStop(0, `${colour}00`);
     fade.addColorStop(1, `${colour}2a`);
@@ -97,18 +97,18 @@ export function drawLanes(pane, corridors, advisory) {
     ctx.strokeStyle = colour;
     ctx.lineWidth = 3 * unit;
     ctx.beginPath();
-    ctx.moveTo(x1, foot - 12 * unit);
-    ctx.lineTo(x1, foot);
-    ctx.lineTo(x2, foot);
-    ctx.lineTo(x2, foot - 12 * unit);
+    ctx.moveTo(x1, base - 12 * unit);
+    ctx.lineTo(x1, base);
+    ctx.lineTo(x2, base);
+    ctx.lineTo(x2, base - 12 * unit);
     ctx.stroke();
-    const says = lane ? `${fixed(lane.risk)} ${lane.blocked ? "blocked" : "clear"}` : words(name);
-    label(pane, says, ((x1 + x2) / 2), height - 33 * unit, colour, "center");
+    const verdict = lane ? `${fixed(lane.risk)} ${lane.blocked ? "blocked" : "clear"}` : words(name);
+    drawLabel(pane, verdict, ((x1 + x2) / 2), height - 33 * unit, colour, "center");
   }
 }
 
-/** The height below which a corridor is judged. @param {Pane} pane @param {number} top */
-export function drawLimit({ ctx, width, height, unit }, top) {
+/** The upper edge of the corridors. @param {Pane} pane @param {number} top */
+export function drawCorridorTop({ ctx, width, height, unit }, top) {
   ctx.strokeStyle = "rgb(235 243 248 / .75)";
   ctx.lineWidth = unit;
   ctx.setLineDash([3 * unit, 5 * unit]);

@@ -1,5 +1,5 @@
 // @ts-check
-// The newest value of each key and how old it is: the server's age of it plus the time since it came here.
+// The newest value of each key and its age: the age on the server plus the time since its receipt here.
 
 /** @typedef {{value: any, at: number, ageMs: number}} Entry */
 
@@ -9,7 +9,7 @@ export class Store {
     this.entries = new Map();
     /** @type {Map<string, number>} */
     this.freshS = new Map();
-    this.heardAt = 0;
+    this.boatHeardAt = 0;
   }
 
   /** @param {string} key @param {any} value @param {number} ageMs @param {number} now */
@@ -18,8 +18,8 @@ export class Store {
     if (key === "dashboard/settings") {
       for (const topic of value.topics) this.freshS.set(topic.name, topic.fresh_s);
     }
-    const ours = key.startsWith("dashboard/") || key === "operator/arming" || key === "health/dashboard";
-    if (!ours) this.heardAt = Math.max(this.heardAt, now - ageMs);
+    const isFromDashboard = key.startsWith("dashboard/") || key === "operator/arming" || key === "health/dashboard";
+    if (!isFromDashboard) this.boatHeardAt = Math.max(this.boatHeardAt, now - ageMs);
   }
 
   /** @param {string} key */
@@ -39,8 +39,8 @@ export class Store {
     return this.ageS(key, now) <= limit;
   }
 
-  /** Seconds since anything came from the boat. @param {number} now */
+  /** Seconds since the last message from the boat. @param {number} now */
   silenceS(now) {
-    return this.heardAt ? (now - this.heardAt) / 1000 : Infinity;
+    return this.boatHeardAt ? (now - this.boatHeardAt) / 1000 : Infinity;
   }
 }

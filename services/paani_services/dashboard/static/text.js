@@ -1,5 +1,5 @@
 // @ts-check
-// Words and numbers for people. Pure.
+// Texts and numbers as the page shows them. Pure.
 
 /** @param {string} name */
 export const words = (name) => name.toLowerCase().replaceAll("_", " ");
@@ -7,7 +7,7 @@ export const words = (name) => name.toLowerCase().replaceAll("_", " ");
 /** @param {string} text */
 export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** A reason code as people say it. @param {string} reason */
+/** A reason code as text. @param {string} reason */
 export const reasonText = (reason) => sentence(words(reason).replace(/^center/, "centre"));
 
 /** @param {number} value @param {number} [digits] */
@@ -22,37 +22,37 @@ export function ageText(seconds) {
 /** True heading in degrees from a counter-clockwise angle from east. @param {number} yawRad */
 export const headingDeg = (yawRad) => (((90 - (yawRad * 180) / Math.PI) % 360) + 360) % 360;
 
-/** @type {Record<string, string>} */
-export const WHY_STILL = {
+/** Reasons for zero thrust: inhibits of navigator and controller, and zero causes of the thrust adapter. @type {Record<string, string>} */
+export const STOP_REASONS = {
   NOT_ARMED: "not armed",
-  NO_CLOCK: "the boat's clock has not been heard",
-  CLOCK_STOPPED: "the boat's clock stands still",
+  NO_CLOCK: "no time received from the boat",
+  CLOCK_STOPPED: "the boat's clock has stopped",
   NO_ODOMETRY: "position unknown",
   STALE_ODOMETRY: "position too old",
-  UNHEALTHY_ODOMETRY: "position not trusted",
+  UNHEALTHY_ODOMETRY: "position estimate not healthy",
   NO_ADVISORY: "no advice yet",
   STALE_ADVISORY: "advice too old",
-  ADVISED_STOP: "the advisor says stop",
-  ADVISED_NO_DATA: "the advisor has nothing to judge",
-  TURN_CAPPED: "turned as far as allowed without a clear way",
-  NO_FREE_PATH: "no way is known to be free",
+  ADVISED_STOP: "the advisor advises STOP",
+  ADVISED_NO_DATA: "the advisor has no evidence",
+  TURN_CAPPED: "turned as far as allowed without finding a clear direction",
+  NO_FREE_PATH: "no trajectory is known to be free",
   NO_ROUTE: "no route",
   ROUTE_FINISHED: "route finished",
   HOLDING: "holding station",
   MISSION_DONE: "mission done",
   OUTSIDE_FENCE: "outside the fence, or too close to it",
   WRONG_DOMAIN: "message from another domain",
-  NO_COMMAND: "no order yet",
-  STALE_COMMAND: "order too old",
-  COMMAND_INVALID: "order not valid",
+  NO_COMMAND: "no command yet",
+  STALE_COMMAND: "command too old",
+  COMMAND_INVALID: "command not valid",
   no_command: "no thrust command yet",
   timeout: "thrust commands stopped coming",
   not_enabled: "the command does not enable thrust",
   not_armed: "not armed",
-  arming_lost: "the operator is not heard",
-  pulse_lost: "a vital process is silent",
+  arming_lost: "no message from the operator's console",
+  pulse_lost: "a vital process sends no heartbeat",
   stale_echo: "thrust command too old",
-  wrong_producer: "thrust command from somebody else",
+  wrong_producer: "thrust command from another process",
   wrong_domain: "thrust command from another domain",
   old_epoch: "thrust command from an earlier run",
   replayed: "thrust command repeated",

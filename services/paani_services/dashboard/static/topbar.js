@@ -1,10 +1,10 @@
 // @ts-check
-// Link, advice, speed and heading.
+// The top bar: link, advice, speed, heading and recording.
 
-import { ageText, byId, fixed, headingDeg, reasonText, setText } from "./text.js";
+import { ageText, byId, fixed, headingDeg, reasonText, setText, words } from "./text.js";
 
-const LOST_S = 1.5;
-/** @type {Record<string, [string, string, string]>} word, kind, path of the arrow */
+const LINK_TIMEOUT_S = 1.5;
+/** Word, kind and SVG path of the arrow. @type {Record<string, [string, string, string]>} */
 const ADVICE = {
   STRAIGHT: ["STRAIGHT", "go", "M24 42V7M11 20L24 7l13 13"],
   SLIGHT_LEFT: ["SLIGHT LEFT", "turn", "M29 42V26L14 10M13 25V9h16"],
@@ -32,18 +32,18 @@ export function renderTopbar(store, open, now) {
 /** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
 function renderLink(store, open, now) {
   const silenceS = store.silenceS(now), never = silenceS === Infinity;
-  const lost = !never && (!open || silenceS > LOST_S);
+  const lost = !never && (!open || silenceS > LINK_TIMEOUT_S);
   document.body.dataset.link = lost ? "lost" : never ? "waiting" : "live";
   setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : `live ${fixed(silenceS, 1)} s`);
-  setText(byId("link-age"), !open ? "no dashboard" : lost ? "boat silent" : never ? "for the boat" : "link");
+  setText(byId("link-age"), !open ? "no connection" : lost ? "no data" : never ? "for data" : "age of data");
   document.title = lost ? "LOST · PAANI" : "PAANI";
 }
 
-/** Only where something is to be recorded. @param {import("./store.js").Store} store @param {boolean} wanted @param {number} now */
-function renderRecord(store, wanted, now) {
+/** The recording chip, hidden where nothing is to be recorded. @param {import("./store.js").Store} store @param {boolean} isWanted @param {number} now */
+function renderRecord(store, isWanted, now) {
   const chip = byId("record"), state = store.get("recorder/state");
   const on = store.isFresh("recorder/state", now) && state.recording;
-  chip.hidden = !wanted;
+  chip.hidden = !isWanted;
   chip.dataset.record = !on ? "off" : state.dropped ? "loses" : "on";
   const lost = on && state.dropped ? `, ${state.dropped} dropped` : "";
   setText(chip, on ? `REC ${ageText((state.source_us - state.since_us) / 1e6)}${lost}` : "not recording");
@@ -62,8 +62,8 @@ function renderAdvice(store, now) {
     byId("advice-arrow").innerHTML = `<path d="${arrow}"/>`;
   }
   setText(byId("advice-word"), word);
-  const old = advisory ? `Last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "Nothing heard yet";
-  const cause = fresh && advisory.cause !== "none" ? `: ${advisory.cause}` : "";
+  const old = advisory ? `Last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "No advice received yet";
+  const cause = fresh && advisory.cause !== "none" ? `: ${words(advisory.cause)}` : "";
   setText(byId("advice-reason"), fresh ? reasonText(advisory.reason) + cause : old);
 }
 

@@ -1,13 +1,13 @@
 // @ts-check
-// STOP is one press and is asked again until the server has it; arming is a hold that expires.
+// The operator's controls: STOP is one press, sent until the server answers; arming is a hold that expires.
 
 import { byId, fixed, setText } from "./text.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400;
-let asking = false, refused = "", heldFrom = 0;
+let isStopPending = false, refusal = "", heldFrom = 0;
 let token = document.querySelector('meta[name="paani-arm-token"]')?.getAttribute("content") ?? "";
 
-/** A restarted server has another token. */
+/** Read the token again: a restarted server has another one. */
 export async function renewToken() {
   const page = new DOMParser().parseFromString(await (await fetch("/")).text(), "text/html");
   token = page.querySelector('meta[name="paani-arm-token"]')?.getAttribute("content") ?? token;
@@ -15,12 +15,12 @@ export async function renewToken() {
 
 export async function stop() {
   release(false);
-  refused = "";
-  if (asking) return;
-  asking = true;
-  while (asking) {
+  refusal = "";
+  if (isStopPending) return;
+  isStopPending = true;
+  while (isStopPending) {
     try {
-      if ((await fetch("/api/stop", { method: "POST" })).ok) asking = false;
+      if ((await fetch("/api/stop", { method: "POST" })).ok) isStopPending = false;
     } catch {
       await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
     }
@@ -35,20 +35,20 @@ async function arm(heldMs) {
       headers: { "Content-Type": "application/json", "X-Paani-Token": token },
       body: JSON.stringify({ held_ms: Math.round(heldMs) }),
     });
-    refused = answer.ok ? "" : (await answer.json()).error;
+    refusal = answer.ok ? "" : (await answer.json()).error;
   } catch {
-    refused = "not sent";
+    refusal = "not sent: no connection to the dashboard";
   }
 }
 
-/** @param {boolean} wanted */
-function release(wanted) {
+/** @param {boolean} mayArm */
+function release(mayArm) {
   const heldMs = performance.now() - heldFrom;
-  if (heldFrom && wanted && heldMs >= HOLD_MS && heldMs <= EXPIRES_MS) void arm(heldMs);
+  if (heldFrom && mayArm && heldMs >= HOLD_MS && heldMs <= EXPIRES_MS) void arm(heldMs);
   heldFrom = 0;
 }
 
-export function bindOrders() {
+export function bindOperatorControls() {
   byId("stop").addEventListener("pointerdown", stop);
   byId("stop").addEventListener("click", stop);
   addEventListener("keydown", (event) => {
@@ -60,7 +60,7 @@ export function bindOrders() {
   const button = byId("arm");
   button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
     button.setPointerCapture(event.pointerId);
-    refused = "";
+    refusal = "";
     heldFrom = performance.now();
   });
   button.addEventListener("pointerup", () => release(true));
@@ -75,25 +75,25 @@ export function bindOrders() {
 }
 
 /** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
-export function renderOrders(store, open, now) {
-  const word = store.get("dashboard/operator"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
+export function renderOperatorState(store, open, now) {
+  const operator = store.get("dashboard/operator"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
   const heldMs = heldFrom ? now - heldFrom : 0;
   if (heldMs > EXPIRES_MS) heldFrom = 0;
   const button = byId("arm");
-  button.disabled = !open || !word || word.armed;
+  button.disabled = !open || !operator || operator.armed;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
-  setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : word?.armed ? "Armed" : "Hold to arm");
-  byId("stop").dataset.latched = String(Boolean(word?.stopped));
-  state.dataset.state = asking || word?.stopped ? "stopped" : word?.armed ? "armed" : "";
-  setText(byId("order-word"), asking ? "STOP ASKED" : !word ? "–" : word.stopped ? "STOPPED" : word.armed ? "ARMED" : "NOT ARMED");
-  setText(byId("order-detail"), refused || (asking ? "asking the dashboard" : detail(word, open)));
+  setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
+  byId("stop").dataset.latched = String(Boolean(operator?.stopped));
+  state.dataset.state = isStopPending || operator?.stopped ? "stopped" : operator?.armed ? "armed" : "";
+  setText(byId("order-word"), isStopPending ? "STOP REQUESTED" : !operator ? "–" : operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED");
+  setText(byId("order-detail"), refusal || (isStopPending ? "sending to the dashboard" : detail(operator, open)));
 }
 
-/** @param {any} word @param {boolean} open */
-function detail(word, open) {
-  if (!word) return "operator state unknown";
-  if (!open) return "last known";
-  if (!word.stopped) return word.armed ? "thrust allowed" : "thrust not allowed";
-  if (word.confirmed_ms !== null) return `plant at zero in ${fixed(word.confirmed_ms, 0)} ms`;
-  return word.asked ? "plant not confirmed" : "latched earlier";
+/** @param {any} operator @param {boolean} open */
+function detail(operator, open) {
+  if (!operator) return "operator state unknown";
+  if (!open) return "last known state";
+  if (!operator.stopped) return operator.armed ? "thrust allowed" : "thrust not allowed";
+  if (operator.confirmed_ms !== null) return `plant at zero in ${fixed(operator.confirmed_ms, 0)} ms`;
+  return operator.asked ? "plant has not confirmed" : "latched before this start";
 }

@@ -1,15 +1,15 @@
 // @ts-check
-// Which frame to show: picture, evidence and mask belong together only when they carry the same frame id. Pure.
+// Chooses the frame to show: picture, evidence and mask belong together only with the same frame id. Pure.
 
-const DEPTH = 16;
-const MASK_LAG_FRAMES = 2; // wait this long for a mask before showing boxes without it
+const MAX_FRAMES = 16;
+const MAX_MASK_LAG_FRAMES = 2; // wait this many frames for a mask before showing boxes without one
 
 /** @param {{frame_epoch: number, frame_seq: number}} message */
 export const frameId = (message) => `${message.frame_epoch}.${message.frame_seq}`;
 
 /** Recent values by frame id, newest last. @template T */
 export class FrameRing {
-  /** @param {(value: T) => void} [onDrop] called with what falls out */
+  /** @param {(value: T) => void} [onDrop] called with each value that is replaced or removed */
   constructor(onDrop = () => {}) {
     /** @type {Map<string, T>} */
     this.byId = new Map();
@@ -25,7 +25,7 @@ export class FrameRing {
     }
     this.byId.set(id, value);
     for (const [oldest, dropped] of this.byId) {
-      if (this.byId.size <= DEPTH) break;
+      if (this.byId.size <= MAX_FRAMES) break;
       this.byId.delete(oldest);
       this.onDrop(dropped);
     }
@@ -43,16 +43,16 @@ export class FrameRing {
 }
 
 /**
- * The frame to draw: the newest picture that has evidence, one with its mask if that is only a little older;
- * without evidence in reach, the newest picture and nothing on it.
+ * Chooses the newest picture that has evidence, or one that is slightly older and has a mask too.
+ * Without any evidence it is the newest picture, without an overlay.
  * @param {string[]} pictures ids, newest first
  * @param {(id: string) => boolean} hasEvidence
  * @param {(id: string) => boolean} hasMask
  * @returns {{id: string | null, evidence: boolean, mask: boolean}}
  */
-export function choose(pictures, hasEvidence, hasMask) {
-  const judged = pictures.filter(hasEvidence);
-  if (!judged.length) return { id: pictures[0] ?? null, evidence: false, mask: false };
-  const masked = judged.slice(0, MASK_LAG_FRAMES).find(hasMask);
-  return { id: masked ?? judged[0], evidence: true, mask: masked !== undefined };
+export function chooseFrame(pictures, hasEvidence, hasMask) {
+  const withEvidence = pictures.filter(hasEvidence);
+  if (!withEvidence.length) return { id: pictures[0] ?? null, evidence: false, mask: false };
+  const withMask = withEvidence.slice(0, MAX_MASK_LAG_FRAMES).find(hasMask);
+  return { id: withMask ?? withEvidence[0], evidence: true, mask: withMask !== undefined };
 }

@@ -1,14 +1,14 @@
 // @ts-check
-// Why this advice: the decision's steps, the three lanes' components, the input, the tracks.
+// The explanation panel: steps of the decision, risk of the three corridors, input; and the panel of tracks.
 
 import { ageText, byId, fixed, make, reasonText, setFacts, setText, words } from "./text.js";
 import { weightsInForce } from "./tuning.js";
 
-const LANES = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
+const CORRIDORS = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
 const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
 const STEPS = ["Picture", "Age", "Centre", "Sides", "Advice"];
-/** Which step decided. @type {Record<string, number>} */
-const DECIDED_AT = {
+/** Index in STEPS of the step that decided. @type {Record<string, number>} */
+const STEP_OF_REASON = {
   UNUSABLE_IMAGE: 0, MALFORMED_EVIDENCE: 0, NO_EVIDENCE: 0, STALE_EVIDENCE: 1, FUTURE_EVIDENCE: 1,
   CENTER_CLEAR: 2, CENTER_EDGE_INCURSION: 3, CENTER_RISK: 3, CENTER_OCCUPIED: 3, CENTER_VESSEL: 3,
   NO_SAFE_SIDE: 3, NO_SIDE_UNOCCUPIED: 3, NO_SIDE_FOR_LONG: 3, TIE_KEPT_SIDE: 3, TIE_STARBOARD: 3, TURN_RETAINED: 4,
@@ -17,9 +17,9 @@ const DECIDED_AT = {
 /** @type {Record<string, Record<string, any>>} */
 const rows = {};
 
-export function buildWhy() {
+export function buildExplanation() {
   for (const step of STEPS) byId("path").append(make("li", "", step));
-  for (const [name, title] of LANES) {
+  for (const [name, title] of CORRIDORS) {
     const row = make("div", "lane"), bars = make("div", "bars"), risk = make("strong"), parts = make("div", "parts"), verdict = make("span", "verdict");
     /** @type {Record<string, any>} */
     const widgets = { row, risk, verdict, limit: document.createElement("u") };
@@ -37,26 +37,26 @@ export function buildWhy() {
 }
 
 /** @param {import("./store.js").Store} store @param {number} now */
-export function renderWhy(store, now) {
+export function renderExplanation(store, now) {
   const advisory = store.get("advisor/advisory"), settings = store.get("dashboard/settings");
   const fresh = store.isFresh("advisor/advisory", now), panel = /** @type {HTMLElement} */ (document.querySelector(".why"));
   for (const part of panel.children) if (part.tagName !== "HEADER") part.classList.toggle("stale", !fresh);
-  setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice heard");
+  setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice received");
   if (!advisory || !settings) return;
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
   renderPath(advisory);
   const weights = weightsInForce(settings.weights, store.get("advisor/shadow"));
-  for (const [name] of LANES) renderLane(rows[name], advisory[name], advisory[name].limit || (name === "center" ? advisory.center_block_risk : advisory.side_block_risk), weights);
+  for (const [name] of CORRIDORS) renderCorridor(rows[name], advisory[name], advisory[name].limit || (name === "center" ? advisory.center_block_risk : advisory.side_block_risk), weights);
   renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
-  const seen = store.get("advisor/tracks");
+  const tracks = store.get("advisor/tracks");
   byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));
-  setText(byId("tracks-sum"), seen?.tracks.length ? `${seen.tracks.length} seen, ${advisory.contributing_track_ids.length} counted` : "");
-  renderTracks(seen, new Set(advisory.contributing_track_ids));
+  setText(byId("tracks-sum"), tracks?.tracks.length ? `${tracks.tracks.length} tracked, ${advisory.contributing_track_ids.length} in the risk` : "");
+  renderTracks(tracks, new Set(advisory.contributing_track_ids));
 }
 
 /** @param {any} advisory */
 function renderPath(advisory) {
-  const decided = DECIDED_AT[advisory.reason] ?? 4;
+  const decided = STEP_OF_REASON[advisory.reason] ?? 4;
   const stops = advisory.direction === "STOP" || advisory.direction === "NO_DATA";
   [...byId("path").children].forEach((item, index) => {
     item.dataset.step = index < decided ? "passed" : index > decided ? "" : stops ? "failed" : "decided";
@@ -66,7 +66,7 @@ function renderPath(advisory) {
 }
 
 /** @param {Record<string, any>} row @param {any} lane @param {number} limit @param {any} weights */
-function renderLane(row, lane, limit, weights) {
+function renderCorridor(row, lane, limit, weights) {
   row.row.dataset.blocked = String(lane.blocked);
   row.limit.style.left = `${limit * 100}%`;
   setText(row.risk, fixed(lane.risk));
@@ -82,7 +82,7 @@ function renderLane(row, lane, limit, weights) {
 function renderInput(evidence, advisory, ageS) {
   const timing = evidence?.timing;
   setFacts(byId("input"), [
-    ["Picture", evidence ? (evidence.usable ? "usable" : `refused: ${evidence.cause}`) : "none", Boolean(evidence && !evidence.usable)],
+    ["Picture", evidence ? (evidence.usable ? "usable" : `unusable: ${words(evidence.cause)}`) : "none", Boolean(evidence && !evidence.usable)],
     ["Age", ageText(ageS), false],
     ["Mask", evidence ? words(evidence.segmentation) : "–", Boolean(evidence && evidence.segmentation !== "learned")],
     ["Inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
@@ -93,7 +93,7 @@ function renderInput(evidence, advisory, ageS) {
 function renderTracks(message, counting) {
   const tracks = message?.tracks ?? [], list = byId("tracks");
   if (!tracks.length) {
-    list.replaceChildren(make("p", "quiet", "Nothing in sight"));
+    list.replaceChildren(make("p", "quiet", "No tracks"));
     return;
   }
   list.replaceChildren(
@@ -102,7 +102,7 @@ function renderTracks(message, counting) {
       const known = track.motion === "unknown" ? "" : track.motion;
       row.dataset.counts = String(counting.has(track.id));
       row.append(make("span", "", `#${track.id}`), make("span", "", track.label), make("span", "", fixed(track.confidence)));
-      row.append(make("span", "", [state, track.held ? "held" : "", known].filter(Boolean).join(", ")));
+      row.append(make("span", "", [state, track.held ? "not seen now" : "", known].filter(Boolean).join(", ")));
       return row;
     }),
   );
