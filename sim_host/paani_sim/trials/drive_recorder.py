@@ -1,4 +1,4 @@
-"""Writes a drive as a recording of the live system, so that replay and explanation read it."""
+"""Writes a drive in the format of a live recording, so that replay and explanation read it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PACKAGES = ("paani", "numpy", "onnxruntime", "msgspec", "mujoco", "opencv-python
 
 
 class DriveRecorder:
-    """`tap` takes every message of one drive. The file is whole or not there."""
+    """Records one drive through `record_message`. The file is written whole or not at all."""
 
     def __init__(self, path: Path, config: Config) -> None:
         """Raises UserError naming a file that cannot be written."""

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class DrivePhase(StrEnum):
-    """READY waits, disarmed, until the boat could go; RUNNING is armed."""
+    """READY: disarmed, until nothing but arming keeps the boat from going. RUNNING: armed."""
 
     READY = "ready"
     RUNNING = "running"
@@ -14,7 +14,7 @@ class DrivePhase(StrEnum):
 class DriveOutcome(StrEnum):
     """How a drive ended. Only COMPLETED is a success; touching something does not end a drive.
 
-    STALLED: two minutes without progress along the route.
+    STALLED: two minutes without progress along the route. NOT_READY: the boat was never ready to be armed.
     """
 
     NONE = "none"

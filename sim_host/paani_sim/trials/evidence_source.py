@@ -1,4 +1,4 @@
-"""Where a drive's evidence comes from: rendered pictures through the boat's own perception, or truth."""
+"""Sources of a drive's evidence: rendered pictures through the boat's own perception, or ground truth."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from paani_sim.worlds import Fault, World
 
 
 class EvidenceSource(Protocol):
-    """Looks once per frame. Not for two threads."""
+    """Gives evidence once per frame. Not thread-safe."""
 
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
-        """Evidence at this pose and time; None where no picture came. roll_rad: as the boat believes it to be."""
+        """Evidence at this pose and time; None if no picture came. `roll_rad` is the estimated roll."""
         ...
 
     def close(self) -> None:
-        """Gives back what it holds."""
+        """Release its resources."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class EvidenceFrame:
-    """`bgr` uint8 [H, W, 3] and `mask` uint8 [64, 80] where there are any."""
+    """Evidence, and the picture `bgr` uint8 [H, W, 3] and `mask` uint8 [64, 80] that it came from, if any."""
 
     evidence: m.Evidence
     bgr: U8 | None = None
@@ -37,7 +37,7 @@ class EvidenceFrame:
 
 
 class CameraEvidenceSource:
-    """Renders, breaks the picture where a fault says so, and perceives it. Raises UserError where OpenGL is missing."""
+    """Renders the picture, applies camera faults and runs perception. Raises UserError where OpenGL is missing."""
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
         self._faults = CameraFaults(faults)
@@ -60,5 +60,5 @@ class CameraEvidenceSource:
 
 
 def _frozen_stopwatch_ms() -> float:
-    """Evidence says how long its steps took; equal drives are equal, so in a drive they take none."""
+    """A stopwatch that stands still, so that the durations in evidence are equal in equal drives."""
     return 0.0

@@ -1,4 +1,4 @@
-"""What a result was made with, so that results of other code, models or settings are not taken for the same."""
+"""Fingerprint of code, models, settings and scenario, so that a stored result of other ones is not reused."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MODELS_PACKAGE = "paani_models"
 
 
 class Fingerprint(msgspec.Struct, frozen=True, kw_only=True):
-    """Checksums."""
+    """Checksums of everything that a result depends on."""
 
     code: str
     models: str
@@ -28,12 +28,12 @@ class Fingerprint(msgspec.Struct, frozen=True, kw_only=True):
     scenario: str
 
     def list_differences(self, other: Fingerprint) -> list[str]:
-        """The names of what is not the same."""
+        """Names of the checksums that differ."""
         return [name for name in self.__struct_fields__ if getattr(self, name) != getattr(other, name)]
 
 
 class FingerprintReader:
-    """Looks at the code and the models once."""
+    """Computes fingerprints; code and models are read once."""
 
     def __init__(self, sets: Iterable[str]) -> None:
         """Raises UserError for a setting."""
@@ -43,7 +43,7 @@ class FingerprintReader:
         self._settings: dict[str, str] = {}
 
     def fingerprint(self, case: TrialCase) -> Fingerprint:
-        """For one drive. Raises UserError for a setting."""
+        """Fingerprint of one case. Raises UserError for a setting."""
         if case.policy not in self._settings:
             self._settings[case.policy] = _checksum(encode_config(load_policy_config(case.policy, self._sets)))
         return Fingerprint(

@@ -1,4 +1,4 @@
-"""What may drive the boat in a trial."""
+"""The policies that a trial compares, and their configurations."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ NOMINAL_SPEED_MPS = Config().navigator.cruise_mps
 
 
 class Policy(StrEnum):
-    """Who sees and who decides.
+    """Where evidence comes from and which profile decides.
 
     PAANI: camera and deciders of the profile `wide`. PAPER: those of the profile `paper`, at its rates and speed.
-    BLIND: follows the route without looking, and without a planner. ORACLE: `paani` with evidence from truth.
+    BLIND: follows the route without evidence and without a planner. ORACLE: `paani` with evidence from ground truth.
     """
 
     PAANI = "paani"
@@ -29,9 +29,9 @@ CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAPER})
 
 
 def load_policy_config(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
-    """Its settings; `sets` may choose another profile for those that are not the paper's.
+    """Load the configuration of a policy; `sets` may choose another profile for every policy but PAPER.
 
-    threads: the two nets side by side, for a drive that has two cores; what they say is the same.
+    threads: run the two networks side by side, for a drive that has two cores; their outputs are the same.
     """
     if policy is Policy.PAPER:
         config = load_config(profile="paper", sets=[each for each in sets if not each.startswith("profile=")])
@@ -46,10 +46,10 @@ def load_policy_config(policy: Policy, sets: Iterable[str] = (), *, threads: boo
 
 
 def time_limit_factor(config: Config) -> float:
-    """A scenario's time limit is for the default cruising speed; who is told to go slower has longer."""
+    """Factor on a scenario's time limit, which is set for the default cruising speed."""
     return NOMINAL_SPEED_MPS / config.navigator.cruise_mps
 
 
 def processed_frame_rate_hz(config: Config) -> float:
-    """How often a picture is taken that is also looked at."""
+    """Rate of the pictures that perception processes."""
     return min(config.eye.rate_hz, config.camera.rate_hz, config.perception.rate_hz)

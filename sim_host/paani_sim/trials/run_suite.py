@@ -1,4 +1,4 @@
-"""Drives many cases in processes of their own and keeps one file each, so that a run can be gone on with."""
+"""Runs many cases in worker processes and stores one file each, so that an interrupted suite can go on."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from paani_sim.trials.run_trial import run_trial
 from paani_sim.trials.trial_cases import TrialCase
 
 RESULTS_FOLDER, EFFORTS_FOLDER = "trials", "efforts"
-# Bounds what a driver of OpenGL may leave behind. Not the executor's own `max_tasks_per_child`: in Python 3.11 it can
-# wait for ever for the process that should take over.
+# Bounds the memory that an OpenGL driver leaks. Not the executor's own `max_tasks_per_child`: in Python 3.11 it can
+# wait for ever for the process that replaces a worker.
 DRIVES_PER_PROCESS = 32
 NICENESS = 5
 THREAD_COUNT_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 class StoredResult(msgspec.Struct, frozen=True, kw_only=True):
-    """One result file."""
+    """Content of one result file."""
 
     fingerprint: Fingerprint
     result: TrialResult
 
 
 class FailedDrive(msgspec.Struct, frozen=True, kw_only=True):
-    """A drive that gave no result."""
+    """A drive that raised an error instead of giving a result."""
 
     case: TrialCase
     reason: str
 
 
 class StoredSuite(msgspec.Struct, frozen=True, kw_only=True):
-    """What a run folder already holds: results by case, what is still to be driven, and why of the old that are."""
+    """Results that a run folder holds, cases still to be driven, and counts of outdated results by what differs."""
 
     results: dict[TrialCase, TrialResult]
     missing: tuple[TrialCase, ...]
@@ -51,7 +51,7 @@ class StoredSuite(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def find_stored_results(folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader) -> StoredSuite:
-    """Which results of the folder hold. One that was made otherwise, or cannot be read, is wanted again."""
+    """Find the results of the folder that still hold. One with another fingerprint, or unreadable, is driven again."""
     results: dict[TrialCase, TrialResult] = {}
     missing: list[TrialCase] = []
     outdated: dict[str, int] = {}
@@ -70,7 +70,7 @@ def find_stored_results(folder: Path, cases: Sequence[TrialCase], reader: Finger
 def run_cases(
     folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
 ) -> Iterator[tuple[TrialCase, TrialResult | FailedDrive]]:
-    """Each case as it is done, its files written. Interrupted, the processes end and what is written stays.
+    """Run each case and yield it when its files are written. When interrupted, workers end and written files stay.
 
     Raises UserError for the folder, and for a setting or a scenario that no drive can use.
     """
@@ -109,12 +109,12 @@ def _run_batch(
 
 
 def result_path(folder: Path, case: TrialCase) -> Path:
-    """Where its result lies."""
+    """Path of a case's result."""
     return folder / RESULTS_FOLDER / f"{case.stem}.json"
 
 
 def read_stored_result(path: Path) -> StoredResult | None:
-    """None where there is none, or none that can be read."""
+    """Read a stored result; None if there is none or it cannot be read."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=StoredResult)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
@@ -122,14 +122,14 @@ def read_stored_result(path: Path) -> StoredResult | None:
 
 
 def encode_stored_result(record: StoredResult) -> bytes:
-    """The bytes of a result file."""
+    """Bytes of a result file."""
     return msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n"
 
 
 def _run_and_store(
     folder: Path, case: TrialCase, fingerprint: Fingerprint, sets: tuple[str, ...], threads: bool
 ) -> TrialResult | FailedDrive:
-    """In a process of its own, which ends with the one that asked: what nobody waits for is not driven."""
+    """Run one case in a worker process. The worker ends when its parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None and not parent.is_alive():
         os._exit(1)

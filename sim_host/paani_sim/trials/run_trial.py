@@ -1,4 +1,4 @@
-"""One trial in this process: scenario, drive, score."""
+"""Runs one case in this process: build the scenario, drive, score."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paani_sim.worlds import Scenario
 
 
 class ComputeEffort(msgspec.Struct, frozen=True, kw_only=True):
-    """What the drive cost: no part of the result, for it differs each time."""
+    """Time that the drive took. It differs from run to run and so is no part of the result."""
 
     wall_s: float
     cpu_s: float
@@ -28,14 +28,14 @@ class ComputeEffort(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def open_evidence_source(policy: Policy, scenario: Scenario, config: Config) -> EvidenceSource | None:
-    """Who looks. Raises UserError where there is no OpenGL."""
+    """Open the policy's source of evidence; None for BLIND. Raises UserError where there is no OpenGL."""
     if policy in CAMERA_POLICIES:
         return CameraEvidenceSource(scenario.world, scenario.faults, config)
     return GroundTruthEvidenceSource(scenario.world, scenario.faults, config) if policy is Policy.ORACLE else None
 
 
 def load_case_config(case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
-    """The policy's settings with the scenario's vessel. Raises UserError for the scenario or a setting."""
+    """Load the policy's configuration with the scenario's vessel. Raises UserError for the scenario or a setting."""
     config, vessel = load_policy_config(case.policy, sets, threads=threads), build_scenario(case).vessel
     if vessel == Scenario.vessel:
         return config
@@ -45,7 +45,7 @@ def load_case_config(case: TrialCase, sets: Iterable[str] = (), *, threads: bool
 def build_drive(
     case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
 ) -> Drive:
-    """Ready to begin; to be closed. Raises UserError for the scenario or a setting."""
+    """Build a drive, to be closed by the caller. Raises UserError for the scenario or a setting."""
     config, scenario = load_case_config(case, sets, threads=threads), build_scenario(case)
     evidence_source = open_evidence_source(case.policy, scenario, config)
     try:
@@ -59,7 +59,7 @@ def build_drive(
 def run_trial(
     case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
 ) -> tuple[TrialResult, ComputeEffort]:
-    """Drive to the end and score. Raises UserError as `drive_of`."""
+    """Run a case to its end and score it. Raises UserError as `drive_of`."""
     wall_ms, cpu_s = stopwatch_ms(), process_cpu_s()
     drive = build_drive(case, sets, threads=threads, tap=tap)
     try:

@@ -1,4 +1,4 @@
-"""Which drives there are: a scenario, what breaks in it, and who drives."""
+"""The cases of a trial: a scenario, a fault in it, and the policy that drives."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
 FIELD_SEPARATOR, FAULT_SEPARATOR = ":", "+"
-FAULT_START_RANGE_S = (12.0, 30.0)  # when a fault begins, drawn by seed
-# How long each fault of the suite lasts [s], and how bad it is in the unit of its kind.
+FAULT_START_RANGE_S = (12.0, 30.0)  # s, between which a fault begins, drawn by the seed
+# Duration of each fault of the suite [s], and its amount in the unit of its kind.
 SUITE_FAULTS = {
     FaultKind.CAMERA_BLACK: (8.0, 0.0),
     FaultKind.CAMERA_FROZEN: (8.0, 0.0),
@@ -31,12 +31,12 @@ SUITE_FAULTS = {
     FaultKind.LINK_LOSS: (3.0, 0.0),
     FaultKind.THRUSTER_LOSS: (20.0, 0.5),
 }
-FAULT_ROUTE_LENGTH_M = 25.0  # long enough for a boat under way to meet its fault, and to go on after it
+FAULT_ROUTE_LENGTH_M = 25.0  # long enough for a boat under way to meet its fault and to go on after it
 CAMERA_FAULTS = tuple(kind for kind in SUITE_FAULTS if kind.name.startswith("CAMERA"))
 
 
 class TrialCase(msgspec.Struct, frozen=True, order=True):
-    """One drive. `world`: a kind of world, where `seed` draws the scenario, or the name or file of one."""
+    """One drive. `world` is a kind of world in which `seed` draws a scenario, or the name or file of a scenario."""
 
     world: str
     seed: int
@@ -45,17 +45,17 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
 
     @property
     def name(self) -> str:
-        """As `--one` takes it."""
+        """The case as `--one` takes it."""
         return f"{self.place}{FIELD_SEPARATOR}{self.seed}{FIELD_SEPARATOR}{self.policy.value}"
 
     @property
     def place(self) -> str:
-        """World and fault."""
+        """World and fault, as in `name`."""
         return self.world + (FAULT_SEPARATOR + self.fault if self.fault else "")
 
     @property
     def stem(self) -> str:
-        """Of the files that belong to it."""
+        """Stem of the names of the files that belong to this case."""
         place = Path(self.world).stem if is_fixed_scenario(self.world) else self.world
         return f"{place}{FAULT_SEPARATOR + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
 
@@ -79,14 +79,14 @@ SUITES = {
 
 
 def is_fixed_scenario(world: str) -> bool:
-    """A scenario that somebody wrote, by name or as a file; not a kind of world to draw one in."""
+    """Whether this names a written scenario, by name or as a file, and not a kind of world to draw one in."""
     return world.endswith(".toml") or world in SCENARIOS
 
 
 def list_cases(
     suite: TrialSuite, worlds: Sequence[str], policies: Iterable[Policy], seeds: tuple[int, int] | None = None
 ) -> list[TrialCase]:
-    """Every drive of a suite, in the order in which they are driven. seeds: others, all of them for every policy."""
+    """Every case of a suite, in the order of driving. `seeds` replaces those of the suite, for every policy alike."""
     first, last = seeds or suite.seeds
     every = {Policy.PAPER: 1 if seeds else suite.paper_seed_stride}
     chosen = tuple(policies)
@@ -110,7 +110,7 @@ def list_cases(
 
 
 def parse_case(text: str) -> TrialCase:
-    """From `WORLD[+FAULT]:SEED:POLICY`. Raises UserError."""
+    """Parse `WORLD[+FAULT]:SEED:POLICY`. Raises UserError."""
     place, _, rest = text.partition(FIELD_SEPARATOR)
     seed, _, policy = rest.partition(FIELD_SEPARATOR)
     world, _, fault = place.partition(FAULT_SEPARATOR)
@@ -126,7 +126,7 @@ def parse_case(text: str) -> TrialCase:
 
 
 def build_scenario(case: TrialCase) -> Scenario:
-    """The scenario, with its fault. Raises UserError for a scenario file that cannot be used."""
+    """Build the scenario of a case, with its fault. Raises UserError for a scenario file that cannot be used."""
     if is_fixed_scenario(case.world):
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:

@@ -139,7 +139,7 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
 
 
 def test_the_readme_s_scenario_is_sound(tmp_path: Path) -> None:
-    readme = (ROOT / "sim_host" / "README.md").read_text()
+    readme = (ROOT / "sim_host/paani_sim/worlds/README.md").read_text()
     scenario = _scenario(tmp_path, readme.split("```toml\n")[1].split("```")[0])
     assert [type(thing).__name__ for thing in (scenario.world.obstacles[-1], *scenario.world.actors)] == [
         "Obstacle",
