@@ -49,7 +49,7 @@ THINGS = (  # kind, look, length, width, height [m], seen from [m]
 )
 
 
-class Sight(NamedTuple):
+class Sample(NamedTuple):
     """One frame: time, true range and bearing, the true box in whole pixels, and the detection of it."""
 
     at_s: float
@@ -68,7 +68,7 @@ class Sight(NamedTuple):
         return min(self.truth[:2]) > SPARE_FRAC and max(self.truth[2:]) < 1.0 - SPARE_FRAC
 
 
-def approaches(count: int) -> list[list[Sight]]:
+def sample_approaches(count: int) -> list[list[Sample]]:
     """Frames of `count` approaches in open water, as perception sees them."""
     rng = np.random.default_rng(5)
     world, perceiver = load_world("lake"), Perceiver(load_config().perception, stopwatch_ms)
@@ -78,7 +78,7 @@ def approaches(count: int) -> list[list[Sight]]:
     return found
 
 
-def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Generator) -> list[Sight]:
+def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Generator) -> list[Sample]:
     kind, observation, long, wide, tall, from_m = THINGS[number % len(THINGS)]
     while True:
         start = random_pose(eye.world, rng)
@@ -93,7 +93,7 @@ def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Genera
         "thing", kind, observation, turned._replace(x_m=x_m, y_m=y_m), long, wide, tall, variant=number % 12
     )
     eye.place_obstacles([target])
-    sights = []
+    samples = []
     for k in range(int((from_m - LAST_M) / SPEED_MPS * RATE_HZ)):
         at_s = k / RATE_HZ
         pose = BoatPose(
@@ -114,19 +114,19 @@ def _approach(eye: Eye, perceiver: Perceiver, number: int, rng: np.random.Genera
         best = max(evidence.detections, key=lambda d: iou(d.box_xyxy, truth), default=None)
         found = best if best is not None and iou(best.box_xyxy, truth) > 0.25 else None
         range_m = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
-        sights.append(Sight(at_s, range_m, pose.yaw_rad, truth, found))
-    return sights
+        samples.append(Sample(at_s, range_m, pose.yaw_rad, truth, found))
+    return samples
 
 
-def jitter(found: list[list[Sight]]) -> FigureTable:
+def jitter(found: list[list[Sample]]) -> FigureTable:
     """By size: how often the detector misses, and how far a box edge moves against the truth between two frames."""
     rows = []
     for low, high in itertools.pairwise(SIZES_PX):
-        seen = [s for sights in found for s in sights if low <= s.size_px < high and s.whole]
+        seen = [s for samples in found for s in samples if low <= s.size_px < high and s.whole]
         steps = [
             (b.found.box_xyxy, a.found.box_xyxy, b.truth, a.truth)
-            for sights in found
-            for a, b in itertools.pairwise(sights)
+            for samples in found
+            for a, b in itertools.pairwise(samples)
             if low <= a.size_px < high and a.whole and b.whole and a.found and b.found and b.at_s - a.at_s < 0.3
         ]
         if len(steps) < 8:
@@ -147,20 +147,20 @@ def jitter(found: list[list[Sight]]) -> FigureTable:
     )
 
 
-def judged(found: list[list[Sight]], profile: str, every: int) -> tuple[str, str, int, float, int]:
+def motion_row(found: list[list[Sample]], profile: str, every: int) -> tuple[str, str, int, float, int]:
     """The advisor on those boxes, taking one frame in `every`: profile, rate, closing moments, known %, wrong."""
     config, rate_hz = load_config(profile=profile), RATE_HZ / every
     need_s, count = max(RULE_S, RULE_PERIODS / rate_hz), defaultdict[str, int](int)
-    for every_sight in found:
-        sights = every_sight[::every]
-        for number, motion in enumerate(_motions(sights, config)):
-            sight = sights[number]
-            since = [s for s in sights[: number + 1] if sight.at_s - s.at_s < need_s + 1e-6]
-            span_s = sight.at_s - since[0].at_s
+    for every_sample in found:
+        samples = every_sample[::every]
+        for number, motion in enumerate(_motions(samples, config)):
+            sample = samples[number]
+            since = [s for s in samples[: number + 1] if sample.at_s - s.at_s < need_s + 1e-6]
+            span_s = sample.at_s - since[0].at_s
             count["wrong"] += motion is m.MotionState.RECEDING
             if (
-                sight.at_s - sights[0].at_s > need_s - 1e-6
-                and math.log(since[0].range_m / sight.range_m) / span_s >= MIN_CLOSING_PER_S
+                sample.at_s - samples[0].at_s > need_s - 1e-6
+                and math.log(since[0].range_m / sample.range_m) / span_s >= MIN_CLOSING_PER_S
                 and all(s.whole and s.size_px >= MIN_SIZE_PX for s in since)
             ):
                 count["closing"] += 1
@@ -169,37 +169,37 @@ def judged(found: list[list[Sight]], profile: str, every: int) -> tuple[str, str
     return profile, f"{rate_hz:g}", count["closing"], round(known, 1), count["wrong"]
 
 
-def _motions(sights: list[Sight], config: Config) -> list[m.MotionState]:
+def _motions(samples: list[Sample], config: Config) -> list[m.MotionState]:
     advisor = decider_of("advisor")
-    state, heard = advisor.state(), {topic.name: Input() for topic in advisor.inputs}
-    said = []
-    for number, sight in enumerate(sights):
-        at_us = 1_000_000_000 + round(sight.at_s * 1e6)
-        heard[keys.EVIDENCE.name] = Input(
+    state, inputs = advisor.state(), {topic.name: Input() for topic in advisor.inputs}
+    states = []
+    for number, sample in enumerate(samples):
+        at_us = 1_000_000_000 + round(sample.at_s * 1e6)
+        inputs[keys.EVIDENCE.name] = Input(
             m.Evidence(
                 source_us=at_us, frame_seq=number, frame_epoch=1, width_px=320, height_px=240, usable=True,
-                detections=() if sight.found is None else (sight.found,),
+                detections=() if sample.found is None else (sample.found,),
             ),
             at_us,
         )  # fmt: skip
-        heard[keys.ODOMETRY.name] = Input(
-            m.Odometry(source_us=at_us, x_m=0.0, y_m=0.0, yaw_rad=sight.yaw_rad, surge_mps=SPEED_MPS, healthy=True),
+        inputs[keys.ODOMETRY.name] = Input(
+            m.Odometry(source_us=at_us, x_m=0.0, y_m=0.0, yaw_rad=sample.yaw_rad, surge_mps=SPEED_MPS, healthy=True),
             at_us,
         )
-        state, outputs = advisor.decide(state, heard, at_us + round(LATENCY_S * 1e6), config)
+        state, outputs = advisor.decide(state, inputs, at_us + round(LATENCY_S * 1e6), config)
         tracks = outputs[keys.TRACKS.name]
         assert isinstance(tracks, m.Tracks)
-        seen = [t for t in tracks.tracks if not t.held] if sight.found is not None else tracks.tracks
+        seen = [t for t in tracks.tracks if not t.held] if sample.found is not None else tracks.tracks
         track = max(seen, key=lambda t: (t.hits, -t.id), default=None)
-        said.append(track.motion if track else m.MotionState.UNKNOWN)
-    return said
+        states.append(track.motion if track else m.MotionState.UNKNOWN)
+    return states
 
 
 def main(count: int) -> int:
     """Print both tables."""
-    found = approaches(count)
+    found = sample_approaches(count)
     sys.stdout.write(table_text(jitter(found)))
-    rows = tuple(judged(found, profile, every) for profile in ("paani", "paper") for every in (1, 2, 5, 10))
+    rows = tuple(motion_row(found, profile, every) for profile in ("paani", "paper") for every in (1, 2, 5, 10))
     columns = ("constants", "Hz", "closing", "known %", "wrong")
     sys.stdout.write("\n" + table_text(FigureTable(name="rendered approaches", columns=columns, rows=rows)))
     return 0

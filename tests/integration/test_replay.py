@@ -150,7 +150,7 @@ class Replay:
         return self.process.returncode, out.decode(), errors.decode()
 
 
-async def heard_from(replay: Replay, names: list[str], seconds: float) -> dict[str, list[Any]]:
+async def messages_from(replay: Replay, names: list[str], seconds: float) -> dict[str, list[Any]]:
     topics = [topic for topic in keys.TOPICS if topic.name in names]
     bus = await replay.listen()
     queues = {topic.name: bus.queue(topic, 5000) for topic in topics}
@@ -168,7 +168,7 @@ async def test_a_replay_keeps_times_order_and_references(config: Config, tmp_pat
     began_us = CLOCK.now_us()
     replay = await Replay.start(file, config, tmp_path, "--from", "0", "--loop")
     names = [topic.name for topic in (keys.EVIDENCE, keys.ADVISORY, keys.ODOMETRY, keys.COMMAND, keys.THRUST)]
-    found = await heard_from(replay, names, 6.0)
+    found = await messages_from(replay, names, 6.0)
     replay.process.terminate()
     code, _, errors = await replay.end()
     assert (code, errors) == (0, "")
@@ -197,7 +197,7 @@ async def test_faster_in_part_only_some_and_commands_when_asked(config: Config, 
     file = await asyncio.to_thread(write_log, tmp_path / "drive.mcap", records)
     words = ("--speed", "4", "--from", "4", "--to", "16", "--commands", "--only", keys.THRUST.name, keys.ODOMETRY.name)
     replay = await Replay.start(file, config, tmp_path, *words, "--loop")
-    found = await heard_from(replay, [topic.name for topic in keys.TOPICS], 4.0)
+    found = await messages_from(replay, [topic.name for topic in keys.TOPICS], 4.0)
     replay.process.terminate()
     code, _, errors = await replay.end()
     assert (code, errors) == (0, "")

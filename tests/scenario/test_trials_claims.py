@@ -129,5 +129,5 @@ def test_a_drive_that_diverges_is_no_success_of_the_command(tmp_path: Path, caps
     suite = ["--policy", "blind", "--worlds", "lake", "--seeds", "1", "--jobs", "1", "--out", out]
     assert command.main([*suite, "--json", str(figures), *words]) == 1
     assert "lake:1:blind: plant: state is not finite" in capsys.readouterr().err
-    told = json.loads(figures.read_bytes())["policies"]["blind"]
-    assert (told["trials"], told["completed"]) == (1, 0)
+    blind = json.loads(figures.read_bytes())["policies"]["blind"]
+    assert (blind["trials"], blind["completed"]) == (1, 0)

@@ -22,7 +22,7 @@ from paani.logs.writer import HEADER
 EVERY_US = 1_000_000  # a map needs no more points
 ESTIMATE, GPS = "estimate", "gps"
 
-Seen = Callable[[Record], None]
+OnRecord = Callable[[Record], None]
 
 
 class Point(NamedTuple):
@@ -55,7 +55,7 @@ class Table:
         self._file.close()
 
 
-def export_csv(log: Log, folder: Path, seen: Seen) -> str:
+def export_csv(log: Log, folder: Path, seen: OnRecord) -> str:
     """One file for each topic that has messages; of pictures the headers. Returns a line that says what was written.
 
     Raises UserError when the folder is there already or cannot be written; nothing half-written is left.
@@ -87,7 +87,7 @@ def export_csv(log: Log, folder: Path, seen: Seen) -> str:
     return f"{folder}: {len(tables)} tables, {rows} rows" + (f"; {left_out} messages are no JSON" if left_out else "")
 
 
-def export_geojson(log: Log, path: Path, seen: Seen) -> str:
+def export_geojson(log: Log, path: Path, seen: OnRecord) -> str:
     """The estimated track and the fixes, as lines with times. Raises UserError as `export_csv`."""
     _require_new(path)
     tracks = _tracks(log, seen)
@@ -106,7 +106,7 @@ def export_geojson(log: Log, path: Path, seen: Seen) -> str:
     return _write("--geojson", path, data, tracks)
 
 
-def export_gpx(log: Log, path: Path, seen: Seen) -> str:
+def export_gpx(log: Log, path: Path, seen: OnRecord) -> str:
     """The same as GPX tracks. Raises UserError as `export_csv`, and without gpxpy."""
     _require_new(path)
     try:
@@ -126,7 +126,7 @@ def export_gpx(log: Log, path: Path, seen: Seen) -> str:
     return _write("--gpx", path, document.to_xml().encode(), tracks)
 
 
-def _tracks(log: Log, seen: Seen) -> dict[str, list[Point]]:
+def _tracks(log: Log, seen: OnRecord) -> dict[str, list[Point]]:
     """Points at least a second apart. Raises UserError where there is no position at all."""
     tracks: dict[str, list[Point]] = {}
     for record in log.records([keys.ODOMETRY.name, keys.GPS.name]):

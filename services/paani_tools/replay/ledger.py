@@ -95,12 +95,12 @@ class Ledger:
             except (msgspec.MsgspecError, UnicodeDecodeError):
                 self.malformed[topic] += 1
             while waiting and waiting[0][0] + LATE_US <= log_us:
-                yield self._given(*waiting.popleft())
+                yield self._recorded_step(*waiting.popleft())
             if log_us >= self._forget_us:
                 self._forget(log_us - KEEP_US)
                 self._forget_us = log_us + FORGET_EVERY_US
         while waiting:
-            yield self._given(*waiting.popleft())
+            yield self._recorded_step(*waiting.popleft())
         self._forget(None)
         self.orphans = [(at_us, name) for at_us, name in self._unclaimed if self._is_between(name)]
 
@@ -109,7 +109,7 @@ class Ledger:
         first = self._first.get(topic, {})
         return seq < first[epoch] if epoch in first else bool(first) and epoch < min(first)
 
-    def _given(self, log_us: int, step: m.Step) -> RecordedStep:
+    def _recorded_step(self, log_us: int, step: m.Step) -> RecordedStep:
         sent = []
         for message in step.sent:
             held = self._messages.get((message.topic, message.epoch, message.seq))

@@ -199,13 +199,13 @@ async def _opened(stack: contextlib.AsyncExitStack, config: Config, user: str) -
 async def _unless_moving(observer: Bus, work: Coroutine[Any, Any, RepublishResult]) -> RepublishResult:
     """Await the work; stop it when something that can move a boat joins this bus."""
 
-    async def mover() -> str:
+    async def first_motion() -> str:
         async for service, alive in observer.alive_events():
             if alive and service in MOVERS:
                 return service
         raise AssertionError("alive events never end")
 
-    playing, watching = asyncio.create_task(work), asyncio.create_task(mover())
+    playing, watching = asyncio.create_task(work), asyncio.create_task(first_motion())
     try:
         await asyncio.wait({playing, watching}, return_when=asyncio.FIRST_COMPLETED)
         if watching.done() and not playing.done():

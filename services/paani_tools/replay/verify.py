@@ -72,7 +72,7 @@ def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckRep
                 config,
                 log.records(Ledger(decider).topics),
                 losses,
-                _shown(progress, log, decider.service, number, len(chosen)),
+                _progress_callback(progress, log, decider.service, number, len(chosen)),
             )
             for number, decider in enumerate(chosen)
         )
@@ -105,7 +105,7 @@ def change_log(
                 log.start_us,
                 losses,
                 instead if chained else {},
-                _shown(progress, log, decider.service, number, len(chosen)),
+                _progress_callback(progress, log, decider.service, number, len(chosen)),
             )
             for number, decider in enumerate(chosen)
         )
@@ -127,7 +127,7 @@ def _installed(log: Log) -> list[Decider[Any]]:
     return [installed[name] for name in keys.STEPS if name in found and name in installed]
 
 
-def _shown(progress: Progress, log: Log, service: str, number: int, total: int) -> StepCallback:
+def _progress_callback(progress: Progress, log: Log, service: str, number: int, total: int) -> StepCallback:
     def show(step: RecomputedStep) -> None:
         done = (step.given.log_us - log.start_us) / max(1, log.end_us - log.start_us)
         progress.at((number + done) / total, service)
