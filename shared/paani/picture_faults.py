@@ -1,7 +1,7 @@
-"""What goes wrong with a camera's picture, in five severities: for measuring and for simulating faults. Pure.
+"""Synthetic picture faults in five severities, for measuring the image-quality check and for simulated cameras. Pure.
 
-A fault is `fault(picture, severity, rng) -> picture`: BGR uint8 [H, W, 3] in and out, severity 1 to 5. Faults of
-geometry move what is seen, so they take a class mask along: `move(picture, mask, severity, rng)`.
+A fault is `fault(picture, severity, rng) -> picture`: BGR uint8 [H, W, 3] in and out, severity 1 to 5. A geometric
+fault moves the content of the picture and so changes its class mask too: `fault(picture, mask, severity, rng)`.
 """
 
 from collections.abc import Callable
@@ -14,41 +14,42 @@ from numpy.typing import NDArray
 from paani.arrays import U8
 
 Fault = Callable[[U8, int, np.random.Generator], U8]
-Move = Callable[[U8, U8, int, np.random.Generator], tuple[U8, U8]]
+GeometricFault = Callable[[U8, U8, int, np.random.Generator], tuple[U8, U8]]
 SEVERITIES = (1, 2, 3, 4, 5)
-IGNORE = 255
+IGNORE = 255  # in class masks: nothing is known of the pixel
 WATER = 0  # in class masks
-MIN_DRY_FRAC = 0.25  # a view without water needs this share of the picture's rows
-DRY = "above_water"  # as a fault's name: a view without water
-MUST_REJECT, MUST_ACCEPT = 0.60, 0.75  # the segmenter's mIoU on a fault below and above which the verdict is settled
+MIN_NO_WATER_FRAC = 0.25  # fraction of the picture's rows above its water from which a view without water is cut
+NO_WATER = "above_water"  # name of the fault that shows a view without water
+# Mean IoU of the segmenter on a faulty picture, below which the picture must be rejected and above which accepted.
+MUST_REJECT, MUST_ACCEPT = 0.60, 0.75
 
 
 def black(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """No light: sensor noise alone."""
-    return _clipped(rng.normal(2.0, 0.8 * severity, picture.shape))
+    return _to_uint8(rng.normal(2.0, 0.8 * severity, picture.shape))
 
 
 def white(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Nothing but light."""
-    return _clipped(rng.normal(258.0 - severity, 0.8 * severity, picture.shape))
+    return _to_uint8(rng.normal(258.0 - severity, 0.8 * severity, picture.shape))
 
 
 def one_colour(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """A hand, a wall, a lens cap in light: one colour, a slight gradient, sensor noise."""
     height = picture.shape[0]
     slope = np.linspace(-2.0 * severity, 2.0 * severity, height)[:, None, None]
-    return _clipped(rng.uniform(30, 225, 3) + slope + rng.normal(0.0, 2.0, picture.shape))
+    return _to_uint8(rng.uniform(30, 225, 3) + slope + rng.normal(0.0, 2.0, picture.shape))
 
 
 def underexposed(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Too short a shutter: light lost, read-out noise left."""
     gain = (0.5, 0.25, 0.12, 0.05, 0.02)[severity - 1]
-    return _clipped(picture * gain + rng.normal(0.0, 2.0, picture.shape))
+    return _to_uint8(picture * gain + rng.normal(0.0, 2.0, picture.shape))
 
 
 def overexposed(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Too long a shutter."""
-    return _clipped(picture * (1.4, 2.0, 3.5, 7.0, 15.0)[severity - 1] + 5.0 * severity)
+    return _to_uint8(picture * (1.4, 2.0, 3.5, 7.0, 15.0)[severity - 1] + 5.0 * severity)
 
 
 def blur(picture: U8, severity: int, _: np.random.Generator) -> U8:
@@ -69,7 +70,7 @@ def motion_blur(picture: U8, severity: int, rng: np.random.Generator) -> U8:
 
 def noise(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Gain without light."""
-    return _clipped(picture + rng.normal(0.0, (8.0, 16.0, 40.0, 70.0, 110.0)[severity - 1], picture.shape))
+    return _to_uint8(picture + rng.normal(0.0, (8.0, 16.0, 40.0, 70.0, 110.0)[severity - 1], picture.shape))
 
 
 def salt_and_pepper(picture: U8, severity: int, rng: np.random.Generator) -> U8:
@@ -91,7 +92,7 @@ def cover(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     along = (x / width - 0.5) * np.cos(angle) + (y / height - 0.5) * np.sin(angle)
     edge = np.quantile(along, share)
     hidden = np.clip((edge - along) / 0.04 + 0.5, 0.0, 1.0)[:, :, None]
-    return _clipped(picture * (1.0 - hidden) + hidden * (rng.uniform(0, 25, 3) + rng.normal(0, 1.5, picture.shape)))
+    return _to_uint8(picture * (1.0 - hidden) + hidden * (rng.uniform(0, 25, 3) + rng.normal(0, 1.5, picture.shape)))
 
 
 def drops(picture: U8, severity: int, rng: np.random.Generator) -> U8:
@@ -114,7 +115,7 @@ def drops(picture: U8, severity: int, rng: np.random.Generator) -> U8:
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REFLECT,
     )
-    return _clipped(picture * (1.0 - wet[:, :, None]) + shown * 1.1 * wet[:, :, None])
+    return _to_uint8(picture * (1.0 - wet[:, :, None]) + shown * 1.1 * wet[:, :, None])
 
 
 def colour_bars(picture: U8, severity: int, rng: np.random.Generator) -> U8:
@@ -125,7 +126,7 @@ def colour_bars(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     )
     card = np.broadcast_to(colours[np.arange(width) * 7 // width], (height, width, 3))
     share = (0.6, 0.75, 0.9, 1.0, 1.0)[severity - 1]
-    return _clipped(picture * (1.0 - share) + card * share + rng.normal(0.0, 1.0 + severity, picture.shape))
+    return _to_uint8(picture * (1.0 - share) + card * share + rng.normal(0.0, 1.0 + severity, picture.shape))
 
 
 def compression(picture: U8, severity: int, rng: np.random.Generator) -> U8:
@@ -158,21 +159,21 @@ def glare(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     sun_x, sun_y = rng.uniform(0.2, 0.8) * width, rng.uniform(0.05, 0.4) * height
     halo = np.exp(-np.hypot(x - sun_x, y - sun_y) / (width * (0.05, 0.1, 0.2, 0.4, 0.8)[severity - 1]))
     streak = np.exp(-np.abs(x - sun_x) / (width * 0.04 * severity)) * (y > sun_y) * 0.6
-    return _clipped(picture + 255.0 * np.maximum(halo, streak)[:, :, None])
+    return _to_uint8(picture + 255.0 * np.maximum(halo, streak)[:, :, None])
 
 
 def fog(picture: U8, severity: int, _: np.random.Generator) -> U8:
     """Contrast fades upwards, with distance."""
     left = (0.75, 0.55, 0.4, 0.25, 0.12)[severity - 1]
     clear = left + (1.0 - left) * np.linspace(0.0, 0.6, picture.shape[0])[:, None, None]
-    return _clipped(picture * clear + 200.0 * (1.0 - clear))
+    return _to_uint8(picture * clear + 200.0 * (1.0 - clear))
 
 
 def night(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     """Little light and the gain turned up."""
     gain = (0.6, 0.45, 0.32, 0.22, 0.15)[severity - 1]
     dim = 255.0 * (picture / 255.0) ** 1.2 * gain * np.array((1.15, 1.0, 0.85))
-    return _clipped(dim + rng.normal(0.0, 2.0 + severity, picture.shape))
+    return _to_uint8(dim + rng.normal(0.0, 2.0 + severity, picture.shape))
 
 
 def rain(picture: U8, severity: int, rng: np.random.Generator) -> U8:
@@ -184,7 +185,7 @@ def rain(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     cv2.line(kernel, (length // 2 - 2, 0), (length // 2 + 2, length - 1), (1.0,), 1)
     streaks = np.clip(cv2.filter2D(seeds, -1, kernel), 0.0, 1.0)[:, :, None]
     haze = 0.06 * severity
-    return _clipped((picture * (1.0 - haze) + 180.0 * haze) * (1.0 - 0.5 * streaks) + 220.0 * 0.5 * streaks)
+    return _to_uint8((picture * (1.0 - haze) + 180.0 * haze) * (1.0 - 0.5 * streaks) + 220.0 * 0.5 * streaks)
 
 
 def false_colour(picture: U8, severity: int, _: np.random.Generator) -> U8:
@@ -200,7 +201,7 @@ def shuffled(picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> 
     places = np.arange(rows * columns)
     moved = rng.permutation(places)[: round(len(places) * (0.15, 0.3, 0.5, 0.75, 1.0)[severity - 1])]
     places[moved] = rng.permutation(moved)
-    return _tiled(picture, places, rows, columns), _tiled(mask, places, rows, columns)
+    return _permute_tiles(picture, places, rows, columns), _permute_tiles(mask, places, rows, columns)
 
 
 def sheared(picture: U8, mask: U8, severity: int, _: np.random.Generator) -> tuple[U8, U8]:
@@ -217,7 +218,7 @@ def sheared(picture: U8, mask: U8, severity: int, _: np.random.Generator) -> tup
 def tilted(picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
     """The camera is not upright: 12, 30, 60, 120, 180 degrees."""
     angle_deg = (12.0, 30.0, 60.0, 120.0, 180.0)[severity - 1] * float(rng.choice((-1.0, 1.0)))
-    return _turned(picture, angle_deg, cv2.INTER_LINEAR, cv2.BORDER_REFLECT), _turned(
+    return _rotate(picture, angle_deg, cv2.INTER_LINEAR, cv2.BORDER_REFLECT), _rotate(
         mask, angle_deg, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT
     )
 
@@ -229,40 +230,40 @@ FAULTS: dict[str, Fault] = {
         colour_bars, compression, drop_out, glare, fog, night, rain, false_colour,
     )
 }  # fmt: skip
-MOVES: dict[str, Move] = {move.__name__: move for move in (shuffled, sheared, tilted)}
+GEOMETRIC_FAULTS: dict[str, GeometricFault] = {move.__name__: move for move in (shuffled, sheared, tilted)}
 
 
-def spoilt(name: str, picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
-    """A picture with one fault, and the mask of what it then shows (255 where nothing is known)."""
-    if name in MOVES:
-        return MOVES[name](picture, mask, severity, rng)
+def apply_fault(name: str, picture: U8, mask: U8, severity: int, rng: np.random.Generator) -> tuple[U8, U8]:
+    """The picture with one fault, and the class mask of what it then shows (`IGNORE` where nothing is known)."""
+    if name in GEOMETRIC_FAULTS:
+        return GEOMETRIC_FAULTS[name](picture, mask, severity, rng)
     return FAULTS[name](picture, severity, rng), mask
 
 
-def due_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
+def required_verdict(fault: str, miou: float) -> Literal["reject", "accept", "free"]:
     """What the image-quality check must do with pictures on which the segmenter reaches that mean IoU."""
-    if miou < MUST_REJECT or fault == DRY:
+    if miou < MUST_REJECT or fault == NO_WATER:
         return "reject"
     return "accept" if miou > MUST_ACCEPT else "free"
 
 
-def above_water(picture: U8, mask: U8) -> U8 | None:
-    """The part of a picture above its water, as large as the picture: no water scene. None where that is too little."""
+def crop_above_water(picture: U8, mask: U8) -> U8 | None:
+    """The part of a picture above its water, scaled to the picture's size; None where that part is too small."""
     height, width = picture.shape[:2]
     rows = np.flatnonzero((mask == WATER).mean(axis=1) > 0.02)
     top = int(rows[0]) * height // mask.shape[0] if rows.size else height
-    if top < MIN_DRY_FRAC * height:
+    if top < MIN_NO_WATER_FRAC * height:
         return None
     part = min(width, round(top * width / height))
     left = (width - part) // 2
     return np.asarray(cv2.resize(picture[:top, left : left + part], (width, height)), np.uint8)
 
 
-def _clipped(values: NDArray[np.floating]) -> U8:
+def _to_uint8(values: NDArray[np.floating]) -> U8:
     return np.asarray(np.clip(values, 0.0, 255.0), np.uint8)
 
 
-def _tiled(grid: U8, places: NDArray[np.intp], rows: int, columns: int) -> U8:
+def _permute_tiles(grid: U8, places: NDArray[np.intp], rows: int, columns: int) -> U8:
     height, width = grid.shape[0] // rows, grid.shape[1] // columns
     result = grid.copy()
     for to, source in enumerate(places.tolist()):
@@ -273,7 +274,7 @@ def _tiled(grid: U8, places: NDArray[np.intp], rows: int, columns: int) -> U8:
     return result
 
 
-def _turned(grid: U8, angle_deg: float, interpolation: int, border: int) -> U8:
+def _rotate(grid: U8, angle_deg: float, interpolation: int, border: int) -> U8:
     height, width = grid.shape[:2]
     turn = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), angle_deg, 1.0)
     return np.asarray(

@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from paani.arrays import U8
-from paani.picture_faults import FAULTS, MOVES, MUST_ACCEPT, MUST_REJECT, SEVERITIES, WATER, spoilt
+from paani.picture_faults import FAULTS, GEOMETRIC_FAULTS, MUST_ACCEPT, MUST_REJECT, SEVERITIES, WATER, apply_fault
 from paani_models.datasets.sources import RENDERED, Sample, read_mask, read_picture
 from paani_models.segmenter.metrics import class_iou, confusion_matrix
 from paani_models.training.augment import OBSTACLE
@@ -113,12 +113,12 @@ def mean_iou(predicted: U8, truth: U8) -> float:
 def measure_fault_levels(chosen: Sequence[Scene], segment: Segment) -> list[FaultLevel]:
     """The segmenter's error on every fault and severity."""
     found = []
-    for name in tqdm((*FAULTS, *MOVES), desc="faults", unit="fault"):
+    for name in tqdm((*FAULTS, *GEOMETRIC_FAULTS), desc="faults", unit="fault"):
         for severity in SEVERITIES:
             total = np.zeros((3, 3), np.int64)
             for index, one in enumerate(chosen):
                 rng = np.random.default_rng([zlib.crc32(name.encode()), severity, index])
-                picture, mask = spoilt(name, one.picture, one.mask, severity, rng)
+                picture, mask = apply_fault(name, one.picture, one.mask, severity, rng)
                 total += confusion_matrix(segment(picture), mask, 3)
             found.append(FaultLevel(name, severity, float(np.nanmean(class_iou(total))), len(chosen)))
     return found

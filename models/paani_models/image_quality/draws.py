@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.arrays import U8
-from paani.picture_faults import above_water, spoilt
+from paani.picture_faults import apply_fault, crop_above_water
 from paani_models.image_quality.data import MIDDLE_WH, FaultLevel, Scene
 from paani_models.image_quality.network import INPUT_HEIGHT_PX, INPUT_WIDTH_PX
 from paani_models.training.augment import crop_land
@@ -54,7 +54,7 @@ def draw_example(
     picture, mask = _vary_scene(scene, rng) if vary else (scene.picture, scene.mask)
     if scene.is_without_water:
         if content >= 0:
-            picture, _ = spoilt(levels[content].fault, picture, mask, levels[content].severity, rng)
+            picture, _ = apply_fault(levels[content].fault, picture, mask, levels[content].severity, rng)
         return FitnessExample(to_network_planes(picture), 0.0, WITHOUT_WATER)
     if content == WITHOUT_WATER:
         view = _crop_without_water(picture, mask, rng)
@@ -65,7 +65,7 @@ def draw_example(
         return FitnessExample(to_network_planes(picture), 1.0, CLEAN)
     level = levels[content]
     return FitnessExample(
-        to_network_planes(spoilt(level.fault, picture, mask, level.severity, rng)[0]), level.target, content
+        to_network_planes(apply_fault(level.fault, picture, mask, level.severity, rng)[0]), level.target, content
     )
 
 
@@ -97,7 +97,7 @@ def _random_part(rng: Rng, least: float) -> tuple[slice, slice]:
 
 def _crop_without_water(picture: U8, mask: U8, rng: Rng) -> U8 | None:
     """A view without water: all that is above it, a part of that, or land alone."""
-    view = above_water(picture, mask)
+    view = crop_above_water(picture, mask)
     kind = rng.random()
     if view is not None and kind < 0.4:
         return view

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
-from paani.picture_faults import due_verdict
+from paani.picture_faults import required_verdict
 from paani.statistics.charts import Points, lines
 from paani_models.catalogue import Figure
 
@@ -27,7 +27,7 @@ class FaultCell(msgspec.Struct, frozen=True):
     @property
     def verdict(self) -> str:
         """What the image-quality check must do here: "reject", "accept", or "free"."""
-        return due_verdict(self.fault, self.miou)
+        return required_verdict(self.fault, self.miou)
 
 
 class FaultTotals(msgspec.Struct, frozen=True):

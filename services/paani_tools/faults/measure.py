@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from paani.arrays import U8
 from paani.messages import UnusableCause
-from paani.picture_faults import DRY, FAULTS, MOVES, SEVERITIES, above_water, due_verdict, spoilt
+from paani.picture_faults import (
+    FAULTS,
+    GEOMETRIC_FAULTS,
+    NO_WATER,
+    SEVERITIES,
+    apply_fault,
+    crop_above_water,
+    required_verdict,
+)
 from paani_tools.faults.corpus import Scene
 
 Segment = Callable[[U8], U8]
@@ -29,7 +37,7 @@ class LevelFigures(msgspec.Struct, frozen=True):
     @property
     def verdict(self) -> str:
         """What the image-quality check must do here: "reject", "accept", or "free"."""
-        return due_verdict(self.fault, self.miou)
+        return required_verdict(self.fault, self.miou)
 
 
 class CleanFigures(msgspec.Struct, frozen=True):
@@ -54,17 +62,17 @@ def measure_levels(scenes: Sequence[Scene], segment: Segment, judge: Judge) -> I
 
     segment: BGR uint8 [H, W, 3] to classes uint8 [h, w]. judge: one picture, as the first of a new camera.
     """
-    for name in (*FAULTS, *MOVES):
+    for name in (*FAULTS, *GEOMETRIC_FAULTS):
         for severity in SEVERITIES:
             counts, rejected = np.zeros((3, 3), np.int64), 0
             for index, scene in enumerate(scenes):
                 rng = np.random.default_rng([zlib.crc32(name.encode()), severity, index])
-                picture, mask = spoilt(name, scene.picture, scene.mask, severity, rng)
+                picture, mask = apply_fault(name, scene.picture, scene.mask, severity, rng)
                 counts += count_classes(segment(picture), mask)
                 rejected += judge(picture) is not UnusableCause.NONE
             yield LevelFigures(name, severity, len(scenes), mean_iou(counts), rejected)
-    dry = [view for scene in scenes if (view := above_water(scene.picture, scene.mask)) is not None]
-    yield LevelFigures(DRY, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
+    dry = [view for scene in scenes if (view := crop_above_water(scene.picture, scene.mask)) is not None]
+    yield LevelFigures(NO_WATER, 5, len(dry), 0.0, sum(judge(view) is not UnusableCause.NONE for view in dry))
 
 
 def measure_clean(source: str, pictures: Iterable[U8], judge: Judge) -> CleanFigures:

@@ -87,9 +87,9 @@ class CorridorConfig(Section, frozen=True):
 
 
 class PerceptionConfig(Section, frozen=True):
-    """`ego_polygon`: corners of the own hull in the picture, normalised; what lies in it is no evidence.
+    """`ego_polygon`: normalised corners of the own hull in the picture; what lies inside is no evidence.
 
-    `engine` runs both nets; `ncnn` needs the files that `paani models convert` makes, and is chosen by
+    `engine` runs detector and segmenter; `ncnn` needs the files that `paani models convert` makes, and is chosen by
     `paani models bench` on the machine itself. The fitness network always runs by onnxruntime.
     """
 

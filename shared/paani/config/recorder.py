@@ -7,11 +7,11 @@ from paani.keys import every_topic
 
 
 class RecorderConfig(Section, frozen=True):
-    """`folder` is where recordings go; empty: nothing is recorded and there is no recorder.
+    """`folder` is where recordings go; empty: nothing is recorded, and no recorder runs.
 
     `leave_out`: topics not recorded. The eye's pictures are what the camera relays, byte for byte.
-    A part ends after `part_s` or `part_mib`. `budget_mib` bounds all parts in the folder: the oldest go, but for those
-    with a file `NAME.keep` beside them. With less than `min_free_mib` left on the disk nothing is written.
+    A part ends after `part_s` or `part_mib`. `budget_mib` bounds all parts in the folder: the oldest are deleted,
+    except those with a file `NAME.keep` beside them. With less than `min_free_mib` left on the disk nothing is written.
     """
 
     folder: str = ""

@@ -1,4 +1,4 @@
-"""Pictures on the bus."""
+"""Header of pictures on the bus."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from paani.messages.header import Count, Message, Stamp, Text
 
 
 class TimeBase(StrEnum):
-    """Which time tells the motion between pictures (I17): `source_us` live, `media_us` in a replay.
+    """Time base for motion between pictures (I17): `source_us` of a live camera, `media_us` of a recording.
 
-    MEDIA is the recording's own time, FRAME_INDEX the index over the replay rate. Freshness is always `source_us`.
+    MEDIA is the recording's own time, FRAME_INDEX the frame's index over the playback rate. Freshness is always judged
+    by `source_us`.
     """
 
     CAPTURE = "capture"
@@ -19,7 +20,7 @@ class TimeBase(StrEnum):
 
 
 class PictureHeader(Message, frozen=True, kw_only=True):
-    """Travels beside encoded picture bytes. `frame_seq`/`frame_epoch` name the camera frame they show."""
+    """Attached to the bytes of an encoded picture. `frame_epoch` and `frame_seq` identify the camera frame it shows."""
 
     frame_seq: Count
     frame_epoch: Count

@@ -1,4 +1,4 @@
-"""What perception sees in one picture."""
+"""Messages of perception: the evidence of one picture."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Label(StrEnum):
 
 
 class UnusableCause(StrEnum):
-    """Why a picture cannot be evidence; NONE when it can."""
+    """Why a picture is unusable as evidence; NONE when it is usable."""
 
     NONE = "none"
     UNDECODABLE = "undecodable"
@@ -38,7 +38,7 @@ class UnusableCause(StrEnum):
 
 
 class SegmentationSource(StrEnum):
-    """Who drew the mask. Only LEARNED may count as free-space evidence (F2)."""
+    """How the class mask was made. Only a LEARNED mask may count as evidence of free water (F2)."""
 
     LEARNED = "learned"
     FALLBACK = "fallback"
@@ -46,13 +46,15 @@ class SegmentationSource(StrEnum):
 
 
 class Detection(msgspec.Struct, frozen=True, kw_only=True):
+    """One box of the detector."""
+
     label: Label
     confidence: Unit
     box_xyxy: BoxXyxy
 
 
 class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
-    """One corridor of the mask: N_j, U_j and clear width (E4-E6), fractions of the corridor."""
+    """One corridor of the mask: non-water fraction N_j, uncertainty U_j and clear width, all of 1 (E4-E6)."""
 
     non_water: Unit = 1.0
     uncertainty: Unit = 1.0
@@ -60,7 +62,10 @@ class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
-    """Wall time of each step for one picture; `frame_age_ms` is the picture's age at inference start."""
+    """Wall time of each step for one picture.
+
+    `frame_age_ms`: age of the picture when inference starts. `gate_ms`: time of the image-quality check.
+    """
 
     frame_age_ms: NonNegative = 0.0
     decode_ms: NonNegative = 0.0
@@ -72,9 +77,9 @@ class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Evidence(Message, frozen=True, kw_only=True):
-    """What perception saw in one picture (B5).
+    """Evidence of one picture (B5).
 
-    `roll_rad`: the roll the corridors were levelled by. Boxes lie in the picture as it is.
+    `roll_rad`: roll by which the corridors were levelled. Boxes and water edge lie in the picture as it is.
     `water_edge`: for each column of the mask as it is, left to right, the lower edge of the first cell that is not
     water, from the bottom up and own hull skipped, as a fraction of the picture's height from its top. 1: no water at
     the bottom of that column; 0: water to the top. Empty: no mask.

@@ -1,4 +1,4 @@
-"""What the recorder says of itself."""
+"""State of the recorder."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from paani.messages.header import Count, Message, Stamp, Text
 
 
 class RecordedTopic(msgspec.Struct, frozen=True, kw_only=True):
-    """Messages of one topic since the recorder began.
+    """Message counts of one topic since the recorder started.
 
-    written: in a file. dropped: heard, but not kept. missing: numbers that its producer gave and nobody here heard.
-    unreadable: among the written, those without a header that can be read.
+    written: in a file. dropped: received, but not written. missing: numbers of the producer that never arrived.
+    unreadable: received without a readable header; such messages are written or dropped too.
     """
 
     topic: Text
@@ -22,7 +22,7 @@ class RecordedTopic(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RecorderState(Message, frozen=True, kw_only=True):
-    """Once a second from the recorder. `problem` says why it does not record; the sums are those of `topics`."""
+    """Published once a second. `problem` says why nothing is recorded; the sums are those of `topics`."""
 
     recording: bool
     problem: Text = ""

@@ -1,4 +1,4 @@
-"""Changing the policy of a running boat in two steps: the operator's request, and the shadow that runs beside."""
+"""Tuning the policy of a running boat: the operator's request, and the report on the shadow policy on trial."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Changes = Annotated[tuple[Change, ...], msgspec.Meta(max_length=32)]
 
 
 class TuningAct(StrEnum):
-    """What the operator asks. NONE: nothing since the dashboard started."""
+    """What the operator requests. NONE: nothing since the dashboard started."""
 
     NONE = "NONE"
     PROPOSE = "PROPOSE"
@@ -33,9 +33,9 @@ class TuningAct(StrEnum):
 
 
 class Tuning(Message, frozen=True, kw_only=True):
-    """The operator's last request, repeated so that late joiners hear it; `source_us` is when it was asked.
+    """The operator's last request, repeated for subscribers that join late; `source_us` is the time of the request.
 
-    `request` counts within an epoch and is obeyed once. `proposal` names what is proposed, promoted or taken back.
+    `request` counts within an epoch; each is obeyed once. `proposal` is the one proposed, promoted or rolled back.
     """
 
     act: TuningAct = TuningAct.NONE
@@ -73,10 +73,10 @@ class Disagreement(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Shadow(Message, frozen=True, kw_only=True):
-    """What runs, what is tried beside it, and where the two differ. Only the active policy is obeyed.
+    """The policy in force, the shadow policy on trial, and where their advice differs. Only the active one is obeyed.
 
-    active: the proposal in force, empty for the configured parameters; `previous` says whether it can be taken back.
-    proposal: the one being tried, empty for none. Counts are of distinct frames since it was proposed:
+    active: the proposal in force, empty for the configured parameters; `previous` says whether it can be rolled back.
+    proposal: the one on trial, empty for none. Counts are of distinct frames since it was proposed:
     `moves_more`, the shadow advises motion where the active policy does not; `stops_more`, the reverse.
     recent: the last disagreements, oldest first.
     """

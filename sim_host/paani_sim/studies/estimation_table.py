@@ -15,7 +15,7 @@ import msgspec
 
 from paani import messages as m
 from paani.config import Config, load_config
-from paani.cores import estimator_of
+from paani.cores import load_estimator
 from paani.geometry import clip, enu_from_geodetic, wrap_rad
 from paani.statistics.figure_table import FigureTable, table_text
 from paani_sim.plant.plant import Plant
@@ -94,7 +94,7 @@ def simulate_course(condition: Condition, seed: int, config: Config) -> Iterator
     """The boat's minutes, step by step of the estimator."""
     world = _build_world(condition)
     origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
-    estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
+    estimator = load_estimator(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
     plant = Plant(world, config.plant, seed, condition.faults)
     every = {
         what: max(1, round(1.0 / (config.plant.step_s * hz)))

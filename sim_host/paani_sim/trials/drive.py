@@ -12,7 +12,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.config import Config
-from paani.cores import estimator_of
+from paani.cores import load_estimator
 from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
@@ -70,7 +70,7 @@ class Drive:
         self._evidence_source = evidence_source
         self.plant = Plant.from_scenario(scenario, config.plant)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
-        self._estimator = estimator_of(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
+        self._estimator = load_estimator(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self._clock = PlantClock(self.plant)
         self._bus = LockstepBus(self._clock, config.bus.domain, tap)
         self.autonomy = AutonomyStack(

@@ -9,7 +9,7 @@ from typing import Protocol
 from paani import messages as m
 from paani.arrays import U8
 from paani.config import Config
-from paani.cores import perceiver_of
+from paani.cores import load_perceiver
 from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.eye.configured_camera import boat_pose, open_eye
 from paani_sim.worlds import Fault, World
@@ -41,7 +41,7 @@ class CameraEvidenceSource:
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
         self._faults = CameraFaults(faults)
-        self._perceiver = perceiver_of(config.perception, _frozen_stopwatch_ms)
+        self._perceiver = load_perceiver(config.perception, _frozen_stopwatch_ms)
         self._renderer = open_eye(world, config.eye)
 
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:

@@ -113,7 +113,7 @@ export class MapPanel {
     ctx.strokeStyle = colour;
     ctx.lineWidth = 1.5;
     ctx.beginPath();
-    for (const point of route.waypoints) ctx.lineTo(...at(point.x_m, point.y_m));
+    for (const point of route.waypoints) ctx.lineTo(...toScreen(point.x_m, point.y_m));
     if (route.repeat) ctx.closePath();
     ctx.stroke();
     route.waypoints.forEach((/** @type {any} */ point, /** @type {number} */ index) => {
@@ -143,7 +143,7 @@ export class MapPanel {
     ctx.setLineDash(dash);
     ctx.globalAlpha = 0.85;
     ctx.beginPath();
-    for (const point of points) ctx.lineTo(...at(point.x, point.y));
+    for (const point of points) ctx.lineTo(...toScreen(point.x, point.y));
     ctx.stroke();
     ctx.setLineDash([]);
     ctx.globalAlpha = 1;

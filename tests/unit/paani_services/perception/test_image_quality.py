@@ -9,7 +9,7 @@ import pytest
 
 from paani.config import ImageQualityConfig, load_config
 from paani.messages import UnusableCause
-from paani.picture_faults import spoilt
+from paani.picture_faults import apply_fault
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from tests.pictures import PICTURES, noisy, river
@@ -63,7 +63,7 @@ def test_what_cameras_deliver_is_usable(name: str) -> None:
 def test_lines_of_a_wrong_length_are_skewed(name: str, size_wh: tuple[int, int], sense: int) -> None:
     """Each line begins 3/320 of the width further along than the one above, to either side."""
     picture = cv2.resize(PICTURES[name], size_wh, interpolation=cv2.INTER_AREA)[:, ::sense]
-    skewed, _ = spoilt("sheared", picture, np.zeros(size_wh[::-1], np.uint8), 5, np.random.default_rng(0))
+    skewed, _ = apply_fault("sheared", picture, np.zeros(size_wh[::-1], np.uint8), 5, np.random.default_rng(0))
     assert check_image_quality(ImageQualityState(), np.ascontiguousarray(skewed[:, ::sense]), 1, ON)[1] is C.SKEWED
 
 
@@ -71,7 +71,9 @@ def test_lines_of_a_wrong_length_are_skewed(name: str, size_wh: tuple[int, int],
 @pytest.mark.parametrize("severity", [3, 4, 5])
 def test_motion_blur_is_not_taken_for_lines_of_a_wrong_length(severity: int, seed: int) -> None:
     """Blurred aslant, lines are like those above them moved along; the segmenter still reaches 0.77 on these."""
-    picture, _ = spoilt("motion_blur", river(), np.zeros((240, 320), np.uint8), severity, np.random.default_rng(seed))
+    picture, _ = apply_fault(
+        "motion_blur", river(), np.zeros((240, 320), np.uint8), severity, np.random.default_rng(seed)
+    )
     assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.NONE
 
 
@@ -80,7 +82,7 @@ def test_the_fitness_network_refuses_what_statistics_cannot_tell(seed: int) -> N
     """These have sound statistics; only the network knows that no camera on a boat sees this."""
     mask = np.zeros((240, 320), np.uint8)
     for name in ("shuffled", "drop_out", "drops", "false_colour"):
-        picture, _ = spoilt(name, river(), mask, 5, np.random.default_rng(seed))
+        picture, _ = apply_fault(name, river(), mask, 5, np.random.default_rng(seed))
         assert check_image_quality(ImageQualityState(), picture, 1, ON)[1] is C.NONE
         assert check_image_quality(ImageQualityState(), picture, 1, ON, FITNESS)[1] is C.UNFIT
 
@@ -116,7 +118,7 @@ def test_a_doubtful_picture_is_checked_upside_down(
 
 @pytest.mark.parametrize(("said", "cause"), [(0.98, C.NONE), (0.90, C.SKEWED), (0.05, C.SKEWED), (np.nan, C.SKEWED)])
 def test_only_a_sure_fitness_accepts_lines_of_a_wrong_length(said: float, cause: UnusableCause) -> None:
-    skewed, _ = spoilt("sheared", river(), np.zeros((240, 320), np.uint8), 5, np.random.default_rng(0))
+    skewed, _ = apply_fault("sheared", river(), np.zeros((240, 320), np.uint8), 5, np.random.default_rng(0))
     assert check_image_quality(ImageQualityState(), skewed, 1, ON, lambda _: said)[1] is cause
     high = msgspec.structs.replace(ON, min_fitness=0.99)
     assert check_image_quality(ImageQualityState(), skewed, 1, high, lambda _: said)[1] is C.SKEWED

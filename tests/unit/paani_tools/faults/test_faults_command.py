@@ -12,7 +12,7 @@ import pytest
 
 from paani.cli import main
 from paani.messages import UnusableCause
-from paani.picture_faults import FAULTS, MOVES
+from paani.picture_faults import FAULTS, GEOMETRIC_FAULTS
 from paani_tools.faults.corpus import Scene
 from paani_tools.faults.measure import CleanFigures, LevelFigures, count_classes, mean_iou, measure_levels, sum_up
 from tests.pictures import noisy, river
@@ -41,8 +41,8 @@ def test_every_cell_is_measured(corpus: Path, tmp_path: Path, capsys: pytest.Cap
     report, svg = tmp_path / "report.json", tmp_path / "curves.svg"
     assert main(["faults", str(corpus), "--scenes", "1", "--json", str(report), "--svg", str(svg)]) == 0
     found = json.loads(report.read_text())
-    assert len(found["cells"]) == 5 * len(FAULTS | MOVES) + 1
-    assert {cell["fault"] for cell in found["cells"]} >= {*FAULTS, *MOVES, "above_water"}
+    assert len(found["cells"]) == 5 * len(FAULTS | GEOMETRIC_FAULTS) + 1
+    assert {cell["fault"] for cell in found["cells"]} >= {*FAULTS, *GEOMETRIC_FAULTS, "above_water"}
     black = next(cell for cell in found["cells"] if cell["fault"] == "black")
     assert (black["rejected"], black["n"]) == (1, 1)
     assert found["clean"] == [{"source": "rivers", "n": 2, "rejected": 0, "causes": []}]
