@@ -1,4 +1,4 @@
-"""A camera that fails as a scenario says: black, frozen, blurred or no pictures. The same times give the same."""
+"""Applies the camera faults of a scenario: black, frozen, blurred or no pictures. Deterministic in time."""
 
 from collections.abc import Iterable
 

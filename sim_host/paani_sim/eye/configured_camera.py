@@ -1,4 +1,4 @@
-"""The eye as the settings mount it on the boat, and the boat's pose as the plant tells it. Pure but for opening."""
+"""The renderer and camera of the settings, and the boat's pose of a `TruePose` message."""
 
 from paani.config import EyeConfig
 from paani.messages import TruePose

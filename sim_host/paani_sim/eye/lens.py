@@ -1,4 +1,4 @@
-"""What a small camera does to a picture: softness, motion, vignette, white balance, sensor noise. Deterministic."""
+"""Effects of a small camera on a picture: softness, motion, vignette, white balance, sensor noise. Deterministic."""
 
 import cv2
 import numpy as np

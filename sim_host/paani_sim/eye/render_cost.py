@@ -1,4 +1,4 @@
-"""What a rendered picture costs, against its size and the number of moving things."""
+"""CPU time of a rendered picture, by its size and the number of actors."""
 
 import dataclasses
 

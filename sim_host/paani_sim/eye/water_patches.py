@@ -1,4 +1,4 @@
-"""What things do to the water and the ground around them: wakes and shadows as flat patches. Pure numpy.
+"""Flat patches around things: wakes on the water, shadows on water and ground. Pure numpy.
 
 A row is x, y, z; two coordinates in the patch; four numbers, the last of which says what it is, a shadow (0) or a wake
 (1); and the way the patch runs. A shadow's coordinates are -1..1, its second number is how dark it is. A wake's are

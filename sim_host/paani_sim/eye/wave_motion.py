@@ -1,4 +1,4 @@
-"""How floating things ride the waves: heave, roll and pitch from the wind sea. Pure."""
+"""Heave, roll and pitch of floating things in the wind sea. Pure."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ class SeaState(NamedTuple):
 
 
 class WaveMotion(NamedTuple):
-    """How far a thing is off its rest."""
+    """Displacement of a thing from its rest."""
 
     up_m: float
     roll_rad: float
@@ -43,7 +43,7 @@ def wind_sea_state(wind: Wind, waves: Waves) -> SeaState:
 
 
 def is_floating(thing: Obstacle | Actor) -> bool:
-    """Whether it moves with the water."""
+    """Whether a thing moves with the water."""
     return (
         isinstance(thing, Actor)
         or thing.kind in {Kind.VESSEL, Kind.BUOY}

@@ -1,4 +1,4 @@
-"""Moving things: where they are on their paths, and how skippers and swimmers among them give way to the boat."""
+"""Actors: their motion along their paths, and how vessels and swimmers give way to the boat."""
 
 import bisect
 import math
@@ -10,15 +10,15 @@ from paani_sim.worlds.world import Actor, Behaviour, Kind, Pose2, actor_distance
 
 VESSEL_KEEPS_CLEAR_M = 3.0  # between the hulls, when an actor has stopped
 SWIMMER_KEEPS_CLEAR_M = 1.0
-ABREAST_MARGIN_M = 1.0  # beside an actor's own breadth: what lies further to the side is not ahead
-DECELERATION_MPS2 = 0.15  # a small craft that throttles back
-# One who has stood still for the boat this long makes way for a while: astern, or ahead of a boat abaft the beam.
+ABREAST_MARGIN_M = 1.0  # beyond the actor's half width: a boat farther to the side does not count as ahead
+DECELERATION_MPS2 = 0.15  # of a small craft that throttles back
+# An actor that has stopped for the boat this long moves away for a while: astern, or ahead if the boat is abaft.
 PATIENCE_S, YIELDING_MPS, YIELDING_S = 8.0, 0.4, 30.0
 STANDING_MPS = 0.05
 
 
 class ActorPath:
-    """An actor's path, measured once: `at` is `actor_at` to the last bits, much sooner."""
+    """An actor's path, measured once: `at` is `actor_pose_along` to the last bits, much sooner."""
 
     def __init__(self, actor: Actor) -> None:
         path_m = np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m
@@ -30,7 +30,7 @@ class ActorPath:
         self._legs: list[list[float]] = np.column_stack([path_m[:-1], steps / lengths[:, None]]).tolist()
 
     def pose_at(self, along_m: float) -> Pose2:
-        """Where the actor is `along_m` down its path."""
+        """Pose of the actor at `along_m` along its path."""
         x_m, y_m, east, north = self._point(along_m)
         ahead, behind = self._point(along_m + self._half_length_m), self._point(along_m - self._half_length_m)
         east_m, north_m = ahead[0] - behind[0], ahead[1] - behind[1]
@@ -48,9 +48,9 @@ class ActorPath:
 
 
 def yielding_speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float], boat_reach_m: float) -> float:
-    """How fast the actor goes with the boat there; `boat_reach_m` is the boat's half length.
+    """Speed of the actor with the boat at this place; `boat_reach_m` is the boat's half length.
 
-    One that gives way slows so that it could stop short of a boat ahead, `KEEP_CLEAR_M` or, who swims,
+    One that gives way slows so that it could stop short of a boat ahead, `VESSEL_KEEPS_CLEAR_M` or, who swims,
     `SWIMMER_KEEPS_CLEAR_M`, and goes on when that is clear; with the boat close alongside it stands still and lets it
     draw ahead.
     """
@@ -78,7 +78,7 @@ class Actors:
     """All actors of a world, advanced together every `every_s`."""
 
     def __init__(self, actors: Sequence[Actor], every_s: float, boat_reach_m: float) -> None:
-        """At their starts."""
+        """Put every actor at its start."""
         self._actors = tuple(actors)
         self._paths = [ActorPath(actor) for actor in actors]
         self._every_s = every_s
@@ -89,7 +89,7 @@ class Actors:
         self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, self.along_m, strict=True)]
 
     def advance(self, t_s: float, boat_xy_m: tuple[float, float]) -> None:
-        """To simulated time `t_s`, `every_s` after the last one; who holds on is where the time says, to the bit."""
+        """To simulated time `t_s`, `every_s` after the last one; an actor that holds on is where time alone puts it."""
         along, speeds = [], []
         for number, (actor, pose, along_m) in enumerate(zip(self._actors, self.poses, self.along_m, strict=True)):
             speed = 0.0
@@ -103,7 +103,7 @@ class Actors:
         self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, along, strict=True)]
 
     def _apply_patience(self, number: int, speed: float, pose: Pose2, boat_xy_m: tuple[float, float]) -> float:
-        """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `MAKING_WAY_S`."""
+        """The speed; after `PATIENCE_S` of standing still for the boat, away from it for `YIELDING_S`."""
         waited_s = self._waited_s[number]
         if waited_s >= PATIENCE_S:
             self._waited_s[number] = waited_s + self._every_s if waited_s < PATIENCE_S + YIELDING_S else 0.0

@@ -1,4 +1,4 @@
-"""The last gate before force: trusts nobody, zero unless everything is in order (O1, O2).
+"""The thrust adapter, the last decision before force: zero thrust unless every check passes (O1, O2).
 
 Time is the plant's own monotonic clock. A command is as old as the plant stamp that it echoes, so
 no other clock matters and a burst of delayed commands is refused whole.
@@ -25,9 +25,9 @@ class AppliedThrust(NamedTuple):
 
 
 class ThrustAdapter:
-    """State machine of the last gate. Every method takes the plant's clock, `now_us`.
+    """State machine of the thrust adapter. Every method takes the plant's clock, `now_us`.
 
-    What is late comes back to life by itself when it is in order again; a latched stop does not:
+    After a timeout, thrust resumes by itself with the next valid input. After a latched stop it does not:
     `Arming.stopped` holds until the operator arms again.
     """
 
@@ -62,15 +62,15 @@ class ThrustAdapter:
         return cause
 
     def receive_arming(self, arming: Arming, now_us: int) -> None:
-        """The operator's newest word, and when it came."""
+        """Take the newest arming message."""
         self._arming, self._arming_us = arming, now_us
 
     def receive_pulse(self, service: str, now_us: int) -> None:
-        """A vital process showed that its event loop runs."""
+        """Take a pulse, which shows that the event loop of a vital process runs."""
         self._pulses_us[service] = now_us
 
     def decide(self, now_us: int) -> AppliedThrust:
-        """What the fans do now."""
+        """The thrust to apply now."""
         cause, lost_pulse = self._zero_cause(now_us)
         if cause is not ZeroCause.NONE or self.command is None:
             return AppliedThrust(0.0, 0.0, 0.0, 0.0, cause, lost_pulse)

@@ -14,7 +14,7 @@ from paani_sim.water.wind import wind_force
 
 WATER_DENSITY_KGPM3 = 1000.0
 DRAG_LINEAR_ABOVE = (
-    10.0  # m/s or rad/s: beyond it drag grows linearly, or explicit steps would diverge after a hard hit
+    10.0  # m/s or rad/s: beyond it drag grows linearly, because explicit steps would diverge after a hard collision
 )
 
 

@@ -1,4 +1,4 @@
-"""What faults of a scenario do to sensors and fans. Pure; the noise underneath stays what it would have been."""
+"""Effects of a scenario's faults on sensors and fans. Pure; the sensors' noise is the same with and without."""
 
 from paani.geometry import wrap_rad
 from paani_sim.plant.dynamics import Fans
@@ -9,20 +9,20 @@ Faults = tuple[Fault, ...]
 
 
 def apply_gps_jump(truth: Truth, faults: Faults, t_s: float) -> Truth:
-    """Where a GPS that has jumped believes to be."""
+    """Shift the true position by a GPS jump."""
     jump = find_active_fault(faults, FaultKind.GPS_JUMP, t_s)
     return truth._replace(x_m=truth.x_m + jump.amount) if jump else truth
 
 
 def apply_gps_outage(reading: GpsReading, last: GpsReading, faults: Faults, t_s: float) -> GpsReading:
-    """In an outage: no fix, no speed, and the `last` position that there was."""
+    """During an outage: no fix, no speed, and the `last` position."""
     if find_active_fault(faults, FaultKind.GPS_OUTAGE, t_s) is None:
         return reading
     return last._replace(sog_mps=0.0, cog_rad=0.0, fix=False)
 
 
 def apply_imu_bias(reading: ImuReading, faults: Faults, t_s: float) -> ImuReading:
-    """With the faults of compass and gyro."""
+    """Add the biases of compass and gyro faults."""
     compass = find_active_fault(faults, FaultKind.COMPASS_BIAS, t_s)
     gyro = find_active_fault(faults, FaultKind.GYRO_BIAS, t_s)
     if compass:
@@ -34,7 +34,7 @@ def apply_imu_bias(reading: ImuReading, faults: Faults, t_s: float) -> ImuReadin
 
 
 def apply_thruster_loss(fans: Fans, faults: Faults, t_s: float) -> Fans:
-    """With the force that a thruster has lost."""
+    """Reduce the force of a thruster that has failed in part."""
     loss = find_active_fault(faults, FaultKind.THRUSTER_LOSS, t_s)
     if loss is None:
         return fans

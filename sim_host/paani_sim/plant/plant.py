@@ -28,7 +28,7 @@ from paani_sim.water.water import Water
 from paani_sim.worlds import Fault, Kind, Scenario, World
 from paani_sim.worlds.spec import build_spec
 
-COLLISION_GAP_S = 1.0  # touching again within it is still the same collision
+COLLISION_GAP_S = 1.0  # a new contact within this time belongs to the same collision
 ACTORS_EVERY_S = 0.05
 
 
@@ -104,13 +104,13 @@ class Plant:
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, config: PlantConfig) -> Self:
-        """The boat of a scenario; a vessel in the settings goes before the scenario's."""
+        """The plant of a scenario; a vessel in the settings overrides the scenario's."""
         vessel = config.vessel or scenario.vessel
         return cls(scenario.world, msgspec.structs.replace(config, vessel=vessel), scenario.seed, scenario.faults)
 
     @property
     def vessel(self) -> Vessel:
-        """What sails."""
+        """Coefficients of the hull."""
         return self._vessel
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The plant beside a published model of the same boats, solved by someone else's integrator.
+"""A published model of the same boats, solved with SciPy, to compare the plant with.
 
 Model: 3 degrees of freedom, surge, sway and yaw, T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion
 Control, 2nd ed. 2021, chapter 6: M nu_r' + C(nu_r) nu_r + D(nu_r) nu_r = tau with nu_r the velocity through a steady,
@@ -66,7 +66,7 @@ class ManoeuvreDifference(NamedTuple):
 
 
 def compare_manoeuvre(vessel: str, manoeuvre: Manoeuvre) -> ManoeuvreDifference:
-    """Both through the same manoeuvre."""
+    """Run plant and reference model through one manoeuvre."""
     expected, found = solve_reference(vessel, manoeuvre), simulate_plant(vessel, manoeuvre)
     return ManoeuvreDifference(
         distance_m=float(np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()),
@@ -76,7 +76,7 @@ def compare_manoeuvre(vessel: str, manoeuvre: Manoeuvre) -> ManoeuvreDifference:
 
 
 def solve_reference(vessel: str, manoeuvre: Manoeuvre) -> F64:
-    """`(n, 3)` x, y [m] and heading [rad] of the published model every `EVERY_S`."""
+    """`(n, 3)` x, y [m] and heading [rad] of the published model every `SAMPLE_S`."""
     times = np.arange(0.0, manoeuvre.seconds + 1e-9, SAMPLE_S)
     turn = manoeuvre.zigzag_rad
 

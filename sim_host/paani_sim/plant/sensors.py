@@ -16,7 +16,7 @@ Vector3 = tuple[float, float, float]
 
 
 class Truth(NamedTuple):
-    """What the sensors look at: map position and velocity, body rates and specific force."""
+    """The true state that the sensors measure: map position and velocity, body rates and specific force."""
 
     x_m: float
     y_m: float

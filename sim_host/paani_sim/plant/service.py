@@ -1,6 +1,6 @@
 """Plant process: thrust in; time, sensors and truth out, at real time.
 
-While a scenario's link is lost, nothing of the board reaches the last gate, and the board gets no time.
+While a scenario's link is lost, nothing of the board reaches the thrust adapter, and the board gets no time.
 """
 
 import asyncio
@@ -51,13 +51,13 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
 
 
 class _BoardLink:
-    """Between board and host, as the scenario has it."""
+    """The link between board and host, which the scenario may interrupt."""
 
     def __init__(self, plant: Plant, faults: tuple[Fault, ...]) -> None:
         self._plant, self._faults = plant, faults
 
     def is_up(self) -> bool:
-        """At the simulated time of now."""
+        """Whether messages pass at the present simulated time."""
         return is_linked(self._faults, self._plant.sim_us * 1e-6)
 
 
@@ -69,7 +69,7 @@ def _pass_to_adapter(
     newest: tuple[m.Thrust | None, m.Arming | None],
     now_us: int,
 ) -> tuple[m.Thrust | None, m.Arming | None]:
-    """Give the adapter what is new since the last time; what came over a lost link is gone."""
+    """Pass new messages to the adapter; thrust that came over a lost link is dropped."""
     thrust, arming = newest
     if arming is not None and arming is not handled[1]:
         adapter.receive_arming(arming, now_us)
@@ -86,7 +86,7 @@ def _receive_pulse(adapter: ThrustAdapter, service: str, monotonic: Clock, link:
 
 
 class _Instruments:
-    """Publishes each measurement when its step comes."""
+    """Publishes each measurement at its rate."""
 
     def __init__(self, bus: Bus, monotonic: Clock, config: Config, link: _BoardLink) -> None:
         self._monotonic, self._link = monotonic, link
@@ -102,7 +102,7 @@ class _Instruments:
         self._since_us = 0
 
     def publish(self, plant: Plant, adapter: ThrustAdapter, applied: AppliedThrust, source_us: int) -> None:
-        """`source_us` dates the step that was just made. The time is for the board alone."""
+        """`source_us` dates the step that was just made. The clock is for the board alone."""
         if plant.steps % self._imu_every == 0:
             self._imu.put(imu_message(plant, source_us))
         if plant.steps % self._gps_every == 0:

@@ -1,4 +1,4 @@
-"""What the plant measures and does, as messages. `source_us` dates the step they speak of."""
+"""Messages of the plant: measurements, truth and applied thrust. `source_us` dates the step."""
 
 from paani import messages as m
 from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
@@ -52,7 +52,7 @@ def pose_message(plant: Plant, source_us: int) -> m.TruePose:
 
 
 def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, since_us: int) -> m.ThrustApplied:
-    """What the last gate does now, and the command behind it."""
+    """The thrust that the adapter applies, and the command behind it."""
     command = adapter.command
     return m.ThrustApplied(
         source_us=source_us,

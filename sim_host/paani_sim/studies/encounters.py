@@ -29,7 +29,7 @@ PERIOD_JITTER_FRAC = 0.05
 
 
 class EncounterFamily(StrEnum):
-    """What happens. In all but the first three the range stays or the thing cannot be measured."""
+    """Kind of encounter. In all but the first three the range stays or the target cannot be measured."""
 
     APPROACH = "approach"
     APPROACH_TURNING = "approach_turning"

@@ -31,7 +31,7 @@ REST_SPEED_MPS, REST_TIME_S, FALSE_MOTION_MPS = 0.02, 2.0, 0.05  # truly at rest
 
 
 class Condition(NamedTuple):
-    """What the boat meets."""
+    """Weather and faults of a course."""
 
     name: str
     wind: Wind = Wind(speed_mps=0.0)

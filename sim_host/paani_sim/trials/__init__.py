@@ -1,1 +1,1 @@
-"""Seeded drives in lockstep: the processes' own cores on one simulated clock, scored."""
+"""Seeded drives in lockstep: the cores of the live processes on one simulated clock, scored."""

@@ -26,7 +26,7 @@ STRAIGHT_AHEAD = m.Advisory(source_us=0, direction=m.Direction.STRAIGHT, reason=
 class AutonomyStack:
     """Advisor, navigator and controller. `blind`: no advisor; the advice is always to go straight on.
 
-    mission: whose first leg follows a route.
+    mission: its first leg follows a route.
     """
 
     def __init__(

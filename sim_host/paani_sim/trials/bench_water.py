@@ -1,4 +1,4 @@
-"""`paani bench water`: how fast the simulator is, and how near to truth what it is compared with."""
+"""`paani bench water`: speed of the simulator, and its physics and estimates beside reference and truth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from paani_sim.worlds import Actor, Scenario, Task, load_world
 WARM_UP_S, RUN_S, COST_S = 3.0, 30.0, 8.0
 ACTORS = (0, 4, 8, 16)
 SIZES_PX = ((160, 120), (320, 240), (640, 480))
-DEFAULT_CASE = 2, (320, 240)  # what the other is while one of them varies
+DEFAULT_CASE = 2, (320, 240)  # actors and picture size that stay while the other one varies
 
 
 class Cost(msgspec.Struct, frozen=True, kw_only=True):
@@ -104,7 +104,7 @@ def measure_costs() -> list[Cost]:
 
 
 def tabulate_costs(costs: list[Cost]) -> FigureTable:
-    """As a table."""
+    """The costs as a table."""
     return FigureTable(
         name="cost",
         columns=("policy", "actors", "picture", "CPU s a simulated s"),

@@ -1,7 +1,7 @@
-"""One drive: plant, sensors, estimator, eyes and board in lockstep on a simulated clock.
+"""One drive: plant, sensors, estimator, evidence and autonomy stack in lockstep on a simulated clock.
 
-The plant steps at its own rate, the estimator at `localization.rate_hz`, the eyes as often as a picture is looked at;
-evidence reaches the board `perception_latency_s` after its picture was taken, everything else at once.
+The plant steps at its own rate, the estimator at `localization.rate_hz`, the source of evidence at the rate of
+perception; evidence reaches the board `perception_latency_s` after its picture was taken, everything else at once.
 """
 
 from __future__ import annotations
@@ -32,12 +32,10 @@ MIN_READY_S = 2.0
 STALL_TIME_S, STALL_PROGRESS_M = (
     120.0,
     0.5,
-)  # who gets no further in that time neither waits for what passes nor goes round a barge
+)  # longer than waiting for passing traffic or going round a barge takes
 ARMING_HZ, PULSE_HZ, SAMPLE_HZ = 5.0, 10.0, 10.0
-ROUTE_END_TOLERANCE_M = (
-    4.0  # an open route is done this near its end: acceptance radius 1.5 m, and the GPS error of a moment
-)
-REPORTED_END_TOLERANCE_M = 3.0  # and this near, where the boat says so: its position is off by the error of the GPS
+ROUTE_END_TOLERANCE_M = 4.0  # of an open route: acceptance radius of 1.5 m, plus the GPS error of a moment
+REPORTED_END_TOLERANCE_M = 3.0  # farther, if the navigator reports the end: its position is off by the GPS error
 
 
 def build_mission(scenario: Scenario) -> m.Mission:
@@ -53,7 +51,7 @@ def build_mission(scenario: Scenario) -> m.Mission:
 
 
 class Drive:
-    """`step` until `phase` is FINISHED; `why` then says how it ended. `close` when done."""
+    """Call `step` until `phase` is FINISHED; `outcome` then says how the drive ended. Call `close` when done."""
 
     def __init__(
         self,
@@ -64,7 +62,7 @@ class Drive:
         tap: MessageTap | None = None,
         perception_latency_s: float = PERCEPTION_LATENCY_S,
     ) -> None:
-        """eyes None: nobody looks, the advice is always to go straight on."""
+        """evidence_source None: no advisor; the advice is always to go straight on."""
         world = scenario.world
         self.scenario, self.config = scenario, config
         self._evidence_source = evidence_source
@@ -85,8 +83,8 @@ class Drive:
         self.time_limit_s = scenario.task.time_limit_s * time_limit_factor(config)
         self.history = DriveHistory()
         self.phase, self.outcome, self.error = DrivePhase.READY, DriveOutcome.NONE, ""
-        self.armed_us = 0  # when the boat was armed
-        self._last_progress_s, self._last_progress_m = 0.0, 0.0  # when and where progress was last made
+        self.armed_us = 0  # when the boat was armed; 0 before
+        self._last_progress_s, self._last_progress_m = 0.0, 0.0  # when and where the last progress was made
         rate = 1.0 / config.plant.step_s
         sensors = config.plant.sensors
         self._steps_between = {
@@ -113,7 +111,7 @@ class Drive:
 
     @property
     def now_us(self) -> int:
-        """The drive's clock: every stamp in its messages is of it."""
+        """Time of the drive's clock, which stamps all its messages."""
         return self._clock.now_us()
 
     @property
@@ -122,12 +120,12 @@ class Drive:
         return (self.now_us - self.armed_us) * 1e-6 if self.armed_us else 0.0
 
     def run(self) -> None:
-        """To the end."""
+        """Drive to the end."""
         while self.phase is not DrivePhase.FINISHED:
             self.step()
 
     def step(self) -> None:
-        """One step of the plant, and all that it sets off. A diverging integration ends the drive."""
+        """One step of the plant, and of every process that is due after it. A diverging integration ends the drive."""
         self.applied = self.adapter.decide(self.now_us)
         try:
             self.plant.step(self.applied.left_n, self.applied.right_n)
@@ -148,7 +146,7 @@ class Drive:
         self._update_phase(now_us)
 
     def close(self) -> None:
-        """Release the plant and the eyes."""
+        """Release the plant and the source of evidence."""
         self.plant.close()
         if self._evidence_source is not None:
             self._evidence_source.close()
@@ -206,7 +204,7 @@ class Drive:
             self._record_images(frame, header)
 
     def _record_images(self, frame: EvidenceFrame, header: m.PictureHeader) -> None:
-        """Picture and mask, for the recording."""
+        """Put picture and mask into the recording."""
         if frame.bgr is not None:
             quality = [cv2.IMWRITE_JPEG_QUALITY, self.config.camera.jpeg_quality]
             self._bus.put(keys.PICTURE, header, cv2.imencode(".jpg", frame.bgr, quality)[1].tobytes())
@@ -216,7 +214,7 @@ class Drive:
             self._bus.put(keys.MASK, mask_header, cv2.imencode(".png", frame.mask)[1].tobytes())
 
     def _publish_arming_and_pulses(self, now_us: int, *, linked: bool) -> None:
-        """The operator's word, the pulses, and the plant's clock."""
+        """Publish arming, the pulses of the vital processes, and the plant's clock."""
         if self._is_due("arming"):
             arming = m.Arming(source_us=now_us, armed=self.phase is DrivePhase.RUNNING)
             arming = self._bus.put(keys.ARMING, arming)
@@ -234,7 +232,7 @@ class Drive:
                 self.autonomy.deliver(keys.SIM_TIME, clock)
 
     def _record_thrust_and_truth(self, now_us: int) -> None:
-        """What the last gate does, and truth."""
+        """Record what the thrust adapter applies, and the true pose."""
         in_force = self.adapter.command if self.applied.zero_cause is m.ZeroCause.NONE else None
         if in_force is not self._command_in_force:
             self._command_in_force, self._in_force_since_us = in_force, now_us
@@ -245,7 +243,7 @@ class Drive:
             self._bus.put(keys.THRUST_APPLIED, applied)
 
     def _update_phase(self, now_us: int) -> None:
-        """The state machine, and the samples that are scored."""
+        """Advance the state machine of the drive, and take the samples that are scored."""
         if self._is_due("sample"):
             self.progress.update(self.plant.position_m)
             if self.phase is DrivePhase.RUNNING:
@@ -268,13 +266,13 @@ class Drive:
             self._finish(DriveOutcome.STALLED)
 
     def _is_ready(self) -> bool:
-        """Nothing but the operator's word is missing, or what the eyes advise."""
+        """Whether nothing but arming or an advised stop keeps the boat from going."""
         command = self.autonomy.command
         waiting = {m.Inhibit.NOT_ARMED, m.Inhibit.ADVISED_STOP}
         return command is not None and bool(command.inhibits) and waiting.issuperset(command.inhibits)
 
     def _is_route_finished(self) -> bool:
-        """The navigator says that the route has no more waypoints."""
+        """Whether the navigator reports the end of the route."""
         command = self.autonomy.command
         done = {m.Inhibit.ROUTE_FINISHED, m.Inhibit.MISSION_DONE}
         return command is not None and not done.isdisjoint(command.inhibits)

@@ -1,4 +1,4 @@
-"""What is kept of a drive while it runs, to be scored when it is over."""
+"""The history of a drive: samples, stops, advisories and changes of thrust, to be scored at its end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paani_sim.trials.route_progress import RouteProgress
 
 
 class DriveSample(NamedTuple):
-    """Ten times a second while the boat is armed."""
+    """State of the boat, sampled ten times a second while it is armed."""
 
     t_s: float
     x_m: float
@@ -28,7 +28,7 @@ class DriveSample(NamedTuple):
 
 
 class StopInterval(NamedTuple):
-    """From when on the boat was ordered not to move, and why: the advice's reason where that was it."""
+    """A time in which the navigator commanded a stop, and its reason: the advisory's, if that was the cause."""
 
     t_s: float
     reason: str
@@ -36,7 +36,7 @@ class StopInterval(NamedTuple):
 
 
 class ThrustChange(NamedTuple):
-    """When the fans were set to another force: the moment [us], whether to none, and the picture behind it [us]."""
+    """A change of the applied thrust: its time [us], whether to zero, and the stamp of the picture behind it [us]."""
 
     at_us: int
     is_zero: bool
@@ -44,24 +44,24 @@ class ThrustChange(NamedTuple):
 
 
 class DriveHistory:
-    """Fills while the drive runs."""
+    """Collects the history while the drive runs."""
 
     def __init__(self) -> None:
         self.samples: list[DriveSample] = []
         self.stops: list[StopInterval] = []
         self.advisories: list[m.Advisory] = []
         self.thrust_changes: list[ThrustChange] = []
-        self.unusable_frames: list[tuple[int, m.UnusableCause]] = []  # picture's stamp and cause
+        self.unusable_frames: list[tuple[int, m.UnusableCause]] = []  # stamp of the picture [us], and cause
         self._in_force: m.Thrust | None = None
         self._was_zero = True
 
     def record_evidence(self, evidence: m.Evidence, now_us: int) -> None:
-        """One picture's evidence reached the board."""
+        """Record that one picture's evidence reached the board."""
         if not evidence.usable:
             self.unusable_frames.append((evidence.source_us, evidence.cause))
 
     def record_thrust(self, applied: AppliedThrust, in_force: m.Thrust | None, now_us: int) -> None:
-        """What the fans do in this step, and the command behind it."""
+        """Record the thrust applied in this step, and the command in force."""
         is_zero = applied.left_n == 0.0 and applied.right_n == 0.0
         picture_us = in_force.source_us if in_force is not None else 0
         before_us = self._in_force.source_us if self._in_force is not None else 0
@@ -72,7 +72,7 @@ class DriveHistory:
     def record_sample(
         self, plant: Plant, progress: RouteProgress, autonomy: AutonomyStack, applied: AppliedThrust
     ) -> None:
-        """Take one."""
+        """Sample the boat, and note new advisories and stops."""
         t_s = plant.sim_us * 1e-6
         x_m, y_m = plant.position_m
         actors_along_m = plant.actors_along_m

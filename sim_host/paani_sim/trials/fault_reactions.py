@@ -1,4 +1,4 @@
-"""What a camera fault led to. Pure."""
+"""Reaction of the boat to camera faults: when it was noticed, fans off, and at rest. Pure."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from paani_sim.trials.result import Reaction
 from paani_sim.worlds import Fault, FaultKind
 
 REST_MPS = 0.05
-REACTION_LIMIT_S = 0.5  # on top of one frame
+REACTION_LIMIT_S = 0.5  # s, in addition to one frame
 CAMERA_FAULTS = frozenset(
     (FaultKind.CAMERA_BLACK, FaultKind.CAMERA_FROZEN, FaultKind.CAMERA_BLURRED, FaultKind.CAMERA_DROPPED)
 )
 
 
 def measure_reactions(faults: Sequence[Fault], history: DriveHistory, frame_s: float) -> tuple[Reaction, ...]:
-    """Of every camera fault that began while the boat was armed. frame_s: between two pictures."""
+    """Measure the reaction to every camera fault that began while the boat was armed. frame_s: period of pictures."""
     if not history.samples:
         return ()
     first_s, last_s = history.samples[0].t_s, history.samples[-1].t_s
@@ -44,8 +44,8 @@ def _measure_reaction(fault: Fault, history: DriveHistory, frame_s: float) -> Re
 
 
 def _zero_thrust_delay_s(changes: Sequence[ThrustChange], start_s: float, end_s: float) -> float | None:
-    """How long after the start of the fault the fans went off for the rest of it; None: they did not."""
-    since_s: float | None = 0.0  # off before the first thrust
+    """Time from the start of the fault until the fans were off for the rest of it; None if they were not."""
+    since_s: float | None = 0.0  # fans are off before the first thrust
     for change in changes:
         after_s = (change.at_us - START_US) * 1e-6 - start_s
         if after_s >= end_s - start_s:

@@ -1,6 +1,6 @@
-"""Evidence from truth: what perfect perception would say of the picture that nobody rendered.
+"""Evidence from ground truth: what perfect perception would report, without rendering a picture.
 
-Boxes are those of what is not hidden by something nearer; the mask has water up to the shore, less what stands in it.
+Boxes are of things that nothing nearer occludes; the mask has water up to the shore, less the things in it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from paani_sim.worlds.faults import find_active_fault
 from paani_sim.worlds.footprint import build_outline, place_outline
 
 MASK_ROWS, MASK_COLUMNS = 64, 80  # of the mask, as the segmenter's
-MAX_RANGE_M = 90.0  # farther things are smaller than a box can be
+MAX_RANGE_M = 90.0  # beyond it things are smaller than the smallest box
 MIN_SIDE_PX = 4.0  # of a box
 MIN_VISIBLE_FRAC = 0.3  # of a silhouette, for a box
-VISIBLE_BEHIND_SHORE_M = 3.0  # what stands no farther behind the shore is seen
+VISIBLE_BEHIND_SHORE_M = 3.0  # things farther behind the shore are hidden
 CONFIDENCE = 0.95
 LABEL_OF_KIND = {
     Kind.PERSON: m.Label.PERSON,
@@ -50,7 +50,7 @@ class VisibleScene(NamedTuple):
 
 
 class GroundTruthEvidenceSource:
-    """Looks at a world without drawing it."""
+    """Computes evidence from the geometry of the world."""
 
     def __init__(self, world: World, faults: Sequence[Fault], config: Config) -> None:
         self._world, self._faults, self._config = world, tuple(faults), config
@@ -90,7 +90,7 @@ class GroundTruthEvidenceSource:
         """See `Eyes`."""
 
     def compute_visible_scene(self, truth: m.TruePose) -> VisibleScene:
-        """What would be in the picture."""
+        """Water cells and boxes of the picture at this pose."""
         pose, t_s = boat_pose(truth), truth.sim_us * 1e-6
         camera_m, map_from_camera = camera_pose(pose, self._camera)
         clip_from_map = view_projection(pose, self._camera)

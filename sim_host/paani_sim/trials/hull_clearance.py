@@ -1,4 +1,4 @@
-"""How near the hull comes to everything solid, and what the camera could have seen of it. Pure numpy.
+"""Clearance between hull and everything solid along a path, and visibility of things to the camera. Pure numpy.
 
 The hull is the outline around both floats: a rectangle with rounded corners.
 """
@@ -17,7 +17,7 @@ from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Actor, Obstacle, Pose2, World
 from paani_sim.worlds.footprint import build_outline, is_round, place_outline
 
-MAX_CLEARANCE_M = 12.0  # what is farther counts as this far
+MAX_CLEARANCE_M = 12.0  # larger clearances count as this
 BANK = "bank"
 CORNER_SIGNS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], np.float64)
 MOMENTS_PER_CHUNK = 32
@@ -25,7 +25,7 @@ MOMENTS_PER_CHUNK = 32
 
 @dataclass(frozen=True, eq=False)
 class HullPath:
-    """Where the boat was: `x_m`, `y_m`, `yaw_rad` `(n,)`, and how far along its path each actor was, `(n, actors)`."""
+    """Path of the hull: `x_m`, `y_m`, `yaw_rad` `(n,)`, and distance of each actor along its path, `(n, actors)`."""
 
     hull: Hull
     x_m: F64
@@ -39,12 +39,12 @@ class HullPath:
         return np.array([0.5 * self.hull.length_m - self.hull.radius_m, 0.5 * self.hull.spacing_m])
 
     def slice_moments(self, chosen: slice) -> HullPath:
-        """Some of the moments."""
+        """The path at some of its moments."""
         return HullPath(self.hull, self.x_m[chosen], self.y_m[chosen], self.yaw_rad[chosen], self.along_m[chosen])
 
 
 def list_waterborne(world: World) -> tuple[Obstacle | Actor, ...]:
-    """What stands or moves in the water, within reach of a hull."""
+    """Things that stand or move in the water, low enough for a hull to touch."""
     return (*(each for each in world.obstacles if each.base_z_m < MAX_FLOATING_BASE_M), *world.actors)
 
 
@@ -63,7 +63,7 @@ def compute_clearances_m(world: World, hull_path: HullPath) -> dict[str, F64]:
 
 
 def compute_actor_poses(actor: Actor, along_m: F64) -> F64:
-    """x, y, yaw `(n, 3)`, as `actor_at` gives them one by one."""
+    """x, y, yaw `(n, 3)`, as `actor_pose_along` gives them one by one."""
     line = np.vstack([actor.path_m, actor.path_m[:1]]) if actor.closed else actor.path_m
     arc_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
@@ -74,7 +74,7 @@ def compute_actor_poses(actor: Actor, along_m: F64) -> F64:
     x, y = at(along_m)
     ahead, behind = at(along_m + 0.5 * actor.length_m), at(along_m - 0.5 * actor.length_m)
     east, north = ahead[0] - behind[0], ahead[1] - behind[1]
-    past = (east == 0.0) & (north == 0.0)  # beyond an end it lies as it came there
+    past = (east == 0.0) & (north == 0.0)  # beyond an end of its path an actor keeps its last heading
     leg = np.where(along_m[past] > 0.0, len(line) - 2, 0)
     east[past], north[past] = (line[leg + 1] - line[leg]).T
     return np.column_stack([x, y, np.arctan2(north, east)])
@@ -83,7 +83,7 @@ def compute_actor_poses(actor: Actor, along_m: F64) -> F64:
 def was_visible(
     world: World, what: str, hull_path: HullPath, half_fov_rad: float, range_m: float, ahead_m: float
 ) -> bool:
-    """Was any of it, at any of these moments, in the field of view, within range, and with nothing before it?
+    """Whether any part of a thing was, at any of these moments, in the field of view, in range and not occluded.
 
     what: the id of a thing, or BANK for the stretch of bank next to where the course ends. ahead_m: of the camera.
     """
@@ -218,7 +218,7 @@ def _find_nearest_on_edges(polygon_m: F64, point: F64) -> F64:
 
 
 def _is_occluded(camera_m: F64, target: F64, segments: Sequence[F64] | F64) -> bool:
-    """Does any segment `(n, 2, 2)` lie between the two? What lies just before the target does not count."""
+    """Whether any segment `(n, 2, 2)` lies between the two. One just before the target does not count."""
     if not len(segments):
         return False
     occluders = np.asarray(segments)

@@ -1,4 +1,4 @@
-"""How far a share that was seen in so many trials can be trusted. Pure."""
+"""Confidence interval of a share. Pure."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The page about many drives: figures with intervals, and the worst drives with plan, pictures and recording."""
+"""Report page of a suite: figures with intervals, and the worst drives with chart, pictures and recording."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LEGEND = (
 def write_report(
     path: Path, summary: Summary, results: Mapping[TrialCase, TrialResult], sets: Sequence[str], jobs: int
 ) -> None:
-    """The page, and beside it a folder with recordings and pictures. Raises UserError for what cannot be written."""
+    """Write the page, and beside it a folder with recordings and pictures. Raises UserError if that fails."""
     folder = path.with_name(f"{path.stem}-drives")
     repeated = repeat_drives(select_worst_drives(results, WORST_COUNT), results, sets, folder, jobs)
     write_whole(path, render_page(summary, results, repeated, folder.name).encode(), "--report")
@@ -39,7 +39,7 @@ def write_report(
 def render_page(
     summary: Summary, results: Mapping[TrialCase, TrialResult], repeated: Sequence[RepeatedDrive], folder: str
 ) -> str:
-    """The HTML text. folder: where recordings lie, from the page."""
+    """HTML text of the page. folder: of the recordings, relative to the page."""
     drives = sum(figures.trials for figures in summary.policies.values())
     km = sum(figures.distance_m for figures in summary.policies.values()) * 1e-3
     body = [

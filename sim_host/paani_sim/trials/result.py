@@ -1,4 +1,4 @@
-"""What one drive came to. Closed values that encode to JSON; equal drives give equal bytes."""
+"""The result of one drive: closed values that encode to JSON. Equal drives give equal bytes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Closeness(StrEnum):
     """Clearance between hull and footprint at the closest point of an encounter.
 
     GRAZING: under 0.3 m, less than half the hull's width. TIGHT: under 0.6 m, one second at cruising speed.
-    CLOSE: under 1.5 m, twice the hull's width. CLEAR: the rest of what came within five metres.
+    CLOSE: under 1.5 m, twice the hull's width. CLEAR: the rest of the encounters, which begin at five metres.
     """
 
     CONTACT = "contact"
@@ -30,7 +30,7 @@ CLOSENESS_LIMIT_M = {Closeness.GRAZING: 0.3, Closeness.TIGHT: 0.6, Closeness.CLO
 
 
 class Encounter(msgspec.Struct, frozen=True, kw_only=True):
-    """Once within reach of one thing, or of the bank: the clearance and the moment of the closest point."""
+    """One approach to a thing or the bank: clearance and time of the closest point."""
 
     what: str
     kind: str
@@ -54,7 +54,7 @@ class Contact(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StopTotals(msgspec.Struct, frozen=True, kw_only=True):
-    """How often and how long the boat was ordered to stand, for one reason."""
+    """Number and total duration of commanded stops for one reason."""
 
     reason: str
     count: int
@@ -62,7 +62,7 @@ class StopTotals(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Reaction(msgspec.Struct, frozen=True, kw_only=True):
-    """What a camera fault led to, counted from its beginning [s]; None: never.
+    """Reaction to a camera fault, in seconds from its beginning; None: never.
 
     `noticed_s`: the picture first called unusable, or None where none came. `zero_thrust_s`, `rest_s`: fans off
     until the fault is over, boat slower than 0.05 m/s. `in_time`: fans off within one frame and 0.5 s.
@@ -77,7 +77,7 @@ class Reaction(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Latency(msgspec.Struct, frozen=True, kw_only=True):
-    """From a picture to the first thrust decided from it, simulated time [s]; None where nobody looks."""
+    """From a picture to the first thrust decided from it, simulated time [s]; None without a source of evidence."""
 
     p50_s: float | None = None
     p95_s: float | None = None

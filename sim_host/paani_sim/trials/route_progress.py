@@ -1,4 +1,4 @@
-"""How far along its route a boat is, and how far off it. Pure."""
+"""Progress along a route and cross-track distance. Pure."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from paani.arrays import F64
 SEARCH_BEHIND_M, SEARCH_AHEAD_M = (
     10.0,
     30.0,
-)  # where the boat is looked for, so that a route that comes near itself is not cut short
+)  # the search window keeps to one branch where the route comes near itself
 
 
 class RouteProgress:
-    """Follows one boat. `now_m`: along the route since the start, laps added up; `best_m`: the farthest so far."""
+    """Tracks one boat. `progress_m`: along the route since the start, laps added; `best_progress_m`: its maximum."""
 
     def __init__(self, route_m: F64, *, closed: bool, start_m: tuple[float, float]) -> None:
         """route_m: `(n, 2)`. start_m: where the boat is at first; the nearest point of the route counts as 0."""
@@ -30,7 +30,7 @@ class RouteProgress:
         self.progress_m = self.best_progress_m = 0.0
 
     def update(self, position_m: tuple[float, float]) -> None:
-        """The boat is here now. `off_m` is its distance to the route, positive to the left of it."""
+        """Update with the boat's position. `cross_track_m` is its distance to the route, positive to the left of it."""
         arc_m, self.cross_track_m = self._nearest(position_m, self._arc_m)
         step_m = arc_m - self._arc_m
         if self._closed:

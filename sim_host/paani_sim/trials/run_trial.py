@@ -59,7 +59,7 @@ def build_drive(
 def run_trial(
     case: TrialCase, sets: Iterable[str] = (), *, threads: bool = False, tap: MessageTap | None = None
 ) -> tuple[TrialResult, ComputeEffort]:
-    """Run a case to its end and score it. Raises UserError as `drive_of`."""
+    """Run a case to its end and score it. Raises UserError as `build_drive`."""
     wall_ms, cpu_s = stopwatch_ms(), process_cpu_s()
     drive = build_drive(case, sets, threads=threads, tap=tap)
     try:

@@ -1,4 +1,4 @@
-"""From a finished drive to its result. Pure."""
+"""Scores a finished drive: contacts, encounters, stops, latency and progress. Pure."""
 
 from __future__ import annotations
 
@@ -39,16 +39,19 @@ from paani_sim.trials.result import (
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
 
-ENCOUNTER_RANGE_M = {"thing": 5.0, BANK: CLOSENESS_LIMIT_M[Closeness.CLOSE]}  # a bank is always somewhere
-ENCOUNTER_GAP_S = 3.0  # two approaches to one thing are one encounter if no longer than this lies between
+ENCOUNTER_RANGE_M = {
+    "thing": 5.0,
+    BANK: CLOSENESS_LIMIT_M[Closeness.CLOSE],
+}  # of a thing; nearer of a bank, which is always in sight
+ENCOUNTER_GAP_S = 3.0  # two approaches to one thing with a shorter gap are one encounter
 VISIBLE_BEFORE_S, VISIBLE_RANGE_M = 5.0, 15.0
 CONTACT_GAP_S = 5.0
-BANK_GEOM_PREFIX = "bank_"  # how the names of the plant's pieces of bank begin
+BANK_GEOM_PREFIX = "bank_"  # prefix of the bank's geoms in the plant
 TRACK_INTERVAL_S = 2.0
 
 
 def score_drive(drive: Drive, policy: Policy) -> TrialResult:
-    """Everything that is known of a drive that has ended."""
+    """Score a drive that has ended."""
     scenario, history, eye = drive.scenario, drive.history, drive.config.eye
     world, samples = scenario.world, history.samples
     hull_path = build_hull_path(world, drive.plant.vessel.hull, samples)
@@ -96,7 +99,7 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
 
 
 def build_hull_path(world: World, hull: Hull, samples: Sequence[DriveSample]) -> HullPath:
-    """The samples as arrays."""
+    """The samples as a path of the hull."""
     progress = [sample.actors_along_m for sample in samples]
     return HullPath(
         hull,
@@ -114,9 +117,9 @@ def find_contacts(
     hull_path: HullPath,
     eye: EyeConfig,
 ) -> tuple[Contact, ...]:
-    """Each time the hull began to touch something, and what the camera could have seen of it.
+    """Find each time the hull began to touch something, and whether the camera could have seen it before.
 
-    Scraping along a thing is one contact: it ends when there is none for `SCRAPE_S`.
+    Scraping along a thing is one contact: it ends when there is none for `CONTACT_GAP_S`.
     """
     kinds, found, last_s = map_kinds(world), list[Contact](), dict[str, float]()
     half_fov_rad = math.radians(0.5 * eye.hfov_deg)
@@ -146,7 +149,7 @@ def find_contacts(
 def find_encounters(
     world: World, samples: Sequence[DriveSample], clearances_m: dict[str, F64], contacts: Sequence[Contact]
 ) -> tuple[Encounter, ...]:
-    """Every approach, in order of time."""
+    """Find every approach within encounter range, in order of time."""
     kinds, found = map_kinds(world), []
     for what, gaps in clearances_m.items():
         near = np.flatnonzero(gaps < ENCOUNTER_RANGE_M[BANK if what == BANK else "thing"])
@@ -172,17 +175,17 @@ def find_encounters(
 
 
 def classify_closeness(clearance_m: float) -> Closeness:
-    """The class of a closest point without contact."""
+    """Class of the clearance at a closest point without contact."""
     return next((kind for kind, under_m in CLOSENESS_LIMIT_M.items() if clearance_m < under_m), Closeness.CLEAR)
 
 
 def map_kinds(world: World) -> dict[str, str]:
-    """What each thing afloat is."""
+    """Kind of each thing in the water, by id."""
     return {thing.id: thing.kind.value for thing in list_waterborne(world)} | {BANK: BANK}
 
 
 def summarise_stops(stops: Sequence[StopInterval], end_s: float) -> tuple[StopTotals, ...]:
-    """By reason, the longest first."""
+    """Number and duration of stops by reason, the longest first."""
     count: collections.Counter[str] = collections.Counter()
     seconds: collections.defaultdict[str, float] = collections.defaultdict(float)
     for stop in stops:
@@ -193,7 +196,7 @@ def summarise_stops(stops: Sequence[StopInterval], end_s: float) -> tuple[StopTo
 
 
 def summarise_latency(applied: Sequence[ThrustChange]) -> Latency:
-    """Each picture's first thrust."""
+    """Latency from each picture to the first thrust decided from it."""
     newest_us, found = 0, []
     for each in applied:
         if each.picture_us > newest_us and not each.is_zero:

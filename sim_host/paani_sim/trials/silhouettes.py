@@ -1,4 +1,4 @@
-"""Things as their silhouettes in a picture. Pure numpy."""
+"""Silhouettes of things in a picture, by projection of their outlines. Pure numpy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paani_sim.eye.camera import NEAR_M
 from paani_sim.worlds import Actor, Obstacle
 from paani_sim.worlds.footprint import CORNERS
 
-MAX_FLOATING_BASE_M = 0.2  # whatever stands higher stands on something else, or bridges the water
+MAX_FLOATING_BASE_M = 0.2  # a thing with a higher foot stands on something else, or bridges the water
 _RING = np.arange(CORNERS)
 _NEXT = (_RING + 1) % CORNERS
 _EDGES = np.concatenate(
@@ -40,7 +40,7 @@ def project_silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> 
     one, other = clip[:, _EDGES[:, 0]], clip[:, _EDGES[:, 1]]
     with np.errstate(divide="ignore", invalid="ignore"):
         part = (NEAR_M - one[..., 3]) / (other[..., 3] - one[..., 3])
-        cut = one + part[..., None] * (other - one)  # of an edge that crosses the plane; no other is used
+        cut = one + part[..., None] * (other - one)  # of an edge that crosses the near plane; other values are not used
     behind_one, behind_other = one[..., 3] < NEAR_M, other[..., 3] < NEAR_M
     first = np.where(behind_one[..., None], cut, one)
     second = np.where(behind_other[..., None], cut, other)

@@ -1,4 +1,4 @@
-"""What many drives came to, by policy, with intervals. Pure."""
+"""Figures of many drives by policy, world and fault, with intervals. Pure."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def summarise_suite(suite: str, results: Mapping[TrialCase, TrialResult]) -> Summary:
-    """By policy, by policy and world, and by fault."""
+    """Summarise drives by policy, by policy and world, and by fault."""
     plain = {case: result for case, result in sorted(results.items()) if not case.fault}
     policies = [policy for policy in Policy if any(case.policy is policy for case in plain)]
     worlds = sorted({case.world for case in plain})
@@ -111,7 +111,7 @@ def summarise_suite(suite: str, results: Mapping[TrialCase, TrialResult]) -> Sum
 
 
 def summarise_drives(results: Sequence[TrialResult]) -> PolicyFigures:
-    """Of one or more drives."""
+    """Figures of one or more drives."""
     count, seconds = len(results), sum(r.seconds for r in results)
     distance_m, minutes = sum(r.distance_m for r in results), sum(r.dithering.seconds for r in results) / 60.0
     collisions, near = sum(r.collisions for r in results), sum(r.near_misses for r in results)
@@ -158,7 +158,7 @@ def summarise_drives(results: Sequence[TrialResult]) -> PolicyFigures:
 
 
 def summarise_fault_drives(results: Sequence[TrialResult]) -> FaultFigures:
-    """Of the drives with one kind of fault."""
+    """Figures of the drives with one kind of fault."""
     reactions = [reaction for r in results for reaction in r.reactions]
     zero = [reaction.zero_thrust_s for reaction in reactions if reaction.zero_thrust_s is not None]
     rest = [reaction.rest_s for reaction in reactions if reaction.rest_s is not None]
@@ -175,7 +175,7 @@ def summarise_fault_drives(results: Sequence[TrialResult]) -> FaultFigures:
 
 
 def share_with_interval(successes: int, trials: int) -> Share:
-    """With its interval."""
+    """A share with its Wilson interval."""
     low, high = wilson_interval(successes, trials)
     return Share(share=round(successes / trials, 4) if trials else 0.0, low=round(low, 4), high=round(high, 4))
 

@@ -1,4 +1,4 @@
-"""A drive seen from above, as SVG text. Pure."""
+"""Chart of a drive from above, as SVG text. Pure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DOT_PX = 5.0
 
 
 def draw_track_chart(world: World, result: TrialResult) -> str:
-    """Shore, route, things, actors where they were at the drive's worst moment, track, contacts and near misses."""
+    """Draw shore, route, things, actors at the worst moment, track, contacts and near misses."""
     track = np.array([(x, y) for _, x, y in result.track] or [world.start[:2]])
     low, high = track.min(axis=0) - MARGIN_M, track.max(axis=0) + MARGIN_M
     wide = max(high[0] - low[0], (high[1] - low[1]) / MAX_HEIGHT_FRAC)
@@ -76,7 +76,7 @@ def draw_track_chart(world: World, result: TrialResult) -> str:
 
 
 def find_worst_moment_s(result: TrialResult) -> float:
-    """The first touch, else the closest point, else where it ended."""
+    """Time of the first contact, else of the closest point, else of the end."""
     if result.contacts:
         return result.contacts[0].at_s
     if result.completed and result.encounters:

@@ -63,7 +63,7 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
 class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
     """`seeds` in every world for every policy; then, for `paani`, each fault in every world so many times.
 
-    `paper_every`: of the seeds, how far apart those of PAPER are, which takes four times as long.
+    `paper_seed_stride`: distance between the seeds of PAPER, whose drives take four times as long.
     """
 
     seeds: tuple[int, int]

@@ -1,4 +1,4 @@
-"""The worst drives once more, recorded and with the pictures before the worst moment."""
+"""Repeats the worst drives, recorded and with the pictures before their worst moment."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BOX_BGR, TEXT_BGR = (0, 140, 255), (255, 255, 255)
 
 
 class RepeatedDrive(msgspec.Struct, frozen=True, kw_only=True):
-    """One drive, driven again. `same`: to the byte. `strip`: a PNG, empty where no camera looks."""
+    """A repeated drive. `is_equal`: to the byte. `strip`: a PNG, empty for a policy without camera."""
 
     case: TrialCase
     is_equal: bool
@@ -37,7 +37,7 @@ class RepeatedDrive(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def select_worst_drives(results: Mapping[TrialCase, TrialResult], count: int) -> list[TrialCase]:
-    """Those of the camera policies first that touched what could be seen, then touched, then did not arrive."""
+    """Select the worst drives: by contacts with visible things, contacts, completion, near misses, clearance."""
 
     def badness(case: TrialCase) -> tuple[float, ...]:
         r = results[case]
@@ -50,7 +50,7 @@ def select_worst_drives(results: Mapping[TrialCase, TrialResult], count: int) ->
 def repeat_drives(
     cases: Sequence[TrialCase], results: Mapping[TrialCase, TrialResult], sets: Sequence[str], folder: Path, jobs: int
 ) -> list[RepeatedDrive]:
-    """Writes one recording each into the folder. Raises UserError where that fails."""
+    """Repeat drives and write one recording each into the folder. Raises UserError where that fails."""
     folder.mkdir(parents=True, exist_ok=True)
     with concurrent.futures.ProcessPoolExecutor(
         min(jobs, max(1, len(cases))), mp_context=multiprocessing.get_context("spawn")
@@ -60,7 +60,7 @@ def repeat_drives(
 
 
 class _PictureCollector:
-    """Keeps what the pictures show, and hands everything on to the recorder."""
+    """Keeps pictures, evidence and advisories, and passes every message on to the recorder."""
 
     def __init__(self, recorder: DriveRecorder) -> None:
         self._recorder = recorder
@@ -92,7 +92,7 @@ def _repeat_drive(case: TrialCase, before: TrialResult, sets: tuple[str, ...], f
 
 
 def render_picture_strip(collector: _PictureCollector, at_s: float) -> bytes:
-    """The pictures before a moment, one second apart, with boxes and advice, as one PNG."""
+    """Render the pictures before a moment, one second apart, with boxes and advisory, as one PNG."""
     pictures = []
     for k in range(PICTURE_COUNT - 1, -1, -1):
         wanted_us = START_US + round((at_s - k * PICTURE_SPACING_S) * 1e6)

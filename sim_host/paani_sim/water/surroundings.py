@@ -1,4 +1,4 @@
-"""What surrounds the hull at one moment."""
+"""Water and air about the hull at one moment."""
 
 from typing import NamedTuple
 

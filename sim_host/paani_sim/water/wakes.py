@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from paani_sim.water.waves import GRAVITY_MPS2
 
-CUSP_RAD = math.acos(math.sqrt(2.0 / 3.0))  # 35.3 degrees off the course run the waves at the cusp
+CUSP_RAD = math.acos(math.sqrt(2.0 / 3.0))  # 35.3 degrees between the course and the waves at the cusp
 DEPTH_M = 3.0  # of the water under the vessels, for the height alone
 MIN_HEIGHT_M = 0.005
 MAX_DISTANCE_M = 60.0  # from the sailing line
 MIN_SPEED_MPS = 0.5
-PACKET_REACH_STD = 3.0  # a packet is felt within so many of its standard deviations
+PACKET_REACH_STD = 3.0  # standard deviations from its middle, beyond which a packet is neglected
 MAX_PACKETS = 4096
 
 
@@ -84,16 +84,16 @@ def emit_packets(source: WakeSource, at_s: float, since_m: float) -> tuple[Packe
 
 
 class Wakes:
-    """All packets that still run."""
+    """All wave packets under way."""
 
     def __init__(self, sources: int) -> None:
-        """`makers`: how many vessels `pass_by` will be told of, always in the same order."""
+        """`sources`: number of vessels that `update_vessels` will be given, always in the same order."""
         self._last_m = [(math.inf, math.inf)] * sources
         self._packets: npt.NDArray[np.float64] = np.zeros((MAX_PACKETS, len(Packet._fields)))
         self._launched = 0
 
     def update_vessels(self, sources: Sequence[WakeSource], at_s: float) -> None:
-        """Where the vessels are now; those that make waves leave a pair of packets every wavelength they go."""
+        """Take the vessels' poses; one that makes waves emits a pair of packets every wavelength along its course."""
         for index, source in enumerate(sources):
             last_x_m, last_y_m = self._last_m[index]
             since_m = math.hypot(source.x_m - last_x_m, source.y_m - last_y_m)

@@ -14,13 +14,13 @@ from paani_sim.water.waves import HullResponse, hull_response, wind_sea
 from paani_sim.water.wind import Gusts
 from paani_sim.worlds.world import World
 
-SURFACE_UPDATE_S = 0.02  # the shortest waves felt take 0.4 s
-SLOW_UPDATE_S = 0.1  # gusts, current, heading towards the waves
-PACKET_MARGIN_M = 1.0  # how far boat and packets come closer in that time
+SURFACE_UPDATE_S = 0.02  # the shortest waves that the hull responds to have a period of 0.4 s
+SLOW_UPDATE_S = 0.1  # period of updates of gusts, current and the response at the present heading
+PACKET_MARGIN_M = 1.0  # by which boat and packets may approach each other in that time
 
 
 class WaveTrain(NamedTuple):
-    """One regular wave with what the hull feels of it."""
+    """One regular wave and the hull's response to it."""
 
     kx_radpm: float
     ky_radpm: float
@@ -36,7 +36,7 @@ class Water:
     """Surroundings of a hull that moves; equal seeds and calls give equal surroundings."""
 
     def __init__(self, world: World, vessel: Vessel, sources: int, seed: np.random.SeedSequence) -> None:
-        """`makers`: how many vessels `pass_by` will be told of."""
+        """`sources`: number of vessels that `update_vessels` will be given."""
         waves, gusts = seed.spawn(2)
         wind = world.wind
         self._length_m, self._spacing_m = vessel.hull.length_m, vessel.hull.spacing_m
@@ -51,11 +51,11 @@ class Water:
         self._now = CALM
 
     def update_vessels(self, sources: Sequence[WakeSource], at_s: float) -> None:
-        """Where the other vessels are now."""
+        """Take the poses of the other vessels."""
         self._wakes.update_vessels(sources, at_s)
 
     def surroundings_at(self, x_m: float, y_m: float, yaw_rad: float, at_s: float) -> Surroundings:
-        """What surrounds the hull; to be asked with rising `at_s` [simulated s]."""
+        """Surroundings of the hull; `at_s` [simulated s] must not decrease from call to call."""
         if at_s - self._slow_updated_s >= SLOW_UPDATE_S - 1e-9:
             self._slow_updated_s = at_s
             self._update_slow(x_m, y_m, yaw_rad, at_s)
@@ -89,7 +89,7 @@ def _add_surface(
     toward: tuple[float, float],
     here: tuple[float, float, float],
 ) -> Surroundings:
-    """`now` with the surface as it is here."""
+    """Add the water's surface at this place to `now`."""
     x_m, y_m, at_s = here
     cos, sin = math.cos, math.sin
     elevation = rate = ahead = left = ahead_rate = left_rate = crest = quarter = 0.0

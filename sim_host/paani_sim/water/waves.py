@@ -1,4 +1,4 @@
-"""Wind sea: JONSWAP components in deep water, and what a hull of finite length feels of one.
+"""Wind sea: JONSWAP components in deep water, and the response of a hull of finite length to one.
 
 Spectrum and fetch laws: K. Hasselmann et al., Measurements of wind-wave growth and swell decay during the
 Joint North Sea Wave Project (JONSWAP), Dt. Hydrogr. Z. A8 no. 12, 1973. Spreading: cos^2 about the wind.
@@ -69,7 +69,7 @@ def wind_sea(wind_mps: float, toward_rad: float, fetch_m: float, rng: np.random.
 
 
 class HullResponse(NamedTuple):
-    """What a hull of two slender pontoons feels of a regular wave, per metre of its amplitude.
+    """Response of a hull of two slender pontoons to a regular wave, per metre of its amplitude.
 
     The mean elevation under it (in phase with the crest) and the slopes that turn it (a quarter period off).
     """

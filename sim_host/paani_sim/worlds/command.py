@@ -1,4 +1,4 @@
-"""`paani world`: what scenarios there are, pictures of one, its MuJoCo model, and whether files are sound."""
+"""`paani world`: list scenarios, draw one, write its MuJoCo model, or check scenario files."""
 
 import argparse
 import sys

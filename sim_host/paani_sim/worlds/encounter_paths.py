@@ -1,6 +1,6 @@
-"""Moving things that meet a boat on its way: where they go and when they start.
+"""Paths of moving things that meet the boat, and when they start.
 
-The boat is taken to move along its way at `boat_mps`, so that it is at `meets_at_m` when they are.
+The boat is assumed to move along its route at `boat_mps`, and to be at `meets_at_m` when they are.
 """
 
 import math
@@ -16,8 +16,8 @@ from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.world import Actor, Pose2, World
 
 NOMINAL_BOAT_MPS = 0.6
-MAX_LEAD_M = 60.0  # as far as this before the meeting, at most
-OVERRUN_M = 25.0  # past the boat's start, or past the way's end
+MAX_LEAD_M = 60.0  # longest stretch of a path before the meeting
+OVERRUN_M = 25.0  # of a path, past the boat's start or the route's end
 PATH_MARGIN_M = 0.4
 
 
@@ -31,7 +31,7 @@ class Encounter(StrEnum):
 
 
 class TimedPath(NamedTuple):
-    """An open path, and when and from how far along it a thing sets out."""
+    """An open path, and the time and the distance along it at which a thing starts."""
 
     path_m: F64
     start_m: float
@@ -48,7 +48,7 @@ def plan_crossing(
     turn_rad: float,
     boat_mps: float,
 ) -> TimedPath | None:
-    """Straight across the way, `turn_rad` to the left of its heading, from water's edge to water's edge.
+    """Straight across the route, `turn_rad` to the left of its heading, from bank to bank.
 
     None where something stands in its way within half its length of the boat's.
     """
@@ -64,7 +64,7 @@ def plan_crossing(
 def plan_head_on(
     route: RouteFrame, meets_at_m: float, *, speed_mps: float, left_m: float, boat_mps: float
 ) -> TimedPath:
-    """Down the boat's way against it, `left_m` to the left of the way, until it is past the boat's start."""
+    """Against the boat along its route, `left_m` to the left of it, until past the boat's start."""
     at_s = meets_at_m / boat_mps
     first_m = meets_at_m + min(MAX_LEAD_M, max(speed_mps * at_s, 1.0))
     return _time_path(route.line_m(first_m, -OVERRUN_M, left_m), first_m - meets_at_m, at_s, speed_mps)
@@ -125,7 +125,7 @@ def _time_path(path_m: F64, before_m: float, at_s: float, speed_mps: float) -> T
 
 
 def _open_water_ahead_m(world: World, pose: Pose2, sense: float, length_m: float) -> float:
-    """How far a thing of this length can go ahead (or astern) of the pose, `LEAD_M` at most."""
+    """How far a thing of this length can go ahead (or astern) of the pose, `MAX_LEAD_M` at most."""
     reach_m = np.arange(0.0, MAX_LEAD_M + 0.5 * length_m, 0.5)
     points_m = np.array([_point_ahead(pose, sense * float(distance_m)) for distance_m in reach_m])
     free = (clearance_m(world.shore_m, points_m) > 1.0) & (obstacle_distance_m(world.obstacles, points_m) > 1.0)

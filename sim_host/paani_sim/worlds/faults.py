@@ -1,4 +1,4 @@
-"""What goes wrong in a scenario, and when. Values only."""
+"""Faults of a scenario and their times. Values only."""
 
 from collections.abc import Iterable
 from enum import StrEnum
@@ -39,5 +39,5 @@ def find_active_fault(faults: Iterable[Fault], kind: FaultKind, t_s: float) -> F
 
 
 def is_linked(faults: Iterable[Fault], t_s: float) -> bool:
-    """Whether board and host hear each other at `t_s`."""
+    """Whether messages pass between board and host at `t_s`."""
     return find_active_fault(faults, FaultKind.LINK_LOSS, t_s) is None

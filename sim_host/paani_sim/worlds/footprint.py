@@ -1,4 +1,4 @@
-"""How things lie on the water, seen from above: what is drawn, what is run into and what is scored. Pure numpy."""
+"""Outlines of things from above, as they are drawn, collide and are scored. Pure numpy."""
 
 from __future__ import annotations
 

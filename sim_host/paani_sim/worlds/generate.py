@@ -28,10 +28,10 @@ from paani_sim.worlds.world import (
 )
 
 ROUTE_LENGTH_RANGE_M = (35.0, 60.0)
-MIN_PASSAGE_M = 3.0  # the least width of a gap that leads on
+MIN_PASSAGE_M = 3.0  # width of the gap that must lead on at any time
 ENCOUNTER_SPACING_M = 8.0  # between the places of two encounters
 END_CLEARANCE_M = 4.0
-GOAL_CLEARANCE_M = 8.0  # nothing is met so near the goal, or stands so far behind it
+GOAL_CLEARANCE_M = 8.0  # no encounter is nearer to the goal, and no obstacle nearer behind it
 MAX_ENCOUNTERS = 4
 MAX_TRIES = 60
 FETCH_M = {"lake": 200.0, "river": 80.0, "canal": 40.0, "harbour": 120.0}
@@ -46,7 +46,7 @@ DrawThing = Callable[["_MeetingPlace", np.random.Generator], Obstacle | Actor | 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _MeetingPlace:
-    """Where on the way something shall be met, and what it is called."""
+    """Where along the route a thing is met, and its id."""
 
     world: World
     route: RouteFrame
@@ -266,7 +266,7 @@ _PROBABILITIES = (0.22, 0.18, 0.12, 0.12, 0.14, 0.12, 0.10)
 
 
 def _draw_weather(world: World, rng: np.random.Generator) -> World:
-    """The same water under another sky, in another season and wind, and with other land around it."""
+    """Draw sky, season, wind and land around the same water."""
     sky = str(rng.choice(("clear", "cloudy", "overcast", "dusk", "hazy"), p=(0.25, 0.3, 0.2, 0.1, 0.15)))
     kind = rng.choice(("dry", "rain", "fog"), p=(0.7, 0.15, 0.15))
     visibility_m = {"dry": (500.0, 1500.0), "rain": (300.0, 900.0), "fog": (150.0, 400.0)}[str(kind)]

@@ -1,4 +1,4 @@
-"""Room to pass: how far things are from points, and whether a boat can get from one end of its way to the other."""
+"""Passability: distances to things, and whether a boat can get from one end of its route to the other."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,7 +9,7 @@ from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.world import Actor, Obstacle, Pose2, World, actor_pose_at
 
-HEADROOM_M = 2.0  # a thing whose foot is higher can be passed underneath
+HEADROOM_M = 2.0  # a boat passes underneath a thing with a higher foot
 HALF_SPAN_M = 14.0
 START_HALF_SPAN_M = 5.0
 ALONG_STEP_M = 1.0
@@ -38,7 +38,7 @@ def obstacle_distance_m(obstacles: Iterable[Obstacle], points_m: F64) -> F64:
 
 
 class PassabilityGrid:
-    """Points on and beside the first `length_m` of a way, with their distance to shore and obstacles."""
+    """Points on and beside the first `length_m` of a route, with their distance to shore and obstacles."""
 
     def __init__(self, world: World, route: RouteFrame, length_m: float) -> None:
         self._along_m = np.arange(0.0, length_m + 0.5 * ALONG_STEP_M, ALONG_STEP_M)
@@ -76,7 +76,7 @@ class PassabilityGrid:
 
 
 def _is_connected(free: Bools, from_columns: Bools) -> bool:
-    """Whether free cells connect these columns of the first row with the last row, never going back."""
+    """Whether free cells connect these columns of the first row with the last row, without stepping back a row."""
     if not len(free):
         return True
     bits = np.left_shift(np.uint64(1), np.arange(free.shape[1], dtype=np.uint64))

@@ -1,4 +1,4 @@
-"""The boat's way: a route in coordinates along and to the left of it, also before its start and beyond its end."""
+"""Coordinates along a route and to its left, also before its start and beyond its end."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ LEG_M = 7.5
 
 
 class RouteFrame:
-    """`along_m` 0 is the boat's start. Around an open route's ends it goes straight on."""
+    """Route coordinates; `along_m` 0 is the boat's start. Beyond its ends an open route is extended straight."""
 
     def __init__(self, route_m: F64, *, closed: bool, first_m: float = 0.0) -> None:
         self._route_m = route_m
@@ -21,7 +21,7 @@ class RouteFrame:
         self._length_m = float(np.linalg.norm(np.diff(route_m, axis=0), axis=1).sum())
 
     def pose_at(self, along_m: float, left_m: float = 0.0, turn_rad: float = 0.0) -> Pose2:
-        """Pose in the map, heading along the way plus `turn_rad`."""
+        """Pose in the map, heading along the route plus `turn_rad`."""
         distance_m = self._first_m + along_m
         if self._closed:
             x_m, y_m, yaw_rad = point_along_closed(self._route_m, distance_m)
@@ -37,7 +37,7 @@ class RouteFrame:
         )
 
     def line_m(self, first_m: float, last_m: float, left_m: float = 0.0) -> F64:
-        """Points about every metre from `first_m` to `last_m`, either way, `left_m` to the left of the way."""
+        """Points about every metre from `first_m` to `last_m`, either way, `left_m` to the left of the route."""
         count = max(2, round(abs(last_m - first_m)) + 1)
         return np.array([self.pose_at(float(along_m), left_m)[:2] for along_m in np.linspace(first_m, last_m, count)])
 

@@ -1,4 +1,4 @@
-"""Whether a scenario can be: route, boat and what floats are in the water, clear of each other and inside the fence."""
+"""Checks a scenario: route, boat and floating things in the water, clear of each other and inside the fence."""
 
 from collections import Counter
 

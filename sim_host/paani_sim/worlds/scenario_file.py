@@ -1,4 +1,4 @@
-"""What a scenario file may say, and reading it strictly. README.md beside this file shows one.
+"""Form of a scenario file, and its strict reader. README.md beside this file shows one.
 
 Frames of points: `map` (metres east and north of the origin), `route` (metres along the route from the boat's start,
 and to its left) and `channel` (the same of the world's centre line, from its first point).

@@ -1,4 +1,4 @@
-"""A scenario on one sheet: what it is, its plan, and what the boat's camera sees along the route."""
+"""Sheet of a scenario: description, plan, and the views of the boat's camera along the route."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""The things of a scenario file, as obstacles and actors of its world."""
+"""Builds the things of a scenario file as obstacles and actors of its world."""
 
 import math
 
@@ -16,7 +16,7 @@ from paani_sim.worlds.world import Actor, Obstacle, Pose2, World
 
 
 def build_thing(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacle | Actor:
-    """The thing as it stands or runs in the world. `where` names the file and the part in a UserError."""
+    """Build one thing in its world. `where` names the file and the part in a UserError."""
     if part.look not in SIZES:
         raise UserError(f"{where}.look: unknown {part.look!r} (known: {', '.join(SIZES)})")
     usual = SIZES[part.look]
@@ -84,7 +84,7 @@ def _locate(part: ActorPart, world: World, where: str, point: tuple[float, float
 
 
 def world_route_frame(world: World) -> RouteFrame:
-    """The world's route as a way."""
+    """Coordinates along the world's route."""
     return RouteFrame(world.route_m, closed=world.route_closed)
 
 

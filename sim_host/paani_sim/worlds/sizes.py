@@ -1,4 +1,4 @@
-"""Usual sizes of things, by their look: kind, length, width and height."""
+"""Kind and usual size of things, by their look."""
 
 from typing import NamedTuple
 

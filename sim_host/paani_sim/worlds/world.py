@@ -1,4 +1,4 @@
-"""What a world is: water, route, things in the way, wind and light. Values only.
+"""Values of a world: water, route, obstacles, actors, wind and light.
 
 Map frame is local ENU (x east, y north, z up, the water surface is z = 0), metres and radians.
 """
@@ -169,7 +169,7 @@ class World:
 
 
 def actor_distance_along_m(actor: Actor, t_s: float) -> float:
-    """How far along its path the actor is at simulated time `t_s` if nothing holds it up [m]."""
+    """How far along its path the actor is at simulated time `t_s` if it never gives way [m]."""
     return actor.start_m + actor.speed_mps * max(0.0, t_s - actor.start_s)
 
 
@@ -184,5 +184,5 @@ def actor_pose_along(actor: Actor, along_m: float) -> Pose2:
 
 
 def actor_pose_at(actor: Actor, t_s: float) -> Pose2:
-    """Where the actor is at simulated time `t_s` if nothing holds it up."""
+    """Where the actor is at simulated time `t_s` if it never gives way."""
     return actor_pose_along(actor, actor_distance_along_m(actor, t_s))
