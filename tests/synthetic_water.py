@@ -19,14 +19,14 @@ PLANNER = CONFIG.navigator.planner
 EYE = build_camera(CONFIG.eye)
 ROWS, COLUMNS = 64, 80
 START_US = 5_000_000
-Bar = tuple[float, float, float, float]  # west, south, east, north [m] of something that stands in the water
+Bar = tuple[float, float, float, float]  # west, south, east, north [m] of an obstacle in the water
 FAR_M = 500.0
 AT_REST, EMPTY_MEMORY = BoatPose(0.0, 0.0, 0.0), ObservationMemory()
-ASTERN = BoatPose(0.0, 0.0, 2.5)  # looks away from whatever lies ahead
+ASTERN = BoatPose(0.0, 0.0, 2.5)  # the camera looks away from what lies ahead
 
 
 def water_edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:
-    """`Evidence.water_edge` of bars in a pool that ends `bank_m` from the camera: each column's rows from below."""
+    """`Evidence.water_edge` of bars in a pool with its bank `bank_m` away; each column ends at its lowest bar."""
     position, turn = camera_pose(boat, EYE)
     right = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * EYE.width_px
     up = (0.5 - (np.arange(ROWS) + 0.5) / ROWS) * EYE.height_px
@@ -42,7 +42,7 @@ def water_edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FA
 
 
 def detection_of(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_m: float = 0.0) -> m.Detection:
-    """The box of a thing with this footprint, from a boat at rest. foot_m: of its foot above the water."""
+    """The box of an obstacle with this footprint, for a boat at rest. foot_m: height of its foot above the water."""
     west, south, east, north = bar
     corners = np.array([[x, y, z] for x in (west, east) for y in (south, north) for z in (foot_m, foot_m + high_m)])
     across, down = project(corners, AT_REST, EYE).T / np.array([[EYE.width_px], [EYE.height_px]])
@@ -51,7 +51,7 @@ def detection_of(bar: Bar, high_m: float, label: m.Label = m.Label.PERSON, foot_
 
 
 def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Evidence:
-    """Usable evidence of a frame taken then."""
+    """Usable evidence of a frame taken at this time."""
     given: dict[str, object] = {
         "source_us": at_us,
         "frame_seq": at_us // 1000,
@@ -67,7 +67,7 @@ def evidence(at_us: int, edge: tuple[float, ...], **changes: object) -> m.Eviden
 
 
 def odometry(at_us: int, boat: BoatPose, surge_mps: float = 0.0, **changes: object) -> m.Odometry:
-    """Healthy odometry of a boat that lies so."""
+    """Healthy odometry of a boat with this pose."""
     given: dict[str, object] = {
         "source_us": at_us,
         "epoch": 1,
@@ -89,7 +89,7 @@ def observe_from(
     memory: ObservationMemory = EMPTY_MEMORY,
     **changes: object,
 ) -> ObservationMemory:
-    """The memory after one more picture from there; open water by default."""
+    """The memory after one more picture from this pose; of open water by default."""
     shown = edge if edge is not None else water_edge_of(boat)
     memory = move_to(memory, at_us, boat)
     return update_memory(memory, None, evidence(at_us, shown, **changes), PLANNER)
@@ -98,7 +98,7 @@ def observe_from(
 def observe_then_look_astern(
     seconds: float, thing: m.Detection, edge: tuple[float, ...] | None = None
 ) -> tuple[ObservationMemory, int]:
-    """The memory of a boat that saw this ahead three times, and has looked astern since; and when that is."""
+    """The memory of a boat that saw this ahead three times and has looked astern since, and the time by then."""
     memory, at_us = EMPTY_MEMORY, START_US
     for _ in range(3):
         memory, at_us = observe_from(edge=edge, at_us=at_us, memory=memory, detections=(thing,)), at_us + 800_000
@@ -108,7 +108,7 @@ def observe_then_look_astern(
 
 
 def move_to(memory: ObservationMemory, at_us: int, boat: BoatPose) -> ObservationMemory:
-    """The memory of a boat that has gone on to there, as its odometry tells ten times a second."""
+    """The memory of a boat that has moved to this pose, with odometry ten times a second."""
     while memory.odom_pose is not None and memory.odom_pose.stamp_us < at_us:
         here = memory.odom_pose
         step_us = min(at_us - here.stamp_us, 100_000)
@@ -126,8 +126,8 @@ def move_to(memory: ObservationMemory, at_us: int, boat: BoatPose) -> Observatio
     return memory if memory.odom_pose is not None else update_memory(memory, odometry(at_us, boat), None, PLANNER)
 
 
-def standing_gaps_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.ndarray:
-    """From each place of one way to the middle of the nearest occupied cell [times]."""
+def static_distances_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.ndarray:
+    """Distances from each position of one trajectory to the middle of the nearest occupied cell [times]."""
     rows, columns = np.nonzero(grid.occupied)
     x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
     gaps_m: np.ndarray = np.hypot(trajectories.x_m - x_m, trajectories.y_m - y_m).min(axis=1, initial=np.inf)

@@ -44,7 +44,7 @@ YAW_RATE_RADPS = 0.35
 
 
 class Pool:
-    """A boat on flat water that goes where it is told, 5 pictures and orders a second."""
+    """A boat on flat water that follows its orders, with 5 pictures and orders a second."""
 
     def __init__(self, *bars: Bar, bank_m: float = 500.0, boat: BoatPose = AT_REST, camera: Camera = CAMERA) -> None:
         self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
@@ -114,7 +114,7 @@ class Pool:
 
 
 def test_open_water_is_sailed_as_without_a_planner() -> None:
-    """Same course and speed where nothing is in the way."""
+    """Course and speed are the same where there is no obstacle."""
     with_planner, without = Pool(), Pool(camera=UNCALIBRATED_CAMERA)
     for one, other in zip(with_planner.run(12.0), without.run(12.0), strict=True):
         if other.enable and with_planner.now_us > START_US + 300_000:
@@ -135,7 +135,7 @@ def test_open_water_is_sailed_as_without_a_planner() -> None:
 def test_the_planner_never_moves_the_boat_where_the_advice_says_stop(
     direction: Direction, bars: list[tuple[float, float]], bank_m: float, yaw: float, warm: bool
 ) -> None:
-    """Advice is the veto: STOP and NO_DATA stay as they are, with a plan in force or without."""
+    """The advice is a veto: STOP and NO_DATA stop the boat, with a plan in force or without."""
     pool = Pool(*((x, y, x + 0.5, y + 1.0) for x, y in bars), bank_m=bank_m, boat=BoatPose(0.0, 0.0, yaw))
     if warm:
         pool.settle(0.6)
@@ -146,7 +146,7 @@ def test_the_planner_never_moves_the_boat_where_the_advice_says_stop(
 
 @pytest.mark.parametrize("turn", [Direction.LEFT, Direction.SLIGHT_LEFT, Direction.RIGHT, Direction.SLIGHT_RIGHT])
 def test_turn_advice_halves_the_speed_and_leans_to_its_side(turn: Direction) -> None:
-    """In open water the course is the route's, or to the side that is advised of it; M7 for the speed."""
+    """In open water the course is the route's, or lies to its advised side; M7 for the speed."""
     side = 1.0 if turn in {Direction.LEFT, Direction.SLIGHT_LEFT} else -1.0
     pool = Pool()
     pool.direction = turn
@@ -157,7 +157,7 @@ def test_turn_advice_halves_the_speed_and_leans_to_its_side(turn: Direction) -> 
 
 @pytest.mark.parametrize("direction", list(Direction))
 def test_without_a_valid_calibration_the_planner_refuses_to_act(direction: Direction) -> None:
-    """The heading heuristic decides as before, to the byte, whatever the pictures show."""
+    """The orders are those of the heading heuristic, to the byte, whatever the pictures show."""
     blocked, unseen = Pool(bank_m=1.5, camera=UNCALIBRATED_CAMERA), Pool(camera=UNCALIBRATED_CAMERA)
     unseen.looks = False
     blocked.direction = unseen.direction = direction
@@ -165,8 +165,8 @@ def test_without_a_valid_calibration_the_planner_refuses_to_act(direction: Direc
         assert msgspec.json.encode(one) == msgspec.json.encode(other)
 
 
-def test_the_decider_gives_it_the_pictures_and_the_calibration() -> None:
-    """Evidence is an input of the recorded step, so a planned order can be decided again."""
+def test_the_decider_passes_evidence_and_calibration_to_the_planner() -> None:
+    """Evidence is an input of the recorded step, so that a planned order can be replayed."""
     config = load_config()
     seeing = msgspec.structs.replace(config, calibration=CAMERA.calibration)
     inputs = {topic.name: Input() for topic in DECIDER.inputs}
@@ -179,13 +179,13 @@ def test_the_decider_gives_it_the_pictures_and_the_calibration() -> None:
     assert [len(each) for each in observations] == [1, 0]
 
 
-def test_the_paper_has_no_planner() -> None:
-    """A prototype beside the evaluated configuration: a calibration alone does not bring it in."""
+def test_the_paper_profile_has_no_planner() -> None:
+    """The paper evaluated none: a calibration alone does not turn it on."""
     assert not PAPER.planner.use
 
 
-def test_what_is_not_seen_free_is_not_entered() -> None:
-    """No picture, then pictures that end: NO_FREE_PATH; before a wall the boat comes no nearer."""
+def test_unknown_water_is_not_entered() -> None:
+    """Without pictures, or after they end, the reason is NO_FREE_PATH; before a wall the boat comes no nearer."""
     pool = Pool()
     pool.looks = False
     assert pool.settle(1.0).inhibits == (Inhibit.NO_FREE_PATH,)
@@ -200,7 +200,7 @@ def test_what_is_not_seen_free_is_not_entered() -> None:
 
 
 def test_a_bar_on_the_route_is_passed_and_the_route_rejoined() -> None:
-    """The advice says STRAIGHT all along: the planner alone goes round, and comes back to the same leg."""
+    """The advice is STRAIGHT throughout: the planner goes round the bar, and back to the same leg."""
     pool = Pool((6.0, -0.6, 6.8, 0.4))
     nearest = math.inf
     aside = 0.0
@@ -215,7 +215,7 @@ def test_a_bar_on_the_route_is_passed_and_the_route_rejoined() -> None:
 
 
 def test_a_boat_before_a_wall_turns_along_it() -> None:
-    """A quay across the route with a way round its left end: no advice but STRAIGHT, and no touch."""
+    """A quay lies across the route, free at its left end: with STRAIGHT advice the boat passes without contact."""
     pool = Pool((6.0, -30.0, 7.0, 2.5))
     nearest = math.inf
     for _ in pool.run(40.0):
@@ -224,9 +224,9 @@ def test_a_boat_before_a_wall_turns_along_it() -> None:
     assert pool.boat.x_m > 7.0
 
 
-def test_a_dead_end_is_waited_in_until_it_opens() -> None:
+def test_a_boat_waits_in_a_dead_end_until_it_opens() -> None:
     pool = Pool((4.0, -30.0, 5.0, 30.0))
-    last = pool.settle(45.0)  # it goes along it first, slowly
+    last = pool.settle(45.0)  # it sails along the bar first, slowly
     assert last.inhibits == (Inhibit.NO_FREE_PATH,)
     assert pool.gap_m() > 0.6
     pool.bars = ()
@@ -234,7 +234,7 @@ def test_a_dead_end_is_waited_in_until_it_opens() -> None:
 
 
 def test_a_boat_under_way_brakes_before_it_gives_up() -> None:
-    """Nothing is seen any more: it is ordered to stand, for a while, and then there is no thrust."""
+    """Pictures end: the boat is ordered to stop for `brake_s`, and then gets no thrust."""
     pool = Pool()
     moving = pool.settle(6.0)
     assert moving.enable
@@ -248,7 +248,7 @@ def test_a_boat_under_way_brakes_before_it_gives_up() -> None:
 
 
 def test_a_boat_at_rest_has_nothing_to_brake() -> None:
-    """With nothing seen from the start no order is enabled, whatever it drifts at."""
+    """Without pictures from the start no order is enabled, whatever the boat drifts at."""
     pool = Pool()
     pool.looks, pool.speed_mps = False, 0.09
     assert not any(order.enable for order in pool.run(2.0))
@@ -260,7 +260,7 @@ def test_a_boat_that_cannot_brake_gives_up_at_once() -> None:
 
 
 def test_a_stuck_detection_does_not_spin_the_boat() -> None:
-    """90 degrees without the planner; with it the route holds the boat, whatever is advised for how long."""
+    """Without the planner the turn ends at 90 degrees; with it the boat keeps to its route, whatever is advised."""
     for camera, high_deg in ((UNCALIBRATED_CAMERA, 97.0), (CAMERA, 45.0)):
         pool = Pool(camera=camera)
         pool.settle(3.0)
@@ -270,8 +270,8 @@ def test_a_stuck_detection_does_not_spin_the_boat() -> None:
 
 
 @pytest.mark.parametrize("turn", [Direction.LEFT, Direction.RIGHT])
-def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Direction) -> None:
-    """Advised when no way has been free for long: it looks there, and does not go, nor round for ever."""
+def test_a_turn_to_a_blocked_side_is_a_pivot(turn: Direction) -> None:
+    """It is advised when no side has been free for long: the boat looks there without going, nor spinning for ever."""
     pool = Pool((4.0, -2.0, 5.0, 2.0))
     pool.direction, pool.shut_in = turn, True
     ordered = [order.speed_mps for order in pool.run(60.0)]
@@ -282,15 +282,15 @@ def test_a_turn_to_a_side_that_is_blocked_is_made_where_the_boat_lies(turn: Dire
     assert ordered[-1] == 0.0
 
 
-def test_a_boat_without_room_does_not_turn_to_look() -> None:
-    """Advice gives way to the map: what its hull would sweep must be free."""
+def test_a_boat_without_room_does_not_pivot_to_look() -> None:
+    """The map overrides the advice: cells that the hull would sweep must be free."""
     pool = Pool(bank_m=0.9)
     pool.direction, pool.shut_in = Direction.LEFT, True
     assert not any(order.enable for order in pool.run(3.0))
 
 
-def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
-    """What was passed is remembered where it is, so the way back need not wait for `clear_m`."""
+def test_with_a_map_an_occupied_side_does_not_delay_the_return() -> None:
+    """The map remembers what was passed, so the boat need not go on for `clear_m` before it returns to its route."""
     advisory = Advisory(
         source_us=START_US, direction=Direction.STRAIGHT, reason=Reason.CENTER_CLEAR, right=LaneRisk(occupied=True)
     )
@@ -305,7 +305,7 @@ def test_an_occupied_side_is_left_to_the_map_where_there_is_one() -> None:
 
 
 def test_the_state_is_small_and_loses_nothing_as_json() -> None:
-    """A recorded state decides on as the live one did; every 2 s it costs the ledger less than 12 kB."""
+    """A recorded state continues as the live one did, and takes less than 12 kB of the recording every 2 s."""
     pool = Pool((10.0, -0.6, 10.8, 0.4))
     pool.settle(9.0)
     data = msgspec.json.encode(pool.state)

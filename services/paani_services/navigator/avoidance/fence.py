@@ -1,7 +1,7 @@
-"""Where the boat may be, and how fast it may go towards the edge of it. Pure plane geometry in the map frame.
+"""The fence: where the boat may be, and how fast it may go towards an edge. Pure plane geometry in the map frame.
 
-Allowed is what lies inside at least one area that keeps in, where there are any, and inside none that keeps out.
-The edge itself is not allowed.
+A point is allowed if it lies inside at least one area that keeps in, where there are any, and inside none that keeps
+out. The edge itself is not allowed.
 """
 
 import math
@@ -14,16 +14,16 @@ from paani.geometry import wrap_rad
 from paani.messages import FenceArea, Keep, Odometry, Waypoint
 from paani_services.navigator.guidance.path_progress import Point, velocity_over_ground_mps
 
-MIN_COURSE_SPEED_MPS = 0.1  # below it the course over ground is noise
-MIN_ORDERED_SPEED_MPS = 0.05  # a slower order would not move the boat
-RETURN_SECTOR_RAD = math.radians(60.0)  # an order this far from the nearest way in still leads in
-PROBE_OFFSET_M = 0.01
+MIN_COURSE_SPEED_MPS = 0.1  # speed below which the course over ground is noise [m/s]
+MIN_ORDERED_SPEED_MPS = 0.05  # a slower order would not move the boat [m/s]
+RETURN_SECTOR_RAD = math.radians(60.0)  # a heading this far off the nearest way in still leads in [rad]
+PROBE_OFFSET_M = 0.01  # distance from an edge at which its sides are probed [m]
 
 Fence = tuple[FenceArea, ...]
 
 
 def is_allowed(fence: Fence, at_m: Point) -> bool:
-    """Inside an area that keeps in, if there is one, and in none that keeps out."""
+    """Whether a point lies inside an area that keeps in, if there is one, and in none that keeps out."""
     inner = [area for area in fence if area.keep is Keep.IN]
     if inner and not any(contains(area, at_m) for area in inner):
         return False
@@ -31,7 +31,7 @@ def is_allowed(fence: Fence, at_m: Point) -> bool:
 
 
 def contains(area: FenceArea, at_m: Point) -> bool:
-    """Whether a ray to the east crosses the polygon's edge an odd number of times."""
+    """Whether the area contains the point: a ray to the east crosses its edges an odd number of times."""
     x_m, y_m = at_m
     inside = False
     for (x1, y1), (x2, y2) in edges(area):
@@ -41,7 +41,7 @@ def contains(area: FenceArea, at_m: Point) -> bool:
 
 
 def edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
-    """From each corner to the next, the one that closes it first."""
+    """The area's edges, from each corner to the next, beginning with the one that closes it."""
     last = area.corners[-1]
     for corner in area.corners:
         yield (last.x_m, last.y_m), (corner.x_m, corner.y_m)
@@ -49,7 +49,7 @@ def edges(area: FenceArea) -> Iterator[tuple[Point, Point]]:
 
 
 def distance_to_edge_m(fence: Fence, at_m: Point) -> float:
-    """To the nearest edge of any area, infinite without a fence."""
+    """Distance to the nearest edge of any area; infinite without a fence."""
     return min(
         (math.dist(at_m, _nearest(at_m, *edge)) for area in fence for edge in edges(area)),
         default=math.inf,
@@ -57,7 +57,7 @@ def distance_to_edge_m(fence: Fence, at_m: Point) -> float:
 
 
 def allowed_distance_m(fence: Fence, from_m: Point, to_m: Point) -> float:
-    """How far along the straight way between two points everything is allowed; infinite if all of it is."""
+    """Distance along the straight line up to which everything is allowed; infinite if all of it is."""
     length_m = math.dist(from_m, to_m)
     if not is_allowed(fence, from_m):
         return 0.0
@@ -86,10 +86,10 @@ def limit_speed(
 ) -> float | None:
     """The speed at which the ordered heading may be sailed, or None where the boat may not move.
 
-    Towards the edge the speed falls so that `fence_margin_m` and the way to stop (`fence_stop_s` times the speed)
-    always fit before it; a boat whose velocity, with what it may gain until the next order, no longer leaves room for
-    the way to stop gets no thrust.
-    Outside, nothing moves, unless `fence_return` and the heading leads to the nearest way in.
+    The speed is limited so that `fence_margin_m` and the stopping distance (`fence_stop_s` times the speed) fit before
+    the edge along the ordered heading. A boat that would come to the edge within `fence_stop_s` at the velocity it may
+    have by the next order gets no thrust. Outside the fence nothing moves, unless `fence_return` is set and the heading
+    leads to the nearest way in.
     """
     if not fence:
         return speed_mps
@@ -109,7 +109,10 @@ def limit_speed(
 def find_route_violation(
     fence: Fence, waypoints: tuple[Waypoint, ...], margin_m: float, *, repeat: bool = False
 ) -> tuple[int, str] | None:
-    """The first waypoint that is not allowed, or whose leg to the next is not or comes nearer than the margin."""
+    """The first waypoint that is not allowed, or whose leg to the next is not or comes nearer than the margin.
+
+    Returned are its number and what is wrong with it; None for a route within the fence.
+    """
     points = [(waypoint.x_m, waypoint.y_m) for waypoint in waypoints]
     for number, point in enumerate(points):
         if not is_allowed(fence, point):
@@ -125,7 +128,7 @@ def find_route_violation(
 
 
 def do_segments_meet(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
-    """Whether two pieces of line touch or cross."""
+    """Whether two line segments touch or cross."""
     return _may_be_within(one, other, 0.0) and _segment_distance_m(one, other) == 0.0
 
 
@@ -146,6 +149,7 @@ def _velocity_at_next_order(odometry: Odometry, config: NavigatorConfig) -> tupl
 def _limit_speed_outside(
     fence: Fence, here: Point, heading_rad: float, speed_mps: float, config: NavigatorConfig
 ) -> float | None:
+    """The ordered speed, if `fence_return` is set and the heading leads to the nearest way in; else None."""
     back_rad = return_bearing_rad(fence, here) if config.fence_return else None
     if back_rad is None or abs(wrap_rad(heading_rad - back_rad)) > RETURN_SECTOR_RAD:
         return None
@@ -153,7 +157,7 @@ def _limit_speed_outside(
 
 
 def _nearest(at_m: Point, start: Point, end: Point) -> Point:
-    """Point of the edge nearest to `at_m`."""
+    """The point of the edge nearest to `at_m`."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
     length2 = along_x * along_x + along_y * along_y
     if length2 == 0.0:
@@ -163,7 +167,7 @@ def _nearest(at_m: Point, start: Point, end: Point) -> Point:
 
 
 def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
-    """Nothing within the margin of the allowed way is an edge, but for edges between two areas that keep in."""
+    """Whether the segment keeps the margin to every edge, except for edges between two areas that keep in."""
     way = (start, end)
     return not any(
         _may_be_within(way, edge, margin_m) and _segment_distance_m(way, edge) < margin_m and _is_border(fence, edge)
@@ -173,7 +177,7 @@ def _is_clear(fence: Fence, start: Point, end: Point, margin_m: float) -> bool:
 
 
 def _is_border(fence: Fence, edge: tuple[Point, Point]) -> bool:
-    """Whether somewhere along the edge one side of it is not allowed: at its middle or just inside its ends."""
+    """Whether one side of the edge is not allowed somewhere along it: probed at its middle and near its ends."""
     (x1, y1), (x2, y2) = edge
     length_m = math.dist(*edge)
     left = (-(y2 - y1) / length_m * PROBE_OFFSET_M, (x2 - x1) / length_m * PROBE_OFFSET_M)
@@ -184,7 +188,7 @@ def _is_border(fence: Fence, edge: tuple[Point, Point]) -> bool:
 
 
 def _may_be_within(one: tuple[Point, Point], other: tuple[Point, Point], within_m: float) -> bool:
-    """False where the boxes around them are further apart than that: most pairs are settled here."""
+    """Whether the bounding boxes of two segments are that near: this settles most pairs."""
     ((x1, y1), (x2, y2)), ((x3, y3), (x4, y4)) = one, other
     return (
         min(x1, x2) - within_m <= max(x3, x4)
@@ -195,7 +199,7 @@ def _may_be_within(one: tuple[Point, Point], other: tuple[Point, Point], within_
 
 
 def _segment_distance_m(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
-    """Distance between two pieces of line; 0 where they meet."""
+    """Distance between two line segments; 0 where they meet."""
     if any(True for _ in _crossings(*one, *other)):
         return 0.0
     ends = [(point, other) for point in one] + [(point, one) for point in other]
@@ -203,15 +207,17 @@ def _segment_distance_m(one: tuple[Point, Point], other: tuple[Point, Point]) ->
 
 
 def _on_edge(area: FenceArea, at_m: Point) -> bool:
+    """Whether the point lies on an edge of the area."""
     return any(_nearest(at_m, *edge) == at_m for edge in edges(area))
 
 
 def _interpolate(start: Point, end: Point, part: float) -> Point:
+    """The point at this fraction of the way from start to end."""
     return start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
 
 
 def _crossings(from_m: Point, to_m: Point, start: Point, end: Point) -> Iterator[float]:
-    """Where on the way, from 0 to 1, it meets the edge; nowhere where they run side by side."""
+    """Fractions of the way, from 0 to 1, at which it meets the edge; none where they are parallel."""
     way_x, way_y = to_m[0] - from_m[0], to_m[1] - from_m[1]
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     to_x, to_y = start[0] - from_m[0], start[1] - from_m[1]

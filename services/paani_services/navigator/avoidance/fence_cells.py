@@ -1,4 +1,4 @@
-"""The fence on the planner's grid: what lies beyond it is no water to plan on. Pure."""
+"""The fence on the planner's grid: cells beyond it are occupied. Pure."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, Occupanc
 
 
 def apply_fence(grid: OccupancyGrid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:
-    """The grid with every cell occupied whose middle the fence does not allow; as `fence.is_allowed` but for edges.
+    """Occupy every cell whose middle the fence does not allow, in the sense of `fence.is_allowed` but for the edges.
 
-    offset_m: east and north of a place in the map, from where it is on the grid.
+    offset_m: a place's east and north in the map, less those on the grid.
     """
     if not fence:
         return grid
@@ -30,7 +30,7 @@ def apply_fence(grid: OccupancyGrid, fence: Fence, offset_m: tuple[float, float]
 
 
 def _inside(grid: OccupancyGrid, area: FenceArea, offset_m: tuple[float, float]) -> Bools:
-    """Cells from whose middle a ray to the east crosses the polygon's edge an odd number of times."""
+    """Cells whose middle the area contains: a ray to the east crosses its edges an odd number of times."""
     middle = (np.arange(GRID_CELLS) + 0.5) * CELL_M
     x_m, y_m = grid.west_m + offset_m[0] + middle, grid.south_m + offset_m[1] + middle
     inside = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)

@@ -244,16 +244,19 @@ def _measure_position(
     easts, norths = (axis.tolist() for axis in outline)
     position_m = (sum(easts) / OUTLINE_POINTS, sum(norths) / OUTLINE_POINTS)
     distance_m = max(math.dist(position_m, camera_m), POSITION_DEVIATION_M)
-    wide_m = WIDTH_DEVIATION_FRAC * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
-    end_rad = row_rad if box.is_small else HULL_EDGE_FACTOR * row_rad
-    range_deviation_m = POSITION_DEVIATION_M + wide_m + end_rad * distance_m * distance_m / height_m
-    across_m = POSITION_DEVIATION_M + wide_m + CROSS_RANGE_FACTOR * row_rad * distance_m
+    width_deviation_m = WIDTH_DEVIATION_FRAC * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
+    edge_rad = row_rad if box.is_small else HULL_EDGE_FACTOR * row_rad
+    range_deviation_m = POSITION_DEVIATION_M + width_deviation_m + edge_rad * distance_m * distance_m / height_m
+    cross_range_deviation_m = POSITION_DEVIATION_M + width_deviation_m + CROSS_RANGE_FACTOR * row_rad * distance_m
     east, north = (position_m[0] - camera_m[0]) / distance_m, (position_m[1] - camera_m[1]) / distance_m
-    along, across = 1.0 / (range_deviation_m * range_deviation_m), 1.0 / (across_m * across_m)
+    range_information, cross_range_information = (
+        1.0 / (range_deviation_m * range_deviation_m),
+        1.0 / (cross_range_deviation_m * cross_range_deviation_m),
+    )
     information_matrix = (
-        along * east * east + across * north * north,
-        (along - across) * east * north,
-        along * north * north + across * east * east,
+        range_information * east * east + cross_range_information * north * north,
+        (range_information - cross_range_information) * east * north,
+        range_information * north * north + cross_range_information * east * east,
     )
     foot = box.bottom < BOX_STEPS - BORDER_STEPS
     shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)

@@ -85,8 +85,8 @@ def project_to_cells(
     near_m = ranges_to_water_m(camera_model, pixel_rays(camera_model, u, top), config.max_range_m)
     ends = pixel_rays(camera_model, u, np.minimum(edge, top))
     far_m = ranges_to_water_m(camera_model, ends, config.max_range_m)
-    water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # no water is seen higher up
-    open_m = np.where(water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
+    is_water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # no water is seen higher up
+    open_m = np.where(is_water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
     open_m[np.arange(edge.size) % column_step > 0] = 0.0
     is_moving = np.zeros(u.shape, np.bool_)
     for box in moving_boxes:
@@ -121,24 +121,26 @@ def _complete_hull(
     bow taken for water, that part is as far away as the part beside it; where the mask misses all of it, the lower end
     of the box counts. What stands before the hull is not part of it.
     """
-    across = np.flatnonzero((u > box.left / BOX_STEPS) & (u < box.right / BOX_STEPS))
-    low_m, least_m = (
+    columns = np.flatnonzero((u > box.left / BOX_STEPS) & (u < box.right / BOX_STEPS))
+    bottom_m, least_m = (
         ranges_to_water_m(
             camera_model,
-            pixel_rays(camera_model, u[across], np.full(across.shape, box.bottom / BOX_STEPS + below)),
+            pixel_rays(camera_model, u[columns], np.full(columns.shape, box.bottom / BOX_STEPS + below)),
             config.max_range_m,
         )
         for below in (0.0, BOX_EDGE_TOLERANCE_FRAC)
     )
-    if across.size == 0 or not np.isfinite(low_m).all():
-        return across[:0]
-    own = far_m[across] >= least_m
-    seen = across[own & (far_m[across] <= low_m.min() + MAX_HULL_LENGTH_M)]
-    beside_m = low_m if seen.size == 0 else far_m[seen[np.abs(across[:, None] - seen[None, :]).argmin(axis=1)]]
-    far_m[across] = np.minimum(far_m[across], np.where(own, beside_m, np.inf))
-    wide_m = _width_m(Rays(*(axis[across] for axis in ends)), far_m[across])
-    depth_m[across] = np.maximum(depth_m[across], min(wide_m, MAX_HULL_DEPTH_M))
-    return across[own]
+    if columns.size == 0 or not np.isfinite(bottom_m).all():
+        return columns[:0]
+    is_own = far_m[columns] >= least_m
+    visible = columns[is_own & (far_m[columns] <= bottom_m.min() + MAX_HULL_LENGTH_M)]
+    beside_m = (
+        bottom_m if visible.size == 0 else far_m[visible[np.abs(columns[:, None] - visible[None, :]).argmin(axis=1)]]
+    )
+    far_m[columns] = np.minimum(far_m[columns], np.where(is_own, beside_m, np.inf))
+    width_m = _width_m(Rays(*(axis[columns] for axis in ends)), far_m[columns])
+    depth_m[columns] = np.maximum(depth_m[columns], min(width_m, MAX_HULL_DEPTH_M))
+    return columns[is_own]
 
 
 def own_hull_top(ego_polygon: Polygon, u: F64) -> F64:
@@ -177,20 +179,20 @@ def _is_static(foot: FootLine, moving_boxes: tuple[ObstacleBox, ...]) -> bool:
 def _foot_points(camera_model: PinholeCamera, foot: FootLine, camera: Camera, config: PlannerConfig) -> tuple[F64, F64]:
     """Points on the water that an obstacle covers: along its foot, as deep as it is wide, with more around people."""
     left, right, bottom = (end / BOX_STEPS for end in (foot.left, foot.right, foot.bottom))
-    given, range_m = _foot_rays(camera_model, left, right, bottom, camera, config)
+    rays, range_m = _foot_rays(camera_model, left, right, bottom, camera, config)
     if not np.isfinite(range_m).all():
         return np.empty(0), np.empty(0)
-    wide_m = _width_m(given, range_m)
-    room_m = config.person_room_m if foot.is_person else 0.0
-    if room_m > 0.0:
-        more = (right - left) * room_m / max(wide_m, CELL_M)
-        given, range_m = _foot_rays(camera_model, left - more, right + more, bottom, camera, config)
+    width_m = _width_m(rays, range_m)
+    margin_m = config.person_room_m if foot.is_person else 0.0
+    if margin_m > 0.0:
+        widening = (right - left) * margin_m / max(width_m, CELL_M)
+        rays, range_m = _foot_rays(camera_model, left - widening, right + widening, bottom, camera, config)
         if not np.isfinite(range_m).all():
             return np.empty(0), np.empty(0)
-    nearer_m = room_m + (CUT_OFF_ALLOWANCE_M if bottom >= CUT_OFF_FRAC else 0.0)
-    depth = math.ceil((nearer_m + room_m + max(config.thickness_m, min(wide_m, MAX_FOOT_DEPTH_M))) / CELL_M) + 1
+    allowance_m = margin_m + (CUT_OFF_ALLOWANCE_M if bottom >= CUT_OFF_FRAC else 0.0)
+    depth = math.ceil((allowance_m + margin_m + max(config.thickness_m, min(width_m, MAX_FOOT_DEPTH_M))) / CELL_M) + 1
     return _points_along_rays(
-        camera_model, given, np.maximum(range_m - nearer_m, 0.0), np.full(range_m.shape, float(depth))
+        camera_model, rays, np.maximum(range_m - allowance_m, 0.0), np.full(range_m.shape, float(depth))
     )
 
 
@@ -199,25 +201,23 @@ def _foot_rays(
 ) -> tuple[Rays, F64]:
     """Rays through the lower end of a box, and the distance along each to the water."""
     u = left + (right - left) * (np.arange(FOOT_SAMPLES) + 0.5) / FOOT_SAMPLES
-    given = pixel_rays(camera_model, u, np.minimum(bottom, own_hull_top(camera.ego_polygon, u)))
-    return given, ranges_to_water_m(camera_model, given, config.max_range_m)
+    rays = pixel_rays(camera_model, u, np.minimum(bottom, own_hull_top(camera.ego_polygon, u)))
+    return rays, ranges_to_water_m(camera_model, rays, config.max_range_m)
 
 
-def _width_m(given: Rays, range_m: F64) -> float:
+def _width_m(rays: Rays, range_m: F64) -> float:
     """Distance between the first and the last point."""
-    east_m, north_m = range_m * given.east, range_m * given.north
+    east_m, north_m = range_m * rays.east, range_m * rays.north
     return math.hypot(float(east_m[-1] - east_m[0]), float(north_m[-1] - north_m[0]))
 
 
-def _points_along_rays(camera_model: PinholeCamera, given: Rays, first_m: F64, counts: F64) -> tuple[F64, F64]:
+def _points_along_rays(camera_model: PinholeCamera, rays: Rays, first_m: F64, counts: F64) -> tuple[F64, F64]:
     """East and north of `counts` points on each ray, a cell apart, beginning at `first_m`."""
     times = np.maximum(counts, 0.0).astype(np.int64)
     ray = np.repeat(np.arange(times.size), times)
     place = np.arange(ray.size) - np.repeat(np.cumsum(times) - times, times)
     range_m = first_m[ray] + CELL_M * place
-    return camera_model.position_m[0] + range_m * given.east[ray], camera_model.position_m[1] + range_m * given.north[
-        ray
-    ]
+    return camera_model.position_m[0] + range_m * rays.east[ray], camera_model.position_m[1] + range_m * rays.north[ray]
 
 
 def _cells_of_all(points: list[tuple[F64, F64]]) -> CellIndices:

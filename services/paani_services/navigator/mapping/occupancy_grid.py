@@ -91,30 +91,30 @@ def build_occupancy_grid(
                 observation, boxes, camera, config, column_step=OLD_COLUMN_STEP if number < first_free else 1
             )
         )
-    free_of = _last_observed([picture.free for picture in pictures], west, south)
-    occupied_of = _last_observed([picture.occupied for picture in pictures], west, south)
-    not_since = (occupied_of >= free_of) & (occupied_of >= 0) & (config.hidden_s > 0.0)
-    occupied_now = not_since | ((occupied_of >= first_occupied) & (occupied_of >= 0))
+    last_free = _last_observed([picture.free for picture in pictures], west, south)
+    last_occupied = _last_observed([picture.occupied for picture in pictures], west, south)
+    not_freed_since = (last_occupied >= last_free) & (last_occupied >= 0) & (config.hidden_s > 0.0)
+    occupied_now = not_freed_since | ((last_occupied >= first_occupied) & (last_occupied >= 0))
     if config.outvoted_by > 0:
-        occupied_now &= ~_is_outvoted(pictures[first_occupied:], occupied_of - first_occupied, west, south, config)
-    people_of = _last_observed([picture.people for picture in pictures], west, south)
-    vessels_of = _last_observed([picture.vessels for picture in pictures], west, south)
+        occupied_now &= ~_is_outvoted(pictures[first_occupied:], last_occupied - first_occupied, west, south, config)
+    last_person = _last_observed([picture.people for picture in pictures], west, south)
+    last_vessel = _last_observed([picture.vessels for picture in pictures], west, south)
     people_now, vessels_now = (
-        occupied_now & (last_of >= 0) & ((last_of >= free_of) | (last_of >= first_occupied))
-        for last_of in (people_of, vessels_of)
+        occupied_now & (last_of >= 0) & ((last_of >= last_free) | (last_of >= first_occupied))
+        for last_of in (last_person, last_vessel)
     )
-    free_now = (free_of >= first_free) & (free_of >= 0) & ~occupied_now
+    free_now = (last_free >= first_free) & (last_free >= 0) & ~occupied_now
     ages_s = np.zeros(len(recent) + 1)  # zero for what is in sight now and, in the last place, for what never was
     ages_s[:first_occupied] = [(now_us - observation.stamp_us) * 1e-6 for observation in recent[:first_occupied]]
     swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
     drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
-    reachable_unseen = _dilate(people_now, swum_m[people_of]) | _dilate(vessels_now, drifted_m[vessels_of])
+    reachable_unseen = _dilate(people_now, swum_m[last_person]) | _dilate(vessels_now, drifted_m[last_vessel])
     shape = (GRID_CELLS, GRID_CELLS)
     grid = OccupancyGrid(
         west * CELL_M,
         south * CELL_M,
         occupied=occupied_now.reshape(shape),
-        occluded=(occupied_now & (occupied_of < first_occupied)).reshape(shape),
+        occluded=(occupied_now & (last_occupied < first_occupied)).reshape(shape),
         free=free_now.reshape(shape),
         blind_zone=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
@@ -127,16 +127,16 @@ def build_occupancy_grid(
 
 
 def blind_zone_radius_m(aspect: float, camera: Camera, config: PlannerConfig) -> float:
-    """Distance from a level boat to the nearest water that its camera sees; 0 if that is beyond `blind_m`."""
+    """Distance from a level boat beyond which its camera sees all water ahead; 0 if that is beyond `blind_m`."""
     camera_model = pinhole_at(LEVEL_POSE, camera.calibration, aspect)
     u = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    given = pixel_rays(camera_model, u, own_hull_top(camera.ego_polygon, u))
-    near_m = ranges_to_water_m(camera_model, given, config.max_range_m)
+    rays = pixel_rays(camera_model, u, own_hull_top(camera.ego_polygon, u))
+    near_m = ranges_to_water_m(camera_model, rays, config.max_range_m)
     if not np.isfinite(near_m).all():
         return 0.0
     east_m, north_m = (
-        camera_model.position_m[0] + near_m * given.east,
-        camera_model.position_m[1] + near_m * given.north,
+        camera_model.position_m[0] + near_m * rays.east,
+        camera_model.position_m[1] + near_m * rays.north,
     )
     reach_m = float(np.sqrt(east_m * east_m + north_m * north_m).max()) + CELL_M
     return reach_m if reach_m <= config.blind_m else 0.0
@@ -152,20 +152,20 @@ def _dilate(cells: Bools, reach_m: F64) -> Bools:
 
 
 def _is_outvoted(
-    pictures: list[ObservedCells], occupied_of: I64, west: int, south: int, config: PlannerConfig
+    pictures: list[ObservedCells], last_occupied: I64, west: int, south: int, config: PlannerConfig
 ) -> Bools:
     """Cells that one picture alone shows occupied, with all cells around them, and that enough later ones show free.
 
-    occupied_of: the number of the last picture that shows each cell occupied.
+    last_occupied: the number of the last picture that shows each cell occupied.
     """
     number, cell = _all_observed([picture.occupied for picture in pictures], west, south)
     first = np.full(GRID_CELLS * GRID_CELLS, len(pictures), np.int64)
     first[cell[::-1]] = number[::-1]
     earliest = _extreme_of_neighbours(first.reshape(GRID_CELLS, GRID_CELLS), np.minimum)
-    latest = _extreme_of_neighbours(occupied_of.reshape(GRID_CELLS, GRID_CELLS), np.maximum)
+    latest = _extreme_of_neighbours(last_occupied.reshape(GRID_CELLS, GRID_CELLS), np.maximum)
     number, cell = _all_observed([picture.free for picture in pictures], west, south)
-    denied = np.bincount(cell[number > occupied_of[cell]], minlength=GRID_CELLS * GRID_CELLS)
-    return np.asarray((earliest == latest).ravel() & (denied >= config.outvoted_by))
+    free_votes = np.bincount(cell[number > last_occupied[cell]], minlength=GRID_CELLS * GRID_CELLS)
+    return np.asarray((earliest == latest).ravel() & (free_votes >= config.outvoted_by))
 
 
 def _extreme_of_neighbours(values: I64, extreme: np.ufunc) -> I64:

@@ -63,7 +63,7 @@ def test_inside_keep_in_and_outside_keep_out(point: tuple[float, float], allowed
 
 
 def test_areas_that_keep_in_join() -> None:
-    """The boat may cross from one into the other; the edge between them is no edge."""
+    """The boat may cross from one area into the other, because the edge between them is no border."""
     joined = (box(Keep.IN, 0, 0, 20, 20), box(Keep.IN, 18, 0, 40, 20))
     assert allowed_distance_m(joined, (5, 10), (35, 10)) == math.inf
     assert find_route_violation(joined, straight_to((5, 10), (35, 10)).waypoints, 2.0) is None
@@ -78,10 +78,10 @@ def test_areas_that_keep_in_join() -> None:
     st.sampled_from(Keep),
 )
 @settings(max_examples=60, deadline=None)
-def test_room_is_what_walking_finds(
+def test_allowed_distance_agrees_with_probing_along_the_line(
     spokes: list[tuple[float, float]], start: tuple[float, float], end: tuple[float, float], keep: Keep
 ) -> None:
-    """Any star-shaped area: every point before the room's end is allowed, and just beyond it one is not."""
+    """For any star-shaped area every point before the distance is allowed, and just beyond it one is not."""
     turns = np.cumsum([share for _, share in spokes]) / sum(share for _, share in spokes) * 2.0 * math.pi
     star = area(keep, *((r * math.cos(a), r * math.sin(a)) for (r, _), a in zip(spokes, turns.tolist(), strict=True)))
     fence, length_m = (star,), math.dist(start, end)
@@ -101,20 +101,20 @@ def test_room_is_what_walking_finds(
 
 
 def test_speed_falls_towards_the_edge_and_ends_before_it() -> None:
-    """Margin and way to stop always fit: at 5 m from the edge 0.7 m/s, at 3 m 0.3 m/s, at 1.6 m nothing."""
+    """Margin and stopping distance always fit: 0.7 m/s at 5 m from the edge, 0.3 m/s at 3 m, none at 1.6 m."""
     speeds = [limit_speed(FENCE, at(x_m, 4.0), 0.0, 0.6, PAANI) for x_m in (20.0, 35.0, 37.0, 38.4)]
     assert speeds == [0.6, 0.6, pytest.approx(0.3), None]
     assert limit_speed(FENCE, at(38.4, 4.0), math.pi, 0.6, PAANI) == 0.6
 
 
-def test_way_over_ground_counts_not_the_heading() -> None:
-    """Carried towards the edge while heading along it: no thrust, whatever is ordered."""
+def test_velocity_over_ground_counts_not_the_heading() -> None:
+    """A boat carried towards the edge while it heads along it gets no thrust, whatever is ordered."""
     carried = at(20.0, 17.5, 0.0, surge_mps=0.1, sway_mps=0.6)
     assert limit_speed(FENCE, carried, 0.0, 0.6, PAANI) is None
     assert limit_speed(FENCE, at(20.0, 17.5, 0.0, surge_mps=0.6), 0.0, 0.6, PAANI) == 0.6
 
 
-def test_outside_nothing_moves_unless_the_way_back_is_allowed() -> None:
+def test_outside_nothing_moves_unless_fence_return_is_set() -> None:
     outside = at(42.0, 10.0)
     for heading_rad in (math.pi, 0.0, 2.0):
         assert limit_speed(FENCE, outside, heading_rad, 0.6, PAANI) is None
@@ -140,7 +140,7 @@ def test_outside_nothing_moves_unless_the_way_back_is_allowed() -> None:
 def test_no_advice_carries_the_boat_over_the_edge(
     yaw_deg: float, x_m: float, y_m: float, advice: list[Direction]
 ) -> None:
-    """Whatever is advised, the boat comes to rest inside; its route leads out on purpose."""
+    """Whatever is advised, the boat stays inside, though its route leads out."""
     if not is_allowed(FENCE, (x_m, y_m)):
         return
     mission = msgspec.structs.replace(mission_of_route(straight_to((x_m, y_m), (80.0, 30.0))), fence=FENCE)
@@ -160,7 +160,7 @@ def test_the_boat_stops_before_the_edge_and_says_why() -> None:
     assert boat.speed_mps < 0.01
 
 
-def test_pushed_out_the_boat_stays_still_or_comes_back() -> None:
+def test_a_boat_pushed_out_stays_still_or_comes_back() -> None:
     mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (30, 4))), fence=FENCE)
     still = DriftingBoat(mission, PAANI, (44.0, 4.0))
     assert still.settle(60.0).inhibits == (Inhibit.OUTSIDE_FENCE,)

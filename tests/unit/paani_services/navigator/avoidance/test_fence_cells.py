@@ -1,4 +1,4 @@
-"""The planner within a fence: what lies beyond it is no water."""
+"""The planner within a fence: cells beyond it are occupied."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ POINT = st.tuples(st.floats(-12.0, 12.0), st.floats(-12.0, 12.0))
 
 
 @given(st.lists(POINT, min_size=3, max_size=7), st.lists(POINT, min_size=3, max_size=5))
-def test_a_cell_is_barred_where_its_middle_is_not_allowed(
+def test_a_cell_is_occupied_where_its_middle_is_not_allowed(
     inner: list[tuple[float, float]], outer: list[tuple[float, float]]
 ) -> None:
-    """Any polygons, crossing themselves included: the same verdict as point by point. No middle lies on an edge."""
+    """For any polygons, even self-crossing ones, the verdict is that of `is_allowed`. No middle lies on an edge."""
     inner, outer = ([(x_m + 0.0137, y_m + 0.0291) for x_m, y_m in corners] for corners in (inner, outer))
     fence = (area(Keep.IN, *inner), area(Keep.OUT, *outer))
     grid = apply_fence(pool(), fence)
@@ -58,8 +58,8 @@ def test_a_cell_is_barred_where_its_middle_is_not_allowed(
             assert bool(grid.occupied[row, column]) is not is_allowed(fence, middle)
 
 
-def test_a_fence_takes_and_gives_nothing() -> None:
-    """Beyond it nothing is free; within it everything stays as it was."""
+def test_a_fence_frees_nothing_and_changes_nothing_inside() -> None:
+    """Beyond the fence nothing is free; within it every cell stays as it was."""
     before = pool(ATHWART)
     after = apply_fence(before, (box(Keep.IN, -50.0, -50.0, 2.0, 50.0),))
     within = np.broadcast_to(np.arange(GRID_CELLS) * CELL_M + before.west_m < 1.9, (GRID_CELLS, GRID_CELLS))
@@ -70,8 +70,8 @@ def test_a_fence_takes_and_gives_nothing() -> None:
     assert apply_fence(before, ()) is before
 
 
-def test_a_fence_lies_in_the_map_and_the_grid_where_it_was_reckoned() -> None:
-    """What is 2 m east on the grid is 5 m east in the map."""
+def test_the_fence_is_shifted_from_the_map_to_the_frame_of_dead_reckoning() -> None:
+    """A place 2 m east on the grid is 5 m east in the map."""
     fence = (box(Keep.IN, -50.0, -50.0, 5.0, 50.0),)
     east_m = np.arange(GRID_CELLS) * CELL_M + pool().west_m
     barred = apply_fence(pool(), fence, (3.0, 0.0)).occupied
@@ -87,8 +87,8 @@ def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) ->
     assert math.copysign(1.0, found.heading_rad) == -side
 
 
-def test_no_way_where_the_fence_leaves_none() -> None:
-    """With the same water and no fence there is one."""
+def test_the_boat_stops_where_the_fence_leaves_no_candidate() -> None:
+    """On the same water without the fence it does not stop."""
     at_rest = odometry(START_US, AT_REST)
     fence = (box(Keep.IN, -1.0, -1.0, 1.6, 1.0),)
 

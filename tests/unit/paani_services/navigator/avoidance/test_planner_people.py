@@ -1,4 +1,4 @@
-"""People: those out of sight may have swum on, those aboard something are not in the water."""
+"""People: those out of sight may have swum on, and those aboard a vessel or a pier are not in the water."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from tests.synthetic_water import (
 
 
 def turned_away(seconds: float) -> tuple[ObservationMemory, int]:
-    """Of a boat that saw a swimmer, and has looked astern since."""
+    """The memory of a boat that saw a swimmer, and has looked astern since."""
     return observe_then_look_astern(seconds, detection_of((4.7, -0.3, 5.3, 0.3), 0.4))
 
 
 def reached_m(grid: OccupancyGrid) -> float:
-    """How near to the boat the nearest cell is that the swimmer may have got to."""
+    """Distance from the boat to the nearest cell that the swimmer may have reached."""
     rows, columns = np.nonzero(grid.reachable_unseen)
     away_m = np.hypot(grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5))
     return float(away_m.min(initial=np.inf))
 
 
 def test_a_person_out_of_sight_may_swim_on() -> None:
-    """0.4 m/s from where they were, 3.6 m at most; what that leaves of the way is less by as much."""
+    """They reach cells at 0.4 m/s from where they were, up to 3.6 m; the clearance there falls by as much."""
     reached = []
     for seconds in (3.2, 4.8, 8.0):
         memory, now_us = turned_away(seconds)
@@ -54,10 +54,10 @@ def test_a_person_out_of_sight_may_swim_on() -> None:
         assert reached_m(build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, still)) > 1e9
 
 
-def test_nobody_has_swum_to_where_a_picture_shows_water() -> None:
-    """The boat looks back: what is seen free is free, and the rest is not."""
+def test_a_person_has_not_swum_to_where_a_picture_shows_water() -> None:
+    """The boat looks back: cells seen free are free, and the rest may be reached."""
     memory, now_us = turned_away(4.8)
-    hidden = BoatPose(0.0, 0.0, 0.6)  # the swimmer's place is just outside the picture, half of what is round it is in
+    hidden = BoatPose(0.0, 0.0, 0.6)  # the swimmer is just outside the picture, half of the surroundings inside
     memory = observe_from(hidden, at_us=now_us + 200_000, memory=memory)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
     assert grid.reachable_unseen.any()
@@ -65,11 +65,11 @@ def test_nobody_has_swum_to_where_a_picture_shows_water() -> None:
 
 
 @pytest.mark.parametrize(("x_m", "y_m"), [(0.0, -2.0), (2.5, 2.4)])
-def test_the_boat_is_careful_where_a_person_may_be(x_m: float, y_m: float) -> None:
-    """A swimmer last seen 8 s ago beside the way: the boat goes slower than it would have at once, or not at all."""
+def test_the_boat_goes_slower_where_a_person_may_be(x_m: float, y_m: float) -> None:
+    """A swimmer was last seen 8 s ago beside the path: the boat goes slower than it would have at once, or stops."""
     memory, now_us = turned_away(8.0)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
-    grid = grid._replace(free=~grid.occupied)  # all else is known
+    grid = grid._replace(free=~grid.occupied)  # everything else is known to be free
     start, setpoint = BoatState(x_m, y_m, 0.0, 0.6), GuidanceSetpoint(0.0, 0.6)
     found, at_once = (
         plan_motion(given, start, setpoint, None, PLANNER)
@@ -79,7 +79,7 @@ def test_the_boat_is_careful_where_a_person_may_be(x_m: float, y_m: float) -> No
 
 
 def test_a_person_aboard_is_not_in_the_water() -> None:
-    """In a kayak or on a pontoon: what carries them is nearer than where their foot would lie on the water."""
+    """A kayak or pontoon is nearer than the point where the rider's foot would project to on the water."""
     for label in (Label.VESSEL, Label.PIER):
         side = (3.6, -1.2, 4.2, 1.2)
         carrier, rider = detection_of(side, 0.5, label), detection_of((3.8, -0.25, 4.0, 0.25), 0.8, foot_m=0.35)
@@ -93,11 +93,11 @@ def test_a_person_aboard_is_not_in_the_water() -> None:
     ("swimmer", "carried"),
     [
         ((3.2, -0.3, 3.5, 0.3), True),  # before the hull
-        ((3.8, -0.3, 4.1, 0.3), False),  # nothing there that could carry them
+        ((3.8, -0.3, 4.1, 0.3), False),  # nothing there carries them
     ],
 )
 def test_a_swimmer_is_in_the_water(swimmer: Bar, carried: bool) -> None:
-    """Nearer than the vessel behind them, or with none about: they stay people, with their room."""
+    """People nearer than the vessel behind them, or with none about, stay people, with room around them."""
     hull = (3.6, -1.2, 4.2, 1.2)
     edge = water_edge_of(AT_REST, (hull, swimmer) if carried else (swimmer,))
     boxes = (
@@ -111,7 +111,7 @@ def test_a_swimmer_is_in_the_water(swimmer: Bar, carried: bool) -> None:
 
 
 def test_people_ashore_do_not_swim() -> None:
-    """On a bank, metres behind where the water ends; at the water's edge they may go in."""
+    """A person metres behind where the water ends stays ashore; one at the water's edge may go in."""
     edge = water_edge_of(AT_REST, bank_m=3.0)
     for x_m, moves in ((5.5, False), (3.2, True)):
         observation = observe_from(
@@ -122,7 +122,7 @@ def test_people_ashore_do_not_swim() -> None:
 
 
 def test_a_swimmer_in_the_empty_corner_of_an_aslant_hull_s_box_is_in_the_water() -> None:
-    """The mask ends the water at the swimmer, not lower: nobody is carried there."""
+    """The mask ends the water at the swimmer, not below, so the hull does not carry them."""
     near, far = (3.0, -1.6, 3.6, -1.0), (5.6, 0.8, 6.2, 1.4)
     hull = tuple((3.0 + 0.26 * k, -1.6 + 0.24 * k, 3.6 + 0.26 * k, -1.0 + 0.24 * k) for k in range(11))
     swimmer = (3.8, 0.3, 4.1, 0.9)

@@ -1,4 +1,4 @@
-"""Vessels adrift: told from moored ones in time; out of sight, they come nearer while they are passed or waited for."""
+"""Vessels adrift: they are told from moored ones in time, and taken to come nearer while out of sight."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ HULL: Bar = (4.0, -1.0, 5.0, 1.0)
 
 
 def passed(seconds: float, label: Label = Label.VESSEL) -> tuple[ObservationMemory, int]:
-    """Of a boat that saw this ahead, and has looked astern since."""
+    """The memory of a boat that saw a hull ahead, and has looked astern since."""
     return observe_then_look_astern(seconds, detection_of(HULL, 0.8, label), water_edge_of(AT_REST, (HULL,)))
 
 
 def off_m(grid: OccupancyGrid) -> float:
-    """How far ahead of the boat the nearest of it is."""
+    """Distance ahead of the boat to the nearest cell without clearance."""
     clear_m = clearance_field_m(grid, PLANNER)
     row = int(-grid.south_m / CELL_M)
     columns = np.flatnonzero(clear_m[row] <= 0.0)
@@ -45,8 +45,8 @@ def off_m(grid: OccupancyGrid) -> float:
 
 
 @pytest.mark.parametrize(("seconds", "nearer_m"), [(0.8, 0.0), (3.2, 0.48), (6.4, 0.96), (16.0, 1.2)])
-def test_a_vessel_out_of_sight_drifts(seconds: float, nearer_m: float) -> None:
-    """0.15 m/s (Q6), 1.2 m at most; in trials one at 0.08 m/s came up 0.06 m short of the boat that passed it."""
+def test_a_vessel_out_of_sight_may_drift(seconds: float, nearer_m: float) -> None:
+    """It comes nearer at 0.15 m/s (Q6), up to 1.2 m."""
     memory, now_us = passed(seconds)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
     assert off_m(grid) == pytest.approx(4.0 - nearer_m, abs=1.5 * CELL_M)
@@ -55,14 +55,14 @@ def test_a_vessel_out_of_sight_drifts(seconds: float, nearer_m: float) -> None:
 
 
 @pytest.mark.parametrize("label", [Label.PIER, Label.BUOY])
-def test_what_is_made_fast_drifts_no_further_than_all_that_is_hidden(label: Label) -> None:
+def test_a_pier_or_buoy_drifts_no_further_than_any_occluded_cell(label: Label) -> None:
     memory, now_us = passed(16.0, label)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
     assert not grid.reachable_unseen.any()
     assert off_m(grid) == pytest.approx(4.0 - PLANNER.hidden_drift_m, abs=1.5 * CELL_M)
 
 
-def test_it_has_not_drifted_to_where_a_picture_shows_water() -> None:
+def test_a_vessel_has_not_drifted_to_where_a_picture_shows_water() -> None:
     memory, now_us = passed(12.0)
     memory = observe_from(BoatPose(0.0, 0.0, 0.7), at_us=now_us + 200_000, memory=memory)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us + 200_000, CAMERA, PLANNER)
@@ -73,7 +73,7 @@ def test_it_has_not_drifted_to_where_a_picture_shows_water() -> None:
 def watched(
     velocity_mps: tuple[float, float], x_m: float, y_m: float, label: Label = Label.VESSEL
 ) -> tuple[DynamicObstacle, ...]:
-    """What moves for certain, when a boat at rest has watched this for 8 s; it came to that place last."""
+    """The obstacles that move for certain, after a boat at rest has watched a hull for 8 s on its way to this place."""
     memory, at_us = ObservationMemory(), START_US
     for k in range(41):
         left_s = 0.2 * (40 - k)
@@ -89,24 +89,24 @@ def watched(
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.13), (-0.13, 0.0), (-0.09, -0.09)])
 @pytest.mark.parametrize("side_m", [0.0, 2.2, -2.2])  # at 2.2 m one end is outside the picture
-def test_a_vessel_adrift_is_told_from_a_moored_one_in_time(velocity: tuple[float, float], side_m: float) -> None:
-    """0.13 m/s is 0.33 m in `fit_s`, which one row of the mask is worth at 4 m; in 8 s it is 1 m."""
+def test_a_vessel_adrift_is_told_from_a_moored_one_in_8_s(velocity: tuple[float, float], side_m: float) -> None:
+    """0.13 m/s is 0.33 m in `fit_s`, as much as one row of the mask at 4 m; in 8 s it is 1 m."""
     (vessel,) = watched(velocity, 4.0, side_m)
     assert vessel.velocity[:2] == pytest.approx(velocity, abs=0.06)
 
 
 @pytest.mark.parametrize("side_m", [0.0, 2.2])
-def test_a_moored_vessel_stands(side_m: float) -> None:
+def test_a_moored_vessel_is_static(side_m: float) -> None:
     assert watched((0.0, 0.0), 4.0, side_m) == ()
 
 
-def test_a_pier_is_given_no_such_time() -> None:
+def test_a_pier_is_never_adrift() -> None:
     assert watched((-0.1, 0.0), 4.0, 0.0, Label.PIER) == ()
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_boat_that_waits_turns_to_where_it_wants_to_go(side: float) -> None:
-    """What passes out of sight is seen so, and the course it keeps is told; hulls that cannot turn on the spot stay."""
+def test_a_waiting_boat_pivots_to_its_course(side: float) -> None:
+    """It sees what passes and keeps to its course; a hull that cannot pivot stays as it is."""
     grid = build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
     resting, setpoint = BoatState(0.0, 0.0, 0.0), GuidanceSetpoint(1.8 * side, 0.6)
     drifting = DynamicObstacle(
@@ -125,8 +125,8 @@ def test_a_boat_that_waits_turns_to_where_it_wants_to_go(side: float) -> None:
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 60.0, 170.0])
-def test_a_boat_leaves_where_something_unseen_may_have_got_to(course_deg: float) -> None:
-    """More cases in which the boat moves: it had lain there, open water ahead, until it was run into (harbour-21)."""
+def test_a_boat_leaves_where_an_unseen_obstacle_may_have_got_to(course_deg: float) -> None:
+    """A boat inside cells that an unseen obstacle may have reached moves away from it, with open water ahead."""
     grid, start = (
         build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER),
         BoatState(0.0, 0.0, 0.0),
@@ -136,7 +136,7 @@ def test_a_boat_leaves_where_something_unseen_may_have_got_to(course_deg: float)
     grid = grid._replace(reachable_unseen=(np.hypot(east_m, north_m) < 2.8) & ~grid.free)
     assert clearance_field_m(grid, PLANNER)[GRID_CELLS // 2, GRID_CELLS // 2] < -0.3
     coming = DynamicObstacle(np.array([-1.6]), np.array([1.2]), 0.2, Velocity(0.1, -0.08, 0.05), 14.0, frozenset())
-    assert predicted_clearance_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here already
+    assert predicted_clearance_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here
     found = plan_motion(grid, start, GuidanceSetpoint(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
     assert 0.0 < found.speed_mps < 0.6
     on = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)

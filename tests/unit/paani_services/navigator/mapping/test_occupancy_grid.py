@@ -65,7 +65,7 @@ def test_q1_a_pixel_of_the_water_comes_back_to_its_point(
     east, north = ahead_m, aside * ahead_m
     x_m = boat.x_m + math.cos(yaw) * east - math.sin(yaw) * north
     y_m = boat.y_m + math.sin(yaw) * east + math.cos(yaw) * north
-    eye = Eye(up_m=0.9)  # on the water where the body's origin is
+    eye = Eye(up_m=0.9)  # at the body's origin, on the water
     u_px, v_px = project(np.array([[x_m, y_m, 0.0]]), boat, eye)[0]
     camera_model = pinhole_at(Pose(boat.x_m, boat.y_m, yaw, roll, pitch), CAMERA.calibration, ASPECT)
     given_rays = pixel_rays(camera_model, np.array([u_px / 320]), np.array([v_px / 240]))
@@ -74,8 +74,8 @@ def test_q1_a_pixel_of_the_water_comes_back_to_its_point(
     assert camera_model.position_m[1] + float(range_m[0] * given_rays.north[0]) == pytest.approx(y_m, abs=1e-6)
 
 
-def test_q1_a_mount_that_is_turned_is_turned_back() -> None:
-    """Mount pitch, roll and yaw as the boat's own, and a principal point off the middle."""
+def test_q1_the_mount_s_rotation_is_taken_into_account() -> None:
+    """Pitch, roll and yaw of the mount act as the boat's own; the principal point may lie off the middle."""
     turned = CalibrationConfig(
         hfov_deg=70.0,
         height_m=0.9,
@@ -127,7 +127,7 @@ def test_open_water_is_free_from_the_picture_s_lower_end_to_the_range_limit() ->
     assert not grid.occupied.any()
 
 
-def test_what_ends_the_water_is_occupied_and_what_lies_behind_it_unknown() -> None:
+def test_the_water_s_end_is_occupied_and_cells_behind_it_unknown() -> None:
     grid = grid_of(observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M)))
     assert cell(grid, 3.5, 0.0) == "free"
     rows, columns = np.nonzero(grid.occupied)
@@ -156,7 +156,7 @@ def test_q3_lifetimes() -> None:
 
 @pytest.mark.parametrize("config", [PAPER, PLANNER])
 def test_q3_occupied_wins_for_its_lifetime(config: PlannerConfig) -> None:
-    """Pictures that show open water there do not free a cell that one saw occupied (Q3), or two, less than 2 s ago."""
+    """Pictures of open water do not free a cell that one picture (Q3), or two, saw occupied less than 2 s ago."""
     vouched_us = 0 if config is PAPER else 200_000
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), at_us=START_US - 200_000)
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), memory=memory)
@@ -166,7 +166,7 @@ def test_q3_occupied_wins_for_its_lifetime(config: PlannerConfig) -> None:
         assert cell(grid_of(memory, config=config), 5.0, 0.0) == expected
 
 
-def test_what_one_picture_alone_shows_two_later_ones_deny() -> None:
+def test_an_obstacle_in_one_picture_alone_is_outvoted_by_two_later_ones() -> None:
     """A glint of the sun is gone within two pictures; the paper's lifetimes keep it for 2 s."""
     memory = observe_from(at_us=START_US - 200_000)
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M), memory=memory)
@@ -176,8 +176,8 @@ def test_what_one_picture_alone_shows_two_later_ones_deny() -> None:
         memory = observe_from(at_us=START_US + 200_000 * (pictures + 1), memory=memory)
 
 
-def test_a_thing_whose_edge_wavers_by_a_cell_is_not_denied() -> None:
-    """Two pictures show it, each a cell off the other: they vouch for each other."""
+def test_an_obstacle_whose_edge_moves_by_a_cell_is_not_outvoted() -> None:
+    """Two pictures that show it a cell apart confirm each other."""
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     memory = observe_from(
         edge=water_edge_of(AT_REST, ((5.2, -1.0, 5.8, 1.0),)), at_us=START_US + 200_000, memory=memory
@@ -187,8 +187,8 @@ def test_a_thing_whose_edge_wavers_by_a_cell_is_not_denied() -> None:
         assert cell(grid_of(memory), 5.0, 0.0) == cell(grid_of(memory), 5.4, 0.0) == "occupied"
 
 
-def test_what_is_out_of_sight_stays_occupied_longer() -> None:
-    """Turned away from it, the boat remembers a bar for `hidden_s`; the paper's lifetimes forget it."""
+def test_cells_out_of_sight_stay_occupied_longer() -> None:
+    """A boat that turned away remembers a bar for `hidden_s`; the paper's lifetimes forget it."""
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     away = BoatPose(0.0, 0.0, 1.5)
     for later_us in range(200_000, 21_000_000, 200_000):
@@ -199,8 +199,8 @@ def test_what_is_out_of_sight_stays_occupied_longer() -> None:
         assert cell(paper, 5.0, 0.0) == ("occupied" if later_us <= 2_000_000 else "unknown")
 
 
-def test_a_thing_stands_where_its_box_ends_below() -> None:
-    """Box bottom, as wide as the box, though the mask calls it water."""
+def test_a_small_obstacle_stands_at_the_lower_end_of_its_box() -> None:
+    """It occupies the width of its box, though the mask shows water there."""
     corners = np.array([[4.0, -0.4, 0.0], [4.0, 0.4, 0.0]])
     (left, low), (right, _) = project(corners, AT_REST, EYE) / (320, 240)
     box = (min(left, right), low - 0.2, max(left, right), low)
@@ -211,7 +211,7 @@ def test_a_thing_stands_where_its_box_ends_below() -> None:
 
 
 def test_people_are_given_more_room() -> None:
-    """Round a swimmer 0.8 m are occupied too; round a buoy of the same box they are not."""
+    """Cells within 0.8 m of a swimmer are occupied too; around a buoy with the same box they are not."""
     corners = np.array([[4.0, -0.3, 0.0], [4.0, 0.3, 0.0]])
     (left, low), (right, _) = project(corners, AT_REST, EYE) / (320, 240)
     box = (min(left, right), low - 0.1, max(left, right), low)
@@ -224,8 +224,8 @@ def test_people_are_given_more_room() -> None:
     assert found[Label.BUOY] == ["occupied", "free", "free", "free"]
 
 
-def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
-    """The lower end of its box is that of its near end; where the mask looks through it, the box counts."""
+def test_a_hull_that_lies_aslant_stands_where_the_mask_ends_the_water() -> None:
+    """The lower end of its box is that of its near end; it counts only where the mask misses the hull."""
     aslant = tuple(0.45 + 0.005 * column for column in range(80))
     box = (0.0, 0.42, 1.0, aslant[-1])
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
@@ -238,7 +238,7 @@ def test_a_hull_that_lies_aslant_stands_where_the_mask_says() -> None:
     )
 
 
-def test_a_column_that_a_box_covers_in_part_is_not_looked_through() -> None:
+def test_a_column_that_a_box_covers_in_part_is_not_missed_by_the_mask() -> None:
     """The near end of this hull is at the left; beside its right end the mask shows the water behind it."""
     aslant = (*(0.99 - 0.012 * column for column in range(26)), *([0.3] * 54))
     vessel, wider = (
@@ -252,13 +252,13 @@ def test_a_column_that_a_box_covers_in_part_is_not_looked_through() -> None:
 
 
 def test_a_hull_is_whole_and_as_deep_as_it_is_wide() -> None:
-    """The mask takes its bow for water, and shows its side alone: 2 m wide at 4 m, it is 2 m deep."""
+    """The mask takes its bow for water and shows its side alone: 2 m wide at 4 m, it is 2 m deep."""
     side = water_edge_of(AT_REST, ((4.0, -1.0, 4.4, 1.0),))
     columns = [column for column, end in enumerate(side) if end > 0.5]
     bow = columns[: len(columns) // 3]
     far = water_edge_of(AT_REST)[bow[0]]
     holed = tuple(far if column in bow else end for column, end in enumerate(side))
-    box = (columns[0] / 80, 0.0, (columns[-1] + 1) / 80, max(side))  # mast and all
+    box = (columns[0] / 80, 0.0, (columns[-1] + 1) / 80, max(side))  # the box includes the mast
     vessel = Detection(label=Label.VESSEL, confidence=0.9, box_xyxy=box)
     grid = grid_of(observe_from(edge=holed, detections=(vessel,)))
     for x_m, y_m, expected in ((4.2, 0.7, "occupied"), (4.2, -0.7, "occupied"), (5.7, 0.0, "occupied")):
@@ -267,8 +267,8 @@ def test_a_hull_is_whole_and_as_deep_as_it_is_wide() -> None:
     assert cell(grid, 3.4, 0.7) == cell(grid, 4.2, 1.5) == "free"
 
 
-def test_what_stands_before_a_vessel_is_no_part_of_it() -> None:
-    """A post 3 m ahead, a ship far behind it and one 6 m away: neither is drawn to the post."""
+def test_an_obstacle_before_a_vessel_is_no_part_of_it() -> None:
+    """A post stands 3 m ahead, and a ship far behind it or one 6 m away: neither is drawn to the post."""
     post = ((3.0, -0.1, 3.2, 0.1),)
     for x_m, low in ((6.0, None), (60.0, 0.42)):
         corners = np.array([[x_m, -1.5, 0.0], [x_m, 1.5, 0.0]])
@@ -296,14 +296,14 @@ def test_a_box_cut_below_stands_nearer_than_the_picture_shows() -> None:
     assert cell(grid, 1.4, 0.0) == "occupied"
 
 
-def test_no_water_at_the_bottom_is_something_at_the_bottom() -> None:
+def test_a_picture_without_water_occupies_the_cells_nearest_to_the_boat() -> None:
     grid = grid_of(observe_from(edge=(1.0,) * 80))
     assert not grid.free.any()
     assert cell(grid, 2.0, 0.0) == "occupied"
 
 
 def test_water_above_the_horizon_is_no_water() -> None:
-    """A meadow read as water reaches above the horizon: its columns say nothing. Two degrees are forgiven."""
+    """A meadow taken for water reaches above the horizon, and its columns do not count. Two degrees are tolerated."""
     horizon = min(water_edge_of(AT_REST)) - 1 / 64
     assert cell(grid_of(observe_from(edge=(horizon - 0.04,) * 80)), 4.0, 0.0) == "free"
     assert not grid_of(observe_from(edge=(horizon - 0.12,) * 80)).free.any()
@@ -312,7 +312,7 @@ def test_water_above_the_horizon_is_no_water() -> None:
 
 @pytest.mark.parametrize("roll", [-0.15, 0.15])
 @pytest.mark.parametrize("pitch", [-0.03, 0.06])
-def test_roll_and_pitch_move_nothing_on_the_water(roll: float, pitch: float) -> None:
+def test_roll_and_pitch_do_not_move_obstacles(roll: float, pitch: float) -> None:
     boat = BoatPose(0.0, 0.0, 0.0, roll_rad=roll, pitch_rad=pitch)
     grid = grid_of(observe_from(boat, water_edge_of(boat, AHEAD_5_M)))
     rows, columns = np.nonzero(grid.occupied)
@@ -322,16 +322,16 @@ def test_roll_and_pitch_move_nothing_on_the_water(roll: float, pitch: float) -> 
     assert 0.6 < y_m.max() < 1.4
 
 
-def test_nothing_of_a_boat_that_sees_too_little_is_beside_it() -> None:
-    """A camera that looks level, or from high up, is blind further than `blind_m`: unknown stays unknown."""
+def test_a_camera_that_is_blind_too_far_has_no_blind_zone() -> None:
+    """A camera that looks level, or from high up, is blind beyond `blind_m`, and unknown cells stay unknown."""
     assert 1.9 < blind_zone_radius_m(ASPECT, CAMERA, PLANNER) < 2.6
     for sets in (["eye.pitch_down_deg=-30"], ["eye.camera_height_m=3"]):
         camera = Camera(calibration_of(load_config(sets=sets).eye))
         assert blind_zone_radius_m(ASPECT, camera, PLANNER) == 0.0
 
 
-def test_the_own_hull_hides_the_water_below_it() -> None:
-    """Free begins above the hull's upper edge in each column."""
+def test_the_own_hull_occludes_the_water_below_it() -> None:
+    """Free cells begin above the hull's upper edge in each column."""
     hull = ((0.3, 1.0), (0.4, 0.8), (0.6, 0.8), (0.7, 1.0))
     assert own_hull_top(hull, np.array([0.1, 0.35, 0.5, 0.9])) == pytest.approx([1.0, 0.9, 0.8, 1.0])
     memory = observe_from()

@@ -1,4 +1,4 @@
-"""What is remembered of the pictures: which, where from, and for how long."""
+"""The memory of observations: which are kept, from which pose, and for how long."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def grid_of(memory: ObservationMemory, age_s: float) -> OccupancyGrid:
         {"height_px": 0},
     ],
 )
-def test_what_is_no_free_space_evidence_is_not_remembered(changes: dict[str, object]) -> None:
+def test_only_free_space_evidence_is_remembered(changes: dict[str, object]) -> None:
     """F2: a fallback mask never frees a cell, nor does a recording or an unusable picture."""
     shown = evidence(START_US, water_edge_of(AT_REST))
     assert is_free_space_evidence(shown)
@@ -53,7 +53,7 @@ def test_what_is_no_free_space_evidence_is_not_remembered(changes: dict[str, obj
 
 
 def test_a_picture_without_odometry_near_it_is_not_remembered() -> None:
-    """Roll, pitch and place must be known within `max_pose_gap_s` of the picture."""
+    """Attitude and position must be known within `max_pose_gap_s` of the picture."""
     known = update_memory(ObservationMemory(), odometry(START_US, AT_REST), None, PLANNER)
     gap_us = round(PLANNER.max_pose_gap_s * 1e6)
     open_water = water_edge_of(AT_REST)
@@ -73,8 +73,8 @@ def test_the_pose_between_two_odometries_lies_between_them() -> None:
     assert pose.yaw_rad == pytest.approx(3.1 + 0.25 * (2.0 * math.pi - 6.2))
 
 
-def test_what_was_seen_stays_where_it_is_while_gps_wanders() -> None:
-    """The position strays by 3 m under a boat at rest, and jumps by 8: nothing seen is nearer or further for it."""
+def test_observations_do_not_move_with_the_gps_position() -> None:
+    """The GPS position of a boat at rest strays by 3 m, and jumps by 8: nothing observed comes nearer or goes away."""
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     before = grid_of(memory, age_s=1.5)
     for k in range(1, 16):
@@ -88,8 +88,10 @@ def test_what_was_seen_stays_where_it_is_while_gps_wanders() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-0.8, 0.8), st.floats(-0.3, 0.3), st.floats(-3.1, 3.1), st.floats(-0.3, 0.3))
-def test_the_way_over_ground_is_reckoned(surge: float, sway: float, yaw: float, rate: float) -> None:
-    """Against the sum of what each twentieth of a second adds, over 5 s."""
+def test_the_position_is_dead_reckoned_from_the_velocity_over_ground(
+    surge: float, sway: float, yaw: float, rate: float
+) -> None:
+    """It agrees with the sum of the steps of 1/20 s over 5 s."""
     memory = update_memory(ObservationMemory(), odometry(START_US, BoatPose(3.0, 4.0, yaw)), None, PLANNER)
     x_m, y_m = 3.0, 4.0
     for k in range(1, 101):
@@ -109,12 +111,12 @@ def test_the_way_over_ground_is_reckoned(surge: float, sway: float, yaw: float, 
         odometry(START_US + round(PLANNER.max_reckon_s * 1e6) + 1, AT_REST),
     ],
 )
-def test_another_epoch_or_a_gap_forgets_what_was_seen(after: Odometry) -> None:
-    """The boat may be anywhere under the cells: unknown is the safe direction."""
+def test_another_epoch_or_a_gap_forgets_all_observations(after: Odometry) -> None:
+    """The boat may be anywhere on the grid: unknown is the safe direction."""
     assert update_memory(observe_from(), after, None, PLANNER).observations == ()
 
 
 @pytest.mark.parametrize("changes", [{"surge_mps": math.nan}, {"sway_mps": math.inf}, {"healthy": False}])
-def test_odometry_that_is_unusable_is_no_way(changes: dict[str, float]) -> None:
+def test_unusable_odometry_is_not_dead_reckoned(changes: dict[str, float]) -> None:
     memory = observe_from()
     assert update_memory(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
