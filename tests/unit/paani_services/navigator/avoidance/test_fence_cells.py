@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.messages import FenceArea, Keep, Waypoint
@@ -44,6 +44,7 @@ def pool(*bars: Bar) -> OccupancyGrid:
 POINT = st.tuples(st.floats(-12.0, 12.0), st.floats(-12.0, 12.0))
 
 
+@settings(deadline=None)
 @given(st.lists(POINT, min_size=3, max_size=7), st.lists(POINT, min_size=3, max_size=5))
 def test_a_cell_is_occupied_where_its_middle_is_not_allowed(
     inner: list[tuple[float, float]], outer: list[tuple[float, float]]
