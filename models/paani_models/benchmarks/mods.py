@@ -20,10 +20,10 @@ OBSTACLE, WATER, SKY = 0, 1, 2
 COLOURS = ((0, 0, 0), (255, 0, 0), (0, 255, 0))  # RGB
 SIZE_WH = (1278, 958)
 EDGE_TOLERANCE_PX = 20
-MIN_OVERLAP = 0.5  # its code; its readme says 0.15
+MIN_OVERLAP = 0.5  # share of an object's area; the benchmark's code has this, its readme says 0.15
 MIN_AREA_PX = 25
-EXPANDED_FRAC = 0.01  # of the width: around land and objects nothing is a false alarm
-WIDER = 1.1  # of a blob on a found object, what is wider than the object by this factor may be a false alarm
+EXPANDED_FRAC = 0.01  # of the width: margin around land and objects in which nothing is a false alarm
+WIDTH_FACTOR = 1.1  # a blob wider than the found object by more than this factor holds false alarms
 ZONE_RADIUS_M = 15.0
 CAMERA_HEIGHT_M = 1.0
 ZONE_HALF_ANGLE_DEG = 40.0
@@ -164,7 +164,7 @@ class ModsTally:
                 if each in found and covered > MIN_OVERLAP * each.area:
                     widths.append(each.bbox[2])
                 inside |= covered > MIN_OVERLAP * area
-            wide = max(0, int((width - sum(widths)) / (WIDER * max(widths))) - 1) if widths else 0
+            wide = max(0, int((width - sum(widths)) / (WIDTH_FACTOR * max(widths))) - 1) if widths else 0
             alarms = wide if widths else int(not inside)
             self.objects[0, 2] += alarms
             self.objects[1, 2] += alarms if zone[y : y + height, x : x + width].any() else 0

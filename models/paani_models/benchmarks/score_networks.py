@@ -1,4 +1,4 @@
-"""The networks on data sets in the layouts of LaRS and MODS, scored by those protocols and written in their formats.
+"""Score the networks on data sets in the layouts of LaRS and MODS, and write predictions in their formats.
 
 LARS/image_list.txt, images/NAME.jpg, semantic_masks/, panoptic_masks/, panoptic_annotations.json
 MODS/mods.json, sequences/NAME/frames/FILE, calibration/calibration-BASE.yaml
@@ -116,7 +116,7 @@ def annotated_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
 
 
 def drop_ignored(rows: F32, ignored: Bools) -> F32:
-    """Rows of which no more than half lies in the ignored part of the picture."""
+    """Keep the rows of which no more than half lies in the ignored part of the picture."""
     kept = []
     for row in rows:
         x1, y1, x2, y2 = np.round(row[1:]).astype(int)

@@ -28,7 +28,7 @@ ROLES = ("detector", "segmenter")
 def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `paani models convert`."""
     parser.add_argument("models", type=Path, nargs="*", metavar="MODEL.onnx", help="the shipped pair if not given")
-    parser.add_argument("--role", choices=ROLES, help="told from the output if not given")
+    parser.add_argument("--role", choices=ROLES, help="inferred from the output if not given")
     parser.add_argument("--out", type=Path, metavar="DIR", help="beside the model if not given")
     parser.add_argument("--pnnx", type=Path, metavar="FILE", help="the converter; found on the PATH if not given")
 

@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="compare the shipped files with their manifest, or judge a file of yours")
     check.add_argument("model", type=Path, nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
-    check.add_argument("--role", choices=PAIR, help="told from the output if not given")
+    check.add_argument("--role", choices=PAIR, help="inferred from the output if not given")
     check.add_argument("--score", action="store_true", help="also its figures on the held-out pictures of --data")
     check.add_argument("--weights", type=Path, default=WEIGHTS)
 

@@ -126,7 +126,7 @@ def format_counts(seen: Sequence[ReadSample]) -> str:
 def check_own_pictures(samples: Sequence[Sample], folder_of: FolderOf, manifest: Path | None = None) -> None:
     """Read everything, print the counts, write the manifests as one file if wanted.
 
-    Raises UserError for whatever `read_everything` refuses, and where a held-out picture leaks into training, naming
+    Raises UserError for whatever `read_all_samples` refuses, and where a held-out picture leaks into training, naming
     both pictures of each pair.
     """
     seen = read_all_samples(samples, folder_of)

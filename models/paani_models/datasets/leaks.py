@@ -88,7 +88,7 @@ def hash_distance(first: int, second: int) -> int:
 def find_leaks(pictures: Sequence[Fingerprint], near_bits: int = MAX_HASH_DISTANCE) -> list[Leak]:
     """Every leak between any two splits, the certain causes first; a pair is named once.
 
-    A view leaks where its hash differs in at most `near_bits` and its thumbnail correlates by NEAR_CORRELATION:
+    A view leaks where its hash differs in at most `near_bits` and its thumbnail correlates by MIN_CORRELATION:
     a bow that fills half of every frame alone does not reach that.
     """
     found: dict[tuple[str, str], Leak] = {}

@@ -60,7 +60,7 @@ class _SourceItems(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class PackedBundle:
-    """What was written."""
+    """Size, number of pictures and JPEG quality of the bundle written."""
 
     size_bytes: int
     pictures: int
@@ -121,7 +121,7 @@ def shrink_to_cover(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def cover_size_wh(wh: tuple[int, int]) -> tuple[int, int]:
-    """The size to which `covering` brings a picture."""
+    """The size to which `shrink_to_cover` brings a picture."""
     scale = min(1.0, max(SIZE_WH[0] / wh[0], SIZE_WH[1] / wh[1]))
     return round(wh[0] * scale), round(wh[1] * scale)
 

@@ -102,7 +102,7 @@ def prepare_waterscenes(
     """Write the new folder `out`: images/, labels/ and manifest.json; return the manifest and the leaks let pass.
 
     strict: refuse splits that share bytes or all but the same view. The official lists do not promise that they do
-    not, so otherwise such pairs are only told. missing_is_empty: a picture without a label file shows no object.
+    not, so otherwise such pairs are only reported. missing_is_empty: a picture without a label file shows no object.
     Raises UserError, leaving nothing behind, for whatever `read_lists` refuses, a folder or file that is missing, a
     picture that cannot be read, and a bad box: the first by name, the others counted.
     """

@@ -155,7 +155,7 @@ def summarise_class(judged: Sequence[ClassMatches]) -> dict[str, float]:
 
 
 def class_figures(found: list[Detections], truths: list[F32], kind: int) -> dict[str, float]:
-    """`summary` of one class. truths: per picture float32 [n,5], class and corners."""
+    """`summarise_class` of one class. truths: per picture float32 [n,5], class and corners."""
     return summarise_class([match_class(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
 
 

@@ -47,7 +47,7 @@ def jitter_hsv(rng: Rng, picture: NDArray[np.uint8], augmentation: Augmentation)
 def augment_paper_example(
     rng: Rng, items: list[BoxedPicture], target_wh: tuple[int, int], augmentation: Augmentation
 ) -> TrainingExample:
-    """One example: of one picture, or a mosaic of four."""
+    """Augment one picture, or a mosaic of four, into a training example."""
     example = (
         _mosaic(rng, items, target_wh, augmentation)
         if len(items) == 4
@@ -94,7 +94,7 @@ def _mosaic(
 def _random_scale_and_shift(
     rng: Rng, centre: NDArray[np.float64], target_wh: tuple[int, int], augmentation: Augmentation
 ) -> F32:
-    """Scale about a point, which comes to lie near the target's middle."""
+    """Scale about a point and shift it to near the target's centre, both at random."""
     scale = 1.0 + rng.uniform(-1, 1) * augmentation.scale
     middle = (0.5 + rng.uniform(-1, 1, 2) * augmentation.translate_frac) * target_wh
     return np.array([[scale, 0, middle[0] - scale * centre[0]], [0, scale, middle[1] - scale * centre[1]]], np.float32)
@@ -107,6 +107,6 @@ def _flip_randomly(rng: Rng, affine: F32, width_px: int, augmentation: Augmentat
 
 
 def _compose_affine(first: F32, second: F32) -> F32:
-    """`first`, then `second`."""
+    """Compose two affine maps: `first`, then `second`."""
     linear = second[:, :2] @ first[:, :2]
     return np.hstack([linear, (second[:, :2] @ first[:, 2] + second[:, 2])[:, None]]).astype(np.float32)

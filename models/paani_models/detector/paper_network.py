@@ -53,7 +53,7 @@ class ResidualBlock(nn.Module):
 
 
 class NestedCspBlock(nn.Module):
-    """Half of the channels through two residuals, half past them."""
+    """Nested cross-stage partial block (C3k): half of the channels through two residual blocks, half past them."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -67,7 +67,7 @@ class NestedCspBlock(nn.Module):
 
 
 class CspBlock(nn.Module):
-    """Two halves, one of them also through a block; all three joined. `deep`: the block is itself partial."""
+    """Cross-stage partial block (C3k2): two halves, one also through a block, all joined. deep: the block is nested."""
 
     def __init__(self, cin: int, cout: int, deep: bool, inner_frac: float = 0.5) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class CspBlock(nn.Module):
 
 
 class PyramidPooling(nn.Module):
-    """Spatial pyramid pooling: one 5x5 maximum after another, all kept."""
+    """Spatial pyramid pooling (SPPF): one 5x5 maximum after another, all kept."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -96,7 +96,7 @@ class PyramidPooling(nn.Module):
 
 
 class Attention(nn.Module):
-    """Every cell attends to every other; a depthwise convolution of the values tells it where they are."""
+    """Multi-head self-attention over cells (Vaswani et al. 2017); a depthwise convolution encodes their position."""
 
     def __init__(self, channels: int, heads: int) -> None:
         super().__init__()
@@ -115,7 +115,7 @@ class Attention(nn.Module):
 
 
 class PartialAttention(nn.Module):
-    """Half of the channels past, half through attention and a small dense net."""
+    """Half of the channels past, half through self-attention and a small dense network (C2PSA)."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()

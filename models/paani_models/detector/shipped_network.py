@@ -115,7 +115,7 @@ class Head(nn.Module):
 
 
 class Detector(nn.Module):
-    """Modules are registered in the order in which they run, which `load_yolox` relies on."""
+    """Modules are registered in the order in which they run, which `load_yolox_weights` relies on."""
 
     def __init__(self) -> None:
         super().__init__()

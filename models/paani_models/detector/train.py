@@ -65,7 +65,7 @@ class DetectorRecipe:
 
 
 def draw_epoch(pictures: list[BoxedPicture], recipe: DetectorRecipe, epoch: int) -> list[int]:
-    """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
+    """Shuffled picture indices of one epoch, balanced by DRAWS_PER_EPOCH; -1 stands for a null picture."""
     rng = np.random.default_rng((recipe.seed, epoch))
     places: dict[str, list[int]] = defaultdict(list)
     for index, item in enumerate(pictures):

@@ -51,7 +51,7 @@ class TimingRow(msgspec.Struct, frozen=True):
 
 
 class NetCost(msgspec.Struct, frozen=True):
-    """What a network weighs, and costs per frame.
+    """File sizes and work per frame of a network.
 
     multiply_adds: None where onnx, which tells them, is not installed.
     """
@@ -93,7 +93,7 @@ class EngineReport(msgspec.Struct, frozen=True):
 
 
 def load_networks(weights: Path) -> dict[str, NetworkFile]:
-    """Both networks of a weights folder. Raises UserError naming a file that is missing or corrupt."""
+    """Load both networks of a weights folder. Raises UserError naming a file that is missing or corrupt."""
     return {
         role: NetworkFile(load_catalogue(weights)[role], verified_path(role, weights)) for role in PAPER_MULTIPLY_ADDS
     }
@@ -102,7 +102,10 @@ def load_networks(weights: Path) -> dict[str, NetworkFile]:
 def prepare_cases(
     nets: Mapping[str, NetworkFile], engines: Sequence[str], threads: Sequence[int]
 ) -> dict[Case, Callable[[], object]]:
-    """Each network ready to run on a drawn scene. Raises UserError for an engine or a file that cannot be used."""
+    """Prepare each network to run on a synthetic scene.
+
+    Raises UserError for an engine or a file that cannot be used.
+    """
     return {
         Case(engine, role, count): _bind_input(net, open_ncnn(verified_ncnn_files(net.file), count))
         if engine == "ncnn"
@@ -142,7 +145,7 @@ def summarise_times(times_ms: Mapping[Case, list[float]]) -> tuple[TimingRow, ..
 
 
 def choose_engine(found: Sequence[TimingRow], agreements: Sequence[Agreement], max_difference: float) -> Choice:
-    """The engine whose fastest number of threads runs the pair in the least time, by medians.
+    """Choose the engine whose fastest number of threads runs the pair in the least time, by medians.
 
     ncnn only where it answers as onnxruntime does, and ran every network that onnxruntime ran; onnxruntime where they
     draw.
@@ -164,7 +167,7 @@ def choose_engine(found: Sequence[TimingRow], agreements: Sequence[Agreement], m
 
 
 def measure_costs(nets: Mapping[str, NetworkFile]) -> tuple[NetCost, ...]:
-    """Sizes of the files that are there, and the work of one run."""
+    """Measure the sizes of the files that exist, and count the work of one run."""
     found = []
     for role, net in nets.items():
         files = ncnn_files(net.file)
@@ -177,7 +180,10 @@ def measure_costs(nets: Mapping[str, NetworkFile]) -> tuple[NetCost, ...]:
 
 
 def measure_agreements(nets: Mapping[str, NetworkFile], inputs: Mapping[str, Inputs]) -> tuple[Agreement, ...]:
-    """One per net. Raises UserError for an engine or a file that cannot be used."""
+    """Measure the agreement of both engines for each network.
+
+    Raises UserError for an engine or a file that cannot be used.
+    """
     return tuple(
         Agreement(
             role,

@@ -32,7 +32,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def infer_role(path: Path, asked: str | None) -> str:
-    """ "segmenter" or "detector" by what comes out. Raises UserError where that cannot be told."""
+    """Infer "segmenter" or "detector" from the output's shape. Raises UserError where it fits neither."""
     if asked is not None:
         return asked
     shape = open_session(path, 1).get_outputs()[0].shape
@@ -42,7 +42,7 @@ def infer_role(path: Path, asked: str | None) -> str:
 
 
 def inspect_model(path: Path, role: str) -> list[Finding]:
-    """Every finding, in the order of the checks. Raises UserError for a file that is no ONNX model."""
+    """Run every check and return the findings in order. Raises UserError for a file that is no ONNX model."""
     contract = read_contract(path, role)
     session = open_session(path, 1)
     findings = list(_check_shapes(session, contract, role))
@@ -162,7 +162,7 @@ def synthetic_inputs(contract: Model) -> dict[str, F32 | NDArray[np.uint8]]:
 
 
 def to_network_input(picture: NDArray[np.uint8], contract: Model) -> F32 | NDArray[np.uint8]:
-    """A network-sized RGB picture [H,W,3] as the network takes it."""
+    """Convert an RGB picture [H,W,3] of the input's size to the network's input."""
     if contract.input.dtype == "uint8":
         return picture[None]
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))

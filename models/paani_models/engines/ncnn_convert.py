@@ -110,13 +110,13 @@ def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> Ncn
 
 
 def find_untranslated_layers(param: str) -> list[str]:
-    """Kinds of layers that pnnx could not translate: it leaves them under their dotted names."""
+    """Find the layers that pnnx could not translate, which it leaves under their dotted names."""
     kinds = [line.split()[0] for line in param.splitlines()[2:] if line.strip()]
     return sorted({kind for kind in kinds if "." in kind})
 
 
 def replace_strided_slices(model: onnx.ModelProto) -> onnx.ModelProto:
-    """The same network with every "each second row and column, side by side" as one convolution: ncnn slices without
+    """Replace each concatenation of slices with step 2 (YOLOX's focus layer) by one convolution: ncnn slices without
     steps.
 
     Exact: each weight is 0 or 1. Changes and returns the model.
@@ -156,7 +156,7 @@ def replace_strided_slices(model: onnx.ModelProto) -> onnx.ModelProto:
 def _read_strided_slice(
     name: str, producers: Mapping[str, onnx.NodeProto], constants: Mapping[str, NDArray[np.generic]]
 ) -> tuple[str, int, int] | None:
-    """Of which tensor each second row and column is this, and from which row and column on; None if it is no such."""
+    """Read a slice of every second row and column: its tensor, first row and column; None where it is another."""
     starts: dict[int, int] = {}
     while (node := producers.get(name)) is not None and node.op_type == "Slice":
         values = [constants.get(given) for given in node.input[1:]]

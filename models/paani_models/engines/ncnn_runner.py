@@ -43,7 +43,7 @@ class Conversion(Record, frozen=True):
 
 
 class NcnnFiles(msgspec.Struct, frozen=True):
-    """Where a model's converted files are, whether or not they are there."""
+    """Paths of a model's converted files, whether or not they exist."""
 
     param: Path
     bin: Path
@@ -51,12 +51,12 @@ class NcnnFiles(msgspec.Struct, frozen=True):
 
 
 def ncnn_files(model: Path) -> NcnnFiles:
-    """The names beside a model file."""
+    """Paths of the converted files beside a model file."""
     return NcnnFiles(*(model.with_suffix(f".ncnn.{ending}") for ending in ("param", "bin", "json")))
 
 
 def verified_ncnn_files(model: Path) -> NcnnFiles:
-    """The files beside a model, checksums just compared: ncnn itself dies of some that are damaged.
+    """Paths beside a model, checksums compared: ncnn itself crashes on some damaged files.
 
     Raises UserError naming the file that is missing, corrupt or made from another model, and the command that makes it.
     """
@@ -95,7 +95,8 @@ def blob_before_resize(files: NcnnFiles) -> str | None:
 
 
 def open_ncnn(files: NcnnFiles, threads: int, output: str = OUTPUT) -> Run:
-    """A function from input [1,C,H,W] to an output with a leading 1, computed in float32. The calls release the GIL.
+    """Open a network as a function from input [1,C,H,W] to an output with a leading 1, computed in float32. The calls
+    release the GIL.
 
     Raises UserError where ncnn is not installed, or naming a file that it does not read.
     """

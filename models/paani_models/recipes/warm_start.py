@@ -1,4 +1,4 @@
-"""An exported network back into PyTorch, so that training can go on from weights of which no checkpoint is left.
+"""Load an exported network back into PyTorch, so that training can go on from weights without a checkpoint.
 
 Export folds batch norm into the convolutions. Here each normalisation is given the statistics that its convolution
 shows on pictures, and the scale and offset that undo them: evaluation equals the exported file, and training, which
@@ -76,7 +76,7 @@ def _order_by_execution(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
 
 
 def _find_following_norms(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
-    """Which normalisation follows which convolution; both stand side by side in a `Sequential`."""
+    """Find the normalisation that follows each convolution; both stand side by side in a `Sequential`."""
     found = {}
     for block in model.modules():
         layers = list(block.children()) if isinstance(block, nn.Sequential) else []
@@ -103,15 +103,15 @@ def _set_statistics(norm: nn.BatchNorm2d, mean: Tensor, variance: Tensor, bias: 
 def _take_statistics(
     model: nn.Module, norms: dict[nn.Conv2d, nn.BatchNorm2d], biases: dict[nn.Conv2d, Tensor], pictures: Tensor
 ) -> None:
-    seen: dict[nn.Conv2d, tuple[Tensor, Tensor]] = {}
+    statistics: dict[nn.Conv2d, tuple[Tensor, Tensor]] = {}
 
-    def look(conv: nn.Module, _inputs: tuple[Tensor, ...], output: Tensor) -> None:
+    def record_statistics(conv: nn.Module, _inputs: tuple[Tensor, ...], output: Tensor) -> None:
         assert isinstance(conv, nn.Conv2d)
-        seen[conv] = (output.mean((0, 2, 3)), output.var((0, 2, 3), unbiased=False))
+        statistics[conv] = (output.mean((0, 2, 3)), output.var((0, 2, 3), unbiased=False))
 
-    handles = [conv.register_forward_hook(look) for conv in norms]
+    handles = [conv.register_forward_hook(record_statistics) for conv in norms]
     model.eval()(pictures)
     for handle in handles:
         handle.remove()
     for conv, norm in norms.items():
-        _set_statistics(norm, *seen[conv], biases[conv])
+        _set_statistics(norm, *statistics[conv], biases[conv])

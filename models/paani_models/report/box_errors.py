@@ -36,7 +36,7 @@ class HeightBand:
 
 @dataclass(frozen=True)
 class BoxErrors:
-    """One class on photographs. fates: true objects by FATES. right, wrong: boxes per step of SCORE_STEPS."""
+    """One class on photographs. outcomes: true objects by OUTCOMES. right, wrong: boxes per step of SCORE_STEPS."""
 
     kind: str
     n: int
@@ -47,13 +47,13 @@ class BoxErrors:
     wrong: NDArray[np.int64]
 
     def count_found_between(self, low: float, high: float) -> tuple[int, int]:
-        """Objects found and objects in all, of the rows between two of HEIGHTS_PX."""
+        """Count objects found and objects in all, of the rows between two of HEIGHTS_PX."""
         rows = [row for row in self.rows if low <= row.low and row.high <= high]
         return sum(row.found for row in rows), sum(row.n for row in rows)
 
 
 def analyse_box_errors(scored: Sequence[ScoredBoxes]) -> list[BoxErrors]:
-    """One per class that people boxed in photographs: what was drawn by a program stays out."""
+    """Analyse each class that people boxed in photographs; rendered pictures are left out."""
     photographs = [item for item in scored if item.sample.source.name != RENDERED]
     limits = []
     for kind, label in enumerate(DETECTOR_CLASSES):
@@ -74,7 +74,7 @@ def analyse_box_errors(scored: Sequence[ScoredBoxes]) -> list[BoxErrors]:
 
 
 def count_outcomes(item: ScoredBoxes, kind: int) -> NDArray[np.int64]:
-    """How many true objects of a class met each of FATES in one picture; the first that fits."""
+    """Count the true objects of a class by outcome in one picture; the first of OUTCOMES that applies."""
     real = item.truth[item.truth[:, 0] == kind, 1:]
     same = item.detections.classes == kind
     shared = iou_matrix(real, item.detections.boxes)

@@ -16,12 +16,12 @@ from paani_models.report.mask_errors import EDGE_DISTANCES_PX, TENTHS, MaskError
 from paani_models.report.requirements import PHOTOGRAPHS, Requirement, RequirementResult
 from paani_models.report.tables import TITLES, render_table
 
-POOLED_SOURCES = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a figure's name need not tell
-_TICKS = 4  # a chart's axis has this many steps, so that each trial stands on a whole number
+POOLED_SOURCES = frozenset({PHOTOGRAPHS, "spoilt", "all"})  # sources that a figure's name omits
+_TICKS = 4  # steps of a chart's axis, so that each experiment stands on a whole number
 
 
 def render_requirements(found: Sequence[RequirementResult], experiments: Sequence[Experiment]) -> str:
-    """What is to be reached, what is, why not; then how each figure moved from recipe to recipe."""
+    """Render each requirement, its figure and the reason where it is missed; then each figure over the experiments."""
     rows = [
         f'<tr class="{"met" if each.is_met else "missed"}"><th>{escape(_requirement_name(each.requirement))}</th>'
         f"<td>{each.n}</td>"
@@ -29,9 +29,9 @@ def render_requirements(found: Sequence[RequirementResult], experiments: Sequenc
         f'<td>{"met" if each.is_met else "missed"}</td><td class="text">{escape(each.limit)}</td></tr>'
         for each in found
     ]
-    head = '<th>figure</th><th>n</th><th>bar</th><th>reached</th><th></th><th class="text">what limits it</th>'
+    head = '<th>figure</th><th>n</th><th>required</th><th>reached</th><th></th><th class="text">what limits it</th>'
     parts = [
-        "<h3>Figures and their bars</h3>",
+        "<h3>Figures and their requirements</h3>",
         "<p>Real pictures of held-out sequences only. What was tried before stands as it was recorded, where it was "
         "measured on as many pictures or boxes as now.</p>",
         render_table(head, rows),
@@ -46,7 +46,7 @@ def render_requirements(found: Sequence[RequirementResult], experiments: Sequenc
 
 
 def render_mask_errors(limits: Sequence[MaskErrors]) -> str:
-    """Where mistakes lie, and the best that the network's cells allow."""
+    """Render where wrong pixels lie, and the best that the network's cells allow."""
     near = "".join(f"<th>within {reach} px</th>" for reach in EDGE_DISTANCES_PX)
     head = (
         "<th>source</th><th>pictures</th><th>wrong</th><th>taken for water</th><th>water missed</th>"
@@ -80,7 +80,7 @@ def render_mask_errors(limits: Sequence[MaskErrors]) -> str:
 
 
 def render_box_errors(limits: Sequence[BoxErrors]) -> str:
-    """Heights, fates and scores of each class."""
+    """Render recall by height, outcomes and scores of each class."""
     parts = ["<h3>Detector: what limits it</h3><p>Photographs only; heights in pixels of the input, 320x256.</p>"]
     for each in limits:
         rows = [
@@ -145,7 +145,7 @@ def _height_chart(shares: Mapping[str, NDArray[np.float64]], title: str) -> str:
 
 
 def _score_chart(limits: BoxErrors) -> str:
-    first = int(1 + 0.1 // SCORE_STEPS[1])  # below 0.1 the wrong ones are legion
+    first = int(1 + 0.1 // SCORE_STEPS[1])  # below a score of 0.1 wrong boxes outnumber all others by far
     middles = (SCORE_STEPS[:-1] + SCORE_STEPS[1:])[first:] / 2
     counts = {"right": limits.right[first:], "wrong": limits.wrong[first:]}
     series: dict[str, Points] = {
@@ -165,7 +165,7 @@ def _format_bound(requirement: Requirement) -> str:
 
 
 def _decimals(requirement: Requirement) -> int:
-    """Decimals of what stands near 0 and of what stands near 1."""
+    """Decimals shown: more for shares near 0 than for figures near 1."""
     return 4 if requirement.at_most else 3
 
 

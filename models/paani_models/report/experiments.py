@@ -37,7 +37,7 @@ class _Record(Record, frozen=True):
 
 
 def read_experiments(weights: Path) -> tuple[Experiment, ...]:
-    """The record of a weights folder, oldest first, empty where there is none.
+    """Read the record of a weights folder, oldest first, empty where there is none.
 
     Raises UserError naming a malformed one.
     """
@@ -71,5 +71,5 @@ def with_present_weights(
 
 
 def encode_experiments(experiments: Sequence[Experiment]) -> bytes:
-    """The record as it stands beside a manifest."""
+    """Encode the record as it is stored beside a manifest."""
     return msgspec.json.format(msgspec.json.encode(_Record(tuple(experiments))), indent=1) + b"\n"

@@ -23,11 +23,12 @@ _UNDECIDED = len(SEGMENTER_CLASSES)
 
 @dataclass(frozen=True)
 class MaskErrors:
-    """Added over pictures of one source, in pixels of its masks.
+    """Sums over the pictures of one source, in pixels of its masks.
 
-    counts, edges: as `confusion` and `edge_counts` give them, an undecided band between two classes split along its
-    middle for the edges; best_counts, best_edges: those of the best answer on CELLS_HW. near: wrong pixels within
-    REACHES_PX of a true edge or undecided band. false_water, missed_water, judged: by tenth of the height, top first.
+    counts, edges: as `confusion_matrix` and `count_edge_matches` give them, an undecided band between two classes split
+    along its middle for the edges; best_counts, best_edges: those of the best answer on CELLS_HW. near: wrong pixels
+    within EDGE_DISTANCES_PX of a true edge or undecided band. false_water, missed_water, judged: by tenth of the
+    height, top first.
     """
 
     source: Source
@@ -50,7 +51,7 @@ class MaskErrors:
 def analyse_mask_errors(
     samples: Sequence[Sample], segment: Callable[[NDArray[np.uint8], tuple[int, ...]], U8]
 ) -> list[MaskErrors]:
-    """One per source. Raises UserError naming a file that cannot be read."""
+    """Analyse each source. Raises UserError naming a file that cannot be read."""
     found: dict[Source, list[I64]] = {}
     for sample in tqdm(samples, "mistakes", unit="picture", mininterval=2.0):
         truth = read_truth(sample)
@@ -67,7 +68,7 @@ def analyse_mask_errors(
 
 
 def count_mask_errors(label: U8, truth: U8) -> tuple[I64, ...]:
-    """The counts of one picture, in the order of MaskLimits."""
+    """The counts of one picture, in the order of MaskErrors."""
     decided = fill_undecided(truth)
     best = round_to_cells(decided)
     wrong = (label != truth) & (truth != IGNORE)
@@ -110,7 +111,7 @@ def round_to_cells(truth: U8) -> U8:
 
 
 def count_by_tenth(flags: NDArray[np.bool_]) -> I64:
-    """Set pixels per tenth of the height, int64 [10], top first."""
+    """Count set pixels per tenth of the height, int64 [10], top first."""
     return np.array([part.sum() for part in np.array_split(flags, TENTHS)], np.int64)
 
 
@@ -125,5 +126,5 @@ def mean_iou(counts: I64) -> float:
 
 
 def edge_f1(edges: I64) -> float:
-    """F1 of counts as `edge_counts` gives them."""
+    """F1 of counts as `count_edge_matches` gives them."""
     return f1_score(*(int(count) for count in edges))

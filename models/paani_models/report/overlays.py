@@ -31,7 +31,7 @@ _WIDTH_PX = 560
 
 @dataclass(frozen=True)
 class DrawnPicture:
-    """A file beside the page and what stands under it."""
+    """A picture file beside the page, and its caption."""
 
     file: str
     caption: str
@@ -40,7 +40,7 @@ class DrawnPicture:
 def draw_masks(
     folder: Path, scored: Sequence[ScoredMask], segment: Callable[[U8, tuple[int, ...]], U8]
 ) -> list[DrawnPicture]:
-    """Tinted by class, pixels that differ from the truth in red. Writes into `folder`/pictures."""
+    """Draw masks tinted by class, pixels that differ from the truth in red. Writes into `folder`/pictures."""
     drawn = []
     for index, item in enumerate(scored):
         picture, truth = read_picture(item.sample.picture), read_truth(item.sample)
@@ -58,7 +58,7 @@ def draw_masks(
 
 
 def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture]:
-    """As the network sees them: true boxes thin green, found boxes thick orange with class and score."""
+    """Draw boxes on letterboxed pictures: true boxes thin green, found boxes thick orange with class and score."""
     drawn = []
     for index, item in enumerate(scored):
         shown = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)
@@ -76,14 +76,14 @@ def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture
 
 
 def choose_extreme_masks(scored: Sequence[ScoredMask]) -> tuple[list[ScoredMask], list[ScoredMask]]:
-    """The worst and the best photographs, no more than two of a sequence; rendered pictures where there is no other."""
+    """Choose the worst and the best photographs, at most two of a sequence; rendered ones where there is no other."""
     scored = _photographs(scored)
     ordered = sorted(scored, key=lambda item: (item.mean_iou, str(item.sample.picture)))
     return _limit_per_sequence(ordered), _limit_per_sequence(ordered[::-1])
 
 
 def choose_extreme_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxes], list[ScoredBoxes]]:
-    """Most mistakes first; and without mistakes, most objects first; otherwise as `ends_of_masks`."""
+    """Choose most mistakes first; and without mistakes, most objects first; otherwise as `choose_extreme_masks`."""
     scored = _photographs(scored)
     ordered = sorted(scored, key=lambda item: (-item.mistakes, str(item.sample.picture)))
     right = [item for item in scored if item.mistakes == 0]
@@ -93,7 +93,7 @@ def choose_extreme_boxes(scored: Sequence[ScoredBoxes]) -> tuple[list[ScoredBoxe
 
 
 def render_gallery(drawn: Sequence[DrawnPicture]) -> str:
-    """HTML figures."""
+    """Render pictures with captions as HTML figures."""
     return (
         '<div class="gallery">'
         + "".join(

@@ -23,7 +23,7 @@ WATER, OBSTACLE, SKY = (SEGMENTER_CLASSES.index(kind) for kind in ("water", "obs
 
 @dataclass(frozen=True)
 class ScoredMask:
-    """One picture: confusion counts int64 [3,3], rows truth; edge counts int64 [4], as `edge_counts` gives them."""
+    """One picture: confusion counts int64 [3,3], rows truth; edge counts int64 [4] of `count_edge_matches`."""
 
     sample: Sample
     counts: I64

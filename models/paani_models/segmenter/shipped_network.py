@@ -163,7 +163,7 @@ class ShippedSegmenter(nn.Module):
         return self.decode(self.taps(x), x)
 
     def encoder(self) -> nn.ModuleList:
-        """The part that `load_imagenet` fills."""
+        """The part that `load_imagenet_encoder` fills."""
         return nn.ModuleList([self.stem, self.stages])
 
 

@@ -105,7 +105,7 @@ def cache_pictures(samples: list[Sample]) -> list[CachedPicture]:
 
 
 def draw_epoch(pictures: list[CachedPicture], recipe: SegmenterRecipe, epoch: int) -> list[int]:
-    """Shuffled picture indices of one epoch, balanced by DRAWS; -1 stands for a null picture."""
+    """Shuffled picture indices of one epoch, balanced by DRAWS_PER_EPOCH; -1 stands for a null picture."""
     rng = np.random.default_rng((recipe.seed, epoch))
     drawn: list[int] = []
     for name in sorted({p.source for p in pictures} - {RENDERED}):

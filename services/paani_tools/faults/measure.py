@@ -26,7 +26,10 @@ Judge = Callable[[U8], UnusableCause]
 
 
 class LevelFigures(msgspec.Struct, frozen=True):
-    """One fault in one severity over n pictures. `miou`: of the segmenter, against what the spoilt picture shows."""
+    """One fault in one severity over n pictures.
+
+    `miou`: of the segmenter, against what the spoilt picture shows.
+    """
 
     fault: str
     severity: int

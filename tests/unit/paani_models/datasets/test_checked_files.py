@@ -113,6 +113,6 @@ def test_labels_that_are_no_text_are_named(tmp_path: Path) -> None:
 
 def test_the_first_mistake_is_named_and_the_rest_counted() -> None:
     raise_first_mistake([])
-    for mistakes, told in ((["a"], "a"), (["a", "b", "c"], r"a \(and 2 more\)")):
-        with pytest.raises(UserError, match=f"^{told}$"):
+    for mistakes, message in ((["a"], "a"), (["a", "b", "c"], r"a \(and 2 more\)")):
+        with pytest.raises(UserError, match=f"^{message}$"):
             raise_first_mistake(mistakes)

@@ -124,10 +124,10 @@ def test_prepare_finds_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixtu
     kept = leaked.read_bytes()
     leaked.write_bytes((data / "tbiseg_dasha" / "images" / "DJI_0001_1.jpg").read_bytes())
     assert main(command) == 2
-    told = capsys.readouterr().err
-    assert "DJI_0001_1.jpg (train)" in told
-    assert "DJI_0035_2.jpg (held out)" in told
-    assert "splits leak: 1 pairs" in told
+    error = capsys.readouterr().err
+    assert "DJI_0001_1.jpg (train)" in error
+    assert "DJI_0035_2.jpg (held out)" in error
+    assert "splits leak: 1 pairs" in error
 
     leaked.write_bytes(kept[:-9])
     assert main(command) == 2

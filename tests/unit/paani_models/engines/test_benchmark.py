@@ -1,4 +1,4 @@
-"""Which engine a machine is told to use, and what a frame costs."""
+"""Choice of the engine for a machine, and the cost of a frame."""
 
 from __future__ import annotations
 

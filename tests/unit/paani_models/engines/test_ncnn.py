@@ -105,10 +105,10 @@ def test_both_engines_read_the_same_cells_of_the_shipped_net(tmp_path: Path) -> 
 
 def test_missing_files_name_file_and_command(tmp_path: Path) -> None:
     model = Path(shutil.copy(verified_path("detector"), tmp_path))
-    with pytest.raises(UserError, match="missing; make it with: paani models convert") as told:
+    with pytest.raises(UserError, match="missing; make it with: paani models convert") as error:
         Perceiver(PerceptionConfig(engine="ncnn", detector=str(model)), stopwatch_ms)
-    assert str(tmp_path / "detector.ncnn.param") in str(told.value)
-    assert str(model) in str(told.value)
+    assert str(tmp_path / "detector.ncnn.param") in str(error.value)
+    assert str(model) in str(error.value)
 
 
 @pytest.mark.parametrize("ending", ["param", "bin", "json"])
@@ -131,7 +131,7 @@ def test_files_of_another_model_are_refused(segmenter: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("param", "weights", "told"),
+    ("param", "weights", "message"),
     [
         ("no net\n", b"", "not a net that ncnn"),
         (CONVOLUTION.replace("Convolution", "Tensor.slice"), packed(), "not a net that ncnn"),
@@ -142,9 +142,9 @@ def test_files_of_another_model_are_refused(segmenter: Path) -> None:
     ],
     ids=["text", "layer", "weights", "output", "input", "shape"],
 )
-def test_files_that_ncnn_cannot_use_are_named(tmp_path: Path, param: str, weights: bytes, told: str) -> None:
+def test_files_that_ncnn_cannot_use_are_named(tmp_path: Path, param: str, weights: bytes, message: str) -> None:
     model = place(small_segmenter(tmp_path / "own.onnx"), param, weights)
-    with pytest.raises(UserError, match=told) as error:
+    with pytest.raises(UserError, match=message) as error:
         NcnnEngine.load("segmenter", str(model), 1)
     assert "own.ncnn." in str(error.value)
 
@@ -182,7 +182,7 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
 
 
 @pytest.mark.parametrize(
-    ("param", "weights", "code", "told"),
+    ("param", "weights", "code", "message"),
     [
         (CONVOLUTION, packed(), 3, "failed on own.onnx: a last word"),
         (CONVOLUTION.replace("Convolution", "Tensor.slice"), packed(), 0, "own.onnx: ncnn has no Tensor.slice"),
@@ -193,13 +193,13 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
     ids=["failure", "layer", "difference", "not finite", "shape"],
 )
 def test_a_bad_conversion_leaves_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], param: str, weights: bytes, code: int, told: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], param: str, weights: bytes, code: int, message: str
 ) -> None:
     source, out = small_segmenter(tmp_path / "own.onnx"), tmp_path / "out"
     pnnx = program(tmp_path, param, weights, code)
     assert main(["convert", str(source), "--pnnx", str(pnnx), "--out", str(out), "--data", "no/such/folder"]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert message in error
     assert error.startswith("paani models: ")
     assert error.count("\n") == 1
     assert not out.exists()

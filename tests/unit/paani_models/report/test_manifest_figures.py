@@ -71,7 +71,7 @@ def test_nothing_reads_as_water_v15() -> None:
 
 
 def test_every_model_states_figures_and_origins() -> None:
-    """The gate's figures are of pictures in every source that is held out, the others' of what people drew in them."""
+    """The image-quality figures are of held-out pictures of every source, the others' of what people drew."""
     for model in load_catalogue().values():
         assert model.origins
         assert all(origin.licence for origin in model.origins)
