@@ -251,11 +251,15 @@ def is_confirmed(track: TrackMemory, config: TrackerConfig) -> bool:
 def tracks_message(state: TrackerState, evidence: Evidence, config: AdvisorConfig) -> Tracks:
     """The tracks as a message, with the time constants of their motion."""
     window = motion_window(state.period_s, config.motion)
+    numbers = {detection.box_xyxy: number for number, detection in enumerate(evidence.detections, 1)}
     return Tracks(
         source_us=evidence.source_us,
         frame_seq=evidence.frame_seq,
         frame_epoch=evidence.frame_epoch,
-        tracks=tuple(_track_message(track, state.at_us, window, config) for track in state.tracks),
+        tracks=tuple(
+            _track_message(track, 0 if track.held else numbers.get(track.box, 0), state.at_us, window, config)
+            for track in state.tracks
+        ),
         rotation=state.rotation,
         period_s=state.period_s,
         motion_history_s=window.history_s,
@@ -263,7 +267,9 @@ def tracks_message(state: TrackerState, evidence: Evidence, config: AdvisorConfi
     )
 
 
-def _track_message(track: TrackMemory, at_us: int, window: Window, config: AdvisorConfig) -> Track:
+def _track_message(
+    track: TrackMemory, detection_number: int, at_us: int, window: Window, config: AdvisorConfig
+) -> Track:
     """One track as a message; acceptance, danger and hold are fields of their own (G11)."""
     motion = estimate_motion(track.identity.motion, at_us, window, config.motion)
     return Track(
@@ -284,6 +290,7 @@ def _track_message(track: TrackMemory, at_us: int, window: Window, config: Advis
         motion_rate_per_s=clip(motion.rate_per_s, -1e6, 1e6),
         motion_margin_per_s=min(motion.margin_per_s, 1e6),
         motion_confidence=motion.confidence,
+        detection_number=detection_number,
     )
 
 

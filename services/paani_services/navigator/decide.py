@@ -1,4 +1,4 @@
-"""The navigator as a decider: advisory, evidence, odometry, clock, arming and its own mission in, one order out."""
+"""The navigator as a decider: what it heard and its own mission in, one order out."""
 
 from paani import keys
 from paani.config import Config
@@ -23,6 +23,7 @@ def decide(state: NavigatorState, inputs: Inputs, now_us: int, config: Config) -
         arming=arming.message,
         arming_us=arming.received_us,
         evidence=inputs[keys.EVIDENCE.name].message,
+        tracks=inputs[keys.TRACKS.name].message,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
     state, order = navigate(
@@ -45,7 +46,7 @@ def _mission(inputs: Inputs) -> Mission | None:
 DECIDER = Decider(
     service="navigator",
     state=NavigatorState,
-    inputs=(keys.ADVISORY, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
+    inputs=(keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,

@@ -21,6 +21,7 @@ from paani.messages import (
     Odometry,
     Purpose,
     SimTime,
+    Tracks,
 )
 from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
 from paani_services.navigator.avoidance.replanning import (
@@ -88,6 +89,7 @@ class NavigatorInputs(msgspec.Struct, frozen=True):
     arming: Arming | None = None
     arming_us: int = 0
     evidence: Evidence | None = None
+    tracks: Tracks | None = None
 
 
 def navigate(
@@ -110,7 +112,7 @@ def navigate(
     state = _end_visual_turn(state, inputs)
     is_planned = config.planner.acts_on(camera.calibration)
     if is_planned:
-        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner)
+        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
         state = msgspec.structs.replace(state, planner_state=planner_state)
     odometry, advisory = inputs.odometry, inputs.advisory
     if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
@@ -162,7 +164,15 @@ def navigate(
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, _build_command(
-        state, inputs, now_us, inhibits, heading_rad, bounded_mps or 0.0, cross_m=cross_m, leg=leg
+        state,
+        inputs,
+        now_us,
+        inhibits,
+        heading_rad,
+        bounded_mps or 0.0,
+        cross_m=cross_m,
+        leg=leg,
+        obstacle_track_ids=state.planner_state.obstacle_track_ids if is_planned else (),
     )
 
 
@@ -317,6 +327,7 @@ def _build_command(
     *,
     cross_m: float = 0.0,
     leg: str = "",
+    obstacle_track_ids: tuple[int, ...] = (),
 ) -> NavCommand:
     advisory = inputs.advisory
     enable = not inhibits
@@ -334,4 +345,5 @@ def _build_command(
         advisory_sent_us=advisory.sent_us if advisory is not None else 0,
         leg_index=state.progress.leg_index,
         leg=leg,
+        obstacle_track_ids=obstacle_track_ids,
     )

@@ -147,11 +147,18 @@ def _navigator(moment: Moment) -> list[str]:
     order = moment.order
     if order is None:
         return ["no order on this advice in the log"]
+    planned_for = [f"planned for {obstacles}"] if (obstacles := _planned_for(moment, order.obstacle_track_ids)) else []
     if not order.enable:
-        return [f"holds the boat: {inhibits(order.inhibits)}"]
+        return [f"holds the boat: {inhibits(order.inhibits)}", *planned_for]
     course = f"steer {_heading_deg(order.heading_rad):03.0f} deg at {order.speed_mps:.2f} m/s"
     off = f", {abs(order.cross_track_m):.1f} m {'left' if order.cross_track_m > 0 else 'right'} of the route"
-    return [f"{course}, waypoint {order.waypoint_index}{off}"]
+    return [f"{course}, waypoint {order.waypoint_index}{off}", *planned_for]
+
+
+def _planned_for(moment: Moment, track_ids: tuple[int, ...]) -> str:
+    """The moving obstacles of the plan, such as `person #3`; `track #3` where it is tracked no more."""
+    labels = {track.id: track.label.value for track in moment.tracks.tracks} if moment.tracks is not None else {}
+    return ", ".join(f"{labels.get(number, 'track')} #{number}" for number in track_ids)
 
 
 def _controller(moment: Moment) -> list[str]:

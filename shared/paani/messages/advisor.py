@@ -46,7 +46,10 @@ class MotionCause(StrEnum):
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True):
-    """One tracked box. Acceptance and prediction are explicit, never hidden in the score (G11)."""
+    """One tracked box. Acceptance and prediction are explicit, never hidden in the score (G11).
+
+    detection_number: of the detection in the evidence of this frame that the track was matched to, from 1; 0: none.
+    """
 
     id: Count
     label: Label
@@ -65,6 +68,7 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     motion_rate_per_s: Finite = 0.0
     motion_margin_per_s: NonNegative = 0.0
     motion_confidence: Unit = 0.0
+    detection_number: Count = 0
 
 
 class RotationUse(StrEnum):

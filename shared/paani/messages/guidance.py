@@ -45,6 +45,7 @@ class NavCommand(Message, frozen=True, kw_only=True):
     `waypoint_index`: the waypoint steered for. `waypoints_reached`: of all legs since the start. `cross_track_m`:
     distance from the line of the leg, positive to its left. `leg_index`: the leg of the mission that is due; `leg`:
     the same in words.
+    `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
     """
 
     enable: bool
@@ -60,6 +61,7 @@ class NavCommand(Message, frozen=True, kw_only=True):
     advisory_sent_us: Stamp = 0
     leg_index: Count = 0
     leg: Text = ""
+    obstacle_track_ids: tuple[Count, ...] = ()
 
     def is_news_after(self, sent: NavCommand | None) -> bool:
         """Whether evidence, advice or inhibits differ from those of the order sent before: then it is sent at once."""

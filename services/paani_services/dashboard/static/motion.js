@@ -36,13 +36,24 @@ export function renderMotion(store, now) {
 function renderCommand(store, now, applied) {
   const command = store.get("navigator/command");
   const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
+  const obstacles = findPlannedObstacles(store, command?.obstacle_track_ids ?? []);
   setFacts(byId("order"), [
     ["Speed command", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
     ["Heading command", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
     ["Cross-track error", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
     ["Command age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
+    ...obstacles,
   ]);
   byId("order").classList.toggle("stale", !store.isFresh("navigator/command", now));
+}
+
+/** The moving obstacles that the command was planned for, as on the picture. @param {import("./store.js").Store} store @param {number[]} ids @returns {[string, string, boolean][]} */
+function findPlannedObstacles(store, ids) {
+  if (!ids.length) return [];
+  /** @type {{id: number, label: string}[]} */
+  const tracks = store.get("advisor/tracks")?.tracks ?? [];
+  const names = ids.map((id) => `${tracks.find((track) => track.id === id)?.label ?? "track"} #${id}`);
+  return [["Planned for", names.join(", "), false]];
 }
 
 /** Which process keeps the boat from moving, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */

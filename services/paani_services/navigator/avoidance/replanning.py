@@ -6,13 +6,13 @@ import msgspec
 
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani.messages import Evidence, Odometry
+from paani.messages import Evidence, Odometry, Tracks
 from paani_services.navigator.avoidance.fence import Fence
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import Plan, plan_motion
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint
 from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles, is_refuted
-from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
+from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import BoxIds, build_occupancy_grid
 
@@ -28,6 +28,7 @@ class PlannerState(
 
     course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
     waiting_since_us: since when no plan has led the boat onward.
+    obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
     """
 
     memory: ObservationMemory = ObservationMemory()
@@ -37,13 +38,19 @@ class PlannerState(
     planned_us: int = 0
     waiting_since_us: int | None = None
     frame_id: tuple[int, int] = (-1, -1)
+    obstacle_track_ids: tuple[int, ...] = ()
 
 
 def observe(
-    state: PlannerState, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig
+    state: PlannerState,
+    odometry: Odometry | None,
+    evidence: Evidence | None,
+    config: PlannerConfig,
+    tracks: Tracks | None = None,
 ) -> PlannerState:
-    """Add the newest odometry, and the newest evidence if it is of a new frame, to the planner's memory."""
-    return msgspec.structs.replace(state, memory=update_memory(state.memory, odometry, evidence, config))
+    """Add the newest odometry, the newest evidence if it is of a new frame, and its tracks to the planner's memory."""
+    memory = update_memory(state.memory, odometry, evidence, config)
+    return msgspec.structs.replace(state, memory=add_track_ids(memory, evidence, tracks))
 
 
 def replan(
@@ -86,6 +93,7 @@ def replan(
             now_us,
             since_us if plan.is_waiting or plan.speed_mps == 0.0 else None,
             state.memory.frame_id,
+            tuple(sorted({obstacle.track_id for obstacle in obstacles} - {0})),
         )
     return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
 

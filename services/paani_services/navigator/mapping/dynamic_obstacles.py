@@ -51,7 +51,7 @@ class DynamicObstacle(NamedTuple):
     """A tracked obstacle with a velocity: its outline now [n], when it was last seen, and the room kept around it.
 
     vacated_boxes: boxes that show it where it is no more. Where it was within `free_s` of when it was last seen stays
-    occupied.
+    occupied. track_id: the advisor's track that it was last seen as; 0: unknown.
     """
 
     east_m: F64
@@ -60,6 +60,7 @@ class DynamicObstacle(NamedTuple):
     velocity: Velocity
     age_s: float
     vacated_boxes: BoxIds
+    track_id: int = 0
 
     @property
     def is_moving(self) -> bool:
@@ -93,6 +94,7 @@ def find_dynamic_obstacles(
                 velocity,
                 -last.time_s,
                 frozenset(each.box_id for each in track if each.time_s < track[-1].time_s - config.free_s),
+                _latest_track_id(track),
             )
         )
     return tuple(found)
@@ -140,8 +142,18 @@ def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -
     if estimate is not None:
         fastest_mps = min(fastest_mps, math.hypot(*estimate.velocity_mps) + estimate.deviation_mps)
     return DynamicObstacle(
-        *last.outline, config.person_near_m, Velocity(0.0, 0.0, fastest_mps), -last.time_s, frozenset()
+        *last.outline,
+        config.person_near_m,
+        Velocity(0.0, 0.0, fastest_mps),
+        -last.time_s,
+        frozenset(),
+        _latest_track_id(track),
     )
+
+
+def _latest_track_id(track: list[PositionMeasurement]) -> int:
+    """The advisor's track of the newest measurement that has one; the association here does not depend on it."""
+    return next((each.track_id for each in reversed(track) if each.track_id), 0)
 
 
 def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
@@ -220,7 +232,9 @@ def _measure_positions(
         for number, box in enumerate(observation.boxes, row):
             if number in in_range:
                 box_id, outline = (observation.stamp_us, number - row), (east_m[number], north_m[number])
-                measured.append(_measure_position(box_id, box, time_s, model, camera.calibration.height_m, outline))
+                measurement = _measure_position(box_id, box, time_s, model, camera.calibration.height_m, outline)
+                ids = observation.box_track_ids
+                measured.append(measurement._replace(track_id=ids[number - row]) if ids else measurement)
         row += len(observation.boxes)
         yield measured
 

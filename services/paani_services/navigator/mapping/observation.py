@@ -13,7 +13,7 @@ import msgspec
 from paani import portable
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani.messages import Detection, Evidence, Label, Odometry, TimeBase
+from paani.messages import Detection, Evidence, Label, Odometry, TimeBase, Tracks
 from paani_services.navigator.mapping.projection import Pose
 
 EDGE_STEPS = 128  # of the picture's height, in which the water edge is stored: two for each row of the mask
@@ -83,6 +83,7 @@ class Observation(
     water_edge: where the water ends in each column, left to right, in 1/128 of the height from the top, rounded towards
     the boat.
     feet: where obstacles stand. boxes: what may move. Of old observations the boxes alone are kept.
+    box_track_ids: the advisor's track of each box, 0 where it has none; empty until its tracks are known.
     """
 
     stamp_us: int
@@ -95,6 +96,7 @@ class Observation(
     water_edge: bytes
     feet: tuple[FootLine, ...] = ()
     boxes: tuple[ObstacleBox, ...] = ()
+    box_track_ids: tuple[int, ...] = ()
 
     @property
     def pose(self) -> Pose:
@@ -221,12 +223,31 @@ def _make_observation(evidence: Evidence, pose: StampedPose) -> Observation:
         evidence.width_px / evidence.height_px,
         bytes(math.ceil(water_edge * EDGE_STEPS) for water_edge in evidence.water_edge),
         tuple(foot for detection in found for foot in _find_feet(detection, evidence.water_edge)),
-        tuple(
-            _make_box(detection, evidence.water_edge)
-            for detection in found
-            if _may_move(detection, evidence.water_edge)
-        ),
+        tuple(_make_box(evidence.detections[number - 1], evidence.water_edge) for number in _movable(evidence)),
     )
+
+
+def _movable(evidence: Evidence) -> list[int]:
+    """The numbers, from 1, of the detections that may move on the water, in the order of an observation's boxes."""
+    carriers = [detection for detection in evidence.detections if detection.label in CARRIER_LABELS]
+    return [
+        number
+        for number, each in enumerate(evidence.detections, 1)
+        if _may_move(each, evidence.water_edge) and not _is_aboard(each, carriers, evidence.water_edge)
+    ]
+
+
+def add_track_ids(memory: ObservationMemory, evidence: Evidence | None, tracks: Tracks | None) -> ObservationMemory:
+    """Add the advisor's tracks to the boxes of the newest observation, once both are of the same picture."""
+    if evidence is None or tracks is None or not memory.observations:
+        return memory
+    newest = memory.observations[-1]
+    frames = {(evidence.frame_epoch, evidence.frame_seq), (tracks.frame_epoch, tracks.frame_seq)}
+    if newest.box_track_ids or not newest.boxes or newest.stamp_us != evidence.source_us or len(frames) != 1:
+        return memory
+    ids = {track.detection_number: track.id for track in tracks.tracks if track.detection_number}
+    labelled = msgspec.structs.replace(newest, box_track_ids=tuple(ids.get(n, 0) for n in _movable(evidence)))
+    return msgspec.structs.replace(memory, observations=(*memory.observations[:-1], labelled))
 
 
 def _is_aboard(rider: Detection, carriers: Sequence[Detection], water_edge: tuple[float, ...]) -> bool:

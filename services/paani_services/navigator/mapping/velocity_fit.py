@@ -22,7 +22,7 @@ class PositionMeasurement(NamedTuple):
 
     box_id: as in `BoxIds`. time_s: from now, negative. range_deviation_m: standard deviation of its range.
     outline: points where it meets the water, from left to right.
-    shows_ends: whether the picture shows its left and its right end.
+    shows_ends: whether the picture shows its left and its right end. track_id: the advisor's track of it; 0: unknown.
     """
 
     box_id: tuple[int, int]
@@ -33,6 +33,7 @@ class PositionMeasurement(NamedTuple):
     range_deviation_m: float
     outline: tuple[F64, F64]
     shows_ends: tuple[bool, bool]
+    track_id: int = 0
 
     @property
     def is_whole(self) -> bool:

@@ -17,6 +17,7 @@ from paani.logs import protobuf
 from paani.logs.reader import Record, open_log
 from paani_tools.explain.command import time_us
 from paani_tools.explain.moment import last_change_us, moment_at
+from paani_tools.explain.narrative import narrative_of
 from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, drive, write_log
 
 DRIVE = drive(16.0)
@@ -72,6 +73,18 @@ def test_by_default_the_last_change_of_direction_is_told(capsys: pytest.CaptureF
     assert f"{(at_us - open_log(log).start_us) * 1e-6:.1f} s: {advisory.direction} ({advisory.reason})" in out
     assert advisory.explanation in out
     assert datetime.datetime.fromtimestamp(at_us * 1e-6, tz=datetime.UTC).strftime("%Y-%m-%d %H:%M:%S") in out
+
+
+def test_the_order_names_the_tracks_that_it_was_planned_for(log: Path) -> None:
+    """By the labels and numbers of the tracks; one that is tracked no more by its number alone."""
+    moment = moment_at(open_log(log), T0_US + 8_000_000)
+    assert "planned for" not in narrative_of(moment, CONFIG)
+    assert moment.order is not None
+    assert moment.tracks is not None
+    track = moment.tracks.tracks[0]
+    order = msgspec.structs.replace(moment.order, obstacle_track_ids=(track.id, 99))
+    told = narrative_of(msgspec.structs.replace(moment, order=order), CONFIG)
+    assert f"planned for {track.label} #{track.id}, track #99" in told
 
 
 def test_the_chain_is_followed_to_what_this_advice_became(log: Path) -> None:
