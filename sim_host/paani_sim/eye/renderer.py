@@ -47,8 +47,7 @@ DETAILS_WITHIN_M = 80.0
 SHADOWS_WITHIN_M = 40.0
 SAME_SURFACE_FRAC = 0.05
 MIRRORED_WITHIN_M = 120.0
-_FLAT = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
-_QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
+_SCREEN_CORNERS = water_patches.CORNERS.astype(np.float32)
 _IDENTITY = np.eye(4, dtype=np.float32)
 
 
@@ -146,7 +145,7 @@ class Eye:
         wide_m, tall_m = scene.plants.rows[:, 3:5].astype(float).T
         self._plants = _Solid(gl, scene.plants, PLANT_WIDTHS, np.stack([wide_m, wide_m, tall_m], axis=1))
         self._afloat, self._actors = self._upload_movables(scene.afloat), self._upload_movables(scene.actors)
-        self._screen = g.make_batch(gl, _FLAT, (2,), _QUAD)
+        self._screen = g.make_batch(gl, _SCREEN_CORNERS, (2,), water_patches.QUAD)
         self._shadows: _Solid | None = None
         self._extra: tuple[Obstacle, ...] = ()
         self._extra_still: g.Batch | None = None

@@ -12,9 +12,9 @@ import numpy as np
 
 from paani.arrays import F32, U8
 from paani.config import CorridorConfig, DetectorConfig
+from paani_models.network_input import MEAN, STD
 
 Run = Callable[[F32], F32]
-MEAN, STD = np.array([0.485, 0.456, 0.406], np.float32), np.array([0.229, 0.224, 0.225], np.float32)  # D7
 PAD_GREY = 114
 WATER = 0
 
