@@ -54,7 +54,7 @@ def test_frames_come_at_their_rate_with_boxes_inside_the_picture(family: Encount
         assert np.median(off) < 1.0
 
 
-def test_what_each_family_does() -> None:
+def test_each_family_has_its_kind_of_motion() -> None:
     """Approach closes, recede opens, stationary and turn keep their range; a turn sweeps across the picture."""
     for number in range(6):
         for family, sign in (

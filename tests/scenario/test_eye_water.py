@@ -25,7 +25,7 @@ STRAIGHT = Actor(
 
 
 @given(st.floats(0.0, 12.0), st.floats(0.0, 5000.0), st.floats(0.0, 600.0))
-def test_rides_stay_small_and_finite(wind_mps: float, fetch_m: float, t_s: float) -> None:
+def test_wave_motion_stays_small_and_finite(wind_mps: float, fetch_m: float, t_s: float) -> None:
     """No more heave than the sea is high, no more roll than a boat survives."""
     sea = wind_sea_state(Wind(wind_mps, 0.4), Waves(fetch_m))
     for thing in (BUOY, BARGE):

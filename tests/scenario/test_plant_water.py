@@ -188,12 +188,12 @@ def test_gps_outage_and_jump(emit_packets: Launch) -> None:
         for plant in (faulty, sound):
             plant.step(0.0, 0.0)
         if step % 20 == 19:
-            told, true = gps_message(faulty, 1), gps_message(sound, 1)
+            measured, true = gps_message(faulty, 1), gps_message(sound, 1)
             told_m, true_m = (
-                enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *ORIGIN_DEG)[0] for fix in (told, true)
+                enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *ORIGIN_DEG)[0] for fix in (measured, true)
             )
             east_m.append(told_m - true_m)
-            fixes.append(told.fix)
+            fixes.append(measured.fix)
             held.append(told_m)
     assert [index for index, fix in enumerate(fixes) if not fix] == [9, 10, 11, 12, 13]
     assert len(set(held[8:14])) == 1
@@ -208,9 +208,9 @@ def test_compass_and_gyro_bias(emit_packets: Launch) -> None:
     for _ in range(150):
         for plant in (faulty, sound):
             plant.step(0.0, 0.0)
-        told, true = imu_message(faulty, 1), imu_message(sound, 1)
-        turned.append(wrap_rad(told.yaw_rad - true.yaw_rad))
-        rates.append(told.gyro_z_radps - true.gyro_z_radps)
+        measured, true = imu_message(faulty, 1), imu_message(sound, 1)
+        turned.append(wrap_rad(measured.yaw_rad - true.yaw_rad))
+        rates.append(measured.gyro_z_radps - true.gyro_z_radps)
     assert turned[:49] == rates[:49] == [0.0] * 49
     assert turned[50:99] == pytest.approx([0.4] * 49)
     assert rates[50:99] == pytest.approx([-0.02] * 49)
@@ -228,7 +228,7 @@ def test_weak_thruster_turns_the_boat_towards_it(emit_packets: Launch, amount: f
     assert plant.energy_j > 0.0
 
 
-def test_truth_tells_where_the_actors_are(emit_packets: Launch) -> None:
+def test_true_pose_carries_the_actors_distances(emit_packets: Launch) -> None:
     """One that gives way is late when the boat lies on its path; the pose says by how much."""
     world = load_world("lake")
     actor = dataclasses.replace(world.actors[0], behaviour=Behaviour.GIVES_WAY)

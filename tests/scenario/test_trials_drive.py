@@ -80,14 +80,14 @@ def test_ready_running_finished(launch: Launch) -> None:
     assert result.limit_s == 60.0
 
 
-def test_time_is_up(launch: Launch) -> None:
+def test_a_drive_ends_at_its_time_limit(launch: Launch) -> None:
     result = result_of(launch(scenario(50.0, 3.0), Policy.BLIND), Policy.BLIND)
     assert (result.why, result.completed) == (DriveOutcome.TIME_LIMIT, False)
     assert result.seconds == pytest.approx(3.0)
     assert result.latency.samples == 0
 
 
-def test_two_minutes_without_progress_are_the_end(launch: Launch) -> None:
+def test_a_drive_ends_after_two_minutes_without_progress(launch: Launch) -> None:
     given = scenario(50.0, 200.0, Fault(FaultKind.LINK_LOSS, 4.0, 200.0), alone=True)
     result = result_of(launch(given, Policy.BLIND), Policy.BLIND)
     assert (result.why, result.completed) == (DriveOutcome.STALLED, False)
@@ -124,7 +124,7 @@ def test_unusable_camera_stops_within_a_frame_and_half_a_second(launch: Launch, 
 @pytest.mark.gl
 @pytest.mark.parametrize("kind", [FaultKind.CAMERA_BLACK, FaultKind.CAMERA_BLURRED])
 def test_unusable_rendered_camera_stops_the_boat(launch: Launch, kind: FaultKind) -> None:
-    """W4 through rendering, gate and nets."""
+    """W4 through rendering, image-quality check and networks."""
     given = scenario(60.0, 9.0, Fault(kind, 6.0, 4.0), alone=True)
     result = result_of(launch(given, Policy.PAANI), Policy.PAANI)
     [reaction] = result.reactions
@@ -141,7 +141,7 @@ def test_rendered_drives_repeat_to_the_byte(launch: Launch) -> None:
 
 
 def test_nothing_crosses_a_lost_link(launch: Launch) -> None:
-    """No thrust, no pulse: the last gate applies zero within its half second, and goes on when the link is back."""
+    """No thrust, no pulse: the thrust adapter applies zero within half a second, and resumes when the link is back."""
     drive = launch(scenario(60.0, 12.0, Fault(FaultKind.LINK_LOSS, 6.0, 2.0), alone=True), Policy.ORACLE)
     forces: dict[float, float] = {}
     while drive.phase is not DrivePhase.FINISHED:
@@ -153,7 +153,7 @@ def test_nothing_crosses_a_lost_link(launch: Launch) -> None:
 
 
 @pytest.mark.parametrize("down_deg", [6.0, 0.0])
-def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float) -> None:
+def test_ground_truth_evidence_agrees_with_the_renderer(down_deg: float) -> None:
     """Things that face the boat, by label; nothing that the shore hides or the boat has passed; level cameras too."""
     world, config = load_world("river"), load_policy_config(Policy.ORACLE, [f"eye.pitch_down_deg={down_deg}"])
     evidence_source = GroundTruthEvidenceSource(world, (), config)
@@ -171,7 +171,7 @@ def test_oracle_sees_boxes_and_water_as_the_renderer_draws_them(down_deg: float)
 
 @pytest.mark.gl
 @pytest.mark.parametrize("name", ["river", "lake"])
-def test_oracle_water_is_the_rendered_water(name: str) -> None:
+def test_ground_truth_water_is_the_rendered_water(name: str) -> None:
     """Mask against the label picture along the route: 0.95 of intersection over union on average."""
     world, config = load_world(name), load_policy_config(Policy.ORACLE)
     oracle, camera = GroundTruthEvidenceSource(world, (), config), Eye(world, build_camera(config.eye))
@@ -201,7 +201,7 @@ def test_water_edge_of_each_column() -> None:
     assert find_water_edge(water) == (0.5, 0.0, 1.0)
 
 
-def test_levelled_turns_as_the_picture_does() -> None:
+def test_level_mask_turns_as_the_picture_does() -> None:
     """Starboard down by 0.1: the horizon in the picture climbs to the right, and is level again afterwards."""
     x = ((np.arange(80) + 0.5) / 80 - 0.5) * 4.0 / 3.0
     y = (np.arange(64) + 0.5) / 64 - 0.5

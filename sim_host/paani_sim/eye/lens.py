@@ -7,7 +7,7 @@ import numpy.typing as npt
 from paani.arrays import U8
 
 NEUTRAL = (1.0, 1.0, 1.0)
-SHORTEST_PX = 0.7  # a smear that nobody sees
+SHORTEST_PX = 0.7  # a shorter smear is invisible
 
 
 class Lens:

@@ -1,4 +1,4 @@
-"""Sky, wind, rain and waves as what the shaders are told of them. Pure numpy."""
+"""Uniforms of the shaders from sky, wind, rain and waves. Pure numpy."""
 
 import numpy as np
 import numpy.typing as npt

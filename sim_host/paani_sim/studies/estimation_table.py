@@ -27,7 +27,7 @@ START_US = 1_000_000_000
 REST_S, UNDER_WAY_S, LEG_S = 60.0, 300.0, 25.0
 CRUISE_FORCE_N, MAX_FORCE_N = 6.0, 15.0
 FAULT_AT_S = 150.0
-REST_SPEED_MPS, REST_TIME_S, FALSE_MOTION_MPS = 0.02, 2.0, 0.05  # truly at rest, and for how long; said to move (L5)
+REST_SPEED_MPS, REST_TIME_S, FALSE_MOTION_MPS = 0.02, 2.0, 0.05  # true rest, its least duration, false motion (L5)
 
 
 class Condition(NamedTuple):
@@ -63,7 +63,7 @@ class EstimationStep(NamedTuple):
 
 
 class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
-    """One course. Distances are in the plane; healthy: while the estimate said so.
+    """One course. Distances are in the plane; healthy: while the estimate states it.
 
     gps_m, compass_deg: RMS errors of the fixes and of the compass themselves. nis: mean over the fixes that were used,
     2 if the stated spread is right; nis_low, nis_high: its 95 % band. nees: mean squared position error over the

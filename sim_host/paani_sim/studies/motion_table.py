@@ -1,10 +1,10 @@
 """How often the advisor's apparent motion is known, and how often it is wrong, by frame rate: encounters against truth.
 
-A moment is a *closing* one when for as long as the rule needs (1.5 s, or six periods between frames if that is more)
-the thing was whole in the picture, at least 16 px in size, and its range shrank by 8 % a second or more: twice the
-estimator's dead band. Missed, dropped and mistaken boxes excuse nothing. A state is *wrong* when it says that a thing
-approaches or recedes which did not over the time the state is measured over; *late* when it was right over that time
-and no longer is over the last half second.
+A moment is *closing* if for as long as the rule needs (1.5 s, or six periods between frames if that is longer) the target
+was whole in the picture and at least 16 px in size, and its range shrank by 8 % a second or more, twice the estimator's
+dead band. Missed, dropped and mistaken boxes are no excuse. A state is *wrong* if it says that a target approaches or
+recedes which did not over the time that the state is measured over. It is *late* if it was right over that time and no
+longer is over the last half second.
 
 `paani bench judgement --only motion`, or `python -m paani_sim.studies.motion_table SEED N`.
 """
@@ -73,7 +73,7 @@ class MotionRow(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class _JudgedFrame(NamedTuple):
-    """What was said of the thing at one frame, and what was true."""
+    """The judged motion of the target at one frame, and the true one."""
 
     motion: m.MotionState
     cause: m.MotionCause
@@ -145,40 +145,40 @@ def load_profile_config(profile: str) -> Config:
 def _judge_encounter(
     advisor: Decider[Any], config: Config, course: EncounterCourse, rate_hz: float, rng: np.random.Generator
 ) -> Iterator[_JudgedFrame]:
-    """Let the advisor hear one encounter as it would live."""
+    """Step the advisor through one encounter at its live rate."""
     camera = Camera(hfov_deg=config.eye.hfov_deg, down_deg=config.eye.pitch_down_deg)
     need_s = max(RULE_S, RULE_PERIODS / rate_hz)
-    state, heard = advisor.state(), {topic.name: Input() for topic in advisor.inputs}
+    state, inputs = advisor.state(), {topic.name: Input() for topic in advisor.inputs}
     step_s, since = 0.0, list[FrameObservation]()
     for number, frame in enumerate(simulate_frames(course, rate_hz, camera, rng)):
         now_s = frame.at_s + LATENCY_S
         while step_s < now_s:
-            heard[keys.ODOMETRY.name] = Input(_odometry(course, step_s - ODOMETRY_AGE_S, rng), _us(step_s))
-            state, _ = advisor.decide(state, heard, _us(step_s), config)
+            inputs[keys.ODOMETRY.name] = Input(_odometry(course, step_s - ODOMETRY_AGE_S, rng), _us(step_s))
+            state, _ = advisor.decide(state, inputs, _us(step_s), config)
             step_s += STEP_S
-        heard[keys.ODOMETRY.name] = Input(_odometry(course, now_s - ODOMETRY_AGE_S, rng), _us(now_s))
-        heard[keys.EVIDENCE.name] = Input(_evidence(frame, number, course, camera), _us(now_s))
-        state, outputs = advisor.decide(state, heard, _us(now_s), config)
+        inputs[keys.ODOMETRY.name] = Input(_odometry(course, now_s - ODOMETRY_AGE_S, rng), _us(now_s))
+        inputs[keys.EVIDENCE.name] = Input(_evidence(frame, number, course, camera), _us(now_s))
+        state, outputs = advisor.decide(state, inputs, _us(now_s), config)
         since = [*(f for f in since if f.at_s >= frame.at_s - need_s), frame]
         yield _judge_frame(outputs[keys.TRACKS.name], course, frame, since, need_s)
 
 
 def _judge_frame(
-    said: m.Message, course: EncounterCourse, frame: FrameObservation, since: list[FrameObservation], need_s: float
+    tracks: m.Message, course: EncounterCourse, frame: FrameObservation, since: list[FrameObservation], need_s: float
 ) -> _JudgedFrame:
-    assert isinstance(said, m.Tracks)
-    seen = [track for track in said.tracks if not track.held] if frame.box is not None else []
-    track = max(seen or said.tracks, key=lambda t: (t.hits, -t.id), default=None)
+    assert isinstance(tracks, m.Tracks)
+    matched = [track for track in tracks.tracks if not track.held] if frame.box is not None else []
+    track = max(matched or tracks.tracks, key=lambda t: (t.hits, -t.id), default=None)
     motion = track.motion if track else m.MotionState.UNKNOWN
     cause = track.motion_cause if track else m.MotionCause.TOO_FEW_SAMPLES
-    wrong = _contradicts(motion, _closing_per_s(course, frame.at_s, said.motion_history_s))
+    wrong = _contradicts(motion, _closing_per_s(course, frame.at_s, tracks.motion_history_s))
     closing = (
         frame.at_s >= need_s
         and _closing_per_s(course, frame.at_s, need_s) >= MIN_CLOSING_PER_S
         and all(observation.whole and observation.size_px >= MIN_SIZE_PX for observation in since)
     )
     late = not wrong and _contradicts(motion, _closing_per_s(course, frame.at_s, RECENT_S))
-    return _JudgedFrame(motion, cause, frozenset(t.id for t in seen), closing, wrong, late)
+    return _JudgedFrame(motion, cause, frozenset(t.id for t in matched), closing, wrong, late)
 
 
 def _closing_per_s(course: EncounterCourse, at_s: float, over_s: float) -> float:

@@ -86,7 +86,7 @@ def measure_lockstep() -> FigureTable:
         name="lockstep",
         columns=("policy", "drives at once", "x real time, together", "CPU s a simulated s"),
         rows=tuple(rows),
-        note=f"river, {RUN_S:.0f} simulated seconds; plant, sensors, estimator, eyes and deciders at their live rates",
+        note=f"river, {RUN_S:.0f} simulated seconds; plant, sensors, estimator, perception, deciders at live rates",
     )
 
 

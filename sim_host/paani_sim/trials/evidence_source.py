@@ -45,7 +45,7 @@ class CameraEvidenceSource:
         self._renderer = open_eye(world, config.eye)
 
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
-        """See `Eyes`."""
+        """See `EvidenceSource`."""
         t_s = truth.sim_us * 1e-6
         bgr = self._faults.apply(self._renderer.render(boat_pose(truth), t_s, truth.actors_along_m).bgr, t_s)
         if bgr is None:
@@ -54,7 +54,7 @@ class CameraEvidenceSource:
         return EvidenceFrame(evidence, bgr, mask)
 
     def close(self) -> None:
-        """See `Eyes`."""
+        """See `EvidenceSource`."""
         self._perceiver.close()
         self._renderer.close()
 

@@ -65,7 +65,7 @@ class GroundTruthEvidenceSource:
         self._corridor_weights = _CorridorWeights(config.perception.corridors)
 
     def observe(self, truth: m.TruePose, header: m.PictureHeader, roll_rad: float) -> EvidenceFrame | None:
-        """See `Eyes`."""
+        """See `EvidenceSource`."""
         t_s = truth.sim_us * 1e-6
         if find_active_fault(self._faults, FaultKind.CAMERA_DROPPED, t_s):
             return None
@@ -87,7 +87,7 @@ class GroundTruthEvidenceSource:
         return EvidenceFrame(evidence)
 
     def close(self) -> None:
-        """See `Eyes`."""
+        """See `EvidenceSource`."""
 
     def compute_visible_scene(self, truth: m.TruePose) -> VisibleScene:
         """Water cells and boxes of the picture at this pose."""

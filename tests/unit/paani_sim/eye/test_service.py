@@ -61,7 +61,7 @@ def test_unknown_world_is_one_line() -> None:
         open_camera(load_config(sets=("world.name=sea",)))
 
 
-def test_a_scenarios_camera_faults_reach_its_pictures() -> None:
+def test_camera_faults_of_a_scenario_reach_its_pictures() -> None:
     """Black while the scenario says so; nothing at all of a camera that drops its pictures."""
     require_gl()
     config = load_config(sets=("world.name=river_camera_black",))

@@ -25,7 +25,7 @@ def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: Any) -> Acto
 
 
 @pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
-def test_track_is_the_path(name: str) -> None:
+def test_actor_path_equals_the_world_s_path(name: str) -> None:
     """The eye places actors with `actor_at`, the plant with its own measure of the path: one pose."""
     for actor in load_world(name).actors:
         track = ActorPath(actor)
@@ -35,7 +35,7 @@ def test_track_is_the_path(name: str) -> None:
             assert abs(wrap_rad(exact.yaw_rad - quick.yaw_rad)) < 1e-6
 
 
-def test_skipper_stops_short_and_goes_on_when_clear() -> None:
+def test_a_vessel_stops_short_and_goes_on_when_clear() -> None:
     actors = Actors([straight()], EVERY_S, BOAT_REACH_M)
     steps = round(24.0 / EVERY_S)
     for step in range(steps):
@@ -61,7 +61,7 @@ def test_a_swimmer_stops_short_of_a_boat_across_the_way_and_not_of_one_that_is_p
     assert actors.along_m[0] > furthest_m + 10.0
 
 
-def test_who_holds_on_keeps_time_to_the_bit() -> None:
+def test_an_actor_that_holds_on_follows_time_to_the_bit() -> None:
     """A path that no one bars is a function of time alone, whatever the boat does."""
     actors = Actors([straight(Behaviour.HOLDS_ON, start_s=2.0)], EVERY_S, BOAT_REACH_M)
     for step in range(400):
@@ -69,7 +69,7 @@ def test_who_holds_on_keeps_time_to_the_bit() -> None:
     assert actors.along_m == (1.5 * (EVERY_S * 400 - 2.0),)
 
 
-def test_nobody_moves_before_the_start() -> None:
+def test_no_actor_moves_before_its_start() -> None:
     actors = Actors([straight(start_s=5.0)], EVERY_S, BOAT_REACH_M)
     for step in range(100):
         actors.advance(EVERY_S * (step + 1), FAR_M)
@@ -87,7 +87,7 @@ def test_giving_way_only_ever_slows(x_m: float, y_m: float, yaw: float) -> None:
     assert yielding_speed_mps(straight(Behaviour.HOLDS_ON), pose, (x_m, y_m), BOAT_REACH_M) == 1.5
 
 
-def test_who_has_waited_long_backs_off_and_tries_again() -> None:
+def test_an_actor_that_waited_long_backs_off_and_tries_again() -> None:
     """Two that wait for each other would wait for ever."""
     actors = Actors([straight()], EVERY_S, BOAT_REACH_M)
     stopped_m, furthest_m, back_m = 0.0, 0.0, 1e9
@@ -104,7 +104,7 @@ def test_who_has_waited_long_backs_off_and_tries_again() -> None:
 
 
 @pytest.mark.parametrize(("x_m", "sense"), [(1.0, -1.0), (-1.0, 1.0)])
-def test_who_makes_way_does_not_run_onto_a_boat_alongside(x_m: float, sense: float) -> None:
+def test_an_actor_that_yields_does_not_touch_a_boat_alongside(x_m: float, sense: float) -> None:
     """Forward of the beam: astern. Abaft it: ahead, and not astern onto it."""
     actors = Actors([straight(start_m=20.0)], EVERY_S, BOAT_REACH_M)
     speeds = []

@@ -135,7 +135,7 @@ def test_disabled_command_is_accepted_and_gives_zero() -> None:
     "arming",
     [None, Arming(source_us=1, armed=False), Arming(source_us=1, armed=True, stopped=True)],
 )
-def test_no_force_without_the_operators_word(arming: Arming | None) -> None:
+def test_no_force_without_arming(arming: Arming | None) -> None:
     adapter = ThrustAdapter(CONFIG, domain=43)
     for service in CONFIG.require_pulses:
         adapter.receive_pulse(service, NOW_US)
@@ -156,7 +156,7 @@ def test_arming_must_be_repeated() -> None:
     assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
 
 
-def test_a_latched_stop_holds_while_everything_else_comes_back() -> None:
+def test_a_latched_stop_holds_while_everything_else_resumes() -> None:
     adapter = ready()
     adapter.receive_arming(Arming(source_us=1, armed=False, stopped=True), NOW_US)
     for n in range(20):
@@ -168,7 +168,7 @@ def test_a_latched_stop_holds_while_everything_else_comes_back() -> None:
 
 
 @pytest.mark.parametrize("silent", CONFIG.require_pulses)
-def test_each_vital_process_must_beat(silent: str) -> None:
+def test_each_vital_process_must_send_pulses(silent: str) -> None:
     """A process that hangs for longer than 0.35 s stops the boat; its next beat frees it."""
     adapter = ready()
     now_us = NOW_US + 350_001
@@ -184,7 +184,7 @@ def test_each_vital_process_must_beat(silent: str) -> None:
     assert adapter.decide(now_us).zero_cause is ZeroCause.NONE
 
 
-def test_a_vital_process_that_never_beat_keeps_the_boat_still() -> None:
+def test_a_vital_process_without_pulse_keeps_the_boat_still() -> None:
     adapter = ThrustAdapter(CONFIG, domain=43)
     adapter.receive_arming(ARMED, NOW_US)
     adapter.offer(thrust(), NOW_US)
@@ -192,7 +192,7 @@ def test_a_vital_process_that_never_beat_keeps_the_boat_still() -> None:
     assert (applied.zero_cause, applied.lost_pulse) == (ZeroCause.PULSE_LOST, CONFIG.require_pulses[0])
 
 
-def test_nothing_heard_nothing_applied() -> None:
+def test_no_command_means_no_thrust() -> None:
     assert ready().decide(NOW_US).zero_cause is ZeroCause.NO_COMMAND
 
 

@@ -89,7 +89,7 @@ def test_wilson_against_known_values(successes: int, trials: int, low: float, hi
 
 
 @given(trials=st.integers(1, 2000), data=st.data())
-def test_wilson_holds_the_share(trials: int, data: st.DataObject) -> None:
+def test_wilson_interval_contains_the_share(trials: int, data: st.DataObject) -> None:
     successes = data.draw(st.integers(0, trials))
     low, high = wilson_interval(successes, trials)
     assert 0.0 <= low <= successes / trials <= high <= 1.0
@@ -116,7 +116,7 @@ def test_a_corner_of_a_bank_counts() -> None:
 
 
 @given(along_m=st.floats(-15.0, 40.0))
-def test_actors_lie_beyond_their_path_s_end_as_they_came(along_m: float) -> None:
+def test_actors_keep_their_heading_beyond_the_end_of_their_path(along_m: float) -> None:
     """A boat that has arrived does not swing round to the east."""
     path_m = np.array([[0.0, 0.0], [0.0, 10.0], [-8.0, 14.0]])
     boat = dataclasses.replace(SWIMMER, closed=False, path_m=path_m, length_m=6.2)
@@ -144,7 +144,7 @@ def test_actors_are_where_the_world_says(along_m: float) -> None:
         ([(0.0, 15.0, 0.0), (0.0, 18.0, 0.0)], BANK, False),  # always beside the boat
     ],
 )
-def test_what_the_camera_could_have_seen(places: list[tuple[float, float, float]], what: str, seen: bool) -> None:
+def test_visibility_to_the_camera(places: list[tuple[float, float, float]], what: str, seen: bool) -> None:
     world = with_things(BUOY, BARGE)
     assert was_visible(world, what, hull_path(POND, places), math.radians(35.0), 15.0, 0.55) is seen
 

@@ -44,7 +44,7 @@ def test_suites() -> None:
     assert len({case.stem for case in standard}) == len(standard) == len({case.name for case in standard})
 
 
-def test_cases_are_read_as_they_are_named() -> None:
+def test_parsing_a_case_inverts_its_name() -> None:
     for case in (
         TrialCase("lake", 3, Policy.ORACLE),
         TrialCase("river", 1, Policy.PAANI, "camera_black"),
@@ -58,7 +58,7 @@ def test_cases_are_read_as_they_are_named() -> None:
     [("sea:1:paani", "no world 'sea'"), ("lake:x:paani", "'x' is no seed"), ("lake:1:me", "no policy 'me'"),
      ("lake+rain:1:paani", "no fault 'rain'"), ("lake", "no policy"), ("", "no world")],
 )  # fmt: skip
-def test_a_case_that_is_none(text: str, says: str) -> None:
+def test_a_malformed_case_is_refused(text: str, says: str) -> None:
     with pytest.raises(UserError, match=says):
         parse_case(text)
 
@@ -77,7 +77,7 @@ def write(folder: Path, case: TrialCase, fingerprint: Fingerprint) -> None:
     path.write_bytes(encode_stored_result(StoredResult(fingerprint=fingerprint, result=RESULT)))
 
 
-def test_a_run_is_gone_on_with(tmp_path: Path, reader: FingerprintReader) -> None:
+def test_an_interrupted_suite_goes_on(tmp_path: Path, reader: FingerprintReader) -> None:
     """Results made alike are kept; one of other code is named and driven again, and so is half a file."""
     write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
     write(tmp_path, CASES[1], msgspec.structs.replace(reader.fingerprint(CASES[1]), code="0", settings="0"))
@@ -101,7 +101,7 @@ def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Pa
     assert before.list_differences(reader.fingerprint(TrialCase(str(file), 1, Policy.BLIND))) == ["scenario"]
 
 
-def test_records_survive_their_file(tmp_path: Path, reader: FingerprintReader) -> None:
+def test_stored_results_survive_their_file(tmp_path: Path, reader: FingerprintReader) -> None:
     write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
     record = read_stored_result(result_path(tmp_path, CASES[0]))
     assert record is not None
@@ -162,13 +162,13 @@ def test_mistakes_are_named(words: list[str], says: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("words", [["--seeds", "3..1"], ["--seeds", "a"], ["--jobs", "0"], ["--policy", "me"]])
-def test_words_that_are_no_options(words: list[str]) -> None:
+def test_malformed_options_are_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         command.main(words)
     assert stop.value.code == 2
 
 
-def test_a_finished_run_is_only_read(
+def test_a_finished_suite_is_only_read(
     tmp_path: Path, reader: FingerprintReader, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Nothing is driven where every result is there; format_summary and figures are written."""
@@ -182,7 +182,7 @@ def test_a_finished_run_is_only_read(
 
 
 @pytest.mark.parametrize("policy", [Policy.PAANI, Policy.ORACLE, Policy.BLIND])
-def test_trials_look_through_the_wide_lens_unless_told(policy: Policy) -> None:
+def test_trials_use_the_wide_lens_by_default(policy: Policy) -> None:
     """The paper's policy is the paper's, whatever is set."""
     assert load_policy_config(policy).profile == "wide"
     told = load_policy_config(policy, ["profile=paani"])

@@ -61,12 +61,12 @@ def test_wake_lies_on_the_cusp() -> None:
     assert heights_m[0] < 0.05 * max(heights_m)
 
 
-def test_nothing_ahead_and_nothing_from_the_slow() -> None:
+def test_no_wake_ahead_and_none_from_slow_vessels() -> None:
     assert abs(surface_m(passed(SPEED_MPS), 10.0, 0.0, 60.0)) == 0.0
     assert passed(0.9).packets_near(-20.0, 7.0, 60.0, 50.0) == []
 
 
-def test_wake_runs_on_when_its_maker_stops() -> None:
+def test_wake_runs_on_when_its_source_stops() -> None:
     wakes = passed(SPEED_MPS, 20.0)
     for step in range(200):
         wakes.update_vessels([WakeSource(0.0, 0.0, 0.0, 0.0, 2.0)], 20.0 + 0.05 * step)

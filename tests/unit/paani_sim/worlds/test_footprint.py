@@ -56,7 +56,7 @@ def canal() -> World:
     return load_world("canal")
 
 
-def test_what_is_run_into_is_the_outline(canal: World) -> None:
+def test_the_colliding_shape_is_the_outline(canal: World) -> None:
     model = build_spec(canal).compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

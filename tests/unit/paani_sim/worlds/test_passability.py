@@ -20,7 +20,7 @@ BARGE = Obstacle("barge", Kind.VESSEL, "barge", Pose2(0.0, 0.0, 0.5 * np.pi), 10
 
 
 @given(st.integers(0, 2**57 - 1), st.integers(0, 2**57 - 1))
-def test_spreading_fills_the_runs_that_hold_a_seed(row: int, seeds: int) -> None:
+def test_flooding_fills_the_runs_that_hold_a_seed(row: int, seeds: int) -> None:
     seeds &= row
     flags = np.array([bool(row >> k & 1) for k in range(57)])
     label, _ = ndimage.label(flags)
@@ -38,12 +38,12 @@ def test_spreading_fills_the_runs_that_hold_a_seed(row: int, seeds: int) -> None
         (["...##", "##..#", "###.."], True),
     ],
 )
-def test_a_way_leads_on_or_not(rows: list[str], leads: bool) -> None:
+def test_connection_of_the_first_row_with_the_last(rows: list[str], leads: bool) -> None:
     free = np.array([[cell == "." for cell in row] for row in rows])
     assert _is_connected(free, np.ones(5, np.bool_)) is leads
 
 
-def test_gaps_are_to_the_footprint() -> None:
+def test_distances_are_to_the_footprint() -> None:
     points_m = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 8.0], [4.0, 9.0]])
     assert footprint_distance_m(BARGE, BARGE.pose, points_m) == pytest.approx([0.0, 2.0, 3.0, 5.0])
     assert obstacle_distance_m((), points_m).tolist() == [np.inf] * 4

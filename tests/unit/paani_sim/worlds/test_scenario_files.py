@@ -89,7 +89,7 @@ def _scenario(tmp_path: Path, text: str) -> Scenario:
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_what_ships_loads_by_name_and_is_sound(name: str) -> None:
+def test_shipped_scenarios_load_by_name_and_are_sound(name: str) -> None:
     """Moving things keep off what stands still, and the scenario compiles."""
     scenario = load_scenario(name)
     assert scenario.name == name
@@ -99,7 +99,7 @@ def test_what_ships_loads_by_name_and_is_sound(name: str) -> None:
     assert build_spec(scenario.world).compile().nmocap == len(scenario.world.actors)
 
 
-def test_enough_ships() -> None:
+def test_shipped_scenarios_cover_faults_and_encounters() -> None:
     """Every world, most kinds of encounter and faults of every sort of instrument."""
     scenarios = [load_scenario(name) for name in SCENARIOS]
     assert 6 <= len(scenarios) <= 12
@@ -114,7 +114,7 @@ def test_a_world_s_name_is_its_plain_scenario() -> None:
     assert np.array_equal(scenario.world.route_m, load_world("lake").route_m)
 
 
-def test_a_file_says_everything(tmp_path: Path) -> None:
+def test_a_file_sets_every_field(tmp_path: Path) -> None:
     scenario = _scenario(tmp_path, WHOLE)
     world, light, wind = scenario.world, scenario.world.light, scenario.world.wind
     assert (scenario.name, scenario.seed, scenario.vessel) == ("mine", 7, "otter")
@@ -326,7 +326,7 @@ _POINTS = st.lists(st.lists(st.floats(-120.0, 120.0), min_size=2, max_size=2), m
     st.one_of(st.just({}), st.dictionaries(st.sampled_from(["from_m", "length_m", "waypoints_m"]), _JUNK | _POINTS)),
 )
 @settings(max_examples=60, deadline=None)
-def test_whatever_the_file_says_it_is_sound_or_refused(actor: dict[str, object], route: dict[str, object]) -> None:
+def test_any_file_is_sound_or_refused(actor: dict[str, object], route: dict[str, object]) -> None:
     """Never anything but a scenario that compiles, or one line."""
     tables = [
         '[world]\nkind = "river"',
