@@ -225,8 +225,9 @@ def test_a_whole_report_of_a_miniature(data: Path, tmp_path: Path) -> None:
     assert [figure.n for row in measured for figure in row.figures] == [4]
 
 
-def test_pictures_never_get_into_the_repository(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    inside = Path(__file__).parent / "report"
+def test_pictures_never_get_into_the_repository(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "checkout" / ".git").mkdir(parents=True)
+    inside = tmp_path / "checkout" / "tests" / "report"
     assert report(data, inside) == 2
     assert "is inside the repository" in capsys.readouterr().err
     assert not inside.exists()
