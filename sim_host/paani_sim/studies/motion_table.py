@@ -2,9 +2,9 @@
 
 A moment is *closing* if for as long as the rule needs (1.5 s, or six periods between frames if that is longer) the
 target was whole in the picture and at least 16 px in size, and its range shrank by 8 % a second or more, twice the
-estimator's dead band. Missed, dropped and mistaken boxes are no excuse. A state is *wrong* if it says that a target approaches or
-recedes which did not over the time that the state is measured over. It is *late* if it was right over that time and no
-longer is over the last half second.
+estimator's dead band. Missed, dropped and mistaken boxes are no excuse. A state is *wrong* if it says that a target
+approaches or recedes which did not over the time that the state is measured over. It is *late* if it was right over
+that time and no longer is over the last half second.
 
 `paani bench judgement --only motion`, or `python -m paani_sim.studies.motion_table SEED N`.
 """

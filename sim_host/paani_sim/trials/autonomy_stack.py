@@ -32,13 +32,13 @@ class AutonomyStack:
     def __init__(
         self, config: Config, mission: m.Mission, bus: LockstepBus, clock: Clock, *, blind: bool = False
     ) -> None:
-        def stepper_of(service: str) -> Stepper[Any, LockstepInbox]:
+        def open_stepper(service: str) -> Stepper[Any, LockstepInbox]:
             return Stepper(bus, clock, config, decider_of(service))
 
         self._config, self._mission, self._bus, self._clock = config, mission, bus, clock
-        self._advisor = None if blind else stepper_of("advisor")
-        self._navigator = stepper_of("navigator")
-        self._controller = stepper_of("controller")
+        self._advisor = None if blind else open_stepper("advisor")
+        self._navigator = open_stepper("navigator")
+        self._controller = open_stepper("controller")
         self._advise_due_us = self._navigate_due_us = self._control_due_us = self._route_due_us = 0
         self._evidence_stale_us: int | None = None
         self._is_navigator_woken = False

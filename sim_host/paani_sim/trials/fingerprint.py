@@ -50,7 +50,7 @@ class FingerprintReader:
             code=self._code,
             models=self._models,
             settings=self._settings[case.policy],
-            scenario=_checksum_files([Path(case.world)]) if case.world.endswith(SCENARIO_SUFFIX) else case.place,
+            scenario=_checksum_files([Path(case.world)]) if case.world.endswith(SCENARIO_SUFFIX) else case.condition,
         )
 
 

@@ -46,10 +46,10 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
     @property
     def name(self) -> str:
         """The case as `--one` takes it."""
-        return f"{self.place}{FIELD_SEPARATOR}{self.seed}{FIELD_SEPARATOR}{self.policy.value}"
+        return f"{self.condition}{FIELD_SEPARATOR}{self.seed}{FIELD_SEPARATOR}{self.policy.value}"
 
     @property
-    def place(self) -> str:
+    def condition(self) -> str:
         """World and fault, as in `name`."""
         return self.world + (FAULT_SEPARATOR + self.fault if self.fault else "")
 
@@ -135,7 +135,7 @@ def build_scenario(case: TrialCase) -> Scenario:
         return scenario
     kind = FaultKind(case.fault)
     duration_s, amount = SUITE_FAULTS[kind]
-    rng = np.random.default_rng([zlib.crc32(case.place.encode()), case.seed])
+    rng = np.random.default_rng([zlib.crc32(case.condition.encode()), case.seed])
     fault = Fault(kind, round(float(rng.uniform(*FAULT_START_RANGE_S)), 2), duration_s, amount)
     task = dataclasses.replace(
         scenario.task, distance_m=min(scenario.task.distance_m or FAULT_ROUTE_LENGTH_M, FAULT_ROUTE_LENGTH_M)

@@ -73,14 +73,14 @@ def emit_packets(source: WakeSource, at_s: float, since_m: float) -> tuple[Packe
     share = since_m * math.sqrt(0.5) / (math.sqrt(2.0 * math.pi) * spread_m)
     amplitude_m = 0.5 * share * height_m(source.speed_mps, DEPTH_M)
 
-    def one(side: float) -> Packet:
+    def emit_packet(side: float) -> Packet:
         cos, sin = math.cos(source.yaw_rad + side * CUSP_RAD), math.sin(source.yaw_rad + side * CUSP_RAD)
         return Packet(
             source.x_m, source.y_m, at_s, k * cos, k * sin, k * phase_mps,
             0.5 * phase_mps * cos, 0.5 * phase_mps * sin, spread_m, amplitude_m,
         )  # fmt: skip
 
-    return one(1.0), one(-1.0)
+    return emit_packet(1.0), emit_packet(-1.0)
 
 
 class Wakes:
