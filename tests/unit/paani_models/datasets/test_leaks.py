@@ -101,7 +101,7 @@ def test_more_pairs_are_counted() -> None:
 
 @pytest.mark.data
 @pytest.mark.skipif(not data_folder().is_dir(), reason=f"no picture data at {data_folder()}; set PAANI_DATA")
-def test_on_real_pictures_copies_are_found_and_strangers_are_not() -> None:
+def test_on_real_pictures_copies_are_found_and_different_sources_are_not() -> None:
     """Every sixth picture against a disguised copy of itself, and against every other source."""
     samples = {sample.picture: sample for sample in read_samples(data_folder(), SOURCES)}
     found, originals = 0, []

@@ -113,7 +113,7 @@ def test_terms_travel_along(tmp_path: Path) -> None:
     assert all(word in text for word in ("someone/water", "abc", "CC0", "JPEG quality 95"))
 
 
-def test_prepare_finds_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_prepare_reports_leaks_between_splits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data = own_data(tmp_path / "data")
     command = ["prepare", "--data", str(data), "--sources", ",".join(NAMES), "--manifest", str(tmp_path / "m.json")]
     assert main(command) == 0

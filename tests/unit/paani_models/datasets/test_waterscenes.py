@@ -230,7 +230,7 @@ def test_a_missing_label_can_be_declared_empty(tmp_path: Path) -> None:
     assert {item.file: sum(item.boxes) for item in manifest.items}["images/000006.jpg"] == 0
 
 
-def test_a_view_on_both_sides_is_told_or_refused(tmp_path: Path) -> None:
+def test_a_view_on_both_sides_is_reported_or_refused(tmp_path: Path) -> None:
     """The official lists promise disjoint ids, no more."""
     raw = waterscenes(tmp_path / "raw")
     twin = np.clip(scene(1).astype(int) + 6, 0, 255).astype(np.uint8)

@@ -208,7 +208,7 @@ def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
     return run
 
 
-def test_learns_four_pictures_by_heart_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_overfits_four_pictures_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train, "SIZE_WH", (160, 128))
     small_run(tmp_path, 12).run()
     rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]

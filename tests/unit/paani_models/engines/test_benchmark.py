@@ -74,9 +74,7 @@ def timed(**pair_ms: float) -> list[TimingRow]:
     ],
     ids=["slower", "faster", "differs", "not a number", "a draw", "alone", "only ncnn"],
 )
-def test_the_faster_engine_is_chosen_where_it_answers_alike(
-    pair_ms: dict[str, float], differ: float, engine: str
-) -> None:
+def test_the_faster_engine_is_chosen_where_outputs_agree(pair_ms: dict[str, float], differ: float, engine: str) -> None:
     assert choose_engine(timed(**pair_ms), [Agreement("detector", differ, 4)], MAX_DIFFERENCE).engine == engine
 
 
@@ -100,7 +98,7 @@ def test_rows_are_least_median_and_p95() -> None:
     )
 
 
-def test_bench_tells_why_ncnn_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     weights = Path(shutil.copytree(WEIGHTS, tmp_path / "weights", ignore=shutil.ignore_patterns("*.ncnn.*")))
     words = ["bench", "--weights", str(weights), "--threads", "1", "--rounds", "1"]
     assert main([*words, "--json", str(tmp_path / "bench.json")]) == 0

@@ -55,7 +55,7 @@ def detector(tmp_path: Path) -> Path:
     return place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 1680))
 
 
-def test_both_engines_answer_alike(segmenter: Path) -> None:
+def test_outputs_of_both_engines_agree(segmenter: Path) -> None:
     one, other = (engine_class(name).load("segmenter", str(segmenter), 1) for name in ("onnxruntime", "ncnn"))
     assert isinstance(one, OnnxEngine)
     assert isinstance(other, NcnnEngine)
@@ -206,7 +206,7 @@ def test_a_bad_conversion_leaves_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["own.onnx", "pnnx"]
 
 
-def test_without_pnnx_it_is_told_how_to_get_it(
+def test_a_missing_pnnx_is_reported_with_its_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = small_segmenter(tmp_path / "own.onnx")
@@ -218,7 +218,7 @@ def test_without_pnnx_it_is_told_how_to_get_it(
 
 
 @pytest.mark.parametrize("name", ["detector", "segmenter"])
-def test_the_joined_corners_are_the_same_net(tmp_path: Path, name: str) -> None:
+def test_replacing_strided_slices_changes_no_bit(tmp_path: Path, name: str) -> None:
     model = replace_strided_slices(onnx.load(str(verified_path(name))))
     onnx.checker.check_model(model, full_check=True)
     onnx.save(model, str(tmp_path / "joined.onnx"))

@@ -108,12 +108,12 @@ def test_check_accepts_both(variant: Path, capsys: pytest.CaptureFixture[str]) -
         assert "input [1, 256, 320, 3] uint8" in capsys.readouterr().out
 
 
-def test_the_command_says_how_to_use_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_variant_command_prints_its_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["models", "variant", "--out", str(tmp_path)]) == 0
     assert f"--set perception.segmenter={tmp_path / 'segmenter.onnx'}" in capsys.readouterr().out
 
 
-def test_a_manifest_that_belies_its_net_is_refused(tmp_path: Path) -> None:
+def test_a_manifest_that_contradicts_its_network_is_refused(tmp_path: Path) -> None:
     """Bytes promised, floats taken; and a shape that is not one of bytes."""
     shipped = load_catalogue()["segmenter"]
     (tmp_path / "own.onnx").write_bytes(verified_path("segmenter").read_bytes())

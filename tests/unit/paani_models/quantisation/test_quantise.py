@@ -140,7 +140,7 @@ def test_equalisation_leaves_what_a_factor_cannot_pass(tmp_path: Path) -> None:
     assert [t.SerializeToString() for t in model.graph.initializer] == before
 
 
-def test_the_papers_recipe_breaks_uneven_channels_and_equalisation_mends_them_t4_v10(tmp_path: Path) -> None:
+def test_per_tensor_quantisation_fails_on_uneven_channels_and_equalisation_repairs_it_t4_v10(tmp_path: Path) -> None:
     """The mechanism behind the paper's collapse: the same function, the same recipe, other scales inside."""
     small_net(tmp_path / "even.onnx")
     small_net(tmp_path / "net.onnx", spread=16.0)

@@ -135,7 +135,7 @@ def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
     assert isinstance(progress.optimiser, torch.optim.AdamW)
 
 
-def test_stage_of() -> None:
+def test_stage_at_epoch() -> None:
     stages = (Stage(2, 64, 64), Stage(1, 128, 128))
     assert [stage_at_epoch(stages, epoch).height_px for epoch in range(3)] == [64, 64, 128]
     with pytest.raises(IndexError):

@@ -167,14 +167,14 @@ def test_a_missed_bar_states_its_measured_reason() -> None:
     assert (met.is_met, met.limit) == (True, "")
 
 
-def test_a_missed_box_bar_names_sizes_and_fates() -> None:
+def test_a_missed_box_requirement_names_sizes_and_outcomes() -> None:
     (person,) = compare_with_requirements([], analyse_box_errors([picture([[0.0, 0.0, 0.0, 3.0, 6.0]], [])]))
     assert (person.requirement.metric, person.value, person.n) == ("person_ap50", 0.0, 1)
     assert "Of 1 objects under 8 px high 0 are found" in person.limit
     assert "1 not seen" in person.limit
 
 
-def test_a_gate_bar_is_kept_from_above_and_names_where_the_gate_is_wrong() -> None:
+def test_an_image_quality_requirement_is_an_upper_bound_and_names_the_worst_faults() -> None:
     cells = (FaultCell("black", 1, 60, 60, 0.1), FaultCell("glare", 5, 60, 50, 0.59), FaultCell("fog", 1, 60, 0, 0.9))
     totals = FaultTotals(false_accept_frac=10 / 120, false_reject_frac=0.0, clean_reject_frac=0.01)
     faults = FaultReport(cells, (CleanSource("boats", 200, 2), CleanSource("river", 100, 0)), totals)

@@ -30,14 +30,14 @@ def test_the_imagenet_segmenter_has_the_segmenters_contract() -> None:
     assert tuple(teacher(x).shape) == (1, 3, 256, 320)
 
 
-def test_the_same_answer_is_at_distance_zero() -> None:
+def test_equal_logits_have_zero_divergence() -> None:
     logits = torch.randn(1, 3, 8, 8, generator=torch.Generator().manual_seed(0))
     assert float(kl_divergence(logits, logits)) == pytest.approx(0.0, abs=1e-6)
     assert float(kl_divergence(logits, logits + 5.0)) == pytest.approx(0.0, abs=1e-5)
     assert float(kl_divergence(logits, -logits)) > 0.1
 
 
-def test_answer_distance_by_hand() -> None:
+def test_kl_divergence_by_hand() -> None:
     """Teacher sure of one of two classes, student undecided: log 2."""
     answer = torch.tensor([50.0, 0.0, -50.0]).view(1, 3, 1, 1)
     logits = torch.tensor([0.0, 0.0, -50.0]).view(1, 3, 1, 1)

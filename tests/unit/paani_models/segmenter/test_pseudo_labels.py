@@ -26,7 +26,7 @@ class SureBelow(nn.Module):  # type: ignore[misc]
         return logits
 
 
-def test_only_sure_answers_become_labels_and_people_stay_right() -> None:
+def test_only_confident_predictions_become_labels_and_drawn_masks_stay() -> None:
     width, height = CACHE_WH
     picture = np.zeros((height, width, 3), np.uint8)
     picture[:, width // 2 :] = 255

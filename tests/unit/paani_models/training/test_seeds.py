@@ -27,7 +27,7 @@ def striped(rng: np.random.Generator) -> CachedPicture:
 
 @pytest.mark.train
 @pytest.mark.slow
-def test_w8_every_seed_learns_and_none_like_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_w8_every_seed_learns_and_gives_its_own_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """W8: the seed is the recipe's. Three seeds give three networks whose loss falls; one seed repeats its network."""
     monkeypatch.setitem(train.DRAWS_PER_EPOCH, "river", 7)
     pictures = [striped(np.random.default_rng(k)) for k in range(6)]
