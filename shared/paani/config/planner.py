@@ -60,27 +60,28 @@ def calibration_of(eye: EyeConfig) -> CalibrationConfig:
 
 
 class PlannerConfig(Section, frozen=True):
-    """The metric planner: what lies on the water around the boat, and where it may go. It acts on a valid calibration.
+    """The local planner and its map of the water around the boat. It acts on a valid calibration alone.
 
-    `blind_m`: what no picture shows beside the boat counts as water that far, unless something was last seen in it; a
-    camera that is blind beyond it leaves the rest unknown.
-    `outvoted_by`: so many later pictures that show water free a cell that one alone shows occupied: a glint; 0: never.
-    `hidden_s`: what was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. It may
-    have come `hidden_drift_m` nearer meanwhile.
-    `person_mps`: how fast a person who is out of sight may swim, `person_reach_m` at most; a vessel drifts at
-    `drift_mps`, `vessel_reach_m` at most.
-    `horizon_slack_deg`: water seen this far above the horizon is no water: nothing in its column counts.
-    `look_m`: what lies so far along a way, but beyond `horizon_s`, is avoided early and forbids nothing.
-    `predict`: what moves counts where it will be, not where it was: velocities over `fit_s`, as far as `mover_range_m`;
-    expected to go on for `unseen_s` out of sight; where it was last seen stays occupied as anything else.
-    `patience_s`: waits so long for what moves to pass.
-    `person_near_m`, `vessel_near_m`: kept free around what moves. `lead_s`: ways that come near where it will be so
-    much later cost more, those astern do not.
-    `room_m`: free way that a boat must keep ahead, to be able to turn away. `turn_radius_m`: no tighter circle at any
-    speed, and `helm_speed_mps`: driven at that by the helm alone; of fans that only push.
-    `drag_per_s`, `drag_per_m`: what slows a boat whose fans are off, per speed and per its square.
-    `brake_s`: so long at most a boat under way is ordered to stand, when nowhere is free; then there is no thrust.
-    `stop_s`: way to rest over speed, the age of the picture included; within it nothing may be unknown.
+    `blind_m`: the blind zone beside the boat counts as water up to here, unless an obstacle was last seen in it.
+    A camera that is blind beyond it leaves the zone unknown.
+    `outvoted_by`: so many later pictures that show water free a cell that one picture alone shows occupied: a glint; 0:
+    never.
+    `hidden_s`: a cell that was last seen occupied stays so this long while the camera looks elsewhere; 0: Q3 alone. The
+    obstacle may have come `hidden_drift_m` nearer meanwhile.
+    `person_mps`: speed of a person who may swim out of sight, over `person_reach_m` at most. An unseen vessel drifts
+    at `drift_mps`, over `vessel_reach_m` at most.
+    `horizon_slack_deg`: water seen this far above the horizon is no water, and nothing in its column counts.
+    `look_m`: obstacles that far along a path, but beyond `horizon_s`, add to the cost and forbid nothing.
+    `predict`: dynamic obstacles count where they are predicted to be. Velocities are fitted over `fit_s`, up to
+    `mover_range_m` away, and predict an obstacle for `unseen_s` out of sight.
+    `patience_s`: the longest that the boat waits for dynamic obstacles to pass.
+    `person_near_m`, `vessel_near_m`: room kept free around dynamic obstacles. `lead_s`: candidates that come near where
+    an obstacle will be so much later cost more, those that pass astern do not.
+    `room_m`: length of free path that a boat must keep ahead, to be able to turn away. `turn_radius_m`: radius of the
+    tightest circle at any speed; `helm_speed_mps`: speed that steering alone causes with thrusters that only push.
+    `drag_per_s`, `drag_per_m`: deceleration with the thrusters off, per speed and per its square.
+    `brake_s`: a boat under way with no feasible candidate is ordered to brake for this long; then it gets no thrust.
+    `stop_s`: stopping distance over speed, the age of the picture included; nothing within it may be unknown.
     """
 
     use: bool = True  # whether the metric planner steers; without it the advice turns the boat by angles
@@ -93,10 +94,10 @@ class PlannerConfig(Section, frozen=True):
     hidden_s: NonNegative = 20.0
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
-    person_room_m: NonNegative = 0.8  # round people: a swimmer's way within `horizon_s`
+    person_room_m: NonNegative = 0.8  # kept around people: a swimmer's distance within `horizon_s`
     person_mps: NonNegative = 0.4  # of a swimmer at ease
     person_reach_m: Reach = 3.6
-    vessel_reach_m: Reach = 1.2  # measured: what is adrift comes 0.5 to 1.5 m nearer while it is passed
+    vessel_reach_m: Reach = 1.2  # measured: a vessel adrift comes 0.5 to 1.5 m nearer while it is passed
     predict: bool = True
     mover_range_m: Positive = 14.0  # one row of the picture is 0.9 m there
     fit_s: Positive = 2.5
@@ -105,8 +106,8 @@ class PlannerConfig(Section, frozen=True):
     lead_s: NonNegative = 2.0
     person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes
     vessel_near_m: NonNegative = 0.2
-    max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that says where it was taken
-    max_reckon_s: Positive = 0.5  # no odometry for longer: what was seen is forgotten
+    max_pose_gap_s: Positive = 0.15  # between a picture and the odometry that gives its pose
+    max_reckon_s: Positive = 0.5  # without odometry for longer, all observations are forgotten
     horizon_s: Positive = 3.0  # Q4
     step_s: Positive = 0.2  # Q4
     look_m: NonNegative = 5.0  # a quarter turn at `turn_radius_m`, the boat, and as much again
@@ -121,15 +122,15 @@ class PlannerConfig(Section, frozen=True):
     helm_speed_mps: NonNegative = 0.0  # Q5
     hull_radius_m: Positive = 0.55  # Q6
     margin_m: NonNegative = 0.7  # measured: least near misses in trials by camera
-    tight_margin_m: NonNegative = 0.25  # Q6; where nothing is free with the whole margin
+    tight_margin_m: NonNegative = 0.25  # Q6; kept where no candidate keeps the whole margin
     drift_mps: NonNegative = 0.15  # Q6
     brake_s: NonNegative = 1.5  # measured: 0.9 s from 0.6 m/s; picture and order before
     stop_s: Positive = 2.5  # measured: K5 drag stops 0.6 m/s in 0.9 m; 0.5 s of picture and order before
-    replan_s: Positive = 0.25  # a plan without a new picture is as old as this at most
-    span_deg: Angle = 120.0  # headings to either side of the wanted course
-    # Between the headings that are tried: the time of a plan goes with their number.
+    replan_s: Positive = 0.25  # age of a plan, at most, while no new picture comes
+    span_deg: Angle = 120.0  # headings to either side of the desired course
+    # Between the sampled headings: the time that a plan takes is proportional to their number.
     spacing_deg: Annotated[float, msgspec.Meta(ge=2.0, le=60.0)] = 10.0
 
     def acts_on(self, calibration: CalibrationConfig) -> bool:
-        """Whether the planner steers: it refuses without a valid calibration."""
+        """Whether the planner steers: it does not without a valid calibration."""
         return self.use and calibration.valid

@@ -348,16 +348,16 @@ def test_a_stopped_boat_facing_away_pivots_to_its_course_before_it_moves(course:
     """An obstacle may have come up on the side that the camera has not seen since the boat stopped."""
     row, column = np.indices((GRID_CELLS, GRID_CELLS))
     cells = np.hypot(column - 49.5, row - 57.5) < 1.6  # abeam, 1.3 m off
-    wish = GuidanceSetpoint(course, 0.6)
-    about = Plan(float(sample_candidates(RESTING, wish, PLANNER)[0][0]), PIVOT_SPEED_FRACTION * 0.6)
+    setpoint = GuidanceSetpoint(course, 0.6)
+    pivot = Plan(float(sample_candidates(RESTING, setpoint, PLANNER)[0][0]), PIVOT_SPEED_FRACTION * 0.6)
     for before in (None, Plan(0.0, 0.0), Plan(course, PIVOT_SPEED_FRACTION * 0.6)):
-        assert plan_motion(round_about(cells), RESTING, wish, before, PLANNER) == about
+        assert plan_motion(round_about(cells), RESTING, setpoint, before, PLANNER) == pivot
     assert (
-        plan_motion(round_about(cells), RESTING, wish, Plan(-2.0, PIVOT_SPEED_FRACTION * 0.6), PLANNER) != about
+        plan_motion(round_about(cells), RESTING, setpoint, Plan(-2.0, PIVOT_SPEED_FRACTION * 0.6), PLANNER) != pivot
     )  # it has already turned that way
-    assert plan_motion(round_about(cells), CRUISING, wish, Plan(0.0, 0.6), PLANNER) != about
+    assert plan_motion(round_about(cells), CRUISING, setpoint, Plan(0.0, 0.6), PLANNER) != pivot
     near = np.hypot(column - 49.5, row - 54.5) < 1.6
-    assert plan_motion(round_about(near), RESTING, wish, None, PLANNER) != about  # the hull has no room to pivot
+    assert plan_motion(round_about(near), RESTING, setpoint, None, PLANNER) != pivot  # the hull has no room to pivot
 
 
 @pytest.mark.parametrize("surge", [0.0, 0.6])
