@@ -1,4 +1,4 @@
-"""Headless Chromium, and a boat that speaks on the bus with frames of known colours."""
+"""Headless Chromium, and a boat that publishes frames of known colours on the bus."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PERIOD_S = 0.2
 
 
 class Boat:
-    """Publishes picture, mask, evidence, tracks and advice; the ids agree unless `astray` shifts them."""
+    """Publishes picture, mask, evidence, tracks and advice; the ids agree unless `frame_offset` shifts them."""
 
     def __init__(self, buses: dict[str, Bus]) -> None:
         self._clock = WallClock()
@@ -44,25 +44,27 @@ class Boat:
         self._jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
         self._png = cv2.imencode(".png", mask)[1].tobytes()
         self.seq = 0
-        self.astray = 0
+        self.frame_offset = 0
 
-    async def speak(self) -> None:
-        """Speak until cancelled."""
+    async def publish_forever(self) -> None:
+        """Publish until cancelled."""
         while True:
-            self.say()
+            self.publish()
             await asyncio.sleep(PERIOD_S)
 
-    def say(self) -> None:
+    def publish(self) -> None:
         now_us, self.seq = self._clock.now_us(), self.seq + 1
         picture = m.PictureHeader(source_us=now_us, frame_seq=self.seq, frame_epoch=1, width_px=320, height_px=240)
         self._pictures.put_picture(picture, self._jpeg)
-        judged = self.seq + self.astray
-        header = msgspec.structs.replace(picture, frame_seq=judged, width_px=80, height_px=64, media_type="image/png")
+        frame_seq = self.seq + self.frame_offset
+        header = msgspec.structs.replace(
+            picture, frame_seq=frame_seq, width_px=80, height_px=64, media_type="image/png"
+        )
         self._masks.put_picture(header, self._png)
         found = m.Detection(label=m.Label.BUOY, confidence=0.8, box_xyxy=BOX)
         self._evidence.put(
             m.Evidence(
-                source_us=now_us, frame_seq=judged, frame_epoch=1, width_px=320, height_px=240, usable=True,
+                source_us=now_us, frame_seq=frame_seq, frame_epoch=1, width_px=320, height_px=240, usable=True,
                 detections=(found,), segmentation=m.SegmentationSource.LEARNED, navigation_eligible=True,
             )
         )  # fmt: skip
@@ -70,13 +72,13 @@ class Boat:
             id=4, label=m.Label.BUOY, hazard=m.Hazard.MARKER, confidence=0.8, box_xyxy=BOX, hits=3, confirmed=True,
             immediate_danger=False, accepted=True, held=False, age_s=1.0, urgency=0.0,
         )  # fmt: skip
-        self._tracks.put(m.Tracks(source_us=now_us, frame_seq=judged, frame_epoch=1, tracks=(track,)))
+        self._tracks.put(m.Tracks(source_us=now_us, frame_seq=frame_seq, frame_epoch=1, tracks=(track,)))
         clear = m.LaneRisk(risk=0.25, non_water=0.4, uncertainty=0.2, clear_width=0.9, blocked=False)
         blocked = m.LaneRisk(risk=0.8, non_water=0.9, obstacle=0.5, uncertainty=0.2, blocked=True, track_ids=(4,))
         self._advisory.put(
             m.Advisory(
                 source_us=now_us, direction=m.Direction.RIGHT, reason=m.Reason.CENTER_RISK, left=blocked,
-                center=blocked, right=clear, contributing_track_ids=(4,), frame_seq=judged, frame_epoch=1,
+                center=blocked, right=clear, contributing_track_ids=(4,), frame_seq=frame_seq, frame_epoch=1,
                 explanation="Turn right: centre risk 0.80 (limit 0.48); left 0.80, right 0.25 (limit 0.58). "
                 "Without buoy #4 (left and centre) it would go STRAIGHT.",
             )
@@ -94,11 +96,11 @@ class Boat:
 async def boat(open_as: OpenAs) -> AsyncIterator[Boat]:
     buses = {user: await open_as(user) for user in ("camera", "perception", "advisor", "plant")}
     boat = Boat(buses)
-    speaking = asyncio.create_task(boat.speak())
+    publishing = asyncio.create_task(boat.publish_forever())
     yield boat
-    speaking.cancel()
+    publishing.cancel()
     with contextlib.suppress(asyncio.CancelledError):
-        await speaking
+        await publishing
 
 
 @pytest.fixture

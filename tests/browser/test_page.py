@@ -8,9 +8,12 @@ from typing import Any
 
 import pytest
 
+from paani import keys
+from paani import messages as m
+from paani.clock import WallClock
 from paani.config import Config
 from tests.browser.conftest import BOX, MASK_EDGE, PICTURE_BGR, Boat
-from tests.conftest import Spawn
+from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
@@ -25,20 +28,20 @@ PIXEL = """([x, y]) => {
 
 
 class Watched:
-    """A page, and everything it complained of or asked of other hosts."""
+    """A page, its console errors, and its requests to other hosts."""
 
     def __init__(self, page: Any, origin: str) -> None:
-        self.page, self.complaints = page, []
-        self.strangers: list[str] = []
-        page.on("console", lambda line: self.complaints.append(line.text) if line.type == "error" else None)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("request", lambda request: self._judge(request.url, origin))
+        self.page, self.errors = page, []
+        self.foreign_requests: list[str] = []
+        page.on("console", lambda line: self.errors.append(line.text) if line.type == "error" else None)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("request", lambda request: self._note_request(request.url, origin))
 
-    complaints: list[str]
+    errors: list[str]
 
-    def _judge(self, url: str, origin: str) -> None:
+    def _note_request(self, url: str, origin: str) -> None:
         if not url.startswith((origin, "blob:", "data:")):
-            self.strangers.append(url)
+            self.foreign_requests.append(url)
 
 
 async def watch(browser: Any, config: Config, width: int = 1440, height: int = 900) -> Watched:
@@ -96,12 +99,12 @@ async def test_the_overlay_lies_on_its_own_frame(
             "blocked", "blocked", "clear",
         ]  # fmt: skip
         assert (tmp_path / "page.png").stat().st_size > 20_000
-        assert watched.complaints == []
-        assert watched.strangers == []
+        assert watched.errors == []
+        assert watched.foreign_requests == []
 
 
-async def test_evidence_of_another_frame_is_left_out(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
-    boat.astray = 500
+async def test_evidence_of_another_frame_is_not_drawn(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+    boat.frame_offset = 500
     async with spawn("dashboard"):
         page = (await watch(browser, config)).page
         await until(page, "paani.overlay.picture_seq > 5")
@@ -119,11 +122,11 @@ async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat,
         page = watched.page
         await until(page, "paani.link === 'live'")
         await hold_to_arm(page)
-        await said(boat, armed=True, stopped=False)
+        await wait_for_arming(boat, armed=True, stopped=False)
         await page.keyboard.press("Space")
-        await said(boat, armed=False, stopped=True)
+        await wait_for_arming(boat, armed=False, stopped=True)
         await until(page, "document.querySelector('#order-detail').textContent.startsWith('plant at zero in')")
-        assert watched.complaints == []
+        assert watched.errors == []
     await until(page, "paani.link === 'lost'")
     assert (await page.inner_text("#link-word")).startswith("LOST")
     frame = "getComputedStyle(document.body, '::after').borderTopWidth"
@@ -131,14 +134,14 @@ async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat,
 
     boat.arming.value = None
     async with spawn("dashboard", "dashboard.arm_at_start=true"):
-        await said(boat, armed=False, stopped=True)
+        await wait_for_arming(boat, armed=False, stopped=True)
         await until(page, "paani.link === 'live'")
         await hold_to_arm(page)
-        await said(boat, armed=True, stopped=False)
+        await wait_for_arming(boat, armed=True, stopped=False)
 
 
 @pytest.mark.parametrize("held_s", [0.3, 5.4])
-async def test_arming_wants_a_hold_that_has_not_expired(
+async def test_arming_needs_a_hold_that_has_not_expired(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, held_s: float
 ) -> None:
     async with spawn("dashboard"):
@@ -160,7 +163,7 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(
         stop = await page.locator("#stop").bounding_box()
         assert stop["y"] + stop["height"] <= 740
         await page.locator("#stop").click()
-        await said(boat, armed=False, stopped=True)
+        await wait_for_arming(boat, armed=False, stopped=True)
 
 
 async def test_the_choice_of_frame(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
@@ -193,8 +196,8 @@ async def hold_to_arm(page: Any, held_s: float = 1.3) -> None:
     await page.mouse.up()
 
 
-async def said(boat: Boat, *, armed: bool, stopped: bool) -> None:
-    """Wait until the operator's word on the bus is this."""
+async def wait_for_arming(boat: Boat, *, armed: bool, stopped: bool) -> None:
+    """Wait until the operator's state on the bus is this."""
     async with asyncio.timeout(10):
         while True:
             word = boat.arming.value
@@ -208,3 +211,26 @@ async def until(page: Any, expression: str) -> None:
     async with asyncio.timeout(WAIT_S):
         while not await page.evaluate(expression):
             await asyncio.sleep(0.05)
+
+
+async def test_the_map_shows_route_and_position(
+    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
+) -> None:
+    route = (await open_as("navigator")).publisher(keys.ROUTE)
+    odometry = (await open_as("localization")).publisher(keys.ODOMETRY)
+    async with spawn("dashboard"):
+        watched = await watch(browser, config)
+        for step in range(20):
+            now_us = WallClock().now_us()
+            route.put(
+                m.Route(
+                    source_us=now_us,
+                    name="straight",
+                    waypoints=(m.Waypoint(x_m=0.0, y_m=0.0), m.Waypoint(x_m=9.0, y_m=4.0)),
+                )
+            )
+            odometry.put(m.Odometry(source_us=now_us, x_m=0.5 * step, y_m=1.0, yaw_rad=0.0, surge_mps=0.5))
+            await asyncio.sleep(0.1)
+        await until(watched.page, "document.querySelector('#map-pose').textContent.startsWith('9.5 m E, 1.0 m N')")
+        await until(watched.page, "document.querySelector('#speed').textContent === '0.50'")
+        assert watched.errors == []

@@ -64,7 +64,7 @@ async def test_the_page_says_whether_it_records(
         assert await page.evaluate("document.documentElement.scrollWidth") == 360
 
 
-async def test_nothing_is_said_where_nothing_is_to_be_recorded(
+async def test_the_chip_is_hidden_where_nothing_is_to_be_recorded(
     browser: Any, boat: Boat, spawn: Spawn, config: Config
 ) -> None:
     async with spawn("dashboard"):

@@ -52,7 +52,7 @@ async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> 
             assert [row["name"] for row in await answer.json()] == [topic.name for topic in keys.TOPICS]
 
 
-async def test_arming_wants_our_page_its_token_and_a_whole_request(
+async def test_arming_needs_the_own_page_its_token_and_a_valid_request(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:
     async with spawn("dashboard"):
@@ -119,14 +119,14 @@ async def test_a_client_that_never_reads_delays_nobody(
                 assert frames >= 10
 
 
-async def test_another_page_may_not_watch(client: aiohttp.ClientSession, spawn: Spawn) -> None:
+async def test_a_foreign_page_cannot_open_the_socket(client: aiohttp.ClientSession, spawn: Spawn) -> None:
     async with spawn("dashboard"):
         with pytest.raises(aiohttp.WSServerHandshakeError) as caught:
             await client.ws_connect("/ws", origin="http://elsewhere.example")
         assert caught.value.status == 403
 
 
-async def test_headless_speaks_and_serves_nothing(spawn: Spawn, boat: Boat, config: Config) -> None:
+async def test_without_a_page_the_operator_is_still_published(spawn: Spawn, boat: Boat, config: Config) -> None:
     async with spawn("dashboard", "dashboard.serve=false", "dashboard.arm_at_start=true"):
         async with asyncio.timeout(5):
             assert (await boat.arming.next()).armed

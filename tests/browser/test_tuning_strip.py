@@ -31,7 +31,7 @@ TRIED = m.Shadow(
 SHOWN = "!document.querySelector('#tuning').hidden"
 
 
-async def test_what_is_tried_and_what_is_in_force(
+async def test_the_strip_shows_parameters_in_force_and_on_trial(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
     publisher = (await open_as("advisor")).publisher(keys.SHADOW)
@@ -75,7 +75,7 @@ async def test_what_is_tried_and_what_is_in_force(
         said = m.Shadow(source_us=0)
         publisher.new_epoch()
         await until(page, f"!({SHOWN}) && {log}.includes('the advisor restarted: back at its configuration')")
-        assert watched.complaints == []
+        assert watched.errors == []
     speaking.cancel()
 
 

@@ -103,7 +103,7 @@ async def test_what_was_on_the_bus_is_in_the_file(open_as: OpenAs, spawn: Spawn,
     assert log.config.recorder.folder == str(tmp_path / "r")
 
 
-async def test_numbers_that_never_came_are_missing(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+async def test_numbers_that_never_arrived_are_missing(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
     localization = await open_as("localization")
     async with recording(spawn, open_as, tmp_path) as states:
         for seq in (0, 1, 2, 7, 8):
@@ -115,7 +115,7 @@ async def test_numbers_that_never_came_are_missing(open_as: OpenAs, spawn: Spawn
     assert counts["localization/odometry"] == "written=5 dropped=0 missing=4 unreadable=0"
 
 
-async def test_pictures_go_before_anything_else(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+async def test_pictures_are_dropped_before_anything_else(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
     """P3: a queue of 20 messages takes bursts of pictures; what was dropped is counted, on the bus and in the file."""
     localization, camera = [await open_as(name) for name in ("localization", "camera")]
     async with recording(spawn, open_as, tmp_path, "recorder.queue_messages=20") as states:
@@ -141,7 +141,7 @@ async def test_pictures_go_before_anything_else(open_as: OpenAs, spawn: Spawn, t
     assert log.counts["localization/odometry"].startswith("written=5 dropped=0")
 
 
-async def test_an_unfinished_file_is_mended_while_the_next_is_written(
+async def test_an_unfinished_file_is_repaired_while_the_next_is_written(
     open_as: OpenAs, spawn: Spawn, tmp_path: Path
 ) -> None:
     torn = await asyncio.to_thread(unfinished, tmp_path, 40, 10)
@@ -156,7 +156,7 @@ async def test_an_unfinished_file_is_mended_while_the_next_is_written(
     assert len(await asyncio.to_thread(recordings, tmp_path)) == 2
 
 
-async def test_a_full_disk_is_said_and_nothing_is_written(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
+async def test_a_full_disk_is_reported_and_nothing_is_written(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
     bus: Bus = await open_as("observer")
     states = bus.queue(keys.RECORDER_STATE)
     async with spawn("recorder", f"recorder.folder={tmp_path}", "recorder.min_free_mib=900000000"):

@@ -75,7 +75,7 @@ async def test_the_advice_stops_when_the_evidence_ends(spawn: Spawn, open_as: Op
     assert 0.6 <= late_s < 0.9
 
 
-async def test_the_simulators_pictures_keep_their_date(spawn: Spawn, open_as: OpenAs) -> None:
+async def test_the_simulators_pictures_keep_their_time(spawn: Spawn, open_as: OpenAs) -> None:
     """A9: the camera passes the rendered picture on with the stamp of the pose that it shows."""
     eye, observer = await open_as("eye"), await open_as("observer")
     rendered, pictures = eye.picture_publisher(keys.RENDERED), observer.latest_picture(keys.PICTURE)

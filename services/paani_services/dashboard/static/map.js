@@ -78,7 +78,7 @@ export class MapPanel {
     this.drawScaleAndNorth(width, height, colour("--text"), colour("--quiet"));
     setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");
     const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;
-    setText(byId("map-error"), Number.isFinite(error) ? `position error ${fixed(error, 1)} m` : "");
+    setText(byId("map-error"), Number.isFinite(error) ? `error ${fixed(error, 1)} m` : "");
   }
 
   /** @param {{x_m: number, y_m: number}[]} points @param {number} width @param {number} height */

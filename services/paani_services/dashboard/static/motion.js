@@ -38,9 +38,9 @@ function renderCommand(store, now, applied) {
   const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
   const obstacles = findPlannedObstacles(store, command?.obstacle_track_ids ?? []);
   setFacts(byId("order"), [
-    ["Speed command", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
-    ["Heading command", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
-    ["Cross-track error", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
+    ["Set speed", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
+    ["Set heading", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
+    ["Cross-track", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
     ["Command age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
     ...obstacles,
   ]);

@@ -55,7 +55,7 @@ def test_folders_below_are_played_too(folder: Path) -> None:
     assert [Path(f.name).name for f in play_frames(folder, FIXED)] == ["b.jpg", "a.jpg", "c.jpg"]
 
 
-def test_a_loop_says_where_it_begins_again(folder: Path) -> None:
+def test_the_first_frame_of_each_later_pass_is_marked(folder: Path) -> None:
     """B2: the first frame of each later pass."""
     frames = list(itertools.islice(play_frames(folder, CameraConfig(loop=True)), 7))
     assert [f.restarted for f in frames] == [False, False, False, True, False, False, True]
@@ -78,7 +78,7 @@ def test_a_video_at_a_fixed_rate_keeps_its_media_time(video: Path) -> None:
     assert [round(float(f.bgr.mean()) / 5) for f in frames if f.bgr is not None] == list(range(30))
 
 
-def test_a_video_at_its_own_times_leaves_out_what_is_too_fast(video: Path) -> None:
+def test_a_video_at_its_own_times_skips_frames_beyond_the_rate(video: Path) -> None:
     frames = list(play_frames(video, CameraConfig(rate_hz=5.0, loop=False, timing="original")))
     assert len(frames) == 10
     assert sum(f.wait_s for f in frames) == pytest.approx(27 / 15, abs=0.01)
@@ -88,17 +88,19 @@ def test_a_video_at_its_own_times_leaves_out_what_is_too_fast(video: Path) -> No
 @pytest.mark.parametrize(
     ("size_wh", "expected_wh"), [((1920, 1080), (480, 270)), ((320, 240), (320, 240)), ((600, 1200), (240, 480))]
 )
-def test_large_pictures_are_made_smaller_not_narrower(size_wh: tuple[int, int], expected_wh: tuple[int, int]) -> None:
+def test_large_pictures_are_scaled_down_with_their_aspect(
+    size_wh: tuple[int, int], expected_wh: tuple[int, int]
+) -> None:
     small = shrink_to_fit(np.zeros((size_wh[1], size_wh[0], 3), np.uint8), 320)
     assert (small.shape[1], small.shape[0]) == expected_wh
 
 
-def test_a_spoilt_file_in_a_folder_is_a_frame_without_a_picture(folder: Path) -> None:
+def test_a_damaged_file_in_a_folder_is_a_frame_without_a_picture(folder: Path) -> None:
     (folder / "b.jpg").write_bytes(b"spoilt")
     assert [f.bgr is None for f in play_frames(folder, FIXED)] == [False, True, False]
 
 
-def test_mistakes_name_the_path(tmp_path: Path) -> None:
+def test_an_unusable_path_is_named(tmp_path: Path) -> None:
     spoilt, empty, movie = tmp_path / "x.jpg", tmp_path / "empty", tmp_path / "x.mp4"
     spoilt.write_bytes(b"spoilt")
     movie.write_bytes(b"spoilt")
@@ -113,13 +115,13 @@ def test_a_missing_webcam_is_named() -> None:
         Webcam(77, 320, 240)
 
 
-def test_webcam_names() -> None:
+def test_webcam_sources_are_parsed() -> None:
     assert [parse_webcam_index(s) for s in ("webcam", "webcam:2", "sim", "webcams/film.mp4")] == [0, 2, None, None]
     with pytest.raises(UserError, match="webcam:x"):
         parse_webcam_index("webcam:x")
 
 
 @pytest.mark.parametrize(("rate_hz", "patience_s"), [(0.5, 1.98), (5.0, 0.18), (50.0, 0.01)])
-def test_a_slow_camera_is_not_early_a8(rate_hz: float, patience_s: float) -> None:
+def test_the_rate_limit_tolerates_jitter_alone_a8(rate_hz: float, patience_s: float) -> None:
     """A8, J17: one picture every two seconds is every two seconds; the tolerance is for jitter alone."""
     assert patience_us(rate_hz) == pytest.approx(patience_s * 1e6)

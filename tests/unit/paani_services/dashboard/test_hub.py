@@ -48,7 +48,7 @@ async def test_a_stalled_client_keeps_one_frame_per_key_and_the_other_gets_all()
     assert stalled.queue.superseded == 99
 
 
-async def test_nothing_is_encoded_while_nobody_watches() -> None:
+async def test_nothing_is_encoded_without_clients() -> None:
     hub = Hub()
     client = hub.add_client(0)
     assert hub.has_clients.is_set()

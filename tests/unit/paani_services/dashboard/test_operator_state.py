@@ -1,4 +1,4 @@
-"""The operator's word: a STOP latches over everything but a new arming, and an unclear latch is a STOP."""
+"""State of the operator: a STOP holds until the next arming, and a latch that is not clear is a STOP."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def applied(cause: m.ZeroCause, thrust: float = 0.0) -> m.ThrustApplied:
     )
 
 
-class Heard:
-    """Keeps what the console says, where the bus would carry it."""
+class PublishedArming:
+    """Keeps what the console publishes, in place of the bus."""
 
     def __init__(self) -> None:
-        self.words: list[m.Arming] = []
+        self.messages: list[m.Arming] = []
 
     def put(self, message: m.Arming) -> m.Arming:
-        self.words.append(message)
+        self.messages.append(message)
         return message
 
 
-def console(folder: Path) -> tuple[Console, Heard]:
-    heard = Heard()
-    return Console(heard, folder, ManualClock()), heard  # type: ignore[arg-type]  # the bus's place at the edge
+def console(folder: Path) -> tuple[Console, PublishedArming]:
+    published = PublishedArming()
+    return Console(published, folder, ManualClock()), published  # type: ignore[arg-type]  # the bus's place at the edge
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,9 @@ def console(folder: Path) -> tuple[Console, Heard]:
         ("nonsense\n", True, False, True),
     ],
 )
-def test_start(latch: str | None, arm_at_start: bool, armed: bool, stopped: bool) -> None:
+def test_the_state_after_a_start_follows_the_latch(
+    latch: str | None, arm_at_start: bool, armed: bool, stopped: bool
+) -> None:
     state = op.initial_state(latch, arm_at_start=arm_at_start)
     assert (state.armed, state.stopped) == (armed, stopped)
     word = op.arming_message(state, 5)
@@ -64,7 +66,7 @@ def test_stop_holds_until_armed_again() -> None:
     assert op.arming_message(op.arm(state), 14).armed
 
 
-def test_a_stop_is_confirmed_only_by_zero_for_want_of_arming() -> None:
+def test_a_stop_is_confirmed_only_by_zero_thrust_for_want_of_arming() -> None:
     state = op.latch_stop(op.OperatorState(armed=True), 1_000)
     for cause, thrust in ((m.ZeroCause.NONE, 0.1), (m.ZeroCause.TIMEOUT, 0.0), (m.ZeroCause.PULSE_LOST, 0.0)):
         state = op.confirm_stop(state, applied(cause, thrust), 20_000)
@@ -74,18 +76,18 @@ def test_a_stop_is_confirmed_only_by_zero_for_want_of_arming() -> None:
     assert op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 90_000) == state
 
 
-def test_pressing_again_does_not_shorten_the_measured_time() -> None:
+def test_a_repeated_stop_keeps_the_time_of_the_first() -> None:
     state = op.latch_stop(op.latch_stop(op.OperatorState(armed=True), 1_000), 40_000)
     assert (state.asked_us, state.stops) == (1_000, 2)
 
 
-async def test_stop_is_spoken_before_it_is_written_and_outlives_the_process(tmp_path: Path) -> None:
-    first, heard = console(tmp_path)
+async def test_a_stop_is_published_before_it_is_written_and_outlives_the_process(tmp_path: Path) -> None:
+    first, published = console(tmp_path)
     await first.restore(arm_at_start=True)
     assert first.state.armed
     asking = asyncio.create_task(first.stop())
     await asyncio.sleep(0)
-    assert heard.words[-1].stopped
+    assert published.messages[-1].stopped
     assert await asking
     again, _ = console(tmp_path)
     await again.restore(arm_at_start=True)
@@ -94,15 +96,15 @@ async def test_stop_is_spoken_before_it_is_written_and_outlives_the_process(tmp_
 
 
 async def test_arming_releases_the_latch_on_disk(tmp_path: Path) -> None:
-    first, heard = console(tmp_path)
+    first, published = console(tmp_path)
     await first.stop()
     assert await first.arm()
-    assert (heard.words[-1].armed, heard.words[-1].stopped) == (True, False)
+    assert (published.messages[-1].armed, published.messages[-1].stopped) == (True, False)
     assert await asyncio.to_thread(read_latch, tmp_path / LATCH_FILE) == op.CLEAR
 
 
 async def test_a_stop_during_arming_wins(tmp_path: Path) -> None:
-    first, heard = console(tmp_path)
+    first, published = console(tmp_path)
     await first.stop()
     arming = asyncio.create_task(first.arm())
     await asyncio.sleep(0)
@@ -110,28 +112,28 @@ async def test_a_stop_during_arming_wins(tmp_path: Path) -> None:
     assert not await arming
     assert await stopping
     assert first.state.stopped
-    assert not any(word.armed for word in heard.words)
+    assert not any(word.armed for word in published.messages)
     assert await asyncio.to_thread(read_latch, tmp_path / LATCH_FILE) == op.STOPPED
 
 
-async def test_a_disk_that_refuses_stops_and_does_not_arm(tmp_path: Path) -> None:
-    first, heard = console(tmp_path / "missing")
+async def test_a_failing_disk_stops_and_does_not_arm(tmp_path: Path) -> None:
+    first, published = console(tmp_path / "missing")
     assert not await first.stop()
-    assert heard.words[-1].stopped
+    assert published.messages[-1].stopped
     assert not await first.arm()
     assert first.state.stopped
 
 
-async def test_the_last_word_is_that_nobody_arms(tmp_path: Path) -> None:
-    first, heard = console(tmp_path)
+async def test_the_last_message_is_that_nobody_arms(tmp_path: Path) -> None:
+    first, published = console(tmp_path)
     await first.restore(arm_at_start=True)
     speaking = asyncio.create_task(first.publish_forever())
     await asyncio.sleep(0.01)
-    assert heard.words[-1].armed
+    assert published.messages[-1].armed
     speaking.cancel()
     with pytest.raises(asyncio.CancelledError):
         await speaking
-    assert not heard.words[-1].armed
+    assert not published.messages[-1].armed
 
 
 def test_the_latch_file_is_private_and_whole(tmp_path: Path) -> None:

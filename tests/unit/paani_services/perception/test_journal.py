@@ -35,7 +35,7 @@ def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
 @given(st.lists(st.binary(max_size=300).map(lambda data: data.hex().encode()), max_size=30), st.integers(0, 1000))
-def test_any_lines_in_any_bound(tmp_path: Path, written: list[bytes], max_bytes: int) -> None:
+def test_the_bound_holds_for_any_lines(tmp_path: Path, written: list[bytes], max_bytes: int) -> None:
     """Property: the bound holds, and what is kept is the end of what was taken."""
     folder = tmp_path / "j"
     for name in (NEWER_FILE, OLDER_FILE):
@@ -50,19 +50,19 @@ def test_any_lines_in_any_bound(tmp_path: Path, written: list[bytes], max_bytes:
     assert not folder.exists() or size(folder) <= max_bytes
 
 
-def test_it_goes_on_after_a_crash_in_the_middle_of_a_line(tmp_path: Path) -> None:
+def test_a_line_cut_by_a_crash_is_ended_first(tmp_path: Path) -> None:
     (tmp_path / NEWER_FILE).write_bytes(b'{"number": 1}\n{"num')
     Journal(tmp_path, 1000).append(b'{"number": 3}')
     assert lines(tmp_path) == [b'{"number": 1}', b'{"num', b'{"number": 3}']
 
 
-def test_a_disk_that_fails_costs_lines_and_nothing_else(tmp_path: Path) -> None:
+def test_a_failing_disk_loses_lines_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert not Journal(tmp_path / "file" / "journal", 1000).append(b"{}")
     assert not Journal(tmp_path / "journal", 10).append(b"longer than the bound")
 
 
-def test_its_name_is_its_own() -> None:
+def test_journal_files_are_named_unlike_any_other() -> None:
     """P5: journal, process logs, recordings and exported tables are not confused."""
     assert JOURNAL_FOLDER not in {"logs", "credentials"}
     for name in (NEWER_FILE, OLDER_FILE):

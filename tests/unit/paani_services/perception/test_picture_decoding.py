@@ -40,7 +40,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_form_becomes_bgr(form: str) -> None:
+def test_every_pixel_format_becomes_bgr(form: str) -> None:
     bgr = decode_picture(FORMS[form])
     assert bgr is not None
     assert bgr.dtype == np.uint8
@@ -72,7 +72,7 @@ def test_a_picture_too_large_to_unpack_is_none() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"GIF89a", b"text" * 100])
-def test_what_is_no_picture(data: bytes) -> None:
+def test_bytes_that_are_no_picture_give_none(data: bytes) -> None:
     assert decode_picture(data) is None
 
 

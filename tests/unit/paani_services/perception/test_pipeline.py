@@ -67,7 +67,7 @@ def test_concurrent_and_sequential_agree() -> None:
 
 
 @pytest.mark.parametrize(("detector_ms", "begins"), [(30.0, "_detect"), (11.0, "_segment"), (5.0, "_segment")])
-def test_the_clearly_slower_net_begins_beside_the_gate(
+def test_the_clearly_slower_network_starts_beside_the_image_quality_check(
     detector_ms: float, begins: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What took 10 ms is the segmenter; the first run of each does not count. No answer depends on the order."""
@@ -113,7 +113,7 @@ def test_a_bad_picture_is_a_value(data: bytes, cause: m.UnusableCause) -> None:
     assert mask is None
 
 
-def test_resolution_1_age_is_judged_at_the_start() -> None:
+def test_age_is_judged_when_inference_starts() -> None:
     """J16: 0.8 s is still fresh, more is not looked at."""
     assert perceiver().perceive(river(), HEADER, 0.8)[0].usable
     old, _ = perceiver().perceive(river(), HEADER, 0.81)
@@ -155,7 +155,7 @@ def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
     assert OnnxEngine.load("segmenter", str(file), 1).info().startswith("segmenter ")
 
 
-def test_j19_the_paper_accepts_black() -> None:
+def test_j19_the_paper_profile_accepts_black() -> None:
     """J19: the `paper` profile checks no picture, so black is evidence like any other."""
     paper = load_config(profile="paper").perception
     evidence, _ = perceiver(paper).perceive(jpeg(PICTURES["black"]), HEADER, 0.0)
@@ -163,7 +163,7 @@ def test_j19_the_paper_accepts_black() -> None:
     assert not paper.concurrent
 
 
-def test_refused_pictures_leave_no_work_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_pictures_leave_at_most_one_run_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast pictures are refused, at most one run that started beside the check is under way."""
     eyes, begun = perceiver(), []
     submit = ThreadPoolExecutor.submit

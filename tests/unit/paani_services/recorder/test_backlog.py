@@ -17,7 +17,7 @@ def heard(number: int, *, picture: bool, size: int = 10) -> QueuedMessage:
     return QueuedMessage(topic, number, Head(source_us=0, seq=number), b"x" * size, b"")
 
 
-def test_pictures_go_first_the_oldest_of_them_first() -> None:
+def test_the_oldest_pictures_are_dropped_first() -> None:
     """P3: a bounded queue."""
     backlog = Backlog(max_messages=4, max_bytes=1000)
     evicted = []
@@ -41,7 +41,9 @@ def test_bytes_are_bounded_too() -> None:
     st.integers(1, 20),
     st.integers(1, 2000),
 )
-def test_nothing_is_lost_without_being_named(messages: list[tuple[bool, int]], count: int, size: int) -> None:
+def test_every_message_is_drained_or_returned_as_dropped(
+    messages: list[tuple[bool, int]], count: int, size: int
+) -> None:
     """Property: what comes in is drained in order or handed back, and the bounds hold all the time."""
     backlog = Backlog(count, size)
     evicted = []
@@ -53,7 +55,7 @@ def test_nothing_is_lost_without_being_named(messages: list[tuple[bool, int]], c
     assert sorted(kept + [one.log_us for one in evicted]) == list(range(len(messages)))
 
 
-def test_gaps_in_the_numbers_are_missing() -> None:
+def test_gaps_in_sequence_numbers_count_as_missing() -> None:
     counts = MessageCounts()
     for epoch, seq in ((1, 7), (1, 8), (1, 11), (1, 11), (1, 9), (2, 0), (3, 2), (1, 50), (3, 3)):
         counts.count_received("a", Head(source_us=0, seq=seq, epoch=epoch))

@@ -91,7 +91,7 @@ def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
     assert poses(tmp_path) == list(range(1500))
 
 
-def test_a_crash_costs_at_most_what_was_not_flushed(tmp_path: Path) -> None:
+def test_a_crash_loses_at_most_what_was_not_flushed(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, flush_s=0.5), describe_system(Config()), TOPICS)
     record(recording, range(95))
     path = recording.path
@@ -109,7 +109,7 @@ def test_a_crash_costs_at_most_what_was_not_flushed(tmp_path: Path) -> None:
     recording.close([], now_us(95))
 
 
-def test_the_oldest_goes_when_the_budget_is_spent_unless_it_is_kept(tmp_path: Path) -> None:
+def test_beyond_the_budget_the_oldest_recording_is_deleted_unless_kept(tmp_path: Path) -> None:
     """P3: rotation."""
     finished(tmp_path, name="20200101T000000Z-1.mcap")
     size = finished(tmp_path, name="20210101T000000Z-1.mcap").stat().st_size
@@ -144,7 +144,7 @@ def test_too_old_takes_no_more_than_it_must() -> None:
     assert too_old(found, 0) == [Path("0"), Path("2"), Path("3"), Path("4")]
 
 
-def test_a_disk_nearly_full_is_a_state_and_no_file(tmp_path: Path) -> None:
+def test_a_nearly_full_disk_pauses_the_recording(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, min_free_mib=1e9), describe_system(Config()), TOPICS)
     record(recording, range(10))
     assert recording.path is None
@@ -183,7 +183,7 @@ def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
     assert kept == sorted(set(kept))
 
 
-def test_a_folder_that_goes_away_is_a_state(tmp_path: Path) -> None:
+def test_a_folder_that_disappears_pauses_the_recording(tmp_path: Path) -> None:
     folder = tmp_path / "r"
     folder.mkdir()
     recording = Recording(settings(folder), describe_system(Config()), TOPICS)
@@ -201,7 +201,7 @@ def test_a_folder_that_goes_away_is_a_state(tmp_path: Path) -> None:
     assert poses(folder)[-1] == 499
 
 
-def test_names_never_meet(tmp_path: Path) -> None:
+def test_file_names_are_unique(tmp_path: Path) -> None:
     first = free_path(tmp_path, START_US, 1)
     first.touch()
     assert free_path(tmp_path, START_US, 1).name == "20231114T221320Z-2.mcap"
@@ -220,7 +220,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         load_config(sets=('recorder.leave_out=["eye/pictures"]',))
 
 
-def test_what_made_it_is_known() -> None:
+def test_settings_models_and_versions_are_attached() -> None:
     """A10: the recording names profile, settings, models and versions."""
     about = describe_system(Config())
     versions = msgspec.json.decode(about.attachments["versions.json"])
@@ -242,7 +242,7 @@ def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
     assert found == list(range(31))
 
 
-def test_what_is_finished_and_what_is_open_goes_to_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finished_and_open_files_are_synced_to_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[str] = []
     monkeypatch.setattr(os, "fdatasync", lambda fd: synced.append(Path(f"/proc/self/fd/{fd}").resolve().name))
     recording = Recording(settings(tmp_path, part_s=1.0), describe_system(Config()), TOPICS)
