@@ -135,8 +135,8 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
     """
     settings = config.advisor.tracker
     state = _advance_clock(state, evidence)
-    given = evidence.detections if evidence.usable else ()
-    valid = sorted((d for d in given if is_valid_detection(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
+    detections = evidence.detections if evidence.usable else ()
+    valid = sorted((d for d in detections if is_valid_detection(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
     frame = _Frame(
         state.at_us,
         camera_view(state.attitudes, evidence, config),
@@ -144,9 +144,9 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
         state.epoch_changed,
         config.advisor,
     )
-    seen, identities = _assign_detections(state.tracks, valid, frame)
+    matched, identities = _assign_detections(state.tracks, valid, frame)
     continued, new_ids = set(identities.track_of.values()), itertools.count(state.next_id)
-    detection_of = {t: d for d, t in seen.track_of.items()}
+    detection_of = {t: d for d, t in matched.track_of.items()}
     tracks = []
     for t, track in enumerate(state.tracks):
         if t in detection_of:
@@ -170,7 +170,7 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
     tracks += [
         _new_track(detection, _update_identity(d, detection, state.tracks, identities, new_ids, frame), frame)
         for d, detection in enumerate(valid)
-        if d not in seen.track_of
+        if d not in matched.track_of
     ]
     alive = [t for t in tracks if (frame.at_us - t.seen_us) * 1e-6 < settings.hold_s]
     newest = sorted(range(len(alive)), key=lambda i: (-alive[i].seen_us, -alive[i].display_confidence, i))
@@ -179,7 +179,7 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
         tracks=tuple(alive[i] for i in sorted(newest[: settings.max_tracks])),
         next_id=next(new_ids),
         epoch_changed=False,
-        malformed=state.malformed + sum(not is_valid_detection(d) for d in given),
+        malformed=state.malformed + sum(not is_valid_detection(d) for d in detections),
         rotation=frame.view.use,
     )
 
@@ -202,14 +202,14 @@ def _assign_detections(
     """Assign to each detection the track at its place, and the track whose identity it continues."""
     boxes, min_iou = [d.box_xyxy for d in valid], frame.config.tracker.iou
     places = [track.box for track in tracks]
-    seen = assign_boxes(places, boxes, min_iou)
+    by_place = assign_boxes(places, boxes, min_iou)
     if frame.view.attitude is None:
-        return seen, seen
-    turned = predict_boxes([(track.box, track.attitude) for track in tracks], frame.view)
-    if turned == places:
-        return seen, seen
-    predicted = [None if track.is_vacated else place for track, place in zip(tracks, turned, strict=True)]
-    return seen, merge_assignments(seen, assign_boxes(predicted, boxes, min_iou))
+        return by_place, by_place
+    rotated = predict_boxes([(track.box, track.attitude) for track in tracks], frame.view)
+    if rotated == places:
+        return by_place, by_place
+    predicted = [None if track.is_vacated else place for track, place in zip(tracks, rotated, strict=True)]
+    return by_place, merge_assignments(by_place, assign_boxes(predicted, boxes, min_iou))
 
 
 def is_valid_detection(detection: Detection) -> bool:

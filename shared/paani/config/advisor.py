@@ -45,7 +45,7 @@ class MotionConfig(Section, frozen=True):
     follow_rate: bool = True  # window and gap reach over at least so many periods between frames
     history_periods: Positive = 6.0  # five samples and one missed frame
     gap_periods: Positive = 2.5  # one missed frame, and half a period of jitter
-    compensate_rotation: bool = True  # tell the boat's own turning apart from motion; I19: no
+    compensate_rotation: bool = True  # of the boat, in apparent motion; I19: no
     max_odometry_gap_s: NonNegative = 0.3  # between a picture and the odometry nearest to it: its freshness limit
     deadband_per_s: Positive = 0.04  # I3
     margin_floor_per_s: Positive = 0.01  # I2
@@ -62,7 +62,7 @@ class MotionConfig(Section, frozen=True):
 
 
 class RiskConfig(Section, frozen=True):
-    """`near_m`, `far_m`: with a valid calibration a thing counts fully up to one and not at all from the other on.
+    """`near_m`, `far_m`: with a valid calibration an obstacle counts fully up to one, not at all beyond the other.
 
     20 m are half a minute at cruise and more than the advisory's lifetime by a factor of nine; `far_m` 0: everything
     counts, as in the paper.
@@ -89,7 +89,7 @@ class PolicyConfig(Section, frozen=True):
     occupancy_coverage: Fraction = 0.25  # J6
     planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
     occupancy_frames: Size = 2  # J6
-    dry: Fraction = 0.95  # a lane of which more is no water is barred, as water alone is a risk of 0.7 at most
+    dry: Fraction = 0.95  # a lane of which more is no water is blocked, as water alone is a risk of 0.7 at most
     center_vessel_area: Fraction = 0.04  # J7
     core_left: Fraction = 0.405  # J9
     core_right: Fraction = 0.595  # J9
@@ -101,7 +101,7 @@ class PolicyConfig(Section, frozen=True):
 
 
 class TuningConfig(Section, frozen=True):
-    """When tried parameters may take effect: after 10 s of frames at the nominal rate, within the hour, at once."""
+    """When proposed parameters may be promoted, and how old a request may be."""
 
     min_frames: Size = 50  # 10 s at the nominal rate
     max_proposal_age_s: Positive = 3600.0  # what was proposed longer ago is no longer meant

@@ -72,7 +72,7 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RotationUse(StrEnum):
-    """Whether the boat's own turning was told apart from motion in this picture, or why not."""
+    """Whether the boat's rotation was compensated in this picture, or why not."""
 
     KNOWN = "known"
     OFF = "off"
@@ -135,9 +135,9 @@ class Reason(StrEnum):
 
 
 class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
-    """R_j and the four numbers it was made from (J4), with the overrides that apply.
+    """Risk R_j of a corridor and the four components it was made from (J4), with the overrides that apply.
 
-    limit: the risk at which this lane is blocked in this frame; lower where it already was.
+    limit: the risk at which this lane is blocked in this frame; lower where it was blocked before.
     """
 
     risk: Unit = 1.0
@@ -173,11 +173,11 @@ class Lane(StrEnum):
 
 
 class ChangedBy(StrEnum):
-    """What it takes to change an advised direction.
+    """What would change an advised direction.
 
-    NOTHING: it goes straight, so nothing is asked. EVIDENCE: one of the sets given. CLEAR_PICTURES: a turn is kept only
-    until enough pictures were clear. NEW_EVIDENCE: the input is at fault, whatever it shows. MORE_EVIDENCE: no set as
-    small as was sought.
+    NOTHING: the direction is STRAIGHT, so nothing is asked. EVIDENCE: one of the sets given, taken away.
+    CLEAR_PICTURES: a turn is retained until enough pictures were clear. NEW_EVIDENCE: the input is at fault.
+    MORE_EVIDENCE: no set as small as those that were tried.
     """
 
     NOTHING = "nothing"
@@ -206,7 +206,7 @@ class Removal(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
-    """What would change the direction, found by asking the policy again without it.
+    """The smallest evidence without which the direction would be another, found by asking the policy again.
 
     removals: the first of the smallest sets, those that lead straight on first; each is known to change the direction.
     found: how many sets of that size do. judged: how many sets the policy was asked about. left_out: tracks that were
