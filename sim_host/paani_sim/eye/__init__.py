@@ -1,4 +1,4 @@
-"""The rendered camera: what the boat's camera sees in a world, with labels where wanted."""
+"""The off-screen renderer of the boat's camera: pictures of a world, with labels on request."""
 
 from paani_sim.eye.camera import BoatPose, Camera, project
 from paani_sim.eye.labels import Labelled, VisibleBox

@@ -1,4 +1,4 @@
-"""The camera on the bow: where it is, what it sees, and how points land in its picture. Pure.
+"""Camera on the bow: its pose, its field of view and the projection of points. Pure.
 
 Pixel coordinates run from the top left corner; body is x forward, y left, z up.
 """
@@ -18,7 +18,7 @@ FAR_M = 3000.0
 
 @dataclass(frozen=True)
 class BoatPose:
-    """Where the boat's origin is in the map, how it lies (roll, then pitch, then yaw), and how fast it turns."""
+    """Position of the boat's origin in the map, attitude (roll, then pitch, then yaw) and yaw rate."""
 
     x_m: float
     y_m: float
@@ -31,7 +31,7 @@ class BoatPose:
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera on the boat. At rest (origin at 0.177 m) it looks from 0.9 m above the water.
+    """A camera on the boat. At rest (origin at 0.177 m) it is 0.9 m above the water.
 
     `k1` and `k2` are the radial terms of Brown's lens model, over focal length: barrel below zero; a pinhole at zero.
     `shutter_s` is how long a picture is exposed while the boat turns.
@@ -80,7 +80,7 @@ def view_projection(pose: BoatPose, camera: Camera) -> F64:
 
 
 def distort(points: F64, camera: Camera) -> F64:
-    """Where the lens puts what a pinhole sees at `points` `(n, 2)`; both from the middle, over focal length."""
+    """Brown's radial distortion of pinhole image `points` `(n, 2)`; both from the middle, over focal length."""
     square = (points**2).sum(axis=1, keepdims=True)
     return np.asarray(points * (1.0 + camera.k1 * square + camera.k2 * square**2))
 

@@ -1,4 +1,4 @@
-"""Triangles sorted by where they are, so that a picture draws only what can be in it, near to far. Pure."""
+"""Triangles in square cells of the map, so that only visible cells are drawn, nearest first. Pure."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""From the label picture to a class mask and boxes of visible pixels. Pure numpy."""
+"""Decodes the label picture into a class mask and boxes of visible pixels. Pure numpy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

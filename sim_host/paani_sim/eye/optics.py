@@ -1,4 +1,4 @@
-"""From the pinhole that is drawn to the lens that is asked for: radial distortion, and which drawn pixel is which."""
+"""Radial lens distortion: the pinhole picture that must be drawn, and the map from its pixels to the lens's."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""A world as drawable rows: what stands still, what moves, plants, and which number is what."""
+"""A world as vertex rows: fixed things, moving things, plants, and the numbers of the label picture."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Tiles of wave slopes and surface noise that the water and land shaders sample. Pure numpy."""
+"""Periodic textures of wave slopes and noise, which the water and land shaders sample. Pure numpy."""
 
 import numpy as np
 import numpy.typing as npt
