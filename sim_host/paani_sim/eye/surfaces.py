@@ -1,4 +1,4 @@
-"""Tiles of what surfaces are made of, one layer each, that the solid shader samples. Pure numpy.
+"""Periodic textures of surface materials, one layer each, which the solid shader samples. Pure numpy.
 
 Every layer is `(TILE, TILE, 4)` uint8, periodic. Layer 0 is noise; in the others channel 1 is brightness around 128.
 """
