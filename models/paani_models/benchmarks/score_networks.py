@@ -117,13 +117,13 @@ def annotated_rows(obstacles: Sequence[mods.Obstacle]) -> F32:
 
 def drop_ignored(rows: F32, ignored: Bools) -> F32:
     """Keep the rows of which no more than half lies in the ignored part of the picture."""
-    kept = []
+    kept_rows = []
     for row in rows:
         x1, y1, x2, y2 = np.round(row[1:]).astype(int)
         patch = ignored[y1:y2, x1:x2]
         if patch.size and patch.mean() <= 0.5:
-            kept.append(row)
-    return np.array(kept, np.float32).reshape(-1, 5)
+            kept_rows.append(row)
+    return np.array(kept_rows, np.float32).reshape(-1, 5)
 
 
 def read_calibration(root: Path, sequence: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -112,9 +112,9 @@ def letterbox_example(item: BoxedPicture, target_wh: tuple[int, int]) -> Trainin
 
 
 def warp_example(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) -> TrainingExample:
-    """Warp picture, boxes and exhaustive_mask map; what lies outside the picture is grey and judged empty.
+    """Warp picture, boxes and exhaustive mask; what lies outside the picture is grey and known to be empty.
 
-    A box that is left too small or too hidden is dropped, and its class is not judged where it was.
+    A box that is left too small or too hidden is dropped, and its class counts as unknown where it was.
     """
     height, width = item.picture.shape[:2]
     picture = cv2.warpAffine(item.picture, affine, target_wh, flags=cv2.INTER_AREA, borderValue=(PAD_GREY,) * 3).astype(
@@ -126,7 +126,7 @@ def warp_example(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) ->
         if full is not None or item.exhaustive_mask[kind] == 0:
             source = full[kind] if full is not None else np.zeros((height, width), np.uint8)
             exhaustive_mask[kind] = cv2.warpAffine(source, affine, target_wh, flags=cv2.INTER_NEAREST, borderValue=(1,))
-    kept = []
+    kept_boxes = []
     for kind, *corners in item.boxes:
         ends = np.array(corners).reshape(2, 2) * (width, height) @ affine[:, :2].T + affine[:, 2]
         low, high = ends.min(0), ends.max(0)
@@ -135,11 +135,11 @@ def warp_example(item: BoxedPicture, affine: F32, target_wh: tuple[int, int]) ->
         if (side <= 0).any():
             continue
         if side.min() >= MIN_SIDE_PX and side.prod() >= MIN_VISIBLE_FRAC * (high - low).prod():
-            kept.append((kind, *inner_low, *inner_high))
+            kept_boxes.append((kind, *inner_low, *inner_high))
         else:
             (x1, y1), (x2, y2) = np.floor(inner_low).astype(int), np.ceil(inner_high).astype(int)
             exhaustive_mask[int(kind), y1:y2, x1:x2] = 0
-    return TrainingExample(picture, np.array(kept, np.float32).reshape(-1, 5), _reduce_to_cells(exhaustive_mask))
+    return TrainingExample(picture, np.array(kept_boxes, np.float32).reshape(-1, 5), _reduce_to_cells(exhaustive_mask))
 
 
 def _reduce_to_cells(exhaustive_mask: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 Ours: the score is objectness times class, trained towards the square root of the IoU, and background is penalised for
 a class only where the source boxes everything of it.
 
-Targets of one picture are boxes float32 [n,5] (class, x1, y1, x2, y2 in input pixels) and a map `judged`
+Targets of one picture are boxes float32 [n,5] (class, x1, y1, x2, y2 in input pixels) and a map `exhaustive_mask`
 bool [4, H/8, W/8]: whether a stride-8 cell holds nothing unannotated of that class. A candidate without an object
 is penalised for a class only where the mask holds for every cell under it.
 """
@@ -89,7 +89,7 @@ def assign_simota(
 
 
 def exhaustive_candidates(exhaustive_mask: Tensor) -> Tensor:
-    """Stride-8 map bool [N,C,h,w] -> bool [N,A,C]: a coarser candidate is judged where all cells under it are."""
+    """Stride-8 mask bool [N,C,h,w] -> bool [N,A,C]: true for a coarser candidate where it is for all cells under it."""
     unknown = (~exhaustive_mask).float()
     levels = [F.max_pool2d(unknown, stride // STRIDES[0]).flatten(2) for stride in STRIDES]
     return torch.cat(levels, 2).transpose(1, 2) < 0.5

@@ -118,39 +118,39 @@ def match_class(found: Detections, truth: F32, kind: int) -> ClassMatches:
     boxes, scores = boxes[order], scores[order]
     real = truth[truth[:, 0] == kind, 1:]
     near = real[(real[:, 2:] - real[:, :2]).min(1, initial=np.inf) >= NEAR_SIDE_PX]
-    table, sure = iou_matrix(boxes, real), scores > CONFIDENCE
+    table, confident = iou_matrix(boxes, real), scores > CONFIDENCE
     return ClassMatches(
         scores,
         np.stack([_match_greedily(table, scores, step) for step in IOU_STEPS]),
         len(real),
-        int(match_boxes(boxes[sure], scores[sure], near, 0.5).sum()),
+        int(match_boxes(boxes[confident], scores[confident], near, 0.5).sum()),
         len(near),
     )
 
 
-def ap50(judged: Sequence[ClassMatches]) -> float:
+def ap50(matches: Sequence[ClassMatches]) -> float:
     """AP at IoU 0.5 of one class over pictures."""
-    scores, hits, positives = _join_matches(judged)
+    scores, hits, positives = _join_matches(matches)
     return average_precision(scores, hits[0], positives)
 
 
-def summarise_class(judged: Sequence[ClassMatches]) -> dict[str, float]:
+def summarise_class(matches: Sequence[ClassMatches]) -> dict[str, float]:
     """AP50, AP50:95, recall and precision at CONFIDENCE of one class over pictures that annotate it.
 
     `n` counts the true boxes. A figure without a case is NaN.
     """
-    scores, hits, positives = _join_matches(judged)
+    scores, hits, positives = _join_matches(matches)
     curves = [average_precision(scores, step, positives) for step in hits]
-    sure = scores > CONFIDENCE
-    right = int((hits[0] & sure).sum())
-    near_found, near = sum(j.near_found for j in judged), sum(j.near for j in judged)
+    confident = scores > CONFIDENCE
+    right = int((hits[0] & confident).sum())
+    near_found, near = sum(j.near_found for j in matches), sum(j.near for j in matches)
     return {
         "n": positives,
         "ap50": curves[0],
         "ap50_95": float(np.mean(curves)),
         "recall_at_0.40": right / positives if positives else float("nan"),
         "recall_16px_at_0.40": near_found / near if near else float("nan"),
-        "precision_at_0.40": right / int(sure.sum()) if sure.any() else float("nan"),
+        "precision_at_0.40": right / int(confident.sum()) if confident.any() else float("nan"),
     }
 
 
@@ -159,16 +159,16 @@ def class_figures(found: list[Detections], truths: list[F32], kind: int) -> dict
     return summarise_class([match_class(f, truth, kind) for f, truth in zip(found, truths, strict=True)])
 
 
-def precision_recall_50(judged: Sequence[ClassMatches]) -> tuple[F64, F64]:
+def precision_recall_50(matches: Sequence[ClassMatches]) -> tuple[F64, F64]:
     """Precision and recall at IoU 0.5 after each box over all pictures, best score first; empty without a positive."""
-    scores, hits, positives = _join_matches(judged)
+    scores, hits, positives = _join_matches(matches)
     if positives == 0:
         return np.zeros(0), np.zeros(0)
     return precision_recall(scores, hits[0], positives)
 
 
-def _join_matches(judged: Sequence[ClassMatches]) -> tuple[F32, Bools, int]:
-    if not judged:
+def _join_matches(matches: Sequence[ClassMatches]) -> tuple[F32, Bools, int]:
+    if not matches:
         return np.zeros(0, np.float32), np.zeros((len(IOU_STEPS), 0), np.bool_), 0
-    scores = np.concatenate([j.scores for j in judged])
-    return scores, np.concatenate([j.hits for j in judged], axis=1), sum(j.positives for j in judged)
+    scores = np.concatenate([j.scores for j in matches])
+    return scores, np.concatenate([j.hits for j in matches], axis=1), sum(j.positives for j in matches)

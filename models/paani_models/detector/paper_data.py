@@ -72,7 +72,7 @@ def _mosaic(
     meet = rng.uniform(0.5, 1.5, 2) * size
     moved = _random_scale_and_shift(rng, size, target_wh, augmentation)
     picture = np.full((target_wh[1], target_wh[0], 3), PAD_GREY, np.uint8)
-    judged = np.ones((len(DETECTOR_CLASSES), target_wh[1] // CELL_PX, target_wh[0] // CELL_PX), np.bool_)
+    exhaustive_mask = np.ones((len(DETECTOR_CLASSES), target_wh[1] // CELL_PX, target_wh[0] // CELL_PX), np.bool_)
     boxes = []
     for item, (right, below) in zip(items, ((0, 0), (1, 0), (0, 1), (1, 1)), strict=True):
         source = np.array(item.picture.shape[1::-1], np.float64)
@@ -86,9 +86,9 @@ def _mosaic(
         low = np.clip(np.round(moved[:, :2] @ corner + moved[:, 2]), 0, target_wh).astype(int)
         high = np.clip(np.round(moved[:, :2] @ (corner + inner) + moved[:, 2]), 0, target_wh).astype(int)
         picture[low[1] : high[1], low[0] : high[0]] = part.picture[low[1] : high[1], low[0] : high[0]]
-        judged &= part.exhaustive_mask
+        exhaustive_mask &= part.exhaustive_mask
         boxes.append(part.boxes)
-    return TrainingExample(picture, np.vstack(boxes), judged)
+    return TrainingExample(picture, np.vstack(boxes), exhaustive_mask)
 
 
 def _random_scale_and_shift(

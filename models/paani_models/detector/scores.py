@@ -80,19 +80,19 @@ def confusion_counts(scored: Sequence[ScoredBoxes]) -> NDArray[np.int64]:
     """
     table = np.zeros((BACKGROUND + 1, BACKGROUND + 1), np.int64)
     for item in scored:
-        judged = [DETECTOR_CLASSES.index(kind) for kind in item.sample.source.annotated]
-        sure = item.detections.scores > CONFIDENCE
-        boxes, kinds = item.detections.boxes[sure], item.detections.classes[sure]
+        annotated = [DETECTOR_CLASSES.index(kind) for kind in item.sample.source.annotated]
+        confident = item.detections.scores > CONFIDENCE
+        boxes, kinds = item.detections.boxes[confident], item.detections.classes[confident]
         shared = iou_matrix(boxes, item.truth[:, 1:])
         free = np.ones(len(item.truth), np.bool_)
-        for index in np.argsort(-item.detections.scores[sure], kind="stable"):
+        for index in np.argsort(-item.detections.scores[confident], kind="stable"):
             row = np.where(free, shared[index], 0.0)
             hit = int(row.argmax()) if len(row) and row.max() >= 0.5 else -1
             if hit >= 0:
                 free[hit] = False
             true = int(item.truth[hit, 0]) if hit >= 0 else BACKGROUND
-            if true in judged or (true == BACKGROUND and kinds[index] in judged):
+            if true in annotated or (true == BACKGROUND and kinds[index] in annotated):
                 table[true, kinds[index]] += 1
         for kind in item.truth[free, 0].astype(int):
-            table[kind, BACKGROUND] += int(kind in judged)
+            table[kind, BACKGROUND] += int(kind in annotated)
     return table

@@ -42,9 +42,9 @@ def _drop_last_resize(model: bytes) -> bytes | None:
     if len(answers) != 1 or last is None or not _is_plain_resize(last.content):
         return None
     answer = _encode_field(_NAME, _first_content(last.content, _INPUT_NAME)) + _FLOAT32
-    kept = [field.whole for field in graph if field is not last and field.number != _OUTPUT]
+    kept_fields = [field.whole for field in graph if field is not last and field.number != _OUTPUT]
     rest = [part.whole for part in outer if part.number != _GRAPH]
-    return b"".join((*rest, _encode_field(_GRAPH, b"".join((*kept, _encode_field(_OUTPUT, answer))))))
+    return b"".join((*rest, _encode_field(_GRAPH, b"".join((*kept_fields, _encode_field(_OUTPUT, answer))))))
 
 
 def _is_plain_resize(node: memoryview) -> bool:

@@ -122,10 +122,10 @@ def score_detector(net: Path, samples: Sequence[Sample]) -> tuple[float, tuple[F
     scored = score_boxes(net, samples)
     figures = []
     for kind, label in enumerate(DETECTOR_CLASSES):
-        judged = [item.class_matches(kind) for item in select_annotated(scored, kind)]
-        positives = sum(item.positives for item in judged)
+        matches = [item.class_matches(kind) for item in select_annotated(scored, kind)]
+        positives = sum(item.positives for item in matches)
         if positives:
-            figures.append(Figure(f"{label}_ap50", "all", round(ap50(judged), 4), positives))
+            figures.append(Figure(f"{label}_ap50", "all", round(ap50(matches), 4), positives))
     return float(np.mean([figure.value for figure in figures])), tuple(figures)
 
 

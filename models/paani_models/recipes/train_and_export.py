@@ -105,8 +105,8 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
         cached = pseudo_label_pictures(labeller, cached, samples)
     training = SegmenterTraining(model, recipe, options.folder, cached, held_out, distillation)
     if options.start is not None and options.start.suffix == ".onnx":
-        shown = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
-        load_exported(model, options.start, torch.from_numpy(segmenter_batch(shown)))
+        resized = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
+        load_exported(model, options.start, torch.from_numpy(segmenter_batch(resized)))
         training.state.average_from_model()
     elif options.start is not None:
         training.state.start_from(options.start)

@@ -62,9 +62,9 @@ def analyse_box_errors(scored: Sequence[ScoredBoxes]) -> list[BoxErrors]:
         n = sum(row.n for row in rows)
         if n == 0:
             continue
-        judged = [item.class_matches(kind) for item in mine]
-        scores = np.concatenate([j.scores for j in judged])
-        hits = np.concatenate([j.hits[0] for j in judged])
+        matches = [item.class_matches(kind) for item in mine]
+        scores = np.concatenate([j.scores for j in matches])
+        hits = np.concatenate([j.hits[0] for j in matches])
         right, wrong = (np.histogram(scores[flags], SCORE_STEPS)[0].astype(np.int64) for flags in (hits, ~hits))
         fates = np.sum([count_outcomes(item, kind) for item in mine], axis=0)
         limits.append(

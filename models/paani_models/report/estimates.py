@@ -17,7 +17,7 @@ from paani_models.report.bootstrap import interval_of_items, interval_of_sums
 from paani_models.report.evidence import Evidence
 from paani_models.segmenter.scores import ScoredMask, mask_measures, sum_counts
 
-Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
+ScoredPicture = TypeVar("ScoredPicture", ScoredMask, ScoredBoxes)
 
 ALARMS = "false_alarms_per_picture"
 AP_REPLICATES = 200  # an average precision sorts every box again
@@ -99,10 +99,10 @@ def estimate_boxes(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
     estimates: list[Estimate] = []
     for kind, label in enumerate(DETECTOR_CLASSES):
         chosen = select_annotated(scored, kind)
-        judged = {id(item): item.class_matches(kind) for item in chosen}
+        matches = {id(item): item.class_matches(kind) for item in chosen}
         for name in [*(source.name for source in _sources(chosen)), *(["all"] if chosen else [])]:
             mine = [item for item in chosen if name in (item.sample.source.name, "all")]
-            groups = [[judged[id(item)] for item in items] for items in _by_sequence(mine).values()]
+            groups = [[matches[id(item)] for item in items] for items in _by_sequence(mine).values()]
             row = summarise_class([each for group in groups for each in group])
             n = int(row.pop("n"))
             low, high = interval_of_items(groups, _ap50, AP_REPLICATES) if n else (math.nan, math.nan)
@@ -112,7 +112,7 @@ def estimate_boxes(scored: Sequence[ScoredBoxes]) -> tuple[Estimate, ...]:
             if name == "all":
                 continue
             for sequence, items in _by_sequence(mine).items():
-                each = [judged[id(item)] for item in items]
+                each = [matches[id(item)] for item in items]
                 boxes = sum(j.positives for j in each)
                 estimates.append(_estimate(f"{label}_ap50", name, ap50(each), boxes, sequence=sequence))
     return tuple(e for e in estimates if math.isfinite(e.value))
@@ -143,11 +143,11 @@ def draw_box_curves(scored: Sequence[ScoredBoxes]) -> tuple[Curve, ...]:
     """One curve per class over all sources that annotate it."""
     curves = []
     for kind, label in enumerate(DETECTOR_CLASSES):
-        judged = [item.class_matches(kind) for item in select_annotated(scored, kind)]
-        n = sum(j.positives for j in judged)
+        matches = [item.class_matches(kind) for item in select_annotated(scored, kind)]
+        n = sum(j.positives for j in matches)
         if n == 0:
             continue
-        precision, recall = precision_recall_50(judged)
+        precision, recall = precision_recall_50(matches)
         best = [float(precision[recall >= step].max(initial=0.0)) for step in RECALL_STEPS]
         curves.append(Curve(label=label, source="all", precision=tuple(round(p, 4) for p in best), n=n))
     return tuple(curves)
@@ -171,16 +171,16 @@ def _confusion(source: str, classes: tuple[str, ...], counts: NDArray[np.int64])
     return Confusion(source=source, classes=classes, counts=tuple(tuple(int(n) for n in row) for row in counts))
 
 
-def _ap50(judged: list[ClassMatches]) -> float:
-    return ap50(judged)
+def _ap50(matches: list[ClassMatches]) -> float:
+    return ap50(matches)
 
 
 def _sources(scored: Sequence[ScoredMask] | Sequence[ScoredBoxes]) -> list[Source]:
     return list(dict.fromkeys(item.sample.source for item in scored))
 
 
-def _by_sequence(scored: Sequence[Scored]) -> dict[str, list[Scored]]:
-    groups: dict[str, list[Scored]] = {}
+def _by_sequence(scored: Sequence[ScoredPicture]) -> dict[str, list[ScoredPicture]]:
+    groups: dict[str, list[ScoredPicture]] = {}
     for item in scored:
         groups.setdefault(f"{item.sample.source.name}/{item.sample.sequence}", []).append(item)
     return groups

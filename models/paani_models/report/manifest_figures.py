@@ -46,9 +46,9 @@ def measure_detector(net: Path, samples: list[Sample]) -> list[Figure]:
     scored = score_boxes(net, samples)
     figures: list[Figure] = []
     for kind, label in enumerate(DETECTOR_CLASSES):
-        judged = [(item.sample.source.name, item.class_matches(kind)) for item in select_annotated(scored, kind)]
-        for group in [*dict.fromkeys(name for name, _ in judged), *(["all"] if judged else [])]:
-            row = summarise_class([each for name, each in judged if group in (name, "all")])
+        matches = [(item.sample.source.name, item.class_matches(kind)) for item in select_annotated(scored, kind)]
+        for group in [*dict.fromkeys(name for name, _ in matches), *(["all"] if matches else [])]:
+            row = summarise_class([each for name, each in matches if group in (name, "all")])
             positives = int(row.pop("n"))
             figures.extend(
                 Figure(f"{label}_{metric}", group, round(value, 4), positives)

@@ -20,7 +20,7 @@ from paani_models.detector.scores import ScoredBoxes
 from paani_models.network_input import letterbox_picture
 from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, ScoredMask, merge_undrawn_sky, read_truth
 
-Scored = TypeVar("Scored", ScoredMask, ScoredBoxes)
+ScoredPicture = TypeVar("ScoredPicture", ScoredMask, ScoredBoxes)
 
 MAX_PICTURES = 8
 PICTURES = "pictures"
@@ -49,11 +49,11 @@ def draw_masks(
         tint = np.zeros_like(picture)
         for kind, colour in ((WATER, _WATER_RGB), (OBSTACLE, _OBSTACLE_RGB), (SKY, _SKY_RGB)):
             tint[label == kind] = colour
-        shown = cv2.addWeighted(picture, 0.65, tint, 0.35, 0)
+        overlay = cv2.addWeighted(picture, 0.65, tint, 0.35, 0)
         wrong = (label != truth) & (truth != IGNORE)
-        shown[wrong] = (0.4 * shown[wrong] + 0.6 * np.array(_WRONG_RGB)).astype(np.uint8)
+        overlay[wrong] = (0.4 * overlay[wrong] + 0.6 * np.array(_WRONG_RGB)).astype(np.uint8)
         caption = f"{item.sample.source.name}, {item.sample.picture.name}: {item.mean_iou:.3f}"
-        drawn.append(_save_picture(folder, f"mask_{index:02}_{item.sample.picture.stem}", shown, caption))
+        drawn.append(_save_picture(folder, f"mask_{index:02}_{item.sample.picture.stem}", overlay, caption))
     return drawn
 
 
@@ -61,17 +61,20 @@ def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture
     """Draw boxes on letterboxed pictures: true boxes thin green, found boxes thick orange with class and score."""
     drawn = []
     for index, item in enumerate(scored):
-        shown = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)
+        overlay = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)
         for kind, *corners in item.truth:
-            _draw_rectangle(shown, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
-        sure = item.detections.scores > CONFIDENCE
+            _draw_rectangle(overlay, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
+        confident = item.detections.scores > CONFIDENCE
         for box, score, kind in zip(
-            item.detections.boxes[sure], item.detections.scores[sure], item.detections.classes[sure], strict=True
+            item.detections.boxes[confident],
+            item.detections.scores[confident],
+            item.detections.classes[confident],
+            strict=True,
         ):
-            _draw_rectangle(shown, box, _FOUND_RGB, 2, f"{DETECTOR_CLASSES[int(kind)]} {score:.2f}", below=False)
+            _draw_rectangle(overlay, box, _FOUND_RGB, 2, f"{DETECTOR_CLASSES[int(kind)]} {score:.2f}", below=False)
         mistakes = f"{item.mistakes} mistake{'' if item.mistakes == 1 else 's'}"
         caption = f"{item.sample.source.name}, {item.sample.picture.name}: {mistakes}"
-        drawn.append(_save_picture(folder, f"boxes_{index:02}_{item.sample.picture.stem}", shown, caption))
+        drawn.append(_save_picture(folder, f"boxes_{index:02}_{item.sample.picture.stem}", overlay, caption))
     return drawn
 
 
@@ -106,13 +109,13 @@ def render_gallery(drawn: Sequence[DrawnPicture]) -> str:
     )
 
 
-def _photographs(scored: Sequence[Scored]) -> Sequence[Scored]:
+def _photographs(scored: Sequence[ScoredPicture]) -> Sequence[ScoredPicture]:
     return [item for item in scored if item.sample.source.name != RENDERED] or scored
 
 
-def _limit_per_sequence(ordered: Sequence[Scored]) -> list[Scored]:
+def _limit_per_sequence(ordered: Sequence[ScoredPicture]) -> list[ScoredPicture]:
     counts: dict[tuple[str, str], int] = {}
-    kept: list[Scored] = []
+    kept: list[ScoredPicture] = []
     for item in ordered:
         key = (item.sample.source.name, item.sample.sequence)
         counts[key] = counts.get(key, 0) + 1
@@ -133,9 +136,9 @@ def _draw_rectangle(
 
 def _save_picture(folder: Path, stem: str, rgb: U8, caption: str) -> DrawnPicture:
     scale = _WIDTH_PX / rgb.shape[1]
-    shown = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    overlay = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     name = f"{PICTURES}/{stem}.jpg"
     (folder / PICTURES).mkdir(exist_ok=True)
-    if not cv2.imwrite(str(folder / name), cv2.cvtColor(shown, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 85]):
+    if not cv2.imwrite(str(folder / name), cv2.cvtColor(overlay, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 85]):
         raise UserError(f"{folder / name}: cannot be written")
     return DrawnPicture(name, caption)

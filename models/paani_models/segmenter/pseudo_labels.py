@@ -36,8 +36,8 @@ def pseudo_label_pictures(net: nn.Module, pictures: list[CachedPicture], samples
         if item.source != UNSEGMENTED:
             labelled.append(item)
             continue
-        shown = np.asarray(cv2.resize(item.picture, SIZE_WH), np.uint8)
-        both = torch.from_numpy(segmenter_batch(np.stack([shown, shown[:, ::-1]])))
+        resized = np.asarray(cv2.resize(item.picture, SIZE_WH), np.uint8)
+        both = torch.from_numpy(segmenter_batch(np.stack([resized, resized[:, ::-1]])))
         share = torch.softmax(net(to_device(both)), 1)
         mean = ((share[0] + share[1].flip(-1)) / 2).cpu().numpy()
         mask = np.where(mean.max(0) >= MIN_PROBABILITY, mean.argmax(0), IGNORE).astype(np.uint8)
