@@ -97,7 +97,7 @@ export class Camera {
     const newest = this.store.get("camera/picture");
     const behind = newest ? newest.frame_seq - header.frame_seq : 0;
     this.canvas.classList.toggle("stale", !fresh);
-    setText(byId("camera-id"), `frame ${header.frame_seq}${behind > 0 ? `, ${behind} frames old` : ""}, ${header.width_px} × ${header.height_px}`);
+    setText(byId("camera-id"), `frame ${header.frame_seq}${behind > 0 ? ` of ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
     setText(
       byId("camera-note"),
       !fresh ? `Last picture ${ageText(ageS)} ago`

@@ -102,7 +102,7 @@ function renderTracks(message, counting) {
       const known = track.motion === "unknown" ? "" : track.motion;
       row.dataset.counts = String(counting.has(track.id));
       row.append(make("span", "", `#${track.id}`), make("span", "", track.label), make("span", "", fixed(track.confidence)));
-      row.append(make("span", "", [state, track.held ? "not seen now" : "", known].filter(Boolean).join(", ")));
+      row.append(make("span", "", [state, track.held ? "unseen" : "", known].filter(Boolean).join(", ")));
       return row;
     }),
   );
