@@ -90,9 +90,9 @@ def observe_from(
     **changes: object,
 ) -> ObservationMemory:
     """The memory after one more picture from this pose; of open water by default."""
-    shown = edge if edge is not None else water_edge_of(boat)
+    water_edge = edge if edge is not None else water_edge_of(boat)
     memory = move_to(memory, at_us, boat)
-    return update_memory(memory, None, evidence(at_us, shown, **changes), PLANNER)
+    return update_memory(memory, None, evidence(at_us, water_edge, **changes), PLANNER)
 
 
 def observe_then_look_astern(

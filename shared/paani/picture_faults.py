@@ -108,14 +108,14 @@ def drops(picture: U8, severity: int, rng: np.random.Generator) -> U8:
     wet = np.asarray(cv2.GaussianBlur(wet, (0, 0), 2.0), np.float32)
     shift = rng.uniform(-0.2, 0.2, 2) * (width, height)
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    shown = cv2.remap(
+    refracted = cv2.remap(
         soft,
         np.asarray(width - 1 - x + shift[0], np.float32),
         np.asarray(height - 1 - y + shift[1], np.float32),
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REFLECT,
     )
-    return _to_uint8(picture * (1.0 - wet[:, :, None]) + shown * 1.1 * wet[:, :, None])
+    return _to_uint8(picture * (1.0 - wet[:, :, None]) + refracted * 1.1 * wet[:, :, None])
 
 
 def colour_bars(picture: U8, severity: int, rng: np.random.Generator) -> U8:

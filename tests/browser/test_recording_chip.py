@@ -23,8 +23,8 @@ CHIP = "document.querySelector('#record')"
 
 def state(**changes: Any) -> m.RecorderState:
     now_us = CLOCK.now_us()
-    told: dict[str, Any] = {"recording": True, "file": "20250101T000000Z-1.mcap", "written": 5000}
-    return m.RecorderState(source_us=now_us, since_us=now_us - 720_000_000, **(told | changes))
+    fields: dict[str, Any] = {"recording": True, "file": "20250101T000000Z-1.mcap", "written": 5000}
+    return m.RecorderState(source_us=now_us, since_us=now_us - 720_000_000, **(fields | changes))
 
 
 async def test_the_page_says_whether_it_records(

@@ -35,11 +35,11 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
     publisher = (await open_as("advisor")).publisher(keys.SHADOW)
-    said = m.Shadow(source_us=0)
+    report = m.Shadow(source_us=0)
 
     async def speak() -> None:
         while True:
-            publisher.put(msgspec.structs.replace(said, source_us=WallClock().now_us()))
+            publisher.put(msgspec.structs.replace(report, source_us=WallClock().now_us()))
             await asyncio.sleep(0.1)
 
     speaking = asyncio.create_task(speak())
@@ -50,7 +50,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         assert not await page.evaluate(SHOWN)
         assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")
 
-        said = TRIED
+        report = TRIED
         await until(page, SHOWN)
         text = await page.inner_text("#tuning")
         assert "7f3a tried: policy.center_block_risk = 0.46" in text
@@ -63,7 +63,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
 
         weights = "[...document.querySelectorAll('.lane .parts span')].map((part) => part.title.split(' ')[0])"
         assert (await page.evaluate(weights))[:4] == ["0.55", "0.65", "0.2", "0.15"]
-        said = m.Shadow(source_us=0, active="7f3a", active_changes=(LOWER, WEIGHT), previous=True)
+        report = m.Shadow(source_us=0, active="7f3a", active_changes=(LOWER, WEIGHT), previous=True)
         await until(page, "document.querySelector('#tuning-force').dataset.promoted === 'true'")
         assert "7f3a in force: policy.center_block_risk = 0.46, risk.non_water = 0.5" in await page.inner_text(
             "#tuning"
@@ -72,7 +72,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         log = "document.querySelector('#log').textContent"
         await until(page, f"{log}.includes('in force: 7f3a')")
 
-        said = m.Shadow(source_us=0)
+        report = m.Shadow(source_us=0)
         publisher.new_epoch()
         await until(page, f"!({SHOWN}) && {log}.includes('the advisor restarted: back at its configuration')")
         assert watched.errors == []

@@ -102,11 +102,11 @@ def test_stamps_are_safe_in_javascript() -> None:
 
 def test_only_the_controller_may_write_thrust() -> None:
     """A7 B13: neither perception nor advisor can write anything that moves the boat."""
-    said = {keys.ARMING.name, keys.TUNING.name}
-    moving = {keys.THRUST.name, keys.COMMAND.name, *said}
+    operator_topics = {keys.ARMING.name, keys.TUNING.name}
+    moving = {keys.THRUST.name, keys.COMMAND.name, *operator_topics}
     for service in keys.SERVICES:
         may = moving & set(authority.written_by(service))
-        expected = {"controller": {keys.THRUST.name}, "navigator": {keys.COMMAND.name}, "dashboard": said}
+        expected = {"controller": {keys.THRUST.name}, "navigator": {keys.COMMAND.name}, "dashboard": operator_topics}
         assert may == expected.get(service, set())
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -99,3 +100,64 @@ def test_served_files_name_no_other_host() -> None:
             text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
             assert "http://" not in text, path
             assert "https://" not in text, path
+
+
+# Pronouns, participles and metaphors that have a name in the field: trajectories, set-point, observation, inputs, ...
+NO_NAMES = frozenset(
+    [
+        "Ways",
+        "Wish",
+        "Tried",
+        "Room",
+        "Pilot",
+        "Crab",
+        "Heard",
+        "Told",
+        "Said",
+        "Felt",
+        "Shown",
+        "Tap",
+        "Along",
+        "Standing",
+        "Mover",
+        "Movers",
+        "Sight",
+        "ways",
+        "wish",
+        "tried",
+        "pilot",
+        "crab",
+        "told",
+        "said",
+        "shown",
+        "steered",
+        "looked",
+        "strayed",
+        "led",
+        "kinship",
+        "heed",
+        "mover",
+        "movers",
+        "sight",
+        "sights",
+        "spare_m",
+        "footprint_m",
+        "comes_near",
+    ]
+)
+
+
+def test_names_are_nouns_and_verbs_of_the_field() -> None:
+    found = []
+    for path in (path for path in SOURCES if path.suffix == ".py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            match node:
+                case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                    pass
+                case ast.arg(arg=name) | ast.Name(id=name, ctx=ast.Store()):
+                    pass
+                case _:
+                    continue
+            if name.lstrip("_") in NO_NAMES:
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno}: {name}")
+    assert found == []

@@ -80,9 +80,9 @@ async def test_two_steps_forth_and_one_back(
         code, out, _ = await tune(private_sets, "propose", "advisor.policy.center_block_risk=0.46", "--json")
         name = msgspec.json.decode(out, type=m.Shadow).proposal
         assert code == 0
-        tried = await until(shadow, lambda s: s.frames >= 5)
-        assert (tried.proposal, tried.differing) == (name, tried.frames)
-        assert tried.recent[-1].shadow_direction is m.Direction.LEFT
+        latest = await until(shadow, lambda s: s.frames >= 5)
+        assert (latest.proposal, latest.differing) == (name, latest.frames)
+        assert latest.recent[-1].shadow_direction is m.Direction.LEFT
         assert (await advisory.next()).direction is m.Direction.STRAIGHT
         code, out, _ = await tune(private_sets, "status")
         assert code == 0

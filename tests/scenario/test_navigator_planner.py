@@ -51,14 +51,14 @@ class Pool:
         self.state, self.now_us, self.speed_mps = NavigatorState(), START_US, 0.0
         self.direction, self.looks, self.shut_in = Direction.STRAIGHT, True, False
         self.order: NavCommand | None = None
-        self.shown: Evidence | None = None
+        self.newest_evidence: Evidence | None = None
 
     def run(self, seconds: float) -> Iterator[NavCommand]:
         for _ in range(round(seconds * 5)):
             self.now_us += STEP_US
             self._drift()
             if self.looks:
-                self.shown = evidence(self.now_us, water_edge_of(self.boat, self.bars, self.bank_m))
+                self.newest_evidence = evidence(self.now_us, water_edge_of(self.boat, self.bars, self.bank_m))
             side = LaneRisk(blocked=self.shut_in)
             advisory = Advisory(
                 source_us=self.now_us, direction=self.direction, reason=Reason.CENTER_CLEAR, left=side, right=side
@@ -80,7 +80,7 @@ class Pool:
             clock_us=self.now_us,
             arming=Arming(source_us=self.now_us, armed=True),
             arming_us=self.now_us,
-            evidence=self.shown,
+            evidence=self.newest_evidence,
         )
 
     def settle(self, seconds: float) -> NavCommand:
@@ -170,8 +170,8 @@ def test_the_decider_passes_evidence_and_calibration_to_the_planner() -> None:
     config = load_config()
     seeing = msgspec.structs.replace(config, calibration=CAMERA.calibration)
     inputs = {topic.name: Input() for topic in DECIDER.inputs}
-    shown = evidence(START_US, water_edge_of(AT_REST))
-    inputs |= {keys.EVIDENCE.name: Input(shown), keys.ODOMETRY.name: Input(odometry(START_US, AT_REST), START_US)}
+    newest = evidence(START_US, water_edge_of(AT_REST))
+    inputs |= {keys.EVIDENCE.name: Input(newest), keys.ODOMETRY.name: Input(odometry(START_US, AT_REST), START_US)}
     observations = [
         DECIDER.decide(NavigatorState(), inputs, START_US, c)[0].planner_state.memory.observations
         for c in (seeing, config)
@@ -316,7 +316,7 @@ def test_the_state_is_small_and_loses_nothing_as_json() -> None:
         pool.now_us,
         pool.speed_mps,
     )
-    again.order, again.shown = pool.order, pool.shown
+    again.order, again.newest_evidence = pool.order, pool.newest_evidence
     assert again.state == pool.state
     for one, other in zip(pool.run(3.0), again.run(3.0), strict=True):
         assert msgspec.json.encode(one) == msgspec.json.encode(other)

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         raise UserError(f"--out: {arguments.out} is inside the repository {repository}; the report holds pictures")
     runs = {folder.name: read_training_record(folder) for folder in arguments.runs}
     faults = read_faults(arguments.faults) if arguments.faults else None
-    tried = read_experiments(arguments.weights)
+    experiments = read_experiments(arguments.weights)
     findings = [finding for path in arguments.evidence for finding in _other_findings(path)]
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     )
     box_limited = analyse_box_errors(scored.boxes)
     bars = compare_with_requirements(limits, box_limited, faults)
-    tried = with_present_weights(tried, load_catalogue(arguments.weights), bars)
+    experiments = with_present_weights(experiments, load_catalogue(arguments.weights), bars)
     masks, boxes = draw_masks(out, [*worst_masks, *best_masks], segment), draw_boxes(out, [*worst_boxes, *best_boxes])
     content = PageContent(
         evaluation=scored.evaluation,
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         runs=runs,
         faults=faults,
         requirements=bars,
-        experiments=tried,
+        experiments=experiments,
         mask_errors=limits,
         box_errors=box_limited,
         worst_masks=masks[: len(worst_masks)],
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         best_boxes=boxes[len(worst_boxes) :],
     )
     write_evaluation(out / "evaluation.json", scored.evaluation)
-    write_whole(out / EXPERIMENTS, encode_experiments(tried))
+    write_whole(out / EXPERIMENTS, encode_experiments(experiments))
     beside = out / f"{PAGE}.partial"
     beside.write_text(page(content), encoding="utf-8")
     beside.replace(out / PAGE)

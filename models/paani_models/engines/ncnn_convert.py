@@ -101,8 +101,8 @@ def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> Ncn
         raise UserError(f"{program}: {error}") from error
     produced = ncnn_files(net)
     if done.returncode != 0 or not (produced.param.is_file() and produced.bin.is_file()):
-        said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-        raise UserError(f"{program}: failed on {source.name}: {said[-1].strip() if said else 'without a word'}")
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        raise UserError(f"{program}: failed on {source.name}: {lines[-1].strip() if lines else 'without a word'}")
     unknown = find_untranslated_layers(produced.param.read_text(encoding="utf-8"))
     if unknown:
         raise UserError(f"{source}: ncnn has no {', '.join(unknown)}")

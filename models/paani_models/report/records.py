@@ -116,8 +116,8 @@ def render_training_charts(rows: Sequence[dict[str, float]]) -> str:
         name: [(row.get("epoch", i + 1), row[name]) for i, row in enumerate(rows) if name in row] for name in names
     }
     losses = {name: points for name, points in series.items() if "loss" in name}
-    shown = [name for name in names if name not in losses and (" " not in name or name.endswith(" ap50"))]
-    figures = {name: series[name] for name in shown if all(0 <= y <= 1 for _, y in series[name])}
+    charted = [name for name in names if name not in losses and (" " not in name or name.endswith(" ap50"))]
+    figures = {name: series[name] for name in charted if all(0 <= y <= 1 for _, y in series[name])}
     last = max((x for points in series.values() for x, _ in points), default=1.0)
     charts = []
     if losses:

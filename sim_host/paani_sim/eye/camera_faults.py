@@ -29,11 +29,11 @@ class CameraFaults:
             return None
         if self._kept is None or not find_active_fault(self._faults, FaultKind.CAMERA_FROZEN, t_s):
             self._kept = bgr.copy()
-        shown = self._kept
+        frame = self._kept
         blurred = find_active_fault(self._faults, FaultKind.CAMERA_BLURRED, t_s)
         if blurred:
             sigma_px = (blurred.amount or BLUR_PX) * bgr.shape[1] / 320.0
-            shown = np.asarray(cv2.GaussianBlur(shown, (0, 0), sigma_px), np.uint8)
+            frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), sigma_px), np.uint8)
         if find_active_fault(self._faults, FaultKind.CAMERA_BLACK, t_s):
-            shown = black(shown, DARK_SEVERITY, np.random.default_rng(round(t_s * 1e6)))
-        return shown
+            frame = black(frame, DARK_SEVERITY, np.random.default_rng(round(t_s * 1e6)))
+        return frame

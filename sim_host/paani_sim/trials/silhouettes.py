@@ -45,9 +45,9 @@ def project_silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> 
     first = np.where(behind_one[..., None], cut, one)
     second = np.where(behind_other[..., None], cut, other)
     ends = np.concatenate([first, second], axis=1)
-    shown = np.tile(~(behind_one & behind_other), 2)
+    is_visible = np.tile(~(behind_one & behind_other), 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         across = 0.5 + 0.5 * ends[..., 0] / ends[..., 3]
         down = 0.5 - 0.5 * ends[..., 1] / ends[..., 3]
     place = np.clip(np.stack([across, down], axis=-1), -20.0, 20.0)
-    return [place[i, shown[i]] for i in range(count)]
+    return [place[i, is_visible[i]] for i in range(count)]

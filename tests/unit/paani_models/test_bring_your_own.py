@@ -79,11 +79,11 @@ def foreign(tmp_path: Path) -> Path:
 def test_a_foreign_segmenter_is_checked_and_used(foreign: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Another size, another order of classes: declared in the manifest, understood by the check and by perception."""
     assert main(["models", "check", str(foreign)]) == 0
-    said = capsys.readouterr().out
-    assert "input [1, 3, 96, 160] float32" in said
-    assert "classes sky, obstacle, water" in said
-    assert "warning" in said  # it calls black water, so only the image-quality check stands before motion
-    assert f"--set perception.segmenter={foreign}" in said
+    printed = capsys.readouterr().out
+    assert "input [1, 3, 96, 160] float32" in printed
+    assert "classes sky, obstacle, water" in printed
+    assert "warning" in printed  # it calls black water, so only the image-quality check stands before motion
+    assert f"--set perception.segmenter={foreign}" in printed
     evidence, mask = Perceiver(PerceptionConfig(segmenter=str(foreign)), stopwatch_ms).perceive(river(), HEADER, 0.0)
     assert mask is not None
     assert (mask[-1] == 0).all()
@@ -96,9 +96,9 @@ def test_without_a_manifest_the_shipped_contract_holds(tmp_path: Path, capsys: p
     path = tmp_path / "own.onnx"
     foreign_segmenter(path, ("water", "obstacle", "sky"))
     assert main(["models", "check", str(path)]) == 1
-    said = capsys.readouterr().out
-    assert "input is [1, 3, 96, 160], the contract has [1, 3, 256, 320]; a manifest.json beside the file" in said
-    assert "cannot be used as it is" in said
+    printed = capsys.readouterr().out
+    assert "input is [1, 3, 96, 160], the contract has [1, 3, 256, 320]; a manifest.json beside the file" in printed
+    assert "cannot be used as it is" in printed
     with pytest.raises(UserError, match=r"own\.onnx: segmenter must have float32"):
         OnnxEngine.load("segmenter", str(path), 1)
 

@@ -102,9 +102,9 @@ def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.Captu
     weights = Path(shutil.copytree(WEIGHTS, tmp_path / "weights", ignore=shutil.ignore_patterns("*.ncnn.*")))
     words = ["bench", "--weights", str(weights), "--threads", "1", "--rounds", "1"]
     assert main([*words, "--json", str(tmp_path / "bench.json")]) == 0
-    said = capsys.readouterr().out
-    assert "ncnn left out: " in said
-    assert "perception.engine=onnxruntime" in said
+    printed = capsys.readouterr().out
+    assert "ncnn left out: " in printed
+    assert "perception.engine=onnxruntime" in printed
     report = msgspec.json.decode((tmp_path / "bench.json").read_bytes(), type=EngineReport)
     assert [(row.engine, row.net, row.n) for row in report.rows] == [
         ("onnxruntime", "detector", 1),

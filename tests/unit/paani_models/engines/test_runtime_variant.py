@@ -72,8 +72,8 @@ def test_perception_reads_the_cells_between_which_the_whole_answer_lies(
 ) -> None:
     """One picture, three ways: the shipped file as perception runs it, its variant, and its whole answer."""
     contract, picture = load_catalogue()["segmenter"], river(4)
-    shown = stretch_picture(picture, *contract.size_hw, lookup_tables_for(contract))
-    cells, whole = (OnnxEngine.load("segmenter", "", 1, full_size=whole).run(shown) for whole in (False, True))
+    stretched = stretch_picture(picture, *contract.size_hw, lookup_tables_for(contract))
+    cells, whole = (OnnxEngine.load("segmenter", "", 1, full_size=whole).run(stretched) for whole in (False, True))
     own = OnnxEngine.load("segmenter", str(variant / "segmenter.onnx"), 1)
     assert cells.shape == (1, 3, 64, 80)
     assert whole.shape == contract.output.shape

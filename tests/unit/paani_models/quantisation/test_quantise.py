@@ -173,20 +173,20 @@ def test_the_papers_recipe_is_signed_per_tensor_qdq_t4(tmp_path: Path) -> None:
 
 def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -> None:
     """Boxes up to 320 and scores up to 1 share one step, of more than 1: scores are 0, or no scores."""
-    net, shown = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
-    quantise_network(net, tmp_path / "detector.onnx", RECIPES["paper"]["detector"], shown)
-    blind, seeing = largest_score(tmp_path / "detector.onnx", shown), largest_score(net, shown)
+    net, samples = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
+    quantise_network(net, tmp_path / "detector.onnx", RECIPES["paper"]["detector"], samples)
+    blind, seeing = largest_score(tmp_path / "detector.onnx", samples), largest_score(net, samples)
     assert blind == 0.0 or blind > 1.0
     assert 0.0 < seeing < 1.0
-    said = decide_acceptance(0.0, 0.5, for_size=True, largest_score=blind, float_largest_score=seeing)
-    assert not said.accepted
-    assert said.reason.startswith("blind: best score")
+    decision = decide_acceptance(0.0, 0.5, for_size=True, largest_score=blind, float_largest_score=seeing)
+    assert not decision.accepted
+    assert decision.reason.startswith("blind: best score")
 
 
 def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
-    net, shown = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
-    quantise_network(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], shown)
-    assert largest_score(tmp_path / "detector.onnx", shown) > 0.5 * largest_score(net, shown)
+    net, samples = verified_path("detector"), [detector_input(river(seed)) for seed in range(3)]
+    quantise_network(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], samples)
+    assert largest_score(tmp_path / "detector.onnx", samples) > 0.5 * largest_score(net, samples)
     quantised = onnx.load(str(tmp_path / "detector.onnx"))
     fed = {name: node for node in quantised.graph.node for name in node.output}
     for output in [node for node in quantised.graph.node if node.name in find_decoding_steps(onnx.load(str(net)))]:
@@ -195,9 +195,9 @@ def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
 
 def test_a_quantised_segmenter_is_checked_and_perceives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """It takes and gives floats like any other, so the check lets it pass and perception runs it."""
-    shown = [segmenter_input(picture[..., ::-1]) for picture in DRAWN.values()]
+    samples = [segmenter_input(picture[..., ::-1]) for picture in DRAWN.values()]
     own = tmp_path / "segmenter.onnx"
-    quantise_network(verified_path("segmenter"), own, RECIPES["equalised"]["segmenter"], shown)
+    quantise_network(verified_path("segmenter"), own, RECIPES["equalised"]["segmenter"], samples)
     assert main(["check", str(own)]) == 0
     assert "8-bit steps are rounded elsewhere" in capsys.readouterr().out
     header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
@@ -241,17 +241,17 @@ def test_decoding_reaches_past_the_expected_distance_to_the_last_convolutions(tm
 def test_acceptance_decides_by_rule_and_says_why_t5(
     loss: float, ratio: float, for_size: bool, accepted: bool, word: str
 ) -> None:
-    said = decide_acceptance(loss, ratio, for_size=for_size)
-    assert said.accepted is accepted
-    assert word in said.reason
-    assert said.rule
+    decision = decide_acceptance(loss, ratio, for_size=for_size)
+    assert decision.accepted is accepted
+    assert word in decision.reason
+    assert decision.rule
 
 
 @pytest.mark.parametrize(("best", "word"), [(0.0, "0.000 where FP32 gives 0.900"), (1.65, "1.650 is no probability")])
 def test_a_blind_net_is_rejected_whatever_its_other_figures(best: float, word: str) -> None:
-    said = decide_acceptance(0.0, 0.5, for_size=True, largest_score=best, float_largest_score=0.9)
-    assert not said.accepted
-    assert word in said.reason
+    decision = decide_acceptance(0.0, 0.5, for_size=True, largest_score=best, float_largest_score=0.9)
+    assert not decision.accepted
+    assert word in decision.reason
     assert decide_acceptance(0.0, 0.5, for_size=False, largest_score=0.85, float_largest_score=0.9).accepted
 
 

@@ -111,9 +111,9 @@ def test_epoch_order_depends_on_seed_and_epoch_only_and_holds_the_nulls(
 def test_rendered_pictures_are_two_in_ten_of_the_shown_ones(river: list[CachedPicture]) -> None:
     rendered = [replace(item, source="rendered") for item in river]
     order = segmenter_train.draw_epoch(river + rendered, SMALL, 0)
-    shown = [i for i in order if i >= 0]
-    assert sum(i >= len(river) for i in shown) == 2
-    assert len(shown) == 9
+    indices = [i for i in order if i >= 0]
+    assert sum(i >= len(river) for i in indices) == 2
+    assert len(indices) == 9
 
 
 def test_learning_rate_warms_up_and_ends_at_one_hundredth_s3() -> None:

@@ -81,11 +81,11 @@ def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
     patch = np.full((60, 80, 3), 220, np.uint8)
     shares = []
     for seed in range(40):
-        shown, labels = augment.paste_obstacle(np.random.default_rng(seed), picture, mask, patch)
+        pasted, labels = augment.paste_obstacle(np.random.default_rng(seed), picture, mask, patch)
         covered = labels == OBSTACLE_CLASS
-        assert (shown[~covered] == 30).all()
+        assert (pasted[~covered] == 30).all()
         assert np.isin(labels, (0, OBSTACLE_CLASS)).all()
-        assert (shown[covered] > 100).mean() > 0.9
+        assert (pasted[covered] > 100).mean() > 0.9
         shares.append(covered.mean())
     assert 0.02 < np.mean(shares) < 0.5
     assert not mask.any()

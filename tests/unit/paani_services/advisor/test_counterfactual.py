@@ -276,6 +276,6 @@ def test_the_longest_explanation_fits_the_message() -> None:
         ),
     )  # fmt: skip
     for reason in R:
-        said = explain_advisory(msgspec.structs.replace(advisory, reason=reason), ())
-        assert len(said) <= 400
-        assert said.endswith(".")
+        sentence = explain_advisory(msgspec.structs.replace(advisory, reason=reason), ())
+        assert len(sentence) <= 400
+        assert sentence.endswith(".")

@@ -299,10 +299,10 @@ def test_a_hidden_obstacle_fades_in_paani_and_stays_in_paper() -> None:
     assert lasting[11].center.obstacle == pytest.approx(lasting[1].center.obstacle)
 
 
-@pytest.mark.parametrize("shown", [0.96, 1.0])
-def test_no_turn_into_a_lane_without_water(shown: float) -> None:
+@pytest.mark.parametrize("non_water", [0.96, 1.0])
+def test_no_turn_into_a_lane_without_water(non_water: float) -> None:
     """A beach from side to side, seen for certain, is a risk of 0.55 in each lane, and no side's limit is that low."""
-    land = m.LaneEvidence(non_water=shown, uncertainty=0.0, clear_width=1.0 - shown)
+    land = m.LaneEvidence(non_water=non_water, uncertainty=0.0, clear_width=1.0 - non_water)
     beach = msgspec.structs.replace(CLEAR, left=land, center=land, right=land)
     _, advice, _ = play([beach])
     assert (advice[0].direction, advice[0].reason) == (D.STOP, R.NO_SAFE_SIDE)

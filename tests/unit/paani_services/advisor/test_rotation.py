@@ -195,8 +195,8 @@ def test_odometry_is_an_input_of_the_decider() -> None:
     heard_now = {topic.name: Input() for topic in DECIDER.inputs} | {keys.EVIDENCE.name: Input(CLEAR, T0_US)}
     for odometry_now, use in ((None, U.NO_ODOMETRY), (odometry(T0_US, 0.0), U.KNOWN)):
         given_now = heard_now | {keys.ODOMETRY.name: Input(odometry_now, T0_US)}
-        _, said = DECIDER.decide(DECIDER.state(), given_now, T0_US + 100_000, PAANI)
-        tracks = said[keys.TRACKS.name]
+        _, outputs = DECIDER.decide(DECIDER.state(), given_now, T0_US + 100_000, PAANI)
+        tracks = outputs[keys.TRACKS.name]
         assert isinstance(tracks, m.Tracks)
         assert tracks.rotation is use
 

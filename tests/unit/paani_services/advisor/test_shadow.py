@@ -110,13 +110,13 @@ def stream(n: int) -> list[m.Evidence]:
 
 
 def test_advice_is_the_same_to_the_byte_with_and_without_a_shadow() -> None:
-    plain, tried = Boat(), Boat()
-    tried.ask(ACT.PROPOSE, "a", (*LOWER, m.Change(path="advisor.tracker.confirm_hits", value="1")))
+    plain, tuned = Boat(), Boat()
+    tuned.ask(ACT.PROPOSE, "a", (*LOWER, m.Change(path="advisor.tracker.confirm_hits", value="1")))
     before = [msgspec.json.encode(advice) for advice in plain.see(stream(60))]
-    beside = [msgspec.json.encode(advice) for advice in tried.see(stream(60))]
+    beside = [msgspec.json.encode(advice) for advice in tuned.see(stream(60))]
     assert before == beside
-    assert plain.outputs[keys.TRACKS.name] == tried.outputs[keys.TRACKS.name]
-    assert tried.shadow.differing > 0
+    assert plain.outputs[keys.TRACKS.name] == tuned.outputs[keys.TRACKS.name]
+    assert tuned.shadow.differing > 0
 
 
 def test_disagreements_are_counted_and_named() -> None:
@@ -340,15 +340,15 @@ def test_no_admissible_value_stops_the_advisor() -> None:
     """A box that grows, shrinks and jumps, judged with each setting at the ends of its range."""
     sizes = (0.1, 0.12, 0.15, 0.3, 0.0, 0.2)
     seen = [seeing(box(m.Label.BUOY, (0.45 - s, 0.5 - s, 0.55 + s, 0.6 + s))) for s in sizes]
-    tried = 0
+    accepted = 0
     for path in sorted(TUNABLE):
         is_switch = setting_text(PAANI.advisor, path) in {"true", "false"}
         for value in ("true", "false") if is_switch else ("0", "1", "5e-324", "1e9"):
             boat = Boat(twice=False)
             boat.ask(ACT.PROPOSE, "a", (m.Change(path=path, value=value),))
             boat.see(seen)
-            tried += boat.shadow.frames == len(sizes)
-    assert tried > 2 * len(TUNABLE)
+            accepted += boat.shadow.frames == len(sizes)
+    assert accepted > 2 * len(TUNABLE)
 
 
 def _with(**policy: float) -> dict[str, object]:

@@ -105,23 +105,23 @@ def test_a_fitness_that_is_no_number_is_unfit() -> None:
 def test_a_doubtful_picture_is_checked_upside_down(
     upright: float, on_its_head: float, cause: UnusableCause, looks: int
 ) -> None:
-    shown = []
+    pictures = []
 
     def fitness(picture: np.ndarray) -> float:
-        shown.append(picture)
+        pictures.append(picture)
         return upright if np.array_equal(picture, river()) else on_its_head
 
     assert check_image_quality(ImageQualityState(), river(), 1, ON, fitness)[1] is cause
-    assert len(shown) == looks
-    assert np.array_equal(shown[-1], river()[:: -1 if looks == 2 else 1, :: -1 if looks == 2 else 1])
+    assert len(pictures) == looks
+    assert np.array_equal(pictures[-1], river()[:: -1 if looks == 2 else 1, :: -1 if looks == 2 else 1])
 
 
-@pytest.mark.parametrize(("said", "cause"), [(0.98, C.NONE), (0.90, C.SKEWED), (0.05, C.SKEWED), (np.nan, C.SKEWED)])
-def test_only_a_sure_fitness_accepts_lines_of_a_wrong_length(said: float, cause: UnusableCause) -> None:
+@pytest.mark.parametrize(("fitness", "cause"), [(0.98, C.NONE), (0.90, C.SKEWED), (0.05, C.SKEWED), (np.nan, C.SKEWED)])
+def test_only_a_sure_fitness_accepts_lines_of_a_wrong_length(fitness: float, cause: UnusableCause) -> None:
     skewed, _ = apply_fault("sheared", river(), np.zeros((240, 320), np.uint8), 5, np.random.default_rng(0))
-    assert check_image_quality(ImageQualityState(), skewed, 1, ON, lambda _: said)[1] is cause
+    assert check_image_quality(ImageQualityState(), skewed, 1, ON, lambda _: fitness)[1] is cause
     high = msgspec.structs.replace(ON, min_fitness=0.99)
-    assert check_image_quality(ImageQualityState(), skewed, 1, high, lambda _: said)[1] is C.SKEWED
+    assert check_image_quality(ImageQualityState(), skewed, 1, high, lambda _: fitness)[1] is C.SKEWED
 
 
 def test_a_picture_below_the_least_size_is_refused() -> None:

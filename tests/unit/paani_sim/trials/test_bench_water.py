@@ -19,10 +19,10 @@ COSTS = [
 
 def test_the_plot_is_well_formed_and_names_both_policies() -> None:
     drawn = ElementTree.fromstring(plot_costs(COSTS))
-    said = " ".join(drawn.itertext())
-    assert "paani" in said
-    assert "oracle" in said
-    assert "thousand pixels" in said
+    text = " ".join(drawn.itertext())
+    assert "paani" in text
+    assert "oracle" in text
+    assert "thousand pixels" in text
     assert sum(element.tag.endswith("polyline") for element in drawn.iter()) == 3
 
 

@@ -185,7 +185,7 @@ def test_a_finished_suite_is_only_read(
 def test_trials_use_the_wide_lens_by_default(policy: Policy) -> None:
     """The paper's policy is the paper's, whatever is set."""
     assert load_policy_config(policy).profile == "wide"
-    told = load_policy_config(policy, ["profile=paani"])
-    assert (told.profile, told.eye.hfov_deg) == ("paani", 70.0)
-    assert told.navigator.planner.use is (policy is not Policy.BLIND)
+    config = load_policy_config(policy, ["profile=paani"])
+    assert (config.profile, config.eye.hfov_deg) == ("paani", 70.0)
+    assert config.navigator.planner.use is (policy is not Policy.BLIND)
     assert load_policy_config(Policy.PAPER, ["profile=paani"]).profile == "paper"

@@ -63,7 +63,7 @@ def test_both_vessels_are_one_hull() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "problem"),
     [
         ("surge_linear = 4.0", "surge_linear = nan", "drag.surge_linear"),
         ("surge_linear = 4.0", "surge_linear = inf", "drag.surge_linear"),
@@ -80,7 +80,7 @@ def test_both_vessels_are_one_hull() -> None:
         ("[hull]", "[hull", "paper"),
     ],
 )
-def test_bad_file_is_refused_by_field(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_bad_file_is_refused_by_field(tmp_path: Path, old: str, new: str, problem: str) -> None:
     text = (FOLDER / "paper.toml").read_text(encoding="utf-8")
     assert old in text
     file = tmp_path / "mine.toml"
@@ -88,7 +88,7 @@ def test_bad_file_is_refused_by_field(tmp_path: Path, old: str, new: str, said: 
     with pytest.raises(UserError) as refusal:
         load_vessel(str(file))
     assert str(file) in str(refusal.value)
-    assert (said in str(refusal.value)) or said == "paper"
+    assert (problem in str(refusal.value)) or problem == "paper"
     assert "\n" not in str(refusal.value)
 
 

@@ -111,23 +111,23 @@ def test_the_velocity_of_a_swimmer_5_m_ahead_is_estimated(velocity: tuple[float,
 @pytest.mark.slow
 def test_a_static_swimmer_is_hardly_ever_taken_for_a_moving_one() -> None:
     """From a boat that moves and turns, with boxes that jitter by a pixel on every side: one in a hundred at most."""
-    rng, said = np.random.default_rng(0), 0
+    rng, found_moving = np.random.default_rng(0), 0
     for seed in range(200):
         x_m, side, surge, yaw = rng.uniform((3.0, -0.3, 0.0, -0.2), (12.0, 0.3, 0.6, 0.2)).tolist()
         watching = {"surge_mps": surge, "yaw_radps": yaw, "seed": seed, "jitter_px": 1.0}
         memory, at_us, _ = watched((x_m, side * x_m), (0.0, 0.0), **watching)
-        said += len(moving(memory, at_us))
-    assert said <= 2
+        found_moving += len(moving(memory, at_us))
+    assert found_moving <= 2
 
 
 @pytest.mark.slow
 def test_boxes_that_include_reflections_are_not_taken_for_motion() -> None:
     """One box in seven reaches a quarter lower: one static swimmer in a hundred at most is taken for a moving one."""
-    said = 0
+    found_moving = 0
     for seed in range(100):
         memory, at_us, _ = watched((3.5 + 0.05 * seed, 0.0), (0.0, 0.0), mistaken=0.15, seed=seed)
-        said += len(moving(memory, at_us))
-    assert said <= 1
+        found_moving += len(moving(memory, at_us))
+    assert found_moving <= 1
 
 
 def test_a_person_may_swim_until_they_are_seen_to_stand() -> None:

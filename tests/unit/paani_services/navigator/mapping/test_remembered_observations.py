@@ -43,11 +43,11 @@ def grid_of(memory: ObservationMemory, age_s: float) -> OccupancyGrid:
 )
 def test_only_free_space_evidence_is_remembered(changes: dict[str, object]) -> None:
     """F2: a fallback mask never frees a cell, nor does a recording or an unusable picture."""
-    shown = evidence(START_US, water_edge_of(AT_REST))
-    assert is_free_space_evidence(shown)
-    assert not is_free_space_evidence(msgspec.structs.replace(shown, **changes))
+    clear_evidence = evidence(START_US, water_edge_of(AT_REST))
+    assert is_free_space_evidence(clear_evidence)
+    assert not is_free_space_evidence(msgspec.structs.replace(clear_evidence, **changes))
     memory = update_memory(
-        ObservationMemory(), odometry(START_US, AT_REST), msgspec.structs.replace(shown, **changes), PLANNER
+        ObservationMemory(), odometry(START_US, AT_REST), msgspec.structs.replace(clear_evidence, **changes), PLANNER
     )
     assert memory.observations == ()
 
