@@ -74,8 +74,18 @@ async def test_the_overlay_lies_on_its_own_frame(
         page = watched.page
         await until(page, "paani.overlay.mask_seq !== null")
         for _ in range(10):
-            shown = await overlay(page)
-            assert len({shown["frame_seq"], shown["picture_seq"], shown["mask_seq"], shown["evidence_seq"]}) == 1
+            overlay_state = await overlay(page)
+            assert (
+                len(
+                    {
+                        overlay_state["frame_seq"],
+                        overlay_state["picture_seq"],
+                        overlay_state["mask_seq"],
+                        overlay_state["evidence_seq"],
+                    }
+                )
+                == 1
+            )
             await asyncio.sleep(0.1)
         await page.screenshot(path=tmp_path / "page.png")
         for layer in ("3", "4"):
@@ -108,9 +118,9 @@ async def test_evidence_of_another_frame_is_not_drawn(browser: Any, boat: Boat, 
     async with spawn("dashboard"):
         page = (await watch(browser, config)).page
         await until(page, "paani.overlay.picture_seq > 5")
-        shown = await overlay(page)
-        assert shown["evidence_seq"] is None
-        assert shown["mask_seq"] is None
+        overlay_state = await overlay(page)
+        assert overlay_state["evidence_seq"] is None
+        assert overlay_state["mask_seq"] is None
         for x, y in ((0.3, 0.9), (0.7, 0.9), (BOX[0], 0.4), (0.5, 0.97)):
             assert is_colour(await page.evaluate(PIXEL, [x, y]), PICTURE_BGR[::-1]), (x, y)
         assert "overlay left out" in await page.inner_text("#camera-note")

@@ -172,9 +172,9 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
     source, out = small_segmenter(tmp_path / "own.onnx"), tmp_path / "out"
     words = ["convert", str(source), "--pnnx", str(program(tmp_path)), "--out", str(out), "--data", "no/such/folder"]
     assert main(words) == 0
-    said = capsys.readouterr().out
-    assert "differ by at most" in said
-    assert f"--set perception.engine=ncnn --set perception.segmenter={out / 'own.onnx'}" in said
+    printed = capsys.readouterr().out
+    assert "differ by at most" in printed
+    assert f"--set perception.engine=ncnn --set perception.segmenter={out / 'own.onnx'}" in printed
     names = ["manifest.json", "own.ncnn.bin", "own.ncnn.json", "own.ncnn.param", "own.onnx"]
     assert sorted(path.name for path in out.iterdir()) == names
     assert NcnnEngine.load("segmenter", str(out / "own.onnx"), 1).contract.sha256 == file_sha256(source)

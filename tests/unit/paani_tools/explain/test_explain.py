@@ -83,8 +83,8 @@ def test_the_order_names_the_tracks_that_it_was_planned_for(log: Path) -> None:
     assert moment.tracks is not None
     track = moment.tracks.tracks[0]
     order = msgspec.structs.replace(moment.order, obstacle_track_ids=(track.id, 99))
-    told = narrative_of(msgspec.structs.replace(moment, order=order), CONFIG)
-    assert f"planned for {track.label} #{track.id}, track #99" in told
+    printed = narrative_of(msgspec.structs.replace(moment, order=order), CONFIG)
+    assert f"planned for {track.label} #{track.id}, track #99" in printed
 
 
 def test_the_chain_is_followed_to_what_this_advice_became(log: Path) -> None:

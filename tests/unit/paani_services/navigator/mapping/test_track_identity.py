@@ -43,10 +43,12 @@ def watch(frames: int, *, with_tracks: bool) -> tuple[PlannerState, m.Tracks, in
         at_us = START_US + PERIOD_US * k
         for pose_us in (at_us - PERIOD_US // 2, at_us):
             planner = observe(planner, odometry(pose_us, AT_REST), None, PLANNER)
-        shown = evidence(at_us, water_edge_of(AT_REST), detections=(EMPTY, QUAY, swimmer(k * PERIOD_US * 1e-6)))
-        planner = observe(planner, None, shown, PLANNER, tracks if with_tracks else None)  # those of the frame before
-        advisor, _, tracks = advise(advisor, shown, at_us, CONFIG)
-        planner = observe(planner, None, shown, PLANNER, tracks if with_tracks else None)
+        measurements = evidence(at_us, water_edge_of(AT_REST), detections=(EMPTY, QUAY, swimmer(k * PERIOD_US * 1e-6)))
+        planner = observe(
+            planner, None, measurements, PLANNER, tracks if with_tracks else None
+        )  # those of the frame before
+        advisor, _, tracks = advise(advisor, measurements, at_us, CONFIG)
+        planner = observe(planner, None, measurements, PLANNER, tracks if with_tracks else None)
     return planner, tracks, at_us
 
 
@@ -90,20 +92,22 @@ def test_motion_does_not_depend_on_the_id() -> None:
     "changes", [{"frame_seq": 1}, {"frame_epoch": 2}, {"tracks": ()}], ids=["other-frame", "other-epoch", "no-tracks"]
 )
 def test_tracks_of_another_frame_label_nothing(changes: dict[str, object]) -> None:
-    shown = evidence(START_US, water_edge_of(AT_REST), detections=(swimmer(0.0),))
-    memory = observe_from(at_us=START_US, memory=ObservationMemory(), detections=shown.detections)
-    _, _, tracks = advise(AdvisorState(), shown, START_US, CONFIG)
-    assert add_track_ids(memory, shown, tracks).observations[-1].box_track_ids == (tracks.tracks[0].id,)
-    labelled = add_track_ids(memory, shown, msgspec.structs.replace(tracks, **changes)).observations[-1]
+    measurements = evidence(START_US, water_edge_of(AT_REST), detections=(swimmer(0.0),))
+    memory = observe_from(at_us=START_US, memory=ObservationMemory(), detections=measurements.detections)
+    _, _, tracks = advise(AdvisorState(), measurements, START_US, CONFIG)
+    assert add_track_ids(memory, measurements, tracks).observations[-1].box_track_ids == (tracks.tracks[0].id,)
+    labelled = add_track_ids(memory, measurements, msgspec.structs.replace(tracks, **changes)).observations[-1]
     assert not any(labelled.box_track_ids)
     assert add_track_ids(memory, None, tracks) is memory
-    assert add_track_ids(memory, shown, None) is memory
+    assert add_track_ids(memory, measurements, None) is memory
 
 
 def test_a_held_track_names_no_detection() -> None:
     """Its number would be that of whatever is detected there."""
-    shown = evidence(START_US, water_edge_of(AT_REST), detections=(swimmer(0.0),))
-    state, _, _ = advise(AdvisorState(), shown, START_US, CONFIG)
-    clear = msgspec.structs.replace(shown, source_us=START_US + PERIOD_US, frame_seq=shown.frame_seq + 1, detections=())
+    measurements = evidence(START_US, water_edge_of(AT_REST), detections=(swimmer(0.0),))
+    state, _, _ = advise(AdvisorState(), measurements, START_US, CONFIG)
+    clear = msgspec.structs.replace(
+        measurements, source_us=START_US + PERIOD_US, frame_seq=measurements.frame_seq + 1, detections=()
+    )
     _, _, tracks = advise(state, clear, START_US + PERIOD_US, CONFIG)
     assert [(track.held, track.detection_number) for track in tracks.tracks] == [(True, 0)]
