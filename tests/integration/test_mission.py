@@ -33,7 +33,7 @@ def settings(folder: Path, east_m: float) -> tuple[str, ...]:
     return tuple(f"navigator.{name}={folder / f'{name}.toml'}" for name in files)
 
 
-class NavigatorInputs:
+class InputPublishers:
     """Publishes everything that the navigator receives, and collects its orders."""
 
     def __init__(self, buses: dict[str, Bus]) -> None:
@@ -69,7 +69,7 @@ BUSES = ("plant", "advisor", "localization", "dashboard", "observer")
 
 async def test_legs_follow_each_other_on_the_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
     """The boat holds its station for half a second of simulated time, then follows its route; both are published."""
-    inputs = NavigatorInputs({name: await open_as(name) for name in BUSES})
+    inputs = InputPublishers({name: await open_as(name) for name in BUSES})
     async with spawn("navigator", *settings(tmp_path, 100.0)), asyncio.timeout(30):
         legs = await inputs.until_under_way()
     assert (legs[0], legs[-1]) == (0, 1)
@@ -84,7 +84,7 @@ async def test_a_navigator_restarted_under_way_goes_on_with_its_leg(
 ) -> None:
     """The station is not held again; with a new run of the operator's process the mission begins anew."""
     buses = {name: await open_as(name) for name in BUSES}
-    inputs, sets = NavigatorInputs(buses), settings(tmp_path, 100.0)
+    inputs, sets = InputPublishers(buses), settings(tmp_path, 100.0)
     async with spawn("navigator", *sets), asyncio.timeout(30):
         await inputs.until_under_way()
     await asyncio.sleep(0.6)
@@ -92,7 +92,7 @@ async def test_a_navigator_restarted_under_way_goes_on_with_its_leg(
         assert set(await inputs.until_under_way()) == {1}
     await buses["dashboard"].close()
     await asyncio.sleep(0.6)
-    anew = NavigatorInputs({**buses, "dashboard": await open_as("dashboard")})
+    anew = InputPublishers({**buses, "dashboard": await open_as("dashboard")})
     anew.sim_us = inputs.sim_us
     async with spawn("navigator", *sets), asyncio.timeout(30):
         assert (await anew.until_under_way())[0] == 0

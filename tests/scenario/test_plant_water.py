@@ -23,7 +23,7 @@ Launch = Callable[..., Plant]
 
 
 @pytest.fixture
-def emit_packets() -> Iterator[Launch]:
+def launch() -> Iterator[Launch]:
     opened: list[Plant] = []
 
     def make(world: World, config: PlantConfig = OTTER, seed: int = 1, faults: tuple[Fault, ...] = ()) -> Plant:
@@ -49,15 +49,15 @@ def drift(plant: Plant, seconds: float, yaw_rad: float = 0.0) -> tuple[float, fl
     return plant.position_m
 
 
-def test_k8_paper_is_blind_to_wind(emit_packets: Launch) -> None:
+def test_k8_paper_is_blind_to_wind(launch: Launch) -> None:
     """K8: no validated wind: a gale leaves the paper's boat where it is."""
-    assert drift(emit_packets(lake(wind=Wind(10.0, 0.5, 0.3)), PlantConfig()), 20.0) == (0.0, 0.0)
+    assert drift(launch(lake(wind=Wind(10.0, 0.5, 0.3)), PlantConfig()), 20.0) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("wind_mps", "speed_mps"), [(3.0, 0.049), (6.0, 0.146)])
-def test_wind_drifts_the_free_boat_broadside(emit_packets: Launch, wind_mps: float, speed_mps: float) -> None:
+def test_wind_drifts_the_free_boat_broadside(launch: Launch, wind_mps: float, speed_mps: float) -> None:
     """Beam wind against 20 v + 80 v^2: 0.05 m/s at 3 m/s, 0.15 m/s at 6 m/s, downwind."""
-    plant = emit_packets(lake(wind=Wind(wind_mps, 0.5 * math.pi)))
+    plant = launch(lake(wind=Wind(wind_mps, 0.5 * math.pi)))
     x_m, y_m = drift(plant, 60.0)
     assert plant.velocity[1] == pytest.approx(speed_mps, rel=0.05)
     assert y_m == pytest.approx(60.0 * speed_mps, rel=0.1)
@@ -65,9 +65,9 @@ def test_wind_drifts_the_free_boat_broadside(emit_packets: Launch, wind_mps: flo
 
 
 @pytest.mark.parametrize("vessel", ["paper", "otter"])
-def test_current_carries_the_free_boat_at_its_own_speed(emit_packets: Launch, vessel: str) -> None:
+def test_current_carries_the_free_boat_at_its_own_speed(launch: Launch, vessel: str) -> None:
     world = lake(current=Current(0.4, 1.0))
-    plant = emit_packets(world, PlantConfig(vessel=vessel))
+    plant = launch(world, PlantConfig(vessel=vessel))
     drift(plant, 60.0, yaw_rad=0.3)
     around = plant.surroundings
     surge_mps, sway_mps, rate_radps = plant.velocity
@@ -77,10 +77,10 @@ def test_current_carries_the_free_boat_at_its_own_speed(emit_packets: Launch, ve
     assert abs(rate_radps) < 1e-3
 
 
-def test_waves_rock_the_boat_gently_and_push_it_little(emit_packets: Launch) -> None:
+def test_waves_rock_the_boat_gently_and_push_it_little(launch: Launch) -> None:
     """U = 6 m/s over 200 m is a sea of 4 cm, shorter than the hull: tenths of a degree, not degrees."""
     waves = dataclasses.replace(lake(wind=Wind(6.0, 0.5), waves=Waves(200.0)))
-    no_windage = emit_packets(waves, PlantConfig(vessel="paper"))
+    no_windage = launch(waves, PlantConfig(vessel="paper"))
     no_windage.place(0.0, 0.0, 0.0)
     pitch, heights = [], []
     for _ in range(6000):
@@ -93,7 +93,7 @@ def test_waves_rock_the_boat_gently_and_push_it_little(emit_packets: Launch) -> 
     assert math.hypot(*no_windage.position_m) < 1.5
 
 
-def test_passing_vessel_s_wake_rolls_the_boat(emit_packets: Launch) -> None:
+def test_passing_vessel_s_wake_rolls_the_boat(launch: Launch) -> None:
     path_m = np.array([[-90.0, -8.0], [90.0, -8.0]])
     actor = dataclasses.replace(
         load_world("lake").actors[0],
@@ -103,7 +103,7 @@ def test_passing_vessel_s_wake_rolls_the_boat(emit_packets: Launch) -> None:
         closed=False,
         behaviour=Behaviour.HOLDS_ON,
     )
-    plant = emit_packets(lake(actors=(actor,)))
+    plant = launch(lake(actors=(actor,)))
     plant.place(0.0, 0.0, 0.0)
     rolls = []
     for _ in range(4000):
@@ -114,11 +114,11 @@ def test_passing_vessel_s_wake_rolls_the_boat(emit_packets: Launch) -> None:
     assert 1.0 < math.degrees(during) < 25.0
 
 
-def test_same_seed_same_sea(emit_packets: Launch) -> None:
+def test_same_seed_same_sea(launch: Launch) -> None:
     rough = lake(wind=Wind(6.0, 0.5, 0.3), waves=Waves(200.0), current=Current(0.2, 0.1))
 
     def trace(seed: int) -> str:
-        plant = emit_packets(rough, seed=seed)
+        plant = launch(rough, seed=seed)
         for _ in range(800):
             plant.step(3.0, 3.5)
         return plant.state_hash()
@@ -127,9 +127,9 @@ def test_same_seed_same_sea(emit_packets: Launch) -> None:
     assert trace(5) != trace(6)
 
 
-def test_fans_lag_by_a_tenth_of_a_second(emit_packets: Launch) -> None:
+def test_fans_lag_by_a_tenth_of_a_second(launch: Launch) -> None:
     """A step of 10 N: 63 % of the paper boat's acceleration after 0.1 s, for the otter's mass with added mass."""
-    plant = emit_packets(lake())
+    plant = launch(lake())
     plant.place(0.0, 0.0, 0.0)
     speeds = []
     for _ in range(11):
@@ -139,9 +139,9 @@ def test_fans_lag_by_a_tenth_of_a_second(emit_packets: Launch) -> None:
     assert acceleration == pytest.approx((1.0 - math.exp(-1.1)) * 10.0 / (12.4 * 1.1), rel=0.03)
 
 
-def test_boat_loses_energy_without_thrust(emit_packets: Launch) -> None:
+def test_boat_loses_energy_without_thrust(launch: Launch) -> None:
     """Tilted, dropped and turning, the otter only ever calms down, added mass and Coriolis included."""
-    plant = emit_packets(lake())
+    plant = launch(lake())
     plant.place(0.0, 0.0, 0.0)
     for _ in range(600):
         plant.step(2.0, 10.0)
@@ -154,9 +154,9 @@ def test_boat_loses_energy_without_thrust(emit_packets: Launch) -> None:
     assert energies[-1] < 0.02 * energies[0]
 
 
-def test_energy_is_force_times_way_through_water(emit_packets: Launch) -> None:
+def test_energy_is_force_times_way_through_water(launch: Launch) -> None:
     """At a steady 0.68 m/s with 12 N, 8.2 W."""
-    plant = emit_packets(lake())
+    plant = launch(lake())
     plant.place(-40.0, 0.0, 0.0)
     for _ in range(2000):
         plant.step(6.0, 6.0)
@@ -164,13 +164,13 @@ def test_energy_is_force_times_way_through_water(emit_packets: Launch) -> None:
     for _ in range(1000):
         plant.step(6.0, 6.0)
     assert (plant.energy_j - before_j) / 10.0 == pytest.approx(12.0 * 0.68, rel=0.02)
-    assert emit_packets(lake()).energy_j == 0.0
+    assert launch(lake()).energy_j == 0.0
 
 
-def test_hits_name_what_was_touched_and_when(emit_packets: Launch) -> None:
+def test_hits_name_what_was_touched_and_when(launch: Launch) -> None:
     world = dataclasses.replace(load_world("lake"), actors=(), wind=STILL)
     sail = next(obstacle for obstacle in world.obstacles if obstacle.id == "sail_middle")
-    plant = emit_packets(world)
+    plant = launch(world)
     plant.place(sail.pose.x_m - 7.0, sail.pose.y_m, 0.0)
     for _ in range(2500):
         plant.step(6.0, 6.0)
@@ -179,10 +179,10 @@ def test_hits_name_what_was_touched_and_when(emit_packets: Launch) -> None:
     assert 3.0 < plant.contact_starts[0].time_s < 12.0
 
 
-def test_gps_outage_and_jump(emit_packets: Launch) -> None:
+def test_gps_outage_and_jump(launch: Launch) -> None:
     """Outage: no fix, and the position stays the last one. Jump: as far east as it says. Noise as without faults."""
     faults = (Fault(FaultKind.GPS_OUTAGE, 2.0, 1.0), Fault(FaultKind.GPS_JUMP, 4.0, 1.0, 25.0))
-    faulty, sound = emit_packets(lake(), faults=faults), emit_packets(lake())
+    faulty, sound = launch(lake(), faults=faults), launch(lake())
     east_m, fixes, held = [], [], []
     for step in range(600):
         for plant in (faulty, sound):
@@ -201,9 +201,9 @@ def test_gps_outage_and_jump(emit_packets: Launch) -> None:
     assert not any(east_m[:9] + east_m[14:19] + east_m[24:])
 
 
-def test_compass_and_gyro_bias(emit_packets: Launch) -> None:
+def test_compass_and_gyro_bias(launch: Launch) -> None:
     faults = (Fault(FaultKind.COMPASS_BIAS, 0.5, 0.5, 0.4), Fault(FaultKind.GYRO_BIAS, 0.5, 0.5, -0.02))
-    faulty, sound = emit_packets(lake(), faults=faults), emit_packets(lake())
+    faulty, sound = launch(lake(), faults=faults), launch(lake())
     turned, rates = [], []
     for _ in range(150):
         for plant in (faulty, sound):
@@ -218,9 +218,9 @@ def test_compass_and_gyro_bias(emit_packets: Launch) -> None:
 
 
 @pytest.mark.parametrize(("amount", "side"), [(0.6, -1.0), (-0.6, 1.0)])
-def test_weak_thruster_turns_the_boat_towards_it(emit_packets: Launch, amount: float, side: float) -> None:
+def test_weak_thruster_turns_the_boat_towards_it(launch: Launch, amount: float, side: float) -> None:
     """Left fan weak: to port is the other way: the right one pushes on, so the bow goes to port."""
-    plant = emit_packets(lake(), faults=(Fault(FaultKind.THRUSTER_LOSS, 0.0, amount=amount),))
+    plant = launch(lake(), faults=(Fault(FaultKind.THRUSTER_LOSS, 0.0, amount=amount),))
     plant.place(0.0, 0.0, 0.0)
     for _ in range(500):
         plant.step(5.0, 5.0)
@@ -228,11 +228,11 @@ def test_weak_thruster_turns_the_boat_towards_it(emit_packets: Launch, amount: f
     assert plant.energy_j > 0.0
 
 
-def test_true_pose_carries_the_actors_distances(emit_packets: Launch) -> None:
+def test_true_pose_carries_the_actors_distances(launch: Launch) -> None:
     """One that gives way is late when the boat lies on its path; the pose says by how much."""
     world = load_world("lake")
     actor = dataclasses.replace(world.actors[0], behaviour=Behaviour.GIVES_WAY)
-    plant = emit_packets(dataclasses.replace(lake(), actors=(actor, world.actors[1])))
+    plant = launch(dataclasses.replace(lake(), actors=(actor, world.actors[1])))
     ahead = actor.path_m[(int(len(actor.path_m) * 0.25)) % len(actor.path_m)]
     plant.place(float(ahead[0]), float(ahead[1]), 0.0)
     for _ in range(6000):
@@ -244,9 +244,9 @@ def test_true_pose_carries_the_actors_distances(emit_packets: Launch) -> None:
     assert plant.collisions == 0
 
 
-def test_otter_heaves_and_rolls_with_its_added_mass(emit_packets: Launch) -> None:
+def test_otter_heaves_and_rolls_with_its_added_mass(launch: Launch) -> None:
     """Heave: sqrt(650 / 24.8) = 5.12 rad/s, zeta 0.3: 1.29 s. Roll: sqrt(90 / 1.032) = 9.34 rad/s, 0.2: 0.69 s."""
-    plant = emit_packets(lake())
+    plant = launch(lake())
     plant.place(0.0, 0.0, 0.0, z_m=0.227)
     plant._data.qvel[3] = 0.2
     heights, rolls = [], []
@@ -265,9 +265,9 @@ def period_s(swing: list[float]) -> float:
 
 
 @pytest.mark.parametrize("vessel", ["paper", "otter"])
-def test_boat_rides_waves_much_longer_than_itself(emit_packets: Launch, vessel: str) -> None:
+def test_boat_rides_waves_much_longer_than_itself(launch: Launch, vessel: str) -> None:
     """Swell of 20 m: the hull goes up and down with the surface and leans with its slope."""
-    plant = emit_packets(lake(wind=Wind(10.0, 0.0), waves=Waves(20_000.0)), PlantConfig(vessel=vessel))
+    plant = launch(lake(wind=Wind(10.0, 0.0), waves=Waves(20_000.0)), PlantConfig(vessel=vessel))
     plant.place(0.0, 0.0, 0.0)
     lifts, surface, pitches, slopes = [], [], [], []
     for step in range(4000):
