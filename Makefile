@@ -13,9 +13,6 @@ DEBIAN_TEST := $(DEBIAN) chromium libatomic1
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-# Tests that share nothing run side by side; those that start processes and watch the clock, one after the other.
-PURE := tests/unit tests/contract tests/replay tests/scenario
-
 .PHONY: run test test-long check lint docs setup setup-test system system-test lock clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
@@ -23,8 +20,8 @@ run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
 test: setup-test lint ## everything that CI runs
-	$(BIN)/python -m pytest -q -n 2 $(PURE) -m "not long"
-	$(BIN)/python -m pytest -q tests $(PURE:%=--ignore=%) -m "not long"
+	$(BIN)/python -m pytest -q -n 2 tests -m "not long and not alone"
+	$(BIN)/python -m pytest -q tests -m "alone and not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
 	@mkdir -p runs

@@ -21,6 +21,9 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
 
+TESTS = Path(__file__).parent
+ALONE = {"bench", "browser", "fault", "integration"}  # folders
+
 settings.register_profile("quick", max_examples=15)  # for `make check`; everything else tries more
 
 START_TIMEOUT_S = 40.0
@@ -32,6 +35,13 @@ OpenAs = Callable[[str], Awaitable[Bus]]
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write the golden files anew")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what does not bear another test beside it: trainings, and all that starts processes or measures."""
+    for item in items:
+        if item.get_closest_marker("train") or ALONE & set(item.path.relative_to(TESTS).parts):
+            item.add_marker(pytest.mark.alone)
 
 
 @pytest.fixture

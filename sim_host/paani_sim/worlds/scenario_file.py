@@ -24,7 +24,7 @@ Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}$")]
 Coordinate = Annotated[float, msgspec.Meta(ge=-1e5, le=1e5)]
 Degrees = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
-Length = Annotated[float, msgspec.Meta(gt=0.0, le=200.0)]
+Length = Annotated[float, msgspec.Meta(ge=0.05, le=200.0)]  # [m]; MuJoCo takes a hull much smaller for a flat mesh
 Distance = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 Seed = Annotated[int, msgspec.Meta(ge=0, le=2**31)]
 Point = tuple[Coordinate, Coordinate]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from paani.config import WorldConfig
@@ -325,6 +325,8 @@ _POINTS = st.lists(st.lists(st.floats(-120.0, 120.0), min_size=2, max_size=2), m
     ),
     st.one_of(st.just({}), st.dictionaries(st.sampled_from(["from_m", "length_m", "waypoints_m"]), _JUNK | _POINTS)),
 )
+@example({"look": "kayak", "at_m": [0.0, 0.0], "length_m": 3e-78}, {})
+@example({"look": "kayak", "at_m": [0.0, 0.0], "length_m": 0.05}, {})
 @settings(max_examples=60, deadline=None)
 def test_any_file_is_sound_or_refused(actor: dict[str, object], route: dict[str, object]) -> None:
     """Never anything but a scenario that compiles, or one line."""
