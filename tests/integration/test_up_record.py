@@ -76,12 +76,18 @@ def test_a_folder_that_goes_away_stops_nothing_and_is_told_at_the_end(
     assert {name for name, figures in summary["services"].items() if figures["restarts"]} == {"recorder"}
 
 
-def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(("words", "name"), [(("--record",), "--record "), (("--set",), "recorder.folder")])
+def test_a_folder_that_cannot_be_written_is_named(
+    words: tuple[str, ...], name: str, tmp_path: Path, private_sets: tuple[str, ...]
+) -> None:
+    """By the option that was given, or by the setting that the recorder reads."""
     (tmp_path / "file").touch()
-    up = Up(tmp_path, *words_of(private_sets, "--headless", "--record", str(tmp_path / "file" / "x")))
+    folder = tmp_path / "file" / "x"
+    given = str(folder) if words == ("--record",) else f"recorder.folder={folder}"
+    up = Up(tmp_path, *words_of(private_sets, "--headless", *words, given))
     assert up.process.wait(60) == 2, (up.out, up.errors)
     [line] = up.errors
-    assert f"recorder.folder {tmp_path / 'file' / 'x'}" in line
+    assert f"{name.strip()} {folder}" in line
     assert up.children() == {}
 
 
