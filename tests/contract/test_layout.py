@@ -70,7 +70,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("import filterpy", "services/paani_services/localization/"),
         ("from filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/"),
-        ("import serial", "services/paani_services/bridge/"),
+        ("import serial", "shared/paani/serial_port.py"),
         ("from mcap", "shared/paani/logs/"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
     ],
