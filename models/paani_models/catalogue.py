@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from paani.errors import UserError
+from paani.whole_file import write_json
 
 WEIGHTS = Path(__file__).parent / "weights"
 MANIFEST = "manifest.json"
@@ -109,11 +110,8 @@ def load_catalogue(folder: Path | None = None) -> dict[str, Model]:
 
 
 def save_catalogue(catalogue: dict[str, Model], folder: Path) -> None:
-    """Write the manifest beside, then rename, so that a reader never sees half of it."""
-    beside = folder / f"{MANIFEST}.partial"
-    encoded = msgspec.json.encode(_Manifest(tuple(catalogue[name] for name in sorted(catalogue))))
-    beside.write_bytes(msgspec.json.format(encoded, indent=1) + b"\n")
-    beside.replace(folder / MANIFEST)
+    """Write the manifest, of which a reader never sees half."""
+    write_json(folder / MANIFEST, _Manifest(tuple(catalogue[name] for name in sorted(catalogue))))
 
 
 IGNORED_CLASS = "-"  # in a detector's manifest: a class of the model that is left out

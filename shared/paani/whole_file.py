@@ -1,17 +1,65 @@
-"""A file that a command writes is whole or absent."""
+"""Files and folders that are written are whole or absent: written beside, then renamed."""
 
 from __future__ import annotations
 
+import contextlib
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+
+import msgspec
 
 from paani.errors import UserError
 
 
 def write_whole(path: Path, data: bytes, option: str = "") -> None:
-    """Write beside the file first, then rename. Raises UserError naming the file, and the option that asked for it."""
+    """Raises UserError naming the file, and the option that asked for it."""
+    with replacement_file(path, option) as beside:
+        beside.write_bytes(data)
+
+
+def write_json(path: Path, value: object, option: str = "") -> None:
+    """Write `indented_json(value)`. Raises UserError as `write_whole`."""
+    write_whole(path, indented_json(value), option)
+
+
+def indented_json(value: object) -> bytes:
+    """JSON that people can read, with a line end; the same for the same value."""
+    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+
+
+@contextlib.contextmanager
+def replacement_file(path: Path, option: str = "") -> Iterator[Path]:
+    """A path to write to, which takes the place of `path` at the end and is removed where anything goes wrong.
+
+    Raises UserError naming the file, and the option that asked for it.
+    """
     beside = path.with_name(f".{path.name}.partial")
     try:
-        beside.write_bytes(data)
+        yield beside
         beside.replace(path)
     except OSError as error:
-        raise UserError(f"{option} {path}: {error.strerror}".strip()) from error
+        raise UserError(f"{option} {path}: {error.strerror or error}".strip()) from error
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def new_folder(path: Path, option: str = "") -> Iterator[Path]:
+    """A folder to write into, renamed to `path` at the end, removed where anything goes wrong or is interrupted.
+
+    Raises UserError where `path` exists or cannot be made.
+    """
+    if path.exists():
+        raise UserError(f"{option} {path}: already exists".strip())
+    beside = path.with_name(f".{path.name}.partial")
+    try:
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir(parents=True)
+        yield beside
+        beside.rename(path)
+    except OSError as error:
+        raise UserError(f"{option} {path}: {error.strerror or error}".strip()) from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from paani.whole_file import write_whole
 from paani_models.benchmarks.mods import Dataset
 from paani_models.detector.metrics import match_boxes
 
@@ -79,10 +80,8 @@ def build_results(name: str, dataset: Dataset, found: Mapping[tuple[int, int], t
 
 
 def write_results(path: Path, content: Results) -> None:
-    """Written beside, then renamed."""
-    beside = path.with_name(path.name + ".partial")
-    beside.write_bytes(msgspec.json.encode(content))
-    beside.replace(path)
+    """In the benchmark's form. Raises UserError naming the file."""
+    write_whole(path, msgspec.json.encode(content))
 
 
 def f_score(pairs: list[tuple[NDArray[np.float32], NDArray[np.float32]]], *, by_class: bool) -> float:

@@ -9,12 +9,10 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-import msgspec
-
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.option_paths import output_file
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_models.catalogue import read_contract, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.engines import benchmark
@@ -101,7 +99,7 @@ def bench(arguments: argparse.Namespace) -> int:
     )
     sys.stdout.write(benchmark.format_report(report))
     if arguments.json:
-        write_whole(arguments.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
+        write_json(arguments.json, report, "--json")
     return 0
 
 

@@ -12,7 +12,7 @@ import msgspec
 
 from paani.errors import UserError
 from paani.option_paths import input_file, input_folder, output_file
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_models.benchmarks.score_networks import score_lars, score_mods
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
 from paani_models.datasets.selection import PictureSelection
@@ -149,4 +149,4 @@ def score_pair(weights: Path, pictures: PictureSelection) -> ScoredPair:
 
 def write_evaluation(path: Path, evaluation: Evaluation) -> None:
     """Written beside, then renamed. Raises UserError naming a file that cannot be written."""
-    write_whole(path, msgspec.json.format(msgspec.json.encode(evaluation), indent=1) + b"\n")
+    write_json(path, evaluation)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-import msgspec
-
 from paani.errors import UserError
+from paani.whole_file import write_json
 from paani_models.catalogue import file_sha256, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
@@ -72,9 +71,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         for_size=arguments.for_size,
         verdict=verdict,
     )
-    beside = target.with_suffix(".json.partial")
-    beside.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
-    beside.replace(target.with_suffix(".json"))
+    write_json(target.with_suffix(".json"), record)
     sys.stdout.write(_format_record(record))
     return 0 if verdict.accepted else 1
 

@@ -82,9 +82,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     )
     write_evaluation(out / "evaluation.json", scored.evaluation)
     write_whole(out / EXPERIMENTS, encode_experiments(experiments))
-    beside = out / f"{PAGE}.partial"
-    beside.write_text(page(content), encoding="utf-8")
-    beside.replace(out / PAGE)
+    write_whole(out / PAGE, page(content).encode())
     sys.stdout.write(f"{out / PAGE}\n")
     return 0
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,26 +18,6 @@ from paani_models.datasets.checked_files import Box, decode_picture, raise_first
 from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture, refuse_leaks
 from paani_models.datasets.manifest import MANIFEST, Entry, SourceManifest, Split, encode_manifest
 from paani_models.datasets.sources import DETECTOR_CLASSES
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A new folder beside `out`, renamed to it at the end, removed where anything goes wrong or is interrupted.
-
-    Raises UserError where `out` exists or cannot be made.
-    """
-    if out.exists():
-        raise UserError(f"{out}: already exists")
-    beside = out.with_name(out.name + ".partial")
-    try:
-        shutil.rmtree(beside, ignore_errors=True)
-        beside.mkdir(parents=True)
-        yield beside
-        beside.rename(out)
-    except OSError as error:
-        raise UserError(f"{out}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 def link_or_copy(source: Path, target: Path) -> None:

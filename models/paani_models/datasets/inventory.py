@@ -12,6 +12,7 @@ import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.whole_file import write_json
 from paani_models.datasets.checked_files import decode_picture, raise_first_mistake, read_whole_file, sha256_hex
 from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture
 from paani_models.datasets.manifest import Entry, MaskKind, SourceManifest, load_manifest
@@ -132,9 +133,7 @@ def check_own_pictures(samples: Sequence[Sample], folder_of: FolderOf, manifest:
     seen = read_all_samples(samples, folder_of)
     sys.stdout.write(format_counts(seen))
     if manifest is not None:
-        beside = manifest.with_name(manifest.name + ".partial")
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(build_manifests(seen, folder_of)), indent=1) + b"\n")
-        beside.replace(manifest)
+        write_json(manifest, build_manifests(seen, folder_of))
     leaks = {str(leak): net for net, found in _find_leaks_by_network(seen).items() for leak in found}
     for text, net in leaks.items():
         sys.stderr.write(f"{net}: {text}\n")

@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from paani.errors import UserError
+from paani.whole_file import indented_json
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
 MANIFEST = "manifest.json"
@@ -78,7 +79,7 @@ def load_manifest(folder: Path) -> SourceManifest:
 
 def encode_manifest(value: msgspec.Struct | tuple[msgspec.Struct, ...]) -> bytes:
     """Deterministic, readable JSON."""
-    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+    return indented_json(value)
 
 
 def count_boxes(manifest: SourceManifest) -> tuple[BoxCounts, ...]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.whole_file import new_folder
 from paani_models.datasets.checked_files import (
     decode_mask,
     decode_picture,
@@ -24,7 +25,7 @@ from paani_models.datasets.checked_files import (
     read_whole_file,
     sha256_hex,
 )
-from paani_models.datasets.intake import Intake, new_folder
+from paani_models.datasets.intake import Intake
 from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture, hash_distance
 from paani_models.datasets.manifest import SourceManifest, Split
 from paani_models.datasets.sources import IGNORE

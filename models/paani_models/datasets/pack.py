@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.whole_file import write_whole
 from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.inventory import FolderOf, read_terms
 from paani_models.datasets.manifest import MANIFEST
@@ -107,7 +108,7 @@ def pack_bundle(
         }
         archive = _build_tar({**other, **listed, **encoded}, compress)
         if len(archive) <= budget:
-            _write(out, archive)
+            write_whole(out, archive)
             return PackedBundle(len(archive), len(encoded), quality)
     raise UserError(f"{out}: {len(names)} pictures do not fit into {max_mb:g} MB; choose fewer sources")
 
@@ -203,14 +204,3 @@ def _build_tar(files: dict[str, bytes], compress: bool) -> bytes:
             entry.size, entry.mode, entry.mtime = len(data), 0o644, 0
             bundle.addfile(entry, io.BytesIO(data))
     return gzip.compress(buffer.getvalue(), 6, mtime=0) if compress else buffer.getvalue()
-
-
-def _write(out: Path, archive: bytes) -> None:
-    beside = out.with_name(out.name + ".partial")
-    try:
-        beside.write_bytes(archive)
-        beside.replace(out)
-    except OSError as error:
-        raise UserError(f"{out}: {error.strerror}") from error
-    finally:
-        beside.unlink(missing_ok=True)

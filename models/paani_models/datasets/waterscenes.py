@@ -16,8 +16,9 @@ import numpy as np
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.whole_file import new_folder
 from paani_models.datasets.checked_files import Box, raise_first_mistake, read_yolo
-from paani_models.datasets.intake import Intake, new_folder
+from paani_models.datasets.intake import Intake
 from paani_models.datasets.leaks import Leak
 from paani_models.datasets.manifest import SPLITS, SourceManifest, Split
 from paani_models.datasets.sources import DETECTOR_CLASSES

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -104,8 +105,7 @@ class DetectorTraining:
             losses = {"box_loss": box_loss, "score_loss": score_loss}
             record = {"epoch": self.state.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
             append_record(self.folder / "epochs.jsonl", record)
-            ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
-            self.state.finish_epoch(self.folder, recipe, float(np.mean(ap50)) if ap50 else 0.0)
+            self.state.finish_epoch(self.folder, recipe, mean_ap50(figures))
 
     def _train_epoch(self) -> tuple[float, float]:
         recipe, state, epoch = self.recipe, self.state, self.state.epoch
@@ -134,11 +134,7 @@ class DetectorTraining:
         for slot in range(index * self.recipe.batch, (index + 1) * self.recipe.batch):
             rng = np.random.default_rng((self.recipe.seed, epoch, slot))
             examples.append(self._example(rng, order, slot, epoch))
-        return (
-            torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
-            [torch.from_numpy(e.boxes) for e in examples],
-            torch.from_numpy(np.stack([e.exhaustive_mask for e in examples])),
-        )
+        return stack_examples(examples)
 
     def _example(self, rng: np.random.Generator, order: list[int], slot: int, epoch: int) -> TrainingExample:
         if order[slot] < 0:
@@ -151,6 +147,15 @@ class DetectorTraining:
         if not late and rng.random() < self.recipe.mosaic_frac:
             chosen += [max(0, order[int(i)]) for i in rng.integers(len(order), size=3)]
         return augment_example(rng, [self.train[i] for i in chosen], SIZE_WH)
+
+
+def stack_examples(examples: Sequence[TrainingExample]) -> Batch:
+    """Network input, boxes of each picture, and where they are exhaustive."""
+    return (
+        torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
+        [torch.from_numpy(e.boxes) for e in examples],
+        torch.from_numpy(np.stack([e.exhaustive_mask for e in examples])),
+    )
 
 
 @torch.no_grad()
@@ -173,3 +178,9 @@ def figures_by_class(model: torch.nn.Module, pictures: list[BoxedPicture]) -> di
         row = class_figures([found[i] for i in chosen], [truths[i] for i in chosen], kind)
         figures[name] = {key: value if key == "n" else round(value, 4) for key, value in row.items()}
     return figures
+
+
+def mean_ap50(figures: dict[str, dict[str, float]]) -> float:
+    """Over the classes that have truths; 0 where none has."""
+    ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
+    return float(np.mean(ap50)) if ap50 else 0.0

@@ -15,8 +15,7 @@ from paani_models.detector.data import BoxedPicture, TrainingExample
 from paani_models.detector.paper_data import Augmentation, augment_paper_example
 from paani_models.detector.paper_loss import task_aligned_loss
 from paani_models.detector.paper_network import Yolo11n
-from paani_models.detector.train import figures_by_class
-from paani_models.network_input import detector_batch
+from paani_models.detector.train import Batch, figures_by_class, mean_ap50, stack_examples
 from paani_models.training.training_state import (
     Prefetch,
     TrainingState,
@@ -25,8 +24,6 @@ from paani_models.training.training_state import (
     to_device,
     training_device,
 )
-
-Batch = tuple[Tensor, list[Tensor], Tensor]
 
 
 @dataclass(frozen=True)
@@ -82,8 +79,7 @@ class Yolo11nTraining:
         while self.state.epoch < last and self._since_best() < self.recipe.patience:
             losses = self._train_epoch()
             figures = figures_by_class(self.state.average.model, self.held_out)
-            ap50 = [row["ap50"] for row in figures.values() if row["n"] > 0]
-            score = round(float(np.mean(ap50)), 4) if ap50 else 0.0
+            score = round(mean_ap50(figures), 4)
             row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
             append_record(self._records(), row)
             self.state.finish_epoch(self.folder, recipe, score)
@@ -141,11 +137,7 @@ class Yolo11nTraining:
     def _batch(self, order: list[int], index: int, seed: tuple[int, int]) -> Batch:
         slots = range(index * self.recipe.batch, (index + 1) * self.recipe.batch)
         examples = [self._example(np.random.default_rng((*seed, slot)), order, slot) for slot in slots]
-        return (
-            torch.from_numpy(detector_batch(np.stack([e.picture for e in examples]))),
-            [torch.from_numpy(e.boxes) for e in examples],
-            torch.from_numpy(np.stack([e.exhaustive_mask for e in examples])),
-        )
+        return stack_examples(examples)
 
     def _example(self, rng: np.random.Generator, order: list[int], slot: int) -> TrainingExample:
         recipe = self.recipe

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from onnx import helper, numpy_helper
 
 from paani.errors import UserError
+from paani.whole_file import indented_json, replacement_file
 from paani_models.catalogue import MANIFEST, Model, file_sha256, load_catalogue, read_contract, save_catalogue
 from paani_models.engines.contract_check import MAX_DIFFERENCE
 from paani_models.engines.ncnn_runner import Conversion, NcnnFiles, ncnn_files
@@ -51,7 +52,7 @@ def convert_to_ncnn(source: Path, role: str, folder: Path, pnnx: Path | None, in
             max_difference=diff,
             inputs=len(inputs),
         )
-        produced.record.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
+        produced.record.write_bytes(indented_json(record))
         try:
             _install_files(source, msgspec.structs.replace(contract, name=role, file=source.name), produced, folder)
         except OSError as error:
@@ -78,9 +79,8 @@ def _install_files(source: Path, entry: Model, produced: NcnnFiles, folder: Path
 
 
 def _copy_whole(have: Path, place: Path) -> None:
-    beside = place.with_name(f"{place.name}.partial")
-    shutil.copyfile(have, beside)
-    beside.replace(place)
+    with replacement_file(place) as beside:
+        shutil.copyfile(have, beside)
 
 
 def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> NcnnFiles:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from paani.errors import UserError
+from paani.whole_file import replacement_file
 from paani_models.catalogue import Model, Tensor, file_sha256, load_catalogue, save_catalogue
 from paani_models.engines.last_resize import drop_last_resize
 
@@ -32,20 +33,19 @@ def write_variant(name: str, contract: Model, net: Path, folder: Path) -> Model:
     output = _declare_cell_output(model, contract.output.shape[:2]) if cells else contract.output
     onnx.checker.check_model(model, full_check=True)
     folder.mkdir(parents=True, exist_ok=True)
-    beside = folder / f"{contract.file}.partial"
-    onnx.save(model, str(beside))
-    _, channels, height, width = contract.input.shape
-    entry = msgspec.structs.replace(
-        contract,
-        name=name,
-        sha256=file_sha256(beside),
-        size_bytes=beside.stat().st_size,
-        input=Tensor(model.graph.input[0].name, (1, height, width, channels), "uint8"),
-        output=output,
-        figures=(),
-    )
     catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
-    beside.replace(folder / contract.file)
+    _, channels, height, width = contract.input.shape
+    with replacement_file(folder / contract.file) as beside:
+        onnx.save(model, str(beside))
+        entry = msgspec.structs.replace(
+            contract,
+            name=name,
+            sha256=file_sha256(beside),
+            size_bytes=beside.stat().st_size,
+            input=Tensor(model.graph.input[0].name, (1, height, width, channels), "uint8"),
+            output=output,
+            figures=(),
+        )
     save_catalogue({**catalogue, name: entry}, folder)
     return entry
 

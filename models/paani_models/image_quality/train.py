@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from paani.arrays import U8
 from paani.errors import UserError
+from paani.whole_file import write_json
 from paani_models.catalogue import file_sha256
 from paani_models.datasets.sources import Sample
 from paani_models.engines.onnx_runner import open_network
@@ -120,9 +121,7 @@ class ImageQualityTraining:
             except msgspec.DecodeError as error:
                 raise UserError(f"{path}: {error}") from error
         found = measure_fault_levels(scenes[:: max(1, len(scenes) // MEASURED_SCENES)], segment)
-        beside = path.with_suffix(".partial")
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=1))
-        beside.replace(path)
+        write_json(path, found)
         return found
 
     def _draw_validation_examples(self, scenes: list[Scene]) -> list[FitnessExample]:

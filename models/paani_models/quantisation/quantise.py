@@ -13,6 +13,7 @@ from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, Q
 
 from paani.arrays import F32
 from paani.errors import UserError
+from paani.whole_file import replacement_file
 from paani_models.quantisation.equalisation import equalise_layers
 
 
@@ -66,7 +67,7 @@ class _CalibrationInputs(CalibrationDataReader):
 
 
 def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs: Sequence[F32]) -> None:
-    """Write `target`, beside and then by renaming.
+    """Write `target`, whole or not at all.
 
     inputs: calibration inputs as the network gets them, [1,3,H,W] each. Raises UserError naming a file that is no ONNX
     net.
@@ -79,29 +80,28 @@ def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs
         equalise_layers(model)
     model = onnx.shape_inference.infer_shapes(model)
     target.parent.mkdir(parents=True, exist_ok=True)
-    float_net, beside = target.with_suffix(".float.partial"), target.with_suffix(".partial")
+    float_net = target.with_suffix(".float.partial")
     onnx.save(model, str(float_net))
     options: dict[str, Any] = {"nodes_to_exclude": find_float_steps(model, recipe)}
     if recipe.operators:
         options["op_types_to_quantize"] = list(recipe.operators)
     logging.getLogger().setLevel(logging.ERROR)  # it recommends a pre-processing that export has done already
     try:
-        quantize_static(
-            str(float_net),
-            str(beside),
-            _CalibrationInputs(model.graph.input[0].name, inputs),
-            quant_format=QuantFormat.QDQ,
-            calibrate_method=CalibrationMethod.MinMax,
-            activation_type=QuantType.QUInt8 if recipe.unsigned_activations else QuantType.QInt8,
-            weight_type=QuantType.QInt8,
-            per_channel=recipe.per_channel,
-            **options,
-        )
-        _drop_unused_constants(beside)
-        beside.replace(target)
+        with replacement_file(target) as beside:
+            quantize_static(
+                str(float_net),
+                str(beside),
+                _CalibrationInputs(model.graph.input[0].name, inputs),
+                quant_format=QuantFormat.QDQ,
+                calibrate_method=CalibrationMethod.MinMax,
+                activation_type=QuantType.QUInt8 if recipe.unsigned_activations else QuantType.QInt8,
+                weight_type=QuantType.QInt8,
+                per_channel=recipe.per_channel,
+                **options,
+            )
+            _drop_unused_constants(beside)
     finally:
-        for left in (float_net, beside):
-            left.unlink(missing_ok=True)
+        float_net.unlink(missing_ok=True)
 
 
 def _drop_unused_constants(path: Path) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from paani.errors import UserError
+from paani.whole_file import replacement_file
 from paani_models.catalogue import (
     Model,
     Origin,
@@ -152,23 +153,23 @@ def _export_and_place(
 ) -> Model:
     contract = CONTRACTS[name]
     folder.mkdir(parents=True, exist_ok=True)
-    beside = folder / f"{contract.file}.partial"
-    write_onnx(net, contract, beside)
-    difference = largest_export_difference(net, beside, inputs)
-    if not difference <= MAX_EXPORT_DIFFERENCE:
-        beside.unlink()
-        raise UserError(f"{name}: the exported net differs by {difference:.2e}, more than {MAX_EXPORT_DIFFERENCE:.0e}")
-    model = msgspec.structs.replace(
-        contract,
-        sha256=file_sha256(beside),
-        size_bytes=beside.stat().st_size,
-        parameters=FUSED_PARAMETERS if isinstance(net, Yolo11n) else parameter_count(net),
-        export_max_abs_diff=float(f"{difference:.2e}"),
-        origins=origins,
-        seed=seed,
-    )
-    catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
-    beside.replace(folder / contract.file)
+    with replacement_file(folder / contract.file) as beside:
+        write_onnx(net, contract, beside)
+        difference = largest_export_difference(net, beside, inputs)
+        if not difference <= MAX_EXPORT_DIFFERENCE:
+            raise UserError(
+                f"{name}: the exported net differs by {difference:.2e}, more than {MAX_EXPORT_DIFFERENCE:.0e}"
+            )
+        model = msgspec.structs.replace(
+            contract,
+            sha256=file_sha256(beside),
+            size_bytes=beside.stat().st_size,
+            parameters=FUSED_PARAMETERS if isinstance(net, Yolo11n) else parameter_count(net),
+            export_max_abs_diff=float(f"{difference:.2e}"),
+            origins=origins,
+            seed=seed,
+        )
+        catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
     save_catalogue({**catalogue, name: model}, folder)
     return model
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.whole_file import indented_json
 from paani_models.catalogue import Figure, Model, Record
 from paani_models.report.requirements import RequirementResult
 
@@ -72,4 +73,4 @@ def with_present_weights(
 
 def encode_experiments(experiments: Sequence[Experiment]) -> bytes:
     """Encode the record as it is stored beside a manifest."""
-    return msgspec.json.format(msgspec.json.encode(_Record(tuple(experiments))), indent=1) + b"\n"
+    return indented_json(_Record(tuple(experiments)))

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from paani.errors import UserError
+from paani.whole_file import replacement_file
 
 Batch = TypeVar("Batch")
 
@@ -88,10 +89,9 @@ class Prefetch(Generic[Batch]):
 
 
 def save_checkpoint(path: Path, state: dict[str, Any]) -> None:
-    """Write beside, then rename: a checkpoint is whole or absent."""
-    beside = path.with_suffix(".partial")
-    torch.save(state, beside)
-    beside.replace(path)
+    """Whole or not at all. Raises UserError naming a file that cannot be written."""
+    with replacement_file(path) as beside:
+        torch.save(state, beside)
 
 
 def load_checkpoint(path: Path) -> dict[str, Any]:

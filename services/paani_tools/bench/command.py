@@ -106,8 +106,6 @@ def _judgement(options: argparse.Namespace) -> int:
 
 def _recorder(options: argparse.Namespace) -> int:
     """Drive, record, print. Exit codes as `paani up`."""
-    if options.json is not None and not options.json.absolute().parent.is_dir():
-        raise UserError(f"--json {options.json}: no such folder")
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
     part, failure = recorder(options, Display(sys.stdout))
     if failure:

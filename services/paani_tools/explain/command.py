@@ -15,6 +15,7 @@ from paani.config import CorridorConfig
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
 from paani.option_paths import input_path, output_file
+from paani.whole_file import write_whole
 from paani_tools.explain.moment import Moment, last_change_us, moment_at
 from paani_tools.explain.narrative import narrative_of
 from paani_tools.look.annotate import annotate_picture
@@ -94,9 +95,4 @@ def _write(path: Path, picture: NDArray[np.uint8]) -> None:
     if path.suffix.lower() not in {".png", ".jpg", ".jpeg"}:
         raise UserError(f"--picture {path}: expected a .png or .jpg file")
     _, data = cv2.imencode(path.suffix.lower(), picture)
-    beside = path.with_name(f".{path.name}.beside")
-    try:
-        beside.write_bytes(data.tobytes())
-        beside.replace(path)
-    except OSError as error:
-        raise UserError(f"--picture {path}: {error.strerror}") from error
+    write_whole(path, data.tobytes(), "--picture")

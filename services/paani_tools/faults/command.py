@@ -12,7 +12,7 @@ from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani.messages import UnusableCause
 from paani.option_paths import input_file, input_folder, output_file
-from paani.whole_file import write_whole
+from paani.whole_file import indented_json, write_whole
 from paani_services.perception.corridors import classify_cells
 from paani_services.perception.engine import engine_class
 from paani_services.perception.fitness import load_fitness
@@ -90,9 +90,9 @@ def main(argv: list[str]) -> int:
     sys.stderr.write("\r" + " " * 40 + "\r")
     report = FaultReport(sum_up(cells, clean), tuple(cells), clean, measure_clean("without_water", dry, models.judge))
     sys.stdout.write(format_table(report))
-    for path, text in ((options.json, _encode_report(report)), (options.svg, draw_severity_curves(cells))):
+    for path, data in ((options.json, indented_json(report)), (options.svg, draw_severity_curves(cells).encode())):
         if path is not None:
-            write_whole(path, text.encode())
+            write_whole(path, data)
     return 0
 
 
@@ -120,7 +120,3 @@ def _read_list(option: str, path: Path) -> frozenset[str]:
         return frozenset(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{option} {path}: {error}") from error
-
-
-def _encode_report(report: FaultReport) -> str:
-    return msgspec.json.format(msgspec.json.encode(report), indent=1).decode() + "\n"

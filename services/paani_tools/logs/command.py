@@ -12,7 +12,7 @@ from paani.errors import UserError
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
-from paani.option_paths import input_path, output_file, output_folder
+from paani.option_paths import input_folder, input_path, output_file, output_folder
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
 from paani_tools.logs.info import info_of, info_text, list_text
 from paani_tools.progress import Progress
@@ -71,8 +71,6 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _list(folder: Path) -> int:
-    if not folder.is_dir():
-        raise UserError(f"{folder}: no such folder")
     if not recordings(folder):
         raise UserError(f"{folder}: no recordings in this folder")
     sys.stdout.write(list_text(folder))
@@ -109,5 +107,5 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--geojson", type=output_file("--geojson"), metavar="FILE", help="the track, for maps")
     export.add_argument("--gpx", type=output_file("--gpx"), metavar="FILE", help="the track, for chart plotters")
     listing = commands.add_parser("list", help="the recordings of a folder")
-    listing.add_argument("path", type=input_path(), metavar="DIR")
+    listing.add_argument("path", type=input_folder(), metavar="DIR")
     return parser

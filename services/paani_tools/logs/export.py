@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import datetime
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ from paani.errors import UserError
 from paani.logs.reader import Log, Record
 from paani.logs.schema import json_schema
 from paani.logs.writer import HEADER
+from paani.whole_file import new_folder, write_whole
 
 EVERY_US = 1_000_000  # a map needs no more points
 ESTIMATE, GPS = "estimate", "gps"
@@ -60,30 +60,18 @@ def export_csv(log: Log, folder: Path, seen: OnRecord) -> str:
 
     Raises UserError when the folder is there already or cannot be written; nothing half-written is left.
     """
-    _require_new(folder)
-    beside = folder.with_name(f".{folder.name}.beside")
-    shutil.rmtree(beside, ignore_errors=True)
     names = {topic.name + HEADER if topic.stance is keys.Stance.PICTURE else topic.name: topic for topic in _topics()}
     tables: dict[str, Table] = {}
     rows = left_out = 0
-    try:
-        beside.mkdir()
+    with new_folder(folder, "--csv") as beside, contextlib.ExitStack() as closing:
         for record in log.records(names):
             seen(record)
             if record.topic not in tables:
                 name = record.topic.removesuffix(HEADER).replace("/", "_").removeprefix("@")
-                tables[record.topic] = Table(beside / f"{name}.csv", names[record.topic])
+                table = Table(beside / f"{name}.csv", names[record.topic])
+                tables[record.topic] = closing.enter_context(contextlib.closing(table))
             written = tables[record.topic].add(record)
             rows, left_out = rows + written, left_out + (not written)
-        for table in tables.values():
-            table.close()
-        beside.rename(folder)
-    except OSError as error:
-        raise UserError(f"--csv {folder}: {error.strerror}") from error
-    finally:
-        for table in tables.values():
-            table.close()
-        shutil.rmtree(beside, ignore_errors=True)
     return f"{folder}: {len(tables)} tables, {rows} rows" + (f"; {left_out} messages are no JSON" if left_out else "")
 
 
@@ -155,22 +143,13 @@ def _place(record: Record) -> Point | None:
 
 
 def _write(option: str, path: Path, data: bytes, tracks: dict[str, list[Point]]) -> str:
-    beside = path.with_name(f".{path.name}.beside")
-    try:
-        beside.write_bytes(data)
-        beside.rename(path)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise UserError(f"{option} {path}: {error.strerror}") from error
+    write_whole(path, data, option)
     return f"{path}: " + ", ".join(f"{name} {len(points)} points" for name, points in tracks.items())
 
 
 def _require_new(path: Path) -> None:
     if path.exists():
-        raise UserError(f"{path}: exists already")
-    if not path.absolute().parent.is_dir():
-        raise UserError(f"{path}: no such folder as {path.absolute().parent}")
+        raise UserError(f"{path}: already exists")
 
 
 def _topics() -> tuple[keys.Topic[Any], ...]:

@@ -9,15 +9,12 @@ import math
 import signal
 import sys
 import tempfile
-from pathlib import Path
-
-import msgspec
 
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
 from paani.option_paths import input_path, output_file
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_tools.progress import Progress
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.report_text import change_text, check_text
@@ -43,13 +40,8 @@ def main(argv: list[str]) -> int:
         report = check_log(log, provenance.config, provenance.notes)
         sys.stdout.write(check_text(report))
     if options.json is not None:
-        write_json(options.json, report)
+        write_json(options.json, report, "--json")
     return 1 if isinstance(report, CheckReport) and not report.is_exact else 0
-
-
-def write_json(path: Path, report: msgspec.Struct) -> None:
-    """Beside the file first, then renamed. Raises UserError."""
-    write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--json")
 
 
 def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Text
 from paani.option_paths import input_path, output_file
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.verdict import PRESENTATION_US, PRESENTATIONS, Verdict
 from paani_tools.progress import Progress
@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
         if report.skipped:
             text += f"{len(report.skipped)} of {len(report.skipped) + len(report.rows) - 1} pictures skipped\n"
     if options.json is not None:
-        write_whole(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
+        write_json(options.json, report, "--json")
     sys.stdout.write(text)
     return 0
 

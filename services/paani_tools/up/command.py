@@ -8,11 +8,9 @@ import json
 import sys
 from pathlib import Path
 
-import msgspec
-
 from paani.cli import add_config_arguments, config_from
 from paani.option_paths import input_file, output_file, output_folder
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import Report
@@ -25,16 +23,11 @@ def main(argv: list[str]) -> int:
     outcome = asyncio.run(_up(options))
     sys.stdout.write(_result(outcome.report))
     if options.summary is not None:
-        write_report(options.summary, outcome.report)
+        write_json(options.summary, outcome.report, "--summary")
     if outcome.failure:
         sys.stderr.write(f"paani: {outcome.failure}\n")
         return 1
     return 0
-
-
-def write_report(path: Path, report: Report) -> None:
-    """Beside the file first, then renamed. Raises UserError."""
-    write_whole(path, msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n", "--summary")
 
 
 def up_sets(

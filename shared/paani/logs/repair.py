@@ -37,6 +37,7 @@ from mcap.records import (
 from paani.errors import UserError
 from paani.logs.layout import MAGIC, PROFILE
 from paani.logs.scan import HEAD, Damage, Data, ScannedRecord, content, records_in, scan, stream_of, unpacked
+from paani.whole_file import replacement_file
 
 FOOTER_BYTES = HEAD.size + 20
 _MESSAGE = struct.Struct("<HIQQ")
@@ -103,8 +104,8 @@ def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaire
         return Repaired(path=path, changed=False)
     _require_ours(path, data, pieces)
     lost = tuple(f"bytes {d.start} to {d.end}: {d.cause}" for d in damage)
-    beside = path.with_name(f".{path.name}.repairing")
-    try:
+    original = None
+    with replacement_file(path) as beside:
         with beside.open("wb") as file:
             found = [piece for piece in pieces if isinstance(piece, ScannedRecord)]
             mended = Mended(file, data, found)
@@ -115,13 +116,9 @@ def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaire
             mended.finish(lost)
             file.flush()
             os.fsync(file.fileno())
-        original = None
         if any(d.end < len(data) for d in damage):
             original = path.with_name(path.name + ".damaged")
             _keep(path, original)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
     return Repaired(path=path, changed=True, messages=mended.messages, lost=lost, original=original)
 
 

@@ -8,12 +8,11 @@ import signal
 import sys
 from pathlib import Path
 
-import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
 from paani.option_paths import output_file, output_folder
-from paani.whole_file import write_whole
+from paani.whole_file import indented_json, write_json
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.policies import Policy, load_policy_config
@@ -74,7 +73,7 @@ def _run_suite(options: argparse.Namespace) -> int:
     summary = summarise_suite(options.suite, results)
     sys.stdout.write(format_summary(summary))
     if options.json:
-        write_whole(options.json, msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n", "--json")
+        write_json(options.json, summary, "--json")
     if options.report and not code:
         from paani_sim.trials.report import write_report  # noqa: PLC0415
 
@@ -92,11 +91,10 @@ def _run_one(options: argparse.Namespace) -> int:
             result, effort = run_trial(case, options.sets, threads=True, tap=recorder.record_message)
     else:
         result, effort = run_trial(case, options.sets, threads=True)
-    data = msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n"
     if options.json:
-        write_whole(options.json, data, "--json")
+        write_json(options.json, result, "--json")
     else:
-        sys.stdout.write(data.decode())
+        sys.stdout.write(indented_json(result).decode())
     sys.stderr.write(
         f"{case.name}: {result.why.value}, {result.collisions} contacts, {result.near_misses} near misses, "
         f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "

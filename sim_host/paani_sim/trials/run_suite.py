@@ -14,7 +14,7 @@ import cv2
 import msgspec
 
 from paani.errors import UserError
-from paani.whole_file import write_whole
+from paani.whole_file import indented_json, write_whole
 from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_trial import run_trial
@@ -123,7 +123,7 @@ def read_stored_result(path: Path) -> StoredResult | None:
 
 def encode_stored_result(record: StoredResult) -> bytes:
     """Bytes of a result file."""
-    return msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n"
+    return indented_json(record)
 
 
 def _run_and_store(

@@ -8,6 +8,7 @@ import cv2
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
@@ -60,7 +61,6 @@ def _render(options: argparse.Namespace) -> int:
     out: Path = options.out
     if out.suffix.lower() != ".png":
         raise UserError(f"--out {out}: must end in .png")
-    _require_folder(out)
     picture = None
     with tqdm(total=VIEWS, unit="view", desc=str(options.scenario), disable=None) as progress:
         for picture in render_sheet(load_scenario(options.scenario), *options.size):
@@ -74,7 +74,6 @@ def _mjcf(options: argparse.Namespace) -> int:
     from paani_sim.vessels import load_vessel  # noqa: PLC0415
     from paani_sim.worlds.spec import build_spec  # noqa: PLC0415  the rest needs no MuJoCo
 
-    _require_folder(options.out)
     scenario = load_scenario(options.scenario)
     spec = build_spec(scenario.world, load_vessel(scenario.vessel), visual=True)
     spec.compile()
@@ -85,16 +84,10 @@ def _mjcf(options: argparse.Namespace) -> int:
 def _dataset(options: argparse.Namespace) -> int:
     from paani_sim.worlds.dataset import write_dataset  # noqa: PLC0415  the rest needs no OpenGL
 
-    _require_folder(options.out)
     manifest = write_dataset(options.out, options.n, options.seed, options.worlds)
     boxes = ", ".join(f"{number} {name}" for name, number in manifest.boxes.items())
     sys.stdout.write(f"{options.out}: {manifest.images} pictures, boxes: {boxes}\n")
     return 0
-
-
-def _require_folder(out: Path) -> None:
-    if not out.absolute().parent.is_dir():
-        raise UserError(f"--out {out}: no such folder")
 
 
 def size(text: str) -> tuple[int, int]:
@@ -135,12 +128,12 @@ def _parser() -> argparse.ArgumentParser:
     mjcf = commands.add_parser("mjcf", help="the MuJoCo model of boat and solids, as XML")
     for command, run in ((render, _render), (mjcf, _mjcf)):
         command.add_argument("scenario", help="name or TOML file")
-        command.add_argument("--out", type=Path, required=True, metavar="FILE")
+        command.add_argument("--out", type=output_file("--out"), required=True, metavar="FILE")
         command.set_defaults(run=run)
     dataset = commands.add_parser("dataset", help="labelled pictures for training")
     dataset.add_argument("--n", type=count, required=True, help="how many pictures")
     dataset.add_argument("--seed", type=seed, default=0)
-    dataset.add_argument("--out", type=Path, required=True, metavar="DIR")
+    dataset.add_argument("--out", type=output_folder("--out"), required=True, metavar="DIR")
     dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
     dataset.set_defaults(run=_dataset)
     return parser

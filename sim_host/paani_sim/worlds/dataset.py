@@ -6,7 +6,6 @@ order, C2) and `manifest.json`. The same arguments give the same files.
 """
 
 import dataclasses
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from tqdm import tqdm
 
 from paani.arrays import U8
 from paani.errors import UserError
+from paani.whole_file import indented_json, new_folder
 from paani_sim.eye.camera import Camera
 from paani_sim.eye.labels import CLASSES, Labelled, select_visible_boxes
 from paani_sim.eye.renderer import Eye
@@ -77,16 +77,18 @@ def write_dataset(
     Some are flatter than `height_px`. Written beside and renamed when complete. Raises `UserError` for a folder that
     exists, an unknown world or missing OpenGL.
     """
-    if out.exists():
-        raise UserError(f"dataset: {out} already exists")
     places = [load_world(name) for name in worlds]
-    beside = out.with_name(out.name + ".part")
-    shutil.rmtree(beside, ignore_errors=True)
-    for folder in ("images", "masks", "labels"):
-        (beside / folder).mkdir(parents=True)
+    with new_folder(out, "--out") as beside:
+        for folder in ("images", "masks", "labels"):
+            (beside / folder).mkdir()
+        return _draw_pictures(beside, n, seed, places, (width_px, height_px))
+
+
+def _draw_pictures(folder: Path, n: int, seed: int, places: Sequence[World], size_px: tuple[int, int]) -> Manifest:
+    width_px, height_px = size_px
     items: list[Item] = []
     boxes = dict.fromkeys((str(kind) for kind in CLASSES), 0)
-    with tqdm(total=n, unit="picture", desc=out.name) as progress:
+    with tqdm(total=n, unit="picture", desc="pictures") as progress:
         session = 0
         while len(items) < n:
             rng = np.random.default_rng([seed, session])
@@ -96,7 +98,7 @@ def write_dataset(
             with Eye(world, Camera(width_px=width_px, height_px=height), supersample=2) as eye:
                 for k in range(min(PICTURES_PER_SESSION, n - len(items))):
                     view = _render_picture(eye, k, rng)
-                    items.append(_write_picture(beside, seq, k, view, rng))
+                    items.append(_write_picture(folder, seq, k, view, rng))
                     for box in view.boxes:
                         boxes[str(box.kind)] += 1
                     progress.update()
@@ -108,9 +110,7 @@ def write_dataset(
         boxes=boxes,
         items=tuple(items),
     )
-    text = msgspec.json.format(msgspec.json.encode(manifest), indent=1)
-    (beside / "manifest.json").write_bytes(text)
-    beside.rename(out)
+    (folder / "manifest.json").write_bytes(indented_json(manifest))
     return manifest
 
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from paani.errors import UserError
+from paani.whole_file import indented_json
 from paani_services.navigator.files.bounded_reading import one_line, read_bytes
 from paani_services.navigator.files.map_frame import FilePoint, LatLon
 from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine, clean_name
@@ -65,7 +66,7 @@ def encode_geojson(line: RouteLine, lat_lon_deg: tuple[LatLon, ...]) -> bytes:
         "properties": {"name": line.name, "repeat": line.repeat},
         "geometry": {"type": "LineString", "coordinates": positions},
     }
-    return msgspec.json.format(msgspec.json.encode(feature), indent=1) + b"\n"
+    return indented_json(feature)
 
 
 def read_geometries(path: Path, where: str) -> list[Geometry]:

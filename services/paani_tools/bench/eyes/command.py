@@ -17,7 +17,7 @@ from paani.clock import stopwatch_ms
 from paani.config import Config, PerceptionConfig
 from paani.errors import UserError
 from paani.option_paths import input_folder, output_file
-from paani.whole_file import write_whole
+from paani.whole_file import write_json
 from paani_models.catalogue import verified_path
 from paani_services.perception.picture_decoding import decode_picture
 from paani_tools.bench.eyes.drawn_scene import SIZE_WH, draw_scene
@@ -102,7 +102,7 @@ def main(argv: list[str]) -> int:
     )
     sys.stdout.write(text(report))
     if options.json:
-        write_whole(options.json, msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n", "--json")
+        write_json(options.json, report, "--json")
     return 0
 
 
