@@ -11,9 +11,10 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from paani import keys
 from paani import messages as m
+from paani.board_status import STATUS_PATH
 from paani.bus import Picture
 from paani.clock import Clock
-from paani.config import DashboardConfig
+from paani.config import Config, DashboardConfig
 from paani.errors import UserError
 from paani_services.dashboard.console import Console
 from paani_services.dashboard.hub import Client, Event, Hub
@@ -28,6 +29,7 @@ from paani_services.dashboard.requests import (
     is_own_host,
     is_same_origin,
 )
+from paani_services.dashboard.status import board_status
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
 MAX_CLIENTS = 16
@@ -50,12 +52,13 @@ class Server:
         console: Console,
         tuner: Tuner,
         clock: Clock,
-        config: DashboardConfig,
+        config: Config,
         pages: dict[str, StaticFile],
         token: str,
     ) -> None:
         self._hub, self._console, self._tuner = hub, console, tuner
-        self._clock, self._config, self._pages, self._token = clock, config, pages, token
+        self._clock, self._profile, self._config = clock, config.profile, config.dashboard
+        self._pages, self._token = pages, token
 
     def app(self) -> web.Application:
         app = web.Application(middlewares=[self._guard], client_max_size=MAX_BODY_BYTES)
@@ -67,6 +70,7 @@ class Server:
                 web.get("/snapshot.jpg", self._snapshot),
                 web.get("/healthz", self._healthz),
                 web.get("/api/topics", self._topics),
+                web.get(STATUS_PATH, self._status),
                 web.post(STOP_PATH, self._stop),
                 web.post("/api/arm", self._arm),
                 web.get("/api/tune", self._tuning),
@@ -179,6 +183,10 @@ class Server:
     async def _topics(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
         return json_response([topic_row(topic) for topic in keys.TOPICS])
+
+    async def _status(self, request: web.Request) -> web.Response:
+        decode_query(dict(request.query), NoQuery)
+        return json_response(board_status(self._hub, self._profile, self._clock.now_us()))
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):

@@ -65,7 +65,7 @@ async def web_server(hub: Hub, console: Console, tuner: Tuner, clock: Clock, con
     """Run the web server while the context lasts."""
     token = secrets.token_urlsafe(24)
     pages = await asyncio.to_thread(load_static_files, token)
-    server = Server(hub, console, tuner, clock, config.dashboard, pages, token)
+    server = Server(hub, console, tuner, clock, config, pages, token)
     runner = await start_server(server.app(), config.dashboard)
     try:
         yield

@@ -36,13 +36,17 @@ SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
 class Segmentation(NamedTuple):
-    """Class mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), what follows from it, its source, and the time spent."""
+    """Class mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), what follows from it, its source, and the time spent.
+
+    `run_ms`: the part of `duration_ms` that the network itself took; 0 where there is none.
+    """
 
     mask: U8
     water_edge: tuple[float, ...]
     corridors: CorridorEvidence
     source: SegmentationSource
     duration_ms: float
+    run_ms: float
 
 
 class Perceiver:
@@ -109,6 +113,7 @@ class Perceiver:
             timing,
             detector_ms=detector_ms,
             segmenter_ms=segmentation.duration_ms,
+            segmenter_run_ms=segmentation.run_ms,
             inference_ms=self._stopwatch_ms() - checked_ms,
         )
         evidence = self._build_evidence(header, bgr, cause, detections, segmentation, timing, start_ms)
@@ -159,7 +164,7 @@ class Perceiver:
     def _segment(self, bgr: U8, roll_rad: float) -> Segmentation:
         """The segmenter's mask; a mask by colour where there is no segmenter or its scores are not finite."""
         start_ms = self._stopwatch_ms()
-        source, (mask, confidence) = SegmentationSource.LEARNED, self._segment_by_network(bgr)
+        source, (mask, confidence, run_ms) = SegmentationSource.LEARNED, self._segment_by_network(bgr)
         if not np.isfinite(confidence).all():
             source, mask = SegmentationSource.FALLBACK, segment_by_colour(bgr)
             confidence = np.full(mask.shape, FALLBACK_CONFIDENCE, np.float32)
@@ -170,17 +175,20 @@ class Perceiver:
             levelled.mask, levelled.confidence, self._config.corridors, levelled.visible_frac
         )
         return Segmentation(
-            mask, find_water_edge(mask, visible_frac), corridors, source, self._stopwatch_ms() - start_ms
+            mask, find_water_edge(mask, visible_frac), corridors, source, self._stopwatch_ms() - start_ms, run_ms
         )
 
-    def _segment_by_network(self, bgr: U8) -> tuple[U8, F32]:
-        """Mask and confidence; a confidence that is not finite where there is no segmenter."""
+    def _segment_by_network(self, bgr: U8) -> tuple[U8, F32, float]:
+        """Mask, confidence, and how long the network ran [ms]; a confidence that is not finite without a segmenter."""
         if self._segmenter is None:
-            return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32)
+            return np.empty((0, 0), np.uint8), np.full(1, np.nan, np.float32), 0.0
         height, width = self._segmenter.contract.size_hw
-        logits = self._segmenter.run(stretch_picture(bgr, height, width, self._tables[1]))
+        tensor = stretch_picture(bgr, height, width, self._tables[1])
+        start_ms = self._stopwatch_ms()
+        logits = self._segmenter.run(tensor)
+        run_ms = self._stopwatch_ms() - start_ms
         rows = self._segmenter.contract.class_rows(SEGMENTER_CLASSES)
-        return classify_cells(logits if rows is None else logits[:, rows], self._config.temperature)
+        return *classify_cells(logits if rows is None else logits[:, rows], self._config.temperature), run_ms
 
     def _build_evidence(
         self,

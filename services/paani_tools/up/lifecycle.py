@@ -7,7 +7,7 @@ import contextlib
 import functools
 import math
 import signal
-from collections.abc import Coroutine, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,9 +36,12 @@ class Outcome(NamedTuple):
     failure: str
 
 
-async def run_plan(plan: Plan, seconds: float | None, display: Display) -> Outcome:
+async def run_plan(
+    plan: Plan, seconds: float | None, display: Display, during: Callable[[], Awaitable[None]] | None = None
+) -> Outcome:
     """Run the plan for `seconds` after every service is alive (None: until a signal), then stop everything.
 
+    during: awaited instead of the seconds; cancelled by a signal or a service that cannot be kept alive.
     Raises UserError when a service ends with a user's mistake; nothing is left running in any case.
     """
     clock, summary = WallClock(), Summary()
@@ -52,8 +55,12 @@ async def run_plan(plan: Plan, seconds: float | None, display: Display) -> Outco
     for number in signals:
         loop.add_signal_handler(number, told_to_stop.set)
     failure = ""
+
+    async def sleep() -> None:
+        await asyncio.sleep(math.inf if seconds is None else seconds)
+
     try:
-        await _run_until(told_to_stop, _run(plan, supervisor, summary, clock, seconds, display))
+        await _run_until(told_to_stop, _run(plan, supervisor, summary, clock, display, during or sleep))
     except ServiceFailed as error:
         failure = str(error)
     finally:
@@ -67,7 +74,12 @@ async def run_plan(plan: Plan, seconds: float | None, display: Display) -> Outco
 
 
 async def _run(
-    plan: Plan, supervisor: Supervisor, summary: Summary, clock: Clock, seconds: float | None, display: Display
+    plan: Plan,
+    supervisor: Supervisor,
+    summary: Summary,
+    clock: Clock,
+    display: Display,
+    during: Callable[[], Awaitable[None]],
 ) -> None:
     bus = collector = None
     try:
@@ -89,7 +101,7 @@ async def _run(
             summary.begin(clock.now_us())
             if plan.config.dashboard.serve:
                 display.print_line(f"open http://{plan.config.dashboard.host}:{plan.config.dashboard.port}")
-            await asyncio.sleep(math.inf if seconds is None else seconds)
+            await during()
             for task in tasks:
                 task.cancel()
     except BaseExceptionGroup as group_error:

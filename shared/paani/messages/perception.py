@@ -64,7 +64,8 @@ class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
 class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
     """Wall time of each step for one picture.
 
-    `frame_age_ms`: age of the picture when inference starts. `gate_ms`: time of the image-quality check.
+    `frame_age_ms`: age of the picture when inference starts. `gate_ms`: time of the image-quality check. `detector_ms`
+    and `segmenter_ms` include preprocessing and decoding; `segmenter_run_ms` is the segmenter's network alone (V18).
     """
 
     frame_age_ms: NonNegative = 0.0
@@ -72,6 +73,7 @@ class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):
     gate_ms: NonNegative = 0.0
     detector_ms: NonNegative = 0.0
     segmenter_ms: NonNegative = 0.0
+    segmenter_run_ms: NonNegative = 0.0
     inference_ms: NonNegative = 0.0
     total_ms: NonNegative = 0.0
 

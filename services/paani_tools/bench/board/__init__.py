@@ -1,0 +1,1 @@
+"""`paani bench board`: the paper's five-minute protocol, on whatever machine it runs on."""

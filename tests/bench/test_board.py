@@ -1,0 +1,123 @@
+"""`paani bench board` on a real run: every row is measured here, or says why it is not."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from paani import keys
+from paani.cli import main as paani
+from paani.clock import stopwatch_ms
+from paani.config import Config
+from paani.logs.reader import open_log
+from paani_tools.bench.board.host_counters import HostCounters
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
+
+ROWS_NOT_EVERYWHERE = {
+    "memory of the control group median [MiB]": "memory",
+    "temperature median / max [C]": "temperature",
+    "OOM kills": "oom_kills",
+    "CPU quota throttling": "throttling",
+}
+
+
+def bench(private_sets: tuple[str, ...], *words: str) -> list[str]:
+    sets = [word for setting in private_sets for word in ("--set", setting)]
+    return [sys.executable, "-m", "paani", "bench", "board", *words, *sets]
+
+
+def test_twelve_polls_of_the_papers_loop(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    """U6, U10, V17-V22: the instrument, on this machine; 12 polls at 0.5 Hz meet 6 or 7 distinct results."""
+    folder = tmp_path / "kept"
+    result = subprocess.run(
+        bench(private_sets, "--polls", "12", "--profile", "paper", "--out", str(folder)),
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    record = json.loads((folder / "board.json").read_text())
+    run, figures = record["run"], record["run"]["figures"]
+    assert len(record["polls"]) == figures["polls"] == figures["answered"] == figures["learned"] == 12
+    assert 5 <= figures["distinct_results"] <= 7
+    assert figures["cadence_hz"] == pytest.approx(0.5, abs=0.1)
+    assert figures["captured_hz"] == pytest.approx(0.5, abs=0.1)
+    assert figures["stale"] == 0
+    assert run["profile"] == "paper"
+    for name in ("pipeline_ms", "detector_ms", "segmenter_run_ms", "frame_age_s"):
+        assert 0 < figures[name]["median"] <= figures[name]["p95"] <= figures[name]["maximum"]
+    assert figures["segmenter_run_ms"]["median"] < figures["segmenter_ms"]["median"]
+    assert figures["frame_age_s"]["median"] * 1e3 > figures["pipeline_ms"]["median"]
+    assert 0 < figures["cpu_percent"]["median"] <= 100
+    assert run["absent"] == HostCounters().absent
+    lines = {line.split("  ")[0]: line for line in result.stdout.splitlines()}
+    for name, key in ROWS_NOT_EVERYWHERE.items():
+        assert (run["absent"].get(key) or "") in lines[name]
+    assert {"467.842", "254.408", "165.593", "0.500", "2.58", "0.6838", "46.32", "1665.7", "45.3"} <= set(
+        result.stdout.split()
+    )
+    assert "measured on" in result.stdout
+    assert open_log(folder).topics[keys.EVIDENCE.name] >= 5
+
+
+def test_a_loop_on_pictures_needs_no_simulator_can_be_attached_to_and_keeps_what_an_interrupt_leaves(
+    tmp_path: Path, private_sets: tuple[str, ...]
+) -> None:
+    folder, out = tmp_path / "kept", tmp_path / "err.txt"
+    pictures = Path(__file__).parents[2] / "examples" / "pictures"
+    with out.open("w") as errors:
+        words = bench(private_sets, "--polls", "600", "--camera", str(pictures), "--out", str(folder))
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=errors, text=True)
+    deadline_ms = stopwatch_ms() + 90e3
+    while "open http" not in out.read_text():
+        assert process.poll() is None and stopwatch_ms() < deadline_ms, out.read_text()  # noqa: PT018
+        threading.Event().wait(0.1)
+    assert "plant" not in out.read_text()
+    attached = tmp_path / "attached"
+    port = next(setting.partition("=")[2] for setting in private_sets if setting.startswith("dashboard.port"))
+    words = ["--attach", f"http://127.0.0.1:{port}", "--cgroup-of", str(process.pid), "--polls", "3"]
+    assert paani(["bench", "board", *words, "--out", str(attached)]) == 0
+    run = json.loads((attached / "board.json").read_text())["run"]
+    assert (run["profile"], run["figures"]["answered"]) == ("paani", 3)
+    assert "Attached to" in run["conditions"][0]
+    process.send_signal(signal.SIGINT)
+    printed, _ = process.communicate(timeout=30)
+    assert process.returncode == 1, out.read_text()
+    made = json.loads((folder / "board.json").read_text())["run"]["figures"]["polls"]
+    assert 1 <= made < 30
+    assert f"interrupted after {made} of 600 polls" in out.read_text()
+    assert "600 were wanted" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (("--polls", "0"), "--polls"),
+        (("--attach", "ftp://x"), "--attach"),
+        (("--attach", "http://127.0.0.1:1", "--camera", "sim"), "--attach"),
+        (("--cgroup-of", "1"), "--cgroup-of"),
+        (("--attach", "http://127.0.0.1:1", "--cgroup-of", "0"), "--cgroup-of"),
+    ],
+)
+def test_a_mistake_is_told_before_anything_starts(
+    words: tuple[str, ...], field: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = 0
+    try:
+        code = paani(["bench", "board", *words])
+    except SystemExit as exit_:
+        code = int(str(exit_.code))
+    assert code == 2
+    assert field in capsys.readouterr().err
+
+
+def test_a_folder_that_keeps_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "board.json").write_text("{}")
+    assert paani(["bench", "board", "--out", str(tmp_path)]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert Config().dashboard.arm_at_start is False
