@@ -35,7 +35,7 @@ def _row(topic: keys.Topic[Any]) -> tuple[str, ...]:
     return (
         f"`{topic.name}`",
         f"[{kind}](messages.md#{kind.lower()})",
-        topic.producer,
+        keys.producers_text(topic),
         f"{topic.rate_hz:g}",
         f"{topic.fresh_s:g}",
         str(topic.stance),

@@ -6,6 +6,7 @@ generated from it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
@@ -14,6 +15,18 @@ import msgspec
 from paani import messages as m
 
 T = TypeVar("T", bound=m.Message)
+
+
+class Graph(StrEnum):
+    """Which processes may exist together, and what their thrust moves.
+
+    SIMULATION: a simulated boat, whose plant applies the thrust. HIL (hardware in the loop): the same boat, driven by
+    the PWM of an emulated microcontroller alone. HULL: a real boat; no simulator.
+    """
+
+    SIMULATION = "simulation"
+    HIL = "hil"
+    HULL = "hull"
 
 
 class Stance(StrEnum):
@@ -30,7 +43,10 @@ class Stance(StrEnum):
 
 
 class Topic(msgspec.Struct, Generic[T], frozen=True, kw_only=True):
-    """A row of the table. `name` is the key below `paani/<domain>/<vessel>/`."""
+    """A row of the table. `name` is the key below `paani/<domain>/<vessel>/`.
+
+    `producer` writes it in a simulation; `topic_in` gives the row of another graph. Without one, nobody may.
+    """
 
     name: str
     type: type[T]
@@ -115,14 +131,14 @@ SHADOW = Topic(
 )
 SIM_TIME = Topic(
     name="plant/clock", type=m.SimTime, producer="plant", rate_hz=20.0, fresh_s=0.5,
-    stance=Stance.STATE, summary="simulated time and the stamp that commands echo",
+    stance=Stance.STATE, summary="the plant's time and the stamp that commands echo",
 )
 GPS = Topic(
-    name="plant/gps", type=m.GpsFix, producer="plant", rate_hz=5.0, fresh_s=1.0,
+    name="sensors/gps", type=m.GpsFix, producer="plant", rate_hz=5.0, fresh_s=1.0,
     stance=Stance.STATE, summary="position with time-correlated error",
 )
 IMU = Topic(
-    name="plant/imu", type=m.ImuSample, producer="plant", rate_hz=100.0, fresh_s=0.2,
+    name="sensors/imu", type=m.ImuSample, producer="plant", rate_hz=100.0, fresh_s=0.2,
     stance=Stance.EVENT, summary="body rates, specific force, compass",
 )
 THRUST_APPLIED = Topic(
@@ -154,21 +170,76 @@ TOPICS: tuple[Topic[Any], ...] = (
 )
 # fmt: on
 
+NOBODY = ""
+# Who writes a topic in a graph where it is not the producer of its row.
+PRODUCERS: Mapping[Graph, Mapping[str, str]] = {
+    Graph.SIMULATION: {},
+    Graph.HIL: {SIM_TIME.name: "thrusters", THRUST_APPLIED.name: "thrusters"},
+    Graph.HULL: {
+        SIM_TIME.name: "thrusters",
+        THRUST_APPLIED.name: "thrusters",
+        GPS.name: "sensors",
+        IMU.name: "sensors",
+        RENDERED.name: NOBODY,
+        TRUE_POSE.name: NOBODY,
+    },
+}
+
 SERVICES = (
     "router",
     "recorder",
     "plant",
     "eye",
+    "sensors",
     "camera",
     "perception",
     "advisor",
     "navigator",
     "controller",
     "localization",
+    "thrusters",
+    "bridge",
     "dashboard",
 )
-BOARD_SERVICES = ("camera", "perception", "advisor", "navigator", "controller")
+# Processes that have no place in a graph: no credential there, and no rights.
+ABSENT: Mapping[Graph, frozenset[str]] = {
+    Graph.SIMULATION: frozenset({"thrusters", "sensors"}),
+    Graph.HIL: frozenset({"sensors"}),
+    Graph.HULL: frozenset({"plant", "eye"}),
+}
+BOARD_SERVICES = (
+    "sensors", "camera", "perception", "advisor", "navigator", "controller", "thrusters", "bridge",
+)  # fmt: skip
 VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")
+
+
+def services_in(graph: Graph) -> tuple[str, ...]:
+    """Processes that have a place in this graph, in the order they start."""
+    return tuple(name for name in SERVICES if name not in ABSENT[graph])
+
+
+def topic_in(topic: Topic[T], graph: Graph) -> Topic[T]:
+    """The row of a topic in this graph: its producer is who may write it there, or `NOBODY`."""
+    producer = PRODUCERS[graph].get(topic.name, topic.producer)
+    if producer in ABSENT[graph]:
+        producer = NOBODY
+    return topic if producer == topic.producer else msgspec.structs.replace(topic, producer=producer)
+
+
+def topics_in(graph: Graph) -> tuple[Topic[Any], ...]:
+    """The rows that somebody writes in this graph."""
+    rows = (topic_in(topic, graph) for topic in TOPICS)
+    return tuple(row for row in rows if row.producer != NOBODY)
+
+
+def producers_text(topic: Topic[Any]) -> str:
+    """Who writes a topic, and who does in the graphs where it is another."""
+    others: dict[str, list[str]] = {}
+    for graph in Graph:
+        if (producer := topic_in(topic, graph).producer) != topic.producer:
+            others.setdefault(producer or "nobody", []).append(graph.value)
+    words = [f"{', '.join(graphs)}: {producer}" for producer, graphs in others.items()]
+    return f"{topic.producer} ({'; '.join(words)})" if words else topic.producer
 
 
 def pulse(service: str) -> Topic[m.Pulse]:
@@ -197,10 +268,23 @@ def health(service: str) -> Topic[m.Health]:
     )
 
 
-def every_topic() -> tuple[Topic[Any], ...]:
-    """The table, every pulse and every health report."""
-    pulses, reports = (pulse(name) for name in VITAL_SERVICES), (health(name) for name in SERVICES)
-    return (*TOPICS, *pulses, *reports)
+def every_topic(graph: Graph | None = None) -> tuple[Topic[Any], ...]:
+    """What is written in this graph, every pulse and every health report of it. None: of all graphs."""
+    services = SERVICES if graph is None else services_in(graph)
+    pulses = (pulse(name) for name in VITAL_SERVICES if name in services)
+    return (*(TOPICS if graph is None else topics_in(graph)), *pulses, *(health(name) for name in services))
+
+
+# Earlier names of topics, and their present ones: old recordings still replay.
+RENAMED_TOPICS = {"plant/gps": GPS.name, "plant/imu": IMU.name}
+
+
+def present_name(name: str) -> str:
+    """The present name of a topic, or of a channel below it, that may carry an earlier one."""
+    for earlier, present in RENAMED_TOPICS.items():
+        if name == earlier or name.startswith(f"{earlier}/"):
+            return present + name.removeprefix(earlier)
+    return name
 
 
 def alive_name(service: str) -> str:

@@ -16,6 +16,7 @@ from tests.places import ROOT
 
 GOLDEN = Path(__file__).parent / "golden"
 ROWS: tuple[keys.Topic[Any], ...] = (*keys.TOPICS, keys.pulse("advisor"), keys.health("advisor"))
+GRAPHS = tuple(keys.Graph)
 
 
 def minimal(kind: Any) -> Any:
@@ -100,12 +101,13 @@ def test_stamps_are_safe_in_javascript() -> None:
         msgspec.json.decode(b'{"source_us": 9007199254740993}', type=m.Pulse)
 
 
-def test_only_the_controller_may_write_thrust() -> None:
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_only_the_controller_may_write_thrust(graph: keys.Graph) -> None:
     """A7 B13: neither perception nor advisor can write anything that moves the boat."""
     operator_topics = {keys.ARMING.name, keys.TUNING.name}
     moving = {keys.THRUST.name, keys.COMMAND.name, *operator_topics}
     for service in keys.SERVICES:
-        may = moving & set(authority.written_by(service))
+        may = moving & set(authority.written_by(service, graph))
         expected = {"controller": {keys.THRUST.name}, "navigator": {keys.COMMAND.name}, "dashboard": operator_topics}
         assert may == expected.get(service, set())
 

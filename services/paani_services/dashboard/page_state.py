@@ -63,7 +63,9 @@ def page_settings(config: Config) -> PageSettings:
         corridors=config.perception.corridors,
         weights=config.advisor.risk,
         acceptance_m=config.navigator.acceptance_m,
-        topics=tuple(TopicFreshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.TOPICS),
+        topics=tuple(
+            TopicFreshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.topics_in(config.bus.graph)
+        ),
         services=config.services,
     )
 

@@ -241,7 +241,7 @@ def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:
     return {
         "name": topic.name,
         "type": topic.type.__name__,
-        "producer": topic.producer,
+        "producer": keys.producers_text(topic),
         "rate_hz": topic.rate_hz,
         "fresh_s": topic.fresh_s,
         "stance": topic.stance.value,

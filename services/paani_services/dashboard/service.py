@@ -77,9 +77,9 @@ def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:
     """Subscribe to every JSON topic and health report, except the two topics that answer the operator."""
     answers = (keys.THRUST_APPLIED, keys.SHADOW)
     topics: list[keys.Topic[Any]] = [
-        topic for topic in keys.TOPICS if topic.stance is not keys.Stance.PICTURE and topic not in answers
+        topic for topic in keys.topics_in(bus.graph) if topic.stance is not keys.Stance.PICTURE and topic not in answers
     ]
-    topics += [keys.health(service) for service in keys.SERVICES]
+    topics += [keys.health(service) for service in keys.services_in(bus.graph)]
     return [(topic, bus.latest(topic)) for topic in topics]
 
 

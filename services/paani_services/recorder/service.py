@@ -35,7 +35,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         raise UserError("recorder.folder: not set (`paani up --record DIR` sets it)")
     await asyncio.to_thread(require_folder, folder)
     await asyncio.to_thread(remove_empty_files, folder)
-    topics = [topic for topic in keys.every_topic() if topic.name not in settings.leave_out]
+    left_out = {keys.present_name(name) for name in settings.leave_out}
+    topics = [topic for topic in keys.every_topic(config.bus.graph) if topic.name not in left_out]
     recording = Recording(settings, await asyncio.to_thread(describe_system, config), topics)
     backlog = Backlog(settings.queue_messages, round(settings.queue_mib * MIB))
     loop, worker, stop = asyncio.get_running_loop(), ThreadPoolExecutor(1, "write"), threading.Event()

@@ -15,7 +15,7 @@ HEAD = ("topic", "type", "producer", "rate [Hz]", "fresh [s]", "travels as", "wh
 def topic_rows() -> list[tuple[str, ...]]:
     """One row of text for each topic, in the order of the table."""
     return [
-        (t.name, t.type.__name__, t.producer, f"{t.rate_hz:g}", f"{t.fresh_s:g}", t.stance.value, t.summary)
+        (t.name, t.type.__name__, keys.producers_text(t), f"{t.rate_hz:g}", f"{t.fresh_s:g}", t.stance.value, t.summary)
         for t in keys.TOPICS
     ]
 

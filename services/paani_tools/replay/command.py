@@ -10,6 +10,7 @@ import signal
 import sys
 import tempfile
 
+from paani import keys
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
@@ -57,16 +58,17 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
         commands=options.commands,
         dashboard=options.dashboard,
     )
-    topics = topics_of(log, what)
+    topics = topics_of(log, what, recorded.bus.graph)
     if not topics:
         raise UserError(f"{log.path}: nothing to republish")
     with tempfile.TemporaryDirectory(prefix="paani-replay-") as folder, Progress("replaying") as progress:
         config = with_settings(replay_config(recorded, log), (ROUTER, f"bus.runtime_dir={folder}", *options.sets))
         bus = config.bus
+        profile = "" if bus.graph is keys.Graph.SIMULATION else f" --profile {config.profile}"
         sys.stdout.write(
             f"{len(topics)} topics of {(log.end_us - log.start_us) * 1e-6:.1f} s, vessel {bus.vessel}; listen with\n"
             f"  paani echo TOPIC --set bus.router={bus.router} --set bus.runtime_dir={bus.runtime_dir}"
-            f" --set bus.vessel={bus.vessel}\n"
+            f" --set bus.vessel={bus.vessel}{profile}\n"
         )
         if what.dashboard:
             sys.stdout.write(f"  http://{config.dashboard.host}:{config.dashboard.port}\n")

@@ -27,7 +27,7 @@ from paani_tools.replay.shift import TimeShift
 
 # Whoever hears these may move a boat or change how it is guided.
 COMMANDS = frozenset({keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name})
-MOVERS = ("plant", "bridge")  # services that turn thrust into motion
+MOVERS = ("plant", "thrusters", "bridge")  # services that turn thrust into motion, or advice into a light
 DASHBOARD = "dashboard"
 BATCH = 256
 AHEAD_US = 300_000  # between the start and the first message
@@ -56,13 +56,13 @@ class RepublishResult(msgspec.Struct, frozen=True, kw_only=True):
     late_ms: tuple[float, float]
 
 
-def topics_of(log: Log, what: RepublishOptions) -> list[keys.Topic[Any]]:
-    """The topics of the log that will be republished. Raises UserError for one that is not there."""
-    known: dict[str, keys.Topic[Any]] = {topic.name: topic for topic in keys.TOPICS}
-    for service in keys.SERVICES:
+def topics_of(log: Log, what: RepublishOptions, graph: keys.Graph) -> list[keys.Topic[Any]]:
+    """The topics of the log that will be republished, in its graph. Raises UserError for one that is not there."""
+    known: dict[str, keys.Topic[Any]] = {topic.name: topic for topic in keys.topics_in(graph)}
+    for service in keys.services_in(graph):
         known |= {topic.name: topic for topic in (keys.pulse(service), keys.health(service))}
     recorded = {name for name in log.topics if name in known}
-    chosen = recorded if what.only is None else {*what.only}
+    chosen = recorded if what.only is None else {keys.present_name(name) for name in what.only}
     for name in sorted(chosen - recorded):
         raise UserError(f"--only {name}: not in {log.path}")
     if not what.commands:
@@ -92,7 +92,7 @@ async def republish(log: Log, config: Config, what: RepublishOptions, on_progres
 
     Raises UserError when the router's address is taken, or a service that could move a boat joins the bus.
     """
-    topics = topics_of(log, what)
+    topics = topics_of(log, what, config.bus.graph)
     router = await open_router(config.bus)
     try:
         async with contextlib.AsyncExitStack() as stack:

@@ -31,11 +31,13 @@ class Collector:
     def __init__(self, bus: Bus, summary: Summary) -> None:
         self._summary = summary
         self._arrived: collections.deque[m.Message] = collections.deque()
+        written = {topic.name for topic in keys.topics_in(bus.graph)}
         for topic in FED:
-            bus.on(topic, self._arrived.append)
-        for service in keys.SERVICES:
+            if topic.name in written:
+                bus.on(topic, self._arrived.append)
+        for service in keys.services_in(bus.graph):
             bus.on(keys.health(service), self._arrived.append)
-        self._pictures = [(topic.producer, bus.latest_picture(topic)) for topic in PICTURES]
+        self._pictures = [(topic.producer, bus.latest_picture(topic)) for topic in PICTURES if topic.name in written]
         self._counted: collections.Counter[str] = collections.Counter()
 
     async def run(self) -> None:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from paani.cli import add_config_arguments, config_from
+from paani.keys import Graph
 from paani.option_paths import input_file, output_file, output_folder
 from paani.whole_file import write_json
 from paani_tools.up.lifecycle import Outcome, run_plan
@@ -32,6 +33,7 @@ def main(argv: list[str]) -> int:
 
 def up_sets(
     *,
+    simulated: bool = True,
     world: str | None,
     camera: str | None,
     headless: bool,
@@ -39,8 +41,8 @@ def up_sets(
     mission: Path | None = None,
     fence: Path | None = None,
 ) -> tuple[str, ...]:
-    """Settings that the options of `paani up` stand for. The boat is a simulated one: the operator arms at start."""
-    sets = ["dashboard.arm_at_start=true"]
+    """Settings that the options of `paani up` stand for. The operator of a simulated boat arms at start."""
+    sets = ["dashboard.arm_at_start=true"] if simulated else []
     if world is not None:
         sets.append(f"world.name={json.dumps(world)}")
     if camera is not None:
@@ -72,7 +74,9 @@ def _result(report: Report) -> str:
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
+    simulated = config_from(options).bus.graph is not Graph.HULL
     sets = up_sets(
+        simulated=simulated,
         world=options.world,
         camera=options.camera,
         headless=options.headless,

@@ -169,9 +169,9 @@ class Summary:
                 if self._step("controller", self._commands, message.command_sent_us, message.sent_us):
                     self._thrusts.remember(message.sent_us)
             case m.ThrustApplied(zero_cause=cause) if cause is not m.ZeroCause.NONE:
-                self._outputs["plant"] += 1
+                self._outputs[message.producer] += 1
             case m.ThrustApplied():
-                self._outputs["plant"] += 1
+                self._outputs[message.producer] += 1
                 self._step("adapter", self._thrusts, message.command_sent_us, message.since_us)
                 inference_ms = self._pictures.get(message.command_source_us, 0.0)
                 if self._step("capture_to_thrust", self._pictures, message.command_source_us, message.since_us):

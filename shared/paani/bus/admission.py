@@ -7,13 +7,13 @@ from typing import Generic, TypeVar
 import msgspec
 
 from paani import messages as m
-from paani.keys import Topic
+from paani.keys import NOBODY, Topic
 
 T = TypeVar("T", bound=m.Message)
 
 
 class Admission(Generic[T]):
-    """Judges the messages of one topic, in the order they arrive."""
+    """Judges the messages of one topic, in the order they arrive. What nobody may write is never let in."""
 
     def __init__(self, topic: Topic[T], domain: int, max_future_s: float) -> None:
         self._topic = topic
@@ -36,7 +36,7 @@ class Admission(Generic[T]):
             return None, "non_finite" if b"NaN" in data or b"Infinity" in data else "undecodable"
         if message.domain != self._domain:
             return None, "wrong_domain"
-        if message.producer != self._topic.producer:
+        if message.producer != self._topic.producer or message.producer == NOBODY:
             return None, "wrong_producer"
         if max(message.source_us, message.sent_us) > now_us + self._max_future_us:
             return None, "future"

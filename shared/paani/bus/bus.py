@@ -47,6 +47,10 @@ class Bus:
     def prefix(self) -> str:
         return f"paani/{self._config.domain}/{self._config.vessel}"
 
+    @property
+    def graph(self) -> keys.Graph:
+        return self._config.graph
+
     def latest(self, topic: keys.Topic[T]) -> Latest[T]:
         """Subscribe, newest wins."""
         inbox: Latest[T] = Latest(self._clock)
@@ -90,12 +94,13 @@ class Bus:
         return pulled
 
     def publisher(self, topic: keys.Topic[T]) -> Publisher[T]:
-        """The right to write is the router's to give: only the topic's producer is heard."""
-        return Publisher(self._session, topic, self._key(topic), self._config.domain, self._clock)
+        """The right to write is the router's to give: only the topic's producer in this graph is heard."""
+        return Publisher(self._session, self._row(topic), self._key(topic), self._config.domain, self._clock)
 
     def picture_publisher(self, topic: keys.Topic[m.PictureHeader], *, push: bool = True) -> PicturePublisher:
         """Pictures: pushed on this machine unless `push` is false, and always there to be pulled."""
-        return PicturePublisher(self._session, topic, self._key(topic), self._config.domain, self._clock, push=push)
+        row = self._row(topic)
+        return PicturePublisher(self._session, row, self._key(topic), self._config.domain, self._clock, push=push)
 
     @contextlib.contextmanager
     def alive(self) -> Iterator[None]:
@@ -179,7 +184,10 @@ class Bus:
         return topic.key(self._config.domain, self._config.vessel)
 
     def _admission(self, topic: keys.Topic[T]) -> Admission[T]:
-        return Admission(topic, self._config.domain, self._config.max_future_s)
+        return Admission(self._row(topic), self._config.domain, self._config.max_future_s)
+
+    def _row(self, topic: keys.Topic[T]) -> keys.Topic[T]:
+        return keys.topic_in(topic, self._config.graph)
 
     def _watch(self, topic: keys.Topic[T], inbox: Inbox[Any]) -> None:
         self.inputs.append((topic, inbox))

@@ -54,6 +54,8 @@ def load_config(
     _merge(tree, PROFILES[chosen])
     for origin, layer in layers:
         _merge(tree, layer)
+        if layer.get("profile") in PROFILES:
+            tree["profile"] = chosen  # a later layer's choice holds for the values of an earlier one
         _decode(tree, origin)
     tree["profile"] = chosen
     return _decode(tree, "configuration")

@@ -1,6 +1,8 @@
-"""The profiles `paper`, `wide` and `fans`: each difference from the default is one value here."""
+"""The profiles: each difference from the default is one value here."""
 
 from __future__ import annotations
+
+from paani.keys import VITAL_SERVICES, Graph, services_in
 
 PAPER: dict[str, object] = {
     "profile": "paper",
@@ -95,4 +97,22 @@ FANS: dict[str, object] = {
     "plant": {"adapter": {"astern": 0.0}},
 }
 
-PROFILES: dict[str, dict[str, object]] = {"paani": {}, "wide": WIDE, "fans": FANS, "paper": PAPER}
+# Hardware in the loop: thrust goes to an emulated microcontroller, and the simulated boat moves by its PWM alone.
+HIL: dict[str, object] = {"profile": "hil", "bus": {"graph": "hil"}}
+
+# A real boat: thrust goes to the microcontroller, fixes come from its sensors, and there is no simulator.
+HULL: dict[str, object] = {
+    "profile": "hull",
+    "bus": {"graph": "hull"},
+    "camera": {"source": "webcam"},
+    "plant": {"adapter": {"require_pulses": [name for name in VITAL_SERVICES if name in services_in(Graph.HULL)]}},
+}
+
+PROFILES: dict[str, dict[str, object]] = {
+    "paani": {},
+    "wide": WIDE,
+    "fans": FANS,
+    "paper": PAPER,
+    "hil": HIL,
+    "hull": HULL,
+}

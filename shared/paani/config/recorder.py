@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from paani.config.section import NonNegative, Positive, Section, Size
-from paani.keys import every_topic
+from paani.keys import every_topic, present_name
+
+KNOWN_TOPICS = frozenset(topic.name for topic in every_topic())
 
 
 class RecorderConfig(Section, frozen=True):
@@ -27,5 +29,5 @@ class RecorderConfig(Section, frozen=True):
     def __post_init__(self) -> None:
         """What is left out exists."""
         for name in self.leave_out:
-            if name not in {topic.name for topic in every_topic()}:
+            if present_name(name) not in KNOWN_TOPICS:
                 raise ValueError(f"leave_out: no topic '{name}'")

@@ -13,10 +13,14 @@ from paani.config.planner import CalibrationConfig
 from paani.config.recorder import RecorderConfig
 from paani.config.section import Positive, Section
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
-from paani.keys import SERVICES
+from paani.keys import Graph, services_in
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
 ShortName = Annotated[str, msgspec.Meta(pattern="^[a-z0-9_]{1,32}$")]
+
+
+# Every other profile is a simulation.
+GRAPHS = {"hil": Graph.HIL, "hull": Graph.HULL}
 
 
 class BusConfig(Section, frozen=True):
@@ -26,6 +30,7 @@ class BusConfig(Section, frozen=True):
     vessel: ShortName = "otter"  # the boat's name in every key
     router: str = "tcp/127.0.0.1:7447"  # where the router listens: this machine alone
     runtime_dir: str = ""
+    graph: Graph = Graph.SIMULATION  # set by the profiles `hil` and `hull` alone; it decides who may write what
     lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000  # a link that was silent for so long counts as cut
     max_future_s: Positive = 1.0  # a stamp further ahead than two machines' clocks may differ is refused
 
@@ -42,7 +47,7 @@ class Config(Section, frozen=True):
     """Defaults < TOML file < `PAANI_<SECTION>__<FIELD>` < `--set section.field=value`."""
 
     # Which set of values the others are compared with; `paani` is the default.
-    profile: Literal["paani", "wide", "fans", "paper"] = "paani"
+    profile: Literal["paani", "wide", "fans", "paper", "hil", "hull"] = "paani"
     bus: BusConfig = BusConfig()
     camera: CameraConfig = CameraConfig()
     calibration: CalibrationConfig = CalibrationConfig()
@@ -60,10 +65,12 @@ class Config(Section, frozen=True):
     @property
     def services(self) -> tuple[str, ...]:
         """Processes that run with these settings, in the order they start."""
-        idle = {"eye"} if self.camera.source != "sim" else set()
+        idle = {"bridge"}
+        if self.camera.source != "sim":
+            idle.add("eye")
         if not self.recorder.folder:
             idle.add("recorder")
-        return tuple(name for name in SERVICES if name not in idle)
+        return tuple(name for name in services_in(self.bus.graph) if name not in idle)
 
     @property
     def is_planner_active(self) -> bool:
@@ -77,6 +84,7 @@ class Config(Section, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""
+        self._require_graph()
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
         starved = 1.0 / rate_hz > motion.max_gap_s or rate_hz * motion.history_s + 1 < motion.min_samples
         if self.profile != "paper" and not motion.follow_rate and starved:
@@ -104,3 +112,16 @@ class Config(Section, frozen=True):
                 f"navigator.planner.turn_radius_m must be above 0: with controller.astern {self.controller.astern},"
                 f" less than controller.max_steer, no boat turns on the spot (profile=fans is for fans that only push)"
             )
+
+    def _require_graph(self) -> None:
+        """The graph is its profile's, and what a real boat must not have is refused there."""
+        graph = GRAPHS.get(self.profile, Graph.SIMULATION)
+        if self.bus.graph is not graph:
+            raise ValueError(
+                f"bus.graph '{self.bus.graph}' is set by the profiles hil and hull alone;"
+                f" profile '{self.profile}' has the graph '{graph}' (--profile hil or hull, without bus.graph)"
+            )
+        if graph is Graph.HULL and self.camera.source == "sim":
+            raise ValueError("camera.source 'sim': a hull has no simulated camera (--camera webcam or PATH)")
+        if graph is Graph.HULL and self.dashboard.arm_at_start:
+            raise ValueError("dashboard.arm_at_start: a hull waits for its operator")

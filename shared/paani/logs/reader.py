@@ -13,11 +13,13 @@ from typing import NamedTuple
 
 from paani.config import Config, decode_config
 from paani.errors import UserError
+from paani.keys import present_name
 from paani.logs.layout import FORMAT, PROFILE, Layout, Span, messages_in, span_bytes
 from paani.logs.locate import layout_of
 
 SUFFIX = ".mcap"
 CONFIG_FILE = "config.json"
+RECORDER = "recorder"  # the metadata record of what the recorder counted by topic
 
 
 class Record(NamedTuple):
@@ -138,6 +140,7 @@ def open_log(path: Path) -> Log:
                 raise
             problems.append(str(error))
             continue
+        _take_present_names(layout)
         parts.append(layout)
         problems += [f"{file.name}: {problem}" for problem in layout.problems]
     if not parts:
@@ -145,6 +148,17 @@ def open_log(path: Path) -> Log:
     parts.sort(key=lambda part: min((span.start_us for span in part.spans), default=0))
     _require_one_drive(path, parts)
     return Log(path, tuple(parts), problems)
+
+
+def _take_present_names(layout: Layout) -> None:
+    """Channels, and what the recorder counted of them, under the present names of their topics."""
+    counts, layout.counts = layout.counts, {}
+    for topic, count in counts.items():
+        name = present_name(topic)
+        layout.counts[name] = layout.counts.get(name, 0) + count
+    layout.channels = {number: present_name(topic) for number, topic in layout.channels.items()}
+    if RECORDER in layout.metadata:
+        layout.metadata[RECORDER] = {present_name(key): text for key, text in layout.metadata[RECORDER].items()}
 
 
 def _require_known_format(layout: Layout) -> None:

@@ -11,9 +11,9 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.clock import Clock, MonotonicClock
 from paani.config import Config
-from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
+from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant
-from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
+from paani_sim.plant.telemetry import gps_message, imu_message, pose_message
 from paani_sim.worlds import Fault
 from paani_sim.worlds.faults import is_linked
 from paani_sim.worlds.load import configured_scenario

@@ -1,7 +1,6 @@
-"""Messages of the plant: measurements, truth and applied thrust. `source_us` dates the step."""
+"""Messages of the plant: measurements and truth. `source_us` dates the step."""
 
 from paani import messages as m
-from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
 from paani_sim.plant.plant import Plant
 
 
@@ -48,18 +47,4 @@ def pose_message(plant: Plant, source_us: int) -> m.TruePose:
         collisions=plant.collisions,
         in_contact=plant.in_contact,
         actors_along_m=plant.actors_along_m,
-    )
-
-
-def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, since_us: int) -> m.ThrustApplied:
-    """The thrust that the adapter applies, and the command behind it."""
-    command = adapter.command
-    return m.ThrustApplied(
-        source_us=source_us,
-        since_us=since_us,
-        **applied._asdict(),
-        rejected=adapter.rejected,
-        command_seq=command.seq if command else 0,
-        command_sent_us=command.sent_us if command else 0,
-        command_source_us=command.source_us if command else 0,
     )

@@ -13,9 +13,9 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config
 from paani.cores import load_estimator
-from paani_sim.plant.adapter import AppliedThrust, ThrustAdapter
+from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant, PlantDiverged
-from paani_sim.plant.telemetry import applied_message, gps_message, imu_message, pose_message
+from paani_sim.plant.telemetry import gps_message, imu_message, pose_message
 from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.drive_history import DriveHistory
 from paani_sim.trials.drive_states import DriveOutcome, DrivePhase

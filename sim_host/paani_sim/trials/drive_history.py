@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from paani import messages as m
-from paani_sim.plant.adapter import AppliedThrust
+from paani.thrust_adapter import AppliedThrust
 from paani_sim.plant.plant import Plant
 from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.route_progress import RouteProgress

@@ -32,7 +32,7 @@ class DriveRecorder:
         about = About(version=_version("paani"), attachments=_attachments(config), facts=facts)
         try:
             self._beside.unlink(missing_ok=True)
-            self._log = LogWriter(self._beside, about, keys.every_topic(), START_US)
+            self._log = LogWriter(self._beside, about, keys.every_topic(keys.Graph.SIMULATION), START_US)
         except OSError as error:
             raise UserError(f"--record {path}: {error.strerror}") from error
 

@@ -100,6 +100,6 @@ def test_a_line_when_something_changes() -> None:
 
 
 def test_what_cannot_be_decoded_is_not_shown() -> None:
-    assert viewer.Viewer().derive("plant/gps", b'{"source_us": "no"}') == []
-    assert viewer.Viewer().derive("plant/gps", b"\xff\xfe") == []
-    assert viewer.Viewer().derive("plant/imu", b"{}") == []
+    assert viewer.Viewer().derive("sensors/gps", b'{"source_us": "no"}') == []
+    assert viewer.Viewer().derive("sensors/gps", b"\xff\xfe") == []
+    assert viewer.Viewer().derive("sensors/imu", b"{}") == []

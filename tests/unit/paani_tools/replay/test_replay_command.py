@@ -75,7 +75,7 @@ def test_services_that_are_not_installed_are_named(capsys: pytest.CaptureFixture
 
 
 def test_a_log_without_decisions_is_not_exact(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    file = write_log(tmp_path / "drive.mcap", [Record("plant/gps", 1_800_000_000_000_000, 0, b"{}")])
+    file = write_log(tmp_path / "drive.mcap", [Record("sensors/gps", 1_800_000_000_000_000, 0, b"{}")])
     code, out, _ = paani(capsys, "replay", file, "--check")
     assert code == 1
     assert out.splitlines()[-1] == "0 decisions, 0 differ"

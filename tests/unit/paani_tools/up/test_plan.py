@@ -25,6 +25,7 @@ from paani_tools.up.terminal import Display
 from tests.pictures import river
 
 pytestmark = pytest.mark.slow
+SIMULATED = keys.services_in(keys.Graph.SIMULATION)
 
 
 @pytest.mark.parametrize("name", sorted(WORLDS))
@@ -34,7 +35,7 @@ async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_s
     route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
     assert plan.config.localization.origin_lat_lon_deg == (world.origin_lat_deg, world.origin_lon_deg)
     np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], world.route_m, atol=1e-4)
-    assert plan.services == tuple(name for name in keys.SERVICES if name != "recorder")
+    assert plan.services == tuple(name for name in SIMULATED if name not in {"recorder", "bridge"})
     assert decode_config(encode_config(plan.config)) == plan.config
 
 
@@ -86,7 +87,7 @@ async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_pat
     """The plant and everything else still run; the thrust adapter waits for no pulse of the eye."""
     cv2.imwrite(str(tmp_path / "river.png"), river())
     plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
-    assert set(keys.SERVICES) - set(plan.services) == {"eye", "recorder"}
+    assert set(SIMULATED) - set(plan.services) == {"eye", "recorder", "bridge"}
     assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
     with pytest.raises(UserError, match=r"camera\.source absent: no such file or folder"):
         await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))
@@ -122,8 +123,8 @@ async def test_a_busy_page_port_is_no_mistake_without_the_page(config: Config, p
 
 
 def test_options_stand_for_settings(private_sets: tuple[str, ...]) -> None:
-    files = {"mission": Path("/a/m.toml"), "fence": Path("/a/f.toml")}
-    sets = up_sets(world="lake", camera="/some where/x.mp4", headless=True, **files)
+    mission, fence = Path("/a/m.toml"), Path("/a/f.toml")
+    sets = up_sets(world="lake", camera="/some where/x.mp4", headless=True, mission=mission, fence=fence)
     config = load_config(sets=(*sets, *private_sets))
     assert (config.world.name, config.camera.source) == ("lake", "/some where/x.mp4")
     assert (config.navigator.mission, config.navigator.fence) == ("/a/m.toml", "/a/f.toml")

@@ -54,7 +54,7 @@ def chain(summary: Summary, captured_us: int, seq: int) -> None:
         summary.feed(
             m.ThrustApplied(
                 source_us=applied_us + 20_000 + repeat * 50_000, since_us=applied_us,
-                seq=2 * seq + repeat, left=0.1, right=0.1, left_n=7.5,
+                producer="plant", seq=2 * seq + repeat, left=0.1, right=0.1, left_n=7.5,
                 right_n=7.5, zero_cause=m.ZeroCause.NONE, command_sent_us=thrust_us, command_source_us=captured_us,
             )
         )  # fmt: skip
@@ -75,7 +75,7 @@ def chain(summary: Summary, captured_us: int, seq: int) -> None:
 
 def health(service: str, *, epoch: int = 1, seq: int = 0, drops: int = 0, rss_mib: float = 40.0) -> m.Health:
     seen = m.InputHealth(
-        topic="plant/imu", alive=True, fresh=True, rate_ok=True, rate_hz=100.0, age_s=0.0, received=500,
+        topic="sensors/imu", alive=True, fresh=True, rate_ok=True, rate_hz=100.0, age_s=0.0, received=500,
         superseded=drops,
     )  # fmt: skip
     state = m.InputHealth(
@@ -153,7 +153,7 @@ def test_counters_add_up_over_the_lives_of_a_process() -> None:
         summary.feed(pose(epoch=epoch, distance_m=distance_m, collisions=collisions))
     got = report(summary)
     assert got.drops["replayed"] == 6
-    assert got.drops["overflow_plant/imu"] == 6
+    assert got.drops["overflow_sensors/imu"] == 6
     assert got.superseded == {"plant/clock": 14}
     assert (got.distance_m, got.collisions) == (12.5, 3)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani.config import AdapterConfig
 from paani.messages import Arming, Thrust, ZeroCause
-from paani_sim.plant.adapter import ThrustAdapter
+from paani.thrust_adapter import ThrustAdapter
 
 NOW_US = 50_000_000
 CONFIG = AdapterConfig()

@@ -1,16 +1,18 @@
 """The thrust adapter, the last decision before force: zero thrust unless every check passes (O1, O2).
 
-Time is the plant's own monotonic clock. A command is as old as the plant stamp that it echoes, so
-no other clock matters and a burst of delayed commands is refused whole.
+It stands before whatever turns thrust into force: the simulated plant, or the microcontroller of a hull. Time is the
+monotonic clock of the process that it runs in, which hands it out as the plant's stamp. A command is as old as the
+stamp that it echoes, so no other clock matters and a burst of delayed commands is refused whole.
 """
 
 import math
 from typing import NamedTuple
 
+from paani import keys
 from paani.config import AdapterConfig
-from paani.messages import Arming, Thrust, ZeroCause
+from paani.messages import Arming, Thrust, ThrustApplied, ZeroCause
 
-PRODUCER = "controller"
+PRODUCER = keys.THRUST.producer  # in every graph
 
 
 class AppliedThrust(NamedTuple):
@@ -113,3 +115,17 @@ class ThrustAdapter:
         if not all(math.isfinite(fan) and -self._config.astern <= fan <= 1.0 for fan in fans):
             return ZeroCause.INVALID
         return ZeroCause.NONE
+
+
+def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, since_us: int) -> ThrustApplied:
+    """The thrust that the adapter applies, and the command behind it."""
+    command = adapter.command
+    return ThrustApplied(
+        source_us=source_us,
+        since_us=since_us,
+        **applied._asdict(),
+        rejected=adapter.rejected,
+        command_seq=command.seq if command else 0,
+        command_sent_us=command.sent_us if command else 0,
+        command_source_us=command.source_us if command else 0,
+    )
