@@ -11,20 +11,29 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
-import re
-from contextlib import suppress
 from typing import cast
-from urllib.parse import urlsplit
 
 import serial
 
-DEFAULT_BAUD = 115200  # of the microcontroller's serial line, and the usual one of its kind
-MIN_BAUD, MAX_BAUD = 300, 4_000_000  # what Linux's serial drivers take
+from paani.port_address import parse_address
+
+__all__ = ["Port", "PortError", "SerialPort", "StreamPort", "describe", "open_port", "parse_address"]
+
 MAX_WAITING_BYTES = 65_536  # over five seconds at 115200 baud: older bytes are of no use to anybody
 READ_BYTES = 4096  # the kernel's buffer of a serial device
+__all__ = [
+    "CONNECT_TIMEOUT_S",
+    "Port",
+    "PortError",
+    "SerialPort",
+    "StreamPort",
+    "describe",
+    "open_port",
+    "parse_address",
+]
+
 CONNECT_TIMEOUT_S = 5.0
 WRITE_TIMEOUT_S = 1.0  # a device that takes no byte for so long is as good as gone
-FORMATS = "serial:/dev/NAME@BAUD or socket://HOST:PORT"
 
 
 class PortError(ConnectionError):
@@ -40,6 +49,7 @@ class Port:
         self._waiting = bytearray()
         self._arrived = asyncio.Event()
         self._problem = ""
+        self._is_paused = False
         self._writing = asyncio.Lock()
 
     @property
@@ -56,6 +66,9 @@ class Port:
             await self._arrived.wait()
         data = bytes(self._waiting)
         self._waiting.clear()
+        if self._is_paused and not self._problem:
+            self._is_paused = False
+            self._resume_reading()
         return data
 
     async def write(self, data: bytes) -> None:
@@ -67,7 +80,7 @@ class Port:
             except TimeoutError:
                 self._end("takes no bytes")
             except OSError as error:
-                self._end(_describe(error))
+                self._end(describe(error))
         if self._problem:
             raise PortError(f"{self.address}: {self._problem}")
 
@@ -78,12 +91,22 @@ class Port:
     async def _write(self, data: bytes) -> None:
         raise NotImplementedError
 
+    def _pause_reading(self) -> None:
+        raise NotImplementedError
+
+    def _resume_reading(self) -> None:
+        raise NotImplementedError
+
     def _take(self, data: bytes) -> None:
+        """Keep the newest bytes. To bound the CPU, a device that babbles is left alone until these are read."""
         self._waiting += data
         excess = len(self._waiting) - MAX_WAITING_BYTES
         if excess > 0:
             del self._waiting[:excess]
             self.dropped_bytes += excess
+            if not self._is_paused:
+                self._is_paused = True
+                self._pause_reading()
         self._arrived.set()
 
     def _end(self, problem: str) -> None:
@@ -99,11 +122,17 @@ class SerialPort(Port):
         super().__init__(address)
         self._device, self._fd = device, int(device.fileno())
         self._loop = asyncio.get_running_loop()
-        self._loop.add_reader(self._fd, self._read_ready)
+        self._resume_reading()
 
     async def close(self) -> None:
         await super().close()
         await asyncio.to_thread(self._device.close)
+
+    def _pause_reading(self) -> None:
+        self._loop.remove_reader(self._fd)
+
+    def _resume_reading(self) -> None:
+        self._loop.add_reader(self._fd, self._read_ready)
 
     def _read_ready(self) -> None:
         try:
@@ -111,7 +140,7 @@ class SerialPort(Port):
         except BlockingIOError:
             return
         except OSError as error:
-            self._end(_describe(error))
+            self._end(describe(error))
             return
         if data:
             self._take(data)
@@ -136,7 +165,7 @@ class SerialPort(Port):
 
     def _end(self, problem: str) -> None:
         if not self._problem:
-            self._loop.remove_reader(self._fd)
+            self._pause_reading()
         super()._end(problem)
 
 
@@ -145,7 +174,7 @@ class StreamPort(Port, asyncio.Protocol):
 
     def __init__(self, address: str) -> None:
         super().__init__(address)
-        self._transport: asyncio.Transport | None = None
+        self._transport: asyncio.Transport
         self._writable = asyncio.Event()
         self._writable.set()
 
@@ -156,7 +185,7 @@ class StreamPort(Port, asyncio.Protocol):
         self._take(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._end(_describe(exc) if isinstance(exc, OSError) else "closed by the other side")
+        self._end(describe(exc) if isinstance(exc, OSError) else "closed by the other side")
         self._writable.set()
 
     def pause_writing(self) -> None:
@@ -167,13 +196,18 @@ class StreamPort(Port, asyncio.Protocol):
 
     async def close(self) -> None:
         await super().close()
-        if self._transport is not None:
-            self._transport.abort()
+        self._transport.abort()
 
     async def _write(self, data: bytes) -> None:
         await self._writable.wait()
-        if self._transport is not None and not self._problem:
+        if not self._problem:
             self._transport.write(data)
+
+    def _pause_reading(self) -> None:
+        self._transport.pause_reading()
+
+    def _resume_reading(self) -> None:
+        self._transport.resume_reading()
 
 
 async def open_port(address: str) -> Port:
@@ -189,26 +223,8 @@ async def open_port(address: str) -> Port:
     except TimeoutError as error:
         raise PortError(f"{address}: no answer") from error
     except OSError as error:
-        raise PortError(f"{address}: {_describe(error)}") from error
+        raise PortError(f"{address}: {describe(error)}") from error
     return stream
-
-
-def parse_address(address: str) -> tuple[str, int]:
-    """Path and baud rate of a serial device, or `host:port` and 0. Raises ValueError, in one line."""
-    if address.startswith("serial:"):
-        match = re.fullmatch(r"serial:(/[^\s@]+)(?:@(\d{1,9}))?", address)
-        if match is None:
-            raise ValueError(f"'{address}' is no port (expected {FORMATS})")
-        baud = int(match[2] or DEFAULT_BAUD)
-        if not MIN_BAUD <= baud <= MAX_BAUD:
-            raise ValueError(f"'{address}': a baud rate lies between {MIN_BAUD} and {MAX_BAUD}")
-        return match[1], baud
-    if address.startswith("socket://"):
-        with suppress(ValueError):
-            parts = urlsplit(address)
-            if parts.hostname and parts.port and not (parts.path or parts.query or parts.fragment):
-                return f"{parts.hostname}:{parts.port}", 0
-    raise ValueError(f"'{address}' is no port (expected {FORMATS})")
 
 
 async def _open_serial(address: str, device: str, baud: int) -> serial.Serial:
@@ -220,7 +236,7 @@ async def _open_serial(address: str, device: str, baud: int) -> serial.Serial:
         opening.add_done_callback(_close_unused)
         raise
     except (OSError, ValueError) as error:  # pyserial's own errors are OSErrors
-        raise PortError(f"{address}: {_describe(error)}") from error
+        raise PortError(f"{address}: {describe(error)}") from error
 
 
 def _close_unused(opening: asyncio.Future[serial.Serial]) -> None:
@@ -228,8 +244,8 @@ def _close_unused(opening: asyncio.Future[serial.Serial]) -> None:
         opening.result().close()
 
 
-def _describe(error: Exception) -> str:
-    """The cause in words; pyserial's texts repeat the path and Python's notation of the error."""
+def describe(error: Exception) -> str:
+    """The cause of a failure in words; pyserial's texts repeat the path and Python's notation of the error."""
     match getattr(error, "errno", None):
         case None:
             return "is no serial device" if isinstance(error, serial.SerialException) else str(error)

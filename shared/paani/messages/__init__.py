@@ -29,6 +29,7 @@ from paani.messages.decision import InputMessage, OutputMessage, Step
 from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
+from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
 from paani.messages.perception import (
     Detection,
@@ -48,6 +49,7 @@ __all__ = [
     "Advisory",
     "Arming",
     "BoxXyxy",
+    "BridgeState",
     "Change",
     "ChangedBy",
     "Count",
@@ -74,6 +76,8 @@ __all__ = [
     "LaneRisk",
     "LegKind",
     "Limit",
+    "McuState",
+    "McuVerdict",
     "Message",
     "Mission",
     "MissionLeg",
@@ -90,6 +94,7 @@ __all__ = [
     "RecordedTopic",
     "RecorderState",
     "Removal",
+    "ResetCause",
     "RotationUse",
     "Route",
     "SegmentationSource",
