@@ -36,6 +36,7 @@ class McuPeer:
         self.session = 0
         self.answers: Callable[[Request], bytes] = self.answer
         self.delay_s = 0.0
+        self.writer: asyncio.StreamWriter | None = None  # of the connection to the router
         self.started_ms = stopwatch_ms()
         self._scanner = MessageScanner()
 
@@ -92,12 +93,14 @@ class McuPeer:
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Answer on one connection until it ends."""
         self._scanner = MessageScanner()
-        with contextlib.suppress(ConnectionError):
-            while data := await reader.read(4096):
-                for answer in self.take(data):
-                    await asyncio.sleep(self.delay_s)
-                    writer.write(answer)
-        writer.close()
+        try:
+            with contextlib.suppress(ConnectionError):
+                while data := await reader.read(4096):
+                    for answer in self.take(data):
+                        await asyncio.sleep(self.delay_s)
+                        writer.write(answer)
+        finally:
+            writer.close()
 
 
 def boot_messages() -> bytes:
@@ -171,8 +174,19 @@ async def served(serve: Callable[[asyncio.StreamReader, asyncio.StreamWriter], A
             task.cancel()
 
 
-async def until(condition: Callable[[], bool], seconds: float = 5.0) -> None:
+async def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
     """Wait until the condition holds; TimeoutError after so many seconds."""
     async with asyncio.timeout(seconds):
         while not condition():
             await asyncio.sleep(0.005)
+
+
+async def run_sketch(router: Path, peer: McuPeer) -> None:
+    """Be the sketch behind the router: register, answer, and begin again when the router restarts."""
+    while True:
+        with contextlib.suppress(OSError):
+            reader, writer = await asyncio.open_unix_connection(router)
+            writer.write(boot_messages())
+            peer.writer = writer
+            await peer.serve(reader, writer)
+        await asyncio.sleep(0.05)

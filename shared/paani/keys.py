@@ -149,6 +149,10 @@ TRUE_POSE = Topic(
     name="@truth/pose", type=m.TruePose, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="simulator truth: eye, dashboard and scoring only",
 )
+BRIDGE_STATE = Topic(
+    name="bridge/state", type=m.BridgeState, producer="bridge", rate_hz=10.0, fresh_s=0.6,
+    stance=Stance.STATE, summary="the microcontroller that shows the advice: line, state, display, counters",
+)
 RECORDER_STATE = Topic(
     name="recorder/state", type=m.RecorderState, producer="recorder", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.STATE, summary="what the recorder writes, dropped and never heard",
@@ -165,7 +169,8 @@ STEPS = {
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
-    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, RECORDER_STATE,
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, BRIDGE_STATE,
+    RECORDER_STATE,
     *STEPS.values(),
 )
 # fmt: on

@@ -1,6 +1,7 @@
 """Configuration: one frozen tree, layered from defaults, a file, the environment and the command line."""
 
 from paani.config.advisor import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
+from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.perception import (
@@ -21,6 +22,7 @@ __all__ = [
     "PROFILES",
     "AdapterConfig",
     "AdvisorConfig",
+    "BridgeConfig",
     "BusConfig",
     "CalibrationConfig",
     "CameraConfig",

@@ -68,6 +68,7 @@ PAPER: dict[str, object] = {
         "astern": 0.0,  # N7
     },
     "plant": {"adapter": {"astern": 0.0}},
+    "bridge": {"lease_ms": 3600},  # J16, M10: advice is shown as long as it may be followed
 }
 
 # A wide lens, level: who comes from 50 degrees off the bow is in the picture. What is meant by an angle, in the default

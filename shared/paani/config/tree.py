@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from paani.config.advisor import AdvisorConfig
+from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.perception import CameraConfig, PerceptionConfig
 from paani.config.planner import CalibrationConfig
@@ -61,6 +62,7 @@ class Config(Section, frozen=True):
     eye: EyeConfig = EyeConfig()
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
+    bridge: BridgeConfig = BridgeConfig()
 
     @property
     def services(self) -> tuple[str, ...]:
@@ -70,6 +72,8 @@ class Config(Section, frozen=True):
             idle.add("eye")
         if not self.recorder.folder:
             idle.add("recorder")
+        if not self.bridge.line:
+            idle.add("bridge")
         return tuple(name for name in services_in(self.bus.graph) if name not in idle)
 
     @property

@@ -1,0 +1,1 @@
+"""Bridge: the advice as bounded symbols, to the microcontroller that shows it."""
