@@ -110,6 +110,7 @@ def spawn(open_as: OpenAs, private_sets: tuple[str, ...]) -> Spawn:
             sys.executable,
             "-m",
             "paani",
+            "run",
             service,
             *arguments,
             stderr=asyncio.subprocess.PIPE,

@@ -17,7 +17,7 @@ GROUPS = {"paani.commands": "", "paani.bench_commands": "bench "}
 INTRODUCTION = """# Commands
 
 `paani COMMAND --help` says the same in a terminal. Exit codes: 0 done, 1 it failed or what was checked is not so, 2 a
-mistake in what was asked for, with one line that says which. A process (`paani SERVICE`) is started the same way;
+mistake in what was asked for, with one line that says which. A process (`paani run SERVICE`) is started the same way;
 `paani up` starts them all.
 
 """

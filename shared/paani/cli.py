@@ -24,6 +24,10 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     name, rest = arguments[0], arguments[1:]
     try:
+        if name == "run":
+            if not rest or rest[0] not in names:
+                raise UserError(f"run {' '.join(rest[:1])}: expected a service (one of {', '.join(sorted(names))})")
+            return _run(rest[0], rest[1:], {})
         if name in commands or name in names:
             return _run(name, rest, commands)
         raise UserError(
@@ -53,10 +57,11 @@ def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
 def usage(commands: list[str], names: list[str]) -> str:
     """The help text."""
     return (
-        "usage: paani COMMAND [options]     paani SERVICE [options]\n\n"
+        "usage: paani COMMAND [options]     paani run SERVICE [options]\n\n"
         f"commands: {', '.join(commands)}\n"
         f"services: {', '.join(names)}\n\n"
-        "`paani up` starts everything; `paani COMMAND --help` says more.\n"
+        "`paani up` starts everything; `paani COMMAND --help` says more. A service whose name is no command's is also\n"
+        "started by `paani SERVICE`.\n"
     )
 
 

@@ -135,11 +135,11 @@ SIM_TIME = Topic(
 )
 GPS = Topic(
     name="sensors/gps", type=m.GpsFix, producer="plant", rate_hz=5.0, fresh_s=1.0,
-    stance=Stance.STATE, summary="position with time-correlated error",
+    stance=Stance.STATE, summary="position, speed and course of the receiver, with its stated error",
 )
 IMU = Topic(
     name="sensors/imu", type=m.ImuSample, producer="plant", rate_hz=100.0, fresh_s=0.2,
-    stance=Stance.EVENT, summary="body rates, specific force, compass",
+    stance=Stance.EVENT, summary="body rates, specific force, and orientation where there is one",
 )
 THRUST_APPLIED = Topic(
     name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
@@ -152,6 +152,10 @@ TRUE_POSE = Topic(
 BRIDGE_STATE = Topic(
     name="bridge/state", type=m.BridgeState, producer="bridge", rate_hz=10.0, fresh_s=0.6,
     stance=Stance.STATE, summary="the microcontroller that shows the advice: line, state, display, counters",
+)
+SENSORS_STATE = Topic(
+    name="sensors/state", type=m.SensorsState, producer="sensors", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.STATE, summary="each device of a real hull: its status, rate, age and failures",
 )
 RECORDER_STATE = Topic(
     name="recorder/state", type=m.RecorderState, producer="recorder", rate_hz=1.0, fresh_s=3.0,
@@ -170,7 +174,7 @@ STEPS = {
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, BRIDGE_STATE,
-    RECORDER_STATE,
+    SENSORS_STATE, RECORDER_STATE,
     *STEPS.values(),
 )
 # fmt: on

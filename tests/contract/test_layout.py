@@ -71,6 +71,8 @@ def test_one_file_one_job(path: Path) -> None:
         ("from filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/"),
         ("import serial", "shared/paani/serial_port.py"),
+        ("from pynmeagps", "services/paani_services/sensors/"),
+        ("from pyubx2", "services/paani_services/sensors/"),
         ("from mcap", "shared/paani/logs/"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
     ],

@@ -13,7 +13,7 @@ from paani.config import LocalizationConfig
 from paani.geometry import enu_from_geodetic
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.estimator import Estimator
-from paani_services.localization.nmea import fixes_from_sentences
+from paani_services.sensors.fixes import fixes_from_sentences
 from tests.places import DATA
 from tests.unit.paani_services.localization.estimated_boat import EstimatedBoat, wandering
 

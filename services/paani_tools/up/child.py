@@ -21,7 +21,7 @@ def run(parent_pid: int, nice: int, service: str) -> int:
     os.nice(nice)
     from paani.cli import main  # noqa: PLC0415  # takes a second on a busy machine: not before the request above
 
-    return main([service])
+    return main(["run", service])
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from paani.config.perception import (
 from paani.config.planner import CalibrationConfig, PlannerConfig, calibration_of
 from paani.config.profiles import PROFILES
 from paani.config.recorder import RecorderConfig
+from paani.config.sensors import GpsConfig, HeadingConfig, ImuConfig, SensorDevicesConfig
 from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, SensorsConfig, WorldConfig
 from paani.config.tree import BusConfig, Config, DashboardConfig
 
@@ -33,7 +34,10 @@ __all__ = [
     "DetectorConfig",
     "EngineName",
     "EyeConfig",
+    "GpsConfig",
+    "HeadingConfig",
     "ImageQualityConfig",
+    "ImuConfig",
     "LocalizationConfig",
     "MotionConfig",
     "NavigatorConfig",
@@ -43,6 +47,7 @@ __all__ = [
     "PolicyConfig",
     "RecorderConfig",
     "RiskConfig",
+    "SensorDevicesConfig",
     "SensorsConfig",
     "TrackerConfig",
     "TuningConfig",

@@ -13,6 +13,7 @@ from paani.config.perception import CameraConfig, PerceptionConfig
 from paani.config.planner import CalibrationConfig
 from paani.config.recorder import RecorderConfig
 from paani.config.section import Positive, Section
+from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
 from paani.keys import Graph, services_in
 
@@ -54,6 +55,7 @@ class Config(Section, frozen=True):
     calibration: CalibrationConfig = CalibrationConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advisor: AdvisorConfig = AdvisorConfig()
+    sensors: SensorDevicesConfig = SensorDevicesConfig()
     localization: LocalizationConfig = LocalizationConfig()
     navigator: NavigatorConfig = NavigatorConfig()
     controller: ControllerConfig = ControllerConfig()

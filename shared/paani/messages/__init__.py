@@ -42,6 +42,7 @@ from paani.messages.perception import (
 )
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
 from paani.messages.recorder import RecordedTopic, RecorderState
+from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
 
 __all__ = [
@@ -98,6 +99,10 @@ __all__ = [
     "RotationUse",
     "Route",
     "SegmentationSource",
+    "SensorDevice",
+    "SensorRole",
+    "SensorStatus",
+    "SensorsState",
     "Shadow",
     "Signed",
     "SimTime",

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.messages import GpsFix
-from paani_services.localization.nmea import UNKNOWN_STD_M, fixes_from_sentences
+from paani_services.sensors.fixes import UNKNOWN_STD_M, fixes_from_sentences
 from tests.places import DATA
 
 LOGS = DATA / "logs"
@@ -102,7 +102,7 @@ def test_time_goes_forward_past_midnight_and_never_back() -> None:
 
     found, drops = all_fixes(at("235959"), at("000000.50"), at("000000.50"), at("000000"), at("000001"))
     assert [fix.source_us for fix in found] == [86_399_000_000, 86_400_500_000, 86_401_000_000]
-    assert drops == {"nmea_late": 2}
+    assert drops == {"gps_late": 2}
 
 
 @given(st.text(max_size=150) | st.builds(sentence, st.text(max_size=90).map(lambda text: "GPRMC," + text)))

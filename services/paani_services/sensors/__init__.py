@@ -1,0 +1,1 @@
+"""GPS, IMU and heading devices of a real hull."""

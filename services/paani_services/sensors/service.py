@@ -1,0 +1,116 @@
+"""Sensor process: GPS, IMU and heading devices of a real hull in, fixes and samples out."""
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus
+from paani.clock import Clock
+from paani.config import Config
+from paani.config.sensors import recording_of
+from paani.serial_port import PortError, open_port
+from paani_services.sensors.backoff import Backoff
+from paani_services.sensors.playback import play
+from paani_services.sensors.suite import Reading, SensorSuite
+
+MAX_BYTES_PER_S = 100_000  # more than a line of 921600 baud carries: the device babbles
+REPORT_S = 1.0
+
+
+async def run(bus: Bus, clock: Clock, config: Config) -> None:
+    """Publish what the devices say, and their state once a second."""
+    suite = SensorSuite(config.sensors)
+    gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
+
+    def publish(reading: Reading) -> None:
+        for fix in reading.fixes:
+            gps.put(fix)
+        for sample in reading.samples:
+            imu.put(sample)
+
+    with bus.alive():
+        async with asyncio.TaskGroup() as group:
+            for address in suite.lines:
+                group.create_task(_serve_line(address, suite, publish, clock))
+            counted = Counter[str]()
+            while True:
+                now_us = clock.now_us()
+                devices = suite.report(now_us)
+                state.put(m.SensorsState(source_us=now_us, devices=devices))
+                bus.note(_summary(devices))
+                for cause, n in (suite.drops - counted).items():
+                    bus.count_drop(cause, n)
+                counted = suite.drops.copy()
+                await asyncio.sleep(REPORT_S)
+
+
+async def _serve_line(address: str, suite: SensorSuite, publish: Callable[[Reading], None], clock: Clock) -> None:
+    """Open a line, and open it again whenever it is lost."""
+    backoff = Backoff()
+    while True:
+        frames = suite.lines[address].frames
+        try:
+            async for data in _play_file(address) if address.startswith("file:") else _read_port(address, clock):
+                now_us = clock.now_us()
+                if data is None:
+                    suite.opened(address, now_us)
+                else:
+                    publish(suite.take(address, data, now_us))
+        except PortError as error:
+            wait_s = backoff.after(is_useful=suite.lines[address].frames > frames)
+            suite.lost(address, f"{error}; next try after {wait_s:g} s")
+            await asyncio.sleep(wait_s)
+        else:
+            suite.lost(address, "played to the end")
+            return
+
+
+async def _read_port(address: str, clock: Clock) -> AsyncIterator[bytes | None]:
+    """None once the device is open, then its bytes. Raises PortError when it is not to be had, gone, or babbles."""
+    port = await open_port(address)
+    try:
+        yield None
+        began_us, n = clock.now_us(), 0
+        while True:
+            data = await port.read()
+            now_us = clock.now_us()
+            if not 0 <= now_us - began_us < 1e6:
+                began_us, n = now_us, 0
+            n += len(data)
+            if n > MAX_BYTES_PER_S:
+                raise PortError(f"{address}: babbles, with over {MAX_BYTES_PER_S // 1000} kB in a second")
+            yield data
+    finally:
+        await port.close()
+
+
+async def _play_file(address: str) -> AsyncIterator[bytes | None]:
+    """None once the log is open, then its bytes at the time and speed that they are due. Raises PortError."""
+    name, speed = recording_of(address)
+    try:
+        log = await asyncio.to_thread(Path(name).open, "rb")
+    except OSError as error:
+        raise PortError(f"{address}: {error.strerror}") from error
+    try:
+        yield None
+        pieces = play(log)
+        loop = asyncio.get_running_loop()
+        due_s = loop.time()
+        while (piece := await asyncio.to_thread(next, pieces, None)) is not None:
+            if speed is not None:
+                due_s += piece.wait_s / speed
+                await asyncio.sleep(due_s - loop.time())
+            yield piece.data
+    finally:
+        await asyncio.to_thread(log.close)
+
+
+def _summary(devices: tuple[m.SensorDevice, ...]) -> str:
+    return "; ".join(
+        f"{device.role} {device.status}" + (f" ({device.note})" if device.note else "")
+        for device in devices
+        if device.status is not m.SensorStatus.OFF
+    )

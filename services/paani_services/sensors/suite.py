@@ -1,0 +1,204 @@
+"""All devices of a hull together: bytes of their lines in, fixes and samples out. Pure.
+
+Data that cannot be believed are withheld, so that who needs them finds them stale and stops the boat.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import msgspec
+
+from paani.config import SensorDevicesConfig
+from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole
+from paani_services.sensors.device import Device, Line
+from paani_services.sensors.fixes import FixDecoder
+from paani_services.sensors.framing import Frame, Framer, Protocol
+from paani_services.sensors.freezing import REPEATED_TIMES, GravityWatch, HeadingWatch, PositionWatch, SampleWatch
+from paani_services.sensors.heading import YawKeeper, read_heading, true_yaw_rad
+from paani_services.sensors.inertial import InertialSample, Mounting, imu_message, read_sample
+from paani_services.sensors.sentences import ChecksumError, Sentence, read_sentence
+
+FIX_SENTENCES = frozenset({"RMC", "GGA", "GLL", "VTG", "GST"})
+HEADING_SENTENCES = frozenset({"HDT", "THS", "HDG", "HDM"})
+SAMPLE_SENTENCES = frozenset({"PQTMIMU", "VNYMR"})
+MAX_KINDS, MAX_KIND = 64, 12  # kinds of frames remembered, and characters of one: a line may say anything
+NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2? Its data are withheld"
+MAX_SPACING_US = 200_000  # between samples that come in one piece: no inertial unit is slower than 5 Hz
+
+
+class Reading(NamedTuple):
+    """What to publish."""
+
+    fixes: tuple[GpsFix, ...] = ()
+    samples: tuple[ImuSample, ...] = ()
+
+
+class SensorSuite:
+    """The devices that the settings name. `lines` are the addresses to open, each once."""
+
+    def __init__(self, config: SensorDevicesConfig) -> None:
+        self._config = config
+        self.drops = Counter[str]()
+        """What was refused since the process began, by cause."""
+        named = {
+            SensorRole.GPS: config.gps.line, SensorRole.IMU: config.imu.line, SensorRole.HEADING: config.heading.line,
+        }  # fmt: skip
+        self._lines = {address: Line(address) for address in named.values() if address}
+        self._framers = {address: Framer() for address in self._lines}
+        self._devices = {role: Device(role, self._lines.get(address)) for role, address in named.items()}
+        self._fixes, self._position_watch = FixDecoder(self.drops), PositionWatch()
+        self._fix_us = 0
+        imu = config.imu
+        self._mounting = Mounting(imu.mount_roll_deg, imu.mount_pitch_deg, imu.mount_yaw_deg)
+        self._sample_watch, self._gravity_watch, self._sample_us = SampleWatch(), GravityWatch(), 0
+        self._heading_watch, self._yaw = HeadingWatch(), YawKeeper(config.heading.max_age_s)
+
+    @property
+    def lines(self) -> Mapping[str, Line]:
+        """Every line by its address."""
+        return self._lines
+
+    def opened(self, address: str, now_us: int) -> None:
+        """A line was opened: begin with its devices anew."""
+        self._lines[address].opened(now_us)
+        self._framers[address] = Framer()
+        for device in self._on(address):
+            device.reset()
+            match device.role:
+                case SensorRole.GPS:
+                    self._fixes, self._position_watch = FixDecoder(self.drops), PositionWatch()
+                case SensorRole.IMU:
+                    self._sample_watch, self._gravity_watch = SampleWatch(), GravityWatch()
+                case SensorRole.HEADING:
+                    self._heading_watch = HeadingWatch()
+                    self._yaw.forget()
+
+    def lost(self, address: str, problem: str) -> None:
+        """A line cannot be opened, or is gone."""
+        self._lines[address].lost(problem)
+
+    def take(self, address: str, data: bytes, now_us: int) -> Reading:
+        """What the bytes of a line say that have just come."""
+        line, framer = self._lines[address], self._framers[address]
+        line.bytes += len(data)
+        line.last_byte_us = now_us
+        before = framer.cut_sentences, framer.ubx_failures
+        fixes, samples = list[GpsFix](), list[InertialSample]()
+        for frame in framer.feed(data):
+            try:
+                self._take_frame(line, frame, now_us, fixes, samples)
+            except ChecksumError:
+                line.checksum_failures += 1
+                self.drops["nmea_checksum"] += 1
+            except ValueError:
+                line.damaged += 1
+                self.drops[f"{frame.protocol.lower()}_damaged"] += 1
+        cut, failed = framer.cut_sentences - before[0], framer.ubx_failures - before[1]
+        line.damaged, line.checksum_failures = line.damaged + cut, line.checksum_failures + failed
+        self.drops += Counter(nmea_damaged=cut, ubx_checksum=failed)
+        return Reading(tuple(fixes), self._stamped(samples, now_us))
+
+    def report(self, now_us: int) -> tuple[SensorDevice, ...]:
+        """Every device, whether it is set or not."""
+        return tuple(device.report(now_us) for device in self._devices.values())
+
+    def _on(self, address: str) -> list[Device]:
+        return [each for each in self._devices.values() if each.line is self._lines[address]]
+
+    def _take_frame(
+        self, line: Line, frame: Frame, now_us: int, fixes: list[GpsFix], samples: list[InertialSample]
+    ) -> None:
+        gps, imu, heading = (self._devices[role] for role in SensorRole)
+        is_gps = gps.line is line
+        protocol = self._config.gps.protocol if is_gps else "auto"
+        if protocol not in {"auto", frame.protocol.lower()}:
+            line.foreign = frame.protocol
+            return
+        if frame.protocol is Protocol.UBX:
+            _count_frame(line, f"UBX-{frame.data[2]:02X}-{frame.data[3]:02X}", now_us)
+            if is_gps:
+                fixes += self._use_fix(gps, self._fixes.take_ubx(frame.data), now_us)
+            return
+        kind, sentence = read_sentence(frame.data)
+        _count_frame(line, kind, now_us)
+        if sentence is None:
+            return
+        if is_gps and kind in FIX_SENTENCES:
+            fixes += self._use_fix(gps, self._fixes.take_sentence(sentence), now_us)
+        elif imu.line is line and kind in SAMPLE_SENTENCES:
+            samples.append(self._mounting.turn(read_sample(sentence)))
+        elif heading.line is line and kind in HEADING_SENTENCES:
+            self._use_heading(heading, sentence, now_us)
+
+    def _use_fix(self, gps: Device, fix: GpsFix | None, now_us: int) -> list[GpsFix]:
+        if fix is None:
+            if self._fixes.repeats >= REPEATED_TIMES:
+                gps.frozen_cause = "the receiver repeats one time: its data are withheld"
+                gps.withheld += 1
+            return []
+        gps.frozen_cause = ""
+        if self._position_watch.take(fix):
+            gps.frozen_cause = "the position stands although the speed says that it moves: its data are withheld"
+            gps.withheld += 1
+            self.drops["gps_frozen"] += 1
+            return []
+        gps.has_fix = fix.fix
+        gps.count_data(now_us)
+        self._fix_us = max(now_us - round(self._config.gps.latency_s * 1e6), self._fix_us + 1, 0)
+        return [msgspec.structs.replace(fix, source_us=self._fix_us)]
+
+    def _use_heading(self, device: Device, sentence: Sentence, now_us: int) -> None:
+        config = self._config
+        yaw_rad, problem = read_heading(sentence, config.variation_deg, config.heading.offset_deg)
+        if yaw_rad is None:
+            device.problem = problem
+            return
+        self._heading_watch.take_heading(yaw_rad)
+        self._yaw.take_heading(yaw_rad, now_us)
+        if device.frozen_cause:
+            device.withheld += 1
+        else:
+            device.count_data(now_us)
+
+    def _stamped(self, samples: list[InertialSample], now_us: int) -> tuple[ImuSample, ...]:
+        """The samples of one piece, evenly spaced in time since the piece before: a line hands over several at once."""
+        if not samples:
+            return ()
+        imu, heading = self._devices[SensorRole.IMU], self._devices[SensorRole.HEADING]
+        spacing_us = min((now_us - self._sample_us) // len(samples), MAX_SPACING_US)
+        messages = []
+        for number, sample in enumerate(samples, 1):
+            at_us = max(now_us - (len(samples) - number) * spacing_us, self._sample_us + 1)
+            self._sample_us = at_us
+            is_frozen = self._sample_watch.take(sample, at_us)
+            is_implausible = self._gravity_watch.take(sample)
+            imu.frozen_cause = "the unit repeats one sample: its data are withheld" if is_frozen else ""
+            imu.implausible_cause = NO_GRAVITY if is_implausible else ""
+            yaw_rad = self._yaw_at(heading, sample, at_us)
+            if is_frozen or is_implausible:
+                imu.withheld += 1
+                self.drops["imu_frozen" if is_frozen else "imu_implausible"] += 1
+                continue
+            imu.count_data(now_us)
+            messages.append(imu_message(sample, at_us, yaw_rad))
+        return tuple(messages)
+
+    def _yaw_at(self, heading: Device, sample: InertialSample, at_us: int) -> float | None:
+        """Yaw of the boat at a sample; None while nothing tells it."""
+        if heading.line is None:
+            yaw_rad = sample.attitude_rad[2] if sample.attitude_rad else None
+            return None if yaw_rad is None else true_yaw_rad(yaw_rad, self._config.imu.yaw, self._config.variation_deg)
+        if self._heading_watch.take_sample(sample.gyro_radps[2], at_us):
+            heading.frozen_cause = "the heading stands although the gyro turns: it is withheld"
+            self._yaw.forget()
+        else:
+            heading.frozen_cause = ""
+        return self._yaw.take_sample(sample.gyro_radps[2], at_us)
+
+
+def _count_frame(line: Line, kind: str, now_us: int) -> None:
+    line.frames += 1
+    if kind in line.kinds or len(line.kinds) < MAX_KINDS:
+        line.kinds[kind[:MAX_KIND]] += 1
+    line.last_frame_us = now_us

@@ -1,0 +1,86 @@
+"""Devices of a real hull: GPS, IMU and heading, each on a line of its own or several on one."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from paani.config.section import NonNegative, Positive, Section
+
+Degrees = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+SPEED_MARK = "?speed="
+FASTEST = "max"
+
+
+class GpsConfig(Section, frozen=True):
+    """`line`: `serial:/dev/ttyUSB0@9600`, `socket://HOST:PORT`, or a recorded log `file:PATH`.
+
+    A log plays in real time, with `file:PATH?speed=4` four times as fast, with `file:PATH?speed=max` as fast as it can.
+    """
+
+    line: str = ""  # no receiver unless one is named: no two boats have the same ports
+    # `auto` reads both, and takes the fixes of UBX where there are any, because they state their accuracy.
+    protocol: Literal["nmea", "ubx", "auto"] = "auto"
+    latency_s: NonNegative = 0.1  # from measurement to the last byte: 50 ms of computing and 40 ms at 38400 baud
+
+
+class ImuConfig(Section, frozen=True):
+    """`mount_*_deg`: how the sensor's axes (x forward, y left, z up) are turned against the boat's, yaw first."""
+
+    line: str = ""  # no unit unless one is named
+    mount_roll_deg: Degrees = 0.0  # flat on the deck
+    mount_pitch_deg: Degrees = 0.0  # positive: its front is lower
+    mount_yaw_deg: Degrees = 0.0  # its x ahead; positive: turned to port
+    # North that a 9-axis unit's yaw refers to; `none`: its yaw is not used, as beside motors that disturb its compass.
+    yaw: Literal["magnetic", "true", "none"] = "magnetic"
+
+
+class HeadingConfig(Section, frozen=True):
+    """A compass or a receiver with two antennas. Once it is set, the IMU's own yaw is not used."""
+
+    line: str = ""  # none unless one is named; the same line as another device's is opened once
+    offset_deg: Degrees = 0.0  # direction it points to on the boat, clockwise from ahead
+    max_age_s: Positive = 1.5  # of a heading that the gyro carries on: the slowest compasses speak once a second
+
+
+class SensorDevicesConfig(Section, frozen=True):
+    """What is on the boat's lines. Nothing is published for a device that is not set."""
+
+    gps: GpsConfig = GpsConfig()
+    imu: ImuConfig = ImuConfig()
+    heading: HeadingConfig = HeadingConfig()
+    # East positive; makes magnetic headings true. Unset: only headings that bring their own variation are used,
+    # because a wrong one turns the boat.
+    variation_deg: Degrees | None = None
+
+    def __post_init__(self) -> None:
+        """Every line is one that can be opened."""
+        for name, line in (("gps", self.gps.line), ("imu", self.imu.line), ("heading", self.heading.line)):
+            try:
+                require_line(line)
+            except ValueError as error:
+                raise ValueError(f"{name}.line: {error}") from error
+
+
+def require_line(line: str) -> None:
+    """Raises ValueError for a text that is no device line; empty is none, and in order."""
+    if line.startswith("file:"):
+        path, speed = recording_of(line)
+        if not path or (speed is not None and not 0.0 < speed <= 1000.0):
+            raise ValueError(f"'{line}' is no recording (expected file:PATH, file:PATH?speed=4 or file:PATH?speed=max)")
+    elif line:
+        from paani.serial_port import parse_address  # noqa: PLC0415  # only who names a device needs pyserial
+
+        parse_address(line)
+
+
+def recording_of(line: str) -> tuple[str, float | None]:
+    """Path and speed of a recorded log: 1 is real time, None as fast as it can. A speed that is no number gives 0."""
+    path, _, speed = line.removeprefix("file:").partition(SPEED_MARK)
+    if speed == FASTEST:
+        return path, None
+    try:
+        return path, float(speed) if speed else 1.0
+    except ValueError:
+        return path, 0.0

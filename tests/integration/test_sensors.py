@@ -1,0 +1,304 @@
+"""The sensor process on pseudo-terminals: real bytes, a real router, and devices that misbehave."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import os
+import random
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus
+from paani.messages import SensorRole, SensorStatus
+from tests.conftest import OpenAs, Spawn
+from tests.places import DATA
+from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, sentence
+
+pytestmark = pytest.mark.integration
+LOGS = DATA / "logs"
+LATITUDE_DEG, LONGITUDE_DEG = 48.1173, 11.5166667
+
+
+class Terminal:
+    """A device on a pseudo-terminal, under a name that stays when it is plugged in again."""
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.address = f"serial:{link}"
+        self._ends: tuple[int, int] | None = None
+
+    def plug(self) -> None:
+        self._ends = os.openpty()
+        os.set_blocking(self._ends[0], False)
+        self.link.symlink_to(os.ttyname(self._ends[1]))
+
+    def unplug(self) -> None:
+        if self._ends is not None:
+            self.link.unlink()
+            for end in self._ends:
+                os.close(end)
+            self._ends = None
+
+    def write(self, data: bytes) -> None:
+        """What does not fit is lost, as on a wire."""
+        if self._ends is not None:
+            with contextlib.suppress(BlockingIOError):
+                os.write(self._ends[0], data)
+
+
+@pytest.fixture
+def private_sets(private_sets: tuple[str, ...]) -> tuple[str, ...]:
+    return (*private_sets, "profile=hull")
+
+
+@pytest.fixture
+def terminals(tmp_path: Path) -> Iterator[dict[str, Terminal]]:
+    found = {name: Terminal(tmp_path / name) for name in ("gps", "imu", "heading")}
+    for terminal in found.values():
+        terminal.plug()
+    yield found
+    for terminal in found.values():
+        terminal.unplug()
+
+
+def lines_of(terminals: dict[str, Terminal]) -> tuple[str, ...]:
+    return tuple(f'sensors.{name}.line="{terminal.address}"' for name, terminal in terminals.items())
+
+
+class Boat:
+    """Drives north-east at 1 m/s: NAV-PVT among GSV at 5 Hz, samples at 100 Hz, headings at 10 Hz."""
+
+    def __init__(self, terminals: dict[str, Terminal]) -> None:
+        self.terminals = terminals
+        self.noise = random.Random(1)
+        self.gps: Callable[[int], bytes] = self.fix
+        self.step = 0
+
+    def fix(self, step: int) -> bytes:
+        along_deg = 0.01 * step * math.sqrt(0.5) / 111_200.0
+        pvt = nav_pvt(
+            10 * step,
+            latitude_deg=LATITUDE_DEG + along_deg,
+            longitude_deg=LONGITUDE_DEG + along_deg / math.cos(math.radians(LATITUDE_DEG)),
+            sog_mmps=1000,
+            course_deg=45.0,
+        )
+        return sentence("GPGSV,1,1,00").encode() + pvt
+
+    def sample(self, step: int) -> bytes:
+        accel = (self.noise.gauss(0.0, 0.03), self.noise.gauss(0.0, 0.03), 9.81 + self.noise.gauss(0.0, 0.03))
+        return imu_line(10 * step, accel, (0.0, 0.0, self.noise.gauss(0.0, 0.1)))
+
+    async def drive(self) -> None:
+        loop = asyncio.get_running_loop()
+        start_s = loop.time()
+        while True:
+            self.terminals["imu"].write(self.sample(self.step))
+            if self.step % 20 == 0:
+                self.terminals["gps"].write(self.gps(self.step))
+            if self.step % 10 == 5:
+                self.terminals["heading"].write(sentence(f"GNHDT,{45.0 + self.noise.gauss(0.0, 0.3):.2f},T").encode())
+            self.step += 1
+            await asyncio.sleep(start_s + 0.01 * self.step - loop.time())
+
+
+@contextlib.asynccontextmanager
+async def driving(boat: Boat) -> AsyncIterator[None]:
+    task = asyncio.create_task(boat.drive())
+    try:
+        yield
+    finally:
+        task.cancel()
+
+
+async def device(
+    bus: Bus, role: SensorRole, until: Callable[[m.SensorDevice], bool], within_s: float
+) -> m.SensorDevice:
+    """The first report of the device that fits; fails with the last one otherwise."""
+    states = bus.latest(keys.SENSORS_STATE)
+    found = None
+    try:
+        async with asyncio.timeout(within_s):
+            while True:
+                state = await states.next()
+                found = next(each for each in state.devices if each.role is role)
+                if until(found):
+                    return found
+    except TimeoutError:
+        pytest.fail(f"after {within_s} s: {found}")
+
+
+def has(status: SensorStatus) -> Callable[[m.SensorDevice], bool]:
+    return lambda found: found.status is status
+
+
+def is_at(rate_hz: float) -> Callable[[m.SensorDevice], bool]:
+    return lambda found: found.rate_hz > 0.9 * rate_hz
+
+
+async def test_a_drive_on_three_serial_lines_reaches_the_estimator(
+    spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
+) -> None:
+    """Every device is in order, the estimate becomes healthy, and it lies where the receiver says."""
+    bus = await open_as("observer")
+    async with spawn("sensors", *lines_of(terminals)), spawn("localization"):
+        odometry, gps, health = bus.latest(keys.ODOMETRY), bus.latest(keys.GPS), bus.latest(keys.health("sensors"))
+        async with driving(Boat(terminals)):
+            for role, rate_hz in ((SensorRole.GPS, 5.0), (SensorRole.IMU, 100.0), (SensorRole.HEADING, 10.0)):
+                found = await device(bus, role, is_at(rate_hz), 15.0)
+                assert found.status is SensorStatus.OK
+                assert (found.checksum_failures, found.damaged, found.withheld, found.reconnections) == (0, 0, 0, 0)
+            async with asyncio.timeout(20.0):
+                while not (estimate := await odometry.next()).healthy:
+                    pass
+            for _ in range(40):
+                estimate = await odometry.next()
+            assert gps.value is not None
+            assert gps.value.producer == "sensors"
+            north_m = (estimate.latitude_deg - gps.value.latitude_deg) * 111_200.0
+            assert abs(north_m) < 3.0
+            assert math.hypot(estimate.surge_mps, estimate.sway_mps) == pytest.approx(1.0, abs=0.3)
+            assert estimate.yaw_rad == pytest.approx(math.radians(45.0), abs=0.05)
+            assert health.value is not None
+            assert "gps ok" in health.value.note
+
+
+async def test_a_receiver_pulled_out_and_plugged_in_again_is_back_by_itself(
+    spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
+) -> None:
+    bus = await open_as("observer")
+    async with spawn("sensors", *lines_of(terminals)), driving(Boat(terminals)):
+        await device(bus, SensorRole.GPS, has(SensorStatus.OK), 10.0)
+        terminals["gps"].unplug()
+        gone = await device(bus, SensorRole.GPS, has(SensorStatus.ABSENT), 5.0)
+        assert "next try" in gone.note
+        fixes = bus.latest(keys.GPS)
+        await asyncio.sleep(1.0)
+        assert fixes.received == 0
+        terminals["gps"].plug()
+        back = await device(bus, SensorRole.GPS, has(SensorStatus.OK), 12.0)
+        assert back.reconnections == 1
+        assert fixes.received > 0
+        assert (await device(bus, SensorRole.IMU, has(SensorStatus.OK), 2.0)).reconnections == 0
+
+
+async def test_a_device_that_babbles_is_named_and_costs_the_others_nothing(
+    spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
+) -> None:
+    bus, noise = await open_as("observer"), random.Random(2).randbytes(4000)
+
+    async def babble() -> None:
+        while True:
+            terminals["gps"].write(noise)
+            await asyncio.sleep(0.002)
+
+    async with spawn("sensors", *lines_of(terminals)), driving(Boat({**terminals, "gps": terminals["heading"]})):
+        babbling = asyncio.create_task(babble())
+        named = await device(bus, SensorRole.GPS, lambda each: "babbles" in each.note, 10.0)
+        assert named.status is SensorStatus.ABSENT
+        health = bus.latest(keys.health("sensors"))
+        await asyncio.sleep(4.0)
+        assert (await device(bus, SensorRole.IMU, has(SensorStatus.OK), 2.0)).rate_hz > 80.0
+        assert health.value is not None
+        assert health.value.cpu_cores < 0.5
+        babbling.cancel()
+
+
+async def test_another_baud_rate_is_told_from_silence(
+    spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
+) -> None:
+    bus, noise = await open_as("observer"), random.Random(3)
+    boat = Boat(terminals)
+    boat.gps = lambda _: noise.randbytes(60)
+    async with spawn("sensors", *lines_of({"gps": terminals["gps"], "imu": terminals["imu"]})), driving(boat):
+        found = await device(bus, SensorRole.GPS, has(SensorStatus.UNREADABLE), 8.0)
+        assert "baud" in found.note
+        boat.gps = lambda _: b""
+        await device(bus, SensorRole.GPS, has(SensorStatus.SILENT), 8.0)
+        boat.gps = boat.fix
+        await device(bus, SensorRole.GPS, has(SensorStatus.OK), 5.0)
+
+
+async def test_a_receiver_that_freezes_gives_no_fixes_and_one_that_rests_does(
+    spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
+) -> None:
+    bus = await open_as("observer")
+    boat = Boat(terminals)
+    boat.gps = lambda step: nav_pvt(10 * step, sog_mmps=20)  # at rest: one position, time goes on
+    async with spawn("sensors", *lines_of(terminals)), driving(boat):
+        await device(bus, SensorRole.GPS, lambda each: each.rate_hz > 4.5, 12.0)
+        assert (await device(bus, SensorRole.GPS, has(SensorStatus.OK), 2.0)).withheld == 0
+        frozen = nav_pvt(10 * boat.step + 100, sog_mmps=20)
+        boat.gps = lambda _: frozen
+        found = await device(bus, SensorRole.GPS, has(SensorStatus.FROZEN), 5.0)
+        assert "time" in found.note
+        fixes = bus.latest(keys.GPS)
+        await asyncio.sleep(2.0)
+        assert fixes.received == 0
+        boat.gps = boat.fix
+        await device(bus, SensorRole.GPS, has(SensorStatus.OK), 5.0)
+
+
+@pytest.mark.data
+@pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
+async def test_a_sailing_log_plays_through_the_same_adapter_as_fast_as_it_can(spawn: Spawn, open_as: OpenAs) -> None:
+    bus = await open_as("observer")
+    async with spawn("sensors", f'sensors.gps.line="file:{LOGS}/plaka_sail.nmea?speed=max"'):
+        found = await device(bus, SensorRole.GPS, lambda each: "played to the end" in each.note, 60.0)
+        assert (found.checksum_failures, found.damaged, found.withheld) == (0, 0, 0)
+        assert found.frames == 3625 * 14 + 3624 + 3625
+
+
+async def paani(sets: tuple[str, ...], *words: str) -> tuple[int | None, str, str]:
+    settings = [word for setting in sets for word in ("--set", setting)]
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "paani", *words, *settings, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    out, errors = await process.communicate()
+    return process.returncode, out.decode(), errors.decode()
+
+
+async def test_paani_sensors_shows_what_each_says_and_what_is_missing(
+    spawn: Spawn, open_as: OpenAs, private_sets: tuple[str, ...], terminals: dict[str, Terminal]
+) -> None:
+    bus = await open_as("observer")
+    terminals["heading"].unplug()
+    async with spawn("sensors", *lines_of(terminals)), driving(Boat(terminals)):
+        await device(bus, SensorRole.IMU, lambda each: each.rate_hz > 90.0, 10.0)
+        code, out, errors = await paani(private_sets, "sensors", "--for", "2.5")
+        assert (code, errors) == (1, "")
+        gps, imu, heading, lacks = out.split("\n\n")[1].splitlines()
+        assert gps.startswith("gps     ok")
+        assert "48.11" in gps
+        assert "m/s^2" in imu
+        assert heading.startswith("heading absent")
+        assert "next try" in heading
+        assert lacks == "missing: a heading: the boat stays stopped without one"
+        terminals["heading"].plug()
+        await device(bus, SensorRole.HEADING, has(SensorStatus.OK), 10.0)
+        code, out, errors = await paani(private_sets, "sensors", "--for", "2.5", "--json")
+        assert (code, errors) == (0, "")
+        row = msgspec.json.decode(out.splitlines()[-1])
+        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok"]
+        assert row["missing"] == ""
+        assert row["imu"]["orientation_available"]
+
+
+async def test_paani_sensors_says_when_nothing_runs(
+    open_as: OpenAs, private_sets: tuple[str, ...], config: object
+) -> None:
+    code, out, errors = await paani(private_sets, "sensors", "--for", "1")
+    assert (code, out) == (2, "")
+    assert "sensors/state" in errors
+    assert len(errors.splitlines()) == 1
+    code, _, errors = await paani((*private_sets, "bus.router=tcp/127.0.0.1:1"), "sensors")
+    assert code == 2
+    assert "nothing listens there" in errors

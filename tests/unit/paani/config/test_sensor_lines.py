@@ -1,0 +1,33 @@
+"""Lines of devices in the settings."""
+
+from __future__ import annotations
+
+import pytest
+
+from paani.config import load_config
+from paani.config.sensors import recording_of
+from paani.errors import UserError
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["", "serial:/dev/ttyUSB0@9600", "socket://127.0.0.1:2947", "file:a.nmea", "file:a?speed=4", "file:a?speed=max"],
+)
+def test_a_line_that_can_be_opened_is_taken(line: str) -> None:
+    assert load_config(sets=(f'sensors.gps.line="{line}"',)).sensors.gps.line == line
+
+
+@pytest.mark.parametrize(
+    "line", ["/dev/ttyUSB0", "serial:ttyUSB0", "serial:/dev/a@5", "file:", "file:a?speed=0", "file:a?speed=x"]
+)
+@pytest.mark.parametrize("device", ["gps", "imu", "heading"])
+def test_another_is_refused_with_its_field(device: str, line: str) -> None:
+    with pytest.raises(UserError, match=rf"sensors.*{device}\.line") as refusal:
+        load_config(sets=(f'sensors.{device}.line="{line}"',))
+    assert "\n" not in str(refusal.value)
+
+
+def test_the_speed_of_a_recording() -> None:
+    assert recording_of("file:/a/b.nmea") == ("/a/b.nmea", 1.0)
+    assert recording_of("file:/a/b.nmea?speed=2.5") == ("/a/b.nmea", 2.5)
+    assert recording_of("file:/a/b.nmea?speed=max") == ("/a/b.nmea", None)

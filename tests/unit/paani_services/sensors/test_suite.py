@@ -1,0 +1,287 @@
+"""All devices together: bytes in, fixes, samples and the state of each device out."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani.config import GpsConfig, HeadingConfig, ImuConfig, SensorDevicesConfig
+from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole, SensorStatus
+from paani_services.sensors.suite import SensorSuite
+from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
+
+GPS, IMU, HEADING = "serial:/dev/gps@9600", "serial:/dev/imu", "serial:/dev/compass@4800"
+CONFIG = SensorDevicesConfig(
+    gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), heading=HeadingConfig(line=HEADING), variation_deg=2.0
+)
+START_US = 1_700_000_000_000_000
+
+
+class Bench:
+    """The suite, and a clock that the test moves."""
+
+    def __init__(self, config: SensorDevicesConfig = CONFIG, *, is_open: bool = True) -> None:
+        self.suite, self.now_us = SensorSuite(config), START_US
+        self._noise = random.Random(1)
+        for address in self.suite.lines if is_open else ():
+            self.suite.opened(address, self.now_us)
+
+    def wait(self, seconds: float) -> None:
+        self.now_us += round(seconds * 1e6)
+
+    def fixes(self, data: bytes) -> tuple[GpsFix, ...]:
+        return self.suite.take(GPS, data, self.now_us).fixes
+
+    def samples(self, data: bytes) -> tuple[ImuSample, ...]:
+        return self.suite.take(IMU, data, self.now_us).samples
+
+    def noisy(self, ms: int, z: float = 9.81, rate_dps: float = 0.0) -> bytes:
+        return imu_line(ms, (0.0, 0.0, z + self._noise.gauss(0.0, 0.03)), (0.0, 0.0, rate_dps))
+
+    def run_imu(self, seconds: float, rate_dps: float = 0.0) -> list[ImuSample]:
+        """100 samples a second, each in its own piece."""
+        found: list[ImuSample] = []
+        for _ in range(round(seconds * 100)):
+            self.wait(0.01)
+            found += self.samples(self.noisy(self.now_us // 1000 % 1_000_000, rate_dps=rate_dps))
+        return found
+
+    def device(self, role: SensorRole) -> SensorDevice:
+        return next(device for device in self.suite.report(self.now_us) if device.role is role)
+
+
+def test_without_settings_there_is_no_line_and_everything_is_off() -> None:
+    bench = Bench(SensorDevicesConfig())
+    assert not bench.suite.lines
+    assert {device.status for device in bench.suite.report(START_US)} == {SensorStatus.OFF}
+
+
+def test_a_fix_is_dated_by_its_receipt_less_the_latency() -> None:
+    bench = Bench()
+    (fix,) = bench.fixes(nav_pvt())
+    assert fix.source_us == START_US - 100_000
+    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+
+
+def test_fixes_that_come_in_one_piece_are_in_order() -> None:
+    first, second = Bench().fixes(rmc("123519") + rmc("123520"))
+    assert second.source_us > first.source_us
+
+
+def test_samples_that_come_in_one_piece_are_spread_over_the_time_since_the_last() -> None:
+    bench = Bench()
+    bench.run_imu(0.5)
+    bench.wait(0.04)
+    found = bench.samples(b"".join(bench.noisy(ms) for ms in (1, 11, 21, 31)))
+    assert [sample.source_us - bench.now_us for sample in found] == [-30_000, -20_000, -10_000, 0]
+
+
+def test_a12_an_mpu6050_has_no_orientation_until_a_compass_gives_the_heading() -> None:
+    alone = Bench(SensorDevicesConfig(imu=ImuConfig(line=IMU)))
+    assert {sample.orientation_available for sample in alone.run_imu(1.0)} == {False}
+    bench = Bench()
+    assert {sample.orientation_available for sample in bench.run_imu(1.0)} == {False}
+    bench.suite.take(HEADING, sentence("HCHDM,358.0,M").encode(), bench.now_us)
+    samples = bench.run_imu(1.0, rate_dps=10.0)
+    assert all(sample.orientation_available for sample in samples)
+    assert samples[0].yaw_rad == pytest.approx(math.radians(90.1), abs=1e-6)
+    assert samples[-1].yaw_rad == pytest.approx(math.radians(100.0), abs=1e-6)
+
+
+def test_the_orientation_becomes_unavailable_when_the_compass_falls_silent() -> None:
+    bench = Bench()
+    bench.suite.take(HEADING, sentence("GNHDT,90.0,T").encode(), bench.now_us)
+    samples = bench.run_imu(2.0)
+    last = max(sample.source_us for sample in samples if sample.orientation_available)
+    assert (last - START_US) * 1e-6 == pytest.approx(1.5, abs=0.02)
+
+
+def test_a_nine_axis_unit_gives_its_own_yaw_only_if_its_north_is_known() -> None:
+    line = sentence("VNYMR,10.0,0.0,0.0,0,0,0,0.01,0.02,-9.81,0,0,0.1").encode()
+    for variation_deg, yaw_deg in ((None, None), (5.0, 75.0)):
+        bench = Bench(SensorDevicesConfig(imu=ImuConfig(line=IMU), variation_deg=variation_deg))
+        (sample,) = bench.samples(line)
+        assert sample.orientation_available is (yaw_deg is not None)
+        if yaw_deg is not None:
+            assert math.degrees(sample.yaw_rad) == pytest.approx(yaw_deg)
+
+
+def test_one_line_may_carry_position_and_heading() -> None:
+    bench = Bench(
+        SensorDevicesConfig(gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), heading=HeadingConfig(line=GPS))
+    )
+    assert set(bench.suite.lines) == {GPS, IMU}
+    assert bench.fixes(rmc() + sentence("GNHDT,0.0,T").encode())
+    assert all(sample.orientation_available for sample in bench.run_imu(0.2))
+    assert bench.device(SensorRole.HEADING).status is SensorStatus.OK
+
+
+def test_each_status_names_what_is_wrong() -> None:
+    bench = Bench(is_open=False)
+    assert bench.device(SensorRole.GPS).status is SensorStatus.ABSENT
+    bench.suite.lost(GPS, "no such file; next try after 1 s")
+    assert bench.device(SensorRole.GPS).note == "no such file; next try after 1 s"
+    bench.suite.opened(GPS, bench.now_us)
+    bench.wait(3.0)
+    assert bench.device(SensorRole.GPS).status is SensorStatus.SILENT
+    assert not bench.fixes(b"\x80\x00\xffab" * 20)
+    device = bench.device(SensorRole.GPS)
+    assert device.status is SensorStatus.UNREADABLE
+    assert "baud" in device.note
+    assert not bench.fixes(sentence("GPGSV,1,1,00").encode())
+    device = bench.device(SensorRole.GPS)
+    assert (device.status, device.heard) == (SensorStatus.INCOMPLETE, "GSV")
+    assert "RMC" in device.note
+    (fix,) = bench.fixes(sentence("GPRMC,123519,V,,,,,,,230394,,").encode())
+    assert not fix.fix
+    assert bench.device(SensorRole.GPS).status is SensorStatus.NO_FIX
+    assert bench.fixes(rmc("123520"))
+    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+    bench.suite.lost(GPS, "vanished")
+    assert bench.device(SensorRole.GPS).status is SensorStatus.ABSENT
+    bench.suite.opened(GPS, bench.now_us)
+    assert bench.device(SensorRole.GPS).reconnections == 1
+
+
+def test_a_compass_without_variation_says_what_to_set() -> None:
+    bench = Bench(SensorDevicesConfig(imu=ImuConfig(line=IMU), heading=HeadingConfig(line=HEADING)))
+    bench.suite.take(HEADING, sentence("HCHDM,358.0,M").encode(), bench.now_us)
+    device = bench.device(SensorRole.HEADING)
+    assert device.status is SensorStatus.INCOMPLETE
+    assert "sensors.variation_deg" in device.note
+    assert not bench.run_imu(0.1)[-1].orientation_available
+
+
+def test_a_protocol_that_is_left_out_is_named_and_not_used() -> None:
+    bench = Bench(SensorDevicesConfig(gps=GpsConfig(line=GPS, protocol="nmea")))
+    bench.wait(3.0)
+    assert not bench.fixes(nav_pvt())
+    device = bench.device(SensorRole.GPS)
+    assert device.status is SensorStatus.UNREADABLE
+    assert "UBX" in device.note
+
+
+def test_a_receiver_whose_time_stands_is_frozen_and_gives_nothing_until_it_goes_on() -> None:
+    bench = Bench()
+    assert bench.fixes(rmc("123519"))
+    for _ in range(6):
+        bench.wait(0.2)
+        assert not bench.fixes(rmc("123519"))
+    assert bench.device(SensorRole.GPS).status is SensorStatus.FROZEN
+    assert bench.fixes(rmc("123520"))
+    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+
+
+def test_a_receiver_that_rests_goes_on_and_one_that_stands_at_speed_is_withheld() -> None:
+    bench = Bench()
+    for second in range(30):
+        bench.wait(1.0)
+        assert bench.fixes(rmc(f"1235{second:02d}", knots=0.02))
+    frozen = []
+    for second in range(30):
+        bench.wait(1.0)
+        frozen.append(not bench.fixes(rmc(f"1235{30 + second}", knots=2.0)))
+    assert frozen.index(True) == 3
+    assert all(frozen[3:])
+    device = bench.device(SensorRole.GPS)
+    assert (device.status, device.withheld) == (SensorStatus.FROZEN, 27)
+    assert bench.fixes(rmc("123640", "4807.0390,N", knots=2.0))
+
+
+def test_an_inertial_unit_that_repeats_one_sample_is_withheld_until_it_changes() -> None:
+    bench = Bench()
+    assert len(bench.run_imu(1.0)) == 100
+    found: list[ImuSample] = []
+    for step in range(200):
+        bench.wait(0.01)
+        found += bench.samples(imu_line(20_000 + 10 * step, (0.0, 0.0, 9.8)))
+    assert len(found) == pytest.approx(50, abs=1)
+    assert bench.device(SensorRole.IMU).status is SensorStatus.FROZEN
+    assert bench.run_imu(0.1)
+    assert bench.device(SensorRole.IMU).status is SensorStatus.OK
+
+
+def test_a_unit_in_g_is_withheld() -> None:
+    bench = Bench()
+    for step in range(20):
+        bench.wait(0.01)
+        assert not bench.samples(bench.noisy(step, z=1.0))
+    device = bench.device(SensorRole.IMU)
+    assert device.status is SensorStatus.IMPLAUSIBLE
+    assert "m/s^2" in device.note
+
+
+def test_a_compass_that_stands_while_the_gyro_turns_is_withheld() -> None:
+    bench = Bench()
+    found: list[ImuSample] = []
+    for _ in range(30):
+        bench.suite.take(HEADING, sentence("GNHDT,90.0,T").encode(), bench.now_us)
+        found += bench.run_imu(0.1, rate_dps=20.0)
+    assert found[20].orientation_available
+    assert not any(sample.orientation_available for sample in found[-200:])
+    assert bench.device(SensorRole.HEADING).status is SensorStatus.FROZEN
+    bench.suite.take(HEADING, sentence("GNHDT,30.0,T").encode(), bench.now_us)
+    assert bench.run_imu(0.1)[-1].orientation_available
+
+
+def test_damage_is_counted_by_cause() -> None:
+    bench = Bench()
+    bench.fixes(rmc().replace(b"A", b"B") + rmc()[:20] + rmc("253519") + nav_pvt()[:-1] + b"\x00" + rmc("123519"))
+    device = bench.device(SensorRole.GPS)
+    assert (device.checksum_failures, device.damaged, device.frames) == (2, 2, 2)
+    assert bench.suite.drops == {"nmea_checksum": 1, "nmea_damaged": 2, "ubx_checksum": 1}
+
+
+def test_the_rate_is_that_of_usable_data() -> None:
+    bench = Bench()
+    for second in range(10):
+        bench.wait(1.0)
+        bench.fixes(rmc(f"1235{second:02d}"))
+    bench.wait(0.5)
+    device = bench.device(SensorRole.GPS)
+    assert device.rate_hz == pytest.approx(1.0, abs=0.01)
+    assert device.age_s == pytest.approx(0.5)
+
+
+@settings(deadline=None)  # the first example compiles patterns and fills caches
+@given(st.lists(st.tuples(st.sampled_from([GPS, IMU, HEADING]), st.binary(max_size=300)), max_size=8))
+def test_any_bytes_on_any_line_are_survived(pieces: list[tuple[str, bytes]]) -> None:
+    bench = Bench()
+    for address, data in pieces:
+        bench.wait(0.1)
+        bench.suite.take(address, data, bench.now_us)
+    assert len(bench.suite.report(bench.now_us)) == 3
+
+
+BODIES = st.text(st.characters(codec="ascii", exclude_characters="\r\n$!*"), max_size=80)
+KINDS = [
+    "GPRMC",
+    "GPGGA",
+    "GPGLL",
+    "GPVTG",
+    "GPGST",
+    "GPHDT",
+    "GPHDG",
+    "GPHDM",
+    "GPTHS",
+    "PQTMIMU",
+    "VNYMR",
+    "PASHR",
+    "PUBX",
+]
+
+
+@settings(deadline=None)  # the first example compiles patterns and fills caches
+@given(st.lists(st.tuples(st.sampled_from(KINDS), BODIES), max_size=6))
+def test_any_sentence_with_a_good_checksum_is_survived(bodies: list[tuple[str, str]]) -> None:
+    bench = Bench(
+        SensorDevicesConfig(gps=GpsConfig(line=GPS), imu=ImuConfig(line=GPS), heading=HeadingConfig(line=GPS))
+    )
+    for kind, body in bodies:
+        bench.wait(0.1)
+        bench.fixes(sentence(f"{kind},{body}").encode())
+    bench.suite.report(bench.now_us)
