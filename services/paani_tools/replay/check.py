@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
@@ -70,60 +71,88 @@ def check_service(
     records: those of `Ledger(decider).topics`. digest: SHA-256 of all bytes computed.
     """
     recompute = Recomputation(decider, config, losses, evolve=False)
-    ledger = recompute.ledger
-    result = ServiceCheck(service=decider.service)
-    causes: collections.Counter[str] = collections.Counter()
-    differences: list[Difference] = []
-    digest = hashlib.sha256()
+    comparison = _Comparison(decider.service, recompute, losses)
     for step in recompute.steps(records):
-        result.steps += 1
         if on_step is not None:
             on_step(step)
+        comparison.take_step(step)
+    comparison.take_orphans()
+    return comparison.finish()
+
+
+class _Comparison:
+    """What the steps of one service gave, beside what was recorded of them."""
+
+    def __init__(self, service: str, recompute: Recomputation, losses: Losses) -> None:
+        self._result = ServiceCheck(service=service)
+        self._recompute, self._losses = recompute, losses
+        self._causes: collections.Counter[str] = collections.Counter()
+        self._differences: list[Difference] = []
+        self._digest = hashlib.sha256()
+
+    def take_step(self, step: RecomputedStep) -> None:
+        """Count a step that was computed again, or why it could not be."""
+        result = self._result
+        result.steps += 1
         if step.missing_before:
-            causes["steps are not in the log"] += step.missing_before
+            self._causes["steps are not in the log"] += step.missing_before
         if step.skip is not None:
-            if step.excuse is ExpectedGap.START:
-                result.before_start += 1
-            elif step.excuse is ExpectedGap.LOST:
-                result.lost += 1
-            else:
-                causes[step.skip + (f" ({step.detail})" if step.detail else "")] += 1
-            continue
+            self._count_skipped(step, step.skip)
+            return
         differs = step.state_same is False
         result.states += step.state_same is not None
         result.differing_states += differs
         for sent, recorded, computed in step.outputs:
-            digest.update(computed)
+            self._digest.update(computed)
             if recorded is None:
-                early = ledger.precedes(sent.topic, sent.epoch, sent.seq)
-                if early or losses.at_edge(step.given.log_us):
-                    result.at_edges += 1
-                elif recompute.is_lost(sent.topic):
-                    result.lost += 1
-                else:
-                    causes[f"{sent.topic} it had sent is not in the log"] += 1
+                self._count_unrecorded(sent, step.given.log_us)
                 continue
             result.messages += 1
             result.message_bytes += len(recorded)
             if computed != recorded:
                 differs = True
                 result.differing_messages += 1
-                if len(differences) < SHOWN:
-                    differences.append(first_difference(step.given.step.source_us, sent, recorded, computed))
+                if len(self._differences) < SHOWN:
+                    self._differences.append(first_difference(step.given.step.source_us, sent, recorded, computed))
         result.decisions += bool(step.outputs) or differs
         result.differ += differs
-    orphans: collections.Counter[str] = collections.Counter()
-    for log_us, (topic, _, _) in ledger.orphans:
-        orphans[topic] += 1
-        if losses.at_edge(log_us):
-            result.at_edges += 1
-        elif orphans[topic] <= recompute.lost_steps:
-            result.lost += 1
+
+    def _count_skipped(self, step: RecomputedStep, skip: str) -> None:
+        if step.excuse is ExpectedGap.START:
+            self._result.before_start += 1
+        elif step.excuse is ExpectedGap.LOST:
+            self._result.lost += 1
         else:
-            causes[f"{topic} belongs to no step in the log"] += 1
-    for topic, count in ledger.malformed.items():
-        causes[f"{topic} does not decode"] += count
-    result.unexplained = tuple(Unexplained(cause=cause, count=count) for cause, count in causes.most_common(SHOWN))
-    result.differences = tuple(differences)
-    result.digest = digest.hexdigest()
-    return result
+            self._causes[skip + (f" ({step.detail})" if step.detail else "")] += 1
+
+    def _count_unrecorded(self, sent: m.OutputMessage, log_us: int) -> None:
+        """A message that the step had sent and the log does not hold."""
+        early = self._recompute.ledger.precedes(sent.topic, sent.epoch, sent.seq)
+        if early or self._losses.at_edge(log_us):
+            self._result.at_edges += 1
+        elif self._recompute.is_lost(sent.topic):
+            self._result.lost += 1
+        else:
+            self._causes[f"{sent.topic} it had sent is not in the log"] += 1
+
+    def take_orphans(self) -> None:
+        """Count, when all steps are through, the messages that belong to none and those that do not decode."""
+        orphans: collections.Counter[str] = collections.Counter()
+        for log_us, (topic, _, _) in self._recompute.ledger.orphans:
+            orphans[topic] += 1
+            if self._losses.at_edge(log_us):
+                self._result.at_edges += 1
+            elif orphans[topic] <= self._recompute.lost_steps:
+                self._result.lost += 1
+            else:
+                self._causes[f"{topic} belongs to no step in the log"] += 1
+        for topic, count in self._recompute.ledger.malformed.items():
+            self._causes[f"{topic} does not decode"] += count
+
+    def finish(self) -> ServiceCheck:
+        """The counts, with the most frequent causes."""
+        result = self._result
+        result.unexplained = tuple(Unexplained(cause=cause, count=n) for cause, n in self._causes.most_common(SHOWN))
+        result.differences = tuple(self._differences)
+        result.digest = self._digest.hexdigest()
+        return result

@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
@@ -60,58 +61,75 @@ def changes_of(
 
     instead: inputs given in place of the recorded ones; what is sent and differs is added to it.
     """
-    decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in decider.outputs}
-    open_episodes: dict[str, Episode] = {}
-    episodes: list[Episode] = []
-    fields: collections.Counter[str] = collections.Counter()
-    messages = changed = numbers = skipped = 0
+    changes = _Changes(decider, start_us)
     for step in Recomputation(decider, config, losses, evolve=True, instead=instead).steps(records):
         if on_step is not None:
             on_step(step)
-        skipped += step.skip is not None
-        at_s = (step.given.step.source_us - start_us) * 1e-6
+        changes.skipped += step.skip is not None
         for sent, recorded, computed in step.outputs:
             if recorded is None:
                 continue
-            messages += 1
-            if recorded == computed:
-                continue
-            instead[sent.topic, sent.epoch, sent.seq] = computed
-            try:
-                before, now = decoders[sent.topic].decode(recorded), decoders[sent.topic].decode(computed)
-            except msgspec.MsgspecError:
-                skipped += 1
-                continue
-            if decision_text(before) == decision_text(now):
-                numbers += 1
-                fields.update(path.partition("[")[0] for path, _, _ in differing_fields(recorded, computed))
-                continue
-            changed += 1
-            episode = open_episodes.get(sent.topic)
-            same = episode is not None and (episode.recorded, episode.computed) == (
-                decision_text(before),
-                decision_text(now),
-            )
-            if episode is not None and same and at_s - episode.end_s <= GAP_US * 1e-6:
-                episode.end_s, episode.decisions = at_s, episode.decisions + 1
-                continue
-            open_episodes[sent.topic] = Episode(
-                topic=sent.topic,
-                start_s=at_s,
-                end_s=at_s,
-                decisions=1,
-                recorded=decision_text(before),
-                computed=decision_text(now),
-                recorded_why=reason_text(before),
-                computed_why=reason_text(now),
-            )
-            episodes.append(open_episodes[sent.topic])
-    return ServiceChanges(
-        service=decider.service,
-        messages=messages,
-        changed=changed,
-        numbers=numbers,
-        skipped=skipped,
-        fields=tuple(fields.most_common(SHOWN_FIELDS)),
-        episodes=tuple(episodes),
-    )
+            changes.messages += 1
+            if recorded != computed:
+                instead[sent.topic, sent.epoch, sent.seq] = computed
+                changes.take(sent.topic, step.given.step.source_us, recorded, computed)
+    return changes.result()
+
+
+class _Changes:
+    """Counts messages of one service that differ, and joins changed decisions into episodes."""
+
+    def __init__(self, decider: Decider[Any], start_us: int) -> None:
+        self.messages = self.skipped = 0
+        self._changed = self._numbers = 0
+        self._service, self._start_us = decider.service, start_us
+        self._decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in decider.outputs}
+        self._fields: collections.Counter[str] = collections.Counter()
+        self._episodes: list[Episode] = []
+        self._newest: dict[str, Episode] = {}
+
+    def take(self, topic: str, at_us: int, recorded: bytes, computed: bytes) -> None:
+        """A message that is not byte for byte the same."""
+        decode = self._decoders[topic].decode
+        try:
+            before, now = decode(recorded), decode(computed)
+        except msgspec.MsgspecError:
+            self.skipped += 1
+            return
+        if decision_text(before) == decision_text(now):
+            self._numbers += 1
+            self._fields.update(path.partition("[")[0] for path, _, _ in differing_fields(recorded, computed))
+            return
+        self._changed += 1
+        self._join_episode(topic, (at_us - self._start_us) * 1e-6, before, now)
+
+    def _join_episode(self, topic: str, at_s: float, before: m.Message, now: m.Message) -> None:
+        """Go on with the topic's newest episode if the same changed in it a moment ago, else begin one."""
+        texts = decision_text(before), decision_text(now)
+        newest = self._newest.get(topic)
+        if newest and (newest.recorded, newest.computed) == texts and at_s - newest.end_s <= GAP_US * 1e-6:
+            newest.end_s, newest.decisions = at_s, newest.decisions + 1
+            return
+        self._newest[topic] = Episode(
+            topic=topic,
+            start_s=at_s,
+            end_s=at_s,
+            decisions=1,
+            recorded=texts[0],
+            computed=texts[1],
+            recorded_why=reason_text(before),
+            computed_why=reason_text(now),
+        )
+        self._episodes.append(self._newest[topic])
+
+    def result(self) -> ServiceChanges:
+        """Everything so far."""
+        return ServiceChanges(
+            service=self._service,
+            messages=self.messages,
+            changed=self._changed,
+            numbers=self._numbers,
+            skipped=self.skipped,
+            fields=tuple(self._fields.most_common(SHOWN_FIELDS)),
+            episodes=tuple(self._episodes),
+        )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from paani.geometry import clip
 from paani_sim.vessels import Vessel
+from paani_sim.vessels.vessel import Buoyancy
 from paani_sim.water.surroundings import CALM, Surroundings
 from paani_sim.water.waves import GRAVITY_MPS2
 from paani_sim.water.wind import wind_force
@@ -50,6 +51,7 @@ class Attitude(NamedTuple):
 
 
 Wrench = tuple[float, float, float, float, float, float]
+BodyAxes = tuple[float, float, float, float, float, float]  # forward x, y, z, left x, y, z in the map frame
 
 
 def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: Surroundings = CALM) -> Wrench:
@@ -61,14 +63,32 @@ def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: S
     varying slowly as in Newman 1974). Added mass in surge and sway, with its Coriolis force in the plane, makes the
     force what the bare mass needs for the acceleration of both; that of the other axes is the model's armature.
     """
-    forward_x, forward_y, forward_z, left_x, left_y, left_z = _body_axes(state)
-    drag, buoyancy, hull = vessel.drag, vessel.buoyancy, vessel.hull
+    axes = _body_axes(state)
+    forward_x, forward_y, forward_z, left_x, left_y, left_z = axes
+    ahead_n, sideways_n, port_nm = _planar_forces(state, axes, fans, vessel, surroundings)
+    roll_nm, pitch_nm = _righting_moments(state, vessel.buoyancy, surroundings)
+    return (
+        forward_x * ahead_n + left_x * sideways_n,
+        forward_y * ahead_n + left_y * sideways_n,
+        forward_z * ahead_n + left_z * sideways_n + _heave_force(state, vessel, surroundings),
+        roll_nm,
+        pitch_nm + vessel.fans.height_m * (fans.left_n + fans.right_n),
+        port_nm,
+    )
+
+
+def _planar_forces(
+    state: HullState, axes: BodyAxes, fans: Fans, vessel: Vessel, surroundings: Surroundings
+) -> tuple[float, float, float]:
+    """Force ahead and to port [N], and moment to port [N m]."""
+    forward_x, forward_y, forward_z, left_x, left_y, left_z = axes
+    drag, mass_kg, length_m = vessel.drag, vessel.hull.mass_kg, vessel.hull.length_m
     vx_mps, vy_mps = state.vx_mps - surroundings.current_x_mps, state.vy_mps - surroundings.current_y_mps
     surge_mps = forward_x * vx_mps + forward_y * vy_mps + forward_z * state.vz_mps
     sway_mps = left_x * vx_mps + left_y * vy_mps + left_z * state.vz_mps
     yaw_rate = state.yaw_rate_radps
 
-    weight_n = hull.mass_kg * GRAVITY_MPS2
+    weight_n = mass_kg * GRAVITY_MPS2
     thrust_n = fans.left_n + fans.right_n
     ahead_n = thrust_n - _drag(surge_mps, drag.surge_linear, drag.surge_quadratic) - weight_n * surroundings.slope_ahead
     sideways_n = -_drag(sway_mps, drag.sway_linear, drag.sway_quadratic) - weight_n * surroundings.slope_left
@@ -76,7 +96,7 @@ def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: S
     port_nm -= _drag(yaw_rate, drag.yaw_linear, drag.yaw_quadratic)
 
     if vessel.wave_reflection_frac:
-        drift_npm2 = 0.5 * WATER_DENSITY_KGPM3 * GRAVITY_MPS2 * hull.length_m * vessel.wave_reflection_frac**2
+        drift_npm2 = 0.5 * WATER_DENSITY_KGPM3 * GRAVITY_MPS2 * length_m * vessel.wave_reflection_frac**2
         ahead_n += drift_npm2 * (forward_x * surroundings.envelope_x_m2 + forward_y * surroundings.envelope_y_m2)
         sideways_n += drift_npm2 * (left_x * surroundings.envelope_x_m2 + left_y * surroundings.envelope_y_m2)
 
@@ -86,7 +106,7 @@ def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: S
             forward_x * air_x_mps + forward_y * air_y_mps,
             left_x * air_x_mps + left_y * air_y_mps,
             vessel.windage,
-            hull.length_m,
+            length_m,
         )
         ahead_n += wind[0]
         sideways_n += wind[1]
@@ -94,28 +114,32 @@ def compute_wrench(state: HullState, fans: Fans, vessel: Vessel, surroundings: S
 
     added = vessel.added_mass
     if added.surge_ratio or added.sway_ratio:
-        coriolis = (added.sway_ratio - added.surge_ratio) * hull.mass_kg * yaw_rate
+        coriolis = (added.sway_ratio - added.surge_ratio) * mass_kg * yaw_rate
         ahead_n = (ahead_n + coriolis * sway_mps) / (1.0 + added.surge_ratio)
         sideways_n = (sideways_n + coriolis * surge_mps) / (1.0 + added.sway_ratio)
+    return ahead_n, sideways_n, port_nm
 
-    up_n = clip(
+
+def _heave_force(state: HullState, vessel: Vessel, surroundings: Surroundings) -> float:
+    """Force upward [N] (K6)."""
+    buoyancy, weight_n = vessel.buoyancy, vessel.hull.mass_kg * GRAVITY_MPS2
+    return clip(
         weight_n
         + buoyancy.heave_stiffness * (buoyancy.equilibrium_z_m + surroundings.elevation_m - state.z_m)
         - buoyancy.heave_damping * (state.vz_mps - surroundings.elevation_rate_mps),
         0.0,
         buoyancy.max_weights * weight_n,
     )
+
+
+def _righting_moments(state: HullState, buoyancy: Buoyancy, surroundings: Surroundings) -> tuple[float, float]:
+    """Moments about the forward and the left axis [N m], which turn the hull to the water's slope (K7)."""
     angles = attitude(state.qw, state.qx, state.qy, state.qz)
     return (
-        forward_x * ahead_n + left_x * sideways_n,
-        forward_y * ahead_n + left_y * sideways_n,
-        forward_z * ahead_n + left_z * sideways_n + up_n,
         buoyancy.roll_stiffness * (surroundings.slope_left - angles.roll_rad)
         - buoyancy.roll_damping * (state.roll_rate_radps - surroundings.slope_left_rate_ps),
         -buoyancy.pitch_stiffness * (surroundings.slope_ahead + angles.pitch_rad)
-        - buoyancy.pitch_damping * (state.pitch_rate_radps + surroundings.slope_ahead_rate_ps)
-        + vessel.fans.height_m * thrust_n,
-        port_nm,
+        - buoyancy.pitch_damping * (state.pitch_rate_radps + surroundings.slope_ahead_rate_ps),
     )
 
 
@@ -143,7 +167,7 @@ def body_velocity(state: HullState) -> tuple[float, float]:
     return forward_x * vx + forward_y * vy + forward_z * vz, left_x * vx + left_y * vy + left_z * vz
 
 
-def _body_axes(state: HullState) -> tuple[float, float, float, float, float, float]:
+def _body_axes(state: HullState) -> BodyAxes:
     qw, qx, qy, qz = state.qw, state.qx, state.qy, state.qz
     return (
         1.0 - 2.0 * (qy * qy + qz * qz),
