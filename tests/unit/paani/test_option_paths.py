@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -53,4 +54,22 @@ def test_what_can_be_used_is_a_path(path_of: PathOf, text: str) -> None:
 )
 def test_what_cannot_be_used_is_named_with_its_option(path_of: PathOf, text: str, problem: str) -> None:
     with pytest.raises(UserError, match=f"^{problem}"):
+        path_of(text)
+
+
+@pytest.mark.parametrize(
+    ("path_of", "text", "problem"),
+    [
+        (input_path("--in"), "file", "--in file: may not be read"),
+        (input_file("--in"), "file", "--in file: may not be read"),
+        (output_file("--out"), "folder/new", "--out folder/new: may not write into .*folder"),
+        (output_folder("--out"), "folder", "--out folder: may not write into .*folder"),
+        (output_folder("--out"), "folder/new/below", "--out folder/new/below: may not write into .*folder"),
+    ],
+)
+def test_what_the_user_has_no_right_to_is_named_with_its_option(
+    path_of: PathOf, text: str, problem: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root, who may run this, has every right
+    with pytest.raises(UserError, match=f"^{problem}$"):
         path_of(text)
