@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -19,6 +20,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import stopwatch_ms
 from paani.config import Config
+from paani_tools.up.log_files import MAX_BYTES
 from paani_tools.up.run_summary import STAGES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
@@ -94,9 +96,14 @@ def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ..
 
 
 def test_a_hung_process_is_started_again_and_ctrl_c_ends_all(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+    """Meanwhile a log is kept bounded."""
     file = tmp_path / "s.json"
     up = Up(tmp_path, *words_of(private_sets, "--summary", str(file)))
     up.until(lambda: "http://127.0.0.1:" in up.out, READY_S)
+    log = tmp_path / "runtime" / "logs" / "advisor.log"
+    with log.open("ab") as child:
+        child.write(bytes(MAX_BYTES + 1))
+    up.until(lambda: log.with_name("advisor.log.1").exists() and log.stat().st_size < MAX_BYTES, 15.0)
     frozen = up.children()["advisor"]
     os.kill(frozen, signal.SIGSTOP)
     up.until(lambda: "advisor is back" in up.out, 15.0)
@@ -169,5 +176,6 @@ def test_a_busy_port_is_named_before_anything_starts(tmp_path: Path, private_set
         up = Up(tmp_path, *words_of(private_sets))
         assert up.process.wait(20) == 2
     assert len(up.errors) == 1
-    assert field in up.errors[0]
+    assert re.search(rf"{field} .*: in use by another program, .* \(--set {field}=.+\)$", up.errors[0])
     assert up.out == ""
+    assert not (tmp_path / "runtime" / "logs").exists(), "no process was started"
