@@ -21,6 +21,14 @@ WAIT_S = 20.0
 TOLERANCE = 14
 WATER_RGBA, OBSTACLE_RGBA = (23, 184, 214, 66), (242, 140, 30, 100)
 ACCEPTED_RGB = (255, 180, 84)
+ROUTE_RGB, TRACK_RGB = (185, 164, 240), (79, 195, 224)
+MAP_PX_PER_M = 6.0  # as the page begins
+MAP_PIXELS = """([x, y]) => {
+  const c = document.querySelector("#map"), ratio = c.width / c.clientWidth;
+  const place = [c.clientWidth / 2 + x, c.clientHeight / 2 - y].map((v) => Math.round(v * ratio) - 2);
+  const data = [...c.getContext("2d").getImageData(place[0], place[1], 5, 5).data];
+  return Array.from({ length: 25 }, (_, i) => data.slice(4 * i, 4 * i + 4));
+}"""
 PIXEL = """([x, y]) => {
   const c = document.querySelector("#camera");
   return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
@@ -223,6 +231,12 @@ async def until(page: Any, expression: str) -> None:
             await asyncio.sleep(0.05)
 
 
+async def has_colour_on_map(page: Any, rgb: tuple[int, int, int], east_m: float, north_m: float) -> bool:
+    """Whether something of a colour is drawn there, seen from the boat, which the map follows."""
+    pixels = await page.evaluate(MAP_PIXELS, [east_m * MAP_PX_PER_M, north_m * MAP_PX_PER_M])
+    return any(alpha > 60 and is_colour(colour, rgb) for *colour, alpha in pixels)
+
+
 async def test_the_map_shows_route_and_position(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
@@ -243,4 +257,8 @@ async def test_the_map_shows_route_and_position(
             await asyncio.sleep(0.1)
         await until(watched.page, "document.querySelector('#map-pose').textContent.startsWith('9.5 m E, 1.0 m N')")
         await until(watched.page, "document.querySelector('#speed').textContent === '0.50'")
+        assert await has_colour_on_map(watched.page, ROUTE_RGB, -5.0, 1.0), "the middle of the only leg"
+        assert not await has_colour_on_map(watched.page, ROUTE_RGB, -5.0, -1.0), "north is up"
+        assert await has_colour_on_map(watched.page, TRACK_RGB, -5.0, 0.0), "where the boat was"
+        assert await has_colour_on_map(watched.page, TRACK_RGB, 1.0, 0.0), "its bow, ahead of where it was"
         assert watched.errors == []
