@@ -20,8 +20,7 @@ run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
 test: setup-test lint ## everything that CI runs
-	$(BIN)/python -m pytest -q -n 2 tests -m "not long and not alone"
-	$(BIN)/python -m pytest -q tests -m "alone and not long"
+	$(BIN)/python -m pytest -q -n 2 tests -m "not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
 	@mkdir -p runs

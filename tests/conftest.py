@@ -11,6 +11,7 @@ import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from blockbuster import blockbuster_ctx
@@ -21,8 +22,9 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
 
-TESTS = Path(__file__).parent
 ALONE = {"bench", "browser", "fault", "integration"}  # folders
+WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
+NICENESS = 10
 
 settings.register_profile("quick", max_examples=15)  # for `make check`; everything else tries more
 
@@ -37,11 +39,40 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write the golden files anew")
 
 
+def is_alone(nodeid: str) -> bool:
+    """Whether a test starts processes or watches the clock, by its folder."""
+    return nodeid.split("/")[1] in ALONE
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what does not bear another test beside it: trainings, and all that starts processes or measures."""
-    for item in items:
-        if item.get_closest_marker("train") or ALONE & set(item.path.relative_to(TESTS).parts):
-            item.add_marker(pytest.mark.alone)
+    items.sort(key=lambda item: not is_alone(item.nodeid))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file."""
+    from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415  a single process does without it
+
+    class AloneFirst(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+        def _split_scope(self, nodeid: str) -> str:
+            return "alone" if is_alone(nodeid) else nodeid.partition("::")[0]
+
+    config.option.loadscopereorder = False
+    return AloneFirst(config, log)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """What may run beside a test that watches the clock yields to it and to its processes.
+
+    The worker that has those gets them first, and only then yields as well.
+    """
+    if WORKER and not is_alone(item.nodeid):
+        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
+    if item.get_closest_marker("train"):
+        import torch  # noqa: PLC0415  only these tests have it
+
+        torch.set_num_threads(1)  # steps of networks this small wait for each other's threads most of the time
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Two hundred scenarios drawn at random."""
+"""Two hundred scenarios drawn at random are fair."""
 
 import pytest
 
