@@ -69,7 +69,7 @@ class Config(Section, frozen=True):
     @property
     def services(self) -> tuple[str, ...]:
         """Processes that run with these settings, in the order they start."""
-        idle = {"bridge"}
+        idle = set[str]()
         if self.camera.source != "sim":
             idle.add("eye")
         if not self.recorder.folder:

@@ -5,6 +5,7 @@ import { Camera } from "./camera.js";
 import { buildExplanation, renderExplanation } from "./explanation.js";
 import { decodeJson } from "./frames.js";
 import { renderHealth } from "./health.js";
+import { renderIndicator } from "./indicator.js";
 import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
@@ -58,6 +59,7 @@ function render() {
   renderTuning(store, now);
   renderExplanation(store, now);
   renderMotion(store, now);
+  renderIndicator(store, now);
   renderHealth(store, open, now);
   map.render(store, now);
   if (!store.isFresh("camera/picture", now)) camera.scheduleDraw();

@@ -5,7 +5,7 @@ import { ageText, byId, fixed, headingDeg, reasonText, setText, words } from "./
 
 const LINK_TIMEOUT_S = 1.5;
 /** Word, kind and SVG path of the arrow. @type {Record<string, [string, string, string]>} */
-const ADVICE = {
+export const ADVICE = {
   STRAIGHT: ["STRAIGHT", "go", "M24 42V7M11 20L24 7l13 13"],
   SLIGHT_LEFT: ["SLIGHT LEFT", "turn", "M29 42V26L14 10M13 25V9h16"],
   SLIGHT_RIGHT: ["SLIGHT RIGHT", "turn", "M19 42V26L34 10M35 25V9H19"],
