@@ -157,6 +157,10 @@ SENSORS_STATE = Topic(
     name="sensors/state", type=m.SensorsState, producer="sensors", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.STATE, summary="each device of a real hull: its status, rate, age and failures",
 )
+THRUSTERS_STATE = Topic(
+    name="thrusters/state", type=m.ThrustersState, producer="thrusters", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.STATE, summary="the line to the microcontroller that drives the thrusters, and what it says",
+)
 RECORDER_STATE = Topic(
     name="recorder/state", type=m.RecorderState, producer="recorder", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.STATE, summary="what the recorder writes, dropped and never heard",
@@ -173,8 +177,8 @@ STEPS = {
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
-    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, TRUE_POSE, BRIDGE_STATE,
-    SENSORS_STATE, RECORDER_STATE,
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE,
+    BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *STEPS.values(),
 )
 # fmt: on

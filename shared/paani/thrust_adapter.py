@@ -63,6 +63,16 @@ class ThrustAdapter:
             self._accepted_us = None
         return cause
 
+    @property
+    def has_heard_operator(self) -> bool:
+        """Whether an arming message has come since the start."""
+        return self._arming is not None
+
+    @property
+    def is_armed(self) -> bool:
+        """The operator's newest word, however old it is; `decide` judges its age."""
+        return self._arming is not None and self._arming.armed and not self._arming.stopped
+
     def receive_arming(self, arming: Arming, now_us: int) -> None:
         """Take the newest arming message."""
         self._arming, self._arming_us = arming, now_us

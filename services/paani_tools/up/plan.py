@@ -16,6 +16,7 @@ from paani.bus.routing import require_free
 from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
 from paani.extras import require_modules
+from paani.keys import Graph
 from paani.runtime import runtime_dir
 from paani_services.camera.picture_sources import read_frames
 from paani_services.navigator.files.mission_file import load_route_and_mission
@@ -33,17 +34,18 @@ class Plan(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Files of route and fence ("": none), and where the map's (0, 0) lies [deg]."""
+    """Files of route and fence ("": none), and where the map's (0, 0) lies [deg]; None: at the first fix."""
 
     route: str
     fence: str
-    origin_lat_lon_deg: tuple[float, float]
+    origin_lat_lon_deg: tuple[float, float] | None
 
 
 async def make_plan(config: Config) -> Plan:
     """Complete the settings. Raises UserError for what can be known before anything starts.
 
-    The scenario's route, fence and origin are handed to navigator and localization unless they have their own.
+    The scenario's route, fence and origin are handed to navigator and localization unless they have their own. A hull
+    has no scenario: its route is given, and without an origin of its own the map's is the first fix.
     With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse; with `sim` the
     calibration is the eye's, unless another is given as valid.
     """
@@ -52,8 +54,14 @@ async def make_plan(config: Config) -> Plan:
     await asyncio.to_thread(_require_source, config.camera)
     if config.dashboard.serve:
         await _require_free_page(config)
-    course = await _course(config)
+    _require_lines(config)
     navigator, localization = config.navigator, config.localization
+    if config.bus.graph is Graph.HULL:
+        if not navigator.route and not navigator.mission:
+            raise UserError("navigator.route: not set (a hull follows a route or a mission of its own: --mission FILE)")
+        course = _Course(navigator.route, navigator.fence, localization.origin_lat_lon_deg)
+    else:
+        course = await _course(config)
     if not navigator.route:
         navigator = replace(navigator, route=course.route)
     if not navigator.fence:
@@ -69,6 +77,15 @@ async def make_plan(config: Config) -> Plan:
     adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
     config = replace(config, plant=replace(config.plant, adapter=adapter))
     return Plan(config.services, config)
+
+
+def _require_lines(config: Config) -> None:
+    """Raises UserError where thrust goes to a microcontroller and nobody has said where that is."""
+    graph = config.bus.graph
+    if graph is not Graph.SIMULATION and not config.thrusters.line:
+        raise UserError(f"thrusters.line: not set (profile {config.profile} drives a microcontroller)")
+    if graph is Graph.HIL and not config.plant.pwm_line:
+        raise UserError("plant.pwm_line: not set (the emulator's bench port, by which profile hil moves the boat)")
 
 
 def _require_source(camera: CameraConfig) -> None:

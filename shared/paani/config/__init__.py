@@ -17,6 +17,7 @@ from paani.config.profiles import PROFILES
 from paani.config.recorder import RecorderConfig
 from paani.config.sensors import GpsConfig, HeadingConfig, ImuConfig, SensorDevicesConfig
 from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, SensorsConfig, WorldConfig
+from paani.config.thrusters import EscConfig, ThrustersConfig
 from paani.config.tree import BusConfig, Config, DashboardConfig
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "DashboardConfig",
     "DetectorConfig",
     "EngineName",
+    "EscConfig",
     "EyeConfig",
     "GpsConfig",
     "HeadingConfig",
@@ -49,6 +51,7 @@ __all__ = [
     "RiskConfig",
     "SensorDevicesConfig",
     "SensorsConfig",
+    "ThrustersConfig",
     "TrackerConfig",
     "TuningConfig",
     "WorldConfig",

@@ -52,6 +52,8 @@ class PlantConfig(Section, frozen=True):
     step_s: Positive = 0.01  # of the integration, small beside every time constant of the hull
     publish_rate_hz: Positive = 20.0  # of clock, pose and applied thrust: twice the controller's rate
     vessel: str | None = None  # its name among the vessels, or a TOML file of the same form; None: the scenario's
+    # Where an emulated microcontroller says what pulses it gives; profile hil moves the boat by them alone.
+    pwm_line: str = ""
     sensors: SensorsConfig = SensorsConfig()
     adapter: AdapterConfig = AdapterConfig()
 

@@ -15,12 +15,15 @@ from paani.config.recorder import RecorderConfig
 from paani.config.section import Positive, Section
 from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
+from paani.config.thrusters import ThrustersConfig
 from paani.keys import Graph, services_in
+from paani.port_address import parse_address
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
 ShortName = Annotated[str, msgspec.Meta(pattern="^[a-z0-9_]{1,32}$")]
 
 
+EMULATED_LINES = "socket://127.0.0.1:PORT or serial:/dev/pts/N"
 # Every other profile is a simulation.
 GRAPHS = {"hil": Graph.HIL, "hull": Graph.HULL}
 
@@ -59,6 +62,7 @@ class Config(Section, frozen=True):
     localization: LocalizationConfig = LocalizationConfig()
     navigator: NavigatorConfig = NavigatorConfig()
     controller: ControllerConfig = ControllerConfig()
+    thrusters: ThrustersConfig = ThrustersConfig()
     world: WorldConfig = WorldConfig()
     plant: PlantConfig = PlantConfig()
     eye: EyeConfig = EyeConfig()
@@ -129,5 +133,20 @@ class Config(Section, frozen=True):
             )
         if graph is Graph.HULL and self.camera.source == "sim":
             raise ValueError("camera.source 'sim': a hull has no simulated camera (--camera webcam or PATH)")
+        line = self.thrusters.line
+        for name, address in (("thrusters.line", line), ("plant.pwm_line", self.plant.pwm_line)):
+            if graph is Graph.HIL and address and not is_emulated(address):
+                raise ValueError(f"{name} {address}: profile hil drives an emulator alone ({EMULATED_LINES})")
+        if graph is Graph.HULL and line.startswith("socket:"):
+            raise ValueError(f"thrusters.line {line}: a hull's microcontroller is at a serial device or unix:/PATH")
         if graph is Graph.HULL and self.dashboard.arm_at_start:
             raise ValueError("dashboard.arm_at_start: a hull waits for its operator")
+
+
+def is_emulated(line: str) -> bool:
+    """Whether only a program of this machine can be at the other end: loopback interface, or pseudo-terminal."""
+    try:
+        device, baud = parse_address(line)
+    except ValueError:
+        return False
+    return device.startswith("/dev/pts/") if baud else device.rpartition(":")[0] == "127.0.0.1"

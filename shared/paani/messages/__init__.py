@@ -43,6 +43,7 @@ from paani.messages.perception import (
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
+from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
 from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
 
 __all__ = [
@@ -92,6 +93,7 @@ __all__ = [
     "Pulse",
     "Purpose",
     "Reason",
+    "ReceiverState",
     "RecordedTopic",
     "RecorderState",
     "Removal",
@@ -111,6 +113,8 @@ __all__ = [
     "Text",
     "Thrust",
     "ThrustApplied",
+    "ThrustHold",
+    "ThrustersState",
     "TimeBase",
     "Track",
     "Tracks",

@@ -54,7 +54,12 @@ class ImuSample(Message, frozen=True, kw_only=True):
 
 
 class ZeroCause(StrEnum):
-    """Why the thrust adapter applies zero; NONE while it applies the thrust that it was sent."""
+    """Why the thrust adapter applies zero; NONE while it applies the thrust that it was sent.
+
+    The last seven are a hull's: LINE_LOST is that the microcontroller does not answer, REFUSED that it takes no thrust;
+    the others are what holds the thrusters on the microcontroller itself. REARM: it waits for the operator to disarm,
+    and to arm again.
+    """
 
     NONE = "none"
     NO_COMMAND = "no_command"
@@ -70,6 +75,13 @@ class ZeroCause(StrEnum):
     REPLAYED = "replayed"
     FUTURE = "future"
     INVALID = "invalid"
+    LINE_LOST = "line_lost"
+    REFUSED = "refused"
+    EMERGENCY_STOP = "emergency_stop"
+    RECEIVER = "receiver"
+    BATTERY_LOW = "battery_low"
+    OVER_CURRENT = "over_current"
+    REARM = "rearm"
 
 
 class ThrustApplied(Message, frozen=True, kw_only=True):

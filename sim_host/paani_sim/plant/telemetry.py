@@ -1,6 +1,9 @@
 """Messages of the plant: measurements and truth. `source_us` dates the step."""
 
+from paani import keys
 from paani import messages as m
+from paani.bus import Bus
+from paani.config import PlantConfig
 from paani_sim.plant.plant import Plant
 
 
@@ -48,3 +51,29 @@ def pose_message(plant: Plant, source_us: int) -> m.TruePose:
         in_contact=plant.in_contact,
         actors_along_m=plant.actors_along_m,
     )
+
+
+def report_every(config: PlantConfig) -> int:
+    """Steps between two reports of clock, pose and thrust."""
+    return max(1, round(1.0 / config.step_s / config.publish_rate_hz))
+
+
+class Measurements:
+    """Publishes fixes, IMU samples and the true pose, each at its rate."""
+
+    def __init__(self, bus: Bus, config: PlantConfig) -> None:
+        self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
+        self._pose = bus.publisher(keys.TRUE_POSE)
+        rate_hz = 1.0 / config.step_s
+        self._gps_every = max(1, round(rate_hz / config.sensors.gps_rate_hz))
+        self._imu_every = max(1, round(rate_hz / config.sensors.imu_rate_hz))
+        self._pose_every = report_every(config)
+
+    def publish(self, plant: Plant, source_us: int) -> None:
+        """`source_us` dates the step that was just made."""
+        if plant.steps % self._imu_every == 0:
+            self._imu.put(imu_message(plant, source_us))
+        if plant.steps % self._gps_every == 0:
+            self._gps.put(gps_message(plant, source_us))
+        if plant.steps % self._pose_every == 0:
+            self._pose.put(pose_message(plant, source_us))

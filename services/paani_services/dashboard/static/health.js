@@ -9,6 +9,7 @@ const MAIN_TOPIC = {
   advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
   localization: "localization/odometry", dashboard: "operator/arming", recorder: "recorder/state",
   bridge: "bridge/state",
+  thrusters: "plant/thrust_applied",
 };
 const COLUMNS = 8;
 /** @type {Map<string, HTMLElement[]>} */

@@ -42,6 +42,7 @@ function renderCommand(store, now, applied) {
     ["Set heading", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
     ["Cross-track", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
     ["Command age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
+    ...findPower(store, now),
     ...obstacles,
   ]);
   byId("order").classList.toggle("stale", !store.isFresh("navigator/command", now));
@@ -56,6 +57,14 @@ function findPlannedObstacles(store, ids) {
   return [["Planned for", names.join(", "), false]];
 }
 
+/** What the microcontroller of a hull's thrusters measures. @param {import("./store.js").Store} store @param {number} now @returns {[string, string, boolean][]} */
+function findPower(store, now) {
+  const state = store.get("thrusters/state");
+  if (!state) return [];
+  const known = store.isFresh("thrusters/state", now) && state.mcu !== "unknown";
+  return [["Battery", known ? `${fixed(state.battery_v, 1)} V, ${fixed(state.current_a, 1)} A` : "–", false]];
+}
+
 /** Which process keeps the boat from moving, and why. @param {import("./store.js").Store} store @param {number} now @returns {[string, string][]} */
 function findStopReasons(store, now) {
   /** @type {[string, string][]} */
@@ -63,8 +72,9 @@ function findStopReasons(store, now) {
   const applied = store.get("plant/thrust_applied");
   if (!store.isFresh("plant/thrust_applied", now)) reasons.push(["plant", "no recent message"]);
   else if (applied.zero_cause !== "none") {
-    const detail = applied.lost_pulse ? `: ${applied.lost_pulse}` : "";
-    reasons.push(["plant", (STOP_REASONS[applied.zero_cause] ?? words(applied.zero_cause)) + detail]);
+    const problem = store.isFresh("thrusters/state", now) ? store.get("thrusters/state").problem : "";
+    const detail = applied.lost_pulse || problem ? `: ${applied.lost_pulse || problem}` : "";
+    reasons.push([applied.producer, (STOP_REASONS[applied.zero_cause] ?? words(applied.zero_cause)) + detail]);
   }
   for (const [who, key] of [["navigator", "navigator/command"], ["controller", "controller/thrust"]]) {
     if (!store.isFresh(key, now)) reasons.push([who, "no recent message"]);

@@ -1,0 +1,230 @@
+"""The thrusters of a hull over a real router and a pseudo-terminal: whatever is wrong is zero, with its cause."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Latest, open_bus
+from paani.bus.routing import open_router
+from paani.clock import WallClock, stopwatch_ms
+from paani.config import Config, load_config
+from paani.errors import UserError
+from paani_services.thrusters.service import run
+from tests.mcu_peer import PtyLine, until
+from tests.thrust_peer import BATTERY, RECEIVER, ThrustPeer
+
+pytestmark = pytest.mark.integration
+CLOCK = WallClock()
+
+
+class Boat:
+    """A hull's bus with the words of operator and controller, and what the thrusters make of them."""
+
+    def __init__(self, config: Config, peer: ThrustPeer, line: PtyLine, buses: dict[str, Bus]) -> None:
+        self.config, self.peer, self.line, self.buses = config, peer, line, buses
+        self.armed: bool | None = None
+        self.thrust, self.is_pulsing = 0.2, True
+        observer = buses["observer"]
+        self.time: Latest[m.SimTime] = observer.latest(keys.SIM_TIME)
+        self.applied: Latest[m.ThrustApplied] = observer.latest(keys.THRUST_APPLIED)
+        self.state: Latest[m.ThrustersState] = observer.latest(keys.THRUSTERS_STATE)
+
+    async def speak(self) -> None:
+        """Operator, controller, who echoes the thrusters' own clock, and every pulse that is waited for: at 10 Hz."""
+        arming = self.buses["dashboard"].publisher(keys.ARMING)
+        thrust = self.buses["controller"].publisher(keys.THRUST)
+        pulses = [self.buses[name].publisher(keys.pulse(name)) for name in self.config.plant.adapter.require_pulses]
+        while True:
+            now_us = CLOCK.now_us()
+            if self.armed is not None:
+                arming.put(m.Arming(source_us=now_us, armed=self.armed))
+            for pulse in pulses if self.is_pulsing else ():
+                pulse.put(m.Pulse(source_us=now_us))
+            echo_us = self.time.value.stamp_us if self.time.value else 0
+            thrust.put(m.Thrust(source_us=now_us, left=self.thrust, right=self.thrust, enabled=True, echo_us=echo_us))
+            await asyncio.sleep(0.1)
+
+    @property
+    def cause(self) -> m.ZeroCause | None:
+        return self.applied.value.zero_cause if self.applied.value else None
+
+    async def until_cause(self, cause: m.ZeroCause) -> None:
+        await until(lambda: self.cause is cause, 8.0)
+
+    async def drive(self) -> None:
+        """Arm, and wait until the boat moves."""
+        self.armed = True
+        await self.until_cause(m.ZeroCause.NONE)
+
+
+@pytest.fixture
+async def boat(private_sets: tuple[str, ...], tmp_path: Path) -> AsyncIterator[Boat]:
+    peer, path = ThrustPeer(), tmp_path / "ttyTHRUST"
+    line = PtyLine(str(path), peer)
+    pulses = 'plant.adapter.require_pulses=["navigator", "localization"]'
+    config = load_config(profile="hull", sets=(*private_sets, f"thrusters.line={line.address}", pulses))
+    router = await open_router(config.bus)
+    users = ("thrusters", "dashboard", "controller", "navigator", "localization", "observer")
+    buses = {user: await open_bus(config.bus, user, CLOCK) for user in users}
+    line.plug_in()
+    found = Boat(config, peer, line, buses)
+    tasks = [
+        asyncio.create_task(run(buses["thrusters"], CLOCK, config)),
+        asyncio.create_task(found.speak()),
+    ]
+    try:
+        yield found
+        assert not any(task.done() for task in tasks), "never a crash"
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        line.pull_out()
+        for bus in buses.values():
+            await bus.close()
+        await asyncio.to_thread(router.close)
+
+
+async def stays(condition: Callable[[], bool], seconds: float) -> None:
+    end_ms = stopwatch_ms() + seconds * 1e3
+    while stopwatch_ms() < end_ms:
+        assert condition()
+        await asyncio.sleep(0.01)
+
+
+async def test_settings_go_first_and_then_thrust_at_ten_hertz_and_more(boat: Boat) -> None:
+    await boat.drive()
+    assert boat.peer.settings[0].session == boat.peer.thrusts[0][1].session
+    count = len(boat.peer.thrusts)
+    await asyncio.sleep(2.0)
+    frames = boat.peer.thrusts[count:]
+    assert len(frames) >= 20
+    gaps_ms = [after - before for (before, _), (after, _) in itertools.pairwise(frames)]
+    assert max(gaps_ms) < boat.peer.lease_ms
+    assert boat.peer.lease_ms <= 300
+    assert all(call.armed and call.left == call.right == 0.2 for _, call in frames)
+    assert [call.seq for _, call in frames] == sorted({call.seq for _, call in frames})
+    applied, state = boat.applied.value, boat.state.value
+    assert applied is not None
+    assert state is not None
+    assert (applied.left, applied.left_n, applied.producer) == (0.2, 15.0, "thrusters")
+    assert (state.mcu, state.enabled, state.pulse_left_us, state.problem) == (m.McuState.FRESH, True, 1580, "")
+
+
+async def test_without_the_operators_word_nothing_is_sent_that_could_clear_a_stop(boat: Boat) -> None:
+    """A disarmed frame is the operator's leave to arm again: a start of this process must not give it."""
+    await until(lambda: len(boat.peer.calls) > 20)
+    assert not boat.peer.thrusts
+    assert {call.method for call in boat.peer.calls} == {"paani_status"}
+    assert boat.cause is m.ZeroCause.NOT_ARMED
+    boat.armed = False
+    await until(lambda: len(boat.peer.thrusts) > 3)
+    assert all(not call.armed and call.left == 0.0 for _, call in boat.peer.thrusts)
+
+
+async def test_a_stop_reaches_the_microcontroller_before_it_is_confirmed(boat: Boat) -> None:
+    await boat.drive()
+    boat.armed = False
+    started_ms = stopwatch_ms()
+    await boat.until_cause(m.ZeroCause.NOT_ARMED)
+    assert stopwatch_ms() - started_ms < 500.0
+    assert not boat.peer.newest.armed
+    assert boat.peer.pulses_us() == (1500, 1500)
+
+
+async def test_words_that_stop_coming_give_zero_but_no_disarmed_frame(boat: Boat) -> None:
+    await boat.drive()
+    boat.armed = None
+    await boat.until_cause(m.ZeroCause.ARMING_LOST)
+    assert boat.peer.newest.armed
+    assert (boat.peer.newest.left, boat.peer.newest.right) == (0.0, 0.0)
+    boat.armed, boat.is_pulsing = True, False
+    await boat.until_cause(m.ZeroCause.PULSE_LOST)
+    assert (boat.peer.newest.left, boat.peer.newest.right) == (0.0, 0.0)
+
+
+async def test_an_emergency_stop_wins_and_arming_again_needs_a_disarm_first(boat: Boat) -> None:
+    """W9: whatever the software orders meanwhile, and after the button is released."""
+    await boat.drive()
+    boat.peer.press()
+    await boat.until_cause(m.ZeroCause.EMERGENCY_STOP)
+    assert boat.peer.pulses_us() == (1500, 1500)
+    boat.peer.release()
+    await stays(lambda: boat.peer.pulses_us() == (1500, 1500), 1.0)
+    assert boat.state.value is not None
+    assert boat.state.value.holds == (m.ThrustHold.EMERGENCY_STOP,)
+    boat.armed = False
+    await until(lambda: not boat.peer.is_latched)
+    await boat.drive()
+    assert boat.peer.pulses_us() == (1580, 1580)
+
+
+@pytest.mark.parametrize(("held", "cause"), [(RECEIVER, m.ZeroCause.RECEIVER), (BATTERY, m.ZeroCause.BATTERY_LOW)])
+async def test_what_holds_on_the_microcontroller_is_shown(boat: Boat, held: int, cause: m.ZeroCause) -> None:
+    await boat.drive()
+    boat.peer.held |= held
+    boat.peer.rc = 2 if held == RECEIVER else 0
+    await boat.until_cause(cause)
+    await until(lambda: boat.state.value is not None and bool(boat.state.value.holds))
+    assert boat.state.value is not None
+    assert (boat.state.value.receiver is m.ReceiverState.TAKEN_OVER) is (held == RECEIVER)
+    assert boat.buses["thrusters"].note_text.startswith("fresh; held by")
+    boat.peer.held = 0
+    await boat.until_cause(m.ZeroCause.NONE)
+
+
+async def test_a_line_that_is_pulled_out_is_named_and_comes_back(boat: Boat) -> None:
+    await boat.drive()
+    boat.line.pull_out()
+    await boat.until_cause(m.ZeroCause.LINE_LOST)
+    await until(lambda: boat.state.value is not None and "ttyTHRUST" in boat.state.value.problem)
+    assert boat.state.value is not None
+    assert not boat.state.value.connected
+    received = boat.time.received
+    await asyncio.sleep(0.5)
+    assert boat.time.received > received, "the clock that orders echo goes on"
+    boat.line.plug_in()
+    await boat.until_cause(m.ZeroCause.NONE)
+
+
+async def test_a_microcontroller_that_restarts_gets_its_settings_again(boat: Boat) -> None:
+    await boat.drive()
+    before = boat.peer.session
+    boat.peer.reset()
+    await until(lambda: boat.peer.session not in {0, before}, 8.0)
+    assert boat.peer.settings[-1].session == boat.peer.session
+    await boat.until_cause(m.ZeroCause.NONE)
+    assert boat.buses["thrusters"].drops["microcontroller_restarted"] == 1
+
+
+async def test_a_second_session_is_refused_and_says_so(boat: Boat) -> None:
+    """Two of these processes on one microcontroller: who drives goes on, the other gives no thrust."""
+    boat.peer.configured, boat.peer.session = 0, 4711
+    boat.peer.accepted_ms, boat.peer.lease_ms = stopwatch_ms() + 2500.0, 0.0
+    boat.armed = True
+    await boat.until_cause(m.ZeroCause.REFUSED)
+    assert not boat.peer.thrusts
+    await boat.until_cause(m.ZeroCause.NONE)  # once the other's lease is over
+
+
+async def test_a_line_must_be_named(boat: Boat) -> None:
+    config = load_config(profile="hull")
+    with pytest.raises(UserError, match=r"thrusters\.line: not set"):
+        await run(boat.buses["thrusters"], CLOCK, config)
+
+
+async def test_a_microcontroller_that_falls_silent_gives_zero_within_its_lease(boat: Boat) -> None:
+    await boat.drive()
+    boat.peer.answers = lambda request: b""
+    started_ms = stopwatch_ms()
+    await boat.until_cause(m.ZeroCause.LINE_LOST)
+    assert stopwatch_ms() - started_ms < boat.peer.lease_ms + 300.0
+    await until(lambda: boat.state.value is not None and "no answer from the mic" in boat.state.value.problem)
+    await until(lambda: boat.state.value is not None and boat.state.value.mcu is m.McuState.UNKNOWN)

@@ -1,0 +1,146 @@
+"""What goes to the microcontroller, and what is known to come out of it."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from paani import messages as m
+from paani.config import EscConfig, ThrustersConfig, load_config
+from paani.errors import UserError
+from paani.microcontroller.caller import McuCaller
+from paani.microcontroller.payloads import THRUST, McuStatus
+from paani.thrust_adapter import AppliedThrust
+from paani_services.thrusters.output import (
+    OutputTracker,
+    ReportSchedule,
+    esc_settings,
+    find_output_cause,
+    holds_of,
+    thrust_call,
+)
+from paani_services.thrusters.state import Sent, note_of, thrusters_state
+
+AHEAD = AppliedThrust(0.2, 0.3, 15.0, 22.5, m.ZeroCause.NONE)
+DISARMED = AppliedThrust(0.0, 0.0, 0.0, 0.0, m.ZeroCause.NOT_ARMED)
+LIVE = McuStatus(kind=THRUST, state=m.McuState.FRESH, verdict=m.McuVerdict.ACCEPTED, enabled=True)
+LEASE_MS = 300.0
+
+
+def test_a_frame_carries_the_decision_and_its_lease() -> None:
+    call = thrust_call(AHEAD, True, (7, 42), 300)
+    assert (call.armed, call.session, call.seq, call.lease_ms, call.age_ms) == (True, 7, 42, 300, 0)
+    assert (call.left, call.right) == (0.2, 0.3)
+
+
+def test_a_boat_that_is_not_armed_is_sent_zero() -> None:
+    call = thrust_call(AHEAD, False, (7, 42), 300)
+    assert (call.armed, call.left, call.right) == (False, 0.0, 0.0)
+
+
+def test_both_sides_are_driven_as_they_were_calibrated() -> None:
+    settings = ThrustersConfig(
+        slew_per_s=1.5, min_battery_v=11.1, max_current_a=20.0,
+        left=EscConfig(reversed=True, trim_us=-12, deadband_us=30), right=EscConfig(trim_us=8, deadband_us=25),
+    )  # fmt: skip
+    esc = esc_settings(settings, 9)
+    assert (esc.session, esc.left_reversed, esc.right_reversed) == (9, True, False)
+    assert (esc.trim_left_us, esc.trim_right_us, esc.deadband_left_us, esc.deadband_right_us) == (-12, 8, 30, 25)
+    assert (esc.neutral_us, esc.span_us, esc.slew_per_s) == (1500, 400, 1.5)
+    assert (esc.min_battery_v, esc.max_current_a) == (11.1, 20.0)
+    esc.encode()
+
+
+@pytest.mark.parametrize(
+    ("holds", "cause"),
+    [
+        (1, m.ZeroCause.EMERGENCY_STOP),
+        (2, m.ZeroCause.RECEIVER),
+        (4, m.ZeroCause.BATTERY_LOW),
+        (8, m.ZeroCause.OVER_CURRENT),
+        (16, m.ZeroCause.REARM),
+        (31, m.ZeroCause.EMERGENCY_STOP),
+    ],
+)
+def test_a_hold_of_the_microcontroller_is_the_cause(holds: int, cause: m.ZeroCause) -> None:
+    status = msgspec.structs.replace(LIVE, holds=holds)
+    assert find_output_cause(status, 10.0, LEASE_MS) is cause
+    assert len(holds_of(status)) == holds.bit_count()
+    assert OutputTracker(LEASE_MS).applied(AHEAD, cause, 0.0) == (0.0, 0.0, 0.0, 0.0, cause, "")
+
+
+def test_what_does_not_answer_or_does_not_take_thrust_gives_none() -> None:
+    assert find_output_cause(LIVE, 10.0, LEASE_MS) is m.ZeroCause.NONE
+    assert find_output_cause(None, 10.0, LEASE_MS) is m.ZeroCause.LINE_LOST
+    assert find_output_cause(LIVE, LEASE_MS + 1, LEASE_MS) is m.ZeroCause.LINE_LOST
+    for state in (m.McuState.BOOT, m.McuState.STALE, m.McuState.SAFE):
+        status = msgspec.structs.replace(LIVE, state=state)
+        assert find_output_cause(status, 10.0, LEASE_MS) is m.ZeroCause.REFUSED
+    for verdict in set(m.McuVerdict) - {m.McuVerdict.ACCEPTED, m.McuVerdict.NONE}:
+        status = msgspec.structs.replace(LIVE, verdict=verdict)
+        assert find_output_cause(status, 10.0, LEASE_MS) is m.ZeroCause.REFUSED
+
+
+def test_a_zero_is_applied_when_it_was_answered_or_the_lease_is_over() -> None:
+    """The operator's STOP is confirmed by what the microcontroller does, not by what it was told."""
+    output = OutputTracker(LEASE_MS)
+    assert output.applied(AHEAD, m.ZeroCause.NONE, 0.0).zero_cause is m.ZeroCause.LINE_LOST
+    output.accept(AHEAD, 1000.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 1100.0) == AHEAD
+    assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1000.0 + LEASE_MS) == AHEAD
+    assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS) == DISARMED
+    assert output.applied(AHEAD, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS).zero_cause is m.ZeroCause.LINE_LOST
+    output.accept(DISARMED, 1100.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 1101.0) == DISARMED
+
+
+def test_reports_come_at_their_rate_and_say_since_when() -> None:
+    command = m.Thrust(source_us=1, left=0.2, right=0.3, enabled=True)
+    schedule = ReportSchedule(50.0, 10, 0.0)
+    assert schedule.advance(m.ZeroCause.NO_COMMAND, None, 10, 0.0) == (True, False)
+    assert schedule.advance(m.ZeroCause.NONE, command, 20, 10.0) == (False, True)
+    assert schedule.since_us == 20
+    assert schedule.advance(m.ZeroCause.NONE, command, 60, 50.0) == (True, False)
+    assert schedule.since_us == 20
+    assert schedule.wait_s(60.0) == pytest.approx(0.04)
+    assert schedule.advance(m.ZeroCause.TIMEOUT, command, 70, 60.0) == (False, True)
+    assert schedule.since_us == 70
+
+
+def test_of_a_silent_microcontroller_nothing_is_claimed() -> None:
+    caller = McuCaller("serial:/dev/absent", THRUST)
+    state = thrusters_state(caller, Sent(), m.ZeroCause.LINE_LOST, 5, 1000.0)
+    assert (state.mcu, state.enabled, state.pulse_left_us, state.answer_age_ms) == (m.McuState.UNKNOWN, False, 0, 1e9)
+    assert note_of(state) == "not opened yet"
+
+
+@pytest.mark.parametrize(
+    ("profile", "sets", "named"),
+    [
+        (None, ["thrusters.lease_ms=301"], r"thrusters\.lease_ms: .*<= 300"),
+        (None, ["thrusters.rate_hz=9"], r"thrusters\.rate_hz"),
+        (
+            None,
+            ["thrusters.rate_hz=10", "thrusters.lease_ms=150"],
+            r"thrusters: .*lease_ms 150: shorter than two frames",
+        ),
+        (None, ["thrusters.line=COM3"], r"thrusters: line: 'COM3' is no port"),
+        (
+            "hil",
+            ["thrusters.line=serial:/dev/ttyACM0"],
+            r"thrusters\.line serial:/dev/ttyACM0: .*emulator alone",
+        ),
+        ("hil", ["thrusters.line=socket://192.0.2.7:5000"], r"thrusters\.line .*emulator alone"),
+        ("hil", ["thrusters.line=unix:/run/arduino-router.sock"], r"thrusters\.line .*emulator alone"),
+        ("hil", ["plant.pwm_line=socket://192.0.2.7:5000"], r"plant\.pwm_line .*emulator alone"),
+        ("hull", ["thrusters.line=socket://127.0.0.1:5000"], r"thrusters\.line .*at a serial device"),
+    ],
+)
+def test_thrust_goes_where_the_profile_says_alone(profile: str | None, sets: list[str], named: str) -> None:
+    with pytest.raises(UserError, match=named):
+        load_config(profile=profile, sets=sets)
+
+
+@pytest.mark.parametrize("line", ["socket://127.0.0.1:5001", "serial:/dev/pts/3", "serial:/dev/pts/3@115200"])
+def test_an_emulator_is_on_this_machine(line: str) -> None:
+    assert load_config(profile="hil", sets=[f"thrusters.line={line}"]).thrusters.line == line
