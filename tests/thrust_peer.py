@@ -18,8 +18,9 @@ class ThrustPeer(McuPeer):
         super().__init__()
         self.settings: list[EscSettings] = []
         self.thrusts: list[tuple[float, ThrustCall]] = []
-        self.held = 0  # bits of what is pressed, taken over, too low or too high now
-        self.is_latched = False
+        self.active = 0  # bits of what is pressed, taken over, too low or too high now
+        self.latched = 0  # what held since the operator last disarmed
+        self.is_armed = self.may_arm = False
         self.configured = self.accepted_ms = self.lease_ms = 0.0
         self.battery_v, self.current_a, self.rc = 12.4, 0.0, 0
 
@@ -31,17 +32,17 @@ class ThrustPeer(McuPeer):
     def newest(self) -> ThrustCall:
         return self.thrusts[-1][1]
 
-    def press(self) -> None:
-        """The emergency stop, which stays until it is released, and the operator has disarmed."""
-        self.held |= ESTOP
-        self.is_latched = True
-
-    def release(self) -> None:
-        self.held &= ~ESTOP
+    def hold(self, bits: int) -> None:
+        """What holds the thrusters from now on; it stays latched until the operator has disarmed."""
+        self.active = bits
+        self.latched |= bits
+        if bits:
+            self.is_armed = self.may_arm = False
 
     def reset(self) -> None:
         super().reset()
         self.configured = 0
+        self.is_armed = self.may_arm = False
 
     def pulses_us(self) -> tuple[int, int]:
         """What its timer holds."""
@@ -58,8 +59,7 @@ class ThrustPeer(McuPeer):
         return pulses[0], pulses[1]
 
     def holds(self) -> int:
-        armed = bool(self.thrusts) and self.newest.armed
-        return self.held | (ESTOP if self.is_latched else 0) | (0 if armed else NOT_ARMED)
+        return self.active | self.latched | (0 if self.is_armed else NOT_ARMED)
 
     def is_live(self) -> bool:
         """Whether its enable line is."""
@@ -84,6 +84,7 @@ class ThrustPeer(McuPeer):
             if verdict is McuVerdict.ACCEPTED:
                 self.settings.append(settings)
                 self.configured = settings.session
+                self.is_armed = self.may_arm = False
         elif request.method == "paani_thrust":
             verdict = self._judge(ThrustCall.decode(request.params[0]))
         return encode_response(request.id, self.thrust_status(verdict).encode())
@@ -96,6 +97,8 @@ class ThrustPeer(McuPeer):
             return McuVerdict.NOT_CONFIGURED
         self.session, self.accepted_ms, self.lease_ms = call.session, stopwatch_ms(), call.lease_ms
         self.thrusts.append((self.accepted_ms, call))
-        if not call.armed and not self.held & ESTOP:
-            self.is_latched = False
+        if not call.armed:
+            self.is_armed, self.may_arm, self.latched = False, not self.active, self.active
+        elif self.may_arm and not self.latched:
+            self.is_armed = True
         return McuVerdict.ACCEPTED

@@ -117,7 +117,8 @@ def test_a_graph_has_credentials_of_its_own(tmp_path: Any) -> None:
         ("hull", ["bus.graph=simulation"], r"bus\.graph 'simulation' .* profile 'hull'"),
         ("hull", ["bus.graph=hil"], r"bus\.graph 'hil'"),
         ("hull", ["camera.source=sim"], r"camera\.source 'sim': a hull has no simulated camera"),
-        ("hull", ["dashboard.arm_at_start=true"], r"dashboard\.arm_at_start: a hull waits for its operator"),
+        ("hull", ["dashboard.arm_at_start=true"], r"dashboard\.arm_at_start: profile hull waits for its operator"),
+        ("hil", ["dashboard.arm_at_start=true"], r"dashboard\.arm_at_start: profile hil waits for its operator"),
     ],
 )
 def test_a_graph_is_named_on_purpose(profile: str | None, sets: list[str], named: str) -> None:

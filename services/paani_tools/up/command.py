@@ -74,7 +74,7 @@ def _result(report: Report) -> str:
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
-    simulated = config_from(options).bus.graph is not Graph.HULL
+    simulated = config_from(options).bus.graph is Graph.SIMULATION
     sets = up_sets(
         simulated=simulated,
         world=options.world,

@@ -139,8 +139,8 @@ class Config(Section, frozen=True):
                 raise ValueError(f"{name} {address}: profile hil drives an emulator alone ({EMULATED_LINES})")
         if graph is Graph.HULL and line.startswith("socket:"):
             raise ValueError(f"thrusters.line {line}: a hull's microcontroller is at a serial device or unix:/PATH")
-        if graph is Graph.HULL and self.dashboard.arm_at_start:
-            raise ValueError("dashboard.arm_at_start: a hull waits for its operator")
+        if graph is not Graph.SIMULATION and self.dashboard.arm_at_start:
+            raise ValueError(f"dashboard.arm_at_start: profile {self.profile} waits for its operator")
 
 
 def is_emulated(line: str) -> bool:
