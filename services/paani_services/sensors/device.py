@@ -7,7 +7,8 @@ from paani.messages import SensorDevice, SensorRole, SensorStatus
 RATE_WINDOW_S = 5.0  # over which the rate of data is counted
 SILENT_S = 2.0  # without a byte: every device of these kinds speaks once a second at least
 UNREADABLE_S = 2.0  # with bytes, and without an intact frame
-LATE_S = {SensorRole.GPS: 2.5, SensorRole.IMU: 0.5, SensorRole.HEADING: 2.5}  # without usable data
+# Without usable data; the estimate gives up no later (`LocalizationConfig.max_gps_age_s` and its kind).
+LATE_S = {SensorRole.GPS: 3.0, SensorRole.IMU: 0.5, SensorRole.HEADING: 3.0}
 NEVER_AGE_S = 1e6  # of data that never came, as in the health reports
 KINDS_SHOWN = 12
 NEEDED = {

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from paani.config.section import NonNegative, Positive, Section
+from paani.port_address import parse_address
 
 Degrees = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 SPEED_MARK = "?speed="
@@ -70,8 +71,6 @@ def require_line(line: str) -> None:
         if not path or (speed is not None and not 0.0 < speed <= 1000.0):
             raise ValueError(f"'{line}' is no recording (expected file:PATH, file:PATH?speed=4 or file:PATH?speed=max)")
     elif line:
-        from paani.serial_port import parse_address  # noqa: PLC0415  # only who names a device needs pyserial
-
         parse_address(line)
 
 
