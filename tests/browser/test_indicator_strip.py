@@ -67,13 +67,14 @@ async def test_the_strip_shows_what_the_microcontroller_shows(
     reporting.cancel()
 
 
-async def test_without_a_bridge_there_is_no_strip(
+async def test_without_a_bridge_and_devices_there_is_no_strip(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
     async with spawn("dashboard"):
         page = (await watch(browser, config)).page
         await until(page, "paani.overlay.mask_seq !== null")
         assert await page.evaluate(f"{STRIP}.hidden")
+        assert await page.evaluate("document.querySelector('#sensors').hidden")
 
 
 async def test_the_strip_fits_a_phone(browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config) -> None:

@@ -8,8 +8,7 @@ const MAIN_TOPIC = {
   plant: "plant/thrust_applied", eye: "eye/picture", camera: "camera/picture", perception: "perception/evidence",
   advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
   localization: "localization/odometry", dashboard: "operator/arming", recorder: "recorder/state",
-  bridge: "bridge/state",
-  thrusters: "plant/thrust_applied",
+  bridge: "bridge/state", thrusters: "plant/thrust_applied", sensors: "sensors/imu",
 };
 const COLUMNS = 8;
 /** @type {Map<string, HTMLElement[]>} */

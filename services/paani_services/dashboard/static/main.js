@@ -10,6 +10,7 @@ import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
 import { bindOperatorControls, renderOperatorState, renewToken } from "./operator.js";
+import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
 import { Store } from "./store.js";
 import { renderTopbar } from "./topbar.js";
@@ -60,6 +61,7 @@ function render() {
   renderExplanation(store, now);
   renderMotion(store, now);
   renderIndicator(store, now);
+  renderSensors(store, now);
   renderHealth(store, open, now);
   map.render(store, now);
   if (!store.isFresh("camera/picture", now)) camera.scheduleDraw();
