@@ -95,6 +95,7 @@ class Config(Section, frozen=True):
     def __post_init__(self) -> None:
         """Refuse settings that cannot work together; the message names the fields."""
         self._require_graph()
+        self._require_lines()
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
         starved = 1.0 / rate_hz > motion.max_gap_s or rate_hz * motion.history_s + 1 < motion.min_samples
         if self.profile != "paper" and not motion.follow_rate and starved:
@@ -141,6 +142,23 @@ class Config(Section, frozen=True):
             raise ValueError(f"thrusters.line {line}: a hull's microcontroller is at a serial device or unix:/PATH")
         if graph is not Graph.SIMULATION and self.dashboard.arm_at_start:
             raise ValueError(f"dashboard.arm_at_start: profile {self.profile} waits for its operator")
+
+    def _require_lines(self) -> None:
+        """A line has one user, and a recording guides no boat that moves."""
+        sensors = self.sensors
+        devices = {
+            "sensors.gps.line": sensors.gps.line,
+            "sensors.imu.line": sensors.imu.line,
+            "sensors.heading.line": sensors.heading.line,
+        }
+        for name, line in devices.items():
+            for other, taken in (("bridge.line", self.bridge.line), ("thrusters.line", self.thrusters.line)):
+                if line and line.partition("@")[0] == taken.partition("@")[0]:
+                    raise ValueError(f"{name} {line}: is also {other}; a sensor needs a line of its own")
+            if line.startswith("file:") and self.thrusters.line:
+                raise ValueError(
+                    f"{name} {line}: a recording is no sensor of a boat that moves (thrusters.line is set)"
+                )
 
 
 def is_emulated(line: str) -> bool:

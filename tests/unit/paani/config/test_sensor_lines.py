@@ -31,3 +31,20 @@ def test_the_speed_of_a_recording() -> None:
     assert recording_of("file:/a/b.nmea") == ("/a/b.nmea", 1.0)
     assert recording_of("file:/a/b.nmea?speed=2.5") == ("/a/b.nmea", 2.5)
     assert recording_of("file:/a/b.nmea?speed=max") == ("/a/b.nmea", None)
+
+
+@pytest.mark.parametrize("device", ["gps", "imu", "heading"])
+@pytest.mark.parametrize("user", ["bridge", "thrusters"])
+def test_a_line_to_the_microcontroller_is_no_sensors_line(device: str, user: str) -> None:
+    lines = (f"sensors.{device}.line=serial:/dev/ttyACM0@9600", f"{user}.line=serial:/dev/ttyACM0")
+    with pytest.raises(UserError, match=rf"sensors\.{device}\.line .*{user}\.line"):
+        load_config(profile="hull", sets=lines)
+    load_config(profile="hull", sets=(lines[0], f"{user}.line=serial:/dev/ttyACM1"))
+
+
+@pytest.mark.parametrize("device", ["gps", "imu", "heading"])
+def test_a_recording_guides_no_boat_that_moves(device: str) -> None:
+    recording, line = f"sensors.{device}.line=file:drive.nmea", "thrusters.line=serial:/dev/ttyACM0"
+    with pytest.raises(UserError, match=rf"sensors\.{device}\.line file:drive\.nmea: a recording"):
+        load_config(profile="hull", sets=(recording, line))
+    load_config(profile="hull", sets=(recording,))
