@@ -24,7 +24,7 @@ from paani.config import Config, load_config
 
 ALONE = {"bench", "browser", "fault", "integration"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 10
+NICENESS = 5
 
 settings.register_profile("quick", max_examples=15)  # for `make check`; everything else tries more
 
