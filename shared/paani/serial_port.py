@@ -9,8 +9,10 @@ The event loop reads a device as soon as it has bytes, so that neither a thread 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import os
+import socket
 from typing import cast
 
 import serial
@@ -180,8 +182,10 @@ class StreamPort(Port, asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
+        self._acknowledge()
 
     def data_received(self, data: bytes) -> None:
+        self._acknowledge()
         self._take(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -202,6 +206,13 @@ class StreamPort(Port, asyncio.Protocol):
         await self._writable.wait()
         if not self._problem:
             self._transport.write(data)
+
+    def _acknowledge(self) -> None:
+        """Acknowledge what came at once, since a peer that sends byte by byte waits for it: 40 ms by default."""
+        stream = self._transport.get_extra_info("socket")
+        if stream is not None and stream.family != socket.AF_UNIX and hasattr(socket, "TCP_QUICKACK"):
+            with contextlib.suppress(OSError):
+                stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
     def _pause_reading(self) -> None:
         self._transport.pause_reading()

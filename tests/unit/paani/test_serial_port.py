@@ -173,3 +173,27 @@ async def test_a_socket_is_a_port_too() -> None:
         with pytest.raises(PortError, match="closed by the other side"):
             await port.write(b"x")
         await port.close()
+
+
+async def test_a_peer_that_sends_byte_by_byte_is_not_kept_waiting() -> None:
+    """It sends on when what it sent is acknowledged, which Linux puts off by 40 ms once a connection is interactive."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        port = await open_port(f"socket://127.0.0.1:{listener.getsockname()[1]}")
+        peer, _ = listener.accept()
+        with peer:
+            durations_ms = []
+            for _ in range(30):
+                started_ms = stopwatch_ms()
+                await port.write(b"?")
+                assert peer.recv(10) == b"?"
+                for _ in range(3):
+                    peer.sendall(b"!")
+                received = b""
+                while len(received) < 3:
+                    received += await port.read()
+                durations_ms.append(stopwatch_ms() - started_ms)
+                await asyncio.sleep(0.02)
+        await port.close()
+    assert sorted(durations_ms)[15] < 30.0

@@ -1,0 +1,1 @@
+"""`paani bench bridge`: the bridge against the firmware on an emulated microcontroller."""
