@@ -8,6 +8,7 @@ import shutil
 import struct
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -45,7 +46,7 @@ def build() -> Path:
     return BUILD
 
 
-def guide(seq: int = 1, direction: Direction = Direction.LEFT, session: int = 7, **fields: int) -> Guide:
+def guide(seq: int = 1, direction: Direction = Direction.LEFT, session: int = 7, **fields: Any) -> Guide:
     return Guide(direction=direction, session=session, seq=seq, lease_ms=fields.pop("lease_ms", 500), **fields)
 
 

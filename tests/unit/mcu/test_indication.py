@@ -126,10 +126,10 @@ def test_a_change_of_state_is_told_at_once(core: Core) -> None:
     core.take(INDICATION_LINE)
     core.receive(INDICATION_LINE, request(guide()))
     core.wait(600)
-    told = statuses(core.take(INDICATION_LINE))
-    assert [status.state for status in told] == [McuState.FRESH, McuState.FRESH, McuState.STALE]
-    assert [status.verdict for status in told] == [McuVerdict.ACCEPTED, McuVerdict.NONE, McuVerdict.NONE]
-    assert told[2].mcu_ms == 500
+    reports = statuses(core.take(INDICATION_LINE))
+    assert [status.state for status in reports] == [McuState.FRESH, McuState.FRESH, McuState.STALE]
+    assert [status.verdict for status in reports] == [McuVerdict.ACCEPTED, McuVerdict.NONE, McuVerdict.NONE]
+    assert reports[2].mcu_ms == 500
 
 
 ARROWS = {
@@ -146,7 +146,7 @@ ARROWS = {
 @pytest.mark.parametrize("direction", ARROWS)
 def test_o3_each_direction_has_its_arrow_and_each_lane_its_bar(core: Core, direction: Direction) -> None:
     """O3 as far as a picture in memory proves it; that the lights of the board show it needs the board."""
-    core.call(guide(1, direction, risks=(100, 1, 255)))  # type: ignore[arg-type]
+    core.call(guide(1, direction, risks=(100, 1, 255)))
     core.wait(1)
     lights = core.lights()
     assert lights[0][:7] == ARROWS[direction]
