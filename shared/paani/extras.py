@@ -10,6 +10,7 @@ EXTRA_OF = {
     "mujoco": "host",
     "OpenGL": "host",
     "filterpy": "host",
+    "scipy": "host",
     "gpxpy": "host",
     "tqdm": "host",
     "torch": "train",

@@ -1,1 +1,1 @@
-"""`paani calibrate`: how the camera is mounted, from the far waterline and the IMU."""
+"""`paani calibrate`: how the camera is mounted, and what the hull does."""

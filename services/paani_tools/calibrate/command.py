@@ -1,7 +1,11 @@
-"""`paani calibrate RECORDING|--live SECONDS --shore-m METRES`: a calibration section for the boat's settings."""
+"""`paani calibrate RECORDING|--live SECONDS --shore-m METRES`: a calibration section for the boat's settings.
+
+`paani calibrate hull` and the like are commands of their own.
+"""
 
 import argparse
 import asyncio
+import importlib
 import sys
 
 from paani.cli import add_config_arguments, config_from
@@ -13,10 +17,14 @@ from paani_tools.calibrate.gather import collect_live, collect_recorded, waterli
 from paani_tools.calibrate.mount import Mount, estimate_mount
 
 MAX_SECONDS = 3600.0
+COMMANDS = {"hull": "paani_tools.calibrate.hull.command"}
+"""What else is calibrated, by the first word, and the module whose `main` does it."""
 
 
 def main(argv: list[str]) -> int:
     """Print what was found, and write it. Raises UserError for input that cannot calibrate; then nothing is written."""
+    if argv and argv[0] in COMMANDS:
+        return int(importlib.import_module(COMMANDS[argv[0]]).main(argv[1:]))
     options = _parser().parse_args(argv)
     config = config_from(options)
     if (options.recording is None) == (options.live is None):
@@ -58,7 +66,8 @@ def calibration_toml(calibration: CalibrationConfig, mount: Mount) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="paani calibrate",
-        description="Pitch and roll of the camera's mount, from the far waterline and the boat's roll and pitch.",
+        description="Pitch and roll of the camera's mount, from the far waterline and the boat's roll and pitch. "
+        f"For the rest of the boat: {', '.join(f'paani calibrate {name}' for name in COMMANDS)}.",
     )
     parser.add_argument("recording", type=input_path(), nargs="?", help="a recording of the moored or slow boat")
     parser.add_argument("--live", type=_seconds, metavar="SECONDS", help="listen to the running boat instead")

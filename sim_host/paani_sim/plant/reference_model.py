@@ -144,7 +144,7 @@ def _wind_force(through_air: F64) -> F64:
 
 def simulate_plant(vessel: str, manoeuvre: Manoeuvre) -> F64:
     """`(n, 3)` as `solved`, of the plant."""
-    plant = Plant(_build_open_water(manoeuvre), PlantConfig(vessel=vessel))
+    plant = Plant(build_open_water(manoeuvre), PlantConfig(vessel=vessel))
     try:
         plant.place(0.0, 0.0, 0.0)
         left_n, right_n, side, track = manoeuvre.left_n, manoeuvre.right_n, 1.0, [(0.0, 0.0, 0.0)]
@@ -161,7 +161,7 @@ def simulate_plant(vessel: str, manoeuvre: Manoeuvre) -> F64:
         plant.close()
 
 
-def _build_open_water(manoeuvre: Manoeuvre) -> World:
+def build_open_water(manoeuvre: Manoeuvre) -> World:
     """A broad channel along the current, without wind, with the boat in its middle."""
     along = np.array([math.cos(manoeuvre.current_rad), math.sin(manoeuvre.current_rad)])
     left = np.array([-along[1], along[0]])

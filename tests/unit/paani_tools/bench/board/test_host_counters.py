@@ -10,7 +10,11 @@ from msgspec.structs import replace
 from paani_tools.bench.board.host_counters import HostCounters, cpu_percent
 from paani_tools.bench.board.machine import identify_machine
 
-STAT = "cpu  {busy} 0 0 {idle} 100 0 0 500 0 0\ncpu0 1 2 3 4 5 6 7 8 9 10\n"
+STAT = "cpu  {busy} 0 0 {idle} {waiting} 0 0 {stolen} 0 0\ncpu0 1 2 3 4 5 6 7 8 9 10\n"
+
+
+def stat(busy: int, idle: int, waiting: int = 100, stolen: int = 500) -> str:
+    return STAT.format(busy=busy, idle=idle, waiting=waiting, stolen=stolen)
 
 
 def write(root: Path, files: dict[str, str]) -> Path:
@@ -21,7 +25,7 @@ def write(root: Path, files: dict[str, str]) -> Path:
 
 
 V2 = {
-    "proc/stat": STAT.format(busy=300, idle=600),
+    "proc/stat": stat(300, 600),
     "proc/vmstat": "pgfault 5\npgmajfault 7\n",
     "proc/self/cgroup": "0::/boat.slice\n",
     "sys/fs/cgroup/cgroup.controllers": "cpu memory\n",
@@ -34,7 +38,7 @@ V2 = {
     "sys/class/thermal/thermal_zone1/temp": "41000\n",
 }
 V1 = {
-    "proc/stat": STAT.format(busy=300, idle=600),
+    "proc/stat": stat(300, 600),
     "proc/vmstat": "pgmajfault 7\n",
     "proc/12/cgroup": "8:pids:/\n4:memory:/docker/abc\n1:cpu,cpuacct:/\n0::/\n",
     "sys/fs/cgroup/memory/memory.usage_in_bytes": f"{200 * 2**20}\n",
@@ -62,7 +66,7 @@ def test_version_1_groups_of_a_process_in_a_container(tmp_path: Path) -> None:
 
 
 def test_what_a_machine_does_not_tell_is_absent_with_its_reason(tmp_path: Path) -> None:
-    counters = HostCounters(write(tmp_path, {"proc/stat": STAT.format(busy=1, idle=1)}))
+    counters = HostCounters(write(tmp_path, {"proc/stat": stat(1, 1)}))
     sample = counters.read()
     assert set(counters.absent) == {"memory", "oom_kills", "throttling", "temperature"}
     assert "no memory control group" in counters.absent["memory"]
@@ -72,7 +76,7 @@ def test_what_a_machine_does_not_tell_is_absent_with_its_reason(tmp_path: Path) 
 def test_u6_load_is_that_of_the_whole_machine(tmp_path: Path) -> None:
     """U6: busy over all ticks; waiting for a disk is idle, and what a hypervisor took is nobody's."""
     before = HostCounters(write(tmp_path, V2)).read()
-    (tmp_path / "proc/stat").write_text(STAT.format(busy=300 + 25, idle=600 + 75))
+    (tmp_path / "proc/stat").write_text(stat(300 + 25, 600 + 45, waiting=100 + 30, stolen=500 + 40))
     after = HostCounters(tmp_path).read()
     assert cpu_percent(before, after) == pytest.approx(25.0)
     assert cpu_percent(after, after) is None
