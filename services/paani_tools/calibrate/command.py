@@ -17,7 +17,10 @@ from paani_tools.calibrate.gather import collect_live, collect_recorded, waterli
 from paani_tools.calibrate.mount import Mount, estimate_mount
 
 MAX_SECONDS = 3600.0
-COMMANDS = {"hull": "paani_tools.calibrate.hull.command"}
+COMMANDS = {
+    "hull": "paani_tools.calibrate.hull.command",
+    "thrusters": "paani_tools.calibrate.thrusters.command",
+}
 """What else is calibrated, by the first word, and the module whose `main` does it."""
 
 
