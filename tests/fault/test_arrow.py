@@ -1,0 +1,103 @@
+"""A drive on the river with its advice on the emulated microcontroller: whatever dies before it, no arrow stays."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+from paani.clock import stopwatch_ms
+from paani.config import BridgeConfig, load_config
+from tests.conftest import find_free_port
+from tests.fault.test_kill import READY_S, Loop, pid_of
+from tests.firmware.emulator import Emulator, open_emulator
+from tests.firmware.tap import STILL, Tap, tapped
+from tests.mcu_peer import until
+
+pytestmark = [pytest.mark.fault, pytest.mark.timeout(400)]
+CHAIN = ("camera", "perception", "advisor", "router", "bridge")  # from the picture to the line
+LIMIT_MS = BridgeConfig().lease_ms + 100
+MANY = int(os.environ.get("ARROW_KILLS", "20"))  # of each process
+
+
+def start(words: list[str], output: IO[str]) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "paani", "up", "--headless", "--world", "river", *words]
+    return subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, text=True)
+
+
+@contextlib.asynccontextmanager
+async def driving(folder: Path, line: str) -> AsyncIterator[Loop]:
+    """`paani up` on the river with a bridge."""
+    sets = (
+        f"bus.router=tcp/127.0.0.1:{find_free_port()}",
+        f"bus.runtime_dir={folder / 'runtime'}",
+        f"bridge.line={line}",
+    )
+    words = [word for setting in sets for word in ("--set", setting)]
+    with (folder / "out").open("w+") as output:
+        supervisor = start(words, output)
+        try:
+            deadline_ms = stopwatch_ms() + READY_S * 1e3
+            while "alive after" not in (found := (folder / "out").read_text()):
+                assert supervisor.poll() is None, found
+                assert stopwatch_ms() < deadline_ms, found
+                await asyncio.to_thread(threading.Event().wait, 0.1)
+            yield Loop(supervisor, load_config(sets=sets).bus)
+            assert supervisor.poll() is None, "the supervisor itself ended"
+        finally:
+            supervisor.terminate()
+            supervisor.wait(10)
+            print((folder / "out").read_text())
+
+
+async def kill_and_time(loop: Loop, service: str, mcu: Emulator, tap: Tap) -> int:
+    """Milliseconds on the microcontroller's clock from the kill of a process until the arrow was STOP."""
+    await until(lambda: tap.display not in STILL, 60.0)
+    pid = await asyncio.to_thread(pid_of, loop, service)
+    await until(lambda: tap.display not in STILL, 60.0)
+    pins = await mcu.wait_for_pins(lambda pins: True)
+    os.kill(pid, signal.SIGKILL)
+    before = len(tap.statuses)
+    await until(lambda: any(status.display in STILL for status in tap.statuses[before:]), 10.0)
+    stopped = next(status for status in tap.statuses[before:] if status.display in STILL)
+    still_ms = max(
+        (status.mcu_ms for status in tap.statuses[before:] if status.display not in STILL), default=pins.mcu_ms
+    )
+    assert still_ms <= stopped.mcu_ms, "an arrow after the STOP"
+    return stopped.mcu_ms - pins.mcu_ms
+
+
+async def kill_each(folder: Path, times: int) -> dict[str, list[int]]:
+    async with open_emulator() as mcu, tapped(mcu.guide) as tap, driving(folder, tap.address) as loop:
+        stopped_ms: dict[str, list[int]] = {service: [] for service in CHAIN}
+        for _ in range(times):
+            for service in CHAIN:
+                stopped_ms[service].append(await kill_and_time(loop, service, mcu, tap))
+                print(f"{service}: STOP after {stopped_ms[service][-1]} ms", flush=True)
+    return stopped_ms
+
+
+async def test_whatever_dies_the_arrow_is_stop_within_its_lease(tmp_path: Path) -> None:
+    stopped_ms = await kill_each(tmp_path, 1)
+    assert {service: [ms for ms in found if ms > LIMIT_MS] for service, found in stopped_ms.items()} == {
+        service: [] for service in CHAIN
+    }
+
+
+@pytest.mark.long
+@pytest.mark.timeout(7200)
+async def test_whatever_dies_twenty_times_the_arrow_is_stop_within_its_lease(tmp_path: Path) -> None:
+    """`ARROW_KILLS=N` sets how often."""
+    stopped_ms = await kill_each(tmp_path, MANY)
+    for service, found in stopped_ms.items():
+        print(f"{service}: {len(found)} kills, STOP after {min(found)} to {max(found)} ms")
+    assert max(max(found) for found in stopped_ms.values()) <= LIMIT_MS
