@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from paani import keys
 from paani.config import load_config
+from paani.decider import decider_of
 from paani.errors import UserError
 
 LINE = "bridge.line=serial:/dev/ttyACM0@115200"
@@ -22,3 +24,11 @@ def test_a_bridge_runs_where_there_is_a_line(profile: str) -> None:
 def test_what_cannot_be_is_refused_with_its_field(setting: str) -> None:
     with pytest.raises(UserError, match=r"^--set bridge[^\n]*: bridge[^\n]*$"):
         load_config(sets=(setting,))
+
+
+def test_the_loop_waits_for_no_bridge() -> None:
+    """O5: the lights are no interlock. No thrust asks for the bridge's pulse, and no process reads what it writes."""
+    assert "bridge" not in keys.VITAL_SERVICES
+    assert "bridge" not in load_config(sets=(LINE,)).plant.adapter.require_pulses
+    for service in keys.DECIDING_SERVICES:
+        assert keys.BRIDGE_STATE not in decider_of(service).inputs
