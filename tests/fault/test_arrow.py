@@ -20,7 +20,7 @@ from paani.config import BridgeConfig, load_config
 from tests.conftest import find_free_port
 from tests.fault.test_kill import READY_S, Loop, pid_of
 from tests.firmware.emulator import Emulator, open_emulator
-from tests.firmware.tap import STILL, Tap, tapped
+from tests.firmware.line_listener import STILL, LineListener, listening_on
 from tests.mcu_peer import until
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(400)]
@@ -59,29 +59,29 @@ async def driving(folder: Path, line: str) -> AsyncIterator[Loop]:
             print((folder / "out").read_text())
 
 
-async def kill_and_time(loop: Loop, service: str, mcu: Emulator, tap: Tap) -> int:
+async def kill_and_time(loop: Loop, service: str, mcu: Emulator, listener: LineListener) -> int:
     """Milliseconds on the microcontroller's clock from the kill of a process until the arrow was STOP."""
-    await until(lambda: tap.display not in STILL, 60.0)
+    await until(lambda: listener.display not in STILL, 60.0)
     pid = await asyncio.to_thread(pid_of, loop, service)
-    await until(lambda: tap.display not in STILL, 60.0)
+    await until(lambda: listener.display not in STILL, 60.0)
     pins = await mcu.wait_for_pins(lambda pins: True)
     os.kill(pid, signal.SIGKILL)
-    before = len(tap.statuses)
-    await until(lambda: any(status.display in STILL for status in tap.statuses[before:]), 10.0)
-    stopped = next(status for status in tap.statuses[before:] if status.display in STILL)
+    before = len(listener.statuses)
+    await until(lambda: any(status.display in STILL for status in listener.statuses[before:]), 10.0)
+    stopped = next(status for status in listener.statuses[before:] if status.display in STILL)
     still_ms = max(
-        (status.mcu_ms for status in tap.statuses[before:] if status.display not in STILL), default=pins.mcu_ms
+        (status.mcu_ms for status in listener.statuses[before:] if status.display not in STILL), default=pins.mcu_ms
     )
     assert still_ms <= stopped.mcu_ms, "an arrow after the STOP"
     return stopped.mcu_ms - pins.mcu_ms
 
 
 async def kill_each(folder: Path, times: int) -> dict[str, list[int]]:
-    async with open_emulator() as mcu, tapped(mcu.guide) as tap, driving(folder, tap.address) as loop:
+    async with open_emulator() as mcu, listening_on(mcu.guide) as listener, driving(folder, listener.address) as loop:
         stopped_ms: dict[str, list[int]] = {service: [] for service in CHAIN}
         for _ in range(times):
             for service in CHAIN:
-                stopped_ms[service].append(await kill_and_time(loop, service, mcu, tap))
+                stopped_ms[service].append(await kill_and_time(loop, service, mcu, listener))
                 print(f"{service}: STOP after {stopped_ms[service][-1]} ms", flush=True)
     return stopped_ms
 

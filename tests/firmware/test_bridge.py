@@ -14,7 +14,7 @@ from paani.microcontroller.payloads import INDICATION, Guide
 from tests.conftest import OpenAs, Spawn
 from tests.fake_router import FakeRouter
 from tests.firmware.emulator import open_emulator
-from tests.firmware.tap import pipe_to_router, tapped
+from tests.firmware.line_listener import listening_on, pipe_to_router
 from tests.integration.test_bridge import bridge
 from tests.mcu_peer import McuPeer, PtyLine, until
 
@@ -48,22 +48,22 @@ async def test_the_advice_on_the_bus_is_on_the_lights(pty: bool, spawn: Spawn, o
 async def test_a_cable_pulled_out_during_a_turn_is_stop_and_the_arrow_comes_back(
     spawn: Spawn, open_as: OpenAs, tmp_path: Path
 ) -> None:
-    async with open_emulator() as mcu, tapped(mcu.guide) as tap:
+    async with open_emulator() as mcu, listening_on(mcu.guide) as listener:
         relay = Relay()
         cable = PtyLine(str(tmp_path / "tty"), relay)
-        await relay.connect(tap.address, cable)
+        await relay.connect(listener.address, cable)
         cable.plug_in()
         async with bridge(spawn, open_as, cable.address, NOBODY) as loop:
             loop.advisor.direction = m.Direction.LEFT
             await loop.state(lambda state: state.display is m.Direction.LEFT)
             pulled_out = await mcu.wait_for_pins(lambda pins: True)
             cable.pull_out()
-            await until(lambda: tap.state is m.McuState.STALE)
-            stopped = next(status for status in tap.statuses if status.state is m.McuState.STALE)
+            await until(lambda: listener.state is m.McuState.STALE)
+            stopped = next(status for status in listener.statuses if status.state is m.McuState.STALE)
             assert stopped.display is m.Direction.STOP
             assert 0 < stopped.mcu_ms - pulled_out.mcu_ms <= 800  # the lease and 100 ms
-            await until(lambda: tap.state is m.McuState.SAFE)
-            assert tap.display is m.Direction.STOP
+            await until(lambda: listener.state is m.McuState.SAFE)
+            assert listener.display is m.Direction.STOP
             await asyncio.sleep(0.5)
             cable.plug_in()
             back = await loop.state(lambda state: state.display is m.Direction.LEFT)

@@ -15,7 +15,7 @@ from tests.mcu_peer import served
 STILL = (Direction.STOP, Direction.NO_DATA)
 
 
-class Tap:
+class LineListener:
     """A relay between a bridge and the microcontroller that stays connected to the latter and keeps each status."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -57,16 +57,16 @@ class Tap:
 
 
 @contextlib.asynccontextmanager
-async def tapped(line: str) -> AsyncIterator[Tap]:
-    """Listen on a line of the emulator; the bridge uses the tap's address instead."""
+async def listening_on(line: str) -> AsyncIterator[LineListener]:
+    """Listen on a line of the emulator; the bridge uses the listener's address instead."""
     host, _, port = line.removeprefix("socket://").rpartition(":")
     reader, writer = await asyncio.open_connection(host, int(port))
-    tap = Tap(reader, writer)
-    listening = asyncio.create_task(tap.listen())
+    listener = LineListener(reader, writer)
+    listening = asyncio.create_task(listener.listen())
     try:
-        async with served(tap.serve) as own_port:
-            tap.address = f"socket://127.0.0.1:{own_port}"
-            yield tap
+        async with served(listener.serve) as own_port:
+            listener.address = f"socket://127.0.0.1:{own_port}"
+            yield listener
     finally:
         listening.cancel()
         await asyncio.gather(listening, return_exceptions=True)
