@@ -10,89 +10,44 @@ from pathlib import Path
 
 import pytest
 
-from paani import keys
 from paani import messages as m
-from paani.bus import Bus, Latest, open_bus
-from paani.bus.routing import open_router
-from paani.clock import WallClock, stopwatch_ms
+from paani.bus import Bus
+from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.errors import UserError
 from paani_services.thrusters.service import run
 from tests.mcu_peer import PtyLine, until
 from tests.thrust_peer import BATTERY, ESTOP, RECEIVER, ThrustPeer
+from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, opened
 
 pytestmark = pytest.mark.integration
-CLOCK = WallClock()
 
 
-class Boat:
-    """A hull's bus with the words of operator and controller, and what the thrusters make of them."""
+class Boat(ThrusterBus):
+    """The bus, the microcontroller at the end of the line, and the line."""
 
-    def __init__(self, config: Config, peer: ThrustPeer, line: PtyLine, buses: dict[str, Bus]) -> None:
-        self.config, self.peer, self.line, self.buses = config, peer, line, buses
-        self.armed: bool | None = None
-        self.thrust, self.is_pulsing = 0.2, True
-        observer = buses["observer"]
-        self.time: Latest[m.SimTime] = observer.latest(keys.SIM_TIME)
-        self.applied: Latest[m.ThrustApplied] = observer.latest(keys.THRUST_APPLIED)
-        self.state: Latest[m.ThrustersState] = observer.latest(keys.THRUSTERS_STATE)
-
-    async def speak(self) -> None:
-        """Operator, controller, who echoes the thrusters' own clock, and every pulse that is waited for: at 10 Hz."""
-        arming = self.buses["dashboard"].publisher(keys.ARMING)
-        thrust = self.buses["controller"].publisher(keys.THRUST)
-        pulses = [self.buses[name].publisher(keys.pulse(name)) for name in self.config.plant.adapter.require_pulses]
-        while True:
-            now_us = CLOCK.now_us()
-            if self.armed is not None:
-                arming.put(m.Arming(source_us=now_us, armed=self.armed))
-            for pulse in pulses if self.is_pulsing else ():
-                pulse.put(m.Pulse(source_us=now_us))
-            echo_us = self.time.value.stamp_us if self.time.value else 0
-            thrust.put(m.Thrust(source_us=now_us, left=self.thrust, right=self.thrust, enabled=True, echo_us=echo_us))
-            await asyncio.sleep(0.1)
-
-    @property
-    def cause(self) -> m.ZeroCause | None:
-        return self.applied.value.zero_cause if self.applied.value else None
-
-    async def until_cause(self, cause: m.ZeroCause) -> None:
-        await until(lambda: self.cause is cause, 8.0)
-
-    async def drive(self) -> None:
-        """Disarm, arm, and wait until the boat moves."""
-        self.armed = False
-        await until(lambda: self.peer.may_arm, 8.0)
-        self.armed = True
-        await self.until_cause(m.ZeroCause.NONE)
+    def __init__(self, config: Config, buses: dict[str, Bus], peer: ThrustPeer, line: PtyLine) -> None:
+        super().__init__(config, buses)
+        self.peer, self.line = peer, line
 
 
 @pytest.fixture
 async def boat(private_sets: tuple[str, ...], tmp_path: Path) -> AsyncIterator[Boat]:
     peer, path = ThrustPeer(), tmp_path / "ttyTHRUST"
     line = PtyLine(str(path), peer)
-    pulses = 'plant.adapter.require_pulses=["navigator", "localization"]'
-    config = load_config(profile="hull", sets=(*private_sets, f"thrusters.line={line.address}", pulses))
-    router = await open_router(config.bus)
-    users = ("thrusters", "dashboard", "controller", "navigator", "localization", "observer")
-    buses = {user: await open_bus(config.bus, user, CLOCK) for user in users}
-    line.plug_in()
-    found = Boat(config, peer, line, buses)
-    tasks = [
-        asyncio.create_task(run(buses["thrusters"], CLOCK, config)),
-        asyncio.create_task(found.speak()),
-    ]
-    try:
-        yield found
-        assert not any(task.done() for task in tasks), "never a crash"
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        line.pull_out()
-        for bus in buses.values():
-            await bus.close()
-        await asyncio.to_thread(router.close)
+    config = load_config(profile="hull", sets=(*private_sets, f"thrusters.line={line.address}", PULSES))
+    async with opened(config) as buses:
+        line.plug_in()
+        found = Boat(config, buses, peer, line)
+        tasks = [asyncio.create_task(run(buses["thrusters"], CLOCK, config)), asyncio.create_task(found.speak())]
+        try:
+            yield found
+            assert not any(task.done() for task in tasks), "never a crash"
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            line.pull_out()
 
 
 async def stays(condition: Callable[[], bool], seconds: float) -> None:
