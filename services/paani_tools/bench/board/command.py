@@ -20,6 +20,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import Clock, WallClock
 from paani.config import Config
 from paani.errors import UserError
+from paani.keys import Graph
 from paani.option_paths import input_folder, output_folder
 from paani.statistics.figure_table import table_text
 from paani.whole_file import write_whole
@@ -54,7 +55,7 @@ def main(argv: list[str]) -> int:
     if options.attach is None and options.cgroup_of is not None:
         raise UserError("--cgroup-of: only with --attach; a loop started here is in this process's control group")
     clock = WallClock()
-    config = config_from(options, _sets(options))
+    config = config_from(options, up_sets(simulated=False, world=options.world, camera=options.camera, headless=False))
     machine, counters = identify_machine(), HostCounters(pid=options.cgroup_of or "self")
     folder = _free_folder(options.out, clock)
     config = replace(config, recorder=replace(config.recorder, folder=str(folder.absolute())))
@@ -87,7 +88,7 @@ async def _start(
     """Run the loop on this machine, unarmed, and poll it. Returns what ran, and why it failed ("": it did not)."""
     plan = await make_plan(config)
     drawn = config.camera.source == "sim"
-    if not drawn:
+    if not drawn and config.bus.graph is Graph.SIMULATION:
         plan = Plan(tuple(name for name in plan.services if name not in SIMULATION_SERVICES), plan.config)
     failures: list[str] = []
 
@@ -137,12 +138,6 @@ async def _until_signal(work: Callable[[], Awaitable[None]]) -> None:
         loop.add_signal_handler(number, task.cancel)
     with contextlib.suppress(asyncio.CancelledError):
         await task
-
-
-def _sets(options: argparse.Namespace) -> tuple[str, ...]:
-    """As `paani up`, but not armed: the protocol measures what is seen and advised, and moves nothing."""
-    sets = up_sets(world=options.world, camera=options.camera, headless=False)
-    return tuple(setting for setting in sets if not setting.startswith("dashboard.arm_at_start"))
 
 
 def _free_folder(out: Path | None, clock: Clock) -> Path:

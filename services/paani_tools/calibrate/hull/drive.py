@@ -15,7 +15,7 @@ from paani import keys
 from paani.arrays import F64
 from paani.errors import UserError
 from paani.logs.reader import open_log
-from paani.messages import GpsFix, ImuSample, Odometry, ThrustApplied
+from paani.messages import GpsFix, ImuSample, Odometry, ThrustApplied, ZeroCause
 from paani_tools.progress import Progress
 
 STEP_S = 0.05  # of the simulation below: a sixth of the shortest time constant of the hulls that ship, or less
@@ -70,7 +70,9 @@ def drive_of(
     fixes: Sequence[GpsFix],
     samples: Sequence[ImuSample],
 ) -> Drive:
-    """The messages of a drive on one grid. Raises UserError for a drive that is too short or has holes."""
+    """The messages of a drive on one grid. Raises UserError for a drive that is too short, has holes, or
+    was driven by radio.
+    """
     healthy = sorted((o for o in odometry if o.healthy), key=lambda o: o.source_us)
     if not healthy:
         raise UserError(f"no healthy {keys.ODOMETRY.name}: the boat's heading is not known")
@@ -83,6 +85,10 @@ def drive_of(
         raise UserError(
             f"{max(0.0, steps * STEP_S):.0f} s with thrust, heading and gyro together; at least {MIN_DRIVE_S:.0f} s"
         )
+    for message in applied:
+        if message.zero_cause is ZeroCause.RECEIVER and begin_us <= message.source_us <= end_us:
+            at_s = (message.source_us - begin_us) * 1e-6
+            raise UserError(f"the radio receiver drove, {at_s:.0f} s into the drive: its thrust is not recorded")
     edges_us = begin_us + np.arange(steps + 1) * STEP_S * 1e6
     for topic, stamps_us in (
         (keys.THRUST_APPLIED, np.array(sorted(a.source_us for a in applied), np.float64)),

@@ -11,6 +11,7 @@ import pytest
 from paani.cli import main as paani
 from paani.config import load_config
 from paani.errors import UserError
+from paani.messages import ZeroCause
 from paani_sim.plant.reference_model import SAMPLE_S, Manoeuvre, solve_reference
 from paani_sim.vessels import load_vessel
 from paani_tools.calibrate.hull.command import REQUIRED, undetermined
@@ -132,6 +133,12 @@ def test_the_thrust_in_a_step_is_its_mean_and_changes_when_the_plant_says(rich: 
     assert found.thrust[int(step)] == pytest.approx(np.array([0.5, -0.1]) * (1.0 - part), abs=1e-9)
     assert found.thrust[int(step) + 1] == pytest.approx([0.5, -0.1])
     assert found.thrust[int(step) - 1] == pytest.approx([0.0, 0.0])
+
+
+def test_a_drive_by_radio_is_refused_because_its_thrust_is_unknown(rich: Messages) -> None:
+    taken = msgspec.structs.replace(rich.applied[600], left=0.0, right=0.0, zero_cause=ZeroCause.RECEIVER)
+    with pytest.raises(UserError, match="the radio receiver drove, 30 s into the drive"):
+        drive_of([*rich.applied[:600], taken, *rich.applied[601:]], rich.odometry, rich.fixes, rich.samples)
 
 
 def test_a_drive_with_holes_or_without_heading_is_refused(rich: Messages) -> None:
