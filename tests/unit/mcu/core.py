@@ -66,13 +66,14 @@ def notification(payload: Payload) -> bytes:
 class Core:
     """The core in this process, one turn of its loop for each millisecond."""
 
-    def __init__(self, now_ms: int = 0, *, paper: bool = False) -> None:
+    def __init__(self, now_ms: int = 0, *, paper: bool = False, steps_at_once: bool = True) -> None:
         self._library = ctypes.CDLL(str(build() / "libpaani.so"))
         self._library.paani_new.restype = ctypes.c_void_p
         self._session = ctypes.c_void_p(self._library.paani_new(int(paper), ctypes.c_uint32(now_ms)))
         self._scanners = {INDICATION_LINE: MessageScanner(), THRUST_LINE: MessageScanner()}
         self.now_ms = now_ms
-        self.wait(0)
+        if steps_at_once:
+            self.wait(0)
 
     def close(self) -> None:
         self._library.paani_delete(self._session)
@@ -85,11 +86,15 @@ class Core:
     def receive(self, line: int, data: bytes) -> None:
         self._library.paani_receive(self._session, ctypes.c_uint8(line), data, ctypes.c_uint32(len(data)))
 
-    def take(self, line: int) -> list[RpcMessage]:
+    def take_bytes(self, line: int) -> bytes:
         """What the core has sent on this line since the last call."""
         buffer = ctypes.create_string_buffer(4096)
-        size = self._library.paani_take(self._session, ctypes.c_uint8(line), buffer, ctypes.c_uint32(len(buffer)))
-        return self._scanners[line].feed(buffer.raw[:size])
+        size = int(self._library.paani_take(self._session, ctypes.c_uint8(line), buffer, ctypes.c_uint32(len(buffer))))
+        return buffer.raw[:size]
+
+    def take(self, line: int) -> list[RpcMessage]:
+        """The messages in what it has sent."""
+        return self._scanners[line].feed(self.take_bytes(line))
 
     def call(self, payload: Payload | bytes, method: type[Payload] | None = None) -> McuStatus:
         """Judge a payload that a router has taken out of its stream."""
