@@ -102,7 +102,9 @@ class Emulator:
 
     async def read_timers(self) -> tuple[int, int, bool]:
         """Both pulse widths in microseconds and the enable line, from the registers themselves."""
+        await self.freeze()  # so that the three belong together
         left, right, lights = [await self.read_register(at) for at in (LEFT_PULSE, RIGHT_PULSE, LIGHTS)]
+        await self.thaw()
         return left // TICKS_PER_US, right // TICKS_PER_US, bool(lights & 1)
 
     async def reset(self) -> None:

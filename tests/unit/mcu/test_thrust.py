@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 
 import pytest
 
@@ -55,7 +54,7 @@ class Boat:
 
 
 @pytest.fixture
-def boat(core: Core) -> Iterator[Boat]:
+def boat(core: Core) -> Boat:
     """Driven at full thrust on both sides."""
     boat = Boat(core)
     boat.arm()
