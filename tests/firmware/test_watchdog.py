@@ -45,8 +45,8 @@ async def test_a_hang_stops_the_boat_within_a_lease_and_is_reset(mcu: Emulator) 
         assert mcu.history[restarted].enable is False
         assert (await guidance.call("paani_guide", GUIDE)).state is McuState.FRESH
         # Thrust needs its settings and its arming anew.
-        call = ThrustCall(armed=True, session=9, seq=9, lease_ms=300, left=1.0, right=1.0).encode()
-        assert (await thrust.call("paani_thrust", call)).verdict is McuVerdict.NOT_CONFIGURED
+        again = ThrustCall(armed=True, session=9, seq=9, lease_ms=300, left=1.0, right=1.0).encode()
+        assert (await thrust.call("paani_thrust", again)).verdict is McuVerdict.NOT_CONFIGURED
         assert await mcu.read_timers() == (1500, 1500, False)
 
 
@@ -59,7 +59,7 @@ async def test_the_outputs_are_safe_before_the_reset(mcu: Emulator) -> None:
             await thrust.call("paani_thrust", call.encode())
         await mcu.wait_for_pins(lambda pins: pins.enable and pins.left_us > 1600)
         await mcu.set_pins("hang")
-        seen = []
+        seen: list[tuple[int, int, bool]] = []
         async with asyncio.timeout(20):
             while not seen or seen[-1][2]:
                 seen.append(await mcu.read_timers())

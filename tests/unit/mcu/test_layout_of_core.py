@@ -36,3 +36,45 @@ def test_the_core_has_no_undefined_symbols(tmp_path: Path) -> None:
     subprocess.run(["g++", *FLAGS, "-c", *sources], cwd=tmp_path, check=True)
     subprocess.run(["ld", "-r", "-o", "core.o", *(f"{path.stem}.o" for path in sources)], cwd=tmp_path, check=True)
     assert subprocess.run(["nm", "-u", "core.o"], cwd=tmp_path, check=True, capture_output=True).stdout == b""
+
+
+def test_the_sketch_compiles_against_stubs_of_its_libraries() -> None:
+    """Syntax and types alone: that it runs needs the board."""
+    if not shutil.which("g++"):
+        pytest.skip("needs g++")
+    command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{ROOT / 'mcu/stubs'}"]
+    checked = subprocess.run([*command, "-x", "c++", SKETCH], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stderr
+
+
+def test_the_sketch_makes_its_outputs_safe_and_starts_the_watchdog_before_the_bridge() -> None:
+    """Only what was made safe before may wait: the bridge's library blocks without a router."""
+    setup = SKETCH.read_text(encoding="utf-8").partition("void setup() {")[2].partition("\n}\n")[0]
+    steps = ["digitalWrite(ENABLE_PIN, LOW)", "set_pins(", "device().start(", "watchdog::start()", "Bridge.begin()"]
+    places = [setup.index(step) for step in steps]
+    assert places == sorted(places)
+
+
+def test_a4_the_microcontroller_serves_four_calls_and_no_other() -> None:
+    """A4 on its side of the wire: what crosses is one of these, of fixed size. The board's router needs the board."""
+    source = (CORE / "scanner.cpp").read_text(encoding="utf-8")
+    served = dict(re.findall(r'\{"\\x[a-f0-9]{2}(\w+)", \d+, (\w+)\}', source))
+    assert served == {
+        "paani_guide": "GUIDE_BYTES",
+        "paani_thrust": "THRUST_BYTES",
+        "paani_esc": "ESC_BYTES",
+        "paani_status": "0",
+    }
+    provided = re.findall(r'Bridge\.provide_safe\("(\w+)"', SKETCH.read_text(encoding="utf-8"))
+    assert set(provided) == set(served)
+
+
+def test_static_analysis_finds_nothing() -> None:
+    if not shutil.which("cppcheck"):
+        pytest.skip("needs cppcheck")
+    command = ["cppcheck", "--quiet", "--std=c++17", "--language=c++", "--error-exitcode=1", "--inline-suppr"]
+    command += ["--enable=warning,performance,portability", f"-I{CORE}"]
+    command += ["--suppress=comparePointers"]  # the startup compares borders that the linker script names
+    folders = [CORE, ROOT / "mcu/qemu", ROOT / "mcu/native"]
+    checked = subprocess.run([*command, *folders], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stderr
