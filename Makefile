@@ -10,16 +10,18 @@ PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
 DEBIAN_TEST := $(DEBIAN) chromium libatomic1
+# What builds, emulates and checks the microcontroller's firmware: most of a gigabyte, which `make check` does without.
+DEBIAN_FIRMWARE := gcc-arm-none-eabi qemu-system-arm g++ cppcheck
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-.PHONY: run test test-long check lint docs setup setup-test system system-test lock clean
+.PHONY: run test test-long check lint docs firmware setup setup-test system system-test system-firmware lock clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
-test: setup-test lint ## everything that CI runs
+test: setup-test system-firmware lint ## everything that CI runs
 	$(BIN)/python -m pytest -q -n 2 tests -m "not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
@@ -39,6 +41,10 @@ lint:
 docs: $(VENV)/.stamp-host-docs ## build the documentation into runs/docs, strictly: a broken link fails
 	$(BIN)/python -m docs.build runs/docs
 
+firmware: system-firmware ## build the microcontroller's image for the emulator into runs/mcu/qemu; prints its bytes
+	@$(MAKE) -s -C mcu/qemu
+	@arm-none-eabi-size runs/mcu/qemu/paani.elf | awk 'NR == 2 { print "paani.elf: text " $$1 ", data " $$2 ", bss " $$3 " bytes" }'
+
 setup: system $(VENV)/.stamp-host
 setup-test: system-test $(VENV)/.stamp-$(subst $(comma),-,$(EXTRAS))
 
@@ -57,6 +63,9 @@ system:
 
 system-test:
 	@sh deploy/system-packages.sh $(DEBIAN_TEST) $(DEBIAN_PYTHON)
+
+system-firmware:
+	@sh deploy/system-packages.sh $(DEBIAN_FIRMWARE)
 
 lock: ## pin what the next installation takes
 	$(BIN)/uv pip compile -q --python-version 3.11 --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock

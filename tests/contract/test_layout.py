@@ -92,7 +92,7 @@ def test_no_picture_of_the_data_ships() -> None:
 
 
 def test_every_top_level_folder_explains_itself() -> None:
-    for folder in ("shared", "services", "sim_host", "models", "deploy", "examples", "tests"):
+    for folder in ("shared", "services", "sim_host", "models", "mcu", "deploy", "examples", "tests"):
         assert (ROOT / folder / "README.md").is_file(), folder
 
 
