@@ -1,11 +1,10 @@
 """The Linux half of the App Lab app: PAANI's bridge, on the socket of the board's router.
 
-PAANI_SETTINGS holds more settings, separated by blanks, such as `bus.router=tcp/192.168.1.20:7447`.
+Other settings come from the environment, as for every process of PAANI: `PAANI_BUS__ROUTER=tcp/192.168.1.20:7447`.
 """
 
 from __future__ import annotations
 
-import os
 import sys
 
 LINE = "unix:/var/run/arduino-router.sock"  # where App Lab mounts the router
@@ -17,8 +16,7 @@ def main() -> int:
     except ImportError:
         sys.stderr.write("paani is not installed: put its wheel beside main.py and its name into requirements.txt\n")
         return 2
-    settings = [f"bridge.line={LINE}", *os.environ.get("PAANI_SETTINGS", "").split()]
-    return run_paani(["bridge", *(word for setting in settings for word in ("--set", setting))])
+    return run_paani(["bridge", "--set", f"bridge.line={LINE}"])
 
 
 if __name__ == "__main__":
