@@ -32,8 +32,9 @@ class BoardFigures(msgspec.Struct, frozen=True, kw_only=True):
 
     Stage times, frame age and `unusable` are of distinct results (by frame); CPU, memory, temperature, `learned` and
     `stale` of polls. `cadence_hz` and `captured_hz` follow from the numbers of the first and last result and picture
-    sampled, so results between two polls count too. `restarts`, `drops`, `oom_kills`, `throttled_periods` and
-    `major_faults` are increases from the first poll to the last. None: not measured here.
+    sampled, so results between two polls count too. `returns`, `drops`, `oom_kills`, `throttled_periods` and
+    `major_faults` are increases from the first poll to the last; a process returns that was started again, or whose
+    link was silent for `bus.lease_ms`. None: not measured here.
     """
 
     polls_wanted: int
@@ -56,7 +57,7 @@ class BoardFigures(msgspec.Struct, frozen=True, kw_only=True):
     learned: int
     stale: int
     unusable: int
-    restarts: int
+    returns: int
     drops: int
     oom_kills: int | None
     throttled_periods: int | None
@@ -94,7 +95,7 @@ def board_figures(polls: Sequence[Poll], wanted: int) -> BoardFigures:
         learned=sum(result.segmentation is m.SegmentationSource.LEARNED for result in sampled),
         stale=sum(is_stale(status) for status in answered),
         unusable=sum(not result.usable for result in results),
-        restarts=sum(_increases(answered, lambda process: process.starts).values()),
+        returns=sum(_increases(answered, lambda process: max(1, process.starts)).values()),
         drops=sum(_increases(answered, lambda process: process.drops).values()),
         oom_kills=_host_increase(hosts, lambda host: host.oom_kills),
         throttled_periods=_host_increase(hosts, lambda host: host.throttled_periods),

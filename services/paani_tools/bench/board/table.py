@@ -84,7 +84,7 @@ def _fault_rows(figures: BoardFigures, absent: dict[str, str]) -> tuple[Row, ...
             figures.distinct_results,
             "refused by the image-quality check",
         ),
-        ("restarts of processes", "-", str(figures.restarts), answered, ""),
+        ("processes lost and back", "-", str(figures.returns), answered, "started again, or their link was silent"),
         ("messages refused or lost", "-", str(figures.drops), answered, ""),
         _count_row("OOM kills", "0", figures.oom_kills, figures.polls, absent.get("oom_kills", "")),
         _count_row("CPU quota throttling", "0", figures.throttled_periods, figures.polls, absent.get("throttling", "")),

@@ -138,13 +138,14 @@ def test_v22_failures_stale_advice_kills_and_throttling_are_counted() -> None:
     old = run[2].status
     assert old is not None
     run[2] = replace(run[2], status=replace(old, advisory_age_s=2.9))
+    run[0] = replace(run[0], status=status(0.5, 2.0, starts=0))  # not seen yet: its first start is none too many
     run[3] = replace(run[3], status=status(3.5, 2.0, starts=2, drops=4))
     run[4] = replace(run[4], status=status(4.5, 2.0, starts=2, drops=5))
     run[5] = replace(run[5], status=status(5.5, 2.0, starts=2, drops=1))
     figures = board_figures(run, 6)
     assert (figures.answered, figures.failures, figures.stale, figures.learned) == (5, {"timed out": 1}, 1, 5)
     assert (figures.oom_kills, figures.throttled_periods, figures.major_faults) == (0, 1, 15)
-    assert (figures.restarts, figures.drops) == (1, 6)
+    assert (figures.returns, figures.drops) == (1, 6)
 
 
 @pytest.mark.parametrize(
