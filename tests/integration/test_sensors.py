@@ -180,9 +180,12 @@ async def test_a_receiver_pulled_out_and_plugged_in_again_is_back_by_itself(
         terminals["gps"].unplug()
         gone = await device(bus, SensorRole.GPS, has(SensorStatus.ABSENT), 5.0)
         assert "next try" in gone.note
-        fixes = bus.latest(keys.GPS)
-        await asyncio.sleep(1.0)
+        fixes, health = bus.latest(keys.GPS), bus.latest(keys.health("sensors"))
+        await asyncio.sleep(4.0)
         assert fixes.received == 0
+        assert health.value is not None
+        assert health.value.cpu_cores < 0.5  # no busy loop
+        assert "gps absent" in health.value.note
         terminals["gps"].plug()
         back = await device(bus, SensorRole.GPS, has(SensorStatus.OK), 12.0)
         assert back.reconnections == 1

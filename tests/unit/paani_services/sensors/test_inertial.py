@@ -102,6 +102,12 @@ def test_a_unit_turned_to_port_reads_ahead_where_the_boat_does() -> None:
     assert turned.gyro_radps == pytest.approx((0.0, 0.1, 0.5))
 
 
+def test_the_yaw_of_a_unit_turned_to_port_is_less_than_its_own() -> None:
+    attitude = euler_rad(rotation(0.0, 0.0, 0.7) @ rotation(0.0, 0.0, math.radians(30.0)))
+    turned = Mounting(0.0, 0.0, 30.0).turn(InertialSample((0.0, 0.0, G), (0.0, 0.0, 0.0), attitude))
+    assert turned.attitude_rad == pytest.approx((0.0, 0.0, 0.7), abs=1e-9)
+
+
 def test_a_unit_upside_down_still_shows_gravity_up_and_the_boats_yaw() -> None:
     boat_yaw = 0.7
     attitude = euler_rad(rotation(0.0, 0.0, boat_yaw) @ rotation(math.pi, 0.0, 0.0))

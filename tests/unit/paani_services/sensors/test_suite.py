@@ -162,7 +162,7 @@ def test_a_protocol_that_is_left_out_is_named_and_not_used() -> None:
     assert not bench.fixes(nav_pvt())
     device = bench.device(SensorRole.GPS)
     assert device.status is SensorStatus.UNREADABLE
-    assert "UBX" in device.note
+    assert device.note == "speaks UBX, which sensors.gps.protocol leaves out"
 
 
 def test_a_receiver_whose_time_stands_is_frozen_and_gives_nothing_until_it_goes_on() -> None:
@@ -226,6 +226,20 @@ def test_a_compass_that_stands_while_the_gyro_turns_is_withheld() -> None:
     assert bench.device(SensorRole.HEADING).status is SensorStatus.FROZEN
     bench.suite.take(HEADING, sentence("GNHDT,30.0,T").encode(), bench.now_us)
     assert bench.run_imu(0.1)[-1].orientation_available
+
+
+def test_a_line_that_is_opened_again_begins_anew() -> None:
+    """A receiver that was switched off may come back with an earlier clock; what was frozen may be over."""
+    bench = Bench()
+    assert bench.fixes(rmc("123519"))
+    for _ in range(5):
+        assert not bench.fixes(rmc("123519"))
+    assert bench.device(SensorRole.GPS).status is SensorStatus.FROZEN
+    bench.suite.lost(GPS, "vanished")
+    bench.suite.opened(GPS, bench.now_us)
+    assert bench.device(SensorRole.GPS).status is SensorStatus.INCOMPLETE
+    assert bench.fixes(rmc("100001"))
+    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
 
 
 def test_damage_is_counted_by_cause() -> None:
