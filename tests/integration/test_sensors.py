@@ -20,7 +20,7 @@ from paani.bus import Bus
 from paani.messages import SensorRole, SensorStatus
 from tests.conftest import OpenAs, Spawn
 from tests.places import DATA
-from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, sentence
+from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
 
 pytestmark = pytest.mark.integration
 LOGS = DATA / "logs"
@@ -248,6 +248,31 @@ async def test_a_receiver_that_freezes_gives_no_fixes_and_one_that_rests_does(
         assert fixes.received == 0
         boat.gps = boat.fix
         await device(bus, SensorRole.GPS, has(SensorStatus.OK), 5.0)
+
+
+@pytest.mark.parametrize(("speed", "least_s", "most_s"), [("", 2.5, 6.0), ("?speed=4", 0.5, 2.4)])
+async def test_a_recording_plays_in_its_own_time_or_faster(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path, speed: str, least_s: float, most_s: float
+) -> None:
+    bus, log = await open_as("observer"), tmp_path / "drive.nmea"
+    log.write_bytes(b"".join(rmc(f"1235{second:02d}") for second in range(10, 18 if speed else 14)))
+    fixes = bus.queue(keys.GPS, 20)
+    async with spawn("sensors", f'sensors.gps.line="file:{log}{speed}"'):
+        await device(bus, SensorRole.GPS, lambda each: "played to the end" in each.note, 20.0)
+    found = fixes.drain()
+    assert len(found) == (8 if speed else 4)
+    assert least_s < (found[-1].source_us - found[0].source_us) * 1e-6 < most_s
+
+
+async def test_a_recording_that_is_not_there_is_named_and_looked_for_again(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path
+) -> None:
+    bus, log = await open_as("observer"), tmp_path / "drive.nmea"
+    async with spawn("sensors", f'sensors.gps.line="file:{log}"'):
+        found = await device(bus, SensorRole.GPS, lambda each: "No such file" in each.note, 5.0)
+        assert found.status is SensorStatus.ABSENT
+        log.write_bytes(rmc("123510") + rmc("123511"))
+        await device(bus, SensorRole.GPS, lambda each: "played to the end" in each.note, 15.0)
 
 
 @pytest.mark.data

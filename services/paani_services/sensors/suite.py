@@ -17,6 +17,7 @@ from paani_services.sensors.framing import Frame, Framer, Protocol
 from paani_services.sensors.freezing import REPEATED_TIMES, GravityWatch, HeadingWatch, PositionWatch, SampleWatch
 from paani_services.sensors.heading import YawKeeper, read_heading, true_yaw_rad
 from paani_services.sensors.inertial import InertialSample, Mounting, imu_message, read_sample
+from paani_services.sensors.receipt_clock import ReceiptClock
 from paani_services.sensors.sentences import ChecksumError, Sentence, read_sentence
 
 FIX_SENTENCES = frozenset({"RMC", "GGA", "GLL", "VTG", "GST"})
@@ -24,6 +25,7 @@ HEADING_SENTENCES = frozenset({"HDT", "THS", "HDG", "HDM"})
 SAMPLE_SENTENCES = frozenset({"PQTMIMU", "VNYMR"})
 MAX_KINDS, MAX_KIND = 64, 12  # kinds of frames remembered, and characters of one: a line may say anything
 NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2? Its data are withheld"
+LATE = "its data come over a second late: they are withheld"
 MAX_SPACING_US = 200_000  # between samples that come in one piece: no inertial unit is slower than 5 Hz
 
 
@@ -48,10 +50,11 @@ class SensorSuite:
         self._framers = {address: Framer() for address in self._lines}
         self._devices = {role: Device(role, self._lines.get(address)) for role, address in named.items()}
         self._fixes, self._position_watch = FixDecoder(self.drops), PositionWatch()
-        self._fix_us = 0
+        self._fix_clock, self._fix_us = ReceiptClock(), 0
         imu = config.imu
         self._mounting = Mounting(imu.mount_roll_deg, imu.mount_pitch_deg, imu.mount_yaw_deg)
         self._sample_watch, self._gravity_watch, self._sample_us = SampleWatch(), GravityWatch(), 0
+        self._sample_clock, self._device_ms = ReceiptClock(), 0
         self._heading_watch, self._yaw = HeadingWatch(), YawKeeper(config.heading.max_age_s)
 
     @property
@@ -68,6 +71,7 @@ class SensorSuite:
             match device.role:
                 case SensorRole.GPS:
                     self._fixes, self._position_watch = FixDecoder(self.drops), PositionWatch()
+                    self._fix_clock = ReceiptClock()
                 case SensorRole.IMU:
                     self._sample_watch, self._gravity_watch = SampleWatch(), GravityWatch()
                 case SensorRole.HEADING:
@@ -143,9 +147,16 @@ class SensorSuite:
             gps.withheld += 1
             self.drops["gps_frozen"] += 1
             return []
+        self._fix_clock.observe(fix.source_us, now_us)
+        at_us = self._fix_clock.date(fix.source_us)
+        if at_us is None:
+            gps.withheld += 1
+            gps.problem = LATE
+            self.drops["gps_old"] += 1
+            return []
         gps.has_fix = fix.fix
         gps.count_data(now_us)
-        self._fix_us = max(now_us - round(self._config.gps.latency_s * 1e6), self._fix_us + 1, 0)
+        self._fix_us = max(at_us - round(self._config.gps.latency_s * 1e6), self._fix_us + 1, 0)
         return [msgspec.structs.replace(fix, source_us=self._fix_us)]
 
     def _use_heading(self, device: Device, sentence: Sentence, now_us: int) -> None:
@@ -162,15 +173,16 @@ class SensorSuite:
             device.count_data(now_us)
 
     def _stamped(self, samples: list[InertialSample], now_us: int) -> tuple[ImuSample, ...]:
-        """The samples of one piece, evenly spaced in time since the piece before: a line hands over several at once."""
-        if not samples:
-            return ()
+        """The samples of one piece, each at its time."""
         imu, heading = self._devices[SensorRole.IMU], self._devices[SensorRole.HEADING]
-        spacing_us = min((now_us - self._sample_us) // len(samples), MAX_SPACING_US)
         messages = []
-        for number, sample in enumerate(samples, 1):
-            at_us = max(now_us - (len(samples) - number) * spacing_us, self._sample_us + 1)
-            self._sample_us = at_us
+        for sample, measured_us in zip(samples, self._times_us(samples, now_us), strict=True):
+            if measured_us is None:
+                imu.withheld += 1
+                imu.problem = LATE
+                self.drops["imu_old"] += 1
+                continue
+            at_us = self._sample_us = max(measured_us, self._sample_us + 1)
             is_frozen = self._sample_watch.take(sample, at_us)
             is_implausible = self._gravity_watch.take(sample)
             imu.frozen_cause = "the unit repeats one sample: its data are withheld" if is_frozen else ""
@@ -183,6 +195,20 @@ class SensorSuite:
             imu.count_data(now_us)
             messages.append(imu_message(sample, at_us, yaw_rad))
         return tuple(messages)
+
+    def _times_us(self, samples: list[InertialSample], now_us: int) -> list[int | None]:
+        """When the samples of one piece were measured: by the unit's clock, or else evenly since the piece before."""
+        if not samples:
+            return []
+        times_ms = [sample.device_ms for sample in samples if sample.device_ms is not None]
+        if len(times_ms) < len(samples):
+            spacing_us = min((now_us - self._sample_us) // len(samples), MAX_SPACING_US)
+            return [now_us - number * spacing_us for number in reversed(range(len(samples)))]
+        if times_ms != sorted(times_ms) or times_ms[0] < self._device_ms:
+            self._sample_clock = ReceiptClock()  # the unit began anew
+        self._device_ms = times_ms[-1]
+        self._sample_clock.observe(max(times_ms) * 1000, now_us)
+        return [self._sample_clock.date(time_ms * 1000) for time_ms in times_ms]
 
     def _yaw_at(self, heading: Device, sample: InertialSample, at_us: int) -> float | None:
         """Yaw of the boat at a sample; None while nothing tells it."""

@@ -68,7 +68,7 @@ def require_line(line: str) -> None:
     """Raises ValueError for a text that is no device line; empty is none, and in order."""
     if line.startswith("file:"):
         path, speed = recording_of(line)
-        if not path or (speed is not None and not 0.0 < speed <= 1000.0):
+        if not path or (speed is not None and not 1.0 <= speed <= 1000.0):
             raise ValueError(f"'{line}' is no recording (expected file:PATH, file:PATH?speed=4 or file:PATH?speed=max)")
     elif line:
         parse_address(line)

@@ -18,7 +18,7 @@ def test_a_line_that_can_be_opened_is_taken(line: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["/dev/ttyUSB0", "serial:ttyUSB0", "serial:/dev/a@5", "file:", "file:a?speed=0", "file:a?speed=x"]
+    "line", ["/dev/ttyUSB0", "serial:ttyUSB0", "serial:/dev/a@5", "file:", "file:a?speed=0.5", "file:a?speed=x"]
 )
 @pytest.mark.parametrize("device", ["gps", "imu", "heading"])
 def test_another_is_refused_with_its_field(device: str, line: str) -> None:

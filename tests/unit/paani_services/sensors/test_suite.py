@@ -72,12 +72,59 @@ def test_fixes_that_come_in_one_piece_are_in_order() -> None:
     assert second.source_us > first.source_us
 
 
-def test_samples_that_come_in_one_piece_are_spread_over_the_time_since_the_last() -> None:
+def test_samples_that_come_in_one_piece_keep_the_spacing_of_their_clock() -> None:
     bench = Bench()
     bench.run_imu(0.5)
     bench.wait(0.04)
-    found = bench.samples(b"".join(bench.noisy(ms) for ms in (1, 11, 21, 31)))
+    newest_ms = bench.now_us // 1000 % 1_000_000
+    found = bench.samples(b"".join(bench.noisy(newest_ms - before) for before in (28, 20, 11, 0)))
+    assert [sample.source_us - bench.now_us for sample in found] == [-28_000, -20_000, -11_000, 0]
+
+
+def test_samples_without_a_clock_are_spread_over_the_time_since_the_last() -> None:
+    bench = Bench()
+    lines = [sentence(f"VNYMR,10,0,0,0,0,0,0.0{n},0.02,-9.81,0,0,0.1").encode() for n in range(5)]
+    bench.samples(lines[0])
+    bench.wait(0.04)
+    found = bench.samples(b"".join(lines[1:]))
     assert [sample.source_us - bench.now_us for sample in found] == [-30_000, -20_000, -10_000, 0]
+
+
+def test_what_waited_on_the_way_is_dated_back_and_withheld_after_a_second() -> None:
+    """A link that stood for three seconds hands over all at once."""
+    bench = Bench()
+    for second in range(10, 15):
+        bench.wait(1.0)
+        assert bench.fixes(rmc(f"1235{second}"))
+    bench.run_imu(1.0)
+    bench.wait(3.0)
+    found = bench.fixes(b"".join(rmc(f"1235{second}") for second in (15, 16, 17, 18)))
+    assert [(bench.now_us - fix.source_us) * 1e-6 for fix in found] == pytest.approx([1.1, 0.1], abs=0.01)
+    now_ms = bench.now_us // 1000 % 1_000_000
+    samples = bench.samples(b"".join(bench.noisy(now_ms - before) for before in (2000, 1500, 500, 0)))
+    assert [bench.now_us - sample.source_us for sample in samples] == pytest.approx([500_000, 0], abs=2000)
+    assert (bench.suite.drops["gps_old"], bench.suite.drops["imu_old"]) == (2, 2)
+
+
+def test_data_that_all_come_late_are_named_until_it_is_clear_that_a_clock_was_set() -> None:
+    bench, taken = Bench(), list[bool]()
+    for second in range(10, 30):
+        bench.wait(61.0 if second == 15 else 1.0)
+        taken.append(bool(bench.fixes(rmc(f"1235{second}"))))
+        if second == 19:
+            device = bench.device(SensorRole.GPS)
+            assert device.status is SensorStatus.INCOMPLETE
+            assert "late" in device.note
+    assert taken == [True] * 5 + [False] * 6 + [True] * 9
+    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+
+
+def test_a_unit_that_began_anew_keeps_its_time() -> None:
+    bench = Bench()
+    bench.run_imu(1.0)
+    bench.wait(0.5)
+    (sample,) = bench.samples(bench.noisy(3))
+    assert sample.source_us == bench.now_us
 
 
 def test_a12_an_mpu6050_has_no_orientation_until_a_compass_gives_the_heading() -> None:
