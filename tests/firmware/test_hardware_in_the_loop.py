@@ -52,16 +52,12 @@ async def arm(page: str) -> None:
             assert answer.status == 200, await answer.text()
 
 
-async def drive(folder: Path, *words: str) -> dict[str, Any]:
-    """Figures of one `paani up`, armed on the page once everything is alive."""
-    await asyncio.to_thread(folder.mkdir)
-    port, summary = find_free_port(), folder / "summary.json"
-    sets = (f"bus.router=tcp/127.0.0.1:{find_free_port()}", f"bus.runtime_dir={folder}", f"dashboard.port={port}")
+@contextlib.asynccontextmanager
+async def running(*words: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    """`paani up`, once it serves its page."""
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "paani", "up", "--for", str(DRIVE_S), "--summary", str(summary), *words),
-        *(word for setting in sets for word in ("--set", setting)),
-        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
-    )  # fmt: skip
+        *(sys.executable, "-m", "paani", "up", *words), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+    )
     assert process.stdout is not None
     output = ""
     try:
@@ -70,14 +66,24 @@ async def drive(folder: Path, *words: str) -> dict[str, Any]:
                 line = (await process.stdout.readline()).decode()
                 assert line, output
                 output += line
-        await arm(f"http://127.0.0.1:{port}")
-        async with asyncio.timeout(DRIVE_S + READY_S):
-            output += (await process.stdout.read()).decode()
-            assert await process.wait() == 0, output
+        yield process
     finally:
         if process.returncode is None:
             process.terminate()
-            await process.wait()
+            await process.communicate()
+
+
+async def drive(folder: Path, *words: str) -> dict[str, Any]:
+    """Figures of one `paani up`, armed on the page once everything is alive."""
+    await asyncio.to_thread(folder.mkdir)
+    port, summary = find_free_port(), folder / "summary.json"
+    sets = (f"bus.router=tcp/127.0.0.1:{find_free_port()}", f"bus.runtime_dir={folder}", f"dashboard.port={port}")
+    given = (word for setting in sets for word in ("--set", setting))
+    async with running("--for", str(DRIVE_S), "--summary", str(summary), *words, *given) as process:
+        await arm(f"http://127.0.0.1:{port}")
+        async with asyncio.timeout(DRIVE_S + READY_S):
+            output, _ = await process.communicate()
+            assert process.returncode == 0, output.decode()
     found: dict[str, Any] = json.loads(await asyncio.to_thread(summary.read_text))
     return found
 

@@ -170,6 +170,15 @@ async def test_a_microcontroller_that_restarts_gets_its_settings_again(boat: Boa
     assert boat.buses["thrusters"].drops["microcontroller_restarted"] == 1
 
 
+async def test_settings_that_the_microcontroller_has_lost_are_sent_again(boat: Boat) -> None:
+    await boat.drive()
+    count = len(boat.peer.settings)
+    boat.peer.configured = 0
+    await until(lambda: len(boat.peer.settings) > count, 8.0)
+    assert boat.buses["thrusters"].drops["refused_not_configured"] >= 1
+    await boat.drive()
+
+
 async def test_a_second_session_is_refused_and_says_so(boat: Boat) -> None:
     """Two of these processes on one microcontroller: who drives goes on, the other gives no thrust."""
     boat.peer.configured, boat.peer.session = 0, 4711

@@ -79,3 +79,14 @@ def test_a_flipped_byte_never_yields_a_value_out_of_range(index: int, value: int
     data[index % len(data)] = value
     message, _ = admission().judge(bytes(data), NOW_US)
     assert message is None or (0.0 <= message.left <= 1.0 and 0.0 <= message.right <= 1.0)
+
+
+def test_what_nobody_may_write_in_a_graph_is_not_let_in() -> None:
+    """On a hull there is no truth, whoever claims to be nobody."""
+    row = keys.topic_in(keys.TRUE_POSE, keys.Graph.HULL)
+    for producer in ("", "plant"):
+        pose = m.TruePose(
+            source_us=1, sim_us=0, x_m=0, y_m=0, z_m=0, roll_rad=0, pitch_rad=0, yaw_rad=0, surge_mps=0, sway_mps=0,
+            yaw_rate_radps=0, domain=43, producer=producer,
+        )  # fmt: skip
+        assert Admission(row, 43, 1.0).judge(msgspec.json.encode(pose), 10) == (None, "wrong_producer")
