@@ -5,6 +5,7 @@ from collections import Counter, deque
 from paani.messages import SensorDevice, SensorRole, SensorStatus
 
 RATE_WINDOW_S = 5.0  # over which the rate of data is counted
+SHORTEST_SPAN_S = 0.5  # data that come in one piece show no rate
 SILENT_S = 2.0  # without a byte: every device of these kinds speaks once a second at least
 UNREADABLE_S = 2.0  # with bytes, and without an intact frame
 # Without usable data; the estimate gives up no later (`LocalizationConfig.max_gps_age_s` and its kind).
@@ -72,14 +73,12 @@ class Device:
         if line is None:
             return SensorDevice(role=self.role, line="", status=SensorStatus.OFF, age_s=NEVER_AGE_S)
         status, note = self._status(line, now_us)
-        recent = sum(now_us - each_us <= RATE_WINDOW_S * 1e6 for each_us in self._times_us)
-        span_s = min(RATE_WINDOW_S, max((now_us - self._times_us[0]) * 1e-6, 1.0)) if self._times_us else 1.0
         return SensorDevice(
             role=self.role,
             line=line.address,
             status=status,
             note=note,
-            rate_hz=recent / span_s,
+            rate_hz=self._rate_hz(now_us),
             age_s=self._age_s(now_us),
             bytes=line.bytes,
             frames=line.frames,
@@ -109,6 +108,13 @@ class Device:
         if not self.has_fix:
             return SensorStatus.NO_FIX, "the receiver has no position"
         return SensorStatus.OK, ""
+
+    def _rate_hz(self, now_us: int) -> float:
+        """Data a second, by the time between the first and the last of the window."""
+        recent_us = [each_us for each_us in self._times_us if now_us - each_us <= RATE_WINDOW_S * 1e6]
+        if len(recent_us) < 2:
+            return len(recent_us) / RATE_WINDOW_S
+        return (len(recent_us) - 1) / max((recent_us[-1] - recent_us[0]) * 1e-6, SHORTEST_SPAN_S)
 
     def _age_s(self, now_us: int) -> float:
         return max((now_us - self._times_us[-1]) * 1e-6, 0.0) if self._times_us else NEVER_AGE_S

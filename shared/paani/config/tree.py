@@ -155,7 +155,8 @@ class Config(Section, frozen=True):
             for other, taken in (("bridge.line", self.bridge.line), ("thrusters.line", self.thrusters.line)):
                 if line and line.partition("@")[0] == taken.partition("@")[0]:
                     raise ValueError(f"{name} {line}: is also {other}; a sensor needs a line of its own")
-            if line.startswith("file:") and self.thrusters.line:
+            moves = self.thrusters.line and not is_emulated(self.thrusters.line)
+            if line.startswith("file:") and moves:
                 raise ValueError(
                     f"{name} {line}: a recording is no sensor of a boat that moves (thrusters.line is set)"
                 )

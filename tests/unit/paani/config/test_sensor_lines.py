@@ -48,3 +48,4 @@ def test_a_recording_guides_no_boat_that_moves(device: str) -> None:
     with pytest.raises(UserError, match=rf"sensors\.{device}\.line file:drive\.nmea: a recording"):
         load_config(profile="hull", sets=(recording, line))
     load_config(profile="hull", sets=(recording,))
+    load_config(profile="hull", sets=(recording, "thrusters.line=serial:/dev/pts/7"))  # an emulator moves nothing

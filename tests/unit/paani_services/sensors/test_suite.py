@@ -302,6 +302,7 @@ def test_the_rate_is_that_of_usable_data() -> None:
     for second in range(10):
         bench.wait(1.0)
         bench.fixes(rmc(f"1235{second:02d}"))
+    assert bench.device(SensorRole.GPS).rate_hz == pytest.approx(1.0, abs=0.01)
     bench.wait(0.5)
     device = bench.device(SensorRole.GPS)
     assert device.rate_hz == pytest.approx(1.0, abs=0.01)
