@@ -14,16 +14,23 @@ from paani.serial_port import Port
 async def open_stream(address: str) -> Port:
     """The line without anyone who answers or judges. QEMU asks once a second whether its pseudo-terminal is in use."""
     port = await open_line(address)
-    scanner, call_id = MessageScanner(), random.getrandbits(31)
+    call_id = random.getrandbits(31)
     async with asyncio.timeout(10):
         while True:
             await port.write(encode_request(call_id, "paani_status"))
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(0.2):
-                    while True:
-                        for message in scanner.feed(await port.read()):
-                            if isinstance(message, Response) and message.id == call_id:
-                                return port
+                await wait_for_answer(port, call_id, 0.2)
+                return port
+
+
+async def wait_for_answer(port: Port, call_id: int, timeout_s: float = 5.0) -> None:
+    """Read until this request is answered. Raises TimeoutError."""
+    scanner = MessageScanner()
+    async with asyncio.timeout(timeout_s):
+        while True:
+            for message in scanner.feed(await port.read()):
+                if isinstance(message, Response) and message.id == call_id:
+                    return
 
 
 def corrupted(frame: bytes, rng: random.Random) -> bytes:

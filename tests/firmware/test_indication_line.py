@@ -13,7 +13,7 @@ from paani.microcontroller.rpc import encode_notification, encode_request
 from paani.serial_port import Port
 from tests.firmware.conftest import open_caller
 from tests.firmware.emulator import Emulator, open_emulator
-from tests.firmware.streams import corrupted, open_stream
+from tests.firmware.streams import corrupted, open_stream, wait_for_answer
 
 pytestmark = pytest.mark.firmware
 
@@ -89,8 +89,7 @@ async def test_corrupted_frames_are_never_acted_on_and_hide_no_good_one(mcu: Emu
         damaged = corrupted(encode_request(seq, "paani_guide", guide(seq, Direction.RIGHT).encode()), rng)
         await port.write(damaged + call)
         good += 1
-        await asyncio.sleep(0.004)
-    await asyncio.sleep(0.2)
+        await wait_for_answer(port, seq)
     await port.close()
     async with open_caller(mcu.guide, INDICATION) as caller:
         status = await caller.call("paani_status")

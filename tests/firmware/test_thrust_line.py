@@ -105,11 +105,16 @@ async def test_the_receiver_wins_over_linux_and_drives_without_it(boat: Boat) ->
     async with boat.driving():
         await boat.see(*FULL, True)
         await boat.mcu.set_pins("rc 1500 1500 0")
+        async with asyncio.timeout(10):
+            while (await boat.caller.call("paani_status")).rc != 1:
+                await asyncio.sleep(0.01)
         await boat.mcu.set_pins("rc 1600 1400 1")
         status = await boat.see(1600, 1400, True)
         assert (status.holds, status.rc) == (RECEIVER | NOT_ARMED, 2)
-    await asyncio.sleep(1.5)
-    assert (await boat.see(1600, 1400, True)).state is McuState.SAFE
+    async with asyncio.timeout(10):
+        while (await boat.caller.call("paani_status")).state is not McuState.SAFE:
+            await asyncio.sleep(0.05)
+    await boat.see(1600, 1400, True)
     await boat.mcu.set_pins("rc none")
     await boat.see(*NEUTRAL, False)
 
