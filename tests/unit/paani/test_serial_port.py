@@ -28,7 +28,7 @@ class Device:
 
     def babble(self, size: int) -> threading.Thread:
         """Send so many bytes as fast as they are taken."""
-        thread = threading.Thread(target=os.write, args=(self._far, bytes(size)))
+        thread = threading.Thread(target=os.write, args=(self._far, bytes(size)), daemon=True)
         thread.start()
         return thread
 
@@ -119,16 +119,17 @@ async def test_a_device_has_one_user(device: Device, port: Port) -> None:
 async def test_a_babbling_device_fills_a_bounded_queue_and_costs_no_cpu_unless_it_is_read(
     device: Device, port: Port
 ) -> None:
-    sent = device.babble(3 * MAX_WAITING_BYTES)
+    sent = device.babble(6 * MAX_WAITING_BYTES)
     while await asyncio.to_thread(sent.is_alive) and not port.dropped_bytes:
         await asyncio.sleep(0.01)
     await asyncio.sleep(0.1)
     before_s = process_cpu_s()
     await asyncio.sleep(0.3)
     assert process_cpu_s() - before_s < 0.1
+    assert sent.is_alive(), "all was taken from a device that nobody reads"
     assert len(await port.read()) == MAX_WAITING_BYTES
     received = 0
-    while received + MAX_WAITING_BYTES + port.dropped_bytes < 3 * MAX_WAITING_BYTES:
+    while received + MAX_WAITING_BYTES + port.dropped_bytes < 6 * MAX_WAITING_BYTES:
         received += len(await port.read())
     sent.join()
     device.send(b"newest")

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.messages import Direction, McuState
-from paani.microcontroller.payloads import INDICATION, Guide, McuStatus
+from paani.microcontroller.payloads import INDICATION, Guide, McuStatus, append_crc
 from paani.microcontroller.rpc import (
     INCOMPLETE,
     MAX_MESSAGE_BYTES,
@@ -117,6 +117,19 @@ def test_a_length_that_was_damaged_swallows_no_message_behind_it() -> None:
     damaged = encode_response(1, status(1)).replace(b"\xc4\x34", b"\xc4\xb4")
     found = scan([damaged + encode_response(2, status(2)) + encode_response(3, status(3))])
     assert [message.id for message in found if isinstance(message, Response)] == [2, 3]
+
+
+def test_a_request_cut_off_before_its_parameters_swallows_no_message_behind_it() -> None:
+    """The message behind it is a list, as parameters are."""
+    cut_off = encode_request(1, "paani_guide")[:-1]
+    assert scan([cut_off + encode_response(2, status(2))]) == [Response(2, "", 0, status(2))]
+
+
+def test_a_message_that_contains_a_head_arrives_in_two_pieces() -> None:
+    payload = append_crc(b"\x94\x01" * 10)
+    message = encode_response(5, payload)
+    for place in range(1, len(message)):
+        assert scan([message[:place], message[place:]]) == [Response(5, "", 0, payload)]
 
 
 def test_a_bin_without_its_crc_is_counted_and_no_message() -> None:

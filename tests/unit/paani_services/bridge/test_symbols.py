@@ -14,7 +14,7 @@ import paani_services.bridge
 from paani import keys
 from paani import messages as m
 from paani.microcontroller.payloads import DIRECTIONS, UNKNOWN_RISK, Guide
-from paani_services.bridge.symbols import REASON_CODES, Symbols, guide_of, symbols_of
+from paani_services.bridge.symbols import REASON_CODES, Symbols, guide_of, percent_of, symbols_of
 
 NOW_US = 1_000_000_000
 LEASE_MS = 700
@@ -104,6 +104,12 @@ def test_every_reason_has_a_number_of_its_own_that_never_changes() -> None:
         "NO_EVIDENCE",
     ]
     assert sorted(REASON_CODES.values()) == list(range(1, 17))
+
+
+@pytest.mark.parametrize("risk", [float("nan"), float("inf"), -0.01, 1.01])
+def test_a_risk_that_is_no_fraction_is_unknown(risk: float) -> None:
+    """The bus refuses such a message; the lights show none all the same."""
+    assert percent_of(risk) == UNKNOWN_RISK
 
 
 @given(ADVISORIES, st.integers(0, 2 * NOW_US), st.integers(0, 2 * NOW_US), st.integers(500, 4000))
