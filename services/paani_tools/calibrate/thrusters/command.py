@@ -97,11 +97,15 @@ class _Walk:
             for key in self._pressed():
                 if key == " ":
                     dead_man.press(now_ms * 1e-3)
+                    ramp.mark()
                 elif key == "r":
                     ramp.restart()
                 elif key in "\r\n" and ramp.offset_us > 0.0 and not dead_man.is_held(now_ms * 1e-3):
                     return ramp.offset_us
-            await self._drive(side, sign, ramp, (now_ms - last_ms) * 1e-3, is_held=dead_man.is_held(now_ms * 1e-3))
+            is_held = dead_man.is_held(now_ms * 1e-3)
+            if not is_held:
+                ramp.release()
+            await self._drive(side, sign, ramp, (now_ms - last_ms) * 1e-3, is_held=is_held)
             last_ms = now_ms
             await asyncio.sleep(FRAME_S)
 

@@ -37,12 +37,21 @@ class Ramp:
     def __init__(self, span_us: float) -> None:
         self._most_us = min(MAX_OFFSET_US, span_us)
         self.offset_us = 0.0
+        self._marked_us = 0.0
+
+    def mark(self) -> None:
+        """The key was sent: until here it was held."""
+        self._marked_us = self.offset_us
+
+    def release(self) -> None:
+        """Back to where the key was last sent; what came after is how long it takes to see that it was let go."""
+        self.offset_us = self._marked_us
 
     def advance(self, elapsed_s: float) -> None:
         self.offset_us = min(self._most_us, self.offset_us + RATE_US_PER_S * elapsed_s)
 
     def restart(self) -> None:
-        self.offset_us = 0.0
+        self.offset_us = self._marked_us = 0.0
 
 
 def fit_esc(side: str, longer_us: float, shorter_us: float, *, is_reversed: bool) -> EscConfig:

@@ -43,7 +43,17 @@ def test_the_ramp_is_slow_and_ends() -> None:
     small.advance(60.0)
     assert small.offset_us == 100.0
     ramp.restart()
+    ramp.release()
     assert ramp.offset_us == 0.0
+
+
+def test_a_release_goes_back_to_where_the_key_was_last_sent() -> None:
+    ramp = Ramp(400)
+    ramp.advance(1.0)
+    ramp.mark()
+    ramp.advance(0.25)
+    ramp.release()
+    assert ramp.offset_us == 20.0
 
 
 def test_rest_lies_in_the_middle_of_what_does_not_turn() -> None:
