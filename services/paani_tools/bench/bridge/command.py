@@ -15,6 +15,7 @@ import msgspec
 
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config, with_settings
+from paani.errors import UserError
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.statistics.measured import Machine, Report
 from paani.statistics.order_statistics import median, nearest_rank
@@ -77,12 +78,15 @@ async def _measure(image: Path, config: Config, count: int) -> FigureTable:
         name="bridge",
         columns=("figure", "n", "median", "p95", "most"),
         rows=tuple(rows),
-        note="against QEMU's mps2-an505 on this machine; the board's own microcontroller is not measured.",
+        note="n: calls answered within 250 ms. Against QEMU's mps2-an505 on this machine; "
+        "the board's own microcontroller is not measured.",
     )
 
 
 def _row(name: str, samples: Iterable[float]) -> tuple[str, int, float, float, float]:
     values = tuple(samples)
+    if not values:
+        raise UserError(f"{name}: no call was answered within 250 ms; the machine has no time for the emulator")
     return name, len(values), round(median(values), 2), round(nearest_rank(values, 95), 2), round(max(values), 2)
 
 

@@ -20,7 +20,7 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock, stopwatch_ms
 from paani.config import Config, with_settings
 from paani.errors import UserError
-from paani.microcontroller.caller import McuCaller
+from paani.microcontroller.caller import CallError, McuCaller
 from paani.microcontroller.payloads import INDICATION, Guide, McuStatus
 
 SPACING_S = 0.03  # between calls: none waits for another
@@ -48,7 +48,7 @@ async def connected(address: str) -> AsyncIterator[McuCaller]:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CONNECT_TIMEOUT_S):
                 while not caller.answered:
-                    with contextlib.suppress(Exception):
+                    with contextlib.suppress(CallError):
                         await caller.call("paani_status")
                     await asyncio.sleep(0.05)
         if not caller.answered:
@@ -60,15 +60,16 @@ async def connected(address: str) -> AsyncIterator[McuCaller]:
 
 
 async def measure_round_trips(address: str, count: int, report: Report) -> list[float]:
-    """Milliseconds from the first byte of a call to its answer."""
+    """Milliseconds from the first byte of a call to its answer; a call without one gives no sample."""
     round_trips_ms = []
     async with connected(address) as caller:
         session = random.SystemRandom().randint(1, 0xFFFF)
         for seq in range(1, count + 1):
             guide = Guide(direction=m.Direction.STRAIGHT, session=session, seq=seq, lease_ms=500)
             started_ms = stopwatch_ms()
-            await caller.call("paani_guide", guide.encode())
-            round_trips_ms.append(stopwatch_ms() - started_ms)
+            with contextlib.suppress(CallError):
+                await caller.call("paani_guide", guide.encode())
+                round_trips_ms.append(stopwatch_ms() - started_ms)
             report(seq / count)
             await asyncio.sleep(SPACING_S)
     return round_trips_ms
@@ -85,11 +86,12 @@ async def measure_lease_errors(address: str, count: int, report: Report) -> list
         for seq in range(1, count + 1):
             lease_ms = rng.randint(50, 400)
             guide = Guide(direction=m.Direction.STRAIGHT, session=session, seq=seq, lease_ms=lease_ms)
-            accepted = await caller.call("paani_guide", guide.encode())
-            async with asyncio.timeout(ANSWER_TIMEOUT_S):
-                while (ended := await changes.get()).state is not m.McuState.STALE:
-                    pass
-            errors_ms.append(float((ended.mcu_ms - accepted.mcu_ms) % 2**32 - lease_ms))
+            with contextlib.suppress(CallError, TimeoutError):
+                accepted = await caller.call("paani_guide", guide.encode())
+                async with asyncio.timeout(ANSWER_TIMEOUT_S):
+                    while (ended := await changes.get()).state is not m.McuState.STALE or ended.seq != seq:
+                        pass
+                errors_ms.append(float((ended.mcu_ms - accepted.mcu_ms) % 2**32 - lease_ms))
             report(seq / count)
     return errors_ms
 
