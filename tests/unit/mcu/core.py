@@ -96,6 +96,10 @@ class Core:
         """The messages in what it has sent."""
         return self._scanners[line].feed(self.take_bytes(line))
 
+    def junk_bytes(self, line: int) -> int:
+        """How much of what it has sent was part of no message."""
+        return self._scanners[line].junk_bytes
+
     def call(self, payload: Payload | bytes, method: type[Payload] | None = None) -> McuStatus:
         """Judge a payload that a router has taken out of its stream."""
         status = ctypes.create_string_buffer(52)

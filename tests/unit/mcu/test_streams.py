@@ -139,6 +139,7 @@ def test_a_peer_that_reads_nothing_stops_nothing(core: Core) -> None:
     assert 5 <= len(answers) <= 10
     core.receive(0, request(guide(100)))
     assert len(statuses(core.take(0))) == 1
+    assert core.junk_bytes(0) == 0  # what found no room went out whole or not at all
 
 
 def test_it_registers_as_a_client_of_the_boards_router_has_to(core: Core) -> None:
