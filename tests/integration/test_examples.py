@@ -19,7 +19,8 @@ import pytest
 
 from examples.draw_pictures import VIEWS, draw
 from paani import cli
-from paani.config import Config
+from paani.config import Config, load_config
+from paani.keys import Graph
 from paani_services.navigator.files.mission_file import load_route_and_mission
 from paani_sim.worlds.load import load_scenario
 from paani_tools.up.command import up_sets
@@ -41,7 +42,8 @@ MANUAL = [
     if line.startswith("paani ")
 ]
 OF_ANOTHER_PACKAGE = ("lookout",)
-
+FIRST_TRIP = (ROOT / "docs" / "how-to" / "first-trip.md").read_text(encoding="utf-8")
+BOAT = FIRST_TRIP.partition("```toml\n")[2].partition("```")[0]
 
 RECORDED = drive(12.0)
 
@@ -91,6 +93,9 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / folder).mkdir(parents=True)
     for file in ("mine.toml", "mine/segmenter.onnx", "mount.toml", "clip.mp4", "runs/one.mcap", "PATH..."):
         (tmp_path / file).touch()
+    for mission in ("mission.toml", "calibration.toml"):
+        (tmp_path / mission).write_bytes((ROOT / "examples" / "mission.toml").read_bytes())
+    (tmp_path / "boat.toml").write_text(BOAT, encoding="utf-8")
     write_log(tmp_path / "runs" / "drive" / "20270101T000000Z-0.mcap", RECORDED)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -126,6 +131,15 @@ def test_every_row_runs_as_written(checkout: Path, capsys: pytest.CaptureFixture
 def test_a_command_of_the_manual_has_its_arguments_right(command: str, checkout: Path) -> None:
     if not is_one_of(command, OF_ANOTHER_PACKAGE):
         parsed(command)
+
+
+def test_the_boat_of_the_first_trip_is_a_hull(checkout: Path) -> None:
+    """The settings on the page go together, with a line for the lights and one for the thrusters."""
+    config = load_config(profile="hull", file=checkout / "boat.toml")
+    assert config.bus.graph is Graph.HULL
+    assert {"bridge", "thrusters", "sensors"} <= set(config.services)
+    assert config.bridge.line
+    assert config.thrusters.line != config.bridge.line
 
 
 @pytest.mark.integration
