@@ -41,6 +41,23 @@ class ManualClock:
         self._now_us += round(seconds * 1e6)
 
 
+MIN_STEP_S = 0.1  # a clock that is only slewed differs by less between two looks
+
+
+class ClockStep:
+    """Tells when a clock was set, by one that never is."""
+
+    def __init__(self, clock: Clock, steady: Clock) -> None:
+        self._clock, self._steady = clock, steady
+        self._difference_us = clock.now_us() - steady.now_us()
+
+    def take_us(self) -> int:
+        """By how much the clock was set since the last call, ahead if positive; 0 if it was not."""
+        difference_us = self._clock.now_us() - self._steady.now_us()
+        step_us, self._difference_us = difference_us - self._difference_us, difference_us
+        return step_us if abs(step_us) > MIN_STEP_S * 1e6 else 0
+
+
 EARLY_S = 0.02  # a picture this much too early is in time: sources jitter
 
 

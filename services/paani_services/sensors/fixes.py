@@ -53,6 +53,8 @@ class FixDecoder:
         self._refusals_in_order = 0
         self.repeats = 0
         """How often in a row the same time came again."""
+        self.was_set = False
+        """Whether the receiver's clock was set back before the newest fix."""
 
     def take_sentence(self, sentence: Sentence) -> GpsFix | None:
         """The fix that this sentence completes. Raises ValueError for one that is damaged."""
@@ -129,7 +131,8 @@ class FixDecoder:
         at_s = time_s + self._offset_s
         if at_s < self._last_s - 0.5 * span_s:  # midnight, or the end of the week
             at_s += span_s
-        if at_s <= self._last_s:
+        self.was_set = at_s <= self._last_s
+        if self.was_set:
             self.repeats = self.repeats + 1 if at_s == self._last_s else 0
             self._refusals_in_order = self._refusals_in_order + 1 if time_s > self._refused_s else 1
             self._refused_s = time_s

@@ -2,12 +2,12 @@
 
 Data that waited on the way, in a buffer or behind a broken network link, come in a piece and are old. The device's
 clock tells: the shortest time that data ever took from there is taken for the way itself; what took longer has waited.
+A way that has become longer for all data is no way: nothing but a clock that was set is followed, and whoever set it
+says so (`shift`, or a clock made anew).
 """
 
 CLOCK_DRIFT = 2e-4  # two cheap crystals differ by less; so fast the shortest way is forgotten
 MAX_WAIT_S = 1.0  # what waited longer is of no use; `MAX_LAG_S` of the estimator
-# Once all data were late for so long, it is not they that are late: a clock was set, as of a board that found its time.
-RESET_S = 5.0
 
 
 class ReceiptClock:
@@ -15,7 +15,7 @@ class ReceiptClock:
 
     def __init__(self) -> None:
         self._offset_us: float | None = None  # ours less the device's, of data that did not wait
-        self._observed_us = self._late_since_us = 0
+        self._observed_us = 0
 
     def observe(self, device_us: int, now_us: int) -> None:
         """The newest data that have come are of this time by the device."""
@@ -24,12 +24,12 @@ class ReceiptClock:
             self._offset_us = offset_us
         self._offset_us += min(CLOCK_DRIFT * (now_us - self._observed_us), offset_us - self._offset_us)
         self._observed_us = now_us
-        if offset_us - self._offset_us <= MAX_WAIT_S * 1e6:
-            self._late_since_us = 0
-        elif not self._late_since_us:
-            self._late_since_us = now_us
-        elif now_us - self._late_since_us > RESET_S * 1e6:
-            self._offset_us, self._late_since_us = offset_us, 0
+
+    def shift(self, step_us: int) -> None:
+        """Our clock was set, ahead if positive."""
+        if self._offset_us is not None:
+            self._offset_us += step_us
+            self._observed_us += step_us
 
     def date(self, device_us: int) -> int | None:
         """When data of this time were measured, plus the way itself; None for what waited too long."""

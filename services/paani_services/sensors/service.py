@@ -8,7 +8,7 @@ from pathlib import Path
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock
+from paani.clock import Clock, ClockStep, MonotonicClock
 from paani.config import Config
 from paani.config.sensors import recording_of
 from paani.serial_port import PortError, open_port
@@ -23,6 +23,7 @@ REPORT_S = 1.0
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Publish what the devices say, and their state once a second."""
     suite = SensorSuite(config.sensors)
+    step = ClockStep(clock, MonotonicClock())
     gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
 
     def publish(reading: Reading) -> None:
@@ -34,7 +35,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     with bus.alive():
         async with asyncio.TaskGroup() as group:
             for address in suite.lines:
-                group.create_task(_serve_line(address, suite, publish, clock))
+                group.create_task(_serve_line(address, suite, publish, clock, step))
             counted = Counter[str]()
             while True:
                 now_us = clock.now_us()
@@ -47,13 +48,16 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 await asyncio.sleep(REPORT_S)
 
 
-async def _serve_line(address: str, suite: SensorSuite, publish: Callable[[Reading], None], clock: Clock) -> None:
+async def _serve_line(
+    address: str, suite: SensorSuite, publish: Callable[[Reading], None], clock: Clock, step: ClockStep
+) -> None:
     """Open a line, and open it again whenever it is lost."""
     backoff = Backoff()
     while True:
         frames = suite.lines[address].frames
         try:
             async for data in _play_file(address) if address.startswith("file:") else _read_port(address, clock):
+                suite.shift_clock(step.take_us())
                 now_us = clock.now_us()
                 if data is None:
                     suite.opened(address, now_us)

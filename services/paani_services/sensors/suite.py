@@ -82,6 +82,12 @@ class SensorSuite:
         """A line cannot be opened, or is gone."""
         self._lines[address].lost(problem)
 
+    def shift_clock(self, step_us: int) -> None:
+        """The clock that `now_us` comes from was set, ahead if positive."""
+        self._fix_clock.shift(step_us)
+        self._sample_clock.shift(step_us)
+        self._fix_us, self._sample_us = max(self._fix_us + step_us, 0), max(self._sample_us + step_us, 0)
+
     def take(self, address: str, data: bytes, now_us: int) -> Reading:
         """What the bytes of a line say that have just come."""
         line, framer = self._lines[address], self._framers[address]
@@ -147,8 +153,12 @@ class SensorSuite:
             gps.withheld += 1
             self.drops["gps_frozen"] += 1
             return []
-        self._fix_clock.observe(fix.source_us, now_us)
-        at_us = self._fix_clock.date(fix.source_us)
+        if self._fixes.was_set:
+            self._fix_clock = ReceiptClock()
+        at_us: int | None = now_us  # a receiver without a position may have no time either
+        if fix.fix:
+            self._fix_clock.observe(fix.source_us, now_us)
+            at_us = self._fix_clock.date(fix.source_us)
         if at_us is None:
             gps.withheld += 1
             gps.problem = LATE

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from paani.config import GpsConfig, HeadingConfig, ImuConfig, SensorDevicesConfig
 from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole, SensorStatus
+from paani_services.sensors.fixes import RESYNC_FIXES
 from paani_services.sensors.suite import SensorSuite
 from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
 
@@ -106,17 +107,53 @@ def test_what_waited_on_the_way_is_dated_back_and_withheld_after_a_second() -> N
     assert (bench.suite.drops["gps_old"], bench.suite.drops["imu_old"]) == (2, 2)
 
 
-def test_data_that_all_come_late_are_named_until_it_is_clear_that_a_clock_was_set() -> None:
+def test_data_that_all_come_late_are_named_and_withheld_for_as_long_as_they_do() -> None:
     bench, taken = Bench(), list[bool]()
     for second in range(10, 30):
         bench.wait(61.0 if second == 15 else 1.0)
         taken.append(bool(bench.fixes(rmc(f"1235{second}"))))
-        if second == 19:
-            device = bench.device(SensorRole.GPS)
-            assert device.status is SensorStatus.INCOMPLETE
-            assert "late" in device.note
-    assert taken == [True] * 5 + [False] * 6 + [True] * 9
-    assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+    assert taken == [True] * 5 + [False] * 15
+    device = bench.device(SensorRole.GPS)
+    assert device.status is SensorStatus.INCOMPLETE
+    assert "late" in device.note
+
+
+@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
+def test_a_board_whose_clock_was_set_goes_on_with_stamps_of_the_new_time(step_s: float) -> None:
+    bench = Bench()
+    bench.run_imu(0.5)
+    for second in range(10, 20):
+        bench.wait(1.0)
+        if second == 15:
+            bench.wait(step_s)
+            bench.suite.shift_clock(round(step_s * 1e6))
+        (fix,) = bench.fixes(rmc(f"1235{second}"))
+        assert fix.source_us == pytest.approx(bench.now_us - 100_000, abs=10_000)
+        (sample,) = bench.samples(bench.noisy(round(1000 * second)))
+        assert sample.source_us == bench.now_us
+
+
+def test_a_receiver_whose_clock_was_set_back_is_believed_again_at_once() -> None:
+    """The fixes that its new time is told by took five seconds: they are not a way that has become longer."""
+    bench = Bench()
+    for second in range(10, 15):
+        bench.wait(1.0)
+        assert bench.fixes(rmc(f"1235{second}"))
+    taken = list[bool]()
+    for second in range(10, 20):
+        bench.wait(1.0)
+        taken.append(bool(bench.fixes(rmc(f"1230{second}"))))
+    assert taken == [False] * (RESYNC_FIXES - 1) + [True] * (11 - RESYNC_FIXES)
+
+
+def test_a_receiver_without_a_position_is_not_late() -> None:
+    bench = Bench()
+    void = sentence("GPRMC,,V,,,,,,,,,,N").encode()
+    for _ in range(10):
+        bench.wait(1.0)
+        (fix,) = bench.fixes(void)
+        assert not fix.fix
+    assert "late" not in bench.device(SensorRole.GPS).note
 
 
 def test_a_unit_that_began_anew_keeps_its_time() -> None:
