@@ -76,7 +76,9 @@ def parsed(command: str) -> argparse.Namespace:
 def require_loadable(options: argparse.Namespace) -> Config:
     """What `paani up` would start with: settings that go together, a scenario, a mission and a fence that load."""
     names = ("world", "camera", "headless", "record", "mission", "fence")
-    config = cli.config_from(options, up_sets(**{name: getattr(options, name) for name in names}))
+    is_simulated = cli.config_from(options).bus.graph is Graph.SIMULATION
+    sets = up_sets(simulated=is_simulated, **{name: getattr(options, name) for name in names})
+    config = cli.config_from(options, sets)
     world = load_scenario(config.world.name).world
     if config.navigator.mission:
         assert load_route_and_mission(config.navigator, (world.origin_lat_deg, world.origin_lon_deg))[1] is not None

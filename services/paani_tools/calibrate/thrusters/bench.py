@@ -18,7 +18,6 @@ from paani.microcontroller.payloads import THRUST, EscSettings, McuStatus, Thrus
 FRAME_S = 0.05
 LEASE_MS = 200  # four frames
 SILENT_S = 3.0  # a microcontroller that has not answered for so long ends the calibration
-NOT_ARMED = 16  # of `McuStatus.holds`; every other bit keeps the thruster still whoever holds the key
 HOLD_WORDS = ("emergency stop", "radio receiver", "battery low", "over-current")
 
 

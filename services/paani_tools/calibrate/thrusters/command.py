@@ -11,6 +11,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import EscConfig, ThrustersConfig
 from paani.errors import UserError
+from paani.microcontroller.payloads import McuStatus
 from paani.option_paths import output_file
 from paani.whole_file import write_whole
 from paani_tools.calibrate.thrusters.bench import FRAME_S, Bench, connected, holds_text, is_driven
@@ -79,14 +80,14 @@ class _Walk:
         return fit_esc(side, begin.longer_us, begin.shorter_us, is_reversed=answer == "s")
 
     async def ask(self, question: str, answers: str) -> str:
-        """The first key that is an answer."""
+        """The first key that is an answer, once a disarmed frame was taken: only after one does anything arm."""
         self._say(f"\n{question}\n")
-        while True:
-            await self._bench.send(0.0, 0.0, is_armed=False)
-            for key in self._pressed():
-                if key in answers:
-                    return key
+        answer, is_disarmed = "", False
+        while not (answer and is_disarmed):
+            is_disarmed |= await self._bench.send(0.0, 0.0, is_armed=False) is not None
+            answer = answer or next((key for key in self._pressed() if key in answers), "")
             await asyncio.sleep(FRAME_S)
+        return answer
 
     async def _find_begin(self, side: str, sign: int) -> float:
         """How far from neutral [us] the side begins to turn, with longer (1) or shorter (-1) pulses."""
@@ -116,8 +117,7 @@ class _Walk:
         status = await self._bench.send(*pulses, is_armed=is_held)
         if is_held and is_driven(status):
             ramp.advance(elapsed_s)
-        held = holds_text(status)
-        word = f"held by {held}" if held else "turning" if is_held else "still"
+        word = _word_of(status, is_held)
         line = f"\r{sign * ramp.offset_us:+6.0f} us  {word:<40}"
         if line != self._shown:
             self._say(line)
@@ -133,6 +133,18 @@ class _Walk:
     def _say(self, text: str) -> None:
         sys.stdout.write(text)
         sys.stdout.flush()
+
+
+def _word_of(status: McuStatus | None, is_held: bool) -> str:
+    """What the thruster does, or what keeps it still."""
+    held = holds_text(status)
+    if held:
+        return f"held by {held}"
+    if status is None:
+        return "no answer"
+    if not is_held:
+        return "still"
+    return "turning" if is_driven(status) else "not armed: let go, then hold again"
 
 
 def _parser() -> argparse.ArgumentParser:
