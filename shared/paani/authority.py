@@ -1,4 +1,4 @@
-"""Who may do what on the bus: credentials, and the router's access control from the table of keys.
+"""Who may do what on the bus: credentials, and the routers' access control from the table of keys.
 
 Default deny. A service may write exactly the keys whose producer it is in the graph (`bus.graph`), and read everything
 but the simulator's truth, which is for `TRUTH_READERS` alone. `OBSERVER` reads and never writes. A process without a
@@ -7,6 +7,7 @@ place in the graph has no credential there and is no subject: no simulator joins
 
 from __future__ import annotations
 
+import hashlib
 import os
 import secrets
 import shutil
@@ -15,7 +16,9 @@ from pathlib import Path
 from paani import keys
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.link_access import LINK, Rule, allow, link_rules
 from paani.runtime import runtime_dir, write_private
+from paani.sides import ROUTER, Side, pictures_sent, services_on
 
 OBSERVER = "observer"
 TRUTH_READERS = ("eye", "dashboard", "recorder", OBSERVER)
@@ -23,8 +26,8 @@ USERS_FILE = ".users"
 
 
 def users_in(graph: keys.Graph) -> tuple[str, ...]:
-    """Who may join the bus of this graph."""
-    return (*keys.services_in(graph), OBSERVER)
+    """Who may join the bus of this graph, on either side."""
+    return (*keys.services_in(graph), OBSERVER, LINK)
 
 
 def credentials_folder(config: BusConfig) -> Path:
@@ -34,9 +37,14 @@ def credentials_folder(config: BusConfig) -> Path:
 
 
 def ensure_credentials(config: BusConfig) -> Path:
-    """One random password file per user (0600), made at the first start. Returns the folder."""
+    """One random password file per user (0600), made at the first start. Returns the folder.
+
+    Board and host have the same: the board makes it. Raises UserError on a host that has not got it.
+    """
     folder, users = credentials_folder(config), users_in(config.graph)
     if not folder.is_dir() or {path.name for path in folder.iterdir()} != {*users, USERS_FILE}:
+        if config.side is Side.HOST:
+            raise UserError(f"{folder}: not the board's credentials; copy there the folder that the board has made")
         beside = folder.with_name(f".{folder.name}.{os.getpid()}")
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir(mode=0o700)
@@ -66,23 +74,21 @@ def password_of(config: BusConfig, user: str) -> str:
         raise UserError(f"{path}: {error.strerror} (credentials are made when the router first starts)") from error
 
 
+def board_router_id(config: BusConfig) -> str:
+    """The Zenoh id by which the host knows the board's router; only the credential of the link tells it."""
+    return "1" + hashlib.sha256(password_of(config, LINK).encode()).hexdigest()[:31]
+
+
 def access_control(config: BusConfig) -> dict[str, object]:
-    """Zenoh's `access_control` object for this vessel's router."""
+    """Zenoh's `access_control` object for this vessel's router on this side."""
     prefix = f"paani/{config.domain}/{config.vessel}"
-    topics, users = keys.topics_in(config.graph), users_in(config.graph)
-    rules: list[dict[str, object]] = []
+    topics, users = keys.topics_in(config.graph), (*services_on(config.side, config.graph), OBSERVER)
+    rules: list[Rule] = []
     policies: list[dict[str, object]] = []
+    subjects: list[dict[str, object]] = [{"id": user, "usernames": [user]} for user in users]
 
     def rule(name: str, messages: list[str], flow: str, key_exprs: list[str]) -> str:
-        rules.append(
-            {
-                "id": name,
-                "messages": messages,
-                "flows": [flow],
-                "permission": "allow",
-                "key_exprs": key_exprs,
-            }
-        )
+        rules.append(allow(name, messages, flow, key_exprs))
         return name
 
     alive = f"{prefix}/@alive/*"
@@ -107,7 +113,7 @@ def access_control(config: BusConfig) -> dict[str, object]:
     for user in users:
         mine = list(everyone) + (truth if user in TRUTH_READERS else [])
         if user != OBSERVER:
-            written = [f"{prefix}/{name}" for name in written_by(user, config.graph)]
+            written = [f"{prefix}/{name}" for name in written_at(config.side, user, config.graph)]
             mine.append(rule(f"write-{user}", ["put", "delete"], "ingress", written))
             mine.append(rule(f"alive-{user}", ["liveliness_token"], "ingress", [f"{prefix}/{keys.alive_name(user)}"]))
             offered = [key for key in written if key in pictures]
@@ -115,13 +121,28 @@ def access_control(config: BusConfig) -> dict[str, object]:
                 mine.append(rule(f"offer-{user}", ["declare_queryable", "reply"], "ingress", offered))
                 mine.append(rule(f"asked-{user}", ["query"], "egress", offered))
         policies.append({"rules": mine, "subjects": [user]})
+    if config.side is not Side.BOTH:
+        crossing = link_rules(config.side, config.graph, prefix)
+        rules += crossing
+        policies.append({"rules": [each["id"] for each in crossing], "subjects": [LINK]})
+        known = {"usernames": [LINK]} if config.side is Side.BOARD else {"zids": [board_router_id(config)]}
+        subjects.append({"id": LINK, **known})
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [{"id": user, "usernames": [user]} for user in users],
+        "subjects": subjects,
         "policies": policies,
     }
+
+
+def written_at(side: Side, user: str, graph: keys.Graph) -> tuple[str, ...]:
+    """Names of the topics that this user may write at the router of this side.
+
+    The host's router hands out the board's pictures that it has pulled, as they are.
+    """
+    pulled = pictures_sent(Side.BOARD, graph) if side is Side.HOST and user == ROUTER else ()
+    return (*written_by(user, graph), *(topic.name for topic in pulled))
 
 
 def written_by(service: str, graph: keys.Graph) -> tuple[str, ...]:

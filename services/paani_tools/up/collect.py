@@ -9,6 +9,7 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
+from paani.sides import Side, services_on, topics_on
 from paani_tools.up.run_summary import Summary
 
 FED: tuple[keys.Topic[Any], ...] = (
@@ -26,16 +27,19 @@ DRAIN_S = 0.25
 
 
 class Collector:
-    """Subscribes when made; `run` hands over what came until it is cancelled."""
+    """Subscribes when made; `run` hands over what came until it is cancelled.
 
-    def __init__(self, bus: Bus, summary: Summary) -> None:
+    Of a board and its host, each counts what is written on its own side: nothing crosses the link to be counted.
+    """
+
+    def __init__(self, bus: Bus, side: Side, summary: Summary) -> None:
         self._summary = summary
         self._arrived: collections.deque[m.Message] = collections.deque()
-        written = {topic.name for topic in keys.topics_in(bus.graph)}
+        written = {topic.name for topic in topics_on(side, bus.graph)}
         for topic in FED:
             if topic.name in written:
                 bus.on(topic, self._arrived.append)
-        for service in keys.services_in(bus.graph):
+        for service in services_on(side, bus.graph):
             bus.on(keys.health(service), self._arrived.append)
         self._pictures = [(topic.producer, bus.latest_picture(topic)) for topic in PICTURES if topic.name in written]
         self._counted: collections.Counter[str] = collections.Counter()

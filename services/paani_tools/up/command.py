@@ -11,6 +11,7 @@ from pathlib import Path
 from paani.cli import add_config_arguments, config_from
 from paani.keys import Graph
 from paani.option_paths import input_file, output_file, output_folder
+from paani.sides import Side
 from paani.whole_file import write_json
 from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
@@ -40,9 +41,12 @@ def up_sets(
     record: Path | None = None,
     mission: Path | None = None,
     fence: Path | None = None,
+    only: str | None = None,
 ) -> tuple[str, ...]:
     """Settings that the options of `paani up` stand for. The operator of a simulated boat arms at start."""
     sets = ["dashboard.arm_at_start=true"] if simulated else []
+    if only is not None:
+        sets.append(f"bus.side={only}")
     if world is not None:
         sets.append(f"world.name={json.dumps(world)}")
     if camera is not None:
@@ -66,11 +70,11 @@ def seconds(text: str) -> float:
 
 
 def _result(report: Report) -> str:
-    rate_hz = report.services["perception"].rate_hz
-    return (
-        f"{report.duration_s:.0f} s: {report.distance_m:.1f} m, {report.waypoints_reached} waypoints, "
-        f"{report.collisions} collisions, perception {rate_hz:.1f} Hz\n"
-    )
+    parts = [f"{report.distance_m:.1f} m", f"{report.waypoints_reached} waypoints", f"{report.collisions} collisions"]
+    parts = parts if "plant" in report.services or "thrusters" in report.services else []
+    if perception := report.services.get("perception"):
+        parts.append(f"perception {perception.rate_hz:.1f} Hz")
+    return f"{report.duration_s:.0f} s: {', '.join(parts)}\n"
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
@@ -83,6 +87,7 @@ async def _up(options: argparse.Namespace) -> Outcome:
         record=options.record,
         mission=options.mission,
         fence=options.fence,
+        only=options.only,
     )
     plan = await make_plan(config_from(options, sets))
     return await run_plan(plan, options.seconds, Display(sys.stdout))
@@ -104,6 +109,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--fence", type=input_file("--fence"), metavar="FILE", help="areas to keep in and out of, TOML or GeoJSON"
+    )
+    parser.add_argument(
+        "--only",
+        choices=(Side.BOARD.value, Side.HOST.value),
+        help="the processes of this machine of two, which meet at bus.link",
     )
     parser.add_argument("--headless", action="store_true", help="serve no page")
     add_config_arguments(parser)

@@ -18,7 +18,9 @@ from paani.bus import open_bus
 from paani.clock import Clock, WallClock, stopwatch_ms
 from paani.errors import UserError
 from paani.runtime import runtime_dir
+from paani.sides import Side
 from paani_tools.up.collect import Collector
+from paani_tools.up.other_side import report_other_side
 from paani_tools.up.plan import Plan
 from paani_tools.up.run_summary import Report, Summary
 from paani_tools.up.silence import ROUTER
@@ -86,10 +88,13 @@ async def _run(
         async with asyncio.TaskGroup() as group:
             tasks = [group.create_task(supervisor.keep_running(ROUTER), name=ROUTER)]
             bus = await open_bus(plan.config.bus, OBSERVER, clock)
-            collector = Collector(bus, summary)
+            collector = Collector(bus, plan.config.bus.side, summary)
             for service in plan.services:
                 bus.on(keys.health(service), functools.partial(_on_health, supervisor))
-            for work in (supervisor.follow_alive(bus), supervisor.watch(), collector.run()):
+            works = [supervisor.follow_alive(bus), supervisor.watch(), collector.run()]
+            if plan.config.bus.side is not Side.BOTH:
+                works.append(report_other_side(bus, plan.config.bus, display.print_line))
+            for work in works:
                 tasks.append(group.create_task(work))
             if RECORDER in plan.services:
                 tasks.append(group.create_task(supervisor.keep_running(RECORDER), name=RECORDER))
@@ -99,7 +104,7 @@ async def _run(
                     tasks.append(group.create_task(supervisor.keep_running(name), name=name))
             await _await_all_alive(supervisor, display)
             summary.begin(clock.now_us())
-            if plan.config.dashboard.serve:
+            if plan.config.dashboard.serve and "dashboard" in plan.services:
                 display.print_line(f"open http://{plan.config.dashboard.host}:{plan.config.dashboard.port}")
             await during()
             for task in tasks:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from paani.bus.routing import require_free
+from paani.bus.routing import require_addresses
 from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
 from paani.extras import require_modules
@@ -45,16 +45,30 @@ async def make_plan(config: Config) -> Plan:
     """Complete the settings. Raises UserError for what can be known before anything starts.
 
     The scenario's route, fence and origin are handed to navigator and localization unless they have their own. A hull
-    has no scenario: its route is given, and without an origin of its own the map's is the first fix.
+    has no scenario: its route is given, and without an origin of its own the map's is the first fix. Of board and host
+    this concerns the one where the navigator runs.
     With a camera other than `sim` there is no eye, and the thrust adapter does not wait for its pulse; with `sim` the
     calibration is the eye's, unless another is given as valid.
     """
     require_modules("up", *(module for name in config.services for module in NEEDED.get(name, ())))
-    require_free(config.bus.router)
-    await asyncio.to_thread(_require_source, config.camera)
-    if config.dashboard.serve:
+    require_addresses(config.bus)
+    if "camera" in config.services:
+        await asyncio.to_thread(_require_source, config.camera)
+    if config.dashboard.serve and "dashboard" in config.services:
         await _require_free_page(config)
     _require_lines(config)
+    config = await _with_course(config) if "navigator" in config.services else config
+    if config.camera.source == "sim":
+        calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
+        return Plan(config.services, replace(config, calibration=calibration))
+    adapter = config.plant.adapter
+    adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
+    config = replace(config, plant=replace(config.plant, adapter=adapter))
+    return Plan(config.services, config)
+
+
+async def _with_course(config: Config) -> Config:
+    """Hand route, fence and origin to navigator and localization, unless they have their own."""
     navigator, localization = config.navigator, config.localization
     if config.bus.graph is Graph.HULL:
         if not navigator.route and not navigator.mission:
@@ -69,22 +83,15 @@ async def make_plan(config: Config) -> Plan:
     if localization.origin_lat_lon_deg is None:
         localization = replace(localization, origin_lat_lon_deg=course.origin_lat_lon_deg)
     await asyncio.to_thread(load_route_and_mission, navigator, localization.origin_lat_lon_deg)
-    config = replace(config, navigator=navigator, localization=localization)
-    if config.camera.source == "sim":
-        calibration = config.calibration if config.calibration.valid else calibration_of(config.eye)
-        return Plan(config.services, replace(config, calibration=calibration))
-    adapter = config.plant.adapter
-    adapter = replace(adapter, require_pulses=tuple(name for name in adapter.require_pulses if name != EYE))
-    config = replace(config, plant=replace(config.plant, adapter=adapter))
-    return Plan(config.services, config)
+    return replace(config, navigator=navigator, localization=localization)
 
 
 def _require_lines(config: Config) -> None:
     """Raises UserError where thrust goes to a microcontroller and nobody has said where that is."""
     graph = config.bus.graph
-    if graph is not Graph.SIMULATION and not config.thrusters.line:
+    if "thrusters" in config.services and not config.thrusters.line:
         raise UserError(f"thrusters.line: not set (profile {config.profile} drives a microcontroller)")
-    if graph is Graph.HIL and not config.plant.pwm_line:
+    if graph is Graph.HIL and "plant" in config.services and not config.plant.pwm_line:
         raise UserError("plant.pwm_line: not set (the emulator's bench port, by which profile hil moves the boat)")
 
 

@@ -1,4 +1,4 @@
-"""The router session: listens, authenticates, and enforces the authority table."""
+"""The router session: listens, authenticates, enforces the authority table, and joins a boat's board and its host."""
 
 from __future__ import annotations
 
@@ -8,51 +8,97 @@ import socket
 
 import zenoh
 
-from paani.authority import USERS_FILE, access_control, ensure_credentials, password_of
-from paani.bus.session import shared_settings, zenoh_config
+from paani.authority import USERS_FILE, access_control, board_router_id, ensure_credentials, password_of
+from paani.bus.session import RETRY, shared_settings, zenoh_config
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.link_access import LINK
+from paani.sides import ROUTER, Side
+
+# An attempt to connect that takes longer is begun again: TCP itself waits ever longer, 7 s after a cut of 10 s.
+LINK_OPEN_MS = 2000
 
 
 def router_config(config: BusConfig) -> zenoh.Config:
-    """A router that denies by default."""
+    """A router that denies by default. The board's also listens at the link, where the host's connects as `LINK`."""
     credentials = ensure_credentials(config)
+    user = LINK if config.side is Side.HOST else ROUTER
     return zenoh_config(
         {
             "mode": "router",
-            "listen/endpoints": [config.router],
-            "transport/auth/usrpwd/user": "router",
-            "transport/auth/usrpwd/password": password_of(config, "router"),
+            "listen/endpoints": listening(config),
+            "transport/auth/usrpwd/user": user,
+            "transport/auth/usrpwd/password": password_of(config, user),
             "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
             "access_control": access_control(config),
+            **_link_settings(config),
             **shared_settings(config),
         }
     )
 
 
+def listening(config: BusConfig) -> list[str]:
+    """Endpoints at which this side's router listens."""
+    return [config.router, config.link] if config.side is Side.BOARD else [config.router]
+
+
+def _link_settings(config: BusConfig) -> dict[str, object]:
+    """The board's router is known by its id; the host's goes on trying to reach it, from the start and after a cut."""
+    match config.side:
+        case Side.BOARD:
+            return {"id": board_router_id(config)}
+        case Side.HOST:
+            return {
+                "connect/endpoints": [config.link],
+                "connect/timeout_ms": -1,
+                "connect/exit_on_failure": False,
+                "connect/retry": RETRY,
+                "transport/unicast/open_timeout": LINK_OPEN_MS,
+            }
+        case _:
+            return {}
+
+
 async def open_router(config: BusConfig) -> zenoh.Session:
-    """Start listening on `bus.router`. Raises UserError when the address is taken or wrong."""
-    require_free(config.router)
+    """Start listening. Raises UserError when an address is taken or wrong."""
+    require_addresses(config)
     try:
         return await asyncio.to_thread(lambda: zenoh.open(router_config(config)))
     except zenoh.ZError as error:
-        raise UserError(f"bus.router {config.router}: {error}") from error
+        raise UserError(f"bus.router {', '.join(listening(config))}: {error}") from error
 
 
-def require_free(endpoint: str) -> None:
-    """Raises UserError unless `tcp/<host>:<port>` can be bound."""
+def require_addresses(config: BusConfig) -> None:
+    """Raises UserError unless this side's router can listen where it is to, and has a link to the other side."""
+    if config.side is not Side.BOTH and not config.link:
+        raise UserError(
+            f"bus.link: not set (board and host meet at tcp/ADDRESS:PORT of the board; this is the {config.side})"
+        )
+    for name, endpoint in zip(("bus.router", "bus.link"), listening(config), strict=False):
+        _require_free(name, endpoint)
+    if config.side is Side.HOST:
+        parse_endpoint("bus.link", config.link)
+
+
+def parse_endpoint(name: str, endpoint: str) -> tuple[str, str, int]:
+    """Scheme, host and port of `tcp/<host>:<port>`. Raises UserError naming the setting."""
     scheme, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     if scheme not in {"tcp", "tls"} or not host or not port.isdecimal():
-        raise UserError(f"bus.router {endpoint}: expected tcp/<host>:<port>")
+        raise UserError(f"{name} {endpoint}: expected tcp/<host>:<port>")
+    return scheme, host, int(port)
+
+
+def _require_free(name: str, endpoint: str) -> None:
+    scheme, host, port = parse_endpoint(name, endpoint)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((host, int(port)))
+            probe.bind((host, port))
         except (OSError, OverflowError) as error:
             if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
                 raise UserError(
-                    f"bus.router {endpoint}: in use by another program, perhaps another `paani up`: stop that, or "
-                    f"choose another port (--set bus.router={scheme}/{host}:{int(port) + 1})"
+                    f"{name} {endpoint}: in use by another program, perhaps another `paani up`: stop that, or "
+                    f"choose another port (--set {name}={scheme}/{host}:{port + 1})"
                 ) from error
-            raise UserError(f"bus.router {endpoint}: {error}") from error
+            raise UserError(f"{name} {endpoint}: {error}") from error

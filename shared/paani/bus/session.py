@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import json
 import logging
 
@@ -14,6 +13,7 @@ from paani.config import BusConfig
 
 LOG = logging.getLogger(__name__)
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
+REACH_S = 1.0
 
 
 def client_config(config: BusConfig, user: str) -> zenoh.Config:
@@ -53,12 +53,25 @@ def zenoh_config(settings: dict[str, object]) -> zenoh.Config:
 
 
 async def open_client(config: BusConfig, user: str) -> zenoh.Session:
-    """Open a session; waits for the router as long as it takes, and says so once."""
-    for attempt in itertools.count():
+    """Open a session; waits for the router as long as it takes, and says once what it waits for."""
+    problem = ""
+    while True:
         try:
             return await asyncio.to_thread(lambda: zenoh.open(client_config(config, user)))
         except zenoh.ZError:
-            if attempt == 0:
-                LOG.warning("waiting for the router at %s (user %s)", config.router, user)
+            was, problem = problem, await _reach(config.router)
+            if problem != was:
+                LOG.warning("the router at %s %s (user %s); waiting", config.router, problem, user)
             await asyncio.sleep(0.1)
-    raise AssertionError("unreachable")
+
+
+async def _reach(endpoint: str) -> str:
+    """Why no session was opened: Zenoh itself does not tell."""
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    try:
+        async with asyncio.timeout(REACH_S):
+            _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
+    except (OSError, TimeoutError):
+        return "does not answer"
+    writer.close()
+    return "lets nobody in by these credentials"

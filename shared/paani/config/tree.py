@@ -16,8 +16,9 @@ from paani.config.section import Positive, Section
 from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
 from paani.config.thrusters import ThrustersConfig
-from paani.keys import Graph, services_in
+from paani.keys import Graph
 from paani.port_address import parse_address
+from paani.sides import Side, services_on
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
 ShortName = Annotated[str, msgspec.Meta(pattern="^[a-z0-9_]{1,32}$")]
@@ -34,6 +35,9 @@ class BusConfig(Section, frozen=True):
     domain: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 43  # A6
     vessel: ShortName = "otter"  # the boat's name in every key
     router: str = "tcp/127.0.0.1:7447"  # where the router listens: this machine alone
+    side: Side = Side.BOTH  # which processes run here; `paani up --only` sets it
+    # Where board and host meet (tcp/ADDRESS:PORT of the board): the board's router listens there, the host's connects.
+    link: str = ""
     runtime_dir: str = ""
     graph: Graph = Graph.SIMULATION  # set by the profiles `hil` and `hull` alone; it decides who may write what
     lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000  # a link that was silent for so long counts as cut
@@ -80,7 +84,7 @@ class Config(Section, frozen=True):
             idle.add("recorder")
         if not self.bridge.line:
             idle.add("bridge")
-        return tuple(name for name in services_in(self.bus.graph) if name not in idle)
+        return tuple(name for name in services_on(self.bus.side, self.bus.graph) if name not in idle)
 
     @property
     def is_planner_active(self) -> bool:

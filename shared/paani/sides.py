@@ -1,0 +1,74 @@
+"""Which machine each process runs on where a boat's board and its host are two, and what crosses the link between them.
+
+`paani up --only`, the routers' access control and the deployment are made from `ON_BOARD`. The router is on both sides,
+and speaks of its own machine alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any
+
+from paani.keys import Graph, Stance, Topic, every_topic, services_in
+
+ROUTER = "router"
+TRUTH = "@truth/"
+
+
+class Side(StrEnum):
+    """The processes of a graph that run on this machine: all of them, the board's, or the host's."""
+
+    BOTH = "both"
+    BOARD = "board"
+    HOST = "host"
+
+    @property
+    def other(self) -> Side:
+        return {Side.BOARD: Side.HOST, Side.HOST: Side.BOARD}.get(self, self)
+
+
+# The other processes of the graph are the host's. On a hull nothing that decides where it goes is the host's; but the
+# operator is, without whose word the thrusters stand still: a boat out of reach of STOP does not drive on.
+ON_BOARD: Mapping[Graph, frozenset[str]] = {
+    Graph.SIMULATION: frozenset({"camera", "perception", "advisor", "bridge"}),
+    Graph.HIL: frozenset({"camera", "perception", "advisor", "bridge"}),
+    Graph.HULL: frozenset(
+        {
+            "sensors", "camera", "perception", "advisor", "navigator", "controller", "localization", "thrusters",
+            "bridge",
+        }
+    ),
+}  # fmt: skip
+
+
+def services_on(side: Side, graph: Graph) -> tuple[str, ...]:
+    """Processes of this side, in the order they start."""
+    services = services_in(graph)
+    if side is Side.BOTH:
+        return services
+    is_board = side is Side.BOARD
+    return tuple(name for name in services if name == ROUTER or (name in ON_BOARD[graph]) is is_board)
+
+
+def topics_on(side: Side, graph: Graph) -> tuple[Topic[Any], ...]:
+    """What the processes of this side write."""
+    services = services_on(side, graph)
+    return tuple(topic for topic in every_topic(graph) if topic.producer in services)
+
+
+def topics_sent(side: Side, graph: Graph) -> tuple[Topic[Any], ...]:
+    """What this side sends to the other by itself: all it writes but the simulator's truth and its router's health.
+
+    Pictures are among them, but only on being asked for.
+    """
+    return tuple(
+        topic
+        for topic in topics_on(side, graph)
+        if side is not Side.BOTH and topic.producer != ROUTER and not topic.name.startswith(TRUTH)
+    )
+
+
+def pictures_sent(side: Side, graph: Graph) -> tuple[Topic[Any], ...]:
+    """Pictures of this side that the other may pull."""
+    return tuple(topic for topic in topics_sent(side, graph) if topic.stance is Stance.PICTURE)

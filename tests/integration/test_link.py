@@ -1,0 +1,221 @@
+"""Two routers, the board's and the host's: what passes between them, and what the credential of the link is good for."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from msgspec.structs import replace
+
+from paani import keys
+from paani import messages as m
+from paani.authority import OBSERVER, ensure_credentials
+from paani.bus import Bus, open_bus
+from paani.bus.routing import open_router
+from paani.clock import WallClock
+from paani.config import BusConfig, load_config
+from paani.errors import UserError
+from paani.link_access import LINK
+from paani.sides import Side
+from paani_services.router.picture_exchange import exchange_pictures
+from tests.conftest import find_free_port, put_raw
+
+pytestmark = pytest.mark.integration
+CLOCK = WallClock()
+
+
+class Sides(NamedTuple):
+    board: BusConfig
+    host: BusConfig
+
+
+@pytest.fixture
+async def sides(tmp_path: Path) -> Sides:
+    link = f"tcp/127.0.0.1:{find_free_port()}"
+    board, host = (
+        load_config(
+            sets=(
+                f"bus.side={side}",
+                f"bus.link={link}",
+                f"bus.router=tcp/127.0.0.1:{find_free_port()}",
+                f"bus.runtime_dir={tmp_path}",
+            )
+        ).bus
+        for side in (Side.BOARD, Side.HOST)
+    )
+    await asyncio.to_thread(ensure_credentials, board)
+    return Sides(board, host)
+
+
+@contextlib.asynccontextmanager
+async def routing(config: BusConfig) -> AsyncIterator[None]:
+    router = await open_router(config)
+    try:
+        yield
+    finally:
+        await asyncio.to_thread(router.close)
+
+
+@contextlib.asynccontextmanager
+async def joined(config: BusConfig, user: str) -> AsyncIterator[Bus]:
+    bus = await open_bus(config, user, CLOCK)
+    try:
+        yield bus
+    finally:
+        await bus.close()
+
+
+async def until(condition: Callable[[], bool], act: Callable[[], object] = lambda: None, limit_s: float = 10.0) -> None:
+    async with asyncio.timeout(limit_s):
+        while not condition():
+            act()
+            await asyncio.sleep(0.02)
+
+
+def tracks() -> m.Tracks:
+    return m.Tracks(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=0, tracks=())
+
+
+def thrust(left: float = 0.1) -> m.Thrust:
+    return m.Thrust(source_us=CLOCK.now_us(), left=left, right=0.1, enabled=True)
+
+
+async def test_messages_and_readiness_cross_both_ways_whoever_is_first(sides: Sides) -> None:
+    """The host starts before its board, loses it, and has it again: by itself."""
+    async with routing(sides.host), joined(sides.host, "controller") as controller:
+        for _ in range(2):
+            await require_crossing(sides, controller)
+
+
+async def require_crossing(sides: Sides, controller: Bus) -> None:
+    async with (
+        routing(sides.board),
+        joined(sides.board, "advisor") as advisor,
+        joined(sides.board, OBSERVER) as on_board,
+        joined(sides.host, OBSERVER) as on_host,
+    ):
+        alive: set[str] = set()
+        following = asyncio.create_task(follow(on_host, alive))
+        with advisor.alive():
+            seen, commanded = on_host.latest(keys.TRACKS), on_board.latest(keys.THRUST)
+            written, ordered = advisor.publisher(keys.TRACKS), controller.publisher(keys.THRUST)
+            await until(lambda: seen.received > 2, lambda: written.put(tracks()))
+            await until(lambda: commanded.received > 2, lambda: ordered.put(thrust()))
+            await until(lambda: "advisor" in alive)
+        await until(lambda: "advisor" not in alive)
+        following.cancel()
+
+
+async def follow(bus: Bus, alive: set[str]) -> None:
+    async for service, is_alive in bus.alive_events():
+        (alive.add if is_alive else alive.discard)(service)
+
+
+async def test_the_links_credential_writes_nothing_of_the_boards(sides: Sides) -> None:
+    """At the board it passes for the host, and for nobody of the board; at the host it is nobody."""
+    async with contextlib.AsyncExitStack() as stack:
+        for router in sides:
+            await stack.enter_async_context(routing(router))
+        advisor = await stack.enter_async_context(joined(sides.board, "advisor"))
+        on_board, on_host = [await stack.enter_async_context(joined(side, OBSERVER)) for side in sides]
+        at_board, at_host = on_board.latest(keys.TRACKS), on_host.latest(keys.TRACKS)
+        thrust_there = on_board.latest(keys.THRUST)
+        own = advisor.publisher(keys.TRACKS)
+        await until(lambda: at_host.received > 0, lambda: own.put(tracks()))
+        stranger_at_link = replace(sides.board, router=sides.board.link)
+        async with joined(stranger_at_link, LINK) as stranger, joined(sides.host, LINK) as at_home:
+            forged = stranger.publisher(keys.THRUST)
+            await until(lambda: thrust_there.received > 0, lambda: forged.put(thrust()))
+            before = (at_board.received, at_host.received, thrust_there.received)
+            for forger in (stranger, at_home):
+                for key in (keys.TRACKS.name, keys.ADVISORY.name, "advisor/*", "**", keys.PICTURE.name):
+                    put_raw(forger, key, b"{}")
+            put_raw(at_home, keys.THRUST.name, b"{}")
+            last = own.put(tracks())
+            await until(lambda: at_host.value is not None and at_host.value.seq == last.seq)
+            await until(lambda: at_board.value is not None and at_board.value.seq == last.seq)
+        assert (at_board.received, at_host.received) == (before[0] + 1, before[1] + 1)
+        assert thrust_there.received == before[2]
+        assert not on_board.drops
+        assert not on_host.drops
+
+
+@pytest.mark.parametrize("user", ["controller", "navigator", "dashboard"])
+async def test_nobody_of_the_host_writes_at_the_boards_router(sides: Sides, user: str) -> None:
+    """A process of the host is a subject of its own router alone, though its password opens the board's door."""
+    topic: keys.Topic[m.Health] = keys.health(user)
+    async with routing(sides.board), routing(sides.host), joined(sides.board, OBSERVER) as on_board:
+        heard = on_board.latest(topic)
+        async with (
+            joined(sides.host, user) as at_home,
+            joined(replace(sides.board, router=sides.board.link), user) as lost,
+        ):
+            own, astray = at_home.publisher(topic), lost.publisher(topic)
+            report = m.Health(source_us=CLOCK.now_us(), service=user, ready=True, uptime_s=0, cpu_cores=0, rss_mib=1)
+            await until(lambda: heard.received > 0, lambda: own.put(report))
+            before = heard.received
+            for _ in range(5):
+                astray.put(report)
+            last = own.put(report)
+            await until(lambda: heard.value is not None and heard.value.seq == last.seq)
+        assert heard.received == before + 1
+
+
+async def test_pictures_are_pulled_across_and_look_pushed_at_home(sides: Sides) -> None:
+    """Both ways: the board's to whoever subscribes on the host, the host's to whoever pulls on the board."""
+    header = m.PictureHeader(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
+    async with (
+        routing(sides.board),
+        routing(sides.host),
+        joined(sides.board, "camera") as camera,
+        joined(sides.host, "eye") as eye,
+        joined(sides.host, "router") as router,
+        joined(sides.host, OBSERVER) as watcher,
+    ):
+        exchange = asyncio.create_task(exchange_pictures(router, sides.host, CLOCK))
+        try:
+            taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
+            seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
+            for index in range(3):
+                taken.put_picture(header, b"taken %d" % index)
+                assert (await asyncio.wait_for(seen.next(), 10)).data == b"taken %d" % index
+            for index in range(3):
+                drawn.put_picture(header, b"drawn %d" % index)
+                assert (await asyncio.wait_for(pulled.next(), 10)).data == b"drawn %d" % index
+            assert (await asyncio.wait_for(pulled_header(pulled, drawn, header), 10)).producer == "eye"
+        finally:
+            exchange.cancel()
+            await asyncio.wait([exchange])
+
+
+async def pulled_header(pulled: object, drawn: object, header: m.PictureHeader) -> m.PictureHeader:
+    drawn.put_picture(header, b"last")  # type: ignore[attr-defined]
+    picture = await pulled.next()  # type: ignore[attr-defined]
+    found: m.PictureHeader = picture.header
+    return found
+
+
+async def test_a_side_without_a_link_does_not_start(sides: Sides) -> None:
+    for config in sides:
+        with pytest.raises(UserError, match=r"bus\.link: not set \(board and host meet at tcp/ADDRESS:PORT"):
+            await open_router(replace(config, link=""))
+        with pytest.raises(UserError, match=r"bus\.link 10\.0\.0\.1: expected tcp/<host>:<port>"):
+            await open_router(replace(config, link="10.0.0.1"))
+
+
+async def test_a_door_that_stays_shut_is_told_from_one_that_is_not_there(
+    sides: Sides, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Another boat's credentials: who waits is told that they are the reason."""
+    other = replace(sides.board, router=sides.board.link, runtime_dir=str(tmp_path / "other"))
+    await asyncio.to_thread(ensure_credentials, other)
+    opening = asyncio.create_task(open_bus(other, LINK, CLOCK))
+    await until(lambda: f"{other.router} does not answer" in caplog.text)
+    async with routing(sides.board):
+        await until(lambda: f"{other.router} lets nobody in by these credentials" in caplog.text)
+        opening.cancel()
+        await asyncio.wait([opening])
