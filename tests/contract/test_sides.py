@@ -70,10 +70,7 @@ def test_the_link_lets_in_what_the_other_side_may_write(side: Side, graph: Graph
     pictures = {topic.name for topic in pictures_sent(side.other, graph)}
     assert writers[LINK] == {topic.name for topic in topics_sent(side.other, graph)} - pictures
     assert not any(name.startswith("@truth") or name.endswith(f"/{ROUTER}") for name in writers[LINK])
-    own = {
-        name: {topic.name for topic in keys.every_topic(graph) if topic.producer == name}
-        for name in services_on(side, graph)
-    }
+    own = {name: set(authority.written_by(name, graph)) for name in services_on(side, graph)}
     if side is Side.HOST:
         own[ROUTER] |= pictures
     assert {user: names for user, names in writers.items() if user != LINK} == own

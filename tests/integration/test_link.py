@@ -1,4 +1,4 @@
-"""Two routers, the board's and the host's: what passes between them, and what the credential of the link is good for."""
+"""Two routers, of board and host: what passes between them, and what the credential of the link is good for."""
 
 from __future__ import annotations
 
