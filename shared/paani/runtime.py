@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 from paani.config import BusConfig
@@ -10,7 +11,11 @@ from paani.errors import UserError
 
 
 def runtime_dir(config: BusConfig) -> Path:
-    """The folder, made with mode 0700. `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder."""
+    """The folder, for its owner alone. `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder.
+
+    Raises UserError for one that cannot be made, that belongs to somebody else, or that is no folder: what lies in it
+    opens the bus.
+    """
     chosen = config.runtime_dir or os.environ.get("PAANI_RUNTIME_DIR", "")
     if not chosen:
         state = os.environ.get("XDG_STATE_HOME", "") or str(Path.home() / ".local" / "state")
@@ -20,6 +25,13 @@ def runtime_dir(config: BusConfig) -> Path:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"bus.runtime_dir {folder}: {error.strerror}") from error
+    found = folder.lstat()
+    if stat.S_ISLNK(found.st_mode):
+        raise UserError(f"bus.runtime_dir {folder}: is a link; name the folder itself")
+    if found.st_uid != os.geteuid():
+        raise UserError(f"bus.runtime_dir {folder}: belongs to another user; choose a folder of your own")
+    if found.st_mode & 0o077:
+        folder.chmod(0o700)
     return folder
 
 

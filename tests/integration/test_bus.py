@@ -11,7 +11,9 @@ from paani import keys
 from paani import messages as m
 from paani.authority import ensure_credentials
 from paani.bus import Latest, Publisher, open_bus
+from paani.bus.admission import MAX_MESSAGE_BYTES
 from paani.bus.routing import open_router
+from paani.bus.session import MAX_BYTES
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from tests.conftest import OpenAs, Spawn, put_raw
@@ -174,3 +176,41 @@ async def test_a_picture_is_watched_by_subscribers_and_by_those_who_pull(open_as
     pulling = asyncio.create_task(dashboard.pull_picture(keys.MASK).next())
     await until(pulled_only.is_watched)
     pulling.cancel()
+
+
+async def test_what_is_too_large_is_dropped_and_disturbs_nobody(open_as: OpenAs) -> None:
+    plant, controller = await open_as("plant"), await open_as("controller")
+    inbox, own = plant.latest(keys.THRUST), controller.publisher(keys.THRUST)
+    await until_received(own, inbox)
+    put_raw(controller, "controller/thrust", b" " * (MAX_MESSAGE_BYTES + 1))
+    await until(lambda: plant.drops["oversized"] == 1)
+    await until_accepted(own, inbox, 0.4)
+
+
+async def test_what_no_link_takes_cuts_off_its_sender_alone(open_as: OpenAs) -> None:
+    plant, controller, advisor = await open_as("plant"), await open_as("controller"), await open_as("advisor")
+    inbox, own = plant.latest(keys.THRUST), controller.publisher(keys.THRUST)
+    await until_received(own, inbox)
+    put_raw(advisor, "advisor/advisory", b" " * (MAX_BYTES + 1))
+    await until_accepted(own, inbox, 0.4)
+
+
+async def until_accepted(own: Publisher[m.Thrust], inbox: Latest[m.Thrust], left: float) -> None:
+    async with asyncio.timeout(5.0):
+        while inbox.value is None or inbox.value.left != left:
+            own.put(thrust(left=left))
+            await asyncio.sleep(0.02)
+
+
+async def test_strangers_that_say_nothing_keep_nobody_out(open_as: OpenAs, config: Config) -> None:
+    """Zenoh alone waits 10 s for each of a hundred of them before it lets anybody else in."""
+    await open_as("plant")
+    _, _, address = config.bus.router.partition("/")
+    host, _, port = address.partition(":")
+    silent = [await asyncio.open_connection(host, int(port)) for _ in range(150)]
+    try:
+        async with asyncio.timeout(4.0):
+            await open_as("controller")
+    finally:
+        for _, writer in silent:
+            writer.close()

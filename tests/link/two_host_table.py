@@ -65,7 +65,7 @@ def measure(row: Row, cuts: int, seconds: float, seed: int) -> str:
 
 
 def figures_text(drive: Drive, begun_us: int, span_s: float) -> str:
-    """Ages of what was in force while the boat was driven, and pictures decided on per second where there was no cut."""
+    """Ages of what was in force while the boat was driven; pictures decided on per second where there was no cut."""
     driven = [each for each in drive.applied if each.at_us >= begun_us and each.cause == "none"]
     ages = (pair([each.command_age_ms for each in driven]), pair([each.picture_age_ms for each in driven]))
     decided = sum(each.at_us >= begun_us for each in drive.decided)

@@ -35,5 +35,5 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             if stale_us is not None and now_us < stale_us:
                 due_us = min(due_us, stale_us)
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(max(due_us - clock.now_us(), 1000) * 1e-6):
+                async with asyncio.timeout(min(max(due_us - clock.now_us(), 1000), period_us) * 1e-6):
                     await evidence.next()

@@ -12,8 +12,8 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.arrays import U8
-from paani.bus import Bus
-from paani.clock import Clock, patience_us
+from paani.bus import Bus, Numbering
+from paani.clock import Clock, MonotonicClock, patience_us
 from paani.config import CameraConfig, Config
 from paani_services.camera.picture_sources import Frame, Webcam, parse_webcam_index, play_frames, shrink_to_fit
 
@@ -24,18 +24,17 @@ class PicturePublisher:
     """Numbers the pictures and publishes them; each picture is a distinct frame."""
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
-        self._publisher, self._clock = bus.picture_publisher(keys.PICTURE), clock
-        self._epoch, self._seq = clock.now_us() // 1000, -1
+        self._publisher, self._frames = bus.picture_publisher(keys.PICTURE), Numbering(clock)
 
     def start_new_epoch(self) -> None:
         """The source started again: frame numbers and stamps before do not compare with those that follow."""
         self._publisher.new_epoch()
-        self._epoch, self._seq = max(self._epoch + 1, self._clock.now_us() // 1000), -1
+        self._frames.new_epoch()
 
     def put(self, data: bytes, header: m.PictureHeader) -> None:
         """Publish one picture; its frame number and epoch are set here."""
-        self._seq += 1
-        numbered = msgspec.structs.replace(header, frame_seq=self._seq, frame_epoch=self._epoch)
+        self._frames.advance()
+        numbered = msgspec.structs.replace(header, frame_seq=self._frames.seq, frame_epoch=self._frames.epoch)
         self._publisher.put_picture(numbered, data)
 
 
@@ -77,12 +76,12 @@ async def _publish_webcam(
 ) -> None:
     """Publish the webcam's newest picture: all are read, so that none waits in the driver; those due go out."""
     camera = await _run_in_worker(worker, Webcam, index, settings.width_px, settings.height_px)
-    period_us, due_us = patience_us(settings.rate_hz), 0
+    period_us, due_us, monotonic = patience_us(settings.rate_hz), 0, MonotonicClock()
     try:
         with bus.alive():
             while True:
                 bgr = await _run_in_worker(worker, camera.read)
-                now_us = clock.now_us()
+                source_us, now_us = clock.now_us(), monotonic.now_us()
                 if bgr is None:
                     raise RuntimeError(
                         f"camera.source {settings.source}: the camera does not answer any more; check its cable"
@@ -91,7 +90,7 @@ async def _publish_webcam(
                     due_us = now_us + period_us
                     small = await _run_in_worker(worker, shrink_to_fit, bgr, settings.width_px)
                     data = await _run_in_worker(worker, encode_jpeg, small, settings.jpeg_quality)
-                    output.put(data, _make_header(small, now_us))
+                    output.put(data, _make_header(small, source_us))
     finally:
         worker.submit(camera.close)
 
@@ -100,16 +99,16 @@ async def _play_recording(
     bus: Bus, clock: Clock, settings: CameraConfig, output: PicturePublisher, worker: ThreadPoolExecutor
 ) -> None:
     """Publish the frames of a recording in order; a file that is no picture goes out unchanged."""
-    frames = play_frames(Path(settings.source), settings)
+    frames, monotonic = play_frames(Path(settings.source), settings), MonotonicClock()
     frame = await _run_in_worker(worker, next, frames, None)
     with bus.alive():
-        due_us = clock.now_us()
+        due_us = monotonic.now_us()
         while frame is not None:
             if frame.restarted:
                 output.start_new_epoch()
             data = await _run_in_worker(worker, _encode_frame, frame, settings.jpeg_quality)
-            due_us = max(due_us + round(frame.wait_s * 1e6), clock.now_us() - round(1e6 / settings.rate_hz))
-            await asyncio.sleep(max(due_us - clock.now_us(), 0) * 1e-6)
+            due_us = max(due_us + round(frame.wait_s * 1e6), monotonic.now_us() - round(1e6 / settings.rate_hz))
+            await asyncio.sleep(max(due_us - monotonic.now_us(), 0) * 1e-6)
             output.put(data, _make_header(frame.bgr, clock.now_us(), frame))
             bus.note(frame.name)
             frame = await _run_in_worker(worker, next, frames, None)

@@ -1,4 +1,4 @@
-"""Encoded pictures to BGR, with work and memory bounded before anything is decompressed. Pure."""
+"""JPEG and PNG to BGR, with work and memory bounded before anything is decompressed. Pure."""
 
 import struct
 
@@ -11,17 +11,19 @@ MAX_PIXELS = 2**25  # as BGR, 100 MB
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 JPEG_SIGNATURE = b"\xff\xd8"
 JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start of frame: height and width follow
+JPEG_FILL = 0xFF  # any number of these may stand before a marker (ITU-T T.81, B.1.1.2)
 JPEG_BARE_MARKERS = frozenset((0x01, *range(0xD0, 0xDA)))  # no length follows
 
 
 def decode_picture(data: bytes | U8) -> U8 | None:
-    """BGR uint8 [H, W, 3] of an encoded picture or its first frame; None where the bytes are no picture.
+    """BGR uint8 [H, W, 3] of a JPEG or PNG, what travels on the bus; None where the bytes are neither.
 
-    Grey, alpha, 16-bit and CMYK pictures become BGR. More than `MAX_PIXELS` are refused as no picture.
+    Grey, alpha, 16-bit and CMYK pictures become BGR. Other formats, pictures whose header states no size, and more than
+    `MAX_PIXELS` are refused as no picture: their decoders allocate before anyone can ask them how much.
     """
     if not isinstance(data, bytes):
         return data if data.ndim == 3 and data.shape[2] == 3 and data.size else None
-    if stated_pixel_count(data) > MAX_PIXELS:
+    if not 0 < stated_pixel_count(data) <= MAX_PIXELS:
         return None
     try:
         bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
@@ -40,6 +42,9 @@ def stated_pixel_count(data: bytes) -> int:
     at = 2
     while at + 9 <= len(data) and data[at] == 0xFF:
         marker = data[at + 1]
+        if marker == JPEG_FILL:
+            at += 1
+            continue
         if marker in JPEG_FRAME_MARKERS:
             height, width = struct.unpack_from(">HH", data, at + 5)
             return int(width) * int(height)

@@ -45,6 +45,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
                 picture = await pictures.next()
                 frame = (picture.header.frame_epoch, picture.header.frame_seq)
+                if last[0] * 1000 > clock.now_us() + config.bus.max_future_s * 1e6:  # before the clock was set back
+                    last = (-1, -1)
                 if frame <= last:  # B3
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue

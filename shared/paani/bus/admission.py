@@ -1,4 +1,9 @@
-"""What a receiver lets in. Everything else is counted by cause and dropped."""
+"""What a receiver lets in. Everything else is counted by cause and dropped.
+
+Epochs are milliseconds of the producer's clock when it began. One further ahead of the receiver's clock than two clocks
+may differ would outrank every honest epoch to come, so it is refused like a stamp of the future. One that was accepted
+before the receiver's clock was set back is forgotten, so that a producer that begins again is heard.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ from paani import messages as m
 from paani.keys import NOBODY, Topic
 
 T = TypeVar("T", bound=m.Message)
+MAX_MESSAGE_BYTES = 1 << 20  # of a message without pictures; a step of a deciding process with its state is the largest
 
 
 class Admission(Generic[T]):
@@ -28,18 +34,26 @@ class Admission(Generic[T]):
 
         A restarted producer has a higher epoch and starts its own sequence; an older epoch never comes back.
         """
+        if len(data) > MAX_MESSAGE_BYTES:
+            return None, "oversized"
         try:
             message = self._decoder.decode(data)
         except msgspec.ValidationError as error:
             return None, "wrong_type" if " got " in str(error) or "missing" in str(error) else "out_of_range"
+        except RecursionError:
+            return None, "undecodable"
         except (msgspec.DecodeError, UnicodeDecodeError):
             return None, "non_finite" if b"NaN" in data or b"Infinity" in data else "undecodable"
         if message.domain != self._domain:
             return None, "wrong_domain"
         if message.producer != self._topic.producer or message.producer == NOBODY:
             return None, "wrong_producer"
-        if max(message.source_us, message.sent_us) > now_us + self._max_future_us:
+        latest_us = now_us + self._max_future_us
+        epoch = max(message.epoch, message.frame_epoch) if isinstance(message, m.PictureHeader) else message.epoch
+        if max(message.source_us, message.sent_us, epoch * 1000) > latest_us:
             return None, "future"
+        if self._epoch * 1000 > latest_us:
+            self._epoch, self._seq = 0, -1
         if message.epoch < self._epoch:
             return None, "old_epoch"
         if message.epoch == self._epoch and message.seq <= self._seq:

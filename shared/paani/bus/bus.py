@@ -23,6 +23,7 @@ from paani.config import BusConfig
 from paani.health import HealthReporter
 
 T = TypeVar("T", bound=m.Message)
+MAX_PICTURE_BYTES = 16 << 20  # encoded; a 12-megapixel JPEG of the best quality is half of it
 
 
 class Picture(msgspec.Struct, frozen=True):
@@ -216,6 +217,9 @@ class Bus:
         self._declared.append(self._session.declare_subscriber(key, zenoh.handlers.Callback(exact, indirect=False)))
 
     def _admit_picture(self, admission: Admission[m.PictureHeader], sample: zenoh.Sample) -> Picture | None:
+        if len(sample.payload) > MAX_PICTURE_BYTES:
+            self.drops["oversized"] += 1
+            return None
         attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
         header, cause = admission.judge(attachment, self._clock.now_us())
         if header is None:

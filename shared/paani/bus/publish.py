@@ -21,12 +21,16 @@ PRIORITY = {
     Stance.EVENT: zenoh.Priority.DATA_HIGH,
     Stance.PICTURE: zenoh.Priority.DATA_LOW,
 }
+EPOCH_AHEAD_MS = 100  # a source that begins again several times within a millisecond runs ahead by so little
 LONG_POLL_S = 2.0
 WATCHED_US = 5_000_000  # whoever pulls asks again within this time
 
 
 class Numbering:
-    """Epoch and sequence of one publisher."""
+    """Epoch and sequence of one publisher. An epoch never lies ahead of the publisher's clock for long.
+
+    Where the clock was set back, a new and lower epoch begins: receivers take no epoch of the future.
+    """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -36,6 +40,13 @@ class Numbering:
     def new_epoch(self) -> None:
         self.epoch = max(self.epoch + 1, self._clock.now_us() // 1000)
         self.seq = -1
+
+    def advance(self) -> None:
+        """Number the next message."""
+        now_ms = self._clock.now_us() // 1000
+        if self.epoch > now_ms + EPOCH_AHEAD_MS:
+            self.epoch, self.seq = now_ms, -1
+        self.seq += 1
 
 
 class Publisher(Generic[T]):
@@ -68,7 +79,7 @@ class Publisher(Generic[T]):
         self._numbering.new_epoch()
 
     def _stamp(self, message: T) -> T:
-        self._numbering.seq += 1
+        self._numbering.advance()
         return msgspec.structs.replace(
             message,
             seq=self._numbering.seq,

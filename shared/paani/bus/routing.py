@@ -17,6 +17,7 @@ from paani.sides import ROUTER, Side
 
 # An attempt to connect that takes longer is begun again: TCP itself waits ever longer, 7 s after a cut of 10 s.
 LINK_OPEN_MS = 2000
+ACCEPT_MS, MAX_PENDING = 1000, 1000
 
 
 def router_config(config: BusConfig) -> zenoh.Config:
@@ -31,6 +32,9 @@ def router_config(config: BusConfig) -> zenoh.Config:
             "transport/auth/usrpwd/password": password_of(config, user),
             "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
             "access_control": access_control(config),
+            # Strangers that connect and say nothing are dropped soon, and do not keep others waiting meanwhile.
+            "transport/unicast/accept_timeout": ACCEPT_MS,
+            "transport/unicast/accept_pending": MAX_PENDING,
             **_link_settings(config),
             **shared_settings(config),
         }

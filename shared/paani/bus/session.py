@@ -14,6 +14,7 @@ from paani.config import BusConfig
 LOG = logging.getLogger(__name__)
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 REACH_S = 1.0
+MAX_BYTES = 32 << 20  # of anything that a peer sends, twice the largest picture; Zenoh alone would take a gigabyte
 
 
 def client_config(config: BusConfig, user: str) -> zenoh.Config:
@@ -42,6 +43,7 @@ def shared_settings(config: BusConfig) -> dict[str, object]:
         # pairs; with 16, its most, under 0.4 %.
         "transport/link/tx/queue/size/real_time": 16,
         "transport/shared_memory/enabled": False,
+        "transport/link/rx/max_message_size": MAX_BYTES,
     }
 
 

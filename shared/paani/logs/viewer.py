@@ -66,7 +66,7 @@ class Viewer:
         decoder, view = self._views[topic]
         try:
             message = decoder.decode(data)
-        except (msgspec.MsgspecError, UnicodeDecodeError):
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
             return []
         return view(message)
 

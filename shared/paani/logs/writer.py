@@ -158,7 +158,7 @@ def read_head(data: bytes) -> Head | None:
     """The header of a message, or None where it cannot be read."""
     try:
         return _HEAD.decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
 
 

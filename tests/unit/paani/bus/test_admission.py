@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from paani import keys
 from paani import messages as m
-from paani.bus.admission import Admission
+from paani.bus.admission import MAX_MESSAGE_BYTES, Admission
+from paani.bus.publish import Numbering
+from paani.clock import ManualClock
 
 NOW_US = 1_000_000_000
 
@@ -48,6 +50,10 @@ def raw(message: m.Message, **changes: object) -> bytes:
         (raw(thrust(), producer="advisor"), "wrong_producer"),
         (raw(thrust(), source_us=NOW_US + 2_000_000), "future"),
         (raw(thrust(), sent_us=NOW_US + 2_000_000), "future"),
+        (raw(thrust(), epoch=2**53), "future"),
+        (raw(thrust(), epoch=NOW_US // 1000 + 2000), "future"),
+        (b'{"unknown": ' + 1500 * b"[" + 1500 * b"]" + b"}", "undecodable"),
+        (raw(thrust(), unknown="x" * MAX_MESSAGE_BYTES), "oversized"),
     ],
 )
 def test_each_fault_has_its_cause(data: bytes, cause: str) -> None:
@@ -64,6 +70,41 @@ def test_duplicates_replays_and_older_epochs_never_come_back() -> None:
     assert judge(raw(thrust(seq=6)), NOW_US)[1] == ""
     assert judge(raw(thrust(seq=0, epoch=8)), NOW_US)[1] == ""
     assert judge(raw(thrust(seq=99, epoch=7)), NOW_US)[1] == "old_epoch"
+
+
+def test_no_epoch_of_the_future_silences_its_producer() -> None:
+    judge = admission().judge
+    assert judge(raw(thrust(epoch=2**53)), NOW_US)[1] == "future"
+    assert judge(raw(thrust()), NOW_US)[1] == ""
+
+
+def test_no_frame_epoch_of_the_future_is_taken() -> None:
+    header = m.PictureHeader(
+        source_us=NOW_US, frame_seq=0, frame_epoch=2**53, width_px=1, height_px=1, epoch=7, producer="camera"
+    )
+    judge = Admission(keys.PICTURE, domain=43, max_future_s=1.0).judge
+    assert judge(msgspec.json.encode(header), NOW_US)[1] == "future"
+    assert judge(msgspec.json.encode(msgspec.structs.replace(header, frame_epoch=7)), NOW_US)[1] == ""
+
+
+@given(st.integers(2, 10**4), st.integers(0, 30), st.booleans())
+def test_a_clock_that_is_set_back_silences_nobody(back_s: int, said: int, is_restarted: bool) -> None:
+    """What is said after it is heard, of a producer that goes on and of one that was started again."""
+    clock = ManualClock(10**12)
+    judge, numbering = admission().judge, Numbering(clock)
+    for _ in range(said):
+        numbering.advance()
+        now_us = clock.now_us()
+        heard = thrust(seq=numbering.seq, epoch=numbering.epoch, source_us=now_us, sent_us=now_us)
+        assert judge(raw(heard), now_us)[1] == ""
+    clock.advance(-back_s)
+    if is_restarted:
+        numbering = Numbering(clock)
+    for _ in range(3):
+        numbering.advance()
+        now_us = clock.now_us()
+        heard = thrust(seq=numbering.seq, epoch=numbering.epoch, source_us=now_us, sent_us=now_us)
+        assert judge(raw(heard), now_us)[1] == ""
 
 
 @given(st.binary(max_size=200))

@@ -14,7 +14,8 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config, decode_config
 from paani.logs.reader import open_log
-from paani.logs.writer import LogWriter
+from paani.logs.viewer import Viewer
+from paani.logs.writer import LogWriter, read_head
 from tests.unit.paani.logs.small_logs import JPEG, NAME, START_US, about, begin, finished, odometry, put
 
 
@@ -103,3 +104,9 @@ def test_an_existing_file_is_never_written_over(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         LogWriter(tmp_path / NAME, about(), keys.every_topic(), START_US)
     assert not open_log(path).problems
+
+
+def test_nesting_without_end_is_unreadable() -> None:
+    nested = b'{"unknown": ' + 2000 * b"[" + 2000 * b"]" + b"}"
+    assert read_head(nested) is None
+    assert Viewer().derive(keys.ODOMETRY.name, nested) == []

@@ -34,7 +34,6 @@ FORMS = {
     "16-bit": cv2.imencode(".png", RIVER.astype(np.uint16) * 257)[1].tobytes(),
     "CMYK": saved(RGB.convert("CMYK"), "JPEG", quality=95),
     "progressive": saved(RGB, "JPEG", quality=95, progressive=True),
-    "animated": saved(RGB, "GIF", save_all=True, append_images=[Image.new("RGB", RGB.size)]),
     "one pixel": saved(Image.new("RGB", (1, 1)), "PNG"),
 }
 
@@ -69,6 +68,29 @@ def test_a_picture_too_large_to_unpack_is_none() -> None:
     at = jpeg.index(b"\xff\xc0")
     jpeg[at + 5 : at + 9] = struct.pack(">HH", 60_000, 60_000)
     assert decode_picture(bytes(jpeg)) is None
+
+
+def filled(width: int, height: int, fill: int) -> bytes:
+    """A JPEG that states this size after fill bytes."""
+    jpeg = cv2.imencode(".jpg", RIVER)[1].tobytes()
+    at = jpeg.index(b"\xff\xc0")
+    return jpeg[:at] + b"\xff" * fill + jpeg[at : at + 5] + struct.pack(">HH", height, width) + jpeg[at + 9 :]
+
+
+def test_fill_bytes_hide_no_size() -> None:
+    assert stated_pixel_count(filled(60_000, 60_000, 7)) == 3_600_000_000
+    assert decode_picture(filled(60_000, 60_000, 7)) is None
+    found = decode_picture(filled(RIVER.shape[1], RIVER.shape[0], 7))
+    assert found is not None
+    assert found.shape == RIVER.shape
+
+
+OTHERS = {form: saved(RGB, form) for form in ("GIF", "BMP", "TIFF", "WEBP", "PPM")}
+
+
+@pytest.mark.parametrize("form", OTHERS)
+def test_other_formats_are_no_pictures_of_a_camera(form: str) -> None:
+    assert decode_picture(OTHERS[form]) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"GIF89a", b"text" * 100])
