@@ -137,13 +137,9 @@ class Player:
         to_us = log.end_us if math.isinf(what.to_s) else min(log.end_us, log.start_us + round(what.to_s * 1e6))
         span_us = max(0, to_us - from_us)
         begin_us = self._clock.now_us() + AHEAD_US
-        epoch_ms = (begin_us - log.start_us) // 1000
         passes = 0
         while passes == 0 or what.loop:
-            shift = TimeShift(
-                from_us, begin_us, what.speed, epoch_ms + passes * (log.end_us - log.start_us) // 1000 + passes
-            )
-            await self._pass(shift, from_us, to_us)
+            await self._pass(TimeShift(from_us, begin_us, what.speed), from_us, to_us)
             passes += 1
             begin_us = max(begin_us + round(span_us / what.speed), self._clock.now_us())
         late = sorted(self._late_ms) or [0.0]

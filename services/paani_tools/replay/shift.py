@@ -2,7 +2,7 @@
 
 Every Unix stamp (`..._us`) in a message moves by one map of time, so at normal speed ages, echoes and references stay
 what they were; at another speed they scale as all time does. What is no Unix time stays: simulated time, a recording's
-own time, the plant's own clock. Epochs (Unix milliseconds) all move by one offset, so their order stays.
+own time, the plant's own clock. Epochs (Unix milliseconds) move as stamps do, so none lies in the future.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ EPOCH = re.compile(rb'(epoch\\*":)(\d{13})(?!\d)')
 
 
 class TimeShift(msgspec.Struct, frozen=True):
-    """Recorded time `from_us` is replayed at `to_us`, `speed` times as fast. Epochs grow by `epoch_ms`."""
+    """Recorded time `from_us` is replayed at `to_us`, `speed` times as fast."""
 
     from_us: int
     to_us: int
     speed: float
-    epoch_ms: int
 
     def shift_us(self, stamp_us: int) -> int:
         """The replayed time of a recorded one."""
@@ -34,4 +33,4 @@ class TimeShift(msgspec.Struct, frozen=True):
     def shift_message(self, data: bytes) -> bytes:
         """A message in JSON, moved."""
         data = STAMP.sub(lambda found: found[1] + b"%d" % max(0, self.shift_us(int(found[2]))), data)
-        return EPOCH.sub(lambda found: found[1] + b"%d" % (int(found[2]) + self.epoch_ms), data)
+        return EPOCH.sub(lambda found: found[1] + b"%d" % max(0, self.shift_us(int(found[2]) * 1000) // 1000), data)

@@ -88,11 +88,11 @@ def test_no_frame_epoch_of_the_future_is_taken() -> None:
 
 
 @given(st.integers(2, 10**4), st.integers(0, 30), st.booleans())
-def test_a_clock_that_is_set_back_silences_nobody(back_s: int, said: int, is_restarted: bool) -> None:
+def test_a_clock_that_is_set_back_silences_nobody(back_s: int, messages: int, is_restarted: bool) -> None:
     """What is said after it is heard, of a producer that goes on and of one that was started again."""
     clock = ManualClock(10**12)
     judge, numbering = admission().judge, Numbering(clock)
-    for _ in range(said):
+    for _ in range(messages):
         numbering.advance()
         now_us = clock.now_us()
         heard = thrust(seq=numbering.seq, epoch=numbering.epoch, source_us=now_us, sent_us=now_us)
