@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import re
+import resource
 import socket
 import sys
 from collections.abc import AsyncIterator
@@ -14,6 +16,7 @@ import pytest
 
 from paani import keys
 from paani.config import Config
+from paani_services.dashboard.server import GIVEN_AWAY, MAX_CLIENTS
 from tests.browser.conftest import Boat
 from tests.conftest import OpenAs, Spawn
 
@@ -117,6 +120,39 @@ async def test_a_client_that_never_reads_delays_nobody(
                         while True:
                             frames += b"camera/picture" in (await watching.receive_bytes())[:32]
                 assert frames >= 10
+
+
+async def test_idle_connections_leave_room_for_a_stop(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    """With as many descriptors as a process usually has, and more strangers than these."""
+    async with spawn("dashboard") as process, contextlib.AsyncExitStack() as strangers:
+        resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (1024, 1024))
+        for _ in range(1100):
+            strangers.enter_context(socket.create_connection(("127.0.0.1", config.dashboard.port), timeout=5.0))
+        async with asyncio.timeout(5.0):
+            async with client.post("/api/stop") as response:
+                assert (await response.json())["stopped"]
+            while boat.arming.value is None or not boat.arming.value.stopped:
+                await boat.arming.next()
+        assert len(await asyncio.to_thread(os.listdir, f"/proc/{process.pid}/fd")) < 512
+
+
+async def test_one_page_too_many_takes_the_place_of_the_oldest(
+    client: aiohttp.ClientSession, spawn: Spawn, config: Config
+) -> None:
+    origin = f"http://127.0.0.1:{config.dashboard.port}"
+    async with spawn("dashboard"), contextlib.AsyncExitStack() as stack:
+        pages = [
+            await stack.enter_async_context(client.ws_connect("/ws", origin=origin)) for _ in range(MAX_CLIENTS + 1)
+        ]
+        for page in pages[1:]:
+            assert (await page.receive(timeout=5.0)).type is aiohttp.WSMsgType.BINARY
+        async with asyncio.timeout(5.0):
+            while (message := await pages[0].receive()).type is aiohttp.WSMsgType.BINARY:
+                pass
+        assert message.data == GIVEN_AWAY
+        assert not pages[-1].closed
 
 
 async def test_a_foreign_page_cannot_open_the_socket(client: aiohttp.ClientSession, spawn: Spawn) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hmac
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 
 import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -16,6 +17,7 @@ from paani.bus import Picture
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
 from paani.errors import UserError
+from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.console import Console
 from paani_services.dashboard.hub import Client, Event, Hub
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
@@ -32,7 +34,8 @@ from paani_services.dashboard.requests import (
 from paani_services.dashboard.status import board_status
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
-MAX_CLIENTS = 16
+MAX_CLIENTS = 16  # pages at once: one more takes the place of the page that has been connected longest
+GIVEN_AWAY = 4001  # close code of a page whose place was taken, from the range for private use (RFC 6455, 7.4.2)
 MAX_BODY_BYTES = 4096
 SEND_TIMEOUT_S = 15.0
 HEARTBEAT_S = 5.0
@@ -59,6 +62,8 @@ class Server:
         self._hub, self._console, self._tuner = hub, console, tuner
         self._clock, self._profile, self._config = clock, config.profile, config.dashboard
         self._pages, self._token = pages, token
+        self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
+        self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 
     def app(self) -> web.Application:
         app = web.Application(middlewares=[self._guard], client_max_size=MAX_BODY_BYTES)
@@ -84,6 +89,13 @@ class Server:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse foreign hosts, answer errors in JSON, and add the security headers to every response."""
+        self.busy.add(request.protocol)
+        try:
+            return await self._guarded(request, handler)
+        finally:
+            self.busy.discard(request.protocol)
+
+    async def _guarded(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
             if request.path != STOP_PATH and not is_own_host(request.host, self._config.host):
                 response: web.StreamResponse = error_response(403, "Host: not a name of this server", "Host")
@@ -191,14 +203,14 @@ class Server:
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):
             return error_response(403, "Origin: only this server's own page may watch", "Origin")
-        if len(self._hub.clients) >= MAX_CLIENTS:
-            return error_response(
-                503, f"{MAX_CLIENTS} pages are connected already; close one and load this again", "clients"
-            )
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, compress=False, max_msg_size=1024)
         socket.headers.update(SECURITY_HEADERS)
         await socket.prepare(request)
         client = self._hub.add_client(self._clock.now_us())
+        self._sockets[client] = socket
+        closing = [
+            asyncio.create_task(each.close(code=GIVEN_AWAY)) for each in list(self._sockets.values())[:-MAX_CLIENTS]
+        ]
         sender = asyncio.create_task(send_all(socket, client))
         try:
             async for message in socket:
@@ -206,7 +218,9 @@ class Server:
                     await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"this socket accepts no messages")
         finally:
             self._hub.remove_client(client)
-            sender.cancel()
+            del self._sockets[client]
+            for task in (sender, *closing):
+                task.cancel()
         return socket
 
 
@@ -223,17 +237,24 @@ async def send_all(socket: web.WebSocketResponse, client: Client) -> None:
         await socket.close(code=WSCloseCode.TRY_AGAIN_LATER)
 
 
-async def start_server(app: web.Application, config: DashboardConfig) -> web.AppRunner:
+@contextlib.asynccontextmanager
+async def serving(server: Server, config: DashboardConfig) -> AsyncIterator[None]:
     """Listen on the configured host only. Raises UserError naming `dashboard.port` or `dashboard.host`."""
-    runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
+    runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
+    assert runner.server is not None
+    protocols = BoundedConnections(runner.server, server.busy)
     try:
-        await web.TCPSite(runner, config.host, config.port).start()
+        listener = await asyncio.get_running_loop().create_server(protocols, config.host, config.port)
     except OSError as error:
         await runner.cleanup()
         field = "dashboard.host" if isinstance(error.errno, int) and error.errno < 0 else "dashboard.port"
         raise UserError(f"{field} {config.host}:{config.port}: {error.strerror}") from error
-    return runner
+    try:
+        yield
+    finally:
+        listener.close()
+        await runner.cleanup()
 
 
 def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:

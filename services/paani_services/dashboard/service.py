@@ -18,7 +18,7 @@ from paani_services.dashboard.console import Console
 from paani_services.dashboard.hub import Event, Hub
 from paani_services.dashboard.page_state import ServiceLiveness, page_operator, page_settings
 from paani_services.dashboard.pages import load_static_files
-from paani_services.dashboard.server import Server, start_server
+from paani_services.dashboard.server import Server, serving
 from paani_services.dashboard.tuning import Tuner
 
 STATE_PERIOD_S = 0.1  # people read numbers no faster
@@ -66,11 +66,8 @@ async def web_server(hub: Hub, console: Console, tuner: Tuner, clock: Clock, con
     token = secrets.token_urlsafe(24)
     pages = await asyncio.to_thread(load_static_files, token)
     server = Server(hub, console, tuner, clock, config, pages, token)
-    runner = await start_server(server.app(), config.dashboard)
-    try:
+    async with serving(server, config.dashboard):
         yield
-    finally:
-        await runner.cleanup()
 
 
 def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:

@@ -1,9 +1,10 @@
 // @ts-check
-// One WebSocket that reconnects by itself.
+// One WebSocket that reconnects by itself; one whose place was given to another page, at the next click.
 
 import { decodeFrame } from "./frames.js";
 
 const BACKOFF_MS = [250, 500, 1000, 2000];
+const GIVEN_AWAY = 4001; // as in server.py
 const SILENCE_TIMEOUT_MS = 3000; // the server sends at least five frames a second
 
 /**
@@ -29,9 +30,13 @@ export function connect(onFrame, onOpen) {
       const { key, header, body } = decodeFrame(event.data);
       onFrame(key, header, body);
     };
-    socket.onclose = () => {
+    socket.onclose = (event) => {
       clearInterval(watchdog);
       onOpen(false);
+      if (event.code === GIVEN_AWAY) {
+        window.addEventListener("pointerdown", open, { once: true });
+        return;
+      }
       setTimeout(open, BACKOFF_MS[Math.min(attempt++, BACKOFF_MS.length - 1)]);
     };
   };

@@ -1,0 +1,33 @@
+"""Bounds the connections of the web server, so that a STOP always finds one free.
+
+An idle connection costs a descriptor, and a process that has none left accepts nobody. Beyond the bound, whoever comes
+takes the place of the connection that has been idle longest: one without a request, or in the middle of a slow one's
+headers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from typing import Any
+
+from aiohttp import web
+from aiohttp.web_protocol import RequestHandler
+
+MAX_CONNECTIONS = 128  # pages keep six each at most; far below the 1,024 descriptors that a process usually has
+
+
+class BoundedConnections:
+    """Makes the protocol of each new connection: for `loop.create_server`."""
+
+    def __init__(self, server: web.Server[Any], busy: Container[object]) -> None:
+        """busy: protocols of the connections whose request is being answered; these keep their places."""
+        self._server, self._busy = server, busy
+
+    def __call__(self) -> RequestHandler[Any]:
+        """The protocol of a connection that has just been accepted."""
+        transports = [(each, each.transport) for each in self._server.connections]
+        open_ones = [(each, found) for each, found in transports if found is not None and not found.is_closing()]
+        idle = [transport for each, transport in open_ones if each not in self._busy]
+        for transport in idle[: max(0, len(open_ones) + 1 - MAX_CONNECTIONS)]:
+            transport.abort()
+        return self._server()
