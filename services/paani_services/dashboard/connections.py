@@ -8,7 +8,6 @@ headers.
 from __future__ import annotations
 
 from collections.abc import Container
-from typing import Any
 
 from aiohttp import web
 from aiohttp.web_protocol import RequestHandler
@@ -19,11 +18,11 @@ MAX_CONNECTIONS = 128  # pages keep six each at most; far below the 1,024 descri
 class BoundedConnections:
     """Makes the protocol of each new connection: for `loop.create_server`."""
 
-    def __init__(self, server: web.Server[Any], busy: Container[object]) -> None:
+    def __init__(self, server: web.Server, busy: Container[object]) -> None:
         """busy: protocols of the connections whose request is being answered; these keep their places."""
         self._server, self._busy = server, busy
 
-    def __call__(self) -> RequestHandler[Any]:
+    def __call__(self) -> RequestHandler:
         """The protocol of a connection that has just been accepted."""
         transports = [(each, each.transport) for each in self._server.connections]
         open_ones = [(each, found) for each, found in transports if found is not None and not found.is_closing()]
