@@ -36,9 +36,16 @@ def runtime_dir(config: BusConfig) -> Path:
 
 
 def write_private(path: Path, text: str) -> None:
-    """Write a file only its owner can read: beside it first, then renamed."""
+    """Write a file only its owner can read: beside it first, then renamed; on disk when this returns."""
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     beside.unlink(missing_ok=True)
     with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as stream:
         stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
     beside.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import aiohttp
 import pytest
 
 from paani import keys
@@ -21,6 +23,7 @@ from paani.authority import OBSERVER
 from paani.bus import Bus, open_bus
 from paani.clock import WallClock, stopwatch_ms
 from paani.config import BusConfig, Config, load_config
+from paani_services.dashboard.server import TOKEN_HEADER
 from tests.conftest import find_free_port
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(90)]
@@ -29,6 +32,7 @@ ZERO_S = 0.5
 BACK_S = 5.0
 FROZEN_S = 1.5
 READY_S = 90.0
+STAYS_STOPPED_S = 1.5
 SERVICES = (*keys.VITAL_SERVICES, "router", "plant")
 CLOCK = WallClock()
 
@@ -36,17 +40,22 @@ CLOCK = WallClock()
 class Loop(NamedTuple):
     supervisor: subprocess.Popen[str]
     bus: BusConfig
+    page: str = ""
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
     """`paani up` on the river, one for all tests of this file."""
     folder = tmp_path_factory.mktemp("up")
-    sets = (f"bus.router=tcp/127.0.0.1:{find_free_port()}", f"bus.runtime_dir={folder / 'runtime'}")
+    sets = (
+        f"bus.router=tcp/127.0.0.1:{find_free_port()}",
+        f"bus.runtime_dir={folder / 'runtime'}",
+        f"dashboard.port={find_free_port()}",
+    )
     words = [word for setting in sets for word in ("--set", setting)]
     with (folder / "out").open("w+") as output:
         supervisor = subprocess.Popen(
-            [sys.executable, "-m", "paani", "up", "--headless", "--world", "river", *words],
+            [sys.executable, "-m", "paani", "up", "--world", "river", *words],
             stdout=output, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         try:
@@ -55,7 +64,8 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
                 assert supervisor.poll() is None, found
                 assert stopwatch_ms() < deadline_ms, found
                 threading.Event().wait(0.1)
-            yield Loop(supervisor, load_config(sets=sets).bus)
+            config = load_config(sets=sets)
+            yield Loop(supervisor, config.bus, f"http://127.0.0.1:{config.dashboard.port}")
             assert supervisor.poll() is None, "the supervisor itself ended"
         finally:
             supervisor.terminate()
@@ -104,6 +114,23 @@ async def until(condition: Callable[[], bool], limit_s: float, what: str) -> Non
         pytest.fail(f"not within {limit_s} s: {what}")
 
 
+async def arm_by_hand(loop: Loop, watch: Watch) -> int:
+    """When the operator armed on the page [us]; until then nothing may move, though every process is alive."""
+    await until(lambda: watch.applied[-1].zero_cause is m.ZeroCause.NOT_ARMED, 5.0, "the operator heard again")
+    back_us = CLOCK.now_us()
+    await asyncio.sleep(STAYS_STOPPED_S)
+    assert watch.applied[-1].zero_cause is m.ZeroCause.NOT_ARMED
+    assert not watch.moves_after(back_us), "armed again by itself"
+    async with aiohttp.ClientSession(loop.page) as client:
+        async with client.get("/") as page:
+            token = re.search(r'paani-arm-token" content="([^"]+)"', await page.text())
+        assert token is not None
+        headers = {"Origin": loop.page, TOKEN_HEADER: token[1]}
+        async with client.post("/api/arm", json={"held_ms": 1500}, headers=headers) as answer:
+            assert answer.status == 200
+    return CLOCK.now_us()
+
+
 def pid_of(loop: Loop, service: str) -> int:
     """The process of that name whose parent is the supervisor."""
     for folder in Path("/proc").glob("[0-9]*"):
@@ -139,7 +166,7 @@ def stopped_after_s(service: str, applied: list[m.ThrustApplied], hit_us: int, b
 @pytest.mark.parametrize("service", SERVICES)
 @pytest.mark.parametrize("hit", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
 async def test_the_boat_stops_and_the_loop_comes_back(loop: Loop, service: str, hit: signal.Signals) -> None:
-    """O2: without fresh orders from a living chain there is no thrust."""
+    """O2: without fresh orders from a living chain there is no thrust. Nothing but a hand arms again."""
     async with watching(loop) as watch:
         await until(lambda: settled(watch), 40.0, "everything alive and thrust applied")
         pid = pid_of(loop, service)
@@ -153,6 +180,8 @@ async def test_the_boat_stops_and_the_loop_comes_back(loop: Loop, service: str, 
             await until(lambda: watch.alive_us[service] > hit_us and not watch.alive[service], 5.0, "seen to be gone")
             await until(lambda: watch.alive[service], 30.0, f"{service} started again")
             back_us = watch.alive_us[service]
+        if (service, hit) == ("dashboard", signal.SIGKILL):
+            back_us = await arm_by_hand(loop, watch)
         await until(lambda: watch.moves_after(back_us), BACK_S, f"thrust after {service} came back")
         stopped_s = stopped_after_s(service, watch.applied, hit_us, back_us)
         moved_us = next(r.source_us for r in watch.applied if moves(r) and r.source_us > back_us)

@@ -11,9 +11,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from paani.bus import Bus
 from paani.clock import MonotonicClock
-from paani.config import encode_config
+from paani.config import Config, encode_config
 from paani.errors import UserError
 from paani_tools.up.backoff import Backoff
 from paani_tools.up.log_files import keep_bounded, open_log
@@ -70,11 +72,7 @@ class Supervisor:
         self._say = say
         self._clock = MonotonicClock()
         self._silence = Silence(self._clock.now_us())
-        self._environment = {
-            **os.environ,
-            **CHILD_ENVIRONMENT,
-            "PAANI_CONFIG_JSON": encode_config(plan.config).decode(),
-        }
+        self._config = plan.config
         self.units = {name: ServiceProcess(name, logs / f"{name}.log") for name in plan.services}
         self._changed = asyncio.Event()
         self._stopping = False
@@ -172,7 +170,7 @@ class Supervisor:
             str(os.getpid()),
             str(NICE.get(unit.name, 0)),
             unit.name,
-            env=self._environment,
+            env=environment(self._config, is_restart=unit.restarts > 0),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -188,6 +186,13 @@ class Supervisor:
         unit.alive = alive
         unit.ever_alive |= alive
         self._changed.set()
+
+
+def environment(config: Config, *, is_restart: bool) -> dict[str, str]:
+    """What a process is started with. One that is started again arms no boat, whatever the first one was to do."""
+    if is_restart:
+        config = replace(config, dashboard=replace(config.dashboard, arm_at_start=False))
+    return {**os.environ, **CHILD_ENVIRONMENT, "PAANI_CONFIG_JSON": encode_config(config).decode()}
 
 
 async def _await_ends(units: list[ServiceProcess], limit_s: float) -> None:

@@ -48,7 +48,7 @@ class DashboardConfig(Section, frozen=True):
     host: str = "127.0.0.1"  # this machine alone: the page asks for no password
     port: Port = 8043  # ends in the paper's domain
     serve: bool = True  # whether there is a page; the operator's process runs without it too
-    arm_at_start: bool = False  # a boat waits for its operator; `paani up`, whose boat is simulated, arms it
+    arm_at_start: bool = False  # `paani up` arms a simulated boat so, once: never again after a restart
     picture_rate_hz: Positive = 10.0  # at most so many pictures are sent to a page
 
 
