@@ -6,6 +6,10 @@ PYTHON ?= python3
 VENV   ?= .venv
 EXTRAS ?= host,dev
 comma  := ,
+LOCKED := base host dev
+# Names no index, and takes one version for all Pythons: what was tested on the host is what the board runs.
+COMPILE = $(VENV)/release/bin/uv pip compile -q --universal --fork-strategy fewest --python-version 3.11 --generate-hashes \
+	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
 PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
@@ -15,7 +19,7 @@ DEBIAN_FIRMWARE := gcc-arm-none-eabi qemu-system-arm g++ cppcheck
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-.PHONY: run test test-long check lint docs firmware setup setup-test system system-test system-firmware lock clean
+.PHONY: run test test-long check lint docs firmware setup setup-test system system-test system-firmware lock dist sbom clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
@@ -38,7 +42,7 @@ lint:
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(VENV)/.stamp-host-docs ## build the documentation into runs/docs, strictly: a broken link fails
+docs: $(VENV)/.stamp-host-dev ## build the documentation into runs/docs, strictly: a broken link fails
 	$(BIN)/python -m docs.build runs/docs
 
 firmware: system-firmware ## build the microcontroller's image for the emulator into runs/mcu/qemu; prints its bytes
@@ -53,9 +57,17 @@ $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "paani needs Python >= 3.11 (PYTHON=...)"; exit 2; }
 	@$(PYTHON) -m venv $(VENV) || { rm -f $@; echo "cannot make $(VENV): install python3-venv"; exit 2; }
 
-$(VENV)/.stamp-%: pyproject.toml requirements.lock | $(VENV)/bin/python
-	$(BIN)/python -m pip install -q -c requirements.lock -e ".[$(subst -,$(comma),$*)]"
+# Extras that have a lock file are installed by its hashes, the others (train: PyTorch, as a build for this machine) by name.
+$(VENV)/.stamp-%: pyproject.toml $(wildcard requirements/*.lock) | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q --require-hashes -r requirements/build.lock $(patsubst %,-r requirements/%.lock,$(filter $(LOCKED),$(subst -, ,$*)))
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	$(foreach extra,$(filter-out $(LOCKED),$(subst -, ,$*)),$(BIN)/python -m pip install -q --no-build-isolation -e ".[$(extra)]" &&) true
 	@mkdir -p runs
+	@touch $@
+
+$(VENV)/release/.stamp: requirements/release.lock | $(VENV)/bin/python
+	@$(BIN)/python -m venv $(@D)
+	$(@D)/bin/python -m pip install -q --require-hashes -r $<
 	@touch $@
 
 system:
@@ -67,8 +79,20 @@ system-test:
 system-firmware:
 	@sh deploy/system-packages.sh $(DEBIAN_FIRMWARE)
 
-lock: ## pin what the next installation takes
-	$(BIN)/uv pip compile -q --python-version 3.11 --extra host --extra dev --no-header --no-annotate --no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock
+lock: $(VENV)/release/.stamp ## pin what the next installation takes, with hashes of its files for every machine
+	$(COMPILE) pyproject.toml --extra dev -o requirements/dev.lock
+	$(COMPILE) pyproject.toml --extra host -c requirements/dev.lock -o requirements/host.lock
+	$(COMPILE) pyproject.toml -c requirements/dev.lock -o requirements/base.lock
+	$(COMPILE) --group build -c requirements/dev.lock -o requirements/build.lock
+	$(COMPILE) --group release -o requirements/release.lock
+
+dist: setup sbom ## wheel, sdist and bill of materials into dist/, the same bytes for the same commit
+	$(BIN)/python -m hatchling build -d dist
+
+sbom: $(VENV)/release/.stamp ## what the host installs, as CycloneDX JSON, into dist/
+	@mkdir -p dist
+	$(VENV)/release/bin/cyclonedx-py requirements --pyproject pyproject.toml --mc-type application --output-reproducible \
+		--of JSON -o dist/paani.cdx.json requirements/host.lock
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import entry_points
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 from unittest import mock
 
 from docs.reference.markdown import prose
+from paani_tools.completion.parsers import find_parser
 
 WIDTH = "100"
 GROUPS = {"paani.commands": "", "paani.bench_commands": "bench "}
@@ -30,19 +31,11 @@ class Command(NamedTuple):
     help: str
 
 
-class _ParserFoundError(Exception):
-    """Carries a command's parser out of the command."""
-
-    def __init__(self, parser: argparse.ArgumentParser) -> None:
-        super().__init__(parser.prog)
-        self.parser = parser
-
-
 def commands() -> Iterator[Command]:
     """Every installed command with its sub-commands, by name."""
     for group, prefix in GROUPS.items():
         for point in sorted(entry_points(group=group), key=lambda point: point.name):
-            yield from _with_sub_commands(f"paani {prefix}{point.name}", _parser_of(point.load()))
+            yield from _with_sub_commands(f"paani {prefix}{point.name}", find_parser(point.load()))
 
 
 def commands_page() -> str:
@@ -52,20 +45,6 @@ def commands_page() -> str:
         level = "##" if command.name.count(" ") == 1 else "###"
         parts.append(f"{level} {command.name}\n\n```text\n{command.help.strip()}\n```\n\n")
     return "".join(parts)
-
-
-def _parser_of(main: Callable[[list[str]], int]) -> argparse.ArgumentParser:
-    """The parser that a command makes, caught when it is about to read its arguments."""
-
-    def caught(parser: argparse.ArgumentParser, *_: object, **__: object) -> NoReturn:
-        raise _ParserFoundError(parser)
-
-    with mock.patch.object(argparse.ArgumentParser, "parse_args", caught):
-        try:
-            main([])
-        except _ParserFoundError as found:
-            return found.parser
-    raise ValueError(f"{main.__module__}: reads its arguments without a parser")
 
 
 def _with_sub_commands(name: str, parser: argparse.ArgumentParser) -> Iterator[Command]:

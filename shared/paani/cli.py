@@ -12,6 +12,7 @@ from paani.config import PROFILES, Config, decode_config, load_config
 from paani.errors import UserError
 from paani.extras import missing_module
 from paani.process import run_service, services
+from paani.version import version_text
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -21,6 +22,9 @@ def main(argv: list[str] | None = None) -> int:
     names = services()
     if not arguments or arguments[0] in {"-h", "--help"}:
         sys.stdout.write(usage(sorted(commands), sorted(names)))
+        return 0
+    if arguments[0] == "--version":
+        sys.stdout.write(f"{version_text()}\n")
         return 0
     name, rest = arguments[0], arguments[1:]
     try:
@@ -57,7 +61,7 @@ def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
 def usage(commands: list[str], names: list[str]) -> str:
     """The help text."""
     return (
-        "usage: paani COMMAND [options]     paani run SERVICE [options]\n\n"
+        "usage: paani COMMAND [options]     paani run SERVICE [options]     paani --version\n\n"
         f"commands: {', '.join(commands)}\n"
         f"services: {', '.join(names)}\n\n"
         "`paani up` starts everything; `paani COMMAND --help` says more. A service whose name is no command's is also\n"

@@ -16,6 +16,9 @@ EXTRA_OF = {
     "torch": "train",
     "onnx": "train",
     "ncnn": "ncnn",
+    "shtab": "completion",
+    "dask": "cluster",
+    "distributed": "cluster",
 }  # module -> extra
 
 

@@ -5,7 +5,7 @@ set -eu
 root=$(mkdir -p "$1" && cd "$1" && pwd)
 here=$(cd "$(dirname "$0")" && pwd)
 python=${PYTHON:-$here/../../.venv/bin/python}
-pins=$here/../../requirements.lock
+pins=$here/../../requirements/base.lock
 [ -x "$root/python" ] && exit 0
 
 mkdir -p "$root/debs" "$root/host" "$root/arm64" "$root/apt/lists/partial" "$root/apt/cache/archives/partial" "$root/wheels"
@@ -27,7 +27,8 @@ for deb in *.deb; do
 done
 
 for wheel in numpy onnxruntime flatbuffers protobuf packaging; do
-    pin=$(grep -i "^$wheel==" "$pins" || echo "$wheel")
+    pin=$(sed -n "s/^\($wheel==[^ ]*\).*/\1/p" "$pins")
+    pin=${pin:-$wheel}
     "$python" -m pip download -q --no-deps --only-binary=:all: --python-version 3.11 --implementation cp \
         --platform manylinux_2_28_aarch64 --platform manylinux_2_27_aarch64 --platform manylinux_2_17_aarch64 \
         --platform manylinux2014_aarch64 -d "$root/wheels" "$pin"
