@@ -10,17 +10,21 @@ from paani.config import BusConfig
 from paani.errors import UserError
 
 
+def runtime_path(config: BusConfig) -> Path:
+    """Where the folder is to be: `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder."""
+    chosen = config.runtime_dir or os.environ.get("PAANI_RUNTIME_DIR", "")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_STATE_HOME", "") or Path.home() / ".local" / "state") / "paani"
+
+
 def runtime_dir(config: BusConfig) -> Path:
-    """The folder, for its owner alone. `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder.
+    """The folder at `runtime_path`, made for its owner alone.
 
     Raises UserError for one that cannot be made, that belongs to somebody else, or that is no folder: what lies in it
     opens the bus.
     """
-    chosen = config.runtime_dir or os.environ.get("PAANI_RUNTIME_DIR", "")
-    if not chosen:
-        state = os.environ.get("XDG_STATE_HOME", "") or str(Path.home() / ".local" / "state")
-        chosen = str(Path(state) / "paani")
-    folder = Path(chosen)
+    folder = runtime_path(config)
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:

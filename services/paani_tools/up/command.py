@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from paani.cli import add_config_arguments, config_from
+from paani.errors import UserError
 from paani.keys import Graph
 from paani.option_paths import input_file, output_file, output_folder
 from paani.sides import Side
@@ -17,6 +18,8 @@ from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import Report
 from paani_tools.up.terminal import Display
+
+DOCTOR = "`paani doctor` says what this machine lacks"
 
 
 def main(argv: list[str]) -> int:
@@ -27,7 +30,7 @@ def main(argv: list[str]) -> int:
     if options.summary is not None:
         write_json(options.summary, outcome.report, "--summary")
     if outcome.failure:
-        sys.stderr.write(f"paani: {outcome.failure}\n")
+        sys.stderr.write(f"paani: {outcome.failure} ({DOCTOR})\n")
         return 1
     return 0
 
@@ -90,7 +93,10 @@ async def _up(options: argparse.Namespace) -> Outcome:
         only=options.only,
     )
     plan = await make_plan(config_from(options, sets))
-    return await run_plan(plan, options.seconds, Display(sys.stdout))
+    try:
+        return await run_plan(plan, options.seconds, Display(sys.stdout))
+    except UserError as error:
+        raise UserError(f"{error} ({DOCTOR})") from error
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,0 +1,1 @@
+"""`paani doctor`: what this machine lacks to run a boat."""
