@@ -16,7 +16,7 @@ from tests.mcu_peer import until
 
 CLOCK = WallClock()
 PULSES = 'plant.adapter.require_pulses=["navigator", "localization"]'
-USERS = ("dashboard", "controller", "navigator", "localization", "observer")
+USERS = ("operator", "dashboard", "controller", "navigator", "localization", "observer")
 
 
 class ThrusterBus:
@@ -33,7 +33,7 @@ class ThrusterBus:
 
     async def speak(self) -> None:
         """Operator, controller, who echoes the thrusters' own clock, and every pulse that is waited for: at 10 Hz."""
-        arming = self.buses["dashboard"].publisher(keys.ARMING)
+        arming = self.buses["operator"].publisher(keys.ARMING)
         thrust = self.buses["controller"].publisher(keys.THRUST)
         pulses = [self.buses[name].publisher(keys.pulse(name)) for name in self.config.plant.adapter.require_pulses]
         while True:

@@ -18,7 +18,7 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.link_access import LINK, Rule, allow, link_rules
 from paani.runtime import runtime_dir, write_private
-from paani.sides import ROUTER, Side, pictures_sent, services_on
+from paani.sides import ROUTER, Side, pictures_sent, writers_on
 
 OBSERVER = "observer"
 TRUTH_READERS = ("eye", "dashboard", "recorder", OBSERVER)
@@ -27,7 +27,7 @@ USERS_FILE = ".users"
 
 def users_in(graph: keys.Graph) -> tuple[str, ...]:
     """Who may join the bus of this graph, on either side."""
-    return (*keys.services_in(graph), OBSERVER, LINK)
+    return (*keys.services_in(graph), *keys.command_line_clients_in(graph), OBSERVER, LINK)
 
 
 def credentials_folder(config: BusConfig) -> Path:
@@ -60,7 +60,7 @@ def ensure_credentials(config: BusConfig) -> Path:
 def require_place(config: BusConfig, user: str) -> None:
     """Raises UserError for a process that has no place in the graph."""
     if user in keys.ABSENT[config.graph]:
-        homes = " or ".join(graph.value for graph in keys.Graph if user in keys.services_in(graph))
+        homes = " or ".join(graph.value for graph in keys.Graph if user not in keys.ABSENT[graph])
         raise UserError(f"bus.graph {config.graph}: {user} has no place in it, only in {homes}")
 
 
@@ -82,7 +82,7 @@ def board_router_id(config: BusConfig) -> str:
 def access_control(config: BusConfig) -> dict[str, object]:
     """Zenoh's `access_control` object for this vessel's router on this side."""
     prefix = f"paani/{config.domain}/{config.vessel}"
-    topics, users = keys.topics_in(config.graph), (*services_on(config.side, config.graph), OBSERVER)
+    topics, users = keys.topics_in(config.graph), (*writers_on(config.side, config.graph), OBSERVER)
     rules: list[Rule] = []
     policies: list[dict[str, object]] = []
     subjects: list[dict[str, object]] = [{"id": user, "usernames": [user]} for user in users]
@@ -115,7 +115,10 @@ def access_control(config: BusConfig) -> dict[str, object]:
         if user != OBSERVER:
             written = [f"{prefix}/{name}" for name in written_at(config.side, user, config.graph)]
             mine.append(rule(f"write-{user}", ["put", "delete"], "ingress", written))
-            mine.append(rule(f"alive-{user}", ["liveliness_token"], "ingress", [f"{prefix}/{keys.alive_name(user)}"]))
+            if user not in keys.COMMAND_LINE_CLIENTS:
+                mine.append(
+                    rule(f"alive-{user}", ["liveliness_token"], "ingress", [f"{prefix}/{keys.alive_name(user)}"])
+                )
             offered = [key for key in written if key in pictures]
             if offered:
                 mine.append(rule(f"offer-{user}", ["declare_queryable", "reply"], "ingress", offered))
@@ -146,8 +149,10 @@ def written_at(side: Side, user: str, graph: keys.Graph) -> tuple[str, ...]:
 
 
 def written_by(service: str, graph: keys.Graph) -> tuple[str, ...]:
-    """Names of the topics that this service alone may write in this graph; none where it has no place."""
+    """Names of the topics that this user alone may write in this graph; none where it has no place."""
     if service in keys.ABSENT[graph]:
         return ()
     own = [topic.name for topic in keys.topics_in(graph) if topic.producer == service]
+    if service in keys.COMMAND_LINE_CLIENTS:
+        return tuple(own)
     return (*own, keys.pulse(service).name, keys.health(service).name)

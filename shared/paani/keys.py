@@ -118,8 +118,12 @@ ODOMETRY = Topic(
     stance=Stance.STATE, summary="pose in the map frame, from GPS and IMU",
 )
 ARMING = Topic(
-    name="operator/arming", type=m.Arming, producer="dashboard", rate_hz=5.0, fresh_s=1.0,
+    name="operator/arming", type=m.Arming, producer="operator", rate_hz=5.0, fresh_s=1.0,
     stance=Stance.COMMAND, summary="the operator's arm and latched stop",
+)
+OPERATOR_STATE = Topic(
+    name="operator/state", type=m.OperatorState, producer="operator", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.STATE, summary="armed or stopped, who asked for it, and whether the latch is on disk",
 )
 TUNING = Topic(
     name="operator/tuning", type=m.Tuning, producer="dashboard", rate_hz=1.0, fresh_s=3.0,
@@ -175,11 +179,22 @@ STEPS = {
     for service in DECIDING_SERVICES
 }
 
+# Who may ask the operator's process to stop or to arm: the page, `paani stop`, and `paani up` for a simulated boat.
+STATION = "dashboard"
+COMMAND_LINE_CLIENTS = ("stop", "arm")
+REQUESTS = {
+    client: Topic(
+        name=f"operator/request/{client}", type=m.OperatorRequest, producer=client, rate_hz=10.0, fresh_s=0.6,
+        stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP, or a hold that arms",
+    )
+    for client in (STATION, *COMMAND_LINE_CLIENTS)
+}
+
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
-    LOCAL_ODOMETRY, ODOMETRY, ARMING, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE,
-    BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
-    *STEPS.values(),
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED,
+    THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    *REQUESTS.values(), *STEPS.values(),
 )
 # fmt: on
 
@@ -212,23 +227,31 @@ SERVICES = (
     "localization",
     "thrusters",
     "bridge",
+    "operator",
     "dashboard",
 )
-# Processes that have no place in a graph: no credential there, and no rights.
+# Who has no place in a graph: no credential there, and no rights. Only a simulated boat is armed without a hand.
 ABSENT: Mapping[Graph, frozenset[str]] = {
     Graph.SIMULATION: frozenset({"thrusters", "sensors"}),
-    Graph.HIL: frozenset({"sensors"}),
-    Graph.HULL: frozenset({"plant", "eye"}),
+    Graph.HIL: frozenset({"sensors", "arm"}),
+    Graph.HULL: frozenset({"plant", "eye", "arm"}),
 }
 BOARD_SERVICES = (
     "sensors", "camera", "perception", "advisor", "navigator", "controller", "thrusters", "bridge",
 )  # fmt: skip
-VITAL_SERVICES = ("eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "dashboard")
+VITAL_SERVICES = (
+    "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "operator", "dashboard",
+)  # fmt: skip
 
 
 def services_in(graph: Graph) -> tuple[str, ...]:
     """Processes that have a place in this graph, in the order they start."""
     return tuple(name for name in SERVICES if name not in ABSENT[graph])
+
+
+def command_line_clients_in(graph: Graph) -> tuple[str, ...]:
+    """Commands that may join the bus of this graph to ask the operator's process; they are no services."""
+    return tuple(name for name in COMMAND_LINE_CLIENTS if name not in ABSENT[graph])
 
 
 def topic_in(topic: Topic[T], graph: Graph) -> Topic[T]:

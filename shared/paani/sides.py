@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
 
-from paani.keys import Graph, Stance, Topic, every_topic, services_in
+from paani.keys import Graph, Stance, Topic, command_line_clients_in, every_topic, services_in
 
 ROUTER = "router"
 TRUTH = "@truth/"
@@ -51,10 +51,19 @@ def services_on(side: Side, graph: Graph) -> tuple[str, ...]:
     return tuple(name for name in services if name == ROUTER or (name in ON_BOARD[graph]) is is_board)
 
 
+def writers_on(side: Side, graph: Graph) -> tuple[str, ...]:
+    """Who writes at the router of this side: its processes, and the commands that ask the operator's process.
+
+    STOP may be asked for on either machine; arming only where the operator is.
+    """
+    clients = tuple(name for name in command_line_clients_in(graph) if name == "stop" or side is not Side.BOARD)
+    return (*services_on(side, graph), *clients)
+
+
 def topics_on(side: Side, graph: Graph) -> tuple[Topic[Any], ...]:
-    """What the processes of this side write."""
-    services = services_on(side, graph)
-    return tuple(topic for topic in every_topic(graph) if topic.producer in services)
+    """What is written on this side."""
+    writers = writers_on(side, graph)
+    return tuple(topic for topic in every_topic(graph) if topic.producer in writers)
 
 
 def topics_sent(side: Side, graph: Graph) -> tuple[Topic[Any], ...]:

@@ -120,4 +120,4 @@ def test_a_folder_that_keeps_a_run_is_refused(tmp_path: Path, capsys: pytest.Cap
     (tmp_path / "board.json").write_text("{}")
     assert paani(["bench", "board", "--out", str(tmp_path)]) == 2
     assert "not empty" in capsys.readouterr().err
-    assert Config().dashboard.arm_at_start is False
+    assert Config().up.arm_at_start is False

@@ -12,6 +12,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from paani.operator_key import ensure_operator_key
 from tests.browser.conftest import BOX, MASK_EDGE, PICTURE_BGR, Boat
 from tests.conftest import OpenAs, Spawn
 
@@ -56,7 +57,8 @@ async def watch(browser: Any, config: Config, width: int = 1440, height: int = 9
     origin = f"http://127.0.0.1:{config.dashboard.port}"
     page = await browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
     watched = Watched(page, origin)
-    await page.goto(origin)
+    key = await asyncio.to_thread(ensure_operator_key, config.bus)
+    await page.goto(f"{origin}/#key={key}")
     return watched
 
 
@@ -134,8 +136,10 @@ async def test_evidence_of_another_frame_is_not_drawn(browser: Any, boat: Boat, 
         assert "overlay left out" in await page.inner_text("#camera-note")
 
 
-async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
-    async with spawn("dashboard"):
+async def test_stop_latches_and_outlives_the_operators_process(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("operator"), spawn("dashboard"):
         watched = await watch(browser, config)
         page = watched.page
         await until(page, "paani.link === 'live'")
@@ -151,7 +155,7 @@ async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat,
     assert await page.evaluate(frame) == "6px"
 
     boat.arming.value = None
-    async with spawn("dashboard", "dashboard.arm_at_start=true"):
+    async with spawn("operator"), spawn("dashboard"):
         await wait_for_arming(boat, armed=False, stopped=True)
         await until(page, "paani.link === 'live'")
         await hold_to_arm(page)
@@ -162,7 +166,7 @@ async def test_stop_latches_and_outlives_the_dashboard(browser: Any, boat: Boat,
 async def test_arming_needs_a_hold_that_has_not_expired(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, held_s: float
 ) -> None:
-    async with spawn("dashboard"):
+    async with spawn("operator"), spawn("dashboard"):
         page = (await watch(browser, config)).page
         await until(page, "!document.querySelector('#arm').disabled")
         await hold_to_arm(page, held_s)
@@ -174,7 +178,7 @@ async def test_arming_needs_a_hold_that_has_not_expired(
 async def test_a_phone_shows_everything_without_scrolling_sideways(
     browser: Any, boat: Boat, spawn: Spawn, config: Config
 ) -> None:
-    async with spawn("dashboard"):
+    async with spawn("operator"), spawn("dashboard"):
         page = (await watch(browser, config, 360, 740)).page
         await until(page, "paani.overlay.mask_seq !== null")
         assert await page.evaluate("document.documentElement.scrollWidth") == 360

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import re
 import resource
 import socket
 import sys
@@ -16,26 +15,20 @@ import pytest
 
 from paani import keys
 from paani.config import Config
-from paani_services.dashboard.server import GIVEN_AWAY, MAX_CLIENTS
+from paani_services.dashboard.server import GIVEN_AWAY, KEY_HEADER, MAX_CLIENTS
+from tests.arming import arm_on_page, headers_of, hold_on_page
 from tests.browser.conftest import Boat
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
 
-HELD = {"held_ms": 1500}
+HELD = {"press": 7}
 
 
 @pytest.fixture
 async def client(config: Config) -> AsyncIterator[aiohttp.ClientSession]:
     async with aiohttp.ClientSession(f"http://127.0.0.1:{config.dashboard.port}") as client:
         yield client
-
-
-async def token_of(client: aiohttp.ClientSession) -> str:
-    async with client.get("/") as page:
-        found = re.search(r'paani-arm-token" content="([^"]+)"', await page.text())
-    assert found is not None
-    return found[1]
 
 
 async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> None:
@@ -55,37 +48,58 @@ async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> 
             assert [row["name"] for row in await answer.json()] == [topic.name for topic in keys.TOPICS]
 
 
-async def test_arming_needs_the_own_page_its_token_and_a_valid_request(
+async def test_arming_needs_the_own_page_the_operators_key_and_a_valid_request(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:
-    async with spawn("dashboard"):
-        ours = {"Origin": f"http://127.0.0.1:{config.dashboard.port}", "X-Paani-Token": await token_of(client)}
+    """The page itself holds no secret: who can load it can watch, and stop."""
+    page = f"http://127.0.0.1:{config.dashboard.port}"
+    async with spawn("operator"), spawn("dashboard"):
+        ours = await asyncio.to_thread(headers_of, page, config.bus)
+        async with client.get("/") as answer:
+            assert ours[KEY_HEADER] not in await answer.text()
         cases: list[tuple[dict[str, str], object, int, str]] = [
             ({}, HELD, 403, "Origin"),
             ({**ours, "Origin": "http://elsewhere.example"}, HELD, 403, "Origin"),
-            ({**ours, "X-Paani-Token": "guess"}, HELD, 403, "X-Paani-Token"),
-            (ours, {"held_ms": 10}, 400, "held_ms"),
-            (ours, {"held_ms": 1500, "speed": 9}, 400, "speed"),
+            ({"Origin": page}, HELD, 403, KEY_HEADER),
+            ({**ours, KEY_HEADER: "guess"}, HELD, 403, KEY_HEADER),
+            (ours, {"press": 0}, 400, "press"),
+            (ours, {"press": 7, "speed": 9}, 400, "speed"),
             ({**ours, "Host": "elsewhere.example"}, HELD, 403, "Host"),
         ]
-        for headers, body, status, field in cases:
-            async with client.post("/api/arm", json=body, headers=headers) as answer:
-                assert (answer.status, (await answer.json())["field"]) == (status, field)
-        await asyncio.sleep(0.3)
+        for act in ("hold", "release"):
+            for headers, body, status, field in cases:
+                async with client.post(f"/api/arm/{act}", json=body, headers=headers) as answer:
+                    assert (answer.status, (await answer.json())["field"]) == (status, field)
+        status, text = await hold_on_page(page, config.bus, held_s=0.4, press=1)
+        assert (status, "less than a second" in text) == (409, True)
         assert boat.arming.value is not None
         assert not boat.arming.value.armed
-        async with client.post("/api/arm", json=HELD, headers=ours) as answer:
-            assert answer.status == 200
+        await arm_on_page(page, config.bus, press=2)
+        await until_arming(boat, armed=True)
 
 
-async def test_anybody_may_stop_with_any_body(client: aiohttp.ClientSession, spawn: Spawn, boat: Boat) -> None:
-    async with spawn("dashboard", "dashboard.arm_at_start=true"):
+async def test_anybody_may_stop_with_any_body(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    async with spawn("operator"), spawn("dashboard"):
+        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+        await until_arming(boat, armed=True)
         async with client.post("/api/stop", data=b"\xff not json", headers={"Host": "elsewhere.example"}) as answer:
             assert (await answer.json()) == {"stopped": True, "kept": True}
-        async with asyncio.timeout(5):
-            while boat.arming.value is None or not boat.arming.value.stopped:
-                await boat.arming.next()
-        assert not boat.arming.value.armed
+        await until_arming(boat, armed=False)
+        assert boat.arming.value is not None
+        assert boat.arming.value.stopped
+
+
+async def test_a_stop_that_nobody_latches_is_said_to_be_none(client: aiohttp.ClientSession, spawn: Spawn) -> None:
+    async with spawn("dashboard"), client.post("/api/stop") as answer:
+        assert (answer.status, (await answer.json())["field"]) == (503, "stopped")
+
+
+async def until_arming(boat: Boat, *, armed: bool) -> None:
+    async with asyncio.timeout(5):
+        while boat.arming.value is None or boat.arming.value.armed is not armed:
+            await asyncio.sleep(0.02)
 
 
 async def test_snapshot(client: aiohttp.ClientSession, spawn: Spawn, boat: Boat) -> None:
@@ -126,7 +140,7 @@ async def test_idle_connections_leave_room_for_a_stop(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:
     """With as many descriptors as a process usually has, and more strangers than these."""
-    async with spawn("dashboard") as process, contextlib.AsyncExitStack() as strangers:
+    async with spawn("operator"), spawn("dashboard") as process, contextlib.AsyncExitStack() as strangers:
         resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (1024, 1024))
         for _ in range(1100):
             strangers.enter_context(socket.create_connection(("127.0.0.1", config.dashboard.port), timeout=5.0))
@@ -162,15 +176,10 @@ async def test_a_foreign_page_cannot_open_the_socket(client: aiohttp.ClientSessi
         assert caught.value.status == 403
 
 
-async def test_without_a_page_the_operator_is_still_published(spawn: Spawn, boat: Boat, config: Config) -> None:
-    async with spawn("dashboard", "dashboard.serve=false", "dashboard.arm_at_start=true"):
-        async with asyncio.timeout(5):
-            assert (await boat.arming.next()).armed
+async def test_without_a_page_nothing_listens(spawn: Spawn, config: Config) -> None:
+    async with spawn("dashboard", "dashboard.serve=false"):
         with pytest.raises(ConnectionRefusedError):
             await asyncio.open_connection("127.0.0.1", config.dashboard.port)
-    async with asyncio.timeout(5):
-        while boat.arming.value is None or boat.arming.value.armed:
-            await boat.arming.next()
 
 
 async def test_busy_port_is_one_line_and_exit_2(open_as: OpenAs, private_sets: tuple[str, ...], config: Config) -> None:

@@ -43,7 +43,9 @@ def test_who_has_no_place_is_no_subject(graph: Graph) -> None:
     """A7: by access control, not by convention; everybody else is a subject once."""
     control = access(graph)
     named = [subject["id"] for subject in control["subjects"]]
-    assert sorted(named) == sorted({*keys.SERVICES, authority.OBSERVER} - keys.ABSENT[graph])
+    assert sorted(named) == sorted(
+        {*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS, authority.OBSERVER} - keys.ABSENT[graph]
+    )
     assert {name for policy in control["policies"] for name in policy["subjects"]} == set(named)
     assert control["default_permission"] == "deny"
 
@@ -117,8 +119,8 @@ def test_a_graph_has_credentials_of_its_own(tmp_path: Any) -> None:
         ("hull", ["bus.graph=simulation"], r"bus\.graph 'simulation' .* profile 'hull'"),
         ("hull", ["bus.graph=hil"], r"bus\.graph 'hil'"),
         ("hull", ["camera.source=sim"], r"camera\.source 'sim': a hull has no simulated camera"),
-        ("hull", ["dashboard.arm_at_start=true"], r"dashboard\.arm_at_start: profile hull waits for its operator"),
-        ("hil", ["dashboard.arm_at_start=true"], r"dashboard\.arm_at_start: profile hil waits for its operator"),
+        ("hull", ["up.arm_at_start=true"], r"up\.arm_at_start: profile hull waits for its operator"),
+        ("hil", ["up.arm_at_start=true"], r"up\.arm_at_start: profile hil waits for its operator"),
     ],
 )
 def test_a_graph_is_named_on_purpose(profile: str | None, sets: list[str], named: str) -> None:

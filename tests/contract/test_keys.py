@@ -49,7 +49,7 @@ def _fill(info: Any) -> Any:
 @pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
 def test_a_row_is_complete(topic: keys.Topic[Any]) -> None:
     """B1-B13: each interface has one producer, a rate, a freshness limit and a stance."""
-    assert topic.producer in keys.SERVICES
+    assert topic.producer in {*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS}
     assert 0 < topic.rate_hz <= 100
     assert topic.fresh_s * topic.rate_hz > 1.0
     assert topic.key(43, "otter").startswith("paani/43/otter/")
@@ -104,12 +104,29 @@ def test_stamps_are_safe_in_javascript() -> None:
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_only_the_controller_may_write_thrust(graph: keys.Graph) -> None:
     """A7 B13: neither perception nor advisor can write anything that moves the boat."""
-    operator_topics = {keys.ARMING.name, keys.TUNING.name}
-    moving = {keys.THRUST.name, keys.COMMAND.name, *operator_topics}
-    for service in keys.SERVICES:
-        may = moving & set(authority.written_by(service, graph))
-        expected = {"controller": {keys.THRUST.name}, "navigator": {keys.COMMAND.name}, "dashboard": operator_topics}
-        assert may == expected.get(service, set())
+    moving = {keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name, keys.TUNING.name}
+    expected = {
+        "controller": {keys.THRUST.name},
+        "navigator": {keys.COMMAND.name},
+        "operator": {keys.ARMING.name},
+        "dashboard": {keys.TUNING.name},
+    }
+    for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):
+        may = moving & set(authority.written_by(user, graph))
+        assert may == expected.get(user, set())
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_each_client_of_the_operator_writes_its_own_requests_and_only_a_simulated_boat_is_armed_by_a_command(
+    graph: keys.Graph,
+) -> None:
+    asked = {topic.name for topic in keys.REQUESTS.values()}
+    for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):
+        own = {keys.REQUESTS[user].name} if user in keys.REQUESTS and user not in keys.ABSENT[graph] else set()
+        assert asked & set(authority.written_by(user, graph)) == own
+    for command in keys.COMMAND_LINE_CLIENTS:
+        assert set(authority.written_by(command, graph)) <= {keys.REQUESTS[command].name}
+    assert ("arm" in authority.users_in(graph)) is (graph is keys.Graph.SIMULATION)
 
 
 def test_the_readme_shows_the_table_of_keys() -> None:

@@ -13,7 +13,7 @@ from paani.config import BusConfig, Config, load_config
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.link_access import LINK
-from paani.sides import ON_BOARD, ROUTER, Side, pictures_sent, services_on, topics_sent
+from paani.sides import ON_BOARD, ROUTER, Side, pictures_sent, services_on, topics_sent, writers_on
 
 SIDES = (Side.BOARD, Side.HOST)
 PROFILE = {Graph.SIMULATION: "paani", Graph.HIL: "hil", Graph.HULL: "hull"}
@@ -53,6 +53,14 @@ def test_every_process_has_one_side(graph: Graph) -> None:
     assert ON_BOARD[graph] <= set(keys.services_in(graph))
 
 
+@pytest.mark.parametrize("graph", Graph)
+def test_stop_may_be_asked_for_on_either_machine_and_arming_only_where_the_operator_is(graph: Graph) -> None:
+    for side in SIDES:
+        clients = set(writers_on(side, graph)) - set(services_on(side, graph))
+        arms = {"arm"} if side is Side.HOST and graph is Graph.SIMULATION else set()
+        assert clients == {"stop"} | arms
+
+
 def test_the_papers_split_and_a_hulls() -> None:
     """Seeing and judging on the board; of a hull all control too, and the operator where the person is."""
     assert services_on(Side.BOARD, Graph.SIMULATION) == ("router", "camera", "perception", "advisor", "bridge")
@@ -70,7 +78,7 @@ def test_the_link_lets_in_what_the_other_side_may_write(side: Side, graph: Graph
     pictures = {topic.name for topic in pictures_sent(side.other, graph)}
     assert writers[LINK] == {topic.name for topic in topics_sent(side.other, graph)} - pictures
     assert not any(name.startswith("@truth") or name.endswith(f"/{ROUTER}") for name in writers[LINK])
-    own = {name: set(authority.written_by(name, graph)) for name in services_on(side, graph)}
+    own = {name: set(authority.written_by(name, graph)) for name in writers_on(side, graph)}
     if side is Side.HOST:
         own[ROUTER] |= pictures
     assert {user: names for user, names in writers.items() if user != LINK} == own

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import aiohttp
 import pytest
 
 from paani import keys
@@ -23,7 +21,7 @@ from paani.authority import OBSERVER
 from paani.bus import Bus, open_bus
 from paani.clock import WallClock, stopwatch_ms
 from paani.config import BusConfig, Config, load_config
-from paani_services.dashboard.server import TOKEN_HEADER
+from tests.arming import arm_on_page
 from tests.conftest import find_free_port
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(90)]
@@ -121,13 +119,7 @@ async def arm_by_hand(loop: Loop, watch: Watch) -> int:
     await asyncio.sleep(STAYS_STOPPED_S)
     assert watch.applied[-1].zero_cause is m.ZeroCause.NOT_ARMED
     assert not watch.moves_after(back_us), "armed again by itself"
-    async with aiohttp.ClientSession(loop.page) as client:
-        async with client.get("/") as page:
-            token = re.search(r'paani-arm-token" content="([^"]+)"', await page.text())
-        assert token is not None
-        headers = {"Origin": loop.page, TOKEN_HEADER: token[1]}
-        async with client.post("/api/arm", json={"held_ms": 1500}, headers=headers) as answer:
-            assert answer.status == 200
+    await arm_on_page(loop.page, loop.bus, press=CLOCK.now_us())
     return CLOCK.now_us()
 
 
@@ -180,7 +172,7 @@ async def test_the_boat_stops_and_the_loop_comes_back(loop: Loop, service: str, 
             await until(lambda: watch.alive_us[service] > hit_us and not watch.alive[service], 5.0, "seen to be gone")
             await until(lambda: watch.alive[service], 30.0, f"{service} started again")
             back_us = watch.alive_us[service]
-        if (service, hit) == ("dashboard", signal.SIGKILL):
+        if service in {"operator", "dashboard"} and hit is signal.SIGKILL:
             back_us = await arm_by_hand(loop, watch)
         await until(lambda: watch.moves_after(back_us), BACK_S, f"thrust after {service} came back")
         stopped_s = stopped_after_s(service, watch.applied, hit_us, back_us)

@@ -11,10 +11,10 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import aiohttp
 import pytest
 
-from paani_tools.tune.client import TOKEN
+from paani.config import load_config
+from tests.arming import arm_on_page
 from tests.conftest import find_free_port
 from tests.firmware.emulator import Emulator, open_emulator
 from tests.mcu_peer import served
@@ -39,17 +39,6 @@ async def bench_port(mcu: Emulator) -> AsyncIterator[str]:
 
     async with served(serve) as port:
         yield f"socket://127.0.0.1:{port}"
-
-
-async def arm(page: str) -> None:
-    """As the operator does on the page."""
-    async with aiohttp.ClientSession() as client:
-        async with client.get(page) as answer:
-            token = TOKEN.search(await answer.text())
-        assert token is not None
-        headers = {"Origin": page, "X-Paani-Token": token[1]}
-        async with client.post(f"{page}/api/arm", json={"held_ms": 1500}, headers=headers) as answer:
-            assert answer.status == 200, await answer.text()
 
 
 @contextlib.asynccontextmanager
@@ -80,7 +69,7 @@ async def drive(folder: Path, *words: str) -> dict[str, Any]:
     sets = (f"bus.router=tcp/127.0.0.1:{find_free_port()}", f"bus.runtime_dir={folder}", f"dashboard.port={port}")
     given = (word for setting in sets for word in ("--set", setting))
     async with running("--for", str(DRIVE_S), "--summary", str(summary), *words, *given) as process:
-        await arm(f"http://127.0.0.1:{port}")
+        await arm_on_page(f"http://127.0.0.1:{port}", load_config(sets=sets).bus)
         async with asyncio.timeout(DRIVE_S + READY_S):
             output, _ = await process.communicate()
             assert process.returncode == 0, output.decode()
@@ -99,7 +88,7 @@ def figures(summary: dict[str, Any], thruster: str) -> str:
 
 async def test_the_simulated_boat_drives_by_the_pulses_alone(tmp_path: Path) -> None:
     """Through the firmware it makes at least three fifths of the direct adapter's way, and touches nothing."""
-    direct = await drive(tmp_path / "direct", "--set", "dashboard.arm_at_start=false")
+    direct = await drive(tmp_path / "direct", "--set", "up.arm_at_start=false")
     async with open_emulator() as mcu, bench_port(mcu) as pulses:
         lines = ("--set", f"thrusters.line={mcu.thrust}", "--set", f"plant.pwm_line={pulses}")
         looped = await drive(tmp_path / "hil", "--profile", "hil", *lines)

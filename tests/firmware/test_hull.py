@@ -17,9 +17,10 @@ from paani import messages as m
 from paani.bus import open_bus
 from paani.clock import WallClock
 from paani.config import load_config
+from tests.arming import arm_on_page
 from tests.conftest import find_free_port
 from tests.firmware.emulator import open_emulator
-from tests.firmware.test_hardware_in_the_loop import arm, running
+from tests.firmware.test_hardware_in_the_loop import running
 from tests.mcu_peer import until
 from tests.pictures import river
 
@@ -86,7 +87,7 @@ async def test_a_hull_starts_disarmed_and_without_a_simulator(tmp_path: Path) ->
                 await until(lambda: applied.value is not None and applied.value.zero_cause is m.ZeroCause.NOT_ARMED)
                 assert state.value is not None
                 assert not state.value.armed
-                await arm(f"http://127.0.0.1:{page}")
+                await arm_on_page(f"http://127.0.0.1:{page}", config.bus)
                 await until(lambda: state.value is not None and state.value.armed and state.value.enabled, 10.0)
                 assert applied.value is not None
                 assert applied.value.zero_cause is not m.ZeroCause.NONE

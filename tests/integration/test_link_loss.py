@@ -31,7 +31,8 @@ async def test_the_last_gate_hears_no_board_over_a_lost_link(spawn: Spawn, open_
     host.on(keys.THRUST_APPLIED, applied.append)
     at_s: dict[int, float] = {}
     host.on(keys.TRUE_POSE, lambda pose: at_s.__setitem__(pose.source_us, pose.sim_us * 1e-6))
-    arming, thrust = host.publisher(keys.ARMING), board.publisher(keys.THRUST)
+    operator = await open_as("operator")
+    arming, thrust = operator.publisher(keys.ARMING), board.publisher(keys.THRUST)
     pulse = eyes.publisher(keys.pulse("perception"))
     heard_s = list[float]()
     async with spawn("plant", f"world.name={tmp_path / 'cut.toml'}", 'plant.adapter.require_pulses=["perception"]'):

@@ -40,7 +40,7 @@ class InputPublishers:
         self.clock = buses["plant"].publisher(keys.SIM_TIME)
         self.advisory = buses["advisor"].publisher(keys.ADVISORY)
         self.odometry = buses["localization"].publisher(keys.ODOMETRY)
-        self.arming = buses["dashboard"].publisher(keys.ARMING)
+        self.arming = buses["operator"].publisher(keys.ARMING)
         self.orders = buses["observer"].latest(keys.COMMAND)
         self.mission = buses["observer"].latest(keys.MISSION)
         self.sim_us = 0
@@ -64,7 +64,7 @@ class InputPublishers:
                     return legs
 
 
-BUSES = ("plant", "advisor", "localization", "dashboard", "observer")
+BUSES = ("plant", "advisor", "localization", "operator", "observer")
 
 
 async def test_legs_follow_each_other_on_the_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
@@ -90,9 +90,9 @@ async def test_a_navigator_restarted_under_way_goes_on_with_its_leg(
     await asyncio.sleep(0.6)
     async with spawn("navigator", *sets), asyncio.timeout(30):
         assert set(await inputs.until_under_way()) == {1}
-    await buses["dashboard"].close()
+    await buses["operator"].close()
     await asyncio.sleep(0.6)
-    anew = InputPublishers({**buses, "dashboard": await open_as("dashboard")})
+    anew = InputPublishers({**buses, "operator": await open_as("operator")})
     anew.sim_us = inputs.sim_us
     async with spawn("navigator", *sets), asyncio.timeout(30):
         assert (await anew.until_under_way())[0] == 0

@@ -19,7 +19,7 @@ from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
-from paani_tools.tune.client import TOKEN
+from tests.arming import arm_on_page, headers_of, hold_on_page
 from tests.conftest import OpenAs, Spawn, put_raw
 from tests.unit.paani_services.advisor.advisor_evidence import water
 
@@ -75,7 +75,8 @@ async def test_two_steps_forth_and_one_back(
     observer = await open_as("observer")
     shadow, advisory = observer.latest(keys.SHADOW), observer.latest(keys.ADVISORY)
     page = f"http://127.0.0.1:{config.dashboard.port}"
-    async with spawn("dashboard", "dashboard.arm_at_start=true"), spawn("advisor", FEW):
+    async with spawn("operator"), spawn("dashboard"), spawn("advisor", FEW):
+        await arm_on_page(page, config.bus)
         await until(advisory, lambda a: a.direction is m.Direction.STRAIGHT)
         code, out, _ = await tune(private_sets, "propose", "advisor.policy.center_block_risk=0.46", "--json")
         name = msgspec.json.decode(out, type=m.Shadow).proposal
@@ -115,7 +116,7 @@ async def test_a_restarted_advisor_is_back_at_its_configuration(
     """The promotion is still repeated on the bus; it is refused, and both page and command say so."""
     observer = await open_as("observer")
     shadow, advisory = observer.latest(keys.SHADOW), observer.latest(keys.ADVISORY)
-    async with spawn("dashboard"):
+    async with spawn("operator"), spawn("dashboard"):
         async with spawn("advisor", FEW):
             _, out, _ = await tune(private_sets, "propose", "advisor.policy.center_block_risk=0.46", "--json")
             await until(shadow, lambda s: s.frames >= 5)
@@ -133,19 +134,15 @@ async def test_a_restarted_advisor_is_back_at_its_configuration(
 async def test_nobody_arms_while_a_request_waits_for_the_advisor(spawn: Spawn, config: Config) -> None:
     """What is promoted wants an arming after it, never one that overtakes it."""
     page = f"http://127.0.0.1:{config.dashboard.port}"
-    async with spawn("dashboard"), aiohttp.ClientSession() as client:
-        async with client.get(page) as answer:
-            token = TOKEN.search(await answer.text())
-        assert token is not None
-        ours = {"Origin": page, "X-Paani-Token": token[1]}
+    async with spawn("operator"), spawn("dashboard"), aiohttp.ClientSession() as client:
+        ours = await asyncio.to_thread(headers_of, page, config.bus)
         asking = asyncio.create_task(client.post(f"{page}/api/tune/promote", json={"proposal": "7f3a"}, headers=ours))
         await asyncio.sleep(0.5)
-        async with client.post(f"{page}/api/arm", json={"held_ms": 1500}, headers=ours) as answer:
-            assert (answer.status, (await answer.json())["field"]) == (409, "armed")
+        status, text = await hold_on_page(page, config.bus, press=1)
+        assert (status, "a tuning request waits" in text) == (409, True)
         async with await asking as answer:
             assert (answer.status, (await answer.json())["field"]) == (503, keys.SHADOW.name)
-        async with client.post(f"{page}/api/arm", json={"held_ms": 1500}, headers=ours) as answer:
-            assert answer.status == 200
+        await arm_on_page(page, config.bus, press=2)
 
 
 async def test_only_the_dashboard_may_tune_and_nonsense_is_counted(
@@ -181,10 +178,10 @@ async def test_only_the_dashboard_may_tune_and_nonsense_is_counted(
 
 async def test_tuned_advice_is_computed_again_from_the_ledger(open_as: OpenAs, spawn: Spawn, perception: Bus) -> None:
     """What was tried and promoted is in the steps and messages, so a replay gives the same bytes."""
-    observer, dashboard = await open_as("observer"), await open_as("dashboard")
+    observer, operator, dashboard = [await open_as(user) for user in ("observer", "operator", "dashboard")]
     topics = (keys.STEPS["advisor"], *ADVISOR.inputs, *ADVISOR.outputs)
     log: dict[str, Any] = {topic.name: observer.queue(topic, 2000) for topic in topics}
-    arming, tuning = dashboard.publisher(keys.ARMING), dashboard.publisher(keys.TUNING)
+    arming, tuning = operator.publisher(keys.ARMING), dashboard.publisher(keys.TUNING)
     change = m.Change(path="advisor.policy.center_block_risk", value="0.46")
     async with spawn("advisor", FEW):
         for request in range(40):

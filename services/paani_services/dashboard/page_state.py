@@ -1,4 +1,4 @@
-"""Messages of the dashboard to its page: settings, operator, and which services are alive. Pure."""
+"""Messages of the dashboard to its page: settings, and which services are alive. Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import msgspec
 
 from paani import keys
 from paani.config import Config, CorridorConfig, RiskConfig
-from paani_services.dashboard.operator_state import OperatorState
 
 
 class TopicFreshness(msgspec.Struct, frozen=True):
@@ -29,15 +28,6 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     acceptance_m: float
     topics: tuple[TopicFreshness, ...]
     services: tuple[str, ...]
-
-
-class PageOperator(msgspec.Struct, frozen=True, kw_only=True):
-    """The operator's state; `confirmed_ms` is the time from a STOP to zero thrust, None until the plant reports it."""
-
-    armed: bool
-    stopped: bool
-    asked: bool
-    confirmed_ms: float | None
 
 
 class ServiceLife(msgspec.Struct, frozen=True):
@@ -68,11 +58,6 @@ def page_settings(config: Config) -> PageSettings:
         ),
         services=config.services,
     )
-
-
-def page_operator(state: OperatorState) -> PageOperator:
-    confirmed_ms = (state.confirmed_us - state.asked_us) * 1e-3 if state.confirmed_us else None
-    return PageOperator(armed=state.armed, stopped=state.stopped, asked=state.asked_us > 0, confirmed_ms=confirmed_ms)
 
 
 class ServiceLiveness:

@@ -13,7 +13,6 @@ MEDIA_TYPES = {
     ".css": "text/css",
     ".svg": "image/svg+xml",
 }
-TOKEN_PLACEHOLDER = "{{arm-token}}"
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
         "default-src 'self'; img-src 'self' blob: data:; base-uri 'none'; form-action 'none';"
@@ -33,12 +32,11 @@ class StaticFile(msgspec.Struct, frozen=True):
     body: bytes
 
 
-def load_static_files(token: str) -> dict[str, StaticFile]:
-    """Every file of the page by name; the arm token is written into `index.html`."""
+def load_static_files() -> dict[str, StaticFile]:
+    """Every file of the page by name."""
     pages = {}
     for path in sorted(STATIC.iterdir()):
         media_type = MEDIA_TYPES.get(path.suffix)
         if media_type is not None:
-            text = path.read_text(encoding="utf-8").replace(TOKEN_PLACEHOLDER, token)
-            pages[path.name] = StaticFile(media_type, text.encode())
+            pages[path.name] = StaticFile(media_type, path.read_bytes())
     return pages

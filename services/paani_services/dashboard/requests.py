@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import msgspec
 
-HOLD_MIN_MS, HOLD_MAX_MS = 1000, 5000
+MAX_PRESS = 2**53 - 1  # what a script of the page can count to
 
 T = TypeVar("T")
 
@@ -21,10 +21,10 @@ class BadRequestError(Exception):
         self.field = field
 
 
-class ArmRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Arming needs a button held for at least a second and released within five."""
+class PressRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The button that arms is held, or let go. `press`: a number of the page's for this press."""
 
-    held_ms: Annotated[int, msgspec.Meta(ge=HOLD_MIN_MS, le=HOLD_MAX_MS)]
+    press: Annotated[int, msgspec.Meta(ge=1, le=MAX_PRESS)]
 
 
 class SnapshotQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

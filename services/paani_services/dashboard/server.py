@@ -17,14 +17,15 @@ from paani.bus import Picture
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
 from paani.errors import UserError
+from paani.operator_client import OperatorClient
 from paani_services.dashboard.connections import BoundedConnections
-from paani_services.dashboard.console import Console
-from paani_services.dashboard.hub import Client, Event, Hub
+from paani_services.dashboard.hub import Client, Hub
+from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
 from paani_services.dashboard.requests import (
-    ArmRequest,
     BadRequestError,
     NoQuery,
+    PressRequest,
     SnapshotQuery,
     decode_body,
     decode_query,
@@ -39,7 +40,8 @@ GIVEN_AWAY = 4001  # close code of a page whose place was taken, from the range 
 MAX_BODY_BYTES = 4096
 SEND_TIMEOUT_S = 15.0
 HEARTBEAT_S = 5.0
-TOKEN_HEADER = "X-Paani-Token"
+KEY_HEADER = "X-Paani-Key"
+ANSWER_TIMEOUT_S = 1.0
 MAX_REPORT_AGE_S = 3.0
 STOP_PATH = "/api/stop"
 
@@ -47,21 +49,21 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """HTTP routes to the hub, the console and the tuner."""
+    """HTTP routes to the hub, the operator's process and the tuner."""
 
     def __init__(
         self,
         hub: Hub,
-        console: Console,
+        operator: OperatorClient,
         tuner: Tuner,
         clock: Clock,
         config: Config,
         pages: dict[str, StaticFile],
-        token: str,
+        key: str,
     ) -> None:
-        self._hub, self._console, self._tuner = hub, console, tuner
+        self._hub, self._operator, self._tuner = hub, operator, tuner
         self._clock, self._profile, self._config = clock, config.profile, config.dashboard
-        self._pages, self._token = pages, token
+        self._pages, self._key = pages, key
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 
@@ -77,7 +79,8 @@ class Server:
                 web.get("/api/topics", self._topics),
                 web.get(STATUS_PATH, self._status),
                 web.post(STOP_PATH, self._stop),
-                web.post("/api/arm", self._arm),
+                web.post("/api/arm/hold", self._hold),
+                web.post("/api/arm/release", self._release),
                 web.get("/api/tune", self._tuning),
                 web.post("/api/tune/propose", self._propose),
                 web.post("/api/tune/promote", self._promote),
@@ -116,37 +119,45 @@ class Server:
         return web.Response(body=page.body, content_type=page.media_type, charset="utf-8")
 
     async def _stop(self, request: web.Request) -> web.Response:
-        """Latch a STOP, whoever asks and whatever the request holds."""
-        kept = await self._console.stop()
-        self._hub.publish_event(
-            Event(
-                self._clock.now_us(),
-                "stop",
-                "STOP requested"
-                + ("" if kept else "; it could not be written to disk and will not outlive this process"),
-            )
-        )
-        return json_response({"stopped": True, "kept": kept})
+        """Ask for STOP, whoever asks and whatever the request holds."""
+        state = await self._operator.stop(ANSWER_TIMEOUT_S)
+        if state is None:
+            return error_response(503, "the operator's process does not answer: no STOP is latched", "stopped")
+        return json_response({"stopped": True, "kept": state.latch_kept})
 
-    async def _arm(self, request: web.Request) -> web.Response:
-        if (refused := self._refuse_other_page(request, "arm")) is not None:
+    async def _hold(self, request: web.Request) -> web.Response:
+        """Pass on that the button of a press is held; how long that has lasted is the operator's process's to say."""
+        if (refused := self._refuse_to_arm(request)) is not None:
             return refused
-        decode_body(await request.read(), ArmRequest)
-        if self._tuner.is_waiting:
-            return error_response(409, "not armed: a tuning request waits for the advisor", "armed")
-        if not await self._console.arm():
-            return error_response(
-                409, "not armed: a STOP came meanwhile, or the latch could not be released on disk", "armed"
-            )
-        self._hub.publish_event(Event(self._clock.now_us(), "warn", "armed"))
+        self._operator.hold(decode_body(await request.read(), PressRequest).press)
+        return json_response({"held": True})
+
+    async def _release(self, request: web.Request) -> web.Response:
+        if (refused := self._refuse_to_arm(request)) is not None:
+            return refused
+        press = decode_body(await request.read(), PressRequest).press
+        refusal = await self._operator.release(press, ANSWER_TIMEOUT_S)
+        if refusal is None:
+            return error_response(503, "not armed: the operator's process does not answer", "armed")
+        if refusal is not m.ArmRefusal.NONE:
+            return error_response(409, f"not armed: {REFUSALS[refusal]}", "armed")
         return json_response({"armed": True})
 
+    def _refuse_to_arm(self, request: web.Request) -> web.Response | None:
+        if (refused := self._refuse_other_page(request, "arm")) is not None:
+            return refused
+        if self._tuner.is_waiting:
+            return error_response(409, "not armed: a tuning request waits for the advisor", "armed")
+        return None
+
     def _refuse_other_page(self, request: web.Request, action: str) -> web.Response | None:
-        """The error response to a request that does not come from this server's own page with its token, else None."""
+        """The error response to a request not from this server's own page, or without the operator's key; else None."""
         if not is_same_origin(request.headers.get("Origin"), request.host):
             return error_response(403, f"Origin: only this server's own page may {action}", "Origin")
-        if not hmac.compare_digest(request.headers.get(TOKEN_HEADER, "").encode(), self._token.encode()):
-            return error_response(403, f"{TOKEN_HEADER}: not the token of this page; load it again", TOKEN_HEADER)
+        if not hmac.compare_digest(request.headers.get(KEY_HEADER, "").encode(), self._key.encode()):
+            return error_response(
+                403, f"{KEY_HEADER}: not the operator's key, without which nobody may {action}", KEY_HEADER
+            )
         return None
 
     async def _propose(self, request: web.Request) -> web.Response:
@@ -187,10 +198,9 @@ class Server:
 
     async def _healthz(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
-        state = self._console.state
-        return json_response(
-            {"ok": True, "clients": len(self._hub.clients), "armed": state.armed, "stopped": state.stopped}
-        )
+        state = self._operator.state
+        armed, stopped = (None, None) if state is None else (state.armed, state.stopped)
+        return json_response({"ok": True, "clients": len(self._hub.clients), "armed": armed, "stopped": stopped})
 
     async def _topics(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)

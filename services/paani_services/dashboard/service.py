@@ -1,10 +1,9 @@
-"""Dashboard process: messages of the bus to the page, the operator's state and requests to the bus."""
+"""Dashboard process: messages of the bus to the page, and what the page asks to the bus."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import secrets
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -13,45 +12,42 @@ from paani import messages as m
 from paani.bus import Bus, Latest
 from paani.clock import Clock
 from paani.config import Config
-from paani.runtime import runtime_dir
-from paani_services.dashboard.console import Console
+from paani.operator_client import OperatorClient
+from paani.operator_key import ensure_operator_key
 from paani_services.dashboard.hub import Event, Hub
-from paani_services.dashboard.page_state import ServiceLiveness, page_operator, page_settings
+from paani_services.dashboard.operator_events import describe_operator_change
+from paani_services.dashboard.page_state import ServiceLiveness, page_settings
 from paani_services.dashboard.pages import load_static_files
 from paani_services.dashboard.server import Server, serving
 from paani_services.dashboard.tuning import Tuner
 
 STATE_PERIOD_S = 0.1  # people read numbers no faster
-OPERATOR_PERIOD_S = 0.2
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Publish the operator's state and requests; serve the page unless `dashboard.serve` is false."""
-    folder = await asyncio.to_thread(runtime_dir, config.bus)
-    console = Console(bus.publisher(keys.ARMING), folder, clock)
-    await console.restore(arm_at_start=config.dashboard.arm_at_start)
+    """Publish tuning requests; serve the page unless `dashboard.serve` is false."""
     tuner = Tuner(bus.publisher(keys.TUNING), clock)
-    page = serve_page(bus, console, tuner, clock, config) if config.dashboard.serve else contextlib.nullcontext()
+    page = serve_page(bus, tuner, clock, config) if config.dashboard.serve else contextlib.nullcontext()
     async with page:
         with bus.alive():
-            async with asyncio.TaskGroup() as publishing:
-                publishing.create_task(console.publish_forever())
-                publishing.create_task(tuner.publish_forever())
+            await tuner.publish_forever()
 
 
 @contextlib.asynccontextmanager
-async def serve_page(bus: Bus, console: Console, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
+async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
     """Run the web server and the tasks that feed it while the context lasts."""
     hub = Hub()
     hub.put("dashboard/settings", page_settings(config), clock.now_us(), clock.now_us())
-    async with web_server(hub, console, tuner, clock, config), asyncio.TaskGroup() as tasks:
+    operator = OperatorClient(bus, clock)
+    async with web_server(hub, operator, tuner, clock, config), asyncio.TaskGroup() as tasks:
         picture_period_s = 1.0 / config.dashboard.picture_rate_hz
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
         feeds.append(forward_while_clients(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
-        feeds.append(forward_applied(hub, console, bus.latest(keys.THRUST_APPLIED), clock))
+        feeds.append(forward_applied(hub, bus.latest(keys.THRUST_APPLIED), clock))
+        feeds.append(forward_operator(hub, bus.latest(keys.OPERATOR_STATE), clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
-        feeds += [publish_operator_state(hub, console, clock), track_services(hub, bus, clock)]
+        feeds.append(track_services(hub, bus, clock))
         running = [tasks.create_task(feed) for feed in feeds]
         try:
             yield
@@ -61,18 +57,20 @@ async def serve_page(bus: Bus, console: Console, tuner: Tuner, clock: Clock, con
 
 
 @contextlib.asynccontextmanager
-async def web_server(hub: Hub, console: Console, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
+async def web_server(
+    hub: Hub, operator: OperatorClient, tuner: Tuner, clock: Clock, config: Config
+) -> AsyncIterator[None]:
     """Run the web server while the context lasts."""
-    token = secrets.token_urlsafe(24)
-    pages = await asyncio.to_thread(load_static_files, token)
-    server = Server(hub, console, tuner, clock, config, pages, token)
+    key = await asyncio.to_thread(ensure_operator_key, config.bus)
+    pages = await asyncio.to_thread(load_static_files)
+    server = Server(hub, operator, tuner, clock, config, pages, key)
     async with serving(server, config.dashboard):
         yield
 
 
 def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:
-    """Subscribe to every JSON topic and health report, except the two topics that answer the operator."""
-    answers = (keys.THRUST_APPLIED, keys.SHADOW)
+    """Subscribe to every JSON topic and health report, except the topics that answer the operator."""
+    answers = (keys.THRUST_APPLIED, keys.OPERATOR_STATE, keys.SHADOW)
     topics: list[keys.Topic[Any]] = [
         topic for topic in keys.topics_in(bus.graph) if topic.stance is not keys.Stance.PICTURE and topic not in answers
     ]
@@ -99,13 +97,23 @@ async def forward_while_clients(
         await asyncio.sleep(period_s)
 
 
-async def forward_applied(hub: Hub, console: Console, inbox: Latest[m.ThrustApplied], clock: Clock) -> None:
-    """Forward what the plant applies to the page, and to the STOP that waits for its confirmation."""
+async def forward_applied(hub: Hub, inbox: Latest[m.ThrustApplied], clock: Clock) -> None:
+    """Forward what the plant applies, twice as often as it says so: a zero is shown at once."""
     while True:
         value = await inbox.next()
-        console.confirm_stop(value)
         hub.put(keys.THRUST_APPLIED.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(0.5 / keys.THRUST_APPLIED.rate_hz)
+
+
+async def forward_operator(hub: Hub, inbox: Latest[m.OperatorState], clock: Clock) -> None:
+    """Forward the operator's state, at once when it changes, and a line of the log for what the operator did."""
+    before: m.OperatorState | None = None
+    while True:
+        value = await inbox.next()
+        if (event := describe_operator_change(before, value, clock.now_us())) is not None:
+            hub.publish_event(event)
+        before = value
+        hub.put(keys.OPERATOR_STATE.name, value, inbox.received_us, clock.now_us())
 
 
 async def forward_shadow(hub: Hub, tuner: Tuner, inbox: Latest[m.Shadow], clock: Clock) -> None:
@@ -116,14 +124,6 @@ async def forward_shadow(hub: Hub, tuner: Tuner, inbox: Latest[m.Shadow], clock:
             hub.publish_event(event)
         hub.put(keys.SHADOW.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(STATE_PERIOD_S)
-
-
-async def publish_operator_state(hub: Hub, console: Console, clock: Clock) -> None:
-    """Publish the operator's state to the pages, at once when it changes."""
-    while True:
-        now_us = clock.now_us()
-        hub.put("dashboard/operator", page_operator(console.state), now_us, now_us)
-        await console.wait_for_change(OPERATOR_PERIOD_S)
 
 
 async def track_services(hub: Hub, bus: Bus, clock: Clock) -> None:

@@ -26,7 +26,10 @@ from paani.logs.reader import Log, Record
 from paani_tools.replay.shift import TimeShift
 
 # Whoever hears these may move a boat or change how it is guided.
-COMMANDS = frozenset({keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name})
+COMMANDS = frozenset(
+    {keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name}
+    | {topic.name for topic in keys.REQUESTS.values()}
+)
 MOVERS = ("plant", "thrusters", "bridge")  # services that turn thrust into motion, or advice into a light
 DASHBOARD = "dashboard"
 BATCH = 256
@@ -83,7 +86,7 @@ def replay_config(config: Config, log: Log) -> Config:
         config,
         bus=bus,
         camera=msgspec.structs.replace(config.camera, source=str(log.path)),
-        dashboard=msgspec.structs.replace(config.dashboard, arm_at_start=False, serve=True),
+        dashboard=msgspec.structs.replace(config.dashboard, serve=True),
     )
 
 

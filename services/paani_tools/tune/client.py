@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import http.client
-import re
 
 import msgspec
 
-from paani.config import DashboardConfig
+from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Shadow
+from paani.operator_key import ensure_operator_key
 
 TIMEOUT_S = 5.0
-TOKEN = re.compile(r'paani-arm-token" content="([^"]+)"')
 
 
 class Refused(msgspec.Struct, frozen=True):
@@ -24,8 +23,8 @@ class Refused(msgspec.Struct, frozen=True):
 class Client:
     """One request each to the dashboard of the configuration."""
 
-    def __init__(self, config: DashboardConfig) -> None:
-        self._config = config
+    def __init__(self, config: Config) -> None:
+        self._config, self._bus = config.dashboard, config.bus
 
     def status(self) -> Shadow:
         """The advisor's newest report. Raises UserError when there is none."""
@@ -33,20 +32,17 @@ class Client:
 
     def ask(self, deed: str, body: object) -> Shadow:
         """Ask to "propose", "promote" or "rollback"; the advisor's answer, which may refuse. Raises UserError."""
-        status, page = self._send("GET", "/")
-        found = TOKEN.search(page.decode(errors="replace"))
-        if found is None:
-            raise UserError(f"{self._origin}: answers {status}, but is no dashboard")
-        return self._report(*self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body), found[1]))
+        key = ensure_operator_key(self._bus)
+        return self._report(*self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body), key))
 
     @property
     def _origin(self) -> str:
         return f"http://{self._config.host}:{self._config.port}"
 
-    def _send(self, method: str, path: str, body: bytes | None = None, token: str = "") -> tuple[int, bytes]:
+    def _send(self, method: str, path: str, body: bytes | None = None, key: str = "") -> tuple[int, bytes]:
         connection = http.client.HTTPConnection(self._config.host, self._config.port, timeout=TIMEOUT_S)
         try:
-            connection.request(method, path, body, {"Origin": self._origin, "X-Paani-Token": token})
+            connection.request(method, path, body, {"Origin": self._origin, "X-Paani-Key": key})
             answer = connection.getresponse()
             return answer.status, answer.read()
         except (OSError, http.client.HTTPException) as error:

@@ -21,7 +21,7 @@ def main(argv: list[str]) -> int:
     """Raises UserError for a setting that cannot be tried, a dashboard that is not there, and each refusal."""
     options = _parser().parse_args(argv)
     config = config_from(options)
-    client = Client(config.dashboard)
+    client = Client(config)
     if options.deed == "status":
         shadow = client.status()
         sys.stdout.write(_json(shadow) if options.json else status_text(shadow, config.advisor))

@@ -46,8 +46,8 @@ def up_sets(
     fence: Path | None = None,
     only: str | None = None,
 ) -> tuple[str, ...]:
-    """Settings that the options of `paani up` stand for. The operator of a simulated boat arms at start."""
-    sets = ["dashboard.arm_at_start=true"] if simulated else []
+    """Settings that the options of `paani up` stand for. A simulated boat is armed at start."""
+    sets = ["up.arm_at_start=true"] if simulated else []
     if only is not None:
         sets.append(f"bus.side={only}")
     if world is not None:

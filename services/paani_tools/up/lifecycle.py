@@ -17,8 +17,9 @@ from paani.authority import OBSERVER, ensure_credentials
 from paani.bus import open_bus
 from paani.clock import Clock, WallClock, stopwatch_ms
 from paani.errors import UserError
-from paani.runtime import runtime_dir
+from paani.runtime import LATCH_FILE, runtime_dir, write_private
 from paani.sides import Side
+from paani_tools.up.arm import arm_once, page_line
 from paani_tools.up.collect import Collector
 from paani_tools.up.other_side import report_other_side
 from paani_tools.up.plan import Plan
@@ -28,6 +29,7 @@ from paani_tools.up.supervise import RECORDER, ServiceFailed, Supervisor
 from paani_tools.up.terminal import Display
 
 READY_S = 120.0
+CLEAR = "clear\n"  # of the STOP latch
 PROGRESS_S = 0.2
 
 
@@ -103,9 +105,11 @@ async def _run(
                 if name not in {ROUTER, RECORDER}:
                     tasks.append(group.create_task(supervisor.keep_running(name), name=name))
             await _await_all_alive(supervisor, display)
-            summary.begin(clock.now_us())
             if plan.config.dashboard.serve and "dashboard" in plan.services:
-                display.print_line(f"open http://{plan.config.dashboard.host}:{plan.config.dashboard.port}")
+                display.print_line(await asyncio.to_thread(page_line, plan.config))
+            if plan.config.up.arm_at_start and "operator" in plan.services:
+                await arm_once(plan.config.bus, clock, display.print_line)
+            summary.begin(clock.now_us())
             await during()
             for task in tasks:
                 task.cancel()
@@ -155,7 +159,10 @@ def _on_health(supervisor: Supervisor, health: m.Health) -> None:
 
 def _prepare(plan: Plan) -> Path:
     ensure_credentials(plan.config.bus)
-    logs = runtime_dir(plan.config.bus) / "logs"
+    folder = runtime_dir(plan.config.bus)
+    logs = folder / "logs"
+    if plan.config.up.arm_at_start and not logs.exists() and not (folder / LATCH_FILE).exists():
+        write_private(folder / LATCH_FILE, CLEAR)  # the first start here: later, a missing latch is a STOP
     logs.mkdir(mode=0o700, exist_ok=True)
     return logs
 

@@ -11,8 +11,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from paani.bus import Bus
 from paani.clock import MonotonicClock
 from paani.config import Config, encode_config
@@ -170,7 +168,7 @@ class Supervisor:
             str(os.getpid()),
             str(NICE.get(unit.name, 0)),
             unit.name,
-            env=environment(self._config, is_restart=unit.restarts > 0),
+            env=environment(self._config),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -188,10 +186,8 @@ class Supervisor:
         self._changed.set()
 
 
-def environment(config: Config, *, is_restart: bool) -> dict[str, str]:
-    """What a process is started with. One that is started again arms no boat, whatever the first one was to do."""
-    if is_restart:
-        config = replace(config, dashboard=replace(config.dashboard, arm_at_start=False))
+def environment(config: Config) -> dict[str, str]:
+    """What a process is started with."""
     return {**os.environ, **CHILD_ENVIRONMENT, "PAANI_CONFIG_JSON": encode_config(config).decode()}
 
 

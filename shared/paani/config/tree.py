@@ -45,11 +45,14 @@ class BusConfig(Section, frozen=True):
 
 
 class DashboardConfig(Section, frozen=True):
-    host: str = "127.0.0.1"  # this machine alone: the page asks for no password
+    host: str = "127.0.0.1"  # this machine alone: whoever reaches the page may watch and stop
     port: Port = 8043  # ends in the paper's domain
-    serve: bool = True  # whether there is a page; the operator's process runs without it too
-    arm_at_start: bool = False  # `paani up` arms a simulated boat so, once: never again after a restart
+    serve: bool = True  # whether there is a page; the process runs without it too
     picture_rate_hz: Positive = 10.0  # at most so many pictures are sent to a page
+
+
+class UpConfig(Section, frozen=True):
+    arm_at_start: bool = False  # `paani up` asks once for a simulated boat to be armed: never again after a restart
 
 
 class Config(Section, frozen=True):
@@ -70,6 +73,7 @@ class Config(Section, frozen=True):
     world: WorldConfig = WorldConfig()
     plant: PlantConfig = PlantConfig()
     eye: EyeConfig = EyeConfig()
+    up: UpConfig = UpConfig()
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
     bridge: BridgeConfig = BridgeConfig()
@@ -144,8 +148,8 @@ class Config(Section, frozen=True):
                 raise ValueError(f"{name} {address}: profile hil drives an emulator alone ({EMULATED_LINES})")
         if graph is Graph.HULL and line.startswith("socket:"):
             raise ValueError(f"thrusters.line {line}: a hull's microcontroller is at a serial device or unix:/PATH")
-        if graph is not Graph.SIMULATION and self.dashboard.arm_at_start:
-            raise ValueError(f"dashboard.arm_at_start: profile {self.profile} waits for its operator")
+        if graph is not Graph.SIMULATION and self.up.arm_at_start:
+            raise ValueError(f"up.arm_at_start: profile {self.profile} waits for its operator")
 
     def _require_lines(self) -> None:
         """A line has one user, and a recording guides no boat that moves."""

@@ -31,6 +31,7 @@ from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, 
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
+from paani.messages.operator import ArmRefusal, OperatorRequest, OperatorState, RequestAct
 from paani.messages.perception import (
     Detection,
     Evidence,
@@ -49,6 +50,7 @@ from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAc
 __all__ = [
     "SIDE_OF",
     "Advisory",
+    "ArmRefusal",
     "Arming",
     "BoxXyxy",
     "BridgeState",
@@ -88,6 +90,8 @@ __all__ = [
     "NavCommand",
     "NonNegative",
     "Odometry",
+    "OperatorRequest",
+    "OperatorState",
     "OutputMessage",
     "PictureHeader",
     "Pulse",
@@ -97,6 +101,7 @@ __all__ = [
     "RecordedTopic",
     "RecorderState",
     "Removal",
+    "RequestAct",
     "ResetCause",
     "RotationUse",
     "Route",

@@ -7,7 +7,7 @@ import { ageText, byId, fixed, make, setText } from "./text.js";
 const MAIN_TOPIC = {
   plant: "plant/thrust_applied", eye: "eye/picture", camera: "camera/picture", perception: "perception/evidence",
   advisor: "advisor/advisory", navigator: "navigator/command", controller: "controller/thrust",
-  localization: "localization/odometry", dashboard: "operator/arming", recorder: "recorder/state",
+  localization: "localization/odometry", operator: "operator/arming", dashboard: "operator/tuning", recorder: "recorder/state",
   bridge: "bridge/state", thrusters: "plant/thrust_applied", sensors: "sensors/imu",
 };
 const COLUMNS = 8;

@@ -9,7 +9,7 @@ import { renderIndicator } from "./indicator.js";
 import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
-import { bindOperatorControls, renderOperatorState, renewToken } from "./operator.js";
+import { bindOperatorControls, renderOperatorState } from "./operator.js";
 import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
 import { Store } from "./store.js";
@@ -46,10 +46,7 @@ function onMessage(key, header, body) {
 /** @param {boolean} isOpen */
 function onOpen(isOpen) {
   open = isOpen;
-  if (isOpen && opened++ > 0) {
-    document.querySelector("#log")?.replaceChildren();
-    void renewToken();
-  }
+  if (isOpen && opened++ > 0) document.querySelector("#log")?.replaceChildren();
 }
 
 function render() {

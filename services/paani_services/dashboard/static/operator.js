@@ -3,14 +3,22 @@
 
 import { byId, fixed, setText } from "./text.js";
 
-const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400;
-let isStopPending = false, refusal = "", heldFrom = 0;
-let token = document.querySelector('meta[name="paani-arm-token"]')?.getAttribute("content") ?? "";
+const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400, REFRESH_MS = 150;
+let isStopPending = false, refusal = "", heldFrom = 0, press = 0, refreshing = 0;
+let key = sessionStorage.getItem("paani-key") ?? "";
 
-/** Read the token again: a restarted server has another one. */
-export async function renewToken() {
-  const page = new DOMParser().parseFromString(await (await fetch("/")).text(), "text/html");
-  token = page.querySelector('meta[name="paani-arm-token"]')?.getAttribute("content") ?? token;
+/** The operator's key comes after the address (`#key=...`), from where no server and no log sees it. */
+function takeKey() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("key");
+  if (!given) return;
+  keepKey(given);
+  history.replaceState(null, "", location.pathname);
+}
+
+/** @param {string} text */
+function keepKey(text) {
+  key = text.trim();
+  sessionStorage.setItem("paani-key", key);
 }
 
 export async function stop() {
@@ -21,34 +29,51 @@ export async function stop() {
   while (isStopPending) {
     try {
       if ((await fetch("/api/stop", { method: "POST" })).ok) isStopPending = false;
-    } catch {
-      await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-    }
+    } catch { /* asked again below */ }
+    if (isStopPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
 }
 
-/** @param {number} heldMs */
-async function arm(heldMs) {
+/** @param {string} act */
+async function send(act) {
   try {
-    const answer = await fetch("/api/arm", {
+    const answer = await fetch(`/api/arm/${act}`, {
       method: "POST",
-      headers: { "Content-Type": "application/json", "X-Paani-Token": token },
-      body: JSON.stringify({ held_ms: Math.round(heldMs) }),
+      headers: { "Content-Type": "application/json", "X-Paani-Key": key },
+      body: JSON.stringify({ press }),
     });
-    refusal = answer.ok ? "" : (await answer.json()).error;
+    if (answer.ok) return;
+    refusal = (await answer.json()).error;
+    if (answer.status === 403) keepKey("");
+    release(false);
   } catch {
     refusal = "not sent: no connection to the dashboard";
+    release(false);
   }
+}
+
+function hold() {
+  refusal = "";
+  if (!key) keepKey(prompt("The operator's key, which `paani up` prints:") ?? "");
+  if (!key) return;
+  press = 1 + Math.floor(Math.random() * 2 ** 50);
+  heldFrom = performance.now();
+  void send("hold");
+  clearInterval(refreshing);
+  refreshing = setInterval(() => void send("hold"), REFRESH_MS);
 }
 
 /** @param {boolean} mayArm */
 function release(mayArm) {
+  clearInterval(refreshing);
   const heldMs = performance.now() - heldFrom;
-  if (heldFrom && mayArm && heldMs >= HOLD_MS && heldMs <= EXPIRES_MS) void arm(heldMs);
+  if (heldFrom && mayArm && heldMs >= HOLD_MS && heldMs <= EXPIRES_MS) void send("release");
   heldFrom = 0;
 }
 
 export function bindOperatorControls() {
+  takeKey();
+  addEventListener("hashchange", takeKey);
   byId("stop").addEventListener("pointerdown", stop);
   byId("stop").addEventListener("click", stop);
   addEventListener("keydown", (event) => {
@@ -60,14 +85,13 @@ export function bindOperatorControls() {
   const button = byId("arm");
   button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
     button.setPointerCapture(event.pointerId);
-    refusal = "";
-    heldFrom = performance.now();
+    hold();
   });
   button.addEventListener("pointerup", () => release(true));
   button.addEventListener("pointercancel", () => release(false));
   button.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
   button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-    if (event.key === "Enter" && !event.repeat) heldFrom = performance.now();
+    if (event.key === "Enter" && !event.repeat) hold();
     if (event.key === "Enter") event.preventDefault();
   });
   button.addEventListener("keyup", (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && release(true));
@@ -76,24 +100,26 @@ export function bindOperatorControls() {
 
 /** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
 export function renderOperatorState(store, open, now) {
-  const operator = store.get("dashboard/operator"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
+  const operator = store.get("operator/state"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
   const heldMs = heldFrom ? now - heldFrom : 0;
-  if (heldMs > EXPIRES_MS) heldFrom = 0;
+  if (heldMs > EXPIRES_MS) release(false);
   const button = byId("arm");
-  button.disabled = !open || !operator || operator.armed;
+  const isHeard = open && store.isFresh("operator/state", now);
+  button.disabled = !isHeard || !operator || operator.armed;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
   state.dataset.state = isStopPending || operator?.stopped ? "stopped" : operator?.armed ? "armed" : "";
   setText(byId("order-word"), isStopPending ? "STOP REQUESTED" : !operator ? "–" : operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED");
-  setText(byId("order-detail"), refusal || (isStopPending ? "sending to the dashboard" : detail(operator, open)));
+  setText(byId("order-detail"), refusal || (isStopPending ? "sending" : detail(operator, isHeard)));
 }
 
-/** @param {any} operator @param {boolean} open */
-function detail(operator, open) {
+/** @param {any} operator @param {boolean} isHeard */
+function detail(operator, isHeard) {
   if (!operator) return "operator state unknown";
-  if (!open) return "last known state";
+  if (!isHeard) return "last known state";
   if (!operator.stopped) return operator.armed ? "thrust allowed" : "thrust not allowed";
-  if (operator.confirmed_ms !== null) return `plant at zero in ${fixed(operator.confirmed_ms, 0)} ms`;
-  return operator.asked ? "plant has not confirmed" : "latched before this start";
+  if (!operator.latch_kept) return "could not be written to disk";
+  if (operator.confirmed_us) return `plant at zero in ${fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)} ms`;
+  return operator.asked_us ? "plant has not confirmed" : "latched before this start";
 }

@@ -18,7 +18,7 @@ export class Store {
     if (key === "dashboard/settings") {
       for (const topic of value.topics) this.freshS.set(topic.name, topic.fresh_s);
     }
-    const isFromDashboard = key.startsWith("dashboard/") || key === "operator/arming" || key === "health/dashboard";
+    const isFromDashboard = key.startsWith("dashboard/") || key.startsWith("operator/") || key === "health/operator" || key === "health/dashboard";
     if (!isFromDashboard) this.boatHeardAt = Math.max(this.boatHeardAt, now - ageMs);
   }
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from paani_services.dashboard.requests import (
-    ArmRequest,
     BadRequestError,
     NoQuery,
+    PressRequest,
     SnapshotQuery,
     decode_body,
     decode_query,
@@ -23,22 +23,22 @@ from paani_services.dashboard.requests import (
         (b"{", "body"),
         (b"[]", "body"),
         (b"\xff", "body"),
-        (b"{}", "held_ms"),
-        (b'{"held_ms":999}', "held_ms"),
-        (b'{"held_ms":5001}', "held_ms"),
-        (b'{"held_ms":"1500"}', "held_ms"),
-        (b'{"held_ms":NaN}', "body"),
-        (b'{"held_ms":1500,"force":true}', "force"),
+        (b"{}", "press"),
+        (b'{"press":0}', "press"),
+        (b'{"press":9007199254740992}', "press"),
+        (b'{"press":"7"}', "press"),
+        (b'{"press":NaN}', "body"),
+        (b'{"press":7,"held_ms":1500}', "held_ms"),
     ],
 )
 def test_a_bad_arm_request_names_its_field(body: bytes, field: str) -> None:
     with pytest.raises(BadRequestError) as caught:
-        decode_body(body, ArmRequest)
+        decode_body(body, PressRequest)
     assert caught.value.field == field
 
 
-def test_a_held_control_is_enough() -> None:
-    assert decode_body(b'{"held_ms":1000}', ArmRequest).held_ms == 1000
+def test_a_press_has_a_number_and_claims_nothing_else() -> None:
+    assert decode_body(b'{"press":7}', PressRequest).press == 7
 
 
 @pytest.mark.parametrize(

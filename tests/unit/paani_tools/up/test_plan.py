@@ -128,7 +128,7 @@ def test_options_stand_for_settings(private_sets: tuple[str, ...]) -> None:
     config = load_config(sets=(*sets, *private_sets))
     assert (config.world.name, config.camera.source) == ("lake", "/some where/x.mp4")
     assert (config.navigator.mission, config.navigator.fence) == ("/a/m.toml", "/a/f.toml")
-    assert config.dashboard.arm_at_start
+    assert config.up.arm_at_start
     assert not config.dashboard.serve
 
 

@@ -35,7 +35,7 @@ async def test_a_hull_starts_no_simulator_and_nothing_armed(hull: tuple[str, ...
     assert not {"plant", "eye"} & set(plan.services)
     assert "eye" not in plan.config.plant.adapter.require_pulses
     assert plan.config.localization.origin_lat_lon_deg is None
-    assert not plan.config.dashboard.arm_at_start
+    assert not plan.config.up.arm_at_start
     assert not plan.config.calibration.valid
 
 

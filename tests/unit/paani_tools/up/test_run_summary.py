@@ -121,7 +121,7 @@ def test_rates_decisions_and_reasons_are_counted_since_all_were_alive() -> None:
     summary = Summary()
     chain(summary, captured_us=0, seq=0)
     for seq in (0, 5):
-        summary.feed(m.Arming(source_us=0, armed=True, seq=seq, producer="dashboard"))
+        summary.feed(m.Arming(source_us=0, armed=True, seq=seq, producer="operator"))
     summary.begin(5 * S)
     chain(summary, captured_us=6 * S, seq=1)
     summary.count_output("eye", 20)
@@ -171,7 +171,7 @@ def test_board_memory_is_the_sum_of_the_board_processes() -> None:
 def test_a_gap_in_the_numbers_is_a_loss_and_a_new_epoch_is_not() -> None:
     summary = begun()
     for epoch, seq in ((1, 0), (1, 1), (1, 4), (2, 0), (2, 1)):
-        summary.feed(m.Arming(source_us=0, armed=True, epoch=epoch, seq=seq, producer="dashboard"))
+        summary.feed(m.Arming(source_us=0, armed=True, epoch=epoch, seq=seq, producer="operator"))
     assert report(summary).drops == {"lost_Arming": 2}
 
 

@@ -1,0 +1,1 @@
+"""The operator's process: arming and STOP, asked for by its clients."""

@@ -1,0 +1,1 @@
+"""`paani stop`: STOP from the command line, past the page."""

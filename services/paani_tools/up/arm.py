@@ -1,0 +1,51 @@
+"""Arms a simulated boat once, at the start, as a client of the operator's process; and says where the page is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from paani.bus import open_bus
+from paani.clock import Clock
+from paani.config import BusConfig, Config
+from paani.messages import ArmRefusal
+from paani.operator_client import OperatorClient
+from paani.operator_key import ensure_operator_key, operator_key_path
+
+CLIENT = "arm"
+ATTEMPTS = 5  # a process of a busy machine may miss a beat while everything starts
+
+
+async def arm_once(config: BusConfig, clock: Clock, say: Callable[[str], None]) -> None:
+    """Hold the button once. What was stopped stays stopped, and is said to be."""
+    bus = await open_bus(config, CLIENT, clock)
+    try:
+        client, refusal = OperatorClient(bus, clock), None
+        for _ in range(ATTEMPTS):
+            refusal = await client.hold_to_arm()
+            if refusal is ArmRefusal.NONE:
+                return
+            if refusal in {ArmRefusal.LATCHED, ArmRefusal.STOPPED, ArmRefusal.NOT_WRITTEN}:
+                break
+        say("not armed: " + _why(refusal))
+    finally:
+        await bus.close()
+
+
+def page_line(config: Config) -> str:
+    """Where the page is; with the operator's key for a person at a terminal, and for a log without."""
+    page = f"open http://{config.dashboard.host}:{config.dashboard.port}"
+    key = ensure_operator_key(config.bus)
+    return f"{page}/#key={key}" if sys.stdout.isatty() else f"{page} (key: {operator_key_path(config.bus)})"
+
+
+def _why(refusal: ArmRefusal | None) -> str:
+    match refusal:
+        case None:
+            return "the operator's process does not answer"
+        case ArmRefusal.LATCHED | ArmRefusal.STOPPED:
+            return "a STOP holds; a hand on the page releases it (hold Arm)"
+        case ArmRefusal.NOT_WRITTEN:
+            return "the STOP latch could not be written to disk"
+        case _:
+            return f"the operator's process refuses ({refusal.value.lower()}); hold Arm on the page"

@@ -1,0 +1,151 @@
+"""The console: a STOP is published before it is written, and whatever cannot be written is a STOP."""
+
+from __future__ import annotations
+
+import asyncio
+import stat
+from pathlib import Path
+from typing import Any
+
+from paani import messages as m
+from paani.clock import ManualClock
+from paani.keys import STATION
+from paani.runtime import LATCH_FILE
+from paani_services.operator import state as op
+from paani_services.operator.console import Console
+from paani_services.operator.latch import read_latch, write_latch
+
+EPOCH = 5
+
+
+class Published:
+    """Keeps what the console publishes, in place of the bus."""
+
+    def __init__(self) -> None:
+        self.messages: list[Any] = []
+
+    def put(self, message: Any) -> Any:
+        self.messages.append(message)
+        return message
+
+
+class Desk:
+    """A console on a folder, and a clock that moves when a button is held."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clock, self.arming, self.states = ManualClock(), Published(), Published()
+        self.clock.advance(1000.0)
+        self.path = folder / LATCH_FILE
+        self.console = Console(self.arming, self.states, folder, self.clock)  # type: ignore[arg-type]  # the bus's place
+
+    async def ask(self, act: m.RequestAct, press: int = 1, client: str = STATION) -> None:
+        await self.console.answer(client, m.OperatorRequest(source_us=1, act=act, press=press), EPOCH)
+
+    async def hold(self, press: int = 1) -> None:
+        for _ in range(7):
+            await self.ask(m.RequestAct.HOLD, press)
+            self.clock.advance(0.2)
+
+    async def arm(self, press: int = 1) -> None:
+        await self.hold(press)
+        await self.ask(m.RequestAct.RELEASE, press)
+
+    async def latch(self) -> str | None:
+        return await asyncio.to_thread(read_latch, self.path)
+
+
+async def test_a_stop_is_published_before_it_is_written_and_outlives_the_process(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.arm()
+    assert desk.console.state.armed
+    asking = asyncio.create_task(desk.ask(m.RequestAct.STOP))
+    await asyncio.sleep(0)
+    assert desk.arming.messages[-1].stopped
+    await asking
+    assert await desk.latch() == op.STOPPED
+    again = Desk(tmp_path)
+    await again.console.restore()
+    assert (again.console.state.armed, again.console.state.stopped) == (False, True)
+
+
+async def test_a_process_that_dies_while_armed_is_a_stop_for_the_next(tmp_path: Path) -> None:
+    """So is a STOP that could not be written: the latch on disk is clear only while nobody is armed."""
+    desk = Desk(tmp_path)
+    await desk.arm()
+    assert await desk.latch() == op.ARMED
+    again = Desk(tmp_path)
+    await again.console.restore()
+    assert (again.console.state.armed, again.console.state.stopped) == (False, True)
+
+
+async def test_an_end_in_good_order_leaves_a_clear_latch_and_a_stop_leaves_a_stop(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.arm()
+    await desk.console.end()
+    assert not desk.arming.messages[-1].armed
+    assert await desk.latch() == op.CLEAR
+    await desk.ask(m.RequestAct.STOP)
+    await desk.console.end()
+    assert await desk.latch() == op.STOPPED
+
+
+async def test_a_stop_during_arming_wins(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.hold()
+    arming = asyncio.create_task(desk.ask(m.RequestAct.RELEASE))
+    await asyncio.sleep(0)
+    await asyncio.gather(arming, desk.ask(m.RequestAct.STOP, client="stop"))
+    assert desk.console.state.stopped
+    assert not any(word.armed for word in desk.arming.messages)
+    assert desk.states.messages[-1].refusal is m.ArmRefusal.STOPPED
+    assert await desk.latch() == op.STOPPED
+
+
+async def test_a_release_that_is_said_again_changes_nothing(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.arm()
+    await desk.ask(m.RequestAct.RELEASE)
+    assert (desk.console.state.armed, desk.console.state.ended.refusal) == (True, m.ArmRefusal.NONE)
+    await desk.ask(m.RequestAct.STOP)
+    await desk.ask(m.RequestAct.RELEASE)
+    assert desk.console.state.stopped
+
+
+async def test_a_failing_disk_stops_and_does_not_arm(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "missing")
+    await desk.arm()
+    assert (desk.console.state.armed, desk.states.messages[-1].refusal) == (False, m.ArmRefusal.NOT_WRITTEN)
+    await desk.ask(m.RequestAct.STOP)
+    assert desk.arming.messages[-1].stopped
+    assert not desk.states.messages[-1].latch_kept
+
+
+async def test_without_the_pages_process_nobody_arms(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.hold()
+    await desk.console.answer(STATION, m.OperatorRequest(source_us=1, act=m.RequestAct.RELEASE, press=1), None)
+    assert (desk.console.state.armed, desk.states.messages[-1].refusal) == (False, m.ArmRefusal.NO_STATION)
+
+
+async def test_a_page_that_begins_again_disarms(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.arm()
+    await desk.console.follow_station(EPOCH + 1, 0.0)
+    assert (desk.arming.messages[-1].armed, desk.arming.messages[-1].stopped) == (False, False)
+    assert await desk.latch() == op.CLEAR
+
+
+def test_the_latch_file_is_private_and_whole(tmp_path: Path) -> None:
+    path = tmp_path / LATCH_FILE
+    assert write_latch(path, op.STOPPED)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert [file.name for file in tmp_path.iterdir()] == [LATCH_FILE]
+
+
+def test_an_unreadable_latch_is_a_stop(tmp_path: Path) -> None:
+    path = tmp_path / LATCH_FILE
+    path.write_bytes(b"\xff\xfe")
+    assert op.initial_state(read_latch(path)).stopped
+    path.unlink()
+    path.mkdir()
+    assert op.initial_state(read_latch(path)).stopped
