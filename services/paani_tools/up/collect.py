@@ -21,6 +21,7 @@ FED: tuple[keys.Topic[Any], ...] = (
     keys.TRUE_POSE,
     keys.ODOMETRY,
     keys.ARMING,
+    keys.TUNING,
 )
 PICTURES = (keys.PICTURE, keys.RENDERED)
 DRAIN_S = 0.25

@@ -182,6 +182,8 @@ class Summary:
             case m.Odometry():
                 self._outputs["localization"] += 1
             case m.Arming():
+                self._outputs["operator"] += 1
+            case m.Tuning():
                 self._outputs["dashboard"] += 1
             case m.Health():
                 self._take_health(message)
