@@ -18,7 +18,8 @@ from paani.messages import (
 )
 from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
-from paani_services.advisor.frame_facts import PolicyState, frame_facts, side_block_risk
+from paani_services.advisor.frame_facts import FrameFacts, PolicyState, frame_facts, side_block_risk
+from paani_services.advisor.people import nearest_ahead_m, speed_limit_mps
 from paani_services.advisor.policy import Decision, advised_purpose, decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
@@ -100,10 +101,23 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
         facts = frame_facts(state.policy, water, obstacles, config)
         policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
         decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
+        decision = _add_people(decision, facts, config)
     else:
         policy = msgspec.structs.replace(policy, clear_frames=0)  # an unusable frame interrupts a run of clear ones
         decision = _stop_for(NO_DECISION, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
     return AdvisorState(tracker, policy, evidence, decision)
+
+
+def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decision:
+    """The decision with who is ahead and how fast the boat may go; the same decision where nobody is near."""
+    limit_mps, ahead = speed_limit_mps(facts.obstacles, config), facts.lanes["center"].people
+    distance_m = nearest_ahead_m(facts.obstacles, ahead)
+    return msgspec.structs.replace(
+        decision,
+        speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
+        people_ahead=tuple(facts.obstacles[i].id for i in ahead) if ahead else msgspec.UNSET,
+        person_distance_m=msgspec.UNSET if distance_m is None or distance_m > MAX_AGE_S else distance_m,
+    )
 
 
 def is_well_formed(evidence: Evidence) -> bool:
@@ -149,4 +163,7 @@ def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, confi
         evidence_sent_us=evidence.sent_us,
         counterfactual=decision.counterfactual,
         purpose=advised_purpose(decision),
+        speed_limit_mps=decision.speed_limit_mps,
+        people_ahead=decision.people_ahead,
+        person_distance_m=decision.person_distance_m,
     )

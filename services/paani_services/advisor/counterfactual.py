@@ -174,7 +174,9 @@ def nearest_limit(facts: FrameFacts, decision: Decision) -> tuple[Limit, float]:
     for lane in LANES:
         limit = lanes[lane].limit
         margin = risks[lane] - limit
-        if lanes[lane].occupied or facts.lanes[lane].is_without_water or (lane == "center" and facts.vessels_ahead):
+        found_in = facts.lanes[lane]
+        is_barred = found_in.is_without_water or found_in.is_closed or bool(found_in.people)
+        if lanes[lane].occupied or is_barred or (lane == "center" and facts.vessels_ahead):
             continue
         across = risks | {lane: limit if margin < 0.0 else math.nextafter(limit, 0.0)}
         moved = msgspec.structs.replace(

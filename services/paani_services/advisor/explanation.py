@@ -3,7 +3,21 @@
 One sentence says what is advised and why, the next what would change it.
 """
 
-from paani.messages import Advisory, ChangedBy, Direction, Lane, LaneRisk, Reason, Removal, Track, UnusableCause
+import msgspec
+
+from paani.messages import (
+    SIDE_OF,
+    Advisory,
+    ChangedBy,
+    Direction,
+    Lane,
+    LaneRisk,
+    Purpose,
+    Reason,
+    Removal,
+    Track,
+    UnusableCause,
+)
 
 MANOEUVRE_TEXT = {
     Direction.STRAIGHT: "Straight on",
@@ -29,6 +43,13 @@ UNUSABLE_TEXT = {
     UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",
 }
+INPUT_FAULTS = {
+    Reason.STALE_EVIDENCE,
+    Reason.FUTURE_EVIDENCE,
+    Reason.UNUSABLE_IMAGE,
+    Reason.MALFORMED_EVIDENCE,
+    Reason.NO_EVIDENCE,
+}
 MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
 ALTERNATIVE_TEXT = {
     Direction.STRAIGHT: "go STRAIGHT",
@@ -46,9 +67,24 @@ MAX_LENGTH = 400  # characters, the limit of the message type `Text`
 
 def explain_advisory(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     """Say what is advised and why, and what would change it; the reason alone where both are too long."""
-    why = f"{MANOEUVRE_TEXT[advisory.direction]}: {_reason_text(advisory, tracks)}."
+    why = _people_text(advisory) + f"{MANOEUVRE_TEXT[advisory.direction]}: {_reason_text(advisory, tracks)}."
     both = f"{why} {_counterfactual_text(advisory, tracks)}".rstrip()
     return both if len(both) <= MAX_LENGTH else why
+
+
+def _people_text(advisory: Advisory) -> str:
+    """What was decided about the people in the way ahead, as a sentence of its own; empty where there is none."""
+    if not advisory.people_ahead or advisory.reason in INPUT_FAULTS:
+        return ""
+    count = len(advisory.people_ahead)
+    who = "swimmer ahead" if count == 1 else f"{count} swimmers ahead"
+    if not isinstance(advisory.person_distance_m, msgspec.UnsetType):
+        who += f" at about {advisory.person_distance_m:.0f} m"
+    if advisory.direction is Direction.STOP:
+        return f"Stop: {who}, waiting. "
+    if advisory.purpose is Purpose.LOOK:
+        return f"Slow: {who}, looking for a way around. "
+    return f"Slow: {who}, passing on the {SIDE_OF.get(advisory.direction, 'side')}. "
 
 
 def _counterfactual_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
@@ -109,9 +145,13 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
         case Reason.MALFORMED_EVIDENCE:
             return "the evidence is malformed"
         case Reason.CENTER_CLEAR:
+            if any(track.label == "person" and track.id in center.track_ids for track in tracks):
+                return f"nobody is near in the way ahead, {centre}"
             return f"the way ahead is clear, {centre}"
         case Reason.TURN_RETAINED:
             return f"keeping the turn until the way ahead stays clear, {centre}"
+        case Reason.CENTER_OCCUPIED if not names and not center.occupied:
+            return f"the way ahead shows no open water; {sides}"
         case Reason.CENTER_OCCUPIED:
             return f"the way ahead is occupied{by}; {sides}"
         case Reason.CENTER_VESSEL:

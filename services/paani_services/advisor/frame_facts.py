@@ -11,6 +11,7 @@ import msgspec
 from paani.config import Config, PolicyConfig
 from paani.messages import SIDE_OF, BoxXyxy, Direction, LaneEvidence
 from paani_services.advisor.association import area
+from paani_services.advisor.people import people_in_lane
 from paani_services.advisor.risk import LANES, LaneTerms, Obstacle, lane_span, lane_terms, overlap, shared_width
 
 MIN_OCCUPYING_PRESENCE = 0.5  # presence below which an unseen obstacle occupies no lane
@@ -36,7 +37,8 @@ class LaneFacts(NamedTuple):
     """One corridor in one frame. Obstacles are given by index.
 
     limit: the risk at which it is blocked. is_without_water: its water alone blocks it. filling: obstacles low and wide
-    enough to occupy it. occupying: those of them that occupy it in this frame.
+    enough to occupy it. occupying: those of them that occupy it in this frame. people: who block it. is_closed: it
+    shows no way of connected water.
     """
 
     terms: LaneTerms
@@ -44,6 +46,8 @@ class LaneFacts(NamedTuple):
     is_without_water: bool
     filling: tuple[int, ...]
     occupying: tuple[int, ...]
+    people: tuple[int, ...] = ()
+    is_closed: bool = False
 
 
 class FrameFacts(NamedTuple):
@@ -81,6 +85,8 @@ def frame_facts(
             is_without_water=is_without_water(water[lane].non_water, policy),
             filling=tuple(filling),
             occupying=tuple(i for i in filling if is_lasting or obstacles[i].is_danger),
+            people=people_in_lane(lane, obstacles, config),
+            is_closed=is_closed(water[lane], policy),
         )
     reaching: dict[str, list[int]] = {"core": [], "left": [], "right": []}
     for i, _ in lanes["center"].terms.obstacles:
@@ -139,6 +145,13 @@ def fills_lane(obstacle: Obstacle, lane: str, config: Config) -> bool:
 def is_without_water(non_water: float, policy: PolicyConfig) -> bool:
     """Whether so little of the lane is water that it is blocked whatever its risk."""
     return non_water > policy.dry
+
+
+def is_closed(water: LaneEvidence, policy: PolicyConfig) -> bool:
+    """Whether the lane shows no way of connected water from the bow; False where the mask was not asked."""
+    if isinstance(water.open_width, msgspec.UnsetType) or policy.open_width == 0.0:
+        return False
+    return water.open_width < policy.open_width or water.non_water > policy.not_water
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:

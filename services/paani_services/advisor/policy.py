@@ -68,6 +68,9 @@ class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"})
     right: LaneRisk = LaneRisk()
     policy_input: PolicyInput = PolicyInput()
     counterfactual: Counterfactual = Counterfactual()
+    speed_limit_mps: float | msgspec.UnsetType = msgspec.UNSET
+    people_ahead: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
+    person_distance_m: float | msgspec.UnsetType = msgspec.UNSET
 
 
 def frame_components(facts: FrameFacts, evidence: Selection, config: Config) -> dict[str, LaneComponents]:
@@ -88,12 +91,14 @@ def evaluate(
         without_water[lane] = found.is_without_water & evidence.has_water(lane)
         occupied[lane] = evidence.has_any(found.occupying)
         blocked[lane] = (components[lane].risk >= found.limit) | without_water[lane] | occupied[lane]
+        blocked[lane] = blocked[lane] | evidence.has_any(found.people) | (found.is_closed & evidence.has_water(lane))
     vessel_ahead = evidence.has_any(facts.vessels_ahead)
     blocked["center"] = blocked["center"] | vessel_ahead
     center, weights = components["center"], config.advisor.risk
     water_risk = weights.non_water * center.non_water + weights.uncertainty * center.uncertainty
     core, left, right = (evidence.has_any(facts.reaching[part]) for part in ("core", "left", "right"))
     is_inner = core | (water_risk >= config.advisor.policy.center_block_risk)
+    is_inner = is_inner | evidence.has_any(facts.lanes["center"].people)  # nobody is passed by a slight turn
     gain = components[facts.held_side].risk - components[OPPOSITE_SIDE[facts.held_side]].risk
     shows_water = True ^ (without_water["left"] & without_water["center"] & without_water["right"])
     return Evaluation(

@@ -12,7 +12,14 @@ from paani.arrays import F64, Bools
 from paani.config import CalibrationConfig, Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
-from paani_services.advisor.tracker import TrackerState, current_urgency, is_accepted, is_immediate_danger, presence
+from paani_services.advisor.tracker import (
+    TrackerState,
+    current_urgency,
+    is_accepted,
+    is_confirmed,
+    is_immediate_danger,
+    presence,
+)
 
 LANES = ("left", "center", "right")
 Truth = bool | Bools
@@ -27,7 +34,7 @@ class Obstacle(msgspec.Struct, frozen=True):
     """An accepted track as the policy weighs it; `presence` decays from 1 while it is not seen.
 
     is_danger: it is low and large in the picture (G5). exempt_lanes: lanes it does not occupy, because the mask shows
-    clear water across most of them.
+    clear water across most of them. distance_m: of its foot; None without a calibration.
     """
 
     id: int
@@ -38,6 +45,9 @@ class Obstacle(msgspec.Struct, frozen=True):
     presence: float
     is_danger: bool
     exempt_lanes: tuple[str, ...] = ()
+    is_person: bool = False
+    is_confirmed: bool = True
+    distance_m: float | None = None
 
 
 class LaneTerms(NamedTuple):
@@ -109,21 +119,28 @@ def severity(confidence: float, box: BoxXyxy) -> float:
     return clip(confidence * (NEAR_SHARE * near + TALL_SHARE * tall), 0.0, 1.0)
 
 
-def range_weight(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weights: RiskConfig) -> float:
-    """Weight of an obstacle by the range of its foot: 1 up to `near_m`, 0 from `far_m` on, linear between.
+def foot_range_m(box: BoxXyxy, aspect: float, calibration: CalibrationConfig) -> float | None:
+    """Range of a box's foot on level water, from a boat at rest; infinite above the horizon, None uncalibrated.
 
-    aspect: width of the picture over its height. The weight is 1 without a valid calibration, and where `far_m` is 0.
-    The range is that on level water from a boat at rest: one degree of pitch is an error of a fifth at 10 m.
+    aspect: width of the picture over its height. One degree of pitch is an error of a fifth at 10 m.
     """
-    if not calibration.valid or weights.far_m == 0.0:
-        return 1.0
+    if not calibration.valid:
+        return None
     focal = 0.5 * aspect / portable.tan(0.5 * math.radians(calibration.hfov_deg))  # heights of the picture
     horizon = calibration.centre_frac[1] - focal * portable.tan(math.radians(calibration.pitch_down_deg))
     # Of rays near the optical axis: range = height times focal length over how far below the horizon.
     below = box[3] - horizon
-    if below <= 0.0:
-        return 0.0
-    range_m = calibration.height_m * focal / below
+    return calibration.height_m * focal / below if below > 0.0 else math.inf
+
+
+def range_weight(box: BoxXyxy, aspect: float, calibration: CalibrationConfig, weights: RiskConfig) -> float:
+    """Weight of an obstacle by the range of its foot: 1 up to `near_m`, 0 from `far_m` on, linear between.
+
+    aspect: width of the picture over its height. The weight is 1 without a valid calibration, and where `far_m` is 0.
+    """
+    range_m = foot_range_m(box, aspect, calibration)
+    if range_m is None or weights.far_m == 0.0:
+        return 1.0
     return clip((weights.far_m - range_m) / (weights.far_m - weights.near_m), 0.0, 1.0)
 
 
@@ -160,12 +177,12 @@ def corridor_risk(non_water: Value, obstacle: Value, urgency: Value, uncertainty
 def obstacles_from_tracks(
     state: TrackerState, config: Config, aspect: float, water: dict[str, LaneEvidence]
 ) -> tuple[Obstacle, ...]:
-    """Obstacles: accepted tracks, confirmed or an immediate danger, that reach below the top of the corridors.
+    """Obstacles: accepted tracks, and people at first sight, that reach below the top of the corridors.
 
     aspect: width of the picture over its height. water: of each lane. The box of a quay that runs obliquely reaches its
     lower edge on one side only: where the metric planner acts, a quay occupies no lane that the mask shows clear.
     """
-    settings = config.advisor.tracker
+    settings, sees_people = config.advisor.tracker, config.advisor.people.use
     open_lanes: tuple[str, ...] = ()
     if config.is_planner_active:
         clear = 1.0 - config.advisor.policy.planned_coverage
@@ -184,9 +201,13 @@ def obstacles_from_tracks(
             presence=presence(track, state.at_us, settings),
             is_danger=is_immediate_danger(track.box, settings),
             exempt_lanes=open_lanes if track.label == "pier" else (),
+            is_person=track.label == "person",
+            is_confirmed=is_confirmed(track, settings),
+            distance_m=foot_range_m(track.box, aspect, config.calibration),
         )
         for track in state.tracks
-        if track.box[3] > config.perception.corridors.top and is_accepted(track, settings)
+        if track.box[3] > config.perception.corridors.top
+        and (is_accepted(track, settings) or (sees_people and track.label == "person"))
     )
 
 

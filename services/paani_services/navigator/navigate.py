@@ -136,7 +136,8 @@ def navigate(
     cross_m = setpoint.cross_track_m
     if inhibits:
         return _hold_integral(state, now_us), _build_command(state, inputs, now_us, inhibits, cross_m=cross_m, leg=leg)
-    heading_rad, speed_mps = setpoint.course_rad, setpoint.speed_mps
+    heading_rad, limit_mps = setpoint.course_rad, _speed_limit_mps(advisory)
+    speed_mps = min(setpoint.speed_mps, limit_mps)
     if direction in TURN_DIRECTIONS:
         state = _hold_integral(state, now_us)
         speed_mps *= config.turn_speed_frac
@@ -160,7 +161,7 @@ def navigate(
     if direction not in TURN_DIRECTIONS:
         is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= COURSE_TOLERANCE_RAD
         state = _integrate_cross_track(state, setpoint, odometry, now_us, config, is_on_course=is_on_course)
-    bounded_mps = limit_speed(mission.fence, odometry, heading_rad, speed_mps, config)
+    bounded_mps = limit_speed(mission.fence, odometry, heading_rad, min(speed_mps, limit_mps), config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, _build_command(
@@ -209,6 +210,13 @@ def _steer_planned(
     state = msgspec.structs.replace(state, planner_state=planner_state)
     is_path_free = plan.speed_mps > 0.0 or is_braking(planner_state, odometry, now_us, config.planner)
     return state, plan.heading_rad, plan.speed_mps, is_path_free
+
+
+def _speed_limit_mps(advisory: Advisory | None) -> float:
+    """The advised limit, which only ever lowers a speed; infinite where nothing is advised."""
+    if advisory is None or isinstance(advisory.speed_limit_mps, msgspec.UnsetType):
+        return math.inf
+    return advisory.speed_limit_mps
 
 
 def _is_turn_to_look(advisory: Advisory | None) -> bool:

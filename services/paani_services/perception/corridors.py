@@ -7,6 +7,7 @@ cells' scores before it; of any other output, the pixel right of and below the c
 from typing import NamedTuple
 
 import cv2
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from paani.messages import LaneEvidence
 CELL_PX, CELL_MIDDLE_PX = 4, 2  # side of a cell, and the pixel of it that is taken
 MIN_CELL_ROWS = 32  # output with fewer rows than this many cells have consists of cells already
 MIN_VISIBLE_FRAC = 0.5  # a corridor of which less is visible is unknown, and so blocked
+BOW_ROWS_FRAC = 0.2  # of the picture, from its lower edge: where water begins that the boat floats in
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
 # Specks are glints of the sun near the boat: regions of at most this many cells, whose top lies in the lowest third of
 # the picture. Two or three cells there are 0.15 m seen from 1 m, and no swimmer's head seen from 5 m.
@@ -66,6 +68,9 @@ def summarise_corridors(
     rows = overlap_fractions(mask.shape[0], corridors.top, 1.0)
     visible = (np.ones(mask.shape, np.float32) if visible_frac is None else visible_frac).astype(np.float64)
     water = (mask == WATER) * visible
+    is_way = None
+    if corridors.open_water:
+        is_way = measure_open_depth(mask, visible.astype(np.float32)) >= corridors.min_depth
     return CorridorEvidence(
         *(
             _summarise_corridor(
@@ -75,6 +80,7 @@ def summarise_corridors(
                 rows,
                 overlap_fractions(mask.shape[1], *span),
                 corridors.clear_column,
+                is_way,
             )
             for span in (corridors.left, corridors.center, corridors.right)
         )
@@ -93,6 +99,28 @@ def find_water_edge(mask: U8, visible_frac: F32) -> tuple[float, ...]:
     lowest = height - is_end[::-1].argmax(axis=0)  # its lower edge, in cells from the top
     edge = np.where(is_end.any(axis=0), lowest, np.where(hull.all(axis=0), height, 0))
     return tuple((edge / height).tolist())
+
+
+def measure_open_depth(mask: U8, visible_frac: F32) -> NDArray[np.float64]:
+    """For each column, how far the water connected with the bow goes without a break, of the picture's height: [w].
+
+    Connected with the bow is the water that meets the lowest `BOW_ROWS_FRAC` of the picture. What lies below its lowest
+    cell there is the boat's own bow, or floats before it. Specks count as water.
+    """
+    height = mask.shape[0]
+    hull = visible_frac < MIN_VISIBLE_FRAC
+    is_water = ~_remove_specks((mask != WATER) & ~hull) & ~hull
+    _, region_of = cv2.connectedComponents(is_water.astype(np.uint8), connectivity=4)
+    start = height - max(1, round(BOW_ROWS_FRAC * height))
+    at_bow = np.unique(region_of[start:][is_water[start:]])
+    connected = np.isin(region_of, at_bow) & is_water
+    from_below = connected[::-1]
+    first = from_below.argmax(axis=0)
+    rows = np.arange(height)[:, None]
+    is_break = ~from_below & (rows > first)
+    end = np.where(is_break.any(axis=0), is_break.argmax(axis=0), height)
+    is_met = from_below[: height - start].any(axis=0)
+    return np.asarray(np.where(is_met, (end - first) / height, 0.0), np.float64)
 
 
 def _remove_specks(is_end: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -117,6 +145,7 @@ def _summarise_corridor(
     rows: NDArray[np.float64],
     columns: NDArray[np.float64],
     clear_column: float,
+    is_way: NDArray[np.bool_] | None,
 ) -> LaneEvidence:
     visible_of_column = rows @ visible
     total = float(visible_of_column @ columns)
@@ -125,13 +154,19 @@ def _summarise_corridor(
     water_of_column = rows @ water
     non_water = 1.0 - float(water_of_column @ columns) / total  # E4
     uncertainty = 1.0 - float(rows @ confidence @ columns) / total  # E5
-    longest = run = 0.0
     clear = (visible_of_column > 0.0) & (water_of_column >= (clear_column - 1e-12) * visible_of_column)
-    for is_clear, width in zip(clear.tolist(), columns.tolist(), strict=True):
-        run = run + width if width > 0.0 and is_clear else 0.0
-        longest = max(longest, run)
     return LaneEvidence(
         non_water=min(1.0, max(0.0, non_water)),
         uncertainty=min(1.0, max(0.0, uncertainty)),
-        clear_width=min(1.0, longest / float(columns.sum())),  # E6
+        clear_width=_widest_run(clear, columns),  # E6
+        open_width=msgspec.UNSET if is_way is None else _widest_run(is_way, columns),
     )
+
+
+def _widest_run(is_clear: NDArray[np.bool_], columns: NDArray[np.float64]) -> float:
+    """The widest run of clear columns, as a fraction of the corridor's width."""
+    longest = run = 0.0
+    for clear, width in zip(is_clear.tolist(), columns.tolist(), strict=True):
+        run = run + width if width > 0.0 and clear else 0.0
+        longest = max(longest, run)
+    return min(1.0, longest / float(columns.sum()))

@@ -1,6 +1,14 @@
 """Configuration: one frozen tree, layered from defaults, a file, the environment and the command line."""
 
-from paani.config.advisor import AdvisorConfig, MotionConfig, PolicyConfig, RiskConfig, TrackerConfig, TuningConfig
+from paani.config.advisor import (
+    AdvisorConfig,
+    MotionConfig,
+    PeopleConfig,
+    PolicyConfig,
+    RiskConfig,
+    TrackerConfig,
+    TuningConfig,
+)
 from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
@@ -43,6 +51,7 @@ __all__ = [
     "LocalizationConfig",
     "MotionConfig",
     "NavigatorConfig",
+    "PeopleConfig",
     "PerceptionConfig",
     "PlannerConfig",
     "PlantConfig",

@@ -89,6 +89,8 @@ class PolicyConfig(Section, frozen=True):
     occupancy_coverage: Fraction = 0.25  # J6
     planned_coverage: Fraction = 0.5  # J6 where the metric planner acts: half of the lane is left to look for a way in
     occupancy_frames: Size = 2  # J6
+    open_width: Fraction = 0.20  # of a lane; J5: none. A lane that shows a narrower way of connected water is blocked
+    not_water: Fraction = 0.80  # a lane of which more is no water is no way, where the mask tells open water
     dry: Fraction = 0.95  # a lane of which more is no water is blocked, as water alone is a risk of 0.7 at most
     center_vessel_area: Fraction = 0.04  # J7
     core_left: Fraction = 0.405  # J9
@@ -98,6 +100,22 @@ class PolicyConfig(Section, frozen=True):
     release_margin: Fraction = 0.08  # measured: 90 % of what the centre's risk changes by between frames
     clear_frames: Size = 2  # J10
     look_frames: FrameCount = 40  # 8 s at 5 Hz with no way free; then the boat turns where it is. 0: never (J5)
+
+
+class PeopleConfig(Section, frozen=True):
+    """What is done about people; `use=false` weighs them as anything else, as the paper does.
+
+    `ahead_m`, `slow_m`, `stop_m`: distances within which a person blocks the way ahead, limits the speed, and stops the
+    boat; they need a calibration. Without one everybody counts as near, and a box of `stop_height` stops the boat.
+    """
+
+    use: bool = True  # J1: a person is a box
+    ahead_m: Positive = 20.0  # half a minute at cruise
+    slow_m: Positive = 10.0
+    stop_m: Positive = 1.5
+    slow_mps: Positive = 0.3  # half of cruise: the boat stops within 0.4 m
+    stop_height: Fraction = 0.6  # of the picture
+    drift_frac: Fraction = 0.05  # of the picture, beside the centre: who is there may drift into the way
 
 
 class TuningConfig(Section, frozen=True):
@@ -120,4 +138,5 @@ class AdvisorConfig(Section, frozen=True):
     motion: MotionConfig = MotionConfig()
     risk: RiskConfig = RiskConfig()
     policy: PolicyConfig = PolicyConfig()
+    people: PeopleConfig = PeopleConfig()
     tuning: TuningConfig = TuningConfig()

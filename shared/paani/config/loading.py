@@ -67,9 +67,16 @@ def encode_config(config: Config) -> bytes:
 
 
 def decode_config(data: bytes) -> Config:
-    """Inverse of `encode_config`, of an earlier version too. Raises UserError."""
+    """Inverse of `encode_config`, of an earlier version too. Raises UserError.
+
+    Settings that the earlier version did not have take the value of the recorded profile.
+    """
     try:
-        return msgspec.convert(with_present_names(msgspec.json.decode(data, type=dict[str, object])), Config)
+        recorded = with_present_names(msgspec.json.decode(data, type=dict[str, object]))
+        profile, tree = recorded.get("profile"), dict[str, object]()
+        _merge(tree, PROFILES.get(profile, {}) if isinstance(profile, str) else {})
+        _merge(tree, recorded)
+        return msgspec.convert(tree, Config)
     except msgspec.MsgspecError as error:
         raise UserError(f"configuration: {error}") from error
 

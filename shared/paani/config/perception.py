@@ -76,6 +76,8 @@ class CorridorConfig(Section, frozen=True):
     center: tuple[Fraction, Fraction] = (0.31, 0.69)  # E3
     right: tuple[Fraction, Fraction] = (0.61, 0.97)  # E3
     clear_column: Fraction = 0.60  # E6
+    open_water: bool = True  # says how wide the connected water from the bow is in each; J5: it is not asked
+    min_depth: Fraction = 0.06  # of the picture: columns with less of it are no way
 
     def __post_init__(self) -> None:
         """A corridor has a width, and something lies below its top."""

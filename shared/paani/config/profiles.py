@@ -11,6 +11,7 @@ PAPER: dict[str, object] = {
         "rate_hz": 0.5,  # J17
         "concurrent": False,  # B4
         "intra_op_threads": 2,  # C14, D11
+        "corridors": {"open_water": False},  # J5: risk alone
         "follow_roll": False,  # E3: corridors are fixed in the picture
         "image_quality": {"enabled": False},  # J19
     },
@@ -25,11 +26,13 @@ PAPER: dict[str, object] = {
             "shape_change_hits": 1,  # I13
             "compensate_rotation": False,  # I19
         },
+        "people": {"use": False},  # J1
         "risk": {"far_m": 0.0},  # J1: by the picture alone
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
         "policy": {
             "side_change_margin": 0.0,  # J5: thresholds without memory
             "release_margin": 0.0,
+            "open_width": 0.0,
             "dry": 1.0,  # J5: risk alone
             "look_frames": 0,  # J5: no side, no motion
         },

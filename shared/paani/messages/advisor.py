@@ -224,7 +224,11 @@ class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Advisory(Message, frozen=True, kw_only=True):
-    """What the advisor advises, the evidence it used (J11), and what would change it."""
+    """What the advisor advises, the evidence it used (J11), and what would change it.
+
+    speed_limit_mps: not to be exceeded while somebody is near; unset while nobody is. people_ahead: tracks of people
+    who block the way ahead. person_distance_m: of the nearest of them, unset where no calibration tells it.
+    """
 
     direction: Direction
     reason: Reason
@@ -243,3 +247,6 @@ class Advisory(Message, frozen=True, kw_only=True):
     explanation: Text = ""
     counterfactual: Counterfactual = Counterfactual()
     purpose: Purpose = Purpose.UNSAID
+    speed_limit_mps: NonNegative | msgspec.UnsetType = msgspec.UNSET
+    people_ahead: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET
+    person_distance_m: NonNegative | msgspec.UnsetType = msgspec.UNSET

@@ -54,11 +54,16 @@ class Detection(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
-    """One corridor of the mask: non-water fraction N_j, uncertainty U_j and clear width, all of 1 (E4-E6)."""
+    """One corridor of the mask: non-water fraction N_j, uncertainty U_j and clear width, all of 1 (E4-E6).
+
+    open_width: the widest way of connected water from the bow outwards, as a fraction of the corridor's width; unset
+    where that is not asked.
+    """
 
     non_water: Unit = 1.0
     uncertainty: Unit = 1.0
     clear_width: Unit = 0.0
+    open_width: Unit | msgspec.UnsetType = msgspec.UNSET
 
 
 class InferenceTiming(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,0 +1,63 @@
+"""People in the picture: who blocks which corridor, and how fast the boat may go while somebody is near. Pure.
+
+A person is no obstacle to be weighed: one sighting blocks a corridor, whatever its risk is, for as long as the track is
+held. Distances are those of the box's foot where the camera is calibrated; without a calibration everybody is near.
+"""
+
+from collections.abc import Iterable
+
+from paani.config import Config
+from paani_services.advisor.risk import Obstacle, lane_span, shared_width
+
+MIN_GLIMPSE_PRESENCE = 0.5  # presence below which a person seen once, and no more, blocks nothing
+
+
+def people_in_lane(lane: str, obstacles: tuple[Obstacle, ...], config: Config) -> tuple[int, ...]:
+    """Indices of the people who block the lane: in it, about to drift into it, or so close that nothing is passed."""
+    if not config.advisor.people.use:
+        return ()
+    start, end = lane_span(lane, config.perception.corridors)
+    drift = config.advisor.people.drift_frac if lane == "center" else 0.0
+    span = (start - drift, end + drift)
+    return tuple(
+        i
+        for i, person in enumerate(obstacles)
+        if counts(person) and (is_close(person, config) or _is_in(person, lane, span, config))
+    )
+
+
+def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | None:
+    """The speed that must not be exceeded; None while nobody is within `slow_m`."""
+    people = config.advisor.people
+    is_near = people.use and any(
+        counts(person) and (person.distance_m is None or person.distance_m <= people.slow_m) for person in obstacles
+    )
+    return people.slow_mps if is_near else None
+
+
+def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> float | None:
+    """Distance of the nearest of these people; None without a calibration, or without people."""
+    known = [distance for i in ahead if (distance := obstacles[i].distance_m) is not None]
+    return min(known, default=None)
+
+
+def counts(obstacle: Obstacle) -> bool:
+    """Whether the obstacle is a person seen now, seen more than once, or glimpsed a moment ago."""
+    return obstacle.is_person and (obstacle.is_confirmed or obstacle.presence >= MIN_GLIMPSE_PRESENCE)
+
+
+def is_close(person: Obstacle, config: Config) -> bool:
+    """Whether the boat stops for the person: within `stop_m`, or a box in the way of `stop_height` and more."""
+    people = config.advisor.people
+    if shared_width(person.box, lane_span("center", config.perception.corridors)) <= 0.0:
+        return False
+    if person.distance_m is not None:
+        return person.distance_m <= people.stop_m
+    return person.box[3] - person.box[1] >= people.stop_height
+
+
+def _is_in(person: Obstacle, lane: str, span: tuple[float, float], config: Config) -> bool:
+    people = config.advisor.people
+    reach_m = people.ahead_m if lane == "center" else people.slow_m
+    is_within = person.distance_m is None or person.distance_m <= reach_m
+    return is_within and shared_width(person.box, span) > 0.0

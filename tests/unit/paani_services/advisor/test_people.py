@@ -1,0 +1,103 @@
+"""People and open water: whoever is in the way is never clear, and what shows no water is no way."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani import messages as m
+from paani.config import Config
+from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, box, lane, play, seeing
+
+STILL = (m.Direction.STOP, m.Direction.NO_DATA)
+BOLDNESS = {m.Direction.STOP: 0, m.Direction.LEFT: 1, m.Direction.RIGHT: 1, m.Direction.SLIGHT_LEFT: 2,
+            m.Direction.SLIGHT_RIGHT: 2, m.Direction.STRAIGHT: 3}  # fmt: skip
+MEETS = st.floats(0.32, 0.60)
+
+
+def boxes(label: m.Label) -> st.SearchStrategy[m.Detection]:
+    return st.builds(
+        lambda x, y, w, h, c: box(label, (x, y, min(1.0, x + w), min(1.0, y + h)), c),
+        st.floats(0.0, 0.9), st.floats(0.2, 0.8), st.floats(0.03, 0.4), st.floats(0.15, 0.5), st.floats(0.41, 1.0),
+    )  # fmt: skip
+
+
+LANES = st.builds(
+    lambda n, u, w: m.LaneEvidence(non_water=n, uncertainty=u, clear_width=1.0 - n, open_width=w),
+    st.floats(0.0, 1.0), st.floats(0.0, 0.3), st.floats(0.0, 1.0),
+)  # fmt: skip
+FRAMES = st.builds(
+    lambda left, center, right, things: msgspec.structs.replace(
+        CLEAR, left=left, center=center, right=right, detections=tuple(things)
+    ),
+    LANES, LANES, LANES, st.lists(boxes(m.Label.BUOY) | boxes(m.Label.VESSEL), max_size=3),
+)  # fmt: skip
+
+
+@given(FRAMES, MEETS, st.floats(0.05, 0.6), st.floats(0.41, 1.0))
+def test_one_picture_of_a_person_ahead_is_enough_to_leave_the_way(
+    frame: m.Evidence, x: float, height: float, confidence: float
+) -> None:
+    person = box(m.Label.PERSON, (x, 0.35, x + 0.08, 0.35 + height), confidence)
+    given_ = play([msgspec.structs.replace(frame, detections=(*frame.detections, person))])[1][0]
+    assert given_.direction is not m.Direction.STRAIGHT
+    assert "clear," not in given_.explanation
+    assert given_.people_ahead
+
+
+@given(FRAMES, boxes(m.Label.PERSON), st.integers(1, 3))
+def test_another_person_makes_no_advice_bolder_and_no_boat_faster(
+    frame: m.Evidence, person: m.Detection, count: int
+) -> None:
+    before = play([frame] * count)[1][-1]
+    after = play([msgspec.structs.replace(frame, detections=(*frame.detections, person))] * count)[1][-1]
+    assert BOLDNESS[after.direction] <= BOLDNESS[before.direction]
+    assert before.speed_limit_mps is msgspec.UNSET
+    assert after.speed_limit_mps in (PAANI.advisor.people.slow_mps, msgspec.UNSET)
+
+
+@given(FRAMES)
+def test_a_lane_without_connected_water_is_never_advised(frame: m.Evidence) -> None:
+    given_ = play([frame] * 3)[1][-1]
+    if given_.direction in STILL:
+        return
+    way = getattr(frame, m.SIDE_OF.get(given_.direction, "center"))
+    assert way.open_width >= PAANI.advisor.policy.open_width
+    assert way.non_water <= PAANI.advisor.policy.not_water
+
+
+@given(st.floats(0.0, 0.5), st.floats(0.0, 0.2), st.floats(0.5, 1.0))
+def test_open_water_with_nothing_ahead_is_straight_on(non_water: float, uncertainty: float, width: float) -> None:
+    water = m.LaneEvidence(non_water=non_water, uncertainty=uncertainty, clear_width=width, open_width=width)
+    frame = msgspec.structs.replace(CLEAR, left=water, center=water, right=water)
+    assert play([frame] * 3)[1][-1].direction is m.Direction.STRAIGHT
+
+
+def test_a_person_that_blinks_is_not_forgotten_while_the_track_is_held() -> None:
+    swimmer = seeing(box(m.Label.PERSON, (0.46, 0.4, 0.54, 0.6)))
+    advice = play([swimmer, swimmer, *[CLEAR] * 14])[1]
+    assert {given_.direction for given_ in advice[:15]}.isdisjoint({m.Direction.STRAIGHT})
+
+
+def test_the_sentence_says_what_was_decided_about_the_person() -> None:
+    swimmer = seeing(box(m.Label.PERSON, (0.46, 0.4, 0.54, 0.56)))
+    told = play([swimmer], CALIBRATED)[1][0]
+    assert told.explanation.startswith(f"Slow: swimmer ahead at about {told.person_distance_m:.0f} m, passing on the ")
+    near = play([seeing(box(m.Label.PERSON, (0.4, 0.3, 0.6, 1.0)))])[1][0]
+    assert near.direction is m.Direction.STOP
+    assert near.explanation.startswith("Stop: swimmer ahead, waiting. ")
+
+
+@pytest.mark.parametrize("config", [PAPER])
+def test_the_paper_weighs_a_person_as_anything_else(config: Config) -> None:
+    as_person, as_buoy = (
+        play([seeing(box(label, (0.46, 0.4, 0.54, 0.56)))] * 3, config)[1][-1]
+        for label in (m.Label.PERSON, m.Label.BUOY)
+    )
+    assert (as_person.direction, as_person.center) == (as_buoy.direction, as_buoy.center)
+    assert b"speed_limit" not in msgspec.json.encode(as_person)
+    closed = msgspec.structs.replace(lane(0.2), open_width=0.0)
+    frame = msgspec.structs.replace(CLEAR, left=closed, center=closed, right=closed)
+    assert play([frame], config)[1][-1].direction is m.Direction.STRAIGHT
