@@ -115,7 +115,7 @@ def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decisi
     return msgspec.structs.replace(
         decision,
         speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
-        people_ahead=tuple(facts.obstacles[i].id for i in ahead) if ahead else msgspec.UNSET,
+        people_ahead=tuple(facts.obstacles[i].id for i in ahead) if config.advisor.people.use else msgspec.UNSET,
         person_distance_m=msgspec.UNSET if distance_m is None or distance_m > MAX_AGE_S else distance_m,
     )
 

@@ -145,7 +145,9 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
         case Reason.MALFORMED_EVIDENCE:
             return "the evidence is malformed"
         case Reason.CENTER_CLEAR:
-            if any(track.label == "person" and track.id in center.track_ids for track in tracks):
+            if advisory.people_ahead == () and any(
+                track.label == "person" and track.id in center.track_ids for track in tracks
+            ):
                 return f"nobody is near in the way ahead, {centre}"
             return f"the way ahead is clear, {centre}"
         case Reason.TURN_RETAINED:
