@@ -227,7 +227,8 @@ class Advisory(Message, frozen=True, kw_only=True):
     """What the advisor advises, the evidence it used (J11), and what would change it.
 
     speed_limit_mps: not to be exceeded while somebody is near; unset while nobody is. people_ahead: tracks of people
-    who block the way ahead, unset where people are weighed as anything else. person_distance_m: of the nearest of them, unset where no calibration tells it.
+    who block the way ahead, unset where people are weighed as anything else.
+    person_distance_m: of the nearest of them, unset where no calibration tells it.
     """
 
     direction: Direction
