@@ -91,6 +91,8 @@ def _rows(fields: tuple[types.Field, ...]) -> str:
 def _default(field: types.Field) -> str:
     if field.required:
         return "required"
+    if field.default is msgspec.NODEFAULT and field.default_factory is msgspec.NODEFAULT:
+        return "unset"
     value = field.default if field.default is not msgspec.NODEFAULT else field.default_factory()
     return "as the type says" if isinstance(value, msgspec.Struct) else f"`{text_of(value)}`"
 

@@ -41,10 +41,10 @@ def test_one_picture_of_a_person_ahead_is_enough_to_leave_the_way(
     frame: m.Evidence, x: float, height: float, confidence: float
 ) -> None:
     person = box(m.Label.PERSON, (x, 0.35, x + 0.08, 0.35 + height), confidence)
-    given_ = play([msgspec.structs.replace(frame, detections=(*frame.detections, person))])[1][0]
-    assert given_.direction is not m.Direction.STRAIGHT
-    assert "clear," not in given_.explanation
-    assert given_.people_ahead
+    advisory = play([msgspec.structs.replace(frame, detections=(*frame.detections, person))])[1][0]
+    assert advisory.direction is not m.Direction.STRAIGHT
+    assert "clear," not in advisory.explanation
+    assert advisory.people_ahead
 
 
 @given(FRAMES, boxes(m.Label.PERSON), st.integers(1, 3))
@@ -60,10 +60,10 @@ def test_another_person_makes_no_advice_bolder_and_no_boat_faster(
 
 @given(FRAMES)
 def test_a_lane_without_connected_water_is_never_advised(frame: m.Evidence) -> None:
-    given_ = play([frame] * 3)[1][-1]
-    if given_.direction in STILL:
+    advisory = play([frame] * 3)[1][-1]
+    if advisory.direction in STILL:
         return
-    way = getattr(frame, m.SIDE_OF.get(given_.direction, "center"))
+    way = getattr(frame, m.SIDE_OF.get(advisory.direction, "center"))
     assert way.open_width >= PAANI.advisor.policy.open_width
     assert way.non_water <= PAANI.advisor.policy.not_water
 
@@ -78,13 +78,15 @@ def test_open_water_with_nothing_ahead_is_straight_on(non_water: float, uncertai
 def test_a_person_that_blinks_is_not_forgotten_while_the_track_is_held() -> None:
     swimmer = seeing(box(m.Label.PERSON, (0.46, 0.4, 0.54, 0.6)))
     advice = play([swimmer, swimmer, *[CLEAR] * 14])[1]
-    assert {given_.direction for given_ in advice[:15]}.isdisjoint({m.Direction.STRAIGHT})
+    assert {advisory.direction for advisory in advice[:15]}.isdisjoint({m.Direction.STRAIGHT})
 
 
 def test_the_sentence_says_what_was_decided_about_the_person() -> None:
     swimmer = seeing(box(m.Label.PERSON, (0.46, 0.4, 0.54, 0.56)))
-    told = play([swimmer], CALIBRATED)[1][0]
-    assert told.explanation.startswith(f"Slow: swimmer ahead at about {told.person_distance_m:.0f} m, passing on the ")
+    advisory = play([swimmer], CALIBRATED)[1][0]
+    assert advisory.explanation.startswith(
+        f"Slow: swimmer ahead at about {advisory.person_distance_m:.0f} m, passing on the "
+    )
     near = play([seeing(box(m.Label.PERSON, (0.4, 0.3, 0.6, 1.0)))])[1][0]
     assert near.direction is m.Direction.STOP
     assert near.explanation.startswith("Stop: swimmer ahead, waiting. ")
