@@ -15,6 +15,7 @@ from paani.bus.routing import open_router
 from paani.clock import Clock, WallClock
 from paani.config import Config
 from paani.errors import UserError
+from paani.log_limit import LogLimit
 
 Service = Callable[[Bus, Clock, Config], Awaitable[None]]
 ROUTER = "router"
@@ -27,7 +28,9 @@ def services() -> dict[str, Callable[[], Service]]:
 
 def run_service(name: str, config: Config) -> int:
     """Run one service until it ends or is told to stop. Exit codes: 0 stopped, 2 user's mistake, 1 crash."""
-    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {name} %(levelname)s %(message)s")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(LogLimit())
+    logging.basicConfig(handlers=[handler], level=logging.INFO, format=f"%(asctime)s {name} %(levelname)s %(message)s")
     try:
         asyncio.run(_serve(name, services()[name](), config))
     except UserError as error:

@@ -21,6 +21,8 @@ from paani.bus.session import open_client
 from paani.clock import Clock
 from paani.config import BusConfig
 from paani.health import HealthReporter
+from paani.heartbeat import Heartbeat
+from paani.runtime import runtime_dir
 
 T = TypeVar("T", bound=m.Message)
 MAX_PICTURE_BYTES = 16 << 20  # encoded; a 12-megapixel JPEG of the best quality is half of it
@@ -108,7 +110,8 @@ class Bus:
         """Declare this service alive, which means ready; start its pulse and its health report."""
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
         reporter = HealthReporter(self.user, self.inputs, self.drops, lambda: self.note_text)
-        tasks = [asyncio.create_task(self._report(reporter), name="health")]
+        heartbeat = Heartbeat(runtime_dir(self._config), self.user)
+        tasks = [asyncio.create_task(self._report(reporter, heartbeat), name="health")]
         if self.user in keys.VITAL_SERVICES:
             tasks.append(asyncio.create_task(self._beat(), name="pulse"))
         try:
@@ -116,6 +119,7 @@ class Bus:
         finally:
             for task in tasks:
                 task.cancel()
+            heartbeat.stopping()
             with contextlib.suppress(zenoh.ZError):
                 token.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
@@ -234,10 +238,12 @@ class Bus:
             publisher.put(m.Pulse(source_us=self._clock.now_us()))
             await asyncio.sleep(1.0 / topic.rate_hz)
 
-    async def _report(self, reporter: HealthReporter) -> None:
+    async def _report(self, reporter: HealthReporter, heartbeat: Heartbeat) -> None:
         publisher = self.publisher(keys.health(self.user))
+        await asyncio.to_thread(heartbeat.ready)
         while True:
             publisher.put(await asyncio.to_thread(reporter.report, self._clock.now_us()))
+            await asyncio.to_thread(heartbeat.beat)
             await asyncio.sleep(1.0)
 
 
