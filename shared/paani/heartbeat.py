@@ -14,7 +14,7 @@ FOLDER = "heartbeats"
 
 
 class Heartbeat:
-    """`ready` once, `beat` once a second while the event loop turns, `stopping` at the end. None of them ever fails."""
+    """`ready` once, then `beat` once a second while the event loop turns. Neither ever fails."""
 
     def __init__(self, runtime: Path, service: str) -> None:
         self._path = runtime / FOLDER / service
@@ -30,12 +30,6 @@ class Heartbeat:
         """It still is."""
         self._touch()
         self._notify("WATCHDOG=1")
-
-    def stopping(self) -> None:
-        """It ends in good order."""
-        with contextlib.suppress(OSError):
-            self._path.unlink(missing_ok=True)
-        self._notify("STOPPING=1")
 
     def _touch(self) -> None:
         with contextlib.suppress(OSError):  # a full disk stops no boat

@@ -89,7 +89,7 @@ def test_a_wheel_works_without_the_checkout(wheel: Path, tmp_path: Path, private
     assert "harbour" in run("paani", "world", "list")
     assert "J7" in run("paani", "claims", "J7")
     where = "import paani; from paani_services.dashboard.pages import load_static_files; "
-    place, pages = run("python", "-c", f"{where}print(paani.__file__, len(load_static_files('')))").split()
+    place, pages = run("python", "-c", f"{where}print(paani.__file__, len(load_static_files()))").split()
     assert place.startswith(str(home))
     assert int(pages) > 5
     sets = [word for setting in private_sets for word in ("--set", setting)]

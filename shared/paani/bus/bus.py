@@ -110,8 +110,7 @@ class Bus:
         """Declare this service alive, which means ready; start its pulse and its health report."""
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
         reporter = HealthReporter(self.user, self.inputs, self.drops, lambda: self.note_text)
-        heartbeat = Heartbeat(runtime_dir(self._config), self.user)
-        tasks = [asyncio.create_task(self._report(reporter, heartbeat), name="health")]
+        tasks = [asyncio.create_task(self._report(reporter), name="health")]
         if self.user in keys.VITAL_SERVICES:
             tasks.append(asyncio.create_task(self._beat(), name="pulse"))
         try:
@@ -119,7 +118,6 @@ class Bus:
         finally:
             for task in tasks:
                 task.cancel()
-            heartbeat.stopping()
             with contextlib.suppress(zenoh.ZError):
                 token.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
@@ -238,8 +236,9 @@ class Bus:
             publisher.put(m.Pulse(source_us=self._clock.now_us()))
             await asyncio.sleep(1.0 / topic.rate_hz)
 
-    async def _report(self, reporter: HealthReporter, heartbeat: Heartbeat) -> None:
+    async def _report(self, reporter: HealthReporter) -> None:
         publisher = self.publisher(keys.health(self.user))
+        heartbeat = Heartbeat(await asyncio.to_thread(runtime_dir, self._config), self.user)
         await asyncio.to_thread(heartbeat.ready)
         while True:
             publisher.put(await asyncio.to_thread(reporter.report, self._clock.now_us()))

@@ -19,26 +19,18 @@ def test_systemd_is_told_by_its_socket(tmp_path: Path, monkeypatch: pytest.Monke
         systemd.settimeout(5.0)
         monkeypatch.setenv("NOTIFY_SOCKET", address)
         heartbeat = Heartbeat(tmp_path, "advisor")
-        for act, text in (
-            (heartbeat.ready, b"READY=1"),
-            (heartbeat.beat, b"WATCHDOG=1"),
-            (heartbeat.stopping, b"STOPPING=1"),
-        ):
+        for act, text in ((heartbeat.ready, b"READY=1"), (heartbeat.beat, b"WATCHDOG=1")):
             act()
             assert systemd.recv(100) == text
 
 
-def test_the_file_is_young_while_the_process_lives_and_gone_after_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_young_while_the_process_lives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     heartbeat, path = Heartbeat(tmp_path, "advisor"), tmp_path / FOLDER / "advisor"
     heartbeat.ready()
     os.utime(path, (1.0, 1.0))
     heartbeat.beat()
     assert path.stat().st_mtime > 1e9
-    heartbeat.stopping()
-    assert not path.exists()
 
 
 def test_a_supervisor_that_is_gone_and_a_disk_that_is_full_stop_no_boat(
@@ -49,4 +41,3 @@ def test_a_supervisor_that_is_gone_and_a_disk_that_is_full_stop_no_boat(
     heartbeat = Heartbeat(tmp_path, "advisor")
     heartbeat.ready()
     heartbeat.beat()
-    heartbeat.stopping()
