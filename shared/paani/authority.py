@@ -14,6 +14,7 @@ import shutil
 from pathlib import Path
 
 from paani import keys
+from paani.certificates import BOARD_ROUTER, identities_of, listener_of, require_certificates
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani.link_access import LINK, Rule, allow, link_rules
@@ -39,8 +40,14 @@ def credentials_folder(config: BusConfig) -> Path:
 def ensure_credentials(config: BusConfig) -> Path:
     """One random password file per user (0600), made at the first start. Returns the folder.
 
-    Board and host have the same: the board makes it. Raises UserError on a host that has not got it.
+    Board and host have the same: the board makes it. Raises UserError on a host that has not got it. With certificates
+    (`bus.certificates`) nothing is made; raises UserError unless all that this side needs are there and in force.
     """
+    if config.certificates:
+        linking = (LINK,) if config.side is Side.HOST else ()
+        own = (*writers_on(config.side, config.graph), OBSERVER, *linking)
+        require_certificates(config, (*own, listener_of(config)))
+        return Path(config.certificates)
     folder, users = credentials_folder(config), users_in(config.graph)
     if not folder.is_dir() or {path.name for path in folder.iterdir()} != {*users, USERS_FILE}:
         if config.side is Side.HOST:
@@ -85,7 +92,9 @@ def access_control(config: BusConfig) -> dict[str, object]:
     topics, users = keys.topics_in(config.graph), (*writers_on(config.side, config.graph), OBSERVER)
     rules: list[Rule] = []
     policies: list[dict[str, object]] = []
-    subjects: list[dict[str, object]] = [{"id": user, "usernames": [user]} for user in users]
+    names = _names_of(config)
+    users = tuple(user for user in users if user in names)
+    subjects: list[dict[str, object]] = [{"id": user, **names[user]} for user in users]
 
     def rule(name: str, messages: list[str], flow: str, key_exprs: list[str]) -> str:
         rules.append(allow(name, messages, flow, key_exprs))
@@ -127,9 +136,10 @@ def access_control(config: BusConfig) -> dict[str, object]:
     if config.side is not Side.BOTH:
         crossing = link_rules(config.side, config.graph, prefix)
         rules += crossing
-        policies.append({"rules": [each["id"] for each in crossing], "subjects": [LINK]})
-        known = {"usernames": [LINK]} if config.side is Side.BOARD else {"zids": [board_router_id(config)]}
-        subjects.append({"id": LINK, **known})
+        known = _other_router(config, names)
+        if known:
+            policies.append({"rules": [each["id"] for each in crossing], "subjects": [LINK]})
+            subjects.append({"id": LINK, **known})
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -137,6 +147,26 @@ def access_control(config: BusConfig) -> dict[str, object]:
         "subjects": subjects,
         "policies": policies,
     }
+
+
+def _names_of(config: BusConfig) -> dict[str, dict[str, list[str]]]:
+    """By what a router knows each user; a user whose certificate was revoked is missing."""
+    users = users_in(config.graph)
+    if not config.certificates:
+        return {user: {"usernames": [user]} for user in users}
+    identities = identities_of(config)
+    names = {user: identities.common_name(user) for user in users}
+    return {user: {"cert_common_names": [name]} for user, name in names.items() if name}
+
+
+def _other_router(config: BusConfig, names: dict[str, dict[str, list[str]]]) -> dict[str, list[str]]:
+    """By what this side's router knows the other side's; empty where that was revoked."""
+    if config.side is Side.BOARD:
+        return names.get(LINK, {})
+    if not config.certificates:
+        return {"zids": [board_router_id(config)]}
+    name = identities_of(config).common_name(BOARD_ROUTER)
+    return {"cert_common_names": [name]} if name else {}
 
 
 def written_at(side: Side, user: str, graph: keys.Graph) -> tuple[str, ...]:

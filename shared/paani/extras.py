@@ -17,6 +17,7 @@ EXTRA_OF = {
     "onnx": "train",
     "ncnn": "ncnn",
     "shtab": "completion",
+    "cryptography": "certs",
     "dask": "cluster",
     "distributed": "cluster",
 }  # module -> extra

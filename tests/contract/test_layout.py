@@ -74,6 +74,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("from pynmeagps", "services/paani_services/sensors/"),
         ("from pyubx2", "services/paani_services/sensors/"),
         ("from mcap", "shared/paani/logs/"),
+        ("from cryptography", "services/paani_tools/certs/"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
     ],
 )

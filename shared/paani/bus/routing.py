@@ -10,6 +10,7 @@ import zenoh
 
 from paani.authority import USERS_FILE, access_control, board_router_id, ensure_credentials, password_of
 from paani.bus.session import RETRY, shared_settings, zenoh_config
+from paani.certificates import endpoint, router_settings
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani.link_access import LINK
@@ -22,15 +23,11 @@ ACCEPT_MS, MAX_PENDING = 1000, 1000
 
 def router_config(config: BusConfig) -> zenoh.Config:
     """A router that denies by default. The board's also listens at the link, where the host's connects as `LINK`."""
-    credentials = ensure_credentials(config)
-    user = LINK if config.side is Side.HOST else ROUTER
     return zenoh_config(
         {
             "mode": "router",
             "listen/endpoints": listening(config),
-            "transport/auth/usrpwd/user": user,
-            "transport/auth/usrpwd/password": password_of(config, user),
-            "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
+            **_identity(config),
             "access_control": access_control(config),
             # Strangers that connect and say nothing are dropped soon, and do not keep others waiting meanwhile.
             "transport/unicast/accept_timeout": ACCEPT_MS,
@@ -43,17 +40,31 @@ def router_config(config: BusConfig) -> zenoh.Config:
 
 def listening(config: BusConfig) -> list[str]:
     """Endpoints at which this side's router listens."""
-    return [config.router, config.link] if config.side is Side.BOARD else [config.router]
+    addresses = [config.router, config.link] if config.side is Side.BOARD else [config.router]
+    return [endpoint(config, address) for address in addresses]
+
+
+def _identity(config: BusConfig) -> dict[str, object]:
+    """How the router knows others, and who it is to the other side's: by certificates or by passwords."""
+    credentials = ensure_credentials(config)
+    if config.certificates:
+        return router_settings(config, LINK if config.side is Side.HOST else None)
+    user = LINK if config.side is Side.HOST else ROUTER
+    return {
+        "transport/auth/usrpwd/user": user,
+        "transport/auth/usrpwd/password": password_of(config, user),
+        "transport/auth/usrpwd/dictionary_file": str(credentials / USERS_FILE),
+    }
 
 
 def _link_settings(config: BusConfig) -> dict[str, object]:
     """The board's router is known by its id; the host's goes on trying to reach it, from the start and after a cut."""
     match config.side:
         case Side.BOARD:
-            return {"id": board_router_id(config)}
+            return {} if config.certificates else {"id": board_router_id(config)}
         case Side.HOST:
             return {
-                "connect/endpoints": [config.link],
+                "connect/endpoints": [endpoint(config, config.link)],
                 "connect/timeout_ms": -1,
                 "connect/exit_on_failure": False,
                 "connect/retry": RETRY,
@@ -78,23 +89,26 @@ def require_addresses(config: BusConfig) -> None:
         raise UserError(
             f"bus.link: not set (board and host meet at tcp/ADDRESS:PORT of the board; this is the {config.side})"
         )
-    for name, endpoint in zip(("bus.router", "bus.link"), listening(config), strict=False):
-        _require_free(name, endpoint)
+    for name, address in (("bus.router", config.router), ("bus.link", config.link)):
+        if address.startswith("tls/") and not config.certificates:
+            raise UserError(f"{name} {address}: needs certificates (`paani certs make`, then bus.certificates)")
+    for name, address in zip(("bus.router", "bus.link"), listening(config), strict=False):
+        _require_free(name, address)
     if config.side is Side.HOST:
         parse_endpoint("bus.link", config.link)
 
 
-def parse_endpoint(name: str, endpoint: str) -> tuple[str, str, int]:
+def parse_endpoint(name: str, address: str) -> tuple[str, str, int]:
     """Scheme, host and port of `tcp/<host>:<port>`. Raises UserError naming the setting."""
-    scheme, _, address = endpoint.partition("/")
-    host, _, port = address.rpartition(":")
+    scheme, _, place = address.partition("/")
+    host, _, port = place.rpartition(":")
     if scheme not in {"tcp", "tls"} or not host or not port.isdecimal():
-        raise UserError(f"{name} {endpoint}: expected tcp/<host>:<port>")
+        raise UserError(f"{name} {address}: expected tcp/<host>:<port>")
     return scheme, host, int(port)
 
 
-def _require_free(name: str, endpoint: str) -> None:
-    scheme, host, port = parse_endpoint(name, endpoint)
+def _require_free(name: str, address: str) -> None:
+    scheme, host, port = parse_endpoint(name, address)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -102,7 +116,7 @@ def _require_free(name: str, endpoint: str) -> None:
         except (OSError, OverflowError) as error:
             if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
                 raise UserError(
-                    f"{name} {endpoint}: in use by another program, perhaps another `paani up`: stop that, or "
+                    f"{name} {address}: in use by another program, perhaps another `paani up`: stop that, or "
                     f"choose another port (--set {name}={scheme}/{host}:{port + 1})"
                 ) from error
-            raise UserError(f"{name} {endpoint}: {error}") from error
+            raise UserError(f"{name} {address}: {error}") from error

@@ -8,7 +8,8 @@ import logging
 
 import zenoh
 
-from paani.authority import password_of
+from paani.authority import password_of, require_place
+from paani.certificates import client_settings, endpoint
 from paani.config import BusConfig
 
 LOG = logging.getLogger(__name__)
@@ -21,14 +22,21 @@ def client_config(config: BusConfig, user: str) -> zenoh.Config:
     """A client that speaks to one router and to nobody else."""
     settings: dict[str, object] = {
         "mode": "client",
-        "connect/endpoints": [config.router],
+        "connect/endpoints": [endpoint(config, config.router)],
         "connect/timeout_ms": 2000,
         "connect/retry": RETRY,
-        "transport/auth/usrpwd/user": user,
-        "transport/auth/usrpwd/password": password_of(config, user),
+        **_identity(config, user),
         **shared_settings(config),
     }
     return zenoh_config(settings)
+
+
+def _identity(config: BusConfig, user: str) -> dict[str, object]:
+    """Who this client is, by certificate or by password. Raises UserError."""
+    require_place(config, user)
+    if config.certificates:
+        return client_settings(config, user)
+    return {"transport/auth/usrpwd/user": user, "transport/auth/usrpwd/password": password_of(config, user)}
 
 
 def shared_settings(config: BusConfig) -> dict[str, object]:

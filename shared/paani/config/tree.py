@@ -38,6 +38,8 @@ class BusConfig(Section, frozen=True):
     side: Side = Side.BOTH  # which processes run here; `paani up --only` sets it
     # Where board and host meet (tcp/ADDRESS:PORT of the board): the board's router listens there, the host's connects.
     link: str = ""
+    # Folder of `paani certs make`: the bus is encrypted, and who speaks is told by certificate. Empty: by password.
+    certificates: str = ""
     runtime_dir: str = ""
     graph: Graph = Graph.SIMULATION  # set by the profiles `hil` and `hull` alone; it decides who may write what
     lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000  # a link that was silent for so long counts as cut

@@ -1,0 +1,1 @@
+"""`paani certs`: a small certificate authority for the processes of one boat."""

@@ -1,0 +1,88 @@
+"""`paani certs`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from paani.certificates import AUTHORITY, Identities, date_text, read_identities
+from paani.cli import add_config_arguments, config_from
+from paani.clock import WallClock
+from paani.extras import require_modules
+
+DAYS = 365
+MAX_DAYS = 3650
+RESTART = "in force with the next start of each router: end `paani up` on both machines, copy the folder, start again\n"
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 done, 1 `show` found one that is not valid now, 2 user's mistake."""
+    options = _parser().parse_args(argv)
+    folder: Path = options.folder
+    if options.action == "show":
+        return _show(read_identities(folder))
+    require_modules(f"certs {options.action}", "cryptography")
+    from paani_tools.certs import folder as certificates  # noqa: PLC0415  # only whoever makes some needs its library
+
+    now_us = WallClock().now_us()
+    if options.action == "make":
+        graph = config_from(options).bus.graph
+        identities = certificates.make(folder, graph, tuple(options.address), now_us, options.days)
+        sys.stdout.write(f"{folder}: {len(identities.holders)} certificates for the graph {graph}\n")
+        return 0
+    if options.action == "rotate":
+        certificates.rotate(folder, options.name, now_us, options.days)
+    else:
+        certificates.revoke(folder, options.name)
+    sys.stdout.write(f"{options.name}: {options.action}d; {RESTART}")
+    return 0
+
+
+def _show(identities: Identities) -> int:
+    now_s = WallClock().now_us() // 1_000_000
+    is_valid = True
+    for name, certificate in {AUTHORITY: identities.authority, **identities.holders}.items():
+        if now_s >= certificate.not_after_s:
+            state = "EXPIRED"
+        else:
+            state = "NOT YET VALID" if now_s < certificate.not_before_s else "valid"
+        is_valid = is_valid and state == "valid"
+        until = date_text(certificate.not_after_s)
+        sys.stdout.write(f"{f'{name}.{certificate.number}':<18} {state} until {until}  {certificate.sha256}\n")
+    for name, number in identities.revoked.items():
+        sys.stdout.write(f"{f'{name}.{number}':<18} REVOKED\n")
+    return 0 if is_valid else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="paani certs",
+        description="Make, renew and revoke the certificates by which a boat's processes know each other.",
+    )
+    actions = parser.add_subparsers(dest="action", required=True)
+    make = actions.add_parser(
+        "make", help="a new authority, and a certificate for each identity of the profile's graph"
+    )
+    make.add_argument(
+        "--address", action="append", default=[], metavar="ADDRESS", help="of a router on a network; may be repeated"
+    )
+    add_config_arguments(make)
+    rotate = actions.add_parser("rotate", help="a new certificate in place of the one in force")
+    rotate.add_argument("name", metavar="IDENTITY", help="or all: with a new authority, which retires every old one")
+    revoke = actions.add_parser("revoke", help="take an identity's rights; `rotate` gives it new ones")
+    revoke.add_argument("name", metavar="IDENTITY")
+    show = actions.add_parser("show", help="names, expiry and SHA-256; exit code 1 where one is not valid now")
+    for action in (make, rotate, revoke, show):
+        action.add_argument("--folder", type=Path, required=True, metavar="FOLDER", help="where the certificates lie")
+    for action in (make, rotate):
+        action.add_argument(
+            "--days", type=_days, default=DAYS, help=f"how long they are valid, 1 to {MAX_DAYS} (default: {DAYS})"
+        )
+    return parser
+
+
+def _days(text: str) -> int:
+    if not text.isascii() or not text.isdecimal() or not 1 <= int(text) <= MAX_DAYS:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected whole days, 1 to {MAX_DAYS}")
+    return int(text)
