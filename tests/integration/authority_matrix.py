@@ -246,6 +246,7 @@ def table(matrix: Matrix) -> str:
 def bus_in(folder: Path, graph: Graph, *, by_certificate: bool) -> BusConfig:
     """A bus of its own, by certificates or passwords that are made in the folder."""
     certificates = folder / "certificates"
+    folder.mkdir(exist_ok=True)
     if by_certificate:
         make(certificates, graph, (), WallClock().now_us(), 1)
     return BusConfig(

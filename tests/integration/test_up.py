@@ -19,9 +19,11 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import stopwatch_ms
-from paani.config import Config
+from paani.config import Config, load_config
+from paani.operator_key import KEY_FILE
 from paani_tools.up.log_files import MAX_BYTES
 from paani_tools.up.run_summary import STAGES
+from tests.integration.exposure import listening, places_of, readable_by_others
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 
@@ -96,10 +98,11 @@ def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ..
 
 
 def test_a_hung_process_is_started_again_and_ctrl_c_ends_all(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
-    """Meanwhile a log is kept bounded."""
+    """Meanwhile a log is kept bounded, only router and page listen, and no secret can be seen."""
     file = tmp_path / "s.json"
     up = Up(tmp_path, *words_of(private_sets, "--summary", str(file)))
     up.until(lambda: "http://127.0.0.1:" in up.out, READY_S)
+    require_closed(up, tmp_path / "runtime", private_sets)
     log = tmp_path / "runtime" / "logs" / "advisor.log"
     with log.open("ab") as child:
         child.write(bytes(MAX_BYTES + 1))
@@ -113,6 +116,25 @@ def test_a_hung_process_is_started_again_and_ctrl_c_ends_all(tmp_path: Path, pri
     assert up.process.wait(3.0) == 0
     assert up.children() == {}
     assert json.loads(file.read_text())["services"]["advisor"]["restarts"] == 1
+
+
+def require_closed(up: Up, runtime: Path, private_sets: tuple[str, ...]) -> None:
+    """Only the router and the page listen, on this machine alone, and nobody else can read a secret."""
+    bus = load_config(sets=private_sets)
+    places = {"router": {("127.0.0.1", port_of(bus.bus.router))}, "dashboard": {("127.0.0.1", bus.dashboard.port)}}
+    children = up.children()
+    for name, pid in {**children, "up": up.process.pid}.items():
+        assert listening(pid) == places.get(name, set()), name
+    assert readable_by_others(runtime) == set()
+    secrets = {path: path.read_text().strip() for path in (runtime / "credentials").iterdir() if path.name[0] != "."}
+    secrets[runtime / KEY_FILE] = (runtime / KEY_FILE).read_text().strip()
+    for path, secret in secrets.items():
+        assert len(secret) > 20, path
+        assert places_of(secret, [up.process.pid, *children.values()], runtime / "logs") == set(), path
+
+
+def port_of(endpoint: str) -> int:
+    return int(endpoint.rpartition(":")[2])
 
 
 def test_no_orphan_survives_a_killed_supervisor(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
