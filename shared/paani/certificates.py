@@ -24,6 +24,7 @@ from paani.sides import Side
 
 INDEX_FILE = "identities.json"
 AUTHORITY = "authority"
+ALL = "all"  # in place of an identity: each of them, and the authority
 # What listens: clients are told nothing by it but that the authority signed it for this address.
 BOARD_ROUTER, HOST_ROUTER = "board_router", "host_router"
 LISTENERS = (BOARD_ROUTER, HOST_ROUTER)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import shutil
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import msgspec
 import pytest
+import zenoh
 from msgspec.structs import replace
 
 from paani import keys
@@ -17,6 +19,7 @@ from paani import messages as m
 from paani.authority import OBSERVER, ensure_credentials
 from paani.bus import Bus, open_bus
 from paani.bus.routing import open_router
+from paani.bus.session import client_config
 from paani.certificates import BOARD_ROUTER, HOST_ROUTER, INDEX_FILE, read_identities
 from paani.clock import WallClock
 from paani.config import BusConfig
@@ -94,20 +97,24 @@ async def refused(config: BusConfig, user: str) -> None:
 
 
 async def silent_beside(config: BusConfig, user: str, old: BusConfig) -> None:
-    """With the old certificates `user` is not heard where the controller of today is."""
+    """With the old certificates `user` is not heard, and hears nothing, where the controller of today is heard."""
     async with joined(config, OBSERVER) as observer, joined(config, "controller") as controller:
         heard = observer.latest(keys.THRUST)
         own = controller.publisher(keys.THRUST)
         async with joined(old, user) as stale:
             await until(lambda: heard.received > 2, lambda: own.put(thrust()))
+            hidden = stale.latest(keys.THRUST)
             drops = sum(observer.drops.values())
             received = heard.received
+            await asyncio.sleep(0.3)  # a subscriber is known to its publisher only a moment after it was declared
             for _ in range(20):
+                own.put(thrust())
                 put_raw(stale, keys.THRUST.name, b"{}")
                 put_raw(stale, f"health/{user}", b"{}")
             own.put(thrust())
             await until(lambda: heard.received > received, lambda: None)
             assert sum(observer.drops.values()) == drops
+            assert (hidden.received, dict(stale.drops)) == (0, {})
 
 
 async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> None:
@@ -122,6 +129,26 @@ async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> N
         await refused(passwords, "controller")
     async with routing(other):
         await refused(config, "controller")
+
+
+@pytest.mark.parametrize("shown", [None, "another authority's", "our router's"])
+async def test_who_trusts_our_authority_must_show_a_clients_certificate_of_it(
+    config: BusConfig, other: BusConfig, shown: str | None
+) -> None:
+    """What an eavesdropper can have: the authority's certificate, which is no secret."""
+    theirs = Path(other.certificates) / "controller.1"
+    ours = Path(config.certificates) / f"{HOST_ROUTER}.1"
+    stranger = client_config(config, "controller")
+    tls: dict[str, object] = {"root_ca_certificate": str(Path(config.certificates) / "authority.1.pem")}
+    if shown is not None:
+        stem = theirs if shown.startswith("another") else ours
+        tls |= {"connect_certificate": f"{stem}.pem", "connect_private_key": f"{stem}.key", "enable_mtls": True}
+    stranger.insert_json5("transport/link/tls", json.dumps(tls))
+    async with routing(config):
+        async with joined(config, "controller"):
+            pass
+        with pytest.raises(zenoh.ZError):
+            await asyncio.to_thread(lambda: zenoh.open(stranger))
 
 
 async def test_a_rotated_certificate_retires_the_one_before(config: BusConfig, old: BusConfig) -> None:

@@ -16,7 +16,7 @@ import msgspec
 from msgspec.structs import replace
 
 from paani.authority import users_in
-from paani.certificates import AUTHORITY, INDEX_FILE, LISTENERS, Certificate, Identities, read_identities
+from paani.certificates import ALL, AUTHORITY, INDEX_FILE, LISTENERS, Certificate, Identities, read_identities
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.runtime import write_private
@@ -24,7 +24,6 @@ from paani.whole_file import new_folder
 from paani_tools.certs.issue import Issued, Signer, make_authority, make_client, make_listener, read_signer
 
 AUTHORITY_LIVES = 10  # times as long as what it signs, so that one identity can be rotated alone for years
-ALL = "all"
 
 
 def names_in(graph: Graph) -> tuple[str, ...]:

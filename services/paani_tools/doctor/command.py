@@ -9,7 +9,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.whole_file import indented_json
 from paani_tools.doctor.devices import check_camera, check_serial
 from paani_tools.doctor.finding import Check, State, finding_text, run_check
-from paani_tools.doctor.machine import check_clock, check_disk, check_permissions
+from paani_tools.doctor.machine import check_certificates, check_clock, check_disk, check_permissions
 from paani_tools.doctor.network import check_page, check_router
 from paani_tools.doctor.software import check_gl, check_models, check_versions
 
@@ -24,6 +24,7 @@ CHECKS: dict[str, Check] = {
     "clock": check_clock,
     "disk": check_disk,
     "permissions": check_permissions,
+    "certificates": check_certificates,
 }
 
 

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import paani
+from paani.authority import ensure_credentials
+from paani.certificates import ALL, date_text, identities_of
 from paani.clock import WallClock
 from paani.config import Config
 from paani.runtime import runtime_path
@@ -18,6 +20,7 @@ from paani_tools.doctor.finding import Verdict, failed, passed, warned
 from paani_tools.up.log_files import MAX_BYTES
 
 MIB = 1 << 20
+EXPIRES_SOON_S = 14 * 86_400.0
 LOG_FILES = 2  # of each process
 ROOMY_MIB = 1024.0  # less is told before it hurts
 TIMEX_BYTES = 208  # struct timex of Linux, 64 bits; more than enough for 32
@@ -106,6 +109,21 @@ def check_permissions(config: Config) -> Iterator[Verdict]:
         yield failed(f"others may read {', '.join(str(path) for path in others[:3])}", f"chmod -R go-rwx {folder}")
     else:
         yield passed(f"bus.runtime_dir {folder}: for its owner alone")
+
+
+def check_certificates(config: Config) -> Iterator[Verdict]:
+    """What this side's processes need of `bus.certificates` is there, private and in force; the first to expire."""
+    folder = config.bus.certificates
+    if not folder:
+        yield passed("bus.certificates: not set; processes sign in by password")
+        return
+    ensure_credentials(config.bus)
+    name, first = min(identities_of(config.bus).holders.items(), key=lambda item: item[1].not_after_s)
+    text = f"bus.certificates {folder}: {name}.{first.number} is the first to expire, {date_text(first.not_after_s)}"
+    if first.not_after_s - WallClock().now_us() * 1e-6 < EXPIRES_SOON_S:
+        yield warned(text, f"paani certs rotate {ALL} --folder {folder}, before the next trip")
+    else:
+        yield passed(text)
 
 
 def _is_open(path: Path) -> bool:

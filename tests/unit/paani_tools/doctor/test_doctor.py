@@ -14,8 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from paani.clock import WallClock
 from paani.config import Config, load_config
+from paani.keys import Graph
 from paani_models import catalogue
+from paani_tools.certs import folder as certificates
 from paani_tools.doctor.command import CHECKS, main
 from paani_tools.doctor.finding import Finding, State, Verdict, run_check
 from paani_tools.doctor.machine import TIME_ERROR, judge_clock
@@ -203,3 +206,15 @@ def test_every_line_is_one_line_and_says_what_to_do(capsys: pytest.CaptureFixtur
     lines = capsys.readouterr().out.splitlines()
     assert {line.split()[1] for line in lines} == {"camera", "disk", "versions"}
     assert all(" -> " in line for line in lines if not line.startswith("ok"))
+
+
+@pytest.mark.parametrize(("days", "state"), [(30, State.OK), (7, State.WARN)])
+def test_certificates_that_expire_soon_are_told(tmp_path: Path, days: int, state: State) -> None:
+    folder = tmp_path / "certs"
+    certificates.make(folder, Graph.SIMULATION, (), WallClock().now_us(), days)
+    sets = (f"bus.certificates={folder}",)
+    assert only(examine("certificates", sets)).state is state
+    (folder / "controller.1.key").unlink()
+    finding = only(examine("certificates", sets))
+    assert finding.state is State.FAIL
+    assert "controller.1.key: No such file" in finding.text
