@@ -224,9 +224,9 @@ def table(matrix: Matrix) -> str:
     own = Counter(topic.producer for topic in topics)
     effects: Counter[tuple[str, str, bool]] = Counter()
     for topic in topics:
-        said = {pair for (_, name), pairs in matrix.heard.items() if name == topic.name for pair in pairs}
+        written = {pair for (_, name), pairs in matrix.heard.items() if name == topic.name for pair in pairs}
         answered = {user for (_, name), users in matrix.answers.items() if name == topic.name for user in users}
-        for user, what in (*said, *((user, "answer") for user in answered)):
+        for user, what in (*written, *((user, "answer") for user in answered)):
             effects[user, what, user == topic.producer] += 1
     strays = Counter(writer for writer, _ in matrix.stray)
     lines = [

@@ -114,7 +114,7 @@ async def silent_beside(config: BusConfig, user: str, old: BusConfig) -> None:
             own.put(thrust())
             await until(lambda: heard.received > received, lambda: None)
             assert sum(observer.drops.values()) == drops
-            assert (hidden.received, dict(stale.drops)) == (0, {})
+            assert hidden.received == 0
 
 
 async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> None:
@@ -131,24 +131,26 @@ async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> N
         await refused(config, "controller")
 
 
-@pytest.mark.parametrize("shown", [None, "another authority's", "our router's"])
+@pytest.mark.parametrize("presented", [None, "another authority's", "our router's"])
 async def test_who_trusts_our_authority_must_show_a_clients_certificate_of_it(
-    config: BusConfig, other: BusConfig, shown: str | None
+    config: BusConfig, other: BusConfig, presented: str | None
 ) -> None:
     """What an eavesdropper can have: the authority's certificate, which is no secret."""
-    theirs = Path(other.certificates) / "controller.1"
-    ours = Path(config.certificates) / f"{HOST_ROUTER}.1"
-    stranger = client_config(config, "controller")
-    tls: dict[str, object] = {"root_ca_certificate": str(Path(config.certificates) / "authority.1.pem")}
-    if shown is not None:
-        stem = theirs if shown.startswith("another") else ours
-        tls |= {"connect_certificate": f"{stem}.pem", "connect_private_key": f"{stem}.key", "enable_mtls": True}
-    stranger.insert_json5("transport/link/tls", json.dumps(tls))
+    ours, theirs = Path(config.certificates), Path(other.certificates)
+
+    def enter(stem: Path | None) -> None:
+        settings = client_config(config, "controller")
+        tls: dict[str, object] = {"root_ca_certificate": str(ours / "authority.1.pem")}
+        if stem is not None:
+            tls |= {"connect_certificate": f"{stem}.pem", "connect_private_key": f"{stem}.key", "enable_mtls": True}
+        settings.insert_json5("transport/link/tls", json.dumps(tls))
+        zenoh.open(settings).close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+    stems = {None: None, "another authority's": theirs / "controller.1", "our router's": ours / f"{HOST_ROUTER}.1"}
     async with routing(config):
-        async with joined(config, "controller"):
-            pass
+        await asyncio.to_thread(enter, ours / "controller.1")
         with pytest.raises(zenoh.ZError):
-            await asyncio.to_thread(lambda: zenoh.open(stranger))
+            await asyncio.to_thread(enter, stems[presented])
 
 
 async def test_a_rotated_certificate_retires_the_one_before(config: BusConfig, old: BusConfig) -> None:
