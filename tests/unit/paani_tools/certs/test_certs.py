@@ -183,6 +183,6 @@ def test_without_the_extra_making_is_one_line_and_showing_goes_on(tmp_path: Path
     refused = run("rotate", "advisor")
     assert refused.returncode == 2
     assert refused.stderr == "paani: certs rotate needs cryptography, not installed here: pip install 'paani[certs]'\n"
-    shown = run("show")
-    assert shown.returncode == 0
-    assert "controller.1" in shown.stdout
+    listed = run("show")
+    assert listed.returncode == 0
+    assert "controller.1" in listed.stdout
