@@ -18,8 +18,6 @@ EXTRA_OF = {
     "ncnn": "ncnn",
     "shtab": "completion",
     "cryptography": "certs",
-    "dask": "cluster",
-    "distributed": "cluster",
 }  # module -> extra
 
 
