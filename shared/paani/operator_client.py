@@ -17,24 +17,27 @@ HOLD_S = 1.2  # a little over the least that arms
 
 
 class OperatorClient:
-    """A client that is named by the user of its bus. Requests are said again until they are answered."""
+    """A client that is named by the user of its bus. Requests are said again until they are answered.
+
+    `states`: the operator's state, for one reader who awaits each; the client itself only looks at the newest.
+    """
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self.name, self._clock = bus.user, clock
         self._requests = bus.publisher(keys.REQUESTS[bus.user])
-        self._state = bus.latest(keys.OPERATOR_STATE)
+        self.states = bus.latest(keys.OPERATOR_STATE)
 
     @property
     def state(self) -> m.OperatorState | None:
         """What the operator's process said last; None where that is too long ago to be true still."""
-        return self._state.value if self._state.receipt_age_s() <= keys.OPERATOR_STATE.fresh_s else None
+        return self.states.value if self.states.receipt_age_s() <= keys.OPERATOR_STATE.fresh_s else None
 
     async def stop(self, timeout_s: float) -> m.OperatorState | None:
         """Ask for STOP; the state in which it is latched, or None where nobody has answered in time."""
         begun_us = self._clock.now_us()
 
         def is_latched(state: m.OperatorState) -> bool:
-            return state.stopped and self._state.received_us >= begun_us
+            return state.stopped and self.states.received_us >= begun_us
 
         return await self._ask(m.RequestAct.STOP, 0, is_latched, timeout_s)
 

@@ -9,8 +9,6 @@ from pathlib import Path
 from paani.config import BusConfig
 from paani.errors import UserError
 
-LATCH_FILE = "stop-latch"
-
 
 def runtime_path(config: BusConfig) -> Path:
     """Where the folder is to be: `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder."""

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import json
 import shutil
-from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import msgspec
@@ -17,7 +16,7 @@ from msgspec.structs import replace
 from paani import keys
 from paani import messages as m
 from paani.authority import OBSERVER, ensure_credentials
-from paani.bus import Bus, open_bus
+from paani.bus import open_bus
 from paani.bus.routing import open_router
 from paani.bus.session import client_config
 from paani.certificates import BOARD_ROUTER, HOST_ROUTER, INDEX_FILE, read_identities
@@ -26,38 +25,14 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.sides import Side
 from paani_tools.certs import folder as certificates
+from tests.bus_peers import joined, routing, until
 from tests.conftest import find_free_port, put_raw
 from tests.integration.authority_matrix import bus_in
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
+JOIN_S = 10.0
 ENTER_S = 4.0  # two attempts of a client
-
-
-@contextlib.asynccontextmanager
-async def routing(config: BusConfig) -> AsyncIterator[None]:
-    router = await open_router(config)
-    try:
-        yield
-    finally:
-        await asyncio.to_thread(router.close)
-
-
-@contextlib.asynccontextmanager
-async def joined(config: BusConfig, user: str) -> AsyncIterator[Bus]:
-    async with asyncio.timeout(10.0):
-        bus = await open_bus(config, user, CLOCK)
-    try:
-        yield bus
-    finally:
-        await bus.close()
-
-
-async def until(condition: Callable[[], bool], act: Callable[[], object]) -> None:
-    async with asyncio.timeout(10.0):
-        while not condition():
-            act()
-            await asyncio.sleep(0.02)
 
 
 def thrust() -> m.Thrust:
@@ -98,10 +73,10 @@ async def refused(config: BusConfig, user: str) -> None:
 
 async def silent_beside(config: BusConfig, user: str, old: BusConfig) -> None:
     """With the old certificates `user` is not heard, and hears nothing, where the controller of today is heard."""
-    async with joined(config, OBSERVER) as observer, joined(config, "controller") as controller:
+    async with joined(config, OBSERVER, JOIN_S) as observer, joined(config, "controller", JOIN_S) as controller:
         heard = observer.latest(keys.THRUST)
         own = controller.publisher(keys.THRUST)
-        async with joined(old, user) as stale:
+        async with joined(old, user, JOIN_S) as stale:
             await until(lambda: heard.received > 2, lambda: own.put(thrust()))
             hidden = stale.latest(keys.THRUST)
             drops = sum(observer.drops.values())
@@ -123,7 +98,7 @@ async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> N
     passwords = replace(config, certificates="")
     await asyncio.to_thread(ensure_credentials, passwords)
     async with routing(config):
-        async with joined(config, OBSERVER):
+        async with joined(config, OBSERVER, JOIN_S):
             pass
         await refused(other, "controller")
         await refused(passwords, "controller")
@@ -160,7 +135,7 @@ async def test_a_rotated_certificate_retires_the_one_before(config: BusConfig, o
         await silent_beside(config, "controller", old)
     await rotate(config, "all")
     async with routing(config):
-        async with joined(config, "controller"):
+        async with joined(config, "controller", JOIN_S):
             pass
         await refused(old, "controller")
         await refused(old, "advisor")
@@ -173,7 +148,7 @@ async def test_a_revoked_identity_cannot_start_and_its_old_certificate_has_no_ri
     async with routing(config):
         with pytest.raises(UserError, match=r"advisor has no certificate \(revoked\)"):
             await open_bus(config, "advisor", CLOCK)
-        async with joined(config, OBSERVER) as observer, joined(old, "advisor") as advisor:
+        async with joined(config, OBSERVER, JOIN_S) as observer, joined(old, "advisor", JOIN_S) as advisor:
             heard = observer.latest(keys.health("advisor"))
             await silent_beside(config, "advisor", old)
             put_raw(advisor, "health/advisor", b"{}")
@@ -196,8 +171,8 @@ async def test_board_and_host_know_each_other_by_certificate(config: BusConfig) 
         async with (
             routing(far),
             routing(host),
-            joined(far, "advisor") as advisor,
-            joined(host, OBSERVER) as on_host,
+            joined(far, "advisor", JOIN_S) as advisor,
+            joined(host, OBSERVER, JOIN_S) as on_host,
         ):
             seen, written = on_host.latest(keys.TRACKS), advisor.publisher(keys.TRACKS)
             tracks = m.Tracks(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=0, tracks=())

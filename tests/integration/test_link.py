@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +21,7 @@ from paani.errors import UserError
 from paani.link_access import LINK
 from paani.sides import Side
 from paani_services.router.picture_exchange import exchange_pictures
+from tests.bus_peers import joined, routing, until
 from tests.conftest import find_free_port, put_raw
 
 pytestmark = pytest.mark.integration
@@ -49,31 +49,6 @@ async def sides(tmp_path: Path) -> Sides:
     )
     await asyncio.to_thread(ensure_credentials, board)
     return Sides(board, host)
-
-
-@contextlib.asynccontextmanager
-async def routing(config: BusConfig) -> AsyncIterator[None]:
-    router = await open_router(config)
-    try:
-        yield
-    finally:
-        await asyncio.to_thread(router.close)
-
-
-@contextlib.asynccontextmanager
-async def joined(config: BusConfig, user: str) -> AsyncIterator[Bus]:
-    bus = await open_bus(config, user, CLOCK)
-    try:
-        yield bus
-    finally:
-        await bus.close()
-
-
-async def until(condition: Callable[[], bool], act: Callable[[], object] = lambda: None, limit_s: float = 10.0) -> None:
-    async with asyncio.timeout(limit_s):
-        while not condition():
-            act()
-            await asyncio.sleep(0.02)
 
 
 def tracks() -> m.Tracks:

@@ -16,7 +16,8 @@ from paani.bus import Bus, open_bus
 from paani.clock import WallClock
 from paani.config import Config
 from paani.operator_client import OperatorClient
-from paani.runtime import LATCH_FILE, runtime_dir
+from paani.runtime import runtime_dir
+from paani_services.operator.latch import LATCH_FILE
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]

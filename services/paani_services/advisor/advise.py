@@ -116,7 +116,7 @@ def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decisi
         decision,
         speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
         people_ahead=tuple(facts.obstacles[i].id for i in ahead) if config.advisor.people.use else msgspec.UNSET,
-        person_distance_m=msgspec.UNSET if distance_m is None or distance_m > MAX_AGE_S else distance_m,
+        person_distance_m=msgspec.UNSET if distance_m is None else distance_m,
     )
 
 

@@ -6,6 +6,7 @@ One sentence says what is advised and why, the next what would change it.
 import msgspec
 
 from paani.messages import (
+    INPUT_FAULTS,
     SIDE_OF,
     Advisory,
     ChangedBy,
@@ -42,13 +43,6 @@ UNUSABLE_TEXT = {
     UnusableCause.FROZEN: "is frozen",
     UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",
-}
-INPUT_FAULTS = {
-    Reason.STALE_EVIDENCE,
-    Reason.FUTURE_EVIDENCE,
-    Reason.UNUSABLE_IMAGE,
-    Reason.MALFORMED_EVIDENCE,
-    Reason.NO_EVIDENCE,
 }
 MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
 ALTERNATIVE_TEXT = {

@@ -22,6 +22,7 @@ from paani_services.dashboard.server import Server, serving
 from paani_services.dashboard.tuning import Tuner
 
 STATE_PERIOD_S = 0.1  # people read numbers no faster
+APPLIED_PERIOD_S = 0.5 / keys.THRUST_APPLIED.rate_hz  # every report: a zero is seen at once
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -44,8 +45,9 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
         feeds.append(forward_while_clients(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
-        feeds.append(forward_applied(hub, bus.latest(keys.THRUST_APPLIED), clock))
-        feeds.append(forward_operator(hub, bus.latest(keys.OPERATOR_STATE), clock))
+        applied = bus.latest(keys.THRUST_APPLIED)
+        feeds.append(forward(hub, keys.THRUST_APPLIED, applied, clock, APPLIED_PERIOD_S))
+        feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
         feeds.append(track_services(hub, bus, clock))
         running = [tasks.create_task(feed) for feed in feeds]
@@ -95,14 +97,6 @@ async def forward_while_clients(
         value = await inbox.next()
         hub.put(topic.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(period_s)
-
-
-async def forward_applied(hub: Hub, inbox: Latest[m.ThrustApplied], clock: Clock) -> None:
-    """Forward what the plant applies, twice as often as it says so: a zero is shown at once."""
-    while True:
-        value = await inbox.next()
-        hub.put(keys.THRUST_APPLIED.name, value, inbox.received_us, clock.now_us())
-        await asyncio.sleep(0.5 / keys.THRUST_APPLIED.rate_hz)
 
 
 async def forward_operator(hub: Hub, inbox: Latest[m.OperatorState], clock: Clock) -> None:

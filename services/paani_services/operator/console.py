@@ -9,9 +9,8 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Publisher
 from paani.clock import Clock
-from paani.runtime import LATCH_FILE
 from paani_services.operator import state as op
-from paani_services.operator.latch import read_latch, write_latch
+from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
 
 
 class Console:

@@ -8,6 +8,7 @@ from pathlib import Path
 from paani.runtime import write_private
 
 LOG = logging.getLogger(__name__)
+LATCH_FILE = "stop-latch"  # in the runtime folder
 
 
 def read_latch(path: Path) -> str | None:

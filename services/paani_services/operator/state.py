@@ -59,12 +59,11 @@ def initial_state(latch: str | None) -> Operator:
 
 def latch_stop(operator: Operator, client: str, now_us: int) -> Operator:
     """Latch a STOP, which ends every hold. A repeated one keeps the time of the first until that is confirmed."""
-    waiting = operator.stopped and operator.asked_us > 0 and operator.confirmed_us == 0
     held = operator.hold
     return Operator(
         by=client,
         stops=operator.stops + 1,
-        asked_us=operator.asked_us if waiting else now_us,
+        asked_us=operator.asked_us if awaits_zero(operator) else now_us,
         ended=operator.ended if held is None else Ended(held.client, held.press, m.ArmRefusal.STOPPED),
     )
 
@@ -125,11 +124,15 @@ def follow_station(operator: Operator, epoch: int, silent_s: float) -> Operator:
 
 def confirm_stop(operator: Operator, applied: m.ThrustApplied, now_us: int) -> Operator:
     """Confirm a STOP by the plant's first report that it applies zero thrust because nobody armed it."""
-    waiting = operator.stopped and operator.asked_us > 0 and operator.confirmed_us == 0
     is_still = applied.left == 0.0 and applied.right == 0.0 and applied.zero_cause is m.ZeroCause.NOT_ARMED
-    if waiting and is_still:
+    if awaits_zero(operator) and is_still:
         return replace(operator, confirmed_us=max(now_us, operator.asked_us + 1))
     return operator
+
+
+def awaits_zero(operator: Operator) -> bool:
+    """Whether a STOP of this process has not been confirmed by zero thrust yet."""
+    return operator.stopped and operator.asked_us > 0 and operator.confirmed_us == 0
 
 
 def is_silent(held: Hold, now_us: int) -> bool:

@@ -17,8 +17,10 @@ from paani.authority import OBSERVER, ensure_credentials
 from paani.bus import open_bus
 from paani.clock import Clock, WallClock, stopwatch_ms
 from paani.errors import UserError
-from paani.runtime import LATCH_FILE, runtime_dir, write_private
+from paani.runtime import runtime_dir, write_private
 from paani.sides import Side
+from paani_services.operator.latch import LATCH_FILE
+from paani_services.operator.state import CLEAR
 from paani_tools.up.arm import arm_once, page_line
 from paani_tools.up.collect import Collector
 from paani_tools.up.other_side import report_other_side
@@ -29,7 +31,6 @@ from paani_tools.up.supervise import RECORDER, ServiceFailed, Supervisor
 from paani_tools.up.terminal import Display
 
 READY_S = 120.0
-CLEAR = "clear\n"  # of the STOP latch
 PROGRESS_S = 0.2
 
 

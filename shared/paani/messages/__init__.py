@@ -6,6 +6,7 @@ A bounded field cannot carry NaN or infinity: JSON has neither, and the bounds r
 """
 
 from paani.messages.advisor import (
+    INPUT_FAULTS,
     SIDE_OF,
     Advisory,
     ChangedBy,
@@ -48,6 +49,7 @@ from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
 from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
 
 __all__ = [
+    "INPUT_FAULTS",
     "SIDE_OF",
     "Advisory",
     "ArmRefusal",

@@ -134,6 +134,17 @@ class Reason(StrEnum):
     NO_EVIDENCE = "NO_EVIDENCE"
 
 
+INPUT_FAULTS = frozenset(
+    {
+        Reason.STALE_EVIDENCE,
+        Reason.FUTURE_EVIDENCE,
+        Reason.UNUSABLE_IMAGE,
+        Reason.MALFORMED_EVIDENCE,
+        Reason.NO_EVIDENCE,
+    }
+)
+
+
 class LaneRisk(msgspec.Struct, frozen=True, kw_only=True):
     """Risk R_j of a corridor and the four components it was made from (J4), with the overrides that apply.
 

@@ -6,18 +6,9 @@ from collections.abc import Iterable
 
 import msgspec
 
-from paani.messages import SIDE_OF, Advisory, Direction, Reason
+from paani.messages import INPUT_FAULTS, SIDE_OF, Advisory, Direction
 
 STILL = (Direction.STOP, Direction.NO_DATA)
-FAULTS = frozenset(
-    {
-        Reason.STALE_EVIDENCE,
-        Reason.FUTURE_EVIDENCE,
-        Reason.UNUSABLE_IMAGE,
-        Reason.MALFORMED_EVIDENCE,
-        Reason.NO_EVIDENCE,
-    }
-)
 PAUSE_S = 5.0  # longer silence, a restart or time going backwards parts one run from the next
 
 
@@ -53,7 +44,7 @@ def dithering(advice: Iterable[Advisory]) -> Dithering:
         elapsed_us += gap_us
         if given.direction is not last.direction:
             changes += 1
-            interruptions += given.reason in FAULTS or last.reason in FAULTS
+            interruptions += given.reason in INPUT_FAULTS or last.reason in INPUT_FAULTS
         stop_go += (given.direction in STILL) is not (last.direction in STILL)
         turned = SIDE_OF.get(given.direction)
         side_flips += turned is not None and side is not None and turned != side

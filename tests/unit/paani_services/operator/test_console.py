@@ -10,10 +10,9 @@ from typing import Any
 from paani import messages as m
 from paani.clock import ManualClock
 from paani.keys import STATION
-from paani.runtime import LATCH_FILE
 from paani_services.operator import state as op
 from paani_services.operator.console import Console
-from paani_services.operator.latch import read_latch, write_latch
+from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
 
 EPOCH = 5
 
