@@ -84,6 +84,7 @@ class OnnxEngine:
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(file.parent))
         options.log_severity_level = 3
+        options.enable_cpu_mem_arena = options.enable_mem_pattern = False  # 30 MiB less, in the same time
 
         def open_session(model: str | bytes) -> Any:
             try:

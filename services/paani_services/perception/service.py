@@ -12,6 +12,7 @@ from paani.arrays import U8
 from paani.bus import Bus, Picture
 from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
+from paani.memory import release_freed_memory
 from paani.runtime import runtime_dir
 from paani_services.perception.journal import JOURNAL_FOLDER, Journal
 from paani_services.perception.pipeline import Perceiver
@@ -24,6 +25,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     evidence_publisher, mask_publisher = bus.publisher(keys.EVIDENCE), bus.picture_publisher(keys.MASK)
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
+    await loop.run_in_executor(worker, release_freed_memory)  # what loading the networks took: some 15 MiB
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)

@@ -13,8 +13,8 @@ from paani.clock import patience_us
 from paani.config import CameraConfig
 from paani.errors import UserError
 from paani.messages import TimeBase
+from paani_services.camera.own_pictures import encode_jpeg
 from paani_services.camera.picture_sources import Webcam, parse_webcam_index, play_frames, shrink_to_fit
-from paani_services.camera.service import encode_jpeg
 from tests.pictures import river
 
 FIXED = CameraConfig(rate_hz=5.0, loop=False)

@@ -1,0 +1,26 @@
+"""Numbers of the pictures that leave this process."""
+
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Numbering
+from paani.clock import Clock
+
+
+class PicturePublisher:
+    """Numbers the pictures and publishes them; each picture is a distinct frame."""
+
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._publisher, self._frames = bus.picture_publisher(keys.PICTURE), Numbering(clock)
+
+    def start_new_epoch(self) -> None:
+        """The source started again: frame numbers and stamps before do not compare with those that follow."""
+        self._publisher.new_epoch()
+        self._frames.new_epoch()
+
+    def put(self, data: bytes, header: m.PictureHeader) -> None:
+        """Publish one picture; its frame number and epoch are set here."""
+        self._frames.advance()
+        numbered = msgspec.structs.replace(header, frame_seq=self._frames.seq, frame_epoch=self._frames.epoch)
+        self._publisher.put_picture(numbered, data)
