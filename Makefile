@@ -14,18 +14,20 @@ PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
 DEBIAN_TEST := $(DEBIAN) chromium libatomic1
+# What tests/deploy builds and runs containers with.
+DEBIAN_DEPLOY := docker.io iptables debootstrap
 # What builds, emulates and checks the microcontroller's firmware: most of a gigabyte, which `make check` does without.
 DEBIAN_FIRMWARE := gcc-arm-none-eabi qemu-system-arm g++ cppcheck
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-.PHONY: run test test-long check lint docs firmware setup setup-test system system-test system-firmware lock dist sbom clean
+.PHONY: run test test-long check lint docs firmware containers containers-down setup setup-test system system-test system-firmware system-deploy lock dist sbom clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
-test: setup-test system-firmware lint ## everything that CI runs
+test: setup-test system-firmware system-deploy lint ## everything that CI runs
 	$(BIN)/python -m pytest -q -n 2 tests -m "not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
@@ -78,6 +80,15 @@ system-test:
 
 system-firmware:
 	@sh deploy/system-packages.sh $(DEBIAN_FIRMWARE)
+
+system-deploy:
+	@sh deploy/system-packages.sh $(DEBIAN_DEPLOY)
+
+containers: ## board and host in containers of this one machine; `make containers-down` ends them
+	@sh deploy/containers.sh up
+
+containers-down:
+	@sh deploy/containers.sh down
 
 lock: $(VENV)/release/.stamp ## pin what the next installation takes, with hashes of its files for every machine
 	$(COMPILE) pyproject.toml --extra dev -o requirements/dev.lock

@@ -22,7 +22,7 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
 
-ALONE = {"bench", "browser", "fault", "firmware", "integration", "link"}  # folders
+ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
 

@@ -72,7 +72,7 @@ def usage(commands: list[str], names: list[str]) -> str:
 def add_config_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that `config_from` reads."""
     parser.add_argument("--profile", choices=tuple(PROFILES), help="which set of constants (default: paani)")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML, or in JSON (FILE.json)")
     parser.add_argument(
         "--set",
         action="append",

@@ -9,13 +9,15 @@ import sys
 from pathlib import Path
 
 from paani.cli import add_config_arguments, config_from
+from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.option_paths import input_file, output_file, output_folder
 from paani.sides import Side
 from paani.whole_file import write_json
 from paani_tools.up.lifecycle import Outcome, run_plan
-from paani_tools.up.plan import make_plan
+from paani_tools.up.plan import complete_plan, make_plan
+from paani_tools.up.prepare import write_plan
 from paani_tools.up.run_summary import Report
 from paani_tools.up.terminal import Display
 
@@ -25,6 +27,9 @@ DOCTOR = "`paani doctor` says what this machine lacks"
 def main(argv: list[str]) -> int:
     """Exit codes: 0 it ran to its end, 1 a service could not be kept alive, 2 user's mistake."""
     options = _parser().parse_args(argv)
+    if options.prepare is not None:
+        asyncio.run(_prepare(options))
+        return 0
     outcome = asyncio.run(_up(options))
     sys.stdout.write(_result(outcome.report))
     if options.summary is not None:
@@ -81,9 +86,21 @@ def _result(report: Report) -> str:
 
 
 async def _up(options: argparse.Namespace) -> Outcome:
-    simulated = config_from(options).bus.graph is Graph.SIMULATION
+    plan = await make_plan(_config(options))
+    try:
+        return await run_plan(plan, options.seconds, Display(sys.stdout))
+    except UserError as error:
+        raise UserError(f"{error} ({DOCTOR})") from error
+
+
+async def _prepare(options: argparse.Namespace) -> None:
+    plan = await complete_plan(_config(options))
+    await asyncio.to_thread(write_plan, plan.config, options.prepare)
+
+
+def _config(options: argparse.Namespace) -> Config:
     sets = up_sets(
-        simulated=simulated,
+        simulated=config_from(options).bus.graph is Graph.SIMULATION,
         world=options.world,
         camera=options.camera,
         headless=options.headless,
@@ -92,11 +109,7 @@ async def _up(options: argparse.Namespace) -> Outcome:
         fence=options.fence,
         only=options.only,
     )
-    plan = await make_plan(config_from(options, sets))
-    try:
-        return await run_plan(plan, options.seconds, Display(sys.stdout))
-    except UserError as error:
-        raise UserError(f"{error} ({DOCTOR})") from error
+    return config_from(options, sets)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -106,6 +119,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--for", dest="seconds", type=seconds, metavar="SECONDS", help="stop after this long")
     parser.add_argument(
         "--summary", type=output_file("--summary"), metavar="FILE", help="write the run's figures as JSON"
+    )
+    parser.add_argument(
+        "--prepare",
+        type=output_file("--prepare"),
+        metavar="FILE",
+        help="start nothing: make what the processes need, and write their settings as JSON",
     )
     parser.add_argument(
         "--record", type=output_folder("--record"), metavar="DIR", help="record everything into this folder"

@@ -8,23 +8,20 @@ import functools
 import math
 import signal
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from paani import keys
 from paani import messages as m
-from paani.authority import OBSERVER, ensure_credentials
+from paani.authority import OBSERVER
 from paani.bus import open_bus
 from paani.clock import Clock, WallClock, stopwatch_ms
 from paani.errors import UserError
-from paani.runtime import runtime_dir, write_private
 from paani.sides import Side
-from paani_services.operator.latch import LATCH_FILE
-from paani_services.operator.state import CLEAR
 from paani_tools.up.arm import arm_once, page_line
 from paani_tools.up.collect import Collector
 from paani_tools.up.other_side import report_other_side
 from paani_tools.up.plan import Plan
+from paani_tools.up.prepare import prepare_folder
 from paani_tools.up.run_summary import Report, Summary
 from paani_tools.up.silence import ROUTER
 from paani_tools.up.supervise import RECORDER, ServiceFailed, Supervisor
@@ -50,7 +47,7 @@ async def run_plan(
     Raises UserError when a service ends with a user's mistake; nothing is left running in any case.
     """
     clock, summary = WallClock(), Summary()
-    logs = await asyncio.to_thread(_prepare, plan)
+    logs = await asyncio.to_thread(prepare_folder, plan.config)
     supervisor = Supervisor(plan, logs, display.print_line)
     told_to_stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -156,16 +153,6 @@ async def _run_until(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> No
 
 def _on_health(supervisor: Supervisor, health: m.Health) -> None:
     supervisor.on_health(health.service)
-
-
-def _prepare(plan: Plan) -> Path:
-    ensure_credentials(plan.config.bus)
-    folder = runtime_dir(plan.config.bus)
-    logs = folder / "logs"
-    if plan.config.up.arm_at_start and not logs.exists() and not (folder / LATCH_FILE).exists():
-        write_private(folder / LATCH_FILE, CLEAR)  # the first start here: later, a missing latch is a STOP
-    logs.mkdir(mode=0o700, exist_ok=True)
-    return logs
 
 
 def _cause(group: BaseExceptionGroup[BaseException]) -> BaseException:

@@ -42,7 +42,15 @@ class _Course(NamedTuple):
 
 
 async def make_plan(config: Config) -> Plan:
-    """Complete the settings. Raises UserError for what can be known before anything starts.
+    """What starts on this machine. Raises UserError for what can be known before anything starts."""
+    await asyncio.to_thread(require_addresses, config.bus)
+    if config.dashboard.serve and "dashboard" in config.services:
+        await _require_free_page(config)
+    return await complete_plan(config)
+
+
+async def complete_plan(config: Config) -> Plan:
+    """Complete the settings, wherever the addresses in them are. Raises UserError.
 
     The scenario's route, fence and origin are handed to navigator and localization unless they have their own. A hull
     has no scenario: its route is given, and without an origin of its own the map's is the first fix. Of board and host
@@ -51,11 +59,8 @@ async def make_plan(config: Config) -> Plan:
     calibration is the eye's, unless another is given as valid.
     """
     require_modules("up", *(module for name in config.services for module in NEEDED.get(name, ())))
-    require_addresses(config.bus)
     if "camera" in config.services:
         await asyncio.to_thread(_require_source, config.camera)
-    if config.dashboard.serve and "dashboard" in config.services:
-        await _require_free_page(config)
     _require_lines(config)
     config = await _with_course(config) if "navigator" in config.services else config
     if config.camera.source == "sim":

@@ -38,7 +38,7 @@ def load_config(
     """
     layers: list[tuple[str, dict[str, object]]] = []
     if file is not None:
-        layers.append((str(file), with_present_names(_read_toml(file))))
+        layers.append((str(file), with_present_names(_read_settings(file))))
     layers.append(("environment", with_present_names(_from_environ(environ or {}))))
     for text in sets:
         layers.append((f"--set {text}", with_present_names(_from_set(text))))
@@ -134,12 +134,14 @@ def _suggestion(text: str, path: str) -> str:
     return f" (did you mean {where}{near[0]}?)" if near else f" (have: {', '.join(names)})"
 
 
-def _read_toml(file: Path) -> dict[str, object]:
+def _read_settings(file: Path) -> dict[str, object]:
+    """TOML, or JSON as `encode_config` writes it where the file's name says so."""
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
+        return msgspec.json.decode(text, type=dict[str, object]) if file.suffix == ".json" else tomllib.loads(text)
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise UserError(f"{file}: {error}") from error
 
 

@@ -1,0 +1,117 @@
+"""Both compose files on a real engine: built, driven, hurt and taken down."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from paani import messages as m
+from paani.keys import Graph
+from paani.sides import Side, services_on
+from tests.deploy.engine import Engine, NoEngine, running_engine
+from tests.deploy.river import build, driving
+
+pytestmark = [pytest.mark.deploy, pytest.mark.timeout(900)]
+
+ZERO_S = 0.5
+BOARD_RSS_MIB = 350.0
+SPEED_MPS = 0.2  # at least, over the whole drive
+
+
+@pytest.fixture(scope="module")
+def engine() -> Iterator[Engine]:
+    try:
+        with running_engine() as found:
+            build(found)
+            yield found
+    except NoEngine as reason:
+        pytest.skip(str(reason))
+
+
+@pytest.mark.parametrize("side", ["board", "host"])
+def test_the_engine_takes_the_file_with_every_profile(engine: Engine, side: str) -> None:
+    engine.compose(side, "--profile", "*", "config", "-q")
+
+
+@pytest.mark.parametrize("side", ["board", "host"])
+def test_an_image_holds_no_secret_and_nothing_of_the_build(engine: Engine, side: str) -> None:
+    run = ("run", "--rm", "--network", "none", "--entrypoint")
+    assert engine.docker(*run, "find", f"paani-{side}", "/var/lib/paani", "-type", "f") == ""
+    assert not {"source", "build", "wheel"} & set(engine.docker(*run, "ls", f"paani-{side}", "/").split())
+
+
+@pytest.mark.parametrize("driven_s", [15.0, pytest.param(60.0, marks=pytest.mark.long)])
+async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, driven_s: float) -> None:
+    async with driving(engine) as drive:
+        await asyncio.to_thread(check_confinement, engine)
+        await drive.await_under_way()
+        begin_m = drive.distance_m
+        decisions = drive.decisions
+        await asyncio.sleep(driven_s)
+        driven_m = drive.distance_m - begin_m
+        rate_hz = (drive.decisions - decisions) / driven_s
+        rss_mib = await asyncio.to_thread(board_rss_mib, engine)
+        lights = await drive.mcu.read_lights()
+        assert drive.bridge is not None
+        arrow = drive.bridge.display
+        perception = await asyncio.to_thread(engine.processes, engine.container("board", "perception"))
+        killed = await drive.fault(lambda: os.kill(perception[-1], signal.SIGKILL), 0.0, lambda: None)
+        cut = await drive.fault(lambda: join(engine, "disconnect"), 4.0, lambda: join(engine, "connect"))
+        print(f"{driven_m:.1f} m in {driven_s:.0f} s, {rate_hz:.1f} decisions/s, arrow {arrow}; board [MiB] {rss_mib}")
+        print(f"perception killed: zero thrust after {killed[0]:.2f} s, thrust after {killed[1]:.2f} s")
+        print(f"link cut for 4 s: zero thrust after {cut[0]:.2f} s, thrust {cut[1]:.2f} s after its return")
+        assert driven_m >= SPEED_MPS * driven_s
+        assert drive.collisions == 0
+        assert rate_hz >= 2.0
+        assert arrow not in {m.Direction.NO_DATA, m.Direction.STOP}
+        assert any(set(row) != {"0"} for row in lights)
+        assert killed[0] <= ZERO_S
+        assert cut[0] <= ZERO_S
+        assert sum(rss_mib.values()) <= BOARD_RSS_MIB
+    assert not engine.containers("board") + engine.containers("host")
+
+
+def check_confinement(engine: Engine) -> None:
+    """What runs where, and what it may."""
+    networks = {}
+    for side in (Side.BOARD, Side.HOST):
+        containers = engine.containers(side)
+        names = {each["Config"]["Labels"]["com.docker.compose.service"] for each in containers}
+        assert names == set(services_on(side, Graph.SIMULATION))
+        networks[side] = {name for each in containers for name in each["NetworkSettings"]["Networks"]}
+        for each in containers:
+            host, name = each["HostConfig"], each["Name"]
+            assert each["State"]["Health"]["Status"] == "healthy", name
+            assert each["Config"]["User"] == "paani", name
+            assert host["ReadonlyRootfs"], name
+            assert host["Memory"] > 0, name
+            assert host["NanoCpus"] > 0, name
+            assert host["PidsLimit"] > 0, name
+            assert host["CapDrop"] == ["ALL"], name
+            assert host["SecurityOpt"] == ["no-new-privileges"], name
+            assert host["LogConfig"]["Config"]["max-size"], name
+            assert not [word for word in each["Config"]["Env"] if "PASSWORD" in word.upper()], name
+    assert not networks[Side.BOARD] & networks[Side.HOST]
+
+
+def board_rss_mib(engine: Engine) -> dict[str, float]:
+    """Resident memory of each container of the board, shared pages counted in every process [MiB]."""
+    found = {}
+    for each in engine.containers("board"):
+        statuses = [
+            Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+            for pid in engine.processes(each["Name"].removeprefix("/"))
+        ]
+        kib = [int(line.split()[1]) for status in statuses for line in status.splitlines() if line.startswith("VmRSS")]
+        found[each["Config"]["Labels"]["com.docker.compose.service"]] = round(sum(kib) / 1024, 1)
+    return found
+
+
+def join(engine: Engine, action: str) -> None:
+    """Take the host's router off the network that leads to the board, or bring it back."""
+    engine.docker("network", action, "paani-host_link", engine.container("host", "router"))
