@@ -14,15 +14,17 @@ import zenoh
 from paani import keys
 from paani import messages as m
 from paani.bus.admission import Admission
+from paani.bus.hearing import Hearing
 from paani.bus.inbox import Inbox, Latest, Queue
 from paani.bus.publish import LONG_POLL_S, PicturePublisher, Publisher
 from paani.bus.raw import RawInbox
 from paani.bus.session import open_client
-from paani.clock import Clock
+from paani.clock import Clock, MonotonicClock
 from paani.config import BusConfig
 from paani.health import HealthReporter
 from paani.heartbeat import Heartbeat
 from paani.runtime import runtime_dir
+from paani.sides import ROUTER
 
 T = TypeVar("T", bound=m.Message)
 MAX_PICTURE_BYTES = 16 << 20  # encoded; a 12-megapixel JPEG of the best quality is half of it
@@ -107,7 +109,11 @@ class Bus:
 
     @contextlib.contextmanager
     def alive(self) -> Iterator[None]:
-        """Declare this service alive, which means ready; start its pulse and its health report."""
+        """Declare this service alive, which means ready; start its pulse and its health report.
+
+        A process that does not hear the bus any more reports no health and no heartbeat, so that whoever supervises it
+        starts it again.
+        """
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
         reporter = HealthReporter(self.user, self.inputs, self.drops, lambda: self.note_text)
         tasks = [asyncio.create_task(self._report(reporter), name="health")]
@@ -236,13 +242,20 @@ class Bus:
             publisher.put(m.Pulse(source_us=self._clock.now_us()))
             await asyncio.sleep(1.0 / topic.rate_hz)
 
+    def _is_connected(self) -> bool:
+        """Whether there is another process's router at the other end; the router's own process does not hear itself."""
+        return self.user != ROUTER and bool(self._session.info.routers_zid())
+
     async def _report(self, reporter: HealthReporter) -> None:
         publisher = self.publisher(keys.health(self.user))
         heartbeat = Heartbeat(await asyncio.to_thread(runtime_dir, self._config), self.user)
+        hearing = Hearing(MonotonicClock(), self._is_connected)
+        self._declare_subscriber(keys.health(ROUTER), lambda sample: hearing.note())
         await asyncio.to_thread(heartbeat.ready)
         while True:
-            publisher.put(await asyncio.to_thread(reporter.report, self._clock.now_us()))
-            await asyncio.to_thread(heartbeat.beat)
+            if not await asyncio.to_thread(hearing.is_deaf):
+                publisher.put(await asyncio.to_thread(reporter.report, self._clock.now_us()))
+                await asyncio.to_thread(heartbeat.beat)
             await asyncio.sleep(1.0)
 
 
