@@ -15,7 +15,7 @@ BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
 DEBIAN_TEST := $(DEBIAN) chromium libatomic1
 # What tests/deploy builds and runs containers with.
-DEBIAN_DEPLOY := docker.io iptables debootstrap
+DEBIAN_DEPLOY := docker.io iptables debootstrap faketime
 # What builds, emulates and checks the microcontroller's firmware: most of a gigabyte, which `make check` does without.
 DEBIAN_FIRMWARE := gcc-arm-none-eabi qemu-system-arm g++ cppcheck
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
@@ -33,6 +33,7 @@ test: setup-test system-firmware system-deploy lint ## everything that CI runs
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
 	@mkdir -p runs
 	$(PAANI) trial --suite standard --report runs/trial-standard.html
+	$(PAANI) bench faults --runs 20 --out runs/faults.json
 	$(BIN)/python -m pytest -q tests -m long || [ $$? -eq 5 ] # 5: no test is marked so
 
 check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests

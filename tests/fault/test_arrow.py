@@ -6,19 +6,14 @@ import asyncio
 import contextlib
 import os
 import signal
-import subprocess
-import sys
-import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import IO
 
 import pytest
 
-from paani.clock import stopwatch_ms
-from paani.config import BridgeConfig, load_config
+from paani.config import BridgeConfig
+from paani_tools.bench.faults.running import Loop, Side, running
 from tests.conftest import find_free_port
-from tests.fault.test_kill import READY_S, Loop, pid_of
 from tests.firmware.emulator import Emulator, open_emulator
 from tests.firmware.line_listener import STILL, LineListener, listening_on
 from tests.mcu_peer import until
@@ -29,11 +24,6 @@ LIMIT_MS = BridgeConfig().lease_ms + 100
 MANY = int(os.environ.get("ARROW_KILLS", "20"))  # of each process
 
 
-def start(words: list[str], output: IO[str]) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "paani", "up", "--headless", "--world", "river", *words]
-    return subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, text=True)
-
-
 @contextlib.asynccontextmanager
 async def driving(folder: Path, line: str) -> AsyncIterator[Loop]:
     """`paani up` on the river with a bridge."""
@@ -42,21 +32,8 @@ async def driving(folder: Path, line: str) -> AsyncIterator[Loop]:
         f"bus.runtime_dir={folder / 'runtime'}",
         f"bridge.line={line}",
     )
-    words = [word for setting in sets for word in ("--set", setting)]
-    with (folder / "out").open("w+") as output:
-        supervisor = start(words, output)
-        try:
-            deadline_ms = stopwatch_ms() + READY_S * 1e3
-            while "alive after" not in (found := (folder / "out").read_text()):
-                assert supervisor.poll() is None, found
-                assert stopwatch_ms() < deadline_ms, found
-                await asyncio.to_thread(threading.Event().wait, 0.1)
-            yield Loop(supervisor, load_config(sets=sets).bus)
-            assert supervisor.poll() is None, "the supervisor itself ended"
-        finally:
-            supervisor.terminate()
-            supervisor.wait(10)
-            print((folder / "out").read_text())
+    async with running([Side(("--headless", "--world", "river"), sets)], folder) as loop:
+        yield loop
 
 
 async def kill_and_time(loop: Loop, service: str, mcu: Emulator, listener: LineListener) -> int | None:
@@ -65,7 +42,7 @@ async def kill_and_time(loop: Loop, service: str, mcu: Emulator, listener: LineL
     None where the emulated microcontroller itself was reset meanwhile, which shows no arrow but starts its clock anew.
     """
     await until(lambda: listener.display not in STILL, 60.0)
-    pid = await asyncio.to_thread(pid_of, loop, service)
+    pid = await asyncio.to_thread(loop.pid_of, service)
     await until(lambda: listener.display not in STILL, 60.0)
     pins = await mcu.wait_for_pins(lambda pins: True)
     os.kill(pid, signal.SIGKILL)

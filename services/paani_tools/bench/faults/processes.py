@@ -1,0 +1,160 @@
+"""Faults of processes: killed, frozen, without memory, descriptors or disk, and beside a greedy neighbour."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import resource
+import signal
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from paani_tools.bench.faults.fault import Expected, Fault
+from paani_tools.bench.faults.running import Loop, until
+
+GONE_S, BACK_S = 10.0, 40.0
+FROZEN_S, REFUSED_S = 1.0, 2.0
+NEEDS_A_HAND = frozenset({"operator", "dashboard"})  # who armed, and where: nobody knows whether they still want it
+NOBODY_WAITS_FOR = frozenset({"recorder", "bridge"})
+ADAPTER = "plant"
+SILENT_CONNECTIONS = 150
+NEIGHBOURS = 4
+
+
+def process_faults(services: tuple[str, ...]) -> list[Fault]:
+    """One of each kind for every process that can have it."""
+    return [
+        *(_killed(name) for name in services),
+        *(_frozen(name) for name in services),
+        *(_refused_memory(name) for name in ("perception", "controller") if name in services),
+        _full_disk(),
+        _descriptors_gone(),
+        _greedy_neighbour(),
+    ]
+
+
+def _expected(service: str) -> Expected:
+    return Expected.GOES_ON if service in NOBODY_WAITS_FOR else Expected.STOPS
+
+
+def _killed(service: str) -> Fault:
+    async def begin(loop: Loop) -> None:
+        pid = loop.pid_of(service)
+        loop.mark()
+        os.kill(pid, signal.SIGKILL)
+
+    async def end(loop: Loop) -> None:
+        watch = loop.watch
+        await until(lambda: watch.changed_us.get(service, 0) > loop.hit_us, GONE_S)
+        await until(lambda: watch.alive.get(service, False), BACK_S)
+
+    expected = Expected.HAND if service in NEEDS_A_HAND else _expected(service)
+    name, away = f"{service} killed", service == ADAPTER
+    return Fault(name=name, expected=expected, begin=begin, end=end, hurts_adapter=away)
+
+
+def _frozen(service: str) -> Fault:
+    frozen: list[int] = []
+
+    async def begin(loop: Loop) -> None:
+        frozen.append(loop.pid_of(service))
+        loop.mark()
+        os.kill(frozen[-1], signal.SIGSTOP)
+
+    async def end(loop: Loop) -> None:
+        os.kill(frozen[-1], signal.SIGCONT)
+
+    return Fault(
+        name=f"{service} not running", expected=_expected(service), begin=begin, end=end, lasts_s=FROZEN_S,
+        hurts_adapter=service == ADAPTER,
+    )  # fmt: skip
+
+
+def _refused_memory(service: str) -> Fault:
+    """The kernel gives the process no more address space than it has: what it asks for fails."""
+    limited: list[int] = []
+
+    async def begin(loop: Loop) -> None:
+        pid = loop.pid_of(service)
+        limited.append(pid)
+        pages = int(await asyncio.to_thread(_read, Path(f"/proc/{pid}/statm")))
+        loop.mark()
+        resource.prlimit(pid, resource.RLIMIT_AS, (pages * resource.getpagesize(), resource.RLIM_INFINITY))
+
+    async def end(loop: Loop) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            resource.prlimit(limited[-1], resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+    name = f"{service} refused memory"
+    return Fault(name=name, expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)
+
+
+def _read(statm: Path) -> str:
+    return statm.read_text(encoding="ascii").split()[0]
+
+
+def _full_disk() -> Fault:
+    """No process can make a file grow."""
+    limited: list[int] = []
+
+    async def begin(loop: Loop) -> None:
+        limited[:] = [loop.pid_of(name) for name in loop.config.services]
+        loop.mark()
+        for pid in limited:
+            resource.prlimit(pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+
+    async def end(loop: Loop) -> None:
+        for pid in limited:
+            with contextlib.suppress(ProcessLookupError):
+                resource.prlimit(pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+    return Fault(name="disk full", expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)
+
+
+def _descriptors_gone() -> Fault:
+    """Connections that say nothing, to the page and to the router, until neither takes one more."""
+    connected = contextlib.AsyncExitStack()
+
+    async def begin(loop: Loop) -> None:
+        loop.mark()
+        router = loop.config.bus.router.rpartition(":")[2]
+        for port in (loop.config.dashboard.port, int(router)):
+            for _ in range(SILENT_CONNECTIONS):
+                with contextlib.suppress(OSError, TimeoutError):
+                    await connected.enter_async_context(_connection(port))
+
+    async def end(loop: Loop) -> None:
+        await connected.aclose()
+
+    name = f"{2 * SILENT_CONNECTIONS} silent connections"
+    return Fault(name=name, expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)
+
+
+@contextlib.asynccontextmanager
+async def _connection(port: int) -> AsyncIterator[None]:
+    _, writer = await asyncio.wait_for(asyncio.open_connection("127.0.0.1", port), 1.0)
+    try:
+        yield
+    finally:
+        writer.close()
+
+
+def _greedy_neighbour() -> Fault:
+    """Programs beside the boat's that want all the processor there is."""
+    neighbours: list[asyncio.subprocess.Process] = []
+
+    async def begin(loop: Loop) -> None:
+        loop.mark()
+        for _ in range(NEIGHBOURS):
+            neighbours.append(await asyncio.create_subprocess_exec(sys.executable, "-c", "while True: pass"))
+
+    async def end(loop: Loop) -> None:
+        while neighbours:
+            neighbour = neighbours.pop()
+            neighbour.kill()
+            await neighbour.wait()
+
+    name = f"{NEIGHBOURS} busy neighbours"
+    return Fault(name=name, expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)

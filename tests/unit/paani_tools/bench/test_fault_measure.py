@@ -1,0 +1,111 @@
+"""How a fault's figures come from what was heard: the adapter's reports, gaps in them, and its restarts."""
+
+from __future__ import annotations
+
+import pytest
+
+from paani import messages as m
+from paani.errors import UserError
+from paani_tools.bench.faults.command import ALL, choose
+from paani_tools.bench.faults.fault import ZERO_S, Expected, Fault
+from paani_tools.bench.faults.measure import FaultRun, keeps_bars, longest_gap_s, zero_after_s
+from paani_tools.bench.faults.running import Loop, Report
+from paani_tools.bench.faults.table import fault_table
+
+HIT_US, WALL_US = 10_000_000, 90_000_000_000
+
+
+def report(at_s: float, *, moves: bool, since_s: float = 0.0) -> Report:
+    """Heard so many seconds after the hit."""
+    cause = m.ZeroCause.NONE if moves else m.ZeroCause.TIMEOUT
+    at_us, wall_us = HIT_US + round(at_s * 1e6), WALL_US + round(at_s * 1e6)
+    return Report(at_us, moves, cause, wall_us, WALL_US + round(since_s * 1e6))
+
+
+async def nothing(loop: Loop) -> None:
+    """No fault at all."""
+
+
+def fault(expected: Expected) -> Fault:
+    return Fault(name="fault", expected=expected, begin=nothing, end=nothing)
+
+
+DRIVING = [report(-0.1, moves=True), report(-0.05, moves=True), report(0.02, moves=True)]
+
+
+def test_zero_is_when_the_adapter_says_that_it_began() -> None:
+    reports = [*DRIVING, report(0.07, moves=True), report(0.12, moves=False, since_s=0.1)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.1)
+
+
+def test_a_beginning_before_the_hit_is_a_clock_that_was_set_and_does_not_count() -> None:
+    reports = [*DRIVING, report(0.12, moves=False, since_s=-3600.0)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.12)
+
+
+def test_thrust_that_was_never_zero_has_no_time() -> None:
+    assert zero_after_s(DRIVING, HIT_US, WALL_US) is None
+
+
+def test_after_silence_the_adapter_says_since_when() -> None:
+    reports = [*DRIVING, report(1.4, moves=False, since_s=0.31)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.31)
+
+
+def test_an_adapter_that_drives_on_in_silence_is_found_out() -> None:
+    """It was moving until shortly before it was heard again."""
+    reports = [*DRIVING, report(1.4, moves=False, since_s=1.3)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(1.3)
+
+
+def test_a_dead_adapter_applies_nothing_after_its_last_word() -> None:
+    reports = [*DRIVING, report(2.0, moves=False, since_s=1.9)]
+    assert zero_after_s(reports, HIT_US, WALL_US, adapter_away=True) == pytest.approx(0.02)
+
+
+def test_what_was_zero_before_the_hit_says_nothing() -> None:
+    reports = [report(-0.3, moves=False), *DRIVING]
+    assert zero_after_s(reports, HIT_US, WALL_US) is None
+
+
+def test_the_longest_gap() -> None:
+    assert longest_gap_s([0, 200_000, 1_400_000, 1_500_000]) == pytest.approx(1.2)
+    assert longest_gap_s([5]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("expected", "change", "kept"),
+    [
+        (Expected.STOPS, {}, True),
+        (Expected.STOPS, {"zero_s": ZERO_S + 0.01}, False),
+        (Expected.STOPS, {"zero_s": None}, False),
+        (Expected.STOPS, {"moved": True}, False),
+        (Expected.STOPS, {"back_s": None}, False),
+        (Expected.STOPS, {"hands": True}, False),
+        (Expected.STOPS, {"problem": "not under way"}, False),
+        (Expected.HAND, {"hands": True}, True),
+        (Expected.HAND, {}, False),
+        (Expected.HAND, {"hands": True, "rearmed": True}, False),
+        (Expected.GOES_ON, {"zero_s": None}, True),
+        (Expected.GOES_ON, {"zero_s": 0.3}, True),
+        (Expected.GOES_ON, {"hands": True}, False),
+        (Expected.GOES_ON, {"back_s": None}, False),
+    ],
+)
+def test_bars(expected: Expected, change: dict[str, object], kept: bool) -> None:
+    values: dict[str, object] = {"fault": "fault", "zero_s": 0.3, "back_s": 1.0, **change}
+    assert keeps_bars(fault(expected), FaultRun(**values)) is kept  # type: ignore[arg-type]
+
+
+def test_the_table_has_the_worst_and_says_what_was_not_measured() -> None:
+    runs = [FaultRun(fault="fault", zero_s=zero_s, back_s=1.0) for zero_s in (0.1, 0.2, 0.45)]
+    text = fault_table([fault(Expected.STOPS)], runs, {"other": "needs a thing"})
+    assert "| fault | stops | 3 | 0.5 | 0.20, 0.45 | 1.00, 1.00 | 0.0 | 0 | 3 |" in text
+    assert "not measured: other: needs a thing" in text
+
+
+def test_each_fault_has_one_name_and_can_be_chosen_by_a_word_of_it() -> None:
+    assert len({each.name for each in ALL}) == len(ALL) >= 20
+    assert {each.name for each in choose(["router"])} == {"router killed", "router not running"}
+    with pytest.raises(UserError, match="no such fault"):
+        choose(["kraken"])

@@ -1,0 +1,56 @@
+"""Slopes and bars of a long drive."""
+
+from __future__ import annotations
+
+import pytest
+
+from paani_tools.bench.soak import Sample, Soaked, SoakReport, keeps_bars, slope_per_h, soak_text, soaked
+
+
+def samples(rss_mib_h: float, *, warm_up_mib: float = 0.0, restarted: bool = False) -> list[Sample]:
+    """An hour, one sample a minute: a jump in the first tenth, then a line."""
+    return [
+        Sample(
+            at_s=60.0 * k,
+            pid=1 if not restarted or k < 40 else 2,
+            rss_mib=50.0 + rss_mib_h * k / 60 + (warm_up_mib if k >= 6 else 0.0),
+            descriptors=19,
+            threads=9,
+        )
+        for k in range(61)
+    ]
+
+
+def report(one: Soaked) -> SoakReport:
+    return SoakReport(
+        driven_s=3600.0, distance_m=1900.0, collisions=0, decisions_hz=5.0, drops={"late": 2}, disk_mib=1.0,
+        disk_slope_mib_h=0.1, processes={"advisor": one},
+    )  # fmt: skip
+
+
+def test_a_slope_is_by_the_hour() -> None:
+    assert slope_per_h([(0.0, 1.0), (1800.0, 2.0), (3600.0, 3.0)]) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("growth_mib_h", [0.0, 0.9, 3.0, -2.0])
+def test_growth_is_that_after_the_warm_up(growth_mib_h: float) -> None:
+    found = soaked(samples(growth_mib_h, warm_up_mib=40.0))
+    assert found.rss_slope_mib_h == pytest.approx(growth_mib_h)
+    assert keeps_bars(report(found)) is (growth_mib_h <= 1.0)
+
+
+def test_a_restart_is_no_way_to_keep_memory_flat() -> None:
+    found = soaked(samples(0.0, restarted=True))
+    assert found.restarts == 1
+    assert not keeps_bars(report(found))
+
+
+def test_descriptors_that_stay_open_break_the_bar() -> None:
+    leaking = [Sample(each.at_s, each.pid, each.rss_mib, 19 + k // 10, 9) for k, each in enumerate(samples(0.0))]
+    assert not keeps_bars(report(soaked(leaking)))
+
+
+def test_the_table_names_each_process_and_what_was_dropped() -> None:
+    text = soak_text(report(soaked(samples(0.5))))
+    assert "| advisor | 50.5 | +0.50 | 19, 19 | 9, 9 | 0 |" in text
+    assert "late 2" in text
