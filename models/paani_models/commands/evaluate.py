@@ -15,8 +15,8 @@ from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_json
 from paani_models.benchmarks.score_networks import score_lars, score_mods
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
+from paani_models.commands.compare import compare_detectors, is_detector
 from paani_models.datasets.selection import PictureSelection
-from paani_models.datasets.sources import DETECTOR_CLASSES
 from paani_models.detector.scores import ScoredBoxes, count_false_alarms, score_boxes
 from paani_models.report.estimates import (
     Evaluation,
@@ -29,6 +29,7 @@ from paani_models.report.estimates import (
     tabulate_mask_confusions,
 )
 from paani_models.report.manifest_figures import measure_detector, measure_false_alarms, measure_segmenter
+from paani_models.report.miss_sheet import refuse_inside_repository
 from paani_models.report.records import image_quality_figures, read_faults
 from paani_models.segmenter.scores import ScoredMask, score_masks
 
@@ -55,6 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", type=output_file("--json"), help="write figures with intervals, per source and sequence, to this file"
     )
+    parser.add_argument(
+        "--html",
+        type=output_file("--html"),
+        metavar="FILE",
+        help="a sheet of the detector's misses and false alarms, outside any repository: it holds pictures",
+    )
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,8 @@ class ScoredPair:
 def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Exit 0, or raise UserError."""
     catalogue = load_catalogue(arguments.weights)
+    if arguments.html:
+        refuse_inside_repository(arguments.html, "--html")
     if arguments.faults:
         _print_and_record("gate", image_quality_figures(read_faults(arguments.faults)), arguments)
         return 0
@@ -76,6 +85,8 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
         if net not in catalogue or not is_scored(catalogue[net].classes):
             raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
         _print_and_record(net, measure_network(net, arguments.weights, pictures), arguments)
+        if is_detector(catalogue[net].classes) and pictures.boxed_samples(held_out=True):
+            compare_detectors(net, arguments.weights, pictures, arguments.html)
     if arguments.json:
         write_evaluation(arguments.json, score_pair(arguments.weights, pictures).evaluation)
     return 0
@@ -110,7 +121,7 @@ def _print_rounded(figures: dict[str, float]) -> None:
 
 def is_scored(classes: tuple[str, ...]) -> bool:
     """Whether a model of the manifest is a segmenter or a detector, which labelled pictures can score."""
-    return "water" in classes or classes == DETECTOR_CLASSES
+    return "water" in classes or is_detector(classes)
 
 
 def measure_network(net: str, weights: Path, pictures: PictureSelection) -> list[Figure]:

@@ -106,6 +106,13 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
     train.add_argument("--epochs", type=int, help="detector and gate only")
     train.add_argument("--peak-rate", type=float)
+    train.add_argument(
+        "--blend",
+        type=float,
+        metavar="SHARE",
+        help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights",
+    )
+    train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
@@ -182,7 +189,8 @@ def _check_file(arguments: argparse.Namespace) -> int:
 
 def _select_pictures(arguments: argparse.Namespace) -> PictureSelection:
     names = [name for name in arguments.sources.split(",") if name]
-    return PictureSelection(arguments.data, names, arguments.rendered)
+    strict = arguments.command == "prepare"
+    return PictureSelection(arguments.data, names, arguments.rendered, strict=strict)
 
 
 def _write_variants(weights: Path, out: Path) -> int:
@@ -222,6 +230,8 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
             epochs=arguments.epochs,
             peak_rate=arguments.peak_rate,
             unchecked=arguments.unchecked,
+            blend=arguments.blend,
+            draws_frac=arguments.draws,
         )
         train_and_export.train_network(arguments.net, pictures, options, arguments.threads)
     else:

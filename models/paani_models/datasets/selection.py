@@ -2,22 +2,66 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models.datasets.sources import RENDERED, Sample, Source, choose_sources, read_samples
+from paani_models.datasets.checked_files import read_yolo
+from paani_models.datasets.sources import (
+    DETECTOR_CLASSES,
+    RENDERED,
+    Sample,
+    Source,
+    choose_sources,
+    read_samples,
+)
 
 
 class PictureSelection:
-    """The chosen sources below a data folder, and a folder of rendered pictures: as given, or that of a bundle."""
+    """The chosen sources below a data folder, and a folder of rendered pictures: as given, or that of a bundle.
 
-    def __init__(self, data: Path, names: list[str], rendered: Path | None) -> None:
+    A source without its manifest, and a picture with a malformed label or a box outside it, are named on stderr,
+    counted and left out; with `strict` they raise UserError where they are read.
+    """
+
+    def __init__(self, data: Path, names: list[str], rendered: Path | None, *, strict: bool = False) -> None:
         if not data.is_dir():
             raise UserError(f"{data}: no such folder; set PAANI_DATA or --data")
         packed = data / RENDERED
         self.data, self.rendered = data, rendered or (packed if (packed / "manifest.json").is_file() else None)
         self.sources: tuple[Source, ...] = choose_sources(names)
+        self.skipped: list[str] = []
+        if not strict:
+            self.sources = self._sources_with_manifests()
         self.samples = read_samples(data, self.sources, self.rendered)
+        if not strict:
+            self.samples = [sample for sample in self.samples if self._has_sound_boxes(sample)]
+        sys.stderr.write("".join(f"skipped {line}\n" for line in self.skipped))
+        if self.skipped:
+            sys.stderr.write(f"skipped {len(self.skipped)} in all, named above\n")
+
+    def _sources_with_manifests(self) -> tuple[Source, ...]:
+        """Raises UserError naming the first manifest that is missing where none is left."""
+        kept = []
+        for source in self.sources:
+            manifest = self.source_folder(source) / "manifest.json"
+            if manifest.is_file() or (source.name == RENDERED and self.rendered is None):
+                kept.append(source)
+            else:
+                self.skipped.append(f"source {source.name}: {manifest}: missing")
+        if not any(source.name != RENDERED or self.rendered is not None for source in kept):
+            raise UserError(self.skipped[0] if self.skipped else "sources: none")
+        return tuple(kept)
+
+    def _has_sound_boxes(self, sample: Sample) -> bool:
+        if sample.label is None:
+            return True
+        try:
+            read_yolo(sample.label, len(DETECTOR_CLASSES))
+        except UserError as error:
+            self.skipped.append(f"picture {sample.picture.name}: {error}")
+            return False
+        return True
 
     def source_folder(self, source: Source) -> Path:
         """Where a source lies."""

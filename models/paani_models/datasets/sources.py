@@ -39,7 +39,7 @@ class Source:
     annotated: detector classes whose every instance is boxed; only for those may background be penalised. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
     drawn: boxes are in ANNOTATIONS; its sequences pass several places, so ten consecutive frames count as one sequence.
-    held_out: sequences for validation; empty means one in eight by name. twins: pictures
+    held_out: sequences for validation; empty means one in `one_in` by name. twins: pictures
     that show what a picture of the other side shows; they are left out. splits: of a prepared public set, which name
     their split in the manifest, the splits that are read; all but "train" are held out.
     """
@@ -55,6 +55,7 @@ class Source:
     own_hull: bool = False
     drawn: bool = False
     held_out: tuple[str, ...] = ()
+    one_in: int = 8
     twins: frozenset[str] = frozenset()
     splits: tuple[str, ...] = ()
 
@@ -135,6 +136,50 @@ SOURCES = (
         annotated=frozenset({"pier"}),
         drawn=True,
         held_out=("dock_image_07", "dock_image_08", "dock_image_09"),  # one place, seen nowhere else
+    ),
+    Source("lifeguard_swim", "lifeguard_swim", labels="labels", annotated=frozenset({"person"}), one_in=4),
+    Source(
+        "surf_people",
+        "surf_people",
+        labels="labels",
+        annotated=frozenset({"person"}),
+        held_out=("block01", "block12"),
+    ),
+    Source("pennfudan", "pennfudan", labels="labels", annotated=frozenset({"person"}), one_in=4),
+    Source("coco_mini", "coco_mini", labels="labels", annotated=frozenset({"person", "vessel"}), one_in=4),
+    Source(
+        "typesofships_kayak_buoy",
+        "typesofships_kayak_buoy",
+        labels="labels",
+        annotated=frozenset({"vessel", "buoy"}),
+        one_in=4,
+        twins=frozenset({"45_jpg_32e09e06cc", "194_jpg_cebb25434b", "160_jpg_f5e567bdc8"}),  # of mcoe_boats
+    ),
+    Source(
+        "ships_pd",
+        "ships_pd",
+        labels="labels",
+        annotated=frozenset({"vessel"}),
+        one_in=4,
+        twins=frozenset({"192_168_0_64_01_20200908141942310_jp_70587625d1"}),
+    ),
+    Source("boats_valenspace", "boats_valenspace", labels="labels", annotated=frozenset({"vessel"}), one_in=4),
+    Source(
+        "lake_robotx_buoys",
+        "lake_robotx_buoys",
+        labels="labels",
+        annotated=frozenset({"buoy"}),
+        held_out=("block05", "block07"),
+        twins=frozenset(
+            {
+                "buoy_000011_b44f9b9823",
+                "buoy_000012_dadadcc173",
+                "buoy_000076_7e0e31302d",
+                "buoy_000078_9483814f5c",
+                "buoy_000081_2fff71642a",
+                "buoy_000084_bd6c58138f",
+            }
+        ),
     ),
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )
@@ -246,7 +291,7 @@ def is_held_out(source: Source, sequence: str) -> bool:
     """Whether a sequence belongs to the validation side; whole sequences only, so no near-copies leak."""
     if source.held_out:
         return sequence in source.held_out
-    return zlib.crc32(sequence.encode()) % 8 == 0
+    return zlib.crc32(sequence.encode()) % source.one_in == 0
 
 
 def read_boxes(label: Path) -> NDArray[np.float32]:

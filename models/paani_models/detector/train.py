@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from paani_models.datasets.sources import DETECTOR_CLASSES, SOURCES
 from paani_models.detector.data import BoxedPicture, TrainingExample, augment_example, letterbox_example
+from paani_models.detector.distillation import Teacher
 from paani_models.detector.loss import detector_loss
 from paani_models.detector.metrics import Detections, class_figures, decode_boxes
 from paani_models.detector.shipped_network import Detector
@@ -45,6 +46,11 @@ DRAWS_PER_EPOCH = {
     "mastr1325": 40,
     "oasis": 40,
     "rendered": 700,
+    "lifeguard_swim": 426,
+    "surf_people": 270,
+    "coco_mini": 178,
+    "typesofships_kayak_buoy": 321,
+    "lake_robotx_buoys": 92,
 }
 NULL_DRAWS = 60  # pictures per epoch that show nothing
 
@@ -63,6 +69,9 @@ class DetectorRecipe:
     mosaic_frac: float = 0.35
     plain_epochs: int = 4  # the last epochs, without mosaic
     seed: int = 42  # S4
+    draws_frac: float = 1.0  # of DRAWS_PER_EPOCH: shorter epochs, each of other pictures
+    frozen: tuple[str, ...] = ()  # parts of the network that do not learn
+    distilled: bool = False
 
 
 def draw_epoch(pictures: list[BoxedPicture], recipe: DetectorRecipe, epoch: int) -> list[int]:
@@ -71,9 +80,10 @@ def draw_epoch(pictures: list[BoxedPicture], recipe: DetectorRecipe, epoch: int)
     places: dict[str, list[int]] = defaultdict(list)
     for index, item in enumerate(pictures):
         places[item.source].append(index)
-    drawn: list[int] = [-1] * NULL_DRAWS
+    drawn: list[int] = [-1] * round(NULL_DRAWS * recipe.draws_frac)
     for name, indices in sorted(places.items()):
-        whole, rest = divmod(DRAWS_PER_EPOCH.get(name, len(indices)), len(indices))
+        wanted = round(DRAWS_PER_EPOCH.get(name, len(indices)) * recipe.draws_frac)
+        whole, rest = divmod(wanted, len(indices))
         drawn.extend(indices * whole)
         drawn.extend(int(i) for i in rng.choice(indices, rest, replace=False))
     return [int(i) for i in rng.permutation(drawn)]
@@ -89,15 +99,19 @@ class DetectorTraining:
         folder: Path,
         train: list[BoxedPicture],
         held_out: list[BoxedPicture],
+        teacher: Teacher | None = None,
     ) -> None:
+        self.teacher = teacher
         self.recipe, self.folder, self.train, self.held_out = recipe, folder, train, held_out
         folder.mkdir(parents=True, exist_ok=True)
         self.model = model
+        for part in recipe.frozen:
+            model.get_submodule(part).requires_grad_(False)
         self.state = TrainingState(model, recipe.peak_rate, recipe.weight_decay)
 
     def run(self, until: int | None = None) -> None:
         """Train to the end of the recipe, or to epoch `until`; Ctrl-C loses no finished epoch."""
-        recipe = asdict(self.recipe)
+        recipe = asdict(self.recipe) | {"frozen": list(self.recipe.frozen)}
         self.state.resume(self.folder, recipe)
         while self.state.epoch < (self.recipe.epochs if until is None else until):
             box_loss, score_loss = self._train_epoch()
@@ -120,9 +134,12 @@ class DetectorTraining:
         losses = []
         title = f"epoch {epoch + 1}/{recipe.epochs}"
         for pictures, truths, judged in tqdm(Prefetch[Batch]()(make, steps), title, steps, mininterval=5.0):
-            boxes, logits = self.model.raw(to_device(pictures))
+            seen = to_device(pictures)
+            boxes, logits = self.model.raw(seen)
             known = [truth.to(training_device()) for truth in truths]
             box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
+            if self.teacher is not None:
+                score_loss = score_loss + self.teacher.loss(seen, boxes, logits, to_device(judged))
             rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps)
             state.update(box_loss + score_loss, rate, clip_norm=10.0)
             losses.append((box_loss.item(), score_loss.item()))

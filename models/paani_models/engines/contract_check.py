@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from paani.arrays import F32
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
-from paani_models.catalogue import Model, read_contract
+from paani_models.catalogue import IGNORED_CLASS, Model, load_catalogue, read_contract
 from paani_models.engines.onnx_runner import Session, open_session, run_network
 
 MAX_DIFFERENCE = 1e-3  # T2
 TIMED_RUNS = 15
 MAX_WATER_FRAC_IN_NULL = 0.05
+PERSON = "person"
+_STRIDES_PX = (8, 16, 32)  # of the shipped detector's candidates
 _QUANTISED = b"QuantizeLinear"
 _ONNX_TYPES = {"float32": "tensor(float)", "uint8": "tensor(uint8)"}
 
@@ -45,7 +47,9 @@ def inspect_model(path: Path, role: str) -> list[Finding]:
     """Run every check and return the findings in order. Raises UserError for a file that is no ONNX model."""
     contract = read_contract(path, role)
     session = open_session(path, 1)
-    findings = list(_check_shapes(session, contract, role))
+    findings = [*_check_shapes(session, contract, role)]
+    if role == "detector":
+        findings += _compare_with_shipped(contract)
     if any(finding.level == "error" for finding in findings):
         return findings
     inputs = synthetic_inputs(contract)
@@ -96,6 +100,31 @@ def _check_shapes(session: Session, contract: Model, role: str) -> Iterator[Find
         else:
             yield Finding("ok", f"{what} {list(shape)} {wanted.dtype}")
     yield Finding("ok", f"classes {', '.join(contract.classes)} ({contract.preprocessing.resize})")
+
+
+def _compare_with_shipped(contract: Model) -> Iterator[Finding]:
+    """What differs from the shipped detector: classes, their order, input size, number of candidates."""
+    shipped = load_catalogue()["detector"]
+    for name in shipped.classes:
+        if name == PERSON and name not in contract.classes:
+            yield Finding("warning", "no class person: people are not seen, and a hull refuses it")
+        elif name not in contract.classes:
+            yield Finding("warning", f"no class {name}: none is found, and only the segmenter stands before one")
+    own = tuple(name for name in contract.classes if name != IGNORED_CLASS)
+    if own != tuple(name for name in shipped.classes if name in own):
+        yield Finding("ok", f"classes in the order {', '.join(own)}, the shipped one has {', '.join(shipped.classes)}")
+    if len(own) < len(contract.classes):
+        yield Finding("ok", f"{len(contract.classes) - len(own)} of its classes are left out")
+    height, width = contract.size_hw
+    if contract.size_hw != shipped.size_hw:
+        yield Finding(
+            "ok", f"input of {width}x{height} pixels, the shipped one has {'x'.join(map(str, shipped.size_hw[::-1]))}"
+        )
+    expected = sum((height // stride) * (width // stride) for stride in _STRIDES_PX)
+    if contract.output.shape[-1] != expected:
+        strides = ", ".join(map(str, _STRIDES_PX))
+        text = f"{contract.output.shape[-1]} candidates, strides {strides} of {width}x{height} pixels give {expected}"
+        yield Finding("warning", f"{text}: other anchors, which is right only if its boxes are already decoded")
 
 
 def _classes_hint(role: str) -> str:

@@ -100,26 +100,39 @@ def open_ncnn(files: NcnnFiles, threads: int, output: str = OUTPUT) -> Run:
 
     Raises UserError where ncnn is not installed, or naming a file that it does not read.
     """
+    return open_ncnn_network(files.param, files.bin, threads, INPUT, output)
+
+
+def open_ncnn_network(param: Path, weights: Path, threads: int, taken_from: str, output: str) -> Run:
+    """Open any pair of ncnn files as `open_ncnn` does, by the names of its input and its output.
+
+    Raises UserError where ncnn is not installed, or naming a file that is missing or that it does not read.
+    """
     if ncnn_version() is None:
         raise UserError(NOT_INSTALLED)
     import ncnn  # noqa: PLC0415 - an extra
 
+    for path in (param, weights):
+        if not path.is_file():
+            raise UserError(f"{path}: missing")
     net = ncnn.Net()
     for option in _HALF_PRECISION_OPTIONS:  # half precision moves logits by more than 1e-3
         setattr(net.opt, option, False)
     net.opt.use_vulkan_compute = False
     net.opt.num_threads = threads
-    if net.load_param(str(files.param)) != 0:
-        raise UserError(f"{files.param}: not a net that ncnn {ncnn_version()} can run")
-    if net.load_model(str(files.bin)) != 0:
-        raise UserError(f"{files.bin}: not the weights of {files.param.name}")
+    if net.load_param(str(param)) != 0:
+        raise UserError(f"{param}: not a net that ncnn {ncnn_version()} can run")
+    if net.load_model(str(weights)) != 0:
+        raise UserError(f"{weights}: not the weights of {param.name}")
 
     def run(x: F32) -> F32:
         extractor = net.create_extractor()
-        taken = extractor.input(INPUT, ncnn.Mat(np.ascontiguousarray(x[0], np.float32)))
-        failed, answer = extractor.extract(output) if taken == 0 else (taken, None)
+        own = ncnn.Mat(np.ascontiguousarray(x[0], np.float32)).clone()  # some networks write into their input
+        failed, answer = extractor.input(taken_from, own), None
+        if failed == 0:
+            failed, answer = extractor.extract(output)
         if failed != 0:
-            raise UserError(f"{files.param}: does not run from {INPUT} to {output}")
+            raise UserError(f"{param}: does not run from {taken_from} to {output}")
         return np.array(answer, np.float32)[None]
 
     return run

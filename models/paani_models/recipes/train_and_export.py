@@ -15,6 +15,8 @@ from paani_models.catalogue import WEIGHTS, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.detector.data import read_boxed_pictures
+from paani_models.detector.distillation import Teacher, add_teachers_boxes, blend_weights
+from paani_models.detector.off_the_shelf import open_off_the_shelf
 from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.shipped_network import Detector, load_yolox_weights
 from paani_models.detector.train import DetectorRecipe, DetectorTraining
@@ -32,6 +34,7 @@ from paani_models.training.training_state import Stage, load_averaged_weights
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
+FROZEN_PARTS = ("stem", "dark2", "dark3")  # of a detector that keeps what it knew: edges and parts, not objects
 COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
 IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
@@ -49,6 +52,8 @@ class TrainingOptions:
     epochs: int | None = None
     peak_rate: float | None = None
     unchecked: bool = False
+    blend: float | None = None
+    draws_frac: float = 1.0
 
 
 def train_network(net: str, pictures: PictureSelection, options: TrainingOptions, threads: int) -> None:
@@ -115,7 +120,15 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
 
 def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
     recipe = DetectorRecipe()
-    recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
+    keeps = options.blend is not None
+    recipe = replace(
+        recipe,
+        epochs=options.epochs or recipe.epochs,
+        peak_rate=options.peak_rate or recipe.peak_rate,
+        draws_frac=options.draws_frac,
+        frozen=FROZEN_PARTS if keeps else (),
+        distilled=keeps,
+    )
     torch.manual_seed(recipe.seed)
     model = Detector()
     if options.start is None:
@@ -126,7 +139,15 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         load_averaged_weights(model, options.start)
     cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
     held_out = read_boxed_pictures(pictures.boxed_samples(held_out=True))
-    DetectorTraining(model, recipe, options.folder, cached, held_out).run()
+    teacher = None
+    if options.blend is not None:
+        teacher = Teacher(pictures.data / COCO_FILE)
+        blend_weights(model, teacher.net, options.blend)
+        cached = add_teachers_boxes(cached, open_off_the_shelf(pictures.data, torch.get_num_threads()))
+    training = DetectorTraining(model, recipe, options.folder, cached, held_out, teacher)
+    if keeps:
+        training.state.average_from_model()
+    training.run()
 
 
 def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None:

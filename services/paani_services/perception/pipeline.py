@@ -13,6 +13,7 @@ from paani.messages import (
     Detection,
     Evidence,
     InferenceTiming,
+    Label,
     LaneEvidence,
     PictureHeader,
     SegmentationSource,
@@ -71,6 +72,11 @@ class Perceiver:
         self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
         self._pending: list[Future[Any]] = []
         self._visible_frac: dict[tuple[int, ...], F32] = {}
+
+    @property
+    def sees_people(self) -> bool:
+        """Whether the detector has a class person."""
+        return Label.PERSON in self._detector.contract.classes
 
     def perceive(
         self, data: bytes | U8, header: PictureHeader, age_s: float, roll_rad: float = 0.0

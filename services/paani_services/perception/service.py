@@ -1,6 +1,7 @@
 """Perception process: the camera's newest picture in, evidence and class mask out."""
 
 import asyncio
+import logging
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -12,10 +13,14 @@ from paani.arrays import U8
 from paani.bus import Bus, Picture
 from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
+from paani.errors import UserError
+from paani.keys import Graph
 from paani.memory import release_freed_memory
 from paani.runtime import runtime_dir
 from paani_services.perception.journal import JOURNAL_FOLDER, Journal
 from paani_services.perception.pipeline import Perceiver
+
+LOG = logging.getLogger(__name__)
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -26,6 +31,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     loop, worker = asyncio.get_running_loop(), ThreadPoolExecutor(1, "perceive")
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
     await loop.run_in_executor(worker, release_freed_memory)  # what loading the networks took: some 15 MiB
+    require_people_seen(perceiver, config)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
@@ -62,6 +68,16 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     finally:
         worker.shutdown(wait=False)
         perceiver.close()
+
+
+def require_people_seen(perceiver: Perceiver, config: Config) -> None:
+    """Warn of a detector without a class person. Raises UserError on a hull, which might hit whom it cannot see."""
+    if perceiver.sees_people:
+        return
+    text = f"perception.detector {config.perception.detector}: has no class person"
+    if config.bus.graph is Graph.HULL:
+        raise UserError(f"{text}; a hull needs one that sees people")
+    LOG.warning("%s: people are not seen", text)
 
 
 def roll_at_capture_rad(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:

@@ -15,11 +15,12 @@ from onnx import TensorProto, helper, numpy_helper
 from paani import messages as m
 from paani.cli import main
 from paani.clock import stopwatch_ms
-from paani.config import PerceptionConfig
+from paani.config import PerceptionConfig, load_config
 from paani.errors import UserError
 from paani_models.catalogue import Model, Preprocessing, Tensor, load_catalogue, save_catalogue, verified_path
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.pipeline import Perceiver
+from paani_services.perception.service import require_people_seen
 from tests.pictures import river
 
 SIZE = (96, 160)
@@ -179,6 +180,59 @@ def test_a_detector_with_other_classes(tmp_path: Path) -> None:
     evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
     assert [d.label for d in evidence.detections] == [m.Label.VESSEL]
     assert evidence.detections[0].confidence == pytest.approx(0.8, abs=1e-3)
+
+
+def detector_of(folder: Path, classes: tuple[str, ...], candidate_count: int = 1680) -> Path:
+    """A detector that finds nothing, with the manifest that declares its classes."""
+    path = folder / "own.onnx"
+    shape = (1, 4 + len(classes), candidate_count)
+    answer = np.concatenate([np.full((1, 4, candidate_count), 150.0), np.zeros((1, len(classes), candidate_count))], 1)
+    save(path, answer.astype(np.float32), [1, 3, 256, 320])
+    own = msgspec.structs.replace(
+        load_catalogue()["detector"], file="own.onnx", classes=classes, output=Tensor("o", shape)
+    )
+    save_catalogue({"own": own}, folder)
+    return path
+
+
+def test_what_differs_in_a_detector_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = detector_of(tmp_path, ("buoy", "-", "vessel"), 2100)
+    assert main(["models", "check", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "warning  no class person: people are not seen, and a hull refuses it" in printed
+    assert "warning  no class pier" in printed
+    assert "classes in the order buoy, vessel, the shipped one has person, vessel, pier, buoy" in printed
+    assert "1 of its classes are left out" in printed
+    assert "2100 candidates, strides 8, 16, 32 of 320x256 pixels give 1680" in printed
+
+
+def test_nothing_differs_in_the_shipped_detector(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["models", "check", str(verified_path("detector"))]) == 0
+    printed = capsys.readouterr().out
+    assert "warning" not in printed
+    assert "candidates" not in printed
+
+
+def test_a_detector_without_people_is_warned_of_and_refused_on_a_hull(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    blind = str(detector_of(tmp_path, ("vessel", "buoy")))
+    for profile, detector, refused, warned in (
+        ("paani", "", False, False),
+        ("paani", blind, False, True),
+        ("hull", "", False, False),
+        ("hull", blind, True, False),
+    ):
+        caplog.clear()
+        sets = ["camera.source=webcam"] if profile == "hull" else []
+        config = load_config(sets=[f"profile={profile}", *sets, f"perception.detector={detector}"])
+        eyes = Perceiver(config.perception, stopwatch_ms)
+        if refused:
+            with pytest.raises(UserError, match=r"perception\.detector .*own\.onnx: has no class person; a hull needs"):
+                require_people_seen(eyes, config)
+        else:
+            require_people_seen(eyes, config)
+        assert ("people are not seen" in caplog.text) == warned
 
 
 def test_a_copy_of_the_shipped_model_scores_as_shipped(tmp_path: Path) -> None:

@@ -1,0 +1,83 @@
+"""What keeps the starting point's knowledge: blended weights, the teacher's loss, and its boxes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
+
+from paani.errors import UserError  # noqa: E402
+from paani_models.detector import distillation  # noqa: E402
+from paani_models.detector import train as detector_train  # noqa: E402
+from paani_models.detector.data import BoxedPicture  # noqa: E402
+from paani_models.detector.distillation import Teacher, add_teachers_boxes, blend_weights  # noqa: E402
+from paani_models.detector.metrics import Detections  # noqa: E402
+from paani_models.detector.off_the_shelf import OffTheShelf  # noqa: E402
+from paani_models.detector.shipped_network import Detector  # noqa: E402
+
+pytestmark = pytest.mark.train
+SEEN = np.full((256, 320, 3), 90, np.uint8)
+
+
+@pytest.fixture
+def teacher(monkeypatch: pytest.MonkeyPatch) -> Teacher:
+    """A teacher of random weights, as the file of the real one is no part of the product."""
+    monkeypatch.setattr(distillation, "load_yolox_weights", lambda net, path: None)
+    torch.manual_seed(1)
+    return Teacher(Path("none.onnx"))
+
+
+def test_weights_are_blended_by_share() -> None:
+    torch.manual_seed(0)
+    one, other = Detector(), Detector()
+    before = one.stem.conv.weight.detach().clone()
+    blend_weights(one, other, 0.25)
+    torch.testing.assert_close(one.stem.conv.weight, 0.75 * before + 0.25 * other.stem.conv.weight)
+    with pytest.raises(UserError, match="--blend"):
+        blend_weights(one, other, 1.5)
+
+
+def test_the_teacher_speaks_only_where_nothing_is_annotated_and_of_what_it_knows(teacher: Teacher) -> None:
+    x = torch.rand(1, 3, 64, 64)
+    boxes, logits = teacher.net.raw(x)
+    silent = torch.zeros(1, 4, 8, 8, dtype=torch.bool)
+    assert teacher.loss(x, boxes, logits + 1.0, ~silent).item() == 0.0
+    assert teacher.loss(x, boxes, logits + 1.0, silent).item() > teacher.loss(x, boxes, logits, silent).item()
+    assert (teacher.answer(x)[1][..., 2:] == 0).all()
+    unknown = silent.clone()
+    unknown[:, :2] = True
+    assert teacher.loss(x, boxes, logits + 1.0, unknown).item() == 0.0
+
+
+def test_teachers_boxes_fill_what_a_source_leaves_out_once_each() -> None:
+    """Both teachers see the person that a source of vessels leaves out, one a vessel too, which is not its to say."""
+
+    def find(picture: np.ndarray, confidence: float, limit: int) -> Detections:
+        boxes = np.array([[32, 64, 96, 128], [200, 100, 300, 200]], np.float32)
+        return Detections(boxes, np.array([0.9, 0.8], np.float32), np.array([0, 1]))
+
+    item = BoxedPicture("mcoe_boats", SEEN, np.zeros((0, 5), np.float32), np.array([0, 1, 0, 1], np.uint8))
+    (filled,) = add_teachers_boxes([item], (OffTheShelf("a", find), OffTheShelf("b", find)))
+    np.testing.assert_allclose(filled.boxes, [[0, 0.1, 0.25, 0.3, 0.5]])
+    whole = BoxedPicture("coco_mini", SEEN, item.boxes, np.array([1, 1, 0, 0], np.uint8))
+    assert add_teachers_boxes([whole], (OffTheShelf("a", find),))[0] is whole
+
+
+def test_frozen_parts_do_not_learn_and_the_rest_does(
+    teacher: Teacher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(detector_train, "NULL_DRAWS", 1)
+    box = np.array([[1, 0.3, 0.4, 0.6, 0.6]], np.float32)
+    item = BoxedPicture("mcoe_boats", SEEN, box, np.array([0, 1, 0, 1], np.uint8))
+    recipe = detector_train.DetectorRecipe(epochs=1, batch=4, warmup_steps=1, frozen=("stem", "dark2"), distilled=True)
+    torch.manual_seed(0)
+    model = Detector()
+    before = {name: value.clone() for name, value in model.state_dict().items()}
+    detector_train.DetectorTraining(model, recipe, tmp_path, [item] * 7, [item], teacher).run()
+    moved = {name.split(".")[0] for name, value in model.state_dict().items() if not torch.equal(value, before[name])}
+    assert not moved & {"stem", "dark2"}
+    assert moved >= {"dark3", "dark4", "heads"}
+    detector_train.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item], teacher).run()  # goes on
