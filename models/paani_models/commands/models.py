@@ -110,7 +110,8 @@ def _parser() -> argparse.ArgumentParser:
         "--blend",
         type=float,
         metavar="SHARE",
-        help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights",
+        help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights;"
+        " above 0 the first stages stay as blended",
     )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")

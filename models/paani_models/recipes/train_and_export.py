@@ -126,7 +126,7 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         epochs=options.epochs or recipe.epochs,
         peak_rate=options.peak_rate or recipe.peak_rate,
         draws_frac=options.draws_frac,
-        frozen=FROZEN_PARTS if keeps else (),
+        frozen=FROZEN_PARTS if options.blend else (),
         distilled=keeps,
     )
     torch.manual_seed(recipe.seed)
