@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 from pathlib import Path
 from typing import Any
@@ -224,6 +225,7 @@ def test_a_detector_without_people_is_warned_of_and_refused_on_a_hull(
         ("hull", blind, True, False),
     ):
         caplog.clear()
+        caplog.set_level(logging.WARNING)
         sets = ["camera.source=webcam"] if profile == "hull" else []
         config = load_config(sets=[f"profile={profile}", *sets, f"perception.detector={detector}"])
         eyes = Perceiver(config.perception, stopwatch_ms)
