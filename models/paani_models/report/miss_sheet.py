@@ -26,8 +26,9 @@ CONTEXT = 1.0  # of the box's longer side, around it on each side
 MIN_CUT_PX, CUT_HEIGHT_PX = 48, 140
 _TRUE_BGR, _FOUND_BGR = (120, 200, 0), (0, 140, 255)
 _STYLE = (
-    "body{font:14px sans-serif;margin:1.5em;max-width:80em}figure{display:inline-block;margin:.3em;vertical-align:top}"
-    "figcaption{font-size:12px;max-width:14em}img{display:block;height:140px}"
+    "body{font:14px sans-serif;margin:1.5em;max-width:80em}img{display:block;height:140px}"
+    "figure{display:inline-block;width:min-content;min-width:140px;margin:.3em .6em .6em 0;vertical-align:top}"
+    "figcaption{font-size:12px;overflow-wrap:anywhere}"
 )
 
 
@@ -108,11 +109,13 @@ def render_sheet(title: str, mistakes: Sequence[Mistake]) -> str:
         f"<h1>{escape(title)}</h1><p>Green: a true box that was missed. Orange: a box that is none, with its "
         "score. Drawn from your own data folder; do not pass it on without the pictures' terms.</p>"
     )
-    order = sorted(mistakes, key=lambda m: (m.kind, m.source, not m.is_miss, -_urgency(m)))
+    place = DETECTOR_CLASSES.index
+    order = sorted(mistakes, key=lambda m: (place(m.kind), m.source, not m.is_miss, -_urgency(m)))
     for (kind, source, is_miss), group in groupby(order, lambda m: (m.kind, m.source, m.is_miss)):
         items = list(group)
-        what = "missed" if is_miss else "false alarms"
-        parts.append(f"<h2>{escape(kind)}, {escape(source)}: {len(items)} {what}</h2>")
+        what = "missed" if is_miss else "false alarm" if len(items) == 1 else "false alarms"
+        some = f", {MAX_PER_GROUP} shown" if len(items) > MAX_PER_GROUP else ""
+        parts.append(f"<h2>{escape(kind)}, {escape(source)}: {len(items)} {what}{some}</h2>")
         parts += [_figure(item) for item in items[:MAX_PER_GROUP]]
     return "\n".join(parts) + "\n"
 
