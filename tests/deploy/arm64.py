@@ -2,7 +2,7 @@
 
     python -m tests.deploy.arm64
 
-Needs root, and Debian's qemu-user-static and binfmt-support. Prints what is verdicts of each picture
+Needs root, and Debian's qemu-user-static and binfmt-support. Prints what is said of each picture
 (default: those of examples/pictures), what differs, and how long each step took. Emulated: answers, not speed.
 """
 

@@ -10,9 +10,9 @@ from paani_tools.bench.faults.measure import keeps_bars, measure
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(150)]
 
-# Processes that do not run for a second are left to `make test-long`: a killed one is the harder case.
-OF_A_LONG_TEST = {fault.name for fault in faults_of(Drive.PLAIN) if fault.name.endswith("not running")}
-ALWAYS = {"router not running", "plant not running", "controller not running"}
+# Others that do not run for a second are left to `make test-long`: a killed one is the harder case.
+OF_A_LONG_TEST = {fault.name for fault in faults_of(Drive.PLAIN) if fault.name.endswith(("not running", "memory"))}
+ALWAYS = {"perception refused memory", "router not running", "plant not running", "controller not running"}
 
 
 def chosen(drive: Drive) -> list[str]:

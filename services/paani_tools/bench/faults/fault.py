@@ -16,12 +16,13 @@ Act = Callable[[Loop], Awaitable[None]]
 class Expected(StrEnum):
     """STOPS: no thrust while it lasts, and it goes on by itself. HAND: it stands until a hand arms it again.
 
-    GOES_ON: it may drive on, and needs no hand.
+    GOES_ON: it may drive on, and needs no hand. MAY_STAND: it may drive on, or stand until a hand arms it.
     """
 
     STOPS = "stops"
     HAND = "stops, needs a hand"
     GOES_ON = "may go on"
+    MAY_STAND = "may go on, or stand"
 
 
 class Drive(StrEnum):

@@ -38,6 +38,8 @@ def keeps_bars(fault: Fault, run: FaultRun) -> bool:
     """Whether the boat did what is expected of it."""
     if run.problem or run.rearmed or run.back_s is None:
         return False
+    if fault.expected is Expected.MAY_STAND:
+        return True
     if fault.expected is Expected.GOES_ON:
         return not run.hands
     stopped = run.zero_s is not None and run.zero_s <= fault.zero_s and not run.moved
@@ -98,8 +100,8 @@ def zero_after_s(
         if not report.moves and before is not None and silent and adapter_away:
             return max(0.0, (before.at_us - hit_us) * 1e-6)
         if not report.moves:
-            since_s = (report.since_us - hit_wall_us) * 1e-6
-            return since_s if since_s >= 0.0 else (report.at_us - hit_us) * 1e-6
+            since_s, heard_s = (report.since_us - hit_wall_us) * 1e-6, (report.at_us - hit_us) * 1e-6
+            return since_s if 0.0 <= since_s <= heard_s else heard_s  # otherwise its clock was set
         before = report
     return None
 

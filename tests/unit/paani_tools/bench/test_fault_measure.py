@@ -41,6 +41,8 @@ def test_zero_is_when_the_adapter_says_that_it_began() -> None:
 def test_a_beginning_before_the_hit_is_a_clock_that_was_set_and_does_not_count() -> None:
     reports = [*DRIVING, report(0.12, moves=False, since_s=-3600.0)]
     assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.12)
+    reports = [*DRIVING, report(0.12, moves=False, since_s=3600.0)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.12)
 
 
 def test_thrust_that_was_never_zero_has_no_time() -> None:
@@ -90,6 +92,8 @@ def test_the_longest_gap() -> None:
         (Expected.GOES_ON, {"zero_s": 0.3}, True),
         (Expected.GOES_ON, {"hands": True}, False),
         (Expected.GOES_ON, {"back_s": None}, False),
+        (Expected.MAY_STAND, {"hands": True}, True),
+        (Expected.MAY_STAND, {"rearmed": True}, False),
     ],
 )
 def test_bars(expected: Expected, change: dict[str, object], kept: bool) -> None:
