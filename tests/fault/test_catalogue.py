@@ -11,7 +11,9 @@ from paani_tools.bench.faults.measure import keeps_bars, measure
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(150)]
 
 # Others that do not run for a second are left to `make test-long`: a killed one is the harder case.
-OF_A_LONG_TEST = {fault.name for fault in faults_of(Drive.PLAIN) if fault.name.endswith(("not running", "memory"))}
+OF_A_LONG_TEST = {fault.name for fault in faults_of(Drive.PLAIN) if fault.name.endswith(("not running", "memory"))} | {
+    "clock set ahead by an hour"
+}
 ALWAYS = {"perception refused memory", "router not running", "plant not running", "controller not running"}
 
 
