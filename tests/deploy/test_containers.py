@@ -45,7 +45,7 @@ def test_an_image_holds_no_secret_and_nothing_of_the_build(engine: Engine, side:
     assert not {"source", "build", "wheel"} & set(engine.docker(*run, "ls", f"paani-{side}", "/").split())
 
 
-@pytest.mark.parametrize("driven_s", [15.0, pytest.param(60.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("driven_s", [8.0, pytest.param(60.0, marks=pytest.mark.long)])
 async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, driven_s: float) -> None:
     async with driving(engine) as drive:
         await asyncio.to_thread(check_confinement, engine)
@@ -68,7 +68,7 @@ async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, 
         assert driven_m >= SPEED_MPS * driven_s
         assert drive.collisions == 0
         assert rate_hz >= 2.0
-        assert arrow not in {m.Direction.NO_DATA, m.Direction.STOP}
+        assert arrow is not m.Direction.NO_DATA
         assert any(set(row) != {"0"} for row in lights)
         assert killed[0] <= ZERO_S
         assert cut[0] <= ZERO_S
