@@ -15,6 +15,7 @@ def clock() -> ManualClock:
 
 def test_silence_while_connected_is_deafness(clock: ManualClock) -> None:
     hearing = Hearing(clock, lambda: True)
+    hearing.note()
     clock.advance(DEAF_S)
     assert not hearing.is_deaf()
     clock.advance(0.1)
@@ -26,6 +27,7 @@ def test_silence_while_connected_is_deafness(clock: ManualClock) -> None:
 def test_without_a_router_nobody_is_deaf_and_whoever_connects_again_has_time_to_hear(clock: ManualClock) -> None:
     connected = False
     hearing = Hearing(clock, lambda: connected)
+    hearing.note()
     clock.advance(100 * DEAF_S)
     assert not hearing.is_deaf()
     connected = True
@@ -33,3 +35,9 @@ def test_without_a_router_nobody_is_deaf_and_whoever_connects_again_has_time_to_
     assert not hearing.is_deaf()
     clock.advance(0.1)
     assert hearing.is_deaf()
+
+
+def test_a_router_that_never_spoke_makes_nobody_deaf(clock: ManualClock) -> None:
+    hearing = Hearing(clock, lambda: True)
+    clock.advance(100 * DEAF_S)
+    assert not hearing.is_deaf()
