@@ -41,7 +41,7 @@ async def kill_and_time(loop: Loop, service: str, mcu: Emulator, listener: LineL
     """Milliseconds on the microcontroller's clock from the kill of a process until the arrow was STOP.
 
     None where the kill had no arrow to stop: a drive that has just come back may miss a picture, so that the arrow had
-    gone out before the kill was timed, or the emulated microcontroller was reset meanwhile, which starts its clock anew.
+    gone out before the kill was timed, or the emulated microcontroller was reset, which starts its clock anew.
     """
     pid = await asyncio.to_thread(loop.pid_of, service)
     await until(lambda: listener.display not in STILL, 60.0)
