@@ -311,6 +311,9 @@ def every_topic(graph: Graph | None = None) -> tuple[Topic[Any], ...]:
     return (*(TOPICS if graph is None else topics_in(graph)), *pulses, *(health(name) for name in services))
 
 
+# Ends the vessel's name of a recording that is played again, so that every key says so.
+REPLAY_SUFFIX = "_replay"
+
 # Earlier names of topics, and their present ones: old recordings still replay.
 RENAMED_TOPICS = {"plant/gps": GPS.name, "plant/imu": IMU.name}
 

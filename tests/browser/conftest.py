@@ -45,6 +45,7 @@ class Boat:
         self._png = cv2.imencode(".png", mask)[1].tobytes()
         self.seq = 0
         self.frame_offset = 0
+        self.zero_cause: m.ZeroCause | None = None  # what the plant says instead of the truth
 
     async def publish_forever(self) -> None:
         """Publish until cancelled."""
@@ -84,7 +85,8 @@ class Boat:
             )
         )  # fmt: skip
         armed = self.arming.value is not None and self.arming.value.armed
-        cause, thrust = (m.ZeroCause.NONE, 0.1) if armed else (m.ZeroCause.NOT_ARMED, 0.0)
+        cause = self.zero_cause or (m.ZeroCause.NONE if armed else m.ZeroCause.NOT_ARMED)
+        thrust = 0.1 if cause is m.ZeroCause.NONE else 0.0
         self._applied.put(
             m.ThrustApplied(
                 source_us=now_us, left=thrust, right=thrust, left_n=75 * thrust, right_n=75 * thrust, zero_cause=cause

@@ -147,7 +147,9 @@ async def test_stop_latches_and_outlives_the_operators_process(
         await wait_for_arming(boat, armed=True, stopped=False)
         await page.keyboard.press("Space")
         await wait_for_arming(boat, armed=False, stopped=True)
-        await until(page, "document.querySelector('#order-detail').textContent.startsWith('plant at zero in')")
+        await until(
+            page, "document.querySelector('#order-detail').textContent.startsWith('confirmed by the thrust adapter in')"
+        )
         assert watched.errors == []
     await until(page, "paani.link === 'lost'")
     assert (await page.inner_text("#link-word")).startswith("LOST")
@@ -158,6 +160,11 @@ async def test_stop_latches_and_outlives_the_operators_process(
     async with spawn("operator"), spawn("dashboard"):
         await wait_for_arming(boat, armed=False, stopped=True)
         await until(page, "paani.link === 'live'")
+        assert await page.evaluate(frame) == "3px", "nobody has seen the loss yet"
+        assert "was lost" in await page.inner_text("#link-age")
+        await page.click("#link-seen")
+        await until(page, "document.body.dataset.loss === ''")
+        assert await page.evaluate(frame) == "0px"
         await hold_to_arm(page)
         await wait_for_arming(boat, armed=True, stopped=False)
 

@@ -7,6 +7,8 @@ import msgspec
 from paani import keys
 from paani.config import Config, CorridorConfig, RiskConfig
 
+MODES = {keys.Graph.SIMULATION: "sim", keys.Graph.HIL: "hil", keys.Graph.HULL: "hull"}
+
 
 class TopicFreshness(msgspec.Struct, frozen=True):
     name: str
@@ -16,12 +18,18 @@ class TopicFreshness(msgspec.Struct, frozen=True):
 
 
 class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """Settings that the page shows or draws with; constant while the process runs."""
+    """Settings that the page shows or draws with; constant while the process runs.
+
+    mode: what the thrust moves, `sim`, `hil` or `hull`; `replay`: a recording is played, and nothing moves. pictures:
+    where they come from, `sim`, `camera` or `file`. planner: whether it chooses heading and speed.
+    """
 
     vessel: str
     domain: int
     profile: str
     mode: str
+    pictures: str
+    planner: bool
     world: str
     corridors: CorridorConfig
     weights: RiskConfig
@@ -43,12 +51,14 @@ class PageServices(msgspec.Struct, frozen=True):
 
 
 def page_settings(config: Config) -> PageSettings:
-    source = config.camera.source
+    source, is_replay = config.camera.source, config.bus.vessel.endswith(keys.REPLAY_SUFFIX)
     return PageSettings(
         vessel=config.bus.vessel,
         domain=config.bus.domain,
         profile=config.profile,
-        mode="sim" if source == "sim" else "board" if source.startswith("webcam") else "replay",
+        mode="replay" if is_replay else MODES[config.bus.graph],
+        pictures="sim" if source == "sim" else "camera" if source.startswith("webcam") else "file",
+        planner=config.is_planner_active,
         world=config.world.name,
         corridors=config.perception.corridors,
         weights=config.advisor.risk,

@@ -81,7 +81,7 @@ def topics_of(log: Log, what: RepublishOptions, graph: keys.Graph) -> list[keys.
 
 def replay_config(config: Config, log: Log) -> Config:
     """The recorded settings for whoever listens: another vessel's name marks every key as a replay."""
-    bus = msgspec.structs.replace(config.bus, vessel=f"{config.bus.vessel[:25]}_replay")
+    bus = msgspec.structs.replace(config.bus, vessel=f"{config.bus.vessel[:25]}{keys.REPLAY_SUFFIX}")
     return msgspec.structs.replace(
         config,
         bus=bus,

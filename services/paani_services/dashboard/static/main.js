@@ -6,6 +6,7 @@ import { buildExplanation, renderExplanation } from "./explanation.js";
 import { decodeJson } from "./frames.js";
 import { renderHealth } from "./health.js";
 import { renderIndicator } from "./indicator.js";
+import { bindLink } from "./link.js";
 import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
@@ -69,6 +70,7 @@ addEventListener("keydown", (event) => {
   if (layer && !event.ctrlKey && !event.metaKey && !event.altKey) camera.toggle(layer);
 });
 buildExplanation();
+bindLink();
 bindOperatorControls();
 connect(onMessage, onOpen);
 setInterval(render, RENDER_PERIOD_MS);

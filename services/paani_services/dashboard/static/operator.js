@@ -1,10 +1,12 @@
 // @ts-check
 // The operator's controls: STOP is one press, sent until the server answers; arming is a hold that expires.
 
-import { byId, fixed, setText } from "./text.js";
+import { isReplay } from "./inhibits.js";
+import { byId, fixed, operatorText, setText } from "./text.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400, REFRESH_MS = 150;
-let isStopPending = false, refusal = "", heldFrom = 0, press = 0, refreshing = 0;
+const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
+let isStopPending = false, stopAskedAt = 0, refusal = "", heldFrom = 0, press = 0, refreshing = 0;
 let key = sessionStorage.getItem("paani-key") ?? "";
 
 /** The operator's key comes after the address (`#key=...`), from where no server and no log sees it. */
@@ -26,6 +28,7 @@ export async function stop() {
   refusal = "";
   if (isStopPending) return;
   isStopPending = true;
+  stopAskedAt = performance.now();
   while (isStopPending) {
     try {
       if ((await fetch("/api/stop", { method: "POST" })).ok) isStopPending = false;
@@ -105,21 +108,33 @@ export function renderOperatorState(store, open, now) {
   if (heldMs > EXPIRES_MS) release(false);
   const button = byId("arm");
   const isHeard = open && store.isFresh("operator/state", now);
-  button.disabled = !isHeard || !operator || operator.armed;
+  button.disabled = !isHeard || !operator || operator.armed || isReplay(store);
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  state.dataset.state = isStopPending || operator?.stopped ? "stopped" : operator?.armed ? "armed" : "";
-  setText(byId("order-word"), isStopPending ? "STOP REQUESTED" : !operator ? "–" : operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED");
-  setText(byId("order-detail"), refusal || (isStopPending ? "sending" : detail(operator, isHeard)));
+  const shown = isStopPending ? pendingStop(now) : operatorState(operator, isHeard, store.ageS("operator/state", now));
+  state.dataset.state = shown.state;
+  setText(byId("order-word"), shown.word);
+  setText(byId("order-detail"), refusal || shown.detail);
 }
 
-/** @param {any} operator @param {boolean} isHeard */
-function detail(operator, isHeard) {
-  if (!operator) return "operator state unknown";
-  if (!isHeard) return "last known state";
-  if (!operator.stopped) return operator.armed ? "thrust allowed" : "thrust not allowed";
-  if (!operator.latch_kept) return "could not be written to disk";
-  if (operator.confirmed_us) return `plant at zero in ${fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)} ms`;
-  return operator.asked_us ? "plant has not confirmed" : "latched before this start";
+/** A STOP that the server has not answered yet. @param {number} now */
+function pendingStop(now) {
+  const waitedMs = now - stopAskedAt;
+  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: `${fixed(waitedMs, 0)} ms ago` };
+  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: `nobody answers; asked again for ${fixed(waitedMs / 1000, 0)} s` };
+}
+
+/** @param {any} operator @param {boolean} isHeard @param {number} ageS */
+function operatorState(operator, isHeard, ageS) {
+  if (!operator) return { state: "", word: "–", detail: "operator state unknown" };
+  const word = operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED", state = operator.stopped ? "stopped" : operator.armed ? "armed" : "";
+  if (!isHeard) return { state: "", word, detail: "last known state" };
+  if (!operator.stopped) return { state, word, detail: operator.armed ? `by ${operatorText(operator.by)}` : "thrust not allowed" };
+  if (operator.confirmed_us && !operator.latch_kept) return { state, word, detail: "could not be written to disk" };
+  if (operator.confirmed_us) return { state, word, detail: `confirmed by the thrust adapter in ${fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)} ms` };
+  if (!operator.asked_us) return { state, word, detail: "latched before this start" };
+  const waitedMs = (operator.sent_us - operator.asked_us) / 1000 + ageS * 1000;
+  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: "waiting for the thrust adapter" };
+  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: "STOP is latched, but the thrust adapter does not report zero" };
 }

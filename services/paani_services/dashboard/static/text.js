@@ -10,6 +10,9 @@ export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 /** A reason code as text. @param {string} reason */
 export const reasonText = (reason) => sentence(words(reason).replace(/^center/, "centre"));
 
+/** Tracks by number as on the picture, "person #3". @param {{id: number, label: string}[]} tracks @param {number[]} ids */
+export const trackNames = (tracks, ids) => ids.map((id) => `${tracks.find((track) => track.id === id)?.label ?? "track"} #${id}`).join(", ");
+
 /** @param {number} value @param {number} [digits] */
 export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
 
@@ -65,6 +68,48 @@ export const STOP_REASONS = {
   replayed: "thrust command repeated",
   future: "thrust command from the future",
   invalid: "thrust command out of range",
+};
+
+/** What the boat does: word and kind. `activity.js` says which holds. @type {Record<string, [string, string]>} */
+export const ACTIVITIES = {
+  STOPPED: ["STOPPED", "stop"],
+  NOT_ARMED: ["NOT ARMED", "none"],
+  STANDING: ["STANDING STILL", "stop"],
+  HOLDING: ["HOLDING", "go"],
+  DONE: ["MISSION DONE", "none"],
+  WAITING: ["WAITING", "turn"],
+  LOOKING: ["LOOKING FOR A WAY", "turn"],
+  AVOIDING: ["AVOIDING", "turn"],
+  ROUTE: ["FOLLOWING ROUTE", "go"],
+  STATION: ["GOING TO STATION", "go"],
+  HOME: ["RETURNING HOME", "go"],
+  UNDER_WAY: ["UNDER WAY", "go"],
+  REPLAY: ["RECORDING", "none"],
+  UNKNOWN: ["UNKNOWN", "none"],
+};
+
+/** What the thrust moves. @type {Record<string, string>} */
+export const MODES = { sim: "SIM", hil: "HIL", hull: "HULL", replay: "REPLAY" };
+
+/** Who stopped or armed the boat, by the name of the process. @type {Record<string, string>} */
+const OPERATORS = { dashboard: "the page", stop: "paani stop", arm: "paani up", "": "an earlier run" };
+
+/** @param {string} by */
+export const operatorText = (by) => OPERATORS[by] ?? by;
+
+/** Stages from the picture to the thrust gate, in order: name, and what is said of one that sends nothing. @type {Record<string, [string, string]>} */
+export const STAGES = {
+  camera: ["Camera", "no recent picture"],
+  perception: ["Perception", "no recent evidence"],
+  advisor: ["Advisor", "no recent advice"],
+  localization: ["Position", "no recent position"],
+  operator: ["Operator", "no word from the operator's process"],
+  mission: ["Mission", ""],
+  planner: ["Planner", ""],
+  fence: ["Fence", ""],
+  navigator: ["Navigator", "no recent order"],
+  controller: ["Controller", "no recent thrust"],
+  gate: ["Thrust adapter", "no recent report of thrust"],
 };
 
 /** Set text only when it changes. @param {Element | null} element @param {string} text */

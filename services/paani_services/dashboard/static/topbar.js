@@ -1,9 +1,12 @@
 // @ts-check
-// The top bar: link, advice, speed, heading and recording.
+// The top bar: mode, link, what the boat does, advice, speed, heading, battery and recording.
 
-import { ageText, byId, fixed, headingDeg, reasonText, setText, words } from "./text.js";
+import { describeActivity } from "./activity.js";
+import { announce } from "./announcer.js";
+import { renderLink } from "./link.js";
+import { ACTIVITIES, MODES, ageText, byId, fixed, headingDeg, reasonText, sentence, setText, words } from "./text.js";
 
-const LINK_TIMEOUT_S = 1.5;
+const NOT_HEARD = { id: "UNKNOWN", word: ACTIVITIES.UNKNOWN[0], kind: "none", reason: "no connection to the dashboard" };
 /** Word, kind and SVG path of the arrow. @type {Record<string, [string, string, string]>} */
 export const ADVICE = {
   STRAIGHT: ["STRAIGHT", "go", "M24 42V7M11 20L24 7l13 13"],
@@ -20,23 +23,20 @@ export function renderTopbar(store, open, now) {
   const settings = store.get("dashboard/settings");
   if (settings) {
     setText(byId("vessel"), `${settings.vessel} · ${settings.domain}`);
-    setText(byId("mode"), settings.mode);
-    byId("mode").dataset.mode = settings.mode;
-    renderRecord(store, settings.services.includes("recorder"), now);
+    const from = settings.mode === "sim" && settings.pictures !== "sim" ? ` · ${settings.pictures}` : "";
+    setText(byId("mode"), MODES[settings.mode] + from);
+    document.documentElement.dataset.mode = settings.mode;
+    renderRecord(store, settings.services.includes("recorder") && settings.mode !== "replay", now);
   }
   renderLink(store, open, now);
-  renderAdvice(store, now);
+  const doing = open ? describeActivity(store, now) : NOT_HEARD;
+  setText(byId("activity-word"), doing.word);
+  setText(byId("activity-reason"), sentence(doing.reason));
+  byId("activity").dataset.kind = doing.kind;
+  byId("activity").dataset.activity = doing.id;
+  const advice = renderAdvice(store, now);
+  announce(`${doing.word}. Advice: ${advice}.`, doing.kind === "stop", now);
   renderPose(store, now);
-}
-
-/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
-function renderLink(store, open, now) {
-  const silenceS = store.silenceS(now), never = silenceS === Infinity;
-  const lost = !never && (!open || silenceS > LINK_TIMEOUT_S);
-  document.body.dataset.link = lost ? "lost" : never ? "waiting" : "live";
-  setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : `live ${fixed(silenceS, 1)} s`);
-  setText(byId("link-age"), !open ? "no connection" : lost ? "no data" : never ? "for data" : "age of data");
-  document.title = lost ? "LOST · PAANI" : "PAANI";
 }
 
 /** The recording chip, hidden where nothing is to be recorded. @param {import("./store.js").Store} store @param {boolean} isWanted @param {number} now */
@@ -65,15 +65,17 @@ function renderAdvice(store, now) {
   const old = advisory ? `Last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "No advice received yet";
   const cause = fresh && advisory.cause !== "none" ? `: ${words(advisory.cause)}` : "";
   setText(byId("advice-reason"), fresh ? reasonText(advisory.reason) + cause : old);
+  return word;
 }
 
 /** @param {import("./store.js").Store} store @param {number} now */
 function renderPose(store, now) {
-  const odometry = store.get("localization/odometry"), command = store.get("navigator/command");
-  const fresh = store.isFresh("localization/odometry", now);
+  const odometry = store.get("localization/odometry"), fresh = store.isFresh("localization/odometry", now);
   setText(byId("speed"), odometry ? fixed(odometry.surge_mps) : "–");
   setText(byId("heading"), odometry ? String(Math.round(headingDeg(odometry.yaw_rad)) % 360).padStart(3, "0") : "–");
-  setText(byId("waypoints"), command ? String(command.waypoints_reached) : "–");
   for (const id of ["speed", "heading"]) byId(id).parentElement.classList.toggle("stale", !fresh);
-  byId("waypoints").parentElement.classList.toggle("stale", !store.isFresh("navigator/command", now));
+  const thrusters = store.get("thrusters/state"), battery = byId("battery");
+  battery.parentElement.hidden = !thrusters?.battery_v;
+  setText(battery, thrusters?.battery_v ? fixed(thrusters.battery_v, 1) : "–");
+  battery.parentElement.classList.toggle("stale", !store.isFresh("thrusters/state", now));
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import msgspec
+import pytest
 
 from paani import keys
 from paani import messages as m
@@ -76,8 +77,21 @@ def test_restarts_are_counted() -> None:
     assert {life.service: life.starts for life in known.services}["eye"] == 2
 
 
-def test_the_page_names_the_mode_by_the_camera() -> None:
-    modes = {
-        s: page_settings(load_config(sets=(f"camera.source={s}",))).mode for s in ("sim", "webcam:1", "/tmp/v.mp4")
-    }
-    assert modes == {"sim": "sim", "webcam:1": "board", "/tmp/v.mp4": "replay"}
+@pytest.mark.parametrize(
+    ("sets", "mode", "pictures"),
+    [
+        (("camera.source=sim",), "sim", "sim"),
+        (("camera.source=webcam:1",), "sim", "camera"),
+        (("camera.source=/tmp/v.mp4",), "sim", "file"),
+        (("bus.vessel=boat_replay", "camera.source=/tmp/drive.mcap"), "replay", "file"),
+        (("profile=hil",), "hil", "sim"),
+        (("profile=hull",), "hull", "camera"),
+        (("profile=hull", "bus.vessel=boat_replay"), "replay", "camera"),
+    ],
+)
+def test_the_page_names_what_the_thrust_moves_and_where_pictures_come_from(
+    sets: tuple[str, ...], mode: str, pictures: str
+) -> None:
+    """A video before a camera's place moves a boat as a camera does: only a recording is a replay."""
+    settings = page_settings(load_config(sets=sets))
+    assert (settings.mode, settings.pictures) == (mode, pictures)
