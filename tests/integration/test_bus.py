@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from collections.abc import Callable
 
 import pytest
@@ -162,6 +163,21 @@ async def test_alive_means_ready(open_as: OpenAs, spawn: Spawn) -> None:
         assert report.ready
         assert {entry.topic for entry in report.inputs} >= {keys.EVIDENCE.name}
         assert report.rss_mib > 10
+
+
+async def test_a_process_gives_back_what_it_has_freed(open_as: OpenAs, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("paani.bus.bus.RECYCLE_S", 0.0)
+    bus, full = await open_as("advisor"), list[dict[str, int]]()
+    collected = lambda phase, info: full.append(info) if phase == "stop" and info["generation"] == 2 else None  # noqa: E731
+    gc.unfreeze()
+    try:
+        with bus.alive():
+            assert gc.get_freeze_count() > 0
+            gc.callbacks.append(collected)
+            await until(lambda: bool(full))
+    finally:
+        gc.unfreeze()
+        gc.callbacks.remove(collected)
 
 
 async def test_a_picture_is_watched_by_subscribers_and_by_those_who_pull(open_as: OpenAs) -> None:

@@ -32,6 +32,7 @@ from paani_services.advisor.policy import (
 from paani_services.advisor.risk import LANES, Operands, Truth, Value
 
 MAX_TRACKS = 24  # the detector gives no more (C9); beyond that, the least severe are left out
+MAX_PIECES = MAX_TRACKS + len(LANES)
 MAX_SHOWN = 3  # sets that the advisory carries
 LIMITS = {"left": Limit.LEFT_RISK, "center": Limit.CENTER_RISK, "right": Limit.RIGHT_RISK}
 
@@ -54,13 +55,13 @@ class Pieces(NamedTuple):
 class Subsets(NamedTuple):
     """All sets of one size out of some pieces, in order.
 
-    members: the pieces of each set. kept: pieces x sets, False where the set takes the piece away. taking: of each
-    piece, the sets that take it away.
+    members: the pieces of each set [sets, size]. kept: False where the set takes the piece away [pieces, sets].
+    taking: of each piece, the sets that take it away [pieces, sets of it].
     """
 
-    members: tuple[tuple[int, ...], ...]
+    members: NDArray[np.uint8]
     kept: Bools
-    taking: tuple[NDArray[np.intp], ...]
+    taking: NDArray[np.intp]
 
 
 class WithoutSubsets:
@@ -107,6 +108,13 @@ class WithoutSubsets:
         return np.minimum(np.maximum(1.0 - none, 0.0), 1.0)
 
 
+def prepare_subsets(config: Config) -> None:
+    """Make the tables of every set that may be asked for, so that neither memory nor a step grows when one first is."""
+    for pieces in range(1, MAX_PIECES + 1):
+        for size in range(1, min(config.advisor.counterfactual_size, pieces) + 1):
+            _subsets(pieces, size)
+
+
 def find_counterfactual(facts: FrameFacts, decision: Decision, config: Config) -> Counterfactual:
     """Find what would have changed the decision on one frame.
 
@@ -134,7 +142,7 @@ def find_counterfactual(facts: FrameFacts, decision: Decision, config: Config) -
         return Counterfactual(
             changed_by=ChangedBy.EVIDENCE,
             removals=tuple(
-                _removal(facts, pieces, subsets.members[i], DIRECTIONS[indices[i]])
+                _removal(facts, pieces, subsets.members[i].tolist(), DIRECTIONS[indices[i]])
                 for i in straight_first[:MAX_SHOWN].tolist()
             ),
             found=changing.size,
@@ -222,16 +230,16 @@ DIRECTIONS = tuple(map(select_direction, POLICY_INPUTS))
 IS_NOT = {direction: np.array([found is not direction for found in DIRECTIONS]) for direction in Direction}
 
 
-@functools.lru_cache(maxsize=3 * (MAX_TRACKS + len(LANES) + 1))
+@functools.lru_cache(maxsize=3 * (MAX_PIECES + 1))
 def _subsets(pieces: int, size: int) -> Subsets:
-    members = tuple(itertools.combinations(range(pieces), size))
+    members = np.array(list(itertools.combinations(range(pieces), size)), np.uint8)
     kept = np.ones((pieces, len(members)), bool)
-    kept[np.array(members).T, np.arange(len(members))] = False
+    kept[members.T, np.arange(len(members))] = False
     kept.flags.writeable = False
-    return Subsets(members, kept, tuple(np.flatnonzero(~row) for row in kept))
+    return Subsets(members, kept, np.flatnonzero(~kept).reshape(pieces, -1) % len(members))
 
 
-def _removal(facts: FrameFacts, pieces: Pieces, taken: tuple[int, ...], direction: Direction) -> Removal:
+def _removal(facts: FrameFacts, pieces: Pieces, taken: Sequence[int], direction: Direction) -> Removal:
     tracks = len(pieces.obstacles)
     return Removal(
         direction=direction,

@@ -9,11 +9,13 @@ from paani.clock import Clock
 from paani.config import Config
 from paani.messages import Advisory
 from paani_services.advisor.advise import evidence_expiry_us
+from paani_services.advisor.counterfactual import prepare_subsets
 from paani_services.advisor.decide import DECIDER
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Advise on each new evidence at once, republish in between, and advise STOP as soon as the evidence is too old."""
+    prepare_subsets(config)
     stepper = Stepper(bus, clock, config, DECIDER)
     evidence = stepper.inboxes[keys.EVIDENCE.name]
     period_us = round(1e6 / config.advisor.rate_hz)

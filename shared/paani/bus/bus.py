@@ -23,6 +23,7 @@ from paani.clock import Clock, MonotonicClock
 from paani.config import BusConfig
 from paani.health import HealthReporter
 from paani.heartbeat import Heartbeat
+from paani.memory import RECYCLE_S, recycle, set_loaded_apart
 from paani.runtime import runtime_dir
 from paani.sides import ROUTER
 
@@ -114,6 +115,7 @@ class Bus:
         A process that does not hear the bus any more reports no health and no heartbeat, so that whoever supervises it
         starts it again.
         """
+        set_loaded_apart()
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
         reporter = HealthReporter(self.user, self.inputs, self.drops, lambda: self.note_text)
         tasks = [asyncio.create_task(self._report(reporter), name="health")]
@@ -249,10 +251,15 @@ class Bus:
     async def _report(self, reporter: HealthReporter) -> None:
         publisher = self.publisher(keys.health(self.user))
         heartbeat = Heartbeat(await asyncio.to_thread(runtime_dir, self._config), self.user)
-        hearing = Hearing(MonotonicClock(), self._is_connected)
+        steady = MonotonicClock()
+        hearing = Hearing(steady, self._is_connected)
         self._declare_subscriber(keys.health(ROUTER), lambda sample: hearing.note())
         await asyncio.to_thread(heartbeat.ready)
+        recycled_us = steady.now_us()
         while True:
+            if steady.now_us() - recycled_us >= RECYCLE_S * 1e6:
+                recycle()
+                recycled_us = steady.now_us()
             if not await asyncio.to_thread(hearing.is_deaf):
                 publisher.put(await asyncio.to_thread(reporter.report, self._clock.now_us()))
                 await asyncio.to_thread(heartbeat.beat)

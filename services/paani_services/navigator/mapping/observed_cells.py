@@ -31,7 +31,7 @@ MAX_HULL_DEPTH_M, MAX_HULL_LENGTH_M = 2.5, 6.0  # a vessel too: beam and length 
 CUT_OFF_FRAC = 0.99  # of the picture's height; a box that reaches this low goes on below the picture
 CUT_OFF_ALLOWANCE_M = 0.8  # how much nearer than the picture shows such an obstacle is taken to stand
 BOX_EDGE_TOLERANCE_FRAC = 2.0 * MASK_ROW_FRAC  # difference between the mask's edge and a box's, of the picture's height
-CACHED_OBSERVATIONS = 512
+CACHED_OBSERVATIONS = 64  # more than are in use; the cells of others are megabytes that come and go with what is seen
 MAP_COLUMNS = 1 << 24  # of cells in the map: 3,355 km
 
 Polygon = tuple[tuple[float, float], ...]

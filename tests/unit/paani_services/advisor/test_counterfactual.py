@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config, load_config
+from paani_services.advisor import counterfactual
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.counterfactual import find_counterfactual, nearest_limit
+from paani_services.advisor.counterfactual import find_counterfactual, nearest_limit, prepare_subsets
 from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.frame_facts import PolicyState, frame_facts
 from paani_services.advisor.policy import decide, frame_components
@@ -279,3 +280,23 @@ def test_the_longest_explanation_fits_the_message() -> None:
         sentence = explain_advisory(msgspec.structs.replace(advisory, reason=reason), ())
         assert len(sentence) <= 400
         assert sentence.endswith(".")
+
+
+@given(scenes(7), CONFIGS)
+def test_no_scene_needs_a_table_that_was_not_made_at_the_start(given_scene: Scene, config: Config) -> None:
+    """What a drive sees does not make the advisor larger."""
+    prepare_subsets(config)
+    made = counterfactual._subsets.cache_info()
+    why(given_scene, config)
+    assert counterfactual._subsets.cache_info().misses == made.misses
+
+
+def test_the_tables_are_small() -> None:
+    prepare_subsets(PAANI)
+    tables = [
+        counterfactual._subsets(pieces, size)
+        for pieces in range(1, counterfactual.MAX_PIECES + 1)
+        for size in range(1, min(3, pieces) + 1)
+    ]
+    assert sum(array.nbytes for table in tables for array in table) < 1.5 * 2**20
+    assert counterfactual._subsets.cache_info().currsize == len(tables)

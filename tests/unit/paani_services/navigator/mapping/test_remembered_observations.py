@@ -16,6 +16,7 @@ from paani_services.navigator.mapping.observation import (
     is_free_space_evidence,
     update_memory,
 )
+from paani_services.navigator.mapping.observed_cells import project_to_cells
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, evidence, observe_from, odometry, water_edge_of
@@ -120,3 +121,18 @@ def test_another_epoch_or_a_gap_forgets_all_observations(after: Odometry) -> Non
 def test_unusable_odometry_is_not_dead_reckoned(changes: dict[str, float]) -> None:
     memory = observe_from()
     assert update_memory(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
+
+
+def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> None:
+    """At 30 Hz. Cells of pictures that are out of use are megabytes that come and go with what is seen."""
+    memory, period_us = ObservationMemory(), 33_333
+    for k in range(round((PLANNER.hidden_s + 2.0) * 1e6 / period_us)):
+        at_us = START_US + k * period_us
+        seen = msgspec.structs.replace(evidence(at_us, water_edge_of(AT_REST)), frame_seq=k)
+        memory = update_memory(memory, odometry(at_us, AT_REST), seen, PLANNER)
+    grid_of(memory, 0.0)
+    made = project_to_cells.cache_info()
+    grid_of(memory, 0.0)
+    assert project_to_cells.cache_info().misses == made.misses
+    assert made.maxsize is not None
+    assert made.maxsize <= 2 * len(memory.observations)
