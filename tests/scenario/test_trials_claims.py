@@ -63,7 +63,7 @@ def test_w14_a_whole_lap_by_camera_round_what_lies_on_it(tmp_path: Path) -> None
 )
 def test_w4_what_lies_ahead_is_not_touched_in_any_condition(tmp_path: Path, condition: str) -> None:
     """W4: it is passed, or stopped before where the picture is not fit to be evidence."""
-    result = driven(tmp_path, AHEAD + condition, Policy.PAANI)
+    result = driven(tmp_path, AHEAD + condition, Policy.PAANI_WIDE)
     assert result.collisions == 0
     assert result.completed or result.stops
 

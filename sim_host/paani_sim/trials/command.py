@@ -8,18 +8,23 @@ import signal
 import sys
 from pathlib import Path
 
+import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import indented_json, write_json
+from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
+from paani_sim.trials.ledger import Ledger
 from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases
 from paani_sim.trials.run_trial import load_case_config, run_trial
-from paani_sim.trials.suite_summary import format_summary, summarise_suite
+from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
+from paani_sim.trials.suite_summary import summarise_suite
+from paani_sim.trials.summary_table import format_summary
 from paani_sim.trials.trial_cases import SUITES, TrialCase, list_cases, parse_case
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.load import load_scenario
@@ -36,7 +41,8 @@ def main(argv: list[str]) -> int:
 
 
 def _run_suite(options: argparse.Namespace) -> int:
-    cases = _list_suite_cases(options)
+    choice, ledger = _open_ledger(options)
+    cases = _list_suite_cases(options, choice)
     out: Path = options.out or Path("runs") / f"trial-{options.suite}"
     reader = FingerprintReader(options.sets)
     for policy in options.policy:
@@ -46,6 +52,10 @@ def _run_suite(options: argparse.Namespace) -> int:
         sys.stderr.write(f"{out}: {len(kept.results)} of {len(cases)} drives are there already\n")
     for why, count in kept.outdated.items():
         sys.stderr.write(f"{out}: {count} drives were made with {why}, and are driven again\n")
+    if ledger is not None:
+        ledger.enter_draws(cases)
+        for case, stored in kept.results.items():
+            ledger.enter_result(case, stored)
     results, failures, code = dict(kept.results), list[FailedDrive](), 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # or the processes that drive would go on without it
     try:
@@ -55,6 +65,8 @@ def _run_suite(options: argparse.Namespace) -> int:
             ):
                 if isinstance(result, TrialResult):
                     results[case] = result
+                    if ledger is not None:
+                        ledger.enter_result(case, result)
                 else:
                     failures.append(result)
                 drives_with_contact = sum(r.collisions > 0 for c, r in results.items() if c.policy is Policy.PAANI)
@@ -70,7 +82,8 @@ def _run_suite(options: argparse.Namespace) -> int:
         sys.stderr.write(f"{case.name}: {results[case].error}\n")
     if not results:
         return code or 1
-    summary = summarise_suite(options.suite, results)
+    counts = ledger.count(choice.part) if ledger is not None else None
+    summary = summarise_suite(options.suite, results, len(cases), choice.commit, counts)
     sys.stdout.write(format_summary(summary))
     if options.json:
         write_json(options.json, summary, "--json")
@@ -81,9 +94,26 @@ def _run_suite(options: argparse.Namespace) -> int:
     return code or int(bool(failures or diverged))
 
 
+def _open_ledger(options: argparse.Namespace) -> tuple[SeedChoice, Ledger | None]:
+    """The choice of seeds with all digits of its commit, and the ledger of a part that has one. Raises UserError."""
+    choice: SeedChoice = options.seeds or SeedChoice()
+    if not choice.is_ledgered:
+        if options.ledger:
+            raise UserError("--ledger is for validation and fresh seeds")
+        return choice, None
+    if options.scenario:
+        raise UserError(f"--scenario: written scenarios are for development, not for {choice.part.value} seeds")
+    root = find_checkout()
+    path: Path = options.ledger or root / LEDGER_NAME
+    choice = msgspec.structs.replace(choice, commit=resolve_commit(root, choice.commit or "HEAD", path))
+    return choice, Ledger(path, choice.commit, options.sets)
+
+
 def _run_one(options: argparse.Namespace) -> int:
     """One drive in this process, its result printed."""
     case = parse_case(options.one)
+    if part_of_seed(case.seed) is SeedPart.VALIDATION:
+        raise UserError(f"--one {options.one}: a validation seed, which is measured and never looked into")
     if options.record:
         from paani_sim.trials.drive_recorder import DriveRecorder  # noqa: PLC0415
 
@@ -96,21 +126,22 @@ def _run_one(options: argparse.Namespace) -> int:
     else:
         sys.stdout.write(indented_json(result).decode())
     sys.stderr.write(
-        f"{case.name}: {result.why.value}, {result.collisions} contacts, {result.near_misses} near misses, "
+        f"{case.name} ({result.part.value} seed): {result.why.value}, "
+        f"{result.collisions} contacts, {result.near_misses} near misses, "
         f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "
         f"{effort.simulated_s / effort.wall_s:.1f} x real time\n"
     )
     return 1 if result.why is DriveOutcome.DIVERGED else 0
 
 
-def _list_suite_cases(options: argparse.Namespace) -> list[TrialCase]:
+def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[TrialCase]:
     worlds = options.scenario or options.worlds or list(WORLDS)
     for world in worlds:
         if options.scenario:
             load_scenario(world)
         elif world not in WORLDS:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
-    return list_cases(SUITES[options.suite], worlds, options.policy, options.seeds)
+    return list_cases(SUITES[options.suite], worlds, options.policy, choice)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -119,7 +150,15 @@ def _parser() -> argparse.ArgumentParser:
         description="Drive seeded scenarios in lockstep, faster than real time, and score them.",
     )
     parser.add_argument("--suite", choices=tuple(SUITES), default="quick", help="default: quick")
-    parser.add_argument("--seeds", type=_seeds, metavar="A..B", help="instead of the suite's")
+    parser.add_argument(
+        "--seeds", type=parse_seeds, metavar="A..B|PART",
+        help="instead of the suite's: A..B, development[:N], validation[:N], or fresh:N@COMMIT, which the commit's hash"
+        " draws",
+    )  # fmt: skip
+    parser.add_argument(
+        "--ledger", type=output_file("--ledger"), metavar="FILE",
+        help=f"where validation and fresh drives are entered, before and after (default: {LEDGER_NAME})",
+    )  # fmt: skip
     parser.add_argument(
         "--policy", nargs="+", type=Policy, choices=tuple(Policy), default=list(Policy), metavar="POLICY",
         help=f"who drives: {', '.join(Policy)} (default: all)",
@@ -143,16 +182,6 @@ def _parser() -> argparse.ArgumentParser:
         "--record", type=output_file("--record"), metavar="FILE", help="write the one drive there as MCAP"
     )
     return parser
-
-
-def _seeds(text: str) -> tuple[int, int]:
-    first, dots, last = text.partition("..")
-    if not (first.isdecimal() and (last.isdecimal() if dots else True)):
-        raise argparse.ArgumentTypeError(f"'{text}' is not A..B")
-    seeds = int(first), int(last or first)
-    if seeds[0] > seeds[1]:
-        raise argparse.ArgumentTypeError(f"'{text}' is empty")
-    return seeds
 
 
 def _count(text: str) -> int:

@@ -15,29 +15,34 @@ NOMINAL_SPEED_MPS = Config().navigator.cruise_mps
 class Policy(StrEnum):
     """Where evidence comes from and which profile decides.
 
-    PAANI: camera and deciders of the profile `wide`. PAPER: those of the profile `paper`, at its rates and speed.
-    BLIND: follows the route without evidence and without a planner. ORACLE: `paani` with evidence from ground truth.
+    PAANI: camera and deciders of the profile `paani`, which `paani up` runs where none is asked for. PAANI_WIDE: those
+    of the profile `wide`. PAPER: those of the profile `paper`, at its rates and speed. BLIND: PAANI without evidence
+    and without a planner. ORACLE: PAANI with evidence from ground truth.
     """
 
     PAANI = "paani"
+    PAANI_WIDE = "paani-wide"
     PAPER = "paper"
     BLIND = "blind"
     ORACLE = "oracle"
 
 
-CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAPER})
+CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAANI_WIDE, Policy.PAPER})
+OWN_PROFILE = {Policy.PAANI_WIDE: "wide", Policy.PAPER: "paper"}  # of policies whose profile no setting changes
 
 
 def load_policy_config(policy: Policy, sets: Iterable[str] = (), *, threads: bool = False) -> Config:
-    """Load the configuration of a policy; `sets` may choose another profile for every policy but PAPER.
+    """Load the configuration of a policy; `sets` may choose another profile for policies without one of their own.
 
     threads: run the two networks side by side, for a drive that has two cores; their outputs are the same.
     """
-    if policy is Policy.PAPER:
-        config = load_config(profile="paper", sets=[each for each in sets if not each.startswith("profile=")])
+    if policy in OWN_PROFILE:
+        config = load_config(
+            profile=OWN_PROFILE[policy], sets=[each for each in sets if not each.startswith("profile=")]
+        )
     else:
         blind = ("navigator.planner.use=false",) if policy is Policy.BLIND else ()
-        config = load_config(sets=("profile=wide", *blind, *sets))
+        config = load_config(sets=(*blind, *sets))
     return msgspec.structs.replace(
         config,
         perception=msgspec.structs.replace(config.perception, concurrent=threads, intra_op_threads=1),

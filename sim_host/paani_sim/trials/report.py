@@ -12,7 +12,9 @@ from string import Template
 from paani.statistics.charts import bar
 from paani.whole_file import write_whole
 from paani_sim.trials.result import CLOSENESS_LIMIT_M, Closeness, TrialResult
+from paani_sim.trials.seed_parts import SeedPart
 from paani_sim.trials.suite_summary import PolicyFigures, Share, Summary
+from paani_sim.trials.summary_table import describe_seeds
 from paani_sim.trials.track_chart import draw_track_chart
 from paani_sim.trials.trial_cases import TrialCase, build_scenario
 from paani_sim.trials.worst_drives import RepeatedDrive, repeat_drives, select_worst_drives
@@ -30,9 +32,13 @@ LEGEND = (
 def write_report(
     path: Path, summary: Summary, results: Mapping[TrialCase, TrialResult], sets: Sequence[str], jobs: int
 ) -> None:
-    """Write the page, and beside it a folder with recordings and pictures. Raises UserError if that fails."""
+    """Write the page, and beside it a folder with recordings and pictures. Raises UserError if that fails.
+
+    Of validation seeds no drive is shown.
+    """
     folder = path.with_name(f"{path.stem}-drives")
-    repeated = repeat_drives(select_worst_drives(results, WORST_COUNT), results, sets, folder, jobs)
+    viewable = {case: result for case, result in results.items() if result.part is not SeedPart.VALIDATION}
+    repeated = repeat_drives(select_worst_drives(viewable, WORST_COUNT), results, sets, folder, jobs)
     write_whole(path, render_page(summary, results, repeated, folder.name).encode(), "--report")
 
 
@@ -48,6 +54,9 @@ def render_page(
         "if the camera could have seen the thing within 15 m in the five seconds before. A near miss is a clearance "
         "below 0.5 m without contact; those of banks are not counted here.</p>",
         _policy_table(summary.policies),
+        "<h2>By distance and by encounter</h2><p>Rates per km have the 95 % interval of a Poisson count, shares of "
+        "encounters with things that of Wilson.</p>",
+        _exposure_table(summary.policies),
         "<h2>How close</h2><p>Encounters within five metres, by the clearance at the closest point.</p>",
         _closeness_table(summary.policies),
         "<h2>Worlds</h2>",
@@ -57,16 +66,23 @@ def render_page(
     ]
     if summary.faults:
         body += ["<h2>Faults</h2>", _fault_table(summary)]
-    body += ["<h2>Worst drives</h2>", LEGEND, *(_drive_section(each, results[each.case], folder) for each in repeated)]
+    body += [
+        "<h2>Worst drives</h2>",
+        LEGEND if repeated else '<p class="faint">None is shown.</p>',
+        *(_drive_section(each, results[each.case], folder) for each in repeated),
+    ]
     template = Template((files("paani_sim.trials") / "page.html").read_text(encoding="utf-8"))
     return template.substitute(
-        title=escape(summary.suite), subtitle=f"{drives} drives, {km:.2f} km", body="\n".join(body)
+        title=escape(summary.suite),
+        subtitle=escape(f"{drives} drives, {km:.2f} km; {describe_seeds(summary.seeds)}"),
+        body="\n".join(body),
     )
 
 
 def _policy_table(rows: Mapping[str, PolicyFigures]) -> str:
     head = (
-        "", "drives", "completed", "without contact", "contacts", "visible", "banks", "per km", "near misses",
+        "", "profile", "seeds", "drives", "completed", "without contact", "contacts", "visible", "banks", "per km",
+        "near misses",
         "contacts and near misses per km", "least clearance [m]", "off route rms [m]", "speed [m/s]",
         "changes a minute", "latency [s]",
     )  # fmt: skip
@@ -74,11 +90,32 @@ def _policy_table(rows: Mapping[str, PolicyFigures]) -> str:
         head,
         [
             (
-                escape(name), str(p.trials), _share_cell(p.completed_share), _share_cell(p.untouched_share),
+                escape(name), escape(p.profile), f"{p.seeds} {p.part.value}", str(p.trials),
+                _share_cell(p.completed_share), _share_cell(p.untouched_share),
                 _count_cell(p.collisions), _count_cell(p.collisions_visible), str(p.collisions_bank),
                 f"{p.contacts_per_km:.2f}", str(p.near_misses), f"{p.close_per_km:.1f}",
                 f"{p.min_clearance_m:.2f}", f"{p.off_route_rms_m:.2f}", f"{p.mean_speed_mps:.2f}",
                 f"{p.changes_per_min:.1f}", "-" if p.latency_p50_s is None else f"{p.latency_p50_s:.2f}",
+            )
+            for name, p in rows.items()
+        ],
+    )  # fmt: skip
+
+
+def _exposure_table(rows: Mapping[str, PolicyFigures]) -> str:
+    head = (
+        "", "km", "contacts per km", "near misses per km", "encounters", "with contact", "with near miss",
+        "encounters with people", "at 1.5&nbsp;m or more",
+    )  # fmt: skip
+    return _table(
+        head,
+        [
+            (
+                escape(name), f"{p.distance_m * 1e-3:.2f}",
+                _rate_cell(p.contacts_per_km, p.contacts_per_km_interval),
+                _rate_cell(p.near_misses_per_km, p.near_misses_per_km_interval), str(p.encountered),
+                _share_cell(p.touched_encounter_share), _share_cell(p.near_encounter_share),
+                str(p.encountered_people), _share_cell(p.person_clear_share),
             )
             for name, p in rows.items()
         ],
@@ -156,6 +193,10 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -
 def _share_cell(s: Share) -> str:
     interval = f"<small>{100 * s.low:.1f} to {100 * s.high:.1f}</small>"
     return f"{100 * s.share:.1f} % {interval}{bar(s.share, s.low, s.high)}"
+
+
+def _rate_cell(rate: float, interval: tuple[float, float]) -> str:
+    return f"{rate:.2f} <small>{interval[0]:.2f} to {interval[1]:.2f}</small>"
 
 
 def _count_cell(count: int) -> str:

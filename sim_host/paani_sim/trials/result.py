@@ -9,6 +9,7 @@ import msgspec
 from paani.statistics.dithering import Dithering
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
+from paani_sim.trials.seed_parts import SeedPart
 
 
 class Closeness(StrEnum):
@@ -26,6 +27,7 @@ class Closeness(StrEnum):
 
 
 NEAR_MISS_CLEARANCE_M = 0.5  # without touching: less than the hull's width
+PERSON_CLEARANCE_M = 1.5  # least distance to be kept to a person: twice the hull's width, as for CLOSE
 CLOSENESS_LIMIT_M = {Closeness.GRAZING: 0.3, Closeness.TIGHT: 0.6, Closeness.CLOSE: 1.5}
 
 
@@ -39,6 +41,11 @@ class Encounter(msgspec.Struct, frozen=True, kw_only=True):
     closeness: Closeness
     x_m: float
     y_m: float
+
+
+def is_near_miss(encounter: Encounter) -> bool:
+    """Whether it came under `NEAR_MISS_CLEARANCE_M` without touching."""
+    return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_CLEARANCE_M
 
 
 class Contact(msgspec.Struct, frozen=True, kw_only=True):
@@ -86,11 +93,17 @@ class Latency(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
-    """One drive. `track`: time, x, y every two seconds. Cross-track error is that of the true position."""
+    """One drive. `track`: time, x, y every two seconds. Cross-track error is that of the true position.
+
+    `part`: what the seed may be used for. `profile`: of the settings that it was driven with; `hfov_deg`: of its lens.
+    """
 
     scenario: str
     seed: int
+    part: SeedPart
     policy: Policy
+    profile: str
+    hfov_deg: float
     world: str
     why: DriveOutcome
     completed: bool

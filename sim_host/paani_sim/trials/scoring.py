@@ -28,14 +28,15 @@ from paani_sim.trials.hull_clearance import (
 from paani_sim.trials.policies import Policy, processed_frame_rate_hz
 from paani_sim.trials.result import (
     CLOSENESS_LIMIT_M,
-    NEAR_MISS_CLEARANCE_M,
     Closeness,
     Contact,
     Encounter,
     Latency,
     StopTotals,
     TrialResult,
+    is_near_miss,
 )
+from paani_sim.trials.seed_parts import part_of_seed
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
 
@@ -65,7 +66,10 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
     return TrialResult(
         scenario=scenario.name,
         seed=scenario.seed,
+        part=part_of_seed(scenario.seed),
         policy=policy,
+        profile=drive.config.profile,
+        hfov_deg=eye.hfov_deg,
         world=world.name,
         why=drive.outcome,
         completed=drive.outcome is DriveOutcome.COMPLETED,
@@ -78,8 +82,8 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
         collisions=len(contacts),
         collisions_visible=sum(contact.visible for contact in contacts),
         collisions_bank=sum(contact.what == BANK for contact in contacts),
-        near_misses=sum(map(_is_near_miss, things)),
-        near_misses_bank=sum(map(_is_near_miss, banks)),
+        near_misses=sum(map(is_near_miss, things)),
+        near_misses_bank=sum(map(is_near_miss, banks)),
         min_clearance_m=_min_clearance_m(gaps for what, gaps in clearances_m.items() if what != BANK),
         min_bank_clearance_m=_min_clearance_m([clearances_m[BANK]]),
         off_route_rms_m=round(float(np.sqrt((cross_track_m * cross_track_m).mean())), 3),
@@ -208,10 +212,6 @@ def summarise_latency(applied: Sequence[ThrustChange]) -> Latency:
     return Latency(
         p50_s=nearest_rank(ordered, 50), p95_s=nearest_rank(ordered, 95), max_s=ordered[-1], samples=len(ordered)
     )
-
-
-def _is_near_miss(encounter: Encounter) -> bool:
-    return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_CLEARANCE_M
 
 
 def _min_clearance_m(clearances_m: Iterable[F64]) -> float:

@@ -8,10 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 
 from paani.statistics.order_statistics import nearest_rank
-from paani_sim.trials.intervals import wilson_interval
+from paani_sim.trials.intervals import poisson_interval, wilson_interval
+from paani_sim.trials.ledger import LedgerCounts
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.result import Closeness, TrialResult
+from paani_sim.trials.result import PERSON_CLEARANCE_M, Closeness, TrialResult, is_near_miss
+from paani_sim.trials.seed_parts import SeedPart, part_of_parts
 from paani_sim.trials.trial_cases import TrialCase
+from paani_sim.worlds import Kind
 
 
 class Share(msgspec.Struct, frozen=True, kw_only=True):
@@ -31,20 +34,35 @@ class PolicyFigures(msgspec.Struct, frozen=True, kw_only=True):
     """Sums over all drives without a fault. `near_misses` are of things; those of banks are counted apart.
 
     `close_per_km`: near misses and contacts, as a boat held by what it hit comes near to nothing after it.
+    `seen_untouched_share`: drives without a contact with what was visible. `touched_encounter_share` and
+    `near_encounter_share`: of the encounters with things, those with a contact and those with a near miss.
+    `person_clear_share`: of the encounters with people, those at `PERSON_CLEARANCE_M` or more. Shares have Wilson
+    intervals, rates per km those of a Poisson count.
     """
 
+    part: SeedPart
+    seeds: int
+    profile: str
     trials: int
     completed: int
     completed_share: Share
     untouched: int
     untouched_share: Share
+    seen_untouched_share: Share
+    encountered: int
+    touched_encounter_share: Share
+    near_encounter_share: Share
+    encountered_people: int
+    person_clear_share: Share
     collisions: int
     collisions_visible: int
     collisions_bank: int
     contacts_per_km: float
+    contacts_per_km_interval: tuple[float, float]
     near_misses: int
     near_misses_bank: int
     near_misses_per_km: float
+    near_misses_per_km_interval: tuple[float, float]
     close_per_km: float
     distance_m: float
     progress_m: float
@@ -78,23 +96,52 @@ class FaultFigures(msgspec.Struct, frozen=True, kw_only=True):
     worst_rest_s: float | None
 
 
+class SeedsDriven(msgspec.Struct, frozen=True, kw_only=True):
+    """Of which part the seeds are, how many different ones, and how many drives were asked for and gave a result.
+
+    `commit` and `ledger`: of seeds that are entered into a ledger.
+    """
+
+    part: SeedPart
+    seeds: int
+    drives: int
+    asked: int
+    commit: str = ""
+    ledger: LedgerCounts | None = None
+
+
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """What `--json` writes."""
 
     suite: str
+    seeds: SeedsDriven
     policies: dict[str, PolicyFigures]
     worlds: dict[str, dict[str, PolicyFigures]]
     faults: dict[str, FaultFigures]
 
 
-def summarise_suite(suite: str, results: Mapping[TrialCase, TrialResult]) -> Summary:
-    """Summarise drives by policy, by policy and world, and by fault."""
+def summarise_suite(
+    suite: str,
+    results: Mapping[TrialCase, TrialResult],
+    asked: int | None = None,
+    commit: str = "",
+    ledger: LedgerCounts | None = None,
+) -> Summary:
+    """Summarise drives by policy, by policy and world, and by fault. asked: drives, where some gave no result."""
     plain = {case: result for case, result in sorted(results.items()) if not case.fault}
     policies = [policy for policy in Policy if any(case.policy is policy for case in plain)]
     worlds = sorted({case.world for case in plain})
     kinds = sorted({case.fault for case in results if case.fault})
     return Summary(
         suite=suite,
+        seeds=SeedsDriven(
+            part=part_of_parts({r.part for r in results.values()}),
+            seeds=len({case.seed for case in results}),
+            drives=len(results),
+            asked=len(results) if asked is None else asked,
+            commit=commit,
+            ledger=ledger,
+        ),
         policies={p.value: summarise_drives([r for c, r in plain.items() if c.policy is p]) for p in policies},
         worlds={
             p.value: {
@@ -117,25 +164,38 @@ def summarise_drives(results: Sequence[TrialResult]) -> PolicyFigures:
     collisions, near = sum(r.collisions for r in results), sum(r.near_misses for r in results)
     completed, untouched = sum(r.completed for r in results), sum(r.collisions == 0 for r in results)
     km = max(distance_m * 1e-3, 1e-9)
-    closeness = collections.Counter(e.closeness.value for r in results for e in r.encounters if e.what != "bank")
     stops: dict[str, StopFigures] = {}
     for stop in (stop for r in results for stop in r.stops):
         old = stops.get(stop.reason, StopFigures(count=0, seconds=0.0))
         stops[stop.reason] = StopFigures(count=old.count + stop.count, seconds=round(old.seconds + stop.seconds, 2))
     latencies = [r.latency for r in results if r.latency.samples]
+    met = [e for r in results for e in r.encounters if e.what != "bank"]
+    closeness = collections.Counter(e.closeness.value for e in met)
+    people = [e for e in met if e.kind == Kind.PERSON.value]
     return PolicyFigures(
+        part=part_of_parts({r.part for r in results}),
+        seeds=len({r.seed for r in results}),
+        profile=" ".join(sorted({r.profile for r in results})),
         trials=count,
         completed=completed,
         completed_share=share_with_interval(completed, count),
         untouched=untouched,
         untouched_share=share_with_interval(untouched, count),
+        seen_untouched_share=share_with_interval(sum(r.collisions_visible == 0 for r in results), count),
+        encountered=len(met),
+        touched_encounter_share=share_with_interval(closeness[Closeness.CONTACT.value], len(met)),
+        near_encounter_share=share_with_interval(sum(map(is_near_miss, met)), len(met)),
+        encountered_people=len(people),
+        person_clear_share=share_with_interval(sum(e.clearance_m >= PERSON_CLEARANCE_M for e in people), len(people)),
         collisions=collisions,
         collisions_visible=sum(r.collisions_visible for r in results),
         collisions_bank=sum(r.collisions_bank for r in results),
         contacts_per_km=round(collisions / km, 3),
+        contacts_per_km_interval=_rate_interval(collisions, km),
         near_misses=near,
         near_misses_bank=sum(r.near_misses_bank for r in results),
         near_misses_per_km=round(near / km, 3),
+        near_misses_per_km_interval=_rate_interval(near, km),
         close_per_km=round((near + collisions) / km, 3),
         distance_m=round(distance_m, 1),
         progress_m=round(sum(r.progress_m for r in results), 1),
@@ -180,34 +240,9 @@ def share_with_interval(successes: int, trials: int) -> Share:
     return Share(share=round(successes / trials, 4) if trials else 0.0, low=round(low, 4), high=round(high, 4))
 
 
-def format_summary(summary: Summary) -> str:
-    """One line per policy, then one per fault."""
-    lines = [
-        f"{'policy':8} {'drives':>6}  {'completed [95 %]':22} {'no contact [95 %]':22} {'contacts':>8} {'visible':>7}"
-        f" {'bank':>5} {'per km':>7} {'near':>5} {'close/km':>8} {'least':>6} {'off rms':>8} {'turns/min':>9} {'km':>7}"
-    ]
-    for name, p in summary.policies.items():
-        lines.append(
-            f"{name:8} {p.trials:6}  {_format_share(p.completed_share):22} {_format_share(p.untouched_share):22}"
-            f" {p.collisions:8} {p.collisions_visible:7} {p.collisions_bank:5} {p.contacts_per_km:7.2f}"
-            f" {p.near_misses:5}"
-            f" {p.close_per_km:8.2f} {p.min_clearance_m:6.2f} {p.off_route_rms_m:8.2f}"
-            f" {p.changes_per_min:9.2f} {p.distance_m * 1e-3:7.3f}"
-        )
-    if summary.faults:
-        lines += [
-            "",
-            f"{'fault':16} {'drives':>6} {'completed':>9} {'contacts':>8} {'in time':>9} {'fans off [s]':>12}",
-        ]
-        for name, f in summary.faults.items():
-            judged = f"{f.in_time}/{f.judged}" if f.judged else "-"
-            worst = "-" if f.worst_zero_thrust_s is None else f"{f.worst_zero_thrust_s:.2f}"
-            lines.append(f"{name:16} {f.trials:6} {f.completed:9} {f.collisions:8} {judged:>9} {worst:>12}")
-    return "\n".join(lines) + "\n"
-
-
-def _format_share(s: Share) -> str:
-    return f"{100 * s.share:5.1f} % [{100 * s.low:4.1f}, {100 * s.high:5.1f}]"
+def _rate_interval(count: int, km: float) -> tuple[float, float]:
+    low, high = poisson_interval(count)
+    return round(low / km, 3), round(high / km, 3)
 
 
 def _per_minute(minutes: float, counts: Iterable[int]) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from paani.errors import UserError
 from paani_sim.trials.policies import Policy
+from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.load import SCENARIOS, load_scenario
@@ -61,20 +62,20 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
 
 
 class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
-    """`seeds` in every world for every policy; then, for `paani`, each fault in every world so many times.
+    """`seed_count` seeds in every world for every policy; then, for `paani`, each fault in every world so many times.
 
     `paper_seed_stride`: distance between the seeds of PAPER, whose drives take four times as long.
     """
 
-    seeds: tuple[int, int]
+    seed_count: int
     paper_seed_stride: int = 1
     camera_faults: int = 0
     other_faults: int = 0
 
 
 SUITES = {
-    "quick": TrialSuite(seeds=(1, 2), paper_seed_stride=2),
-    "standard": TrialSuite(seeds=(1, 50), paper_seed_stride=10, camera_faults=3, other_faults=1),
+    "quick": TrialSuite(seed_count=2, paper_seed_stride=2),
+    "standard": TrialSuite(seed_count=50, paper_seed_stride=10, camera_faults=3, other_faults=1),
 }
 
 
@@ -84,25 +85,28 @@ def is_fixed_scenario(world: str) -> bool:
 
 
 def list_cases(
-    suite: TrialSuite, worlds: Sequence[str], policies: Iterable[Policy], seeds: tuple[int, int] | None = None
+    suite: TrialSuite, worlds: Sequence[str], policies: Iterable[Policy], choice: SeedChoice | None = None
 ) -> list[TrialCase]:
-    """Every case of a suite, in the order of driving. `seeds` replaces those of the suite, for every policy alike."""
-    first, last = seeds or suite.seeds
-    every = {Policy.PAPER: 1 if seeds else suite.paper_seed_stride}
-    chosen = tuple(policies)
+    """Every case of a suite, in the order of driving. A choice that says which or how many seeds holds for PAPER too.
+
+    Without one the seeds are the first development seeds.
+    """
+    choice = choice or SeedChoice()
+    seeds, chosen = list_seeds(choice, suite.seed_count), tuple(policies)
+    every = {Policy.PAPER: 1 if choice.span or choice.count else suite.paper_seed_stride}
     found = [
         TrialCase(world, seed, policy)
-        for seed in range(first, last + 1)
+        for number, seed in enumerate(seeds)
         for world in worlds
         for policy in chosen
-        if (seed - first) % every.get(policy, 1) == 0
+        if number % every.get(policy, 1) == 0
     ]
     if Policy.PAANI in chosen:
         for kind in SUITE_FAULTS:
             count = suite.camera_faults if kind in CAMERA_FAULTS else suite.other_faults
             found += [
                 TrialCase(world, seed, Policy.PAANI, kind.value)
-                for seed in range(first, first + count)
+                for seed in seeds[:count]
                 for world in worlds
                 if not is_fixed_scenario(world)
             ]

@@ -19,7 +19,7 @@ from paani_sim.trials.hull_clearance import (
     compute_clearances_m,
     was_visible,
 )
-from paani_sim.trials.intervals import wilson_interval
+from paani_sim.trials.intervals import poisson_interval, wilson_interval
 from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.result import Closeness, Contact
 from paani_sim.trials.route_progress import RouteProgress
@@ -93,6 +93,19 @@ def test_wilson_interval_contains_the_share(trials: int, data: st.DataObject) ->
     successes = data.draw(st.integers(0, trials))
     low, high = wilson_interval(successes, trials)
     assert 0.0 <= low <= successes / trials <= high <= 1.0
+
+
+@pytest.mark.parametrize(("count", "low", "high"), [(0, 0.0, 3.689), (1, 0.025, 5.572), (10, 4.795, 18.390)])
+def test_poisson_against_the_exact_interval(count: int, low: float, high: float) -> None:
+    """Garwood's, as tables of the chi-squared distribution give it."""
+    assert poisson_interval(count) == pytest.approx((low, high), abs=0.03)
+
+
+@given(st.integers(0, 3000))
+def test_poisson_interval_contains_the_count_and_rises_with_it(count: int) -> None:
+    low, high = poisson_interval(count)
+    assert 0.0 <= low <= count < high
+    assert poisson_interval(count + 1) > (low, high)
 
 
 def test_clearance_is_from_hull_to_footprint() -> None:

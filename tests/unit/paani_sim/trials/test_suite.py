@@ -6,6 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from paani.config import load_config
 from paani.errors import UserError
 from paani_sim.trials import command
 from paani_sim.trials.drive_states import DriveOutcome
@@ -19,7 +20,9 @@ from paani_sim.trials.run_suite import (
     read_stored_result,
     result_path,
 )
-from paani_sim.trials.suite_summary import Summary, format_summary, summarise_suite
+from paani_sim.trials.seed_parts import SeedPart
+from paani_sim.trials.suite_summary import Summary, summarise_suite
+from paani_sim.trials.summary_table import format_summary
 from paani_sim.trials.trial_cases import SUITE_FAULTS, SUITES, TrialCase, build_scenario, list_cases, parse_case
 from paani_sim.worlds import WORLDS, FaultKind
 from tests.unit.paani_sim.trials.trial_results import RESULT
@@ -35,7 +38,7 @@ def reader() -> FingerprintReader:
 def test_suites() -> None:
     """`standard` drives 50 times in each world with every policy but the slow one, which drives 5 times in each."""
     quick, standard = (list_cases(SUITES[name], tuple(WORLDS), Policy) for name in ("quick", "standard"))
-    assert len(quick) == len(WORLDS) * (2 * 3 + 1)
+    assert len(quick) == len(WORLDS) * (2 * (len(Policy) - 1) + 1)
     for policy in Policy:
         plain = [case for case in standard if case.policy is policy and not case.fault]
         missing = 5 if policy is Policy.PAPER else 50
@@ -111,7 +114,7 @@ def test_stored_results_survive_their_file(tmp_path: Path, reader: FingerprintRe
 def test_figures_have_what_the_scoring_reads() -> None:
     """`policies.<name>.{trials,completed,collisions,near_misses,distance_m}`, and intervals."""
     bad = msgspec.structs.replace(
-        RESULT, completed=False, why=DriveOutcome.TIME_LIMIT, collisions=2, collisions_visible=1, near_misses=0
+        RESULT, seed=2, completed=False, why=DriveOutcome.TIME_LIMIT, collisions=2, collisions_visible=1, near_misses=0
     )
     blind = msgspec.structs.replace(RESULT, policy=Policy.BLIND, near_misses=4)
     fault = msgspec.structs.replace(
@@ -133,6 +136,13 @@ def test_figures_have_what_the_scoring_reads() -> None:
     assert (paani["contacts_per_km"], paani["collisions_visible"], paani["untouched"]) == (20.0, 1, 1)
     assert paani["completed_share"]["low"] < 0.5 < paani["completed_share"]["high"]
     assert paani["encounters"]["tight"] == 2
+    assert (paani["part"], paani["seeds"], paani["profile"]) == ("development", 2, "paani")
+    assert (paani["encountered"], paani["near_encounter_share"]["share"]) == (2, 1.0)
+    assert paani["seen_untouched_share"]["share"] == 0.5
+    low, high = paani["contacts_per_km_interval"]
+    assert low == pytest.approx(10.0 * 0.2246, abs=0.01)
+    assert high == pytest.approx(10.0 * 7.2209, abs=0.01)
+    assert (read["seeds"]["part"], read["seeds"]["drives"], read["seeds"]["asked"]) == ("development", 4, 4)
     assert paani["ended"] == {"completed": 1, "time_limit": 1}
     assert paani["stops"]["NO_SAFE_SIDE"] == {"count": 4, "seconds": 8.0}
     assert paani["changes_per_min"] == 3.0
@@ -140,7 +150,20 @@ def test_figures_have_what_the_scoring_reads() -> None:
     assert read["worlds"]["paani"]["lake"]["trials"] == 2
     assert read["faults"]["camera_black"]["in_time"] == read["faults"]["camera_black"]["judged"] == 1
     assert msgspec.json.decode(msgspec.json.encode(summary), type=Summary) == summary
-    assert "camera_black" in format_summary(summary)
+    text = format_summary(summary)
+    assert "camera_black" in text
+    assert text.startswith("development seeds: 2; drives: 4\n")
+
+
+def test_figures_of_people_and_of_several_parts_say_so() -> None:
+    met = msgspec.structs.replace(RESULT.encounters[0], kind="person")
+    near = msgspec.structs.replace(RESULT, encounters=(met, msgspec.structs.replace(met, clearance_m=1.5)))
+    other = msgspec.structs.replace(RESULT, part=SeedPart.VALIDATION)
+    summary = summarise_suite("quick", {CASES[0]: near, CASES[1]: other}, asked=5)
+    figures = summary.policies["paani"]
+    assert (figures.encountered_people, figures.person_clear_share.share) == (2, 0.5)
+    assert (summary.seeds.part, figures.part) == (SeedPart.MIXED, SeedPart.MIXED)
+    assert "mixed seeds: 2; drives: 2; 3 without a result" in format_summary(summary)
 
 
 @pytest.mark.parametrize(
@@ -161,7 +184,7 @@ def test_mistakes_are_named(words: list[str], says: str, tmp_path: Path) -> None
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("words", [["--seeds", "3..1"], ["--seeds", "a"], ["--jobs", "0"], ["--policy", "me"]])
+@pytest.mark.parametrize("words", [["--jobs", "0"], ["--policy", "me"]])
 def test_malformed_options_are_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         command.main(words)
@@ -182,10 +205,12 @@ def test_a_finished_suite_is_only_read(
 
 
 @pytest.mark.parametrize("policy", [Policy.PAANI, Policy.ORACLE, Policy.BLIND])
-def test_trials_use_the_wide_lens_by_default(policy: Policy) -> None:
-    """The paper's policy is the paper's, whatever is set."""
-    assert load_policy_config(policy).profile == "wide"
-    config = load_policy_config(policy, ["profile=paani"])
-    assert (config.profile, config.eye.hfov_deg) == ("paani", 70.0)
+def test_trials_drive_what_ships(policy: Policy) -> None:
+    """`paani` drives the settings of `paani up`, the paper's policy the paper's, and the wide lens is asked for."""
+    config = load_policy_config(policy)
+    assert (config.profile, config.eye) == ("paani", load_config().eye)
     assert config.navigator.planner.use is (policy is not Policy.BLIND)
+    assert load_policy_config(policy, ["profile=wide"]).eye.hfov_deg == 102.0
     assert load_policy_config(Policy.PAPER, ["profile=paani"]).profile == "paper"
+    wide = load_policy_config(Policy.PAANI_WIDE, ["profile=paani", "navigator.cruise_mps=0.5"])
+    assert (wide.profile, wide.eye.hfov_deg, wide.navigator.cruise_mps) == ("wide", 102.0, 0.5)

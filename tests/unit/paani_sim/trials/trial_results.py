@@ -4,11 +4,15 @@ from paani.statistics.dithering import Dithering
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import Closeness, Encounter, Latency, StopTotals, TrialResult
+from paani_sim.trials.seed_parts import SeedPart
 
 RESULT = TrialResult(
     scenario="random:lake:1",
     seed=1,
+    part=SeedPart.DEVELOPMENT,
     policy=Policy.PAANI,
+    profile="paani",
+    hfov_deg=70.0,
     world="lake",
     why=DriveOutcome.COMPLETED,
     completed=True,
