@@ -1,41 +1,39 @@
-"""Every statement of the paper has one row, and every test that a row names exists."""
+"""Every statement of the paper has one row; the tests that a row names exist, and its mutants fit the product."""
 
 from __future__ import annotations
 
-import ast
 import re
-import tomllib
+from pathlib import Path
 
 import pytest
 
+from paani.errors import UserError
+from tests.claims_check.__main__ import choose_rows, main
+from tests.claims_check.table import IDS, TABLE, find_faults, read_table
 from tests.places import ROOT
 
-COUNTS = {
-    "A": 12, "B": 17, "C": 15, "D": 11, "E": 7, "F": 4, "G": 11, "H": 6, "I": 22, "J": 19, "K": 10, "L": 5, "M": 11,
-    "N": 8, "O": 5, "P": 5, "Q": 6, "R": 11, "S": 12, "T": 6, "U": 10, "V": 24, "W": 15,
-}  # fmt: skip
-CLAIMS = tomllib.loads((ROOT / "tests" / "claims.toml").read_text(encoding="utf-8"))
+CLAIMS = read_table(ROOT)
+MAX_PROVED_WITHOUT_MUTANT = 128  # it only ever goes down
 
 
 def test_the_file_is_complete() -> None:
-    expected = [f"{letter}{number}" for letter, count in COUNTS.items() for number in range(1, count + 1)]
-    assert len(expected) == 252
-    assert sorted(CLAIMS) == sorted(expected)
+    assert len(IDS) == 252
+    assert sorted(CLAIMS) == sorted(IDS)
+
+
+def test_every_row_can_be_checked() -> None:
+    """Tests that exist, mutants that fit in one place of one file and change its code."""
+    assert find_faults(CLAIMS, ROOT) == []
 
 
 @pytest.mark.parametrize("claim", CLAIMS)
-def test_a_row_is_proved_exempt_or_pending(claim: str) -> None:
-    row = CLAIMS[claim]
-    assert len(row.keys() & {"test", "exempt", "pending"}) == 1
-    assert row.keys() <= {"says", "test", "exempt", "pending"}
-    assert len(row["says"].split()) >= 4, "a statement is a sentence"
-    for name in row.get("test", []):
-        file, _, function = name.partition("::")
-        assert (ROOT / file).is_file(), name
-        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-        functions = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)}
-        assert function in functions, name
-    assert row.get("test", True), "an empty list of tests proves nothing"
+def test_a_statement_is_a_sentence(claim: str) -> None:
+    assert len(CLAIMS[claim].says.split()) >= 4
+
+
+def test_ever_fewer_rows_are_without_a_mutant() -> None:
+    without = [name for name, row in CLAIMS.items() if row.test and not row.mutant]
+    assert len(without) == MAX_PROVED_WITHOUT_MUTANT
 
 
 def test_every_cited_statement_is_in_the_file() -> None:
@@ -47,3 +45,71 @@ def test_every_cited_statement_is_in_the_file() -> None:
                 for letter, first, last in cited.findall(bracket):
                     for number in (first, last or first):
                         assert f"{letter}{int(number)}" in CLAIMS, (path, bracket)
+
+
+SOUND = """
+[H3]
+says = "Three is less than four."
+test = ["tests/test_it.py::test_three"]
+mutant = [{ file = "shared/it.py", from = "3 < 4", to = "3 < 2" }]
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout with one module, one test and a table that is in order."""
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared" / "it.py").write_text('"""Less is 3 < 5."""\n\n\ndef less() -> bool:\n    return 3 < 4\n')
+    (tmp_path / "tests" / "test_it.py").write_text("def test_three() -> None: ...\n")
+    (tmp_path / TABLE).write_text(SOUND)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "fault"),
+    [
+        ("[H3]", "[H33]", "H33: no such statement of the paper"),
+        ("::test_three", "::test_four", "H3: no such test: tests/test_it.py::test_four"),
+        ("tests/test_it.py", "tests/test_no.py", "H3: no such test: tests/test_no.py::test_three"),
+        ("shared/it.py", "shared/no.py", "H3: no such file: shared/no.py"),
+        ('from = "3 < 4"', 'from = "3 < 9"', "H3: `from` occurs 0 times in shared/it.py, not once: '3 < 9'"),
+        ('from = "3 < 4"', 'from = "3 < "', "H3: `from` occurs 2 times in shared/it.py, not once: '3 < '"),
+        ('to = "3 < 2"', 'to = "3 <"', "H3: is no Python any more: shared/it.py: `3 < 4` -> `3 <` (invalid syntax)"),
+        ('from = "3 < 4"', 'from = "3 < 5"', "H3: changes no code: shared/it.py: `3 < 5` -> `3 < 2`"),
+        ('test = ["tests/test_it.py::test_three"]', "", "H3: needs either `test` or `exempt`"),
+        ('says = "', 'exempt = "it is not"\nsays = "', "H3: needs either `test` or `exempt`"),
+    ],
+)
+def test_a_fault_of_the_table_is_named(
+    checkout: Path, before: str, after: str, fault: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With its row, before anything runs, and exit code 2."""
+    (checkout / TABLE).write_text(SOUND.replace(before, after))
+    assert main([], checkout) == 2
+    assert fault in capsys.readouterr().err.splitlines()
+
+
+def test_a_malformed_table_is_named(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (checkout / TABLE).write_text(SOUND + "killed = true\n")
+    assert main([], checkout) == 2
+    assert f"{checkout / TABLE}: Object contains unknown field `killed`" in capsys.readouterr().err
+
+
+def test_rows_are_chosen_by_id_tier_draw_and_part() -> None:
+    mutated = [name for name, row in CLAIMS.items() if row.mutant]
+    assert list(choose_rows(CLAIMS, None, None, None, None)) == mutated
+    assert list(choose_rows(CLAIMS, ["I7", "H3"], None, None, None)) == ["H3", "I7"]
+    parts = [choose_rows(CLAIMS, None, None, None, f"{part}/3") for part in (1, 2, 3)]
+    assert sorted(name for part in parts for name in part) == sorted(mutated)
+    tenth = choose_rows(CLAIMS, None, None, "1", None)
+    assert len(tenth) == -(-len(mutated) // 10)
+    assert list(tenth) != list(choose_rows(CLAIMS, None, None, "2", None))
+    quick = choose_rows(CLAIMS, None, ["unit"], None, None)
+    assert all(test.startswith("tests/unit/") for row in quick.values() for test in row.test)
+    for wrong in ("X1", "A11"):
+        with pytest.raises(UserError, match=f"--rows: {wrong}"):
+            choose_rows(CLAIMS, [wrong], None, None, None)
+    for wrong in ("0/3", "4/3", "a"):
+        with pytest.raises(UserError, match=f"--shard: {wrong}"):
+            choose_rows(CLAIMS, None, None, None, wrong)

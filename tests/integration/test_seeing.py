@@ -6,6 +6,7 @@ import asyncio
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from paani import keys
@@ -54,6 +55,68 @@ async def test_pictures_become_advice_and_black_stops_it(spawn: Spawn, open_as: 
     assert mask.value is not None
     assert (mask.value.header.frame_epoch, mask.value.header.frame_seq) in frames
     assert mask.value.header.media_type == "image/png"
+
+
+async def test_a_frame_seen_before_or_older_is_no_evidence_again(spawn: Spawn, open_as: OpenAs) -> None:
+    """B3: judged by epoch, number and stamp before any network runs, and counted; B6: the mask has a key of its own."""
+    camera, observer = await open_as("camera"), await open_as("observer")
+    pictures, clock = camera.picture_publisher(keys.PICTURE), WallClock()
+    evidence, mask = observer.queue(keys.EVIDENCE, 64), observer.latest_picture(keys.MASK)
+    health = observer.latest(keys.health("perception"))
+    data = cv2.imencode(".jpg", river())[1].tobytes()
+    seen: list[m.Evidence] = []
+
+    def show(epoch: int, seq: int) -> None:
+        header = m.PictureHeader(
+            source_us=clock.now_us(), frame_seq=seq, frame_epoch=epoch, width_px=320, height_px=240
+        )
+        pictures.put_picture(header, data)
+
+    async def judge(epoch: int, seq: int) -> None:
+        show(epoch, seq)
+        async with asyncio.timeout(20):
+            seen.append(await evidence.get())
+            picture = await mask.next()
+        assert (picture.header.frame_epoch, picture.header.frame_seq) == (epoch, seq)
+        cells = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_UNCHANGED)
+        assert cells is not None
+        assert cells.shape == (64, 80)
+
+    async def refuse(epoch: int, seq: int, cause: str, times: int) -> None:
+        show(epoch, seq)
+        async with asyncio.timeout(10):
+            while m.DropCount(cause=cause, count=times) not in (await health.next()).drops:
+                pass
+
+    async with spawn("perception", "perception.rate_hz=50"):
+        await judge(5, 0)
+        await judge(5, 1)
+        await refuse(5, 1, "duplicate_frame", 1)
+        await refuse(5, 0, "old_frame", 1)
+        await refuse(4, 7, "old_frame", 2)
+        await judge(6, 0)
+    seen += evidence.drain()
+    assert [(e.frame_epoch, e.frame_seq) for e in seen] == [(5, 0), (5, 1), (6, 0)]
+
+
+@pytest.mark.parametrize("measured", [False, True])
+async def test_a_picture_says_whether_its_camera_is_calibrated(
+    spawn: Spawn, open_as: OpenAs, folder: Path, measured: bool
+) -> None:
+    """B2, B16: time of capture, epoch and number of every frame; no calibration unless one is established as valid."""
+    observer, clock = await open_as("observer"), WallClock()
+    pictures, began_us = observer.latest_picture(keys.PICTURE), clock.now_us()
+    known = ("calibration.hfov_deg=70", "calibration.height_m=0.9", "calibration.valid=true") if measured else ()
+    headers = []
+    async with spawn("camera", f"camera.source={folder}", "camera.rate_hz=20", *known):
+        async with asyncio.timeout(20):
+            for _ in range(3):
+                headers.append((await pictures.next()).header)
+    assert {header.calibrated for header in headers} == {measured}
+    assert len({header.frame_epoch for header in headers}) == 1
+    assert [header.frame_seq for header in headers] == sorted({header.frame_seq for header in headers})
+    stamps_us = [header.source_us for header in headers]
+    assert began_us < stamps_us[0] < stamps_us[1] < stamps_us[2] <= clock.now_us()
 
 
 async def test_the_advice_stops_when_the_evidence_ends(spawn: Spawn, open_as: OpenAs) -> None:

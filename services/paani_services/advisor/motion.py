@@ -120,7 +120,7 @@ def estimate_motion(history: MotionHistory, at_us: int, window: Window, config: 
         )
     if (at_us - samples[-1].at_us) * 1e-6 > window.max_gap_s:
         return _unknown_motion(MotionCause.GAP)
-    duration_s = (samples[-1].at_us - samples[0].at_us) * 1e-6
+    duration_s = (samples[-1].at_us - samples[0].at_us) / 1e6  # correctly rounded: 400 ms are no less than 0.4 s
     if duration_s < config.min_duration_s:
         return _unknown_motion(MotionCause.TOO_SHORT)
     times_s = [(s.at_us - samples[0].at_us) * 1e-6 for s in samples]

@@ -9,9 +9,13 @@ from paani.clock import Clock
 
 
 class PicturePublisher:
-    """Numbers the pictures and publishes them; each picture is a distinct frame."""
+    """Numbers the pictures and publishes them; each picture is a distinct frame.
 
-    def __init__(self, bus: Bus, clock: Clock) -> None:
+    is_calibrated: somebody measured the camera that takes them (`calibration.valid`); every header says so (B16).
+    """
+
+    def __init__(self, bus: Bus, clock: Clock, *, is_calibrated: bool) -> None:
+        self._is_calibrated = is_calibrated
         self._publisher, self._frames = bus.picture_publisher(keys.PICTURE), Numbering(clock)
 
     def start_new_epoch(self) -> None:
@@ -20,7 +24,9 @@ class PicturePublisher:
         self._frames.new_epoch()
 
     def put(self, data: bytes, header: m.PictureHeader) -> None:
-        """Publish one picture; its frame number and epoch are set here."""
+        """Publish one picture; its frame number and epoch, and whether its camera is calibrated, are set here."""
         self._frames.advance()
-        numbered = msgspec.structs.replace(header, frame_seq=self._frames.seq, frame_epoch=self._frames.epoch)
+        numbered = msgspec.structs.replace(
+            header, frame_seq=self._frames.seq, frame_epoch=self._frames.epoch, calibrated=self._is_calibrated
+        )
         self._publisher.put_picture(numbered, data)

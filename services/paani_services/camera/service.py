@@ -11,7 +11,7 @@ from paani_services.camera.picture_publisher import PicturePublisher
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Publish at most `camera.rate_hz` pictures a second."""
-    output = PicturePublisher(bus, clock)
+    output = PicturePublisher(bus, clock, is_calibrated=config.calibration.valid)
     if config.camera.source == "sim":
         await _relay_simulator(bus, clock, config.camera, output)
     else:

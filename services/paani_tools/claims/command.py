@@ -1,4 +1,4 @@
-"""`paani claims [ID ...]`: what the paper states, and which test proves it."""
+"""`paani claims [ID ...]`: what the paper states, which test proves it, and what is better here."""
 
 from __future__ import annotations
 

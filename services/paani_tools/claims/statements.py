@@ -1,4 +1,4 @@
-"""The statements of the paper, each with its proof, the reason why it does not apply, or what it waits for.
+"""The statements of the paper, each with its proof, what is better here on purpose, or why it does not apply.
 
 The table ships inside the wheel; in a checkout it is `tests/claims.toml`.
 """
@@ -18,23 +18,28 @@ SHIPPED = "claims.toml"
 IN_CHECKOUT = Path(__file__).parents[3] / "tests" / SHIPPED
 _ID = re.compile(r"([A-Z])(\d+)")
 
-State = Literal["proved", "exempt", "pending"]
+State = Literal["proved", "improved", "exempt"]
 
 
 class _Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     says: str
     test: tuple[str, ...] = ()
+    mutant: tuple[dict[str, str], ...] = ()
+    improved: str = ""
     exempt: str = ""
-    pending: str = ""
 
 
 class Statement(msgspec.Struct, frozen=True, kw_only=True):
-    """One statement. `proof`: tests as `file::function` where it is proved, else one sentence that says why not."""
+    """One statement. `proof`: tests as `file::function`, or the one sentence that says why it is exempt.
+
+    improved: what is better here than in the paper on purpose, and how the paper's own form is kept; empty otherwise.
+    """
 
     id: str
     says: str
     state: State
     proof: tuple[str, ...]
+    improved: str = ""
 
 
 def read_statements() -> tuple[Statement, ...]:
@@ -69,21 +74,21 @@ def statements_text(statements: tuple[Statement, ...]) -> str:
     """A paragraph for each statement, then how many are in each state."""
     lines = []
     for each in statements:
-        lines += [f"{each.id}  {each.says}", *(f"    {each.state}: {proof}" for proof in each.proof)]
+        lines += [f"{each.id}  {each.says}", *([f"    improved: {each.improved}"] if each.improved else [])]
+        lines += [f"    {'exempt' if each.state == 'exempt' else 'proved'}: {proof}" for proof in each.proof]
     counts = ", ".join(f"{sum(each.state == state for each in statements)} {state}" for state in _STATES)
     noun = "statement" if len(statements) == 1 else "statements"
     return "\n".join([*lines, f"{len(statements)} {noun}: {counts}"]) + "\n"
 
 
-_STATES: tuple[State, ...] = ("proved", "exempt", "pending")
+_STATES: tuple[State, ...] = ("proved", "improved", "exempt")
 
 
 def _statement(name: str, row: _Row) -> Statement:
-    if row.test:
-        return Statement(id=name, says=row.says, state="proved", proof=row.test)
     if row.exempt:
         return Statement(id=name, says=row.says, state="exempt", proof=(row.exempt,))
-    return Statement(id=name, says=row.says, state="pending", proof=(row.pending,))
+    state: State = "improved" if row.improved else "proved"
+    return Statement(id=name, says=row.says, state=state, proof=row.test, improved=row.improved)
 
 
 def _ids(name: str, statements: tuple[Statement, ...]) -> set[str]:

@@ -20,7 +20,10 @@ class TimeBase(StrEnum):
 
 
 class PictureHeader(Message, frozen=True, kw_only=True):
-    """Attached to the bytes of an encoded picture. `frame_epoch` and `frame_seq` identify the camera frame it shows."""
+    """Attached to the bytes of an encoded picture. `frame_epoch` and `frame_seq` identify the camera frame it shows.
+
+    `calibrated`: the camera's calibration is established as valid; without that there is none (B16).
+    """
 
     frame_seq: Count
     frame_epoch: Count

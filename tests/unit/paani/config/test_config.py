@@ -103,29 +103,6 @@ def test_a_rate_that_starves_the_motion_estimator_is_refused_i22(rate_hz: float,
             load_config(sets=sets)
 
 
-def test_the_paper_profile_carries_the_papers_constants() -> None:
-    """A6 A8 C6 C7 C8 C9 C14 D11 J5 J16 J17 M2 M5 M6 M7 N1 N2 N3 N4 N5 N6 O1 O2 L1 L3."""
-    c = load_config(profile="paper")
-    assert c.profile == "paper"
-    assert c.bus.domain == 43
-    assert (c.camera.width_px, c.camera.height_px, c.camera.rate_hz) == (320, 240, 0.5)
-    boxes = c.perception.detections
-    assert (boxes.confidence, boxes.nms_input, boxes.nms_iou, boxes.max_boxes) == (0.4, 256, 0.45, 24)
-    assert (c.perception.rate_hz, c.perception.concurrent, c.perception.intra_op_threads) == (0.5, False, 2)
-    assert not c.perception.image_quality.enabled
-    assert (c.advisor.policy.center_block_risk, c.advisor.policy.side_block_risk) == (0.48, 0.58)
-    assert (c.advisor.rate_hz, c.advisor.lifetime_s, c.perception.max_frame_age_s) == (5.0, 3.5, 0.8)
-    navigator = c.navigator
-    assert (navigator.acceptance_m, navigator.cruise_mps, navigator.turn_speed_frac) == (1.0, 0.15, 0.5)
-    assert (navigator.turn_deg, navigator.slight_turn_deg, navigator.latch_turns) == (25.0, 10.0, False)
-    k = c.controller
-    assert (k.rate_hz, k.max_speed_mps, k.max_forward, k.max_steer, k.slew_per_s) == (10.0, 0.30, 0.08, 0.04, 0.15)
-    assert (k.speed_kp, k.speed_feed_forward, k.heading_kp, k.heading_kd) == (0.08, 0.16, 0.08, 0.05)
-    assert (c.plant.adapter.force_per_unit_n, c.plant.adapter.timeout_s) == (75.0, 0.5)
-    assert (k.astern, c.plant.adapter.astern) == (0.0, 0.0)
-    assert c.localization.rate_hz == 20.0
-
-
 @pytest.mark.parametrize(
     ("sets", "field"),
     [

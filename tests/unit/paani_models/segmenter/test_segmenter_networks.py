@@ -35,6 +35,26 @@ def test_segmenter_decoder_d2_d3_d4() -> None:
     assert net.head.kernel_size == (3, 3)
 
 
+def test_each_block_of_the_decoder_enlarges_adds_and_refines_d3_d8() -> None:
+    """What enters a block is the map before, each cell repeated, plus the projected tap; then 3x3, norm and ReLU."""
+    torch.manual_seed(0)
+    net, entered = segmenter.PaperSegmenter().eval(), []
+    hooks = [r.register_forward_pre_hook(lambda _, inputs: entered.append(inputs[0])) for r in net.refines]
+    with torch.no_grad():
+        taps = net.taps(torch.rand(1, 3, 256, 320))
+        net.decode(taps)
+        for hook in hooks:
+            hook.remove()
+        deeper = net.project(taps[-1])
+        for lateral, refine, tap, given in zip(net.laterals, net.refines, taps[-2::-1], entered, strict=True):
+            assert lateral.kernel_size == (1, 1)
+            repeated = deeper.repeat_interleave(2, 2).repeat_interleave(2, 3)
+            assert torch.allclose(given, repeated + lateral(tap), atol=1e-6)
+            assert [type(layer) for layer in refine] == [nn.Conv2d, nn.BatchNorm2d, nn.ReLU]
+            assert refine[0].kernel_size == (3, 3)
+            deeper = refine(given)
+
+
 def test_segmenter_output_is_piecewise_constant_over_four_pixels_d4_d5() -> None:
     torch.manual_seed(0)
     logits = segmenter.PaperSegmenter().eval()(torch.rand(1, 3, 256, 320)).detach()

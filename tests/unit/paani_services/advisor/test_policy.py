@@ -31,22 +31,38 @@ VESSEL, BUOY, PIER = m.Label.VESSEL, m.Label.BUOY, m.Label.PIER
 
 @pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
 @pytest.mark.parametrize(
-    ("risks", "direction", "reason"),
+    ("risks", "blocked", "direction", "reason"),
     [
-        pytest.param((0.3413, 0.2941, 0.1611), D.STRAIGHT, R.CENTER_CLEAR, id="V11-47266"),
-        pytest.param((0.4976, 0.5114, 0.4573), D.RIGHT, R.CENTER_RISK, id="V12-01703"),
-        pytest.param((0.3367, 0.4716, 0.6280), D.STRAIGHT, R.CENTER_CLEAR, id="V13-27011"),
-        pytest.param((0.0288, 0.0004, 0.0029), D.STRAIGHT, R.CENTER_CLEAR, id="V15-black-ungated"),
+        pytest.param((0.3413, 0.2941, 0.1611), "", D.STRAIGHT, R.CENTER_CLEAR, id="V11-47266"),
+        pytest.param((0.4976, 0.5114, 0.4573), "center", D.RIGHT, R.CENTER_RISK, id="V12-01703"),
+        pytest.param((0.3367, 0.4716, 0.6280), "right", D.STRAIGHT, R.CENTER_CLEAR, id="V13-27011"),
+        pytest.param((0.0288, 0.0004, 0.0029), "", D.STRAIGHT, R.CENTER_CLEAR, id="V15-black-ungated"),
     ],
 )
 def test_table_of_scenarios(
-    config: Config, risks: tuple[float, float, float], direction: m.Direction, reason: m.Reason
+    config: Config, risks: tuple[float, float, float], blocked: str, direction: m.Direction, reason: m.Reason
 ) -> None:
     """V11, V12, V13, V15, J5: the lanes' published risks give the published advice, frame after frame (U8: 8)."""
     _, advice, _ = play([water(*risks)] * 8, config, period_s=0.1)
     for advised in advice:
         assert (advised.direction, advised.reason) == (direction, reason)
         assert (advised.left.risk, advised.center.risk, advised.right.risk) == pytest.approx(risks)
+        assert [name for name in ("left", "center", "right") if getattr(advised, name).blocked] == blocked.split()
+
+
+def test_v12_the_vessel_at_the_edge_of_the_frame_has_unknown_motion() -> None:
+    """V12: the box weighs in the risk all the same; the water beside it makes up the published sums."""
+    confidence, xyxy = 0.85723, (0.0, 0.36, 0.28, 0.50)
+    seen = confidence * (0.6 * (0.50 - 0.30) / 0.70 + 0.4 * 0.14 / 0.50) * (0.28 - 0.03) / 0.28  # J1, J2
+    risks = {"left": 0.4976, "center": 0.5114, "right": 0.4573}
+    lanes = {name: lane(risk - 0.65 * seen * (name == "left")) for name, risk in risks.items()}
+    evidence = msgspec.structs.replace(seeing(box(VESSEL, xyxy, confidence)), **lanes)
+    _, advice, tracks = play([evidence] * 8, PAPER, period_s=0.1)
+    vessel, advised = tracks[-1].tracks[0], advice[-1]
+    assert vessel.confidence == pytest.approx(confidence)
+    assert (vessel.motion, vessel.motion_cause) == (m.MotionState.UNKNOWN, m.MotionCause.CLIPPED_BY_FRAME)
+    assert {name: getattr(advised, name).risk for name in risks} == pytest.approx(risks)
+    assert (advised.direction, advised.reason) == (D.RIGHT, R.CENTER_RISK)
 
 
 def test_v14_a_side_below_its_limit_may_still_be_occupied() -> None:

@@ -80,6 +80,7 @@ def test_a_detection_reaches_only_the_lanes_it_overlaps() -> None:
     assert advice[1].center.risk == pytest.approx(0.05 + 0.65 * expected)
     assert (advice[1].left.obstacle, advice[1].right.obstacle) == (0.0, 0.0)
     assert advice[1].contributing_track_ids == (tracks[1].tracks[0].id,) == advice[1].center.track_ids
+    assert advice[1].left.track_ids == advice[1].right.track_ids == ()
 
 
 def test_a_box_above_the_corridors_is_in_none() -> None:

@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from paani import messages as m
+from paani.config import Config
 from paani_services.advisor.advise import AdvisorState, advise
 from paani_services.advisor.association import assign_boxes, iou
 from paani_services.advisor.motion import MotionHistory, SizeMeasurement, Window, add_measurement, estimate_motion
@@ -44,6 +45,16 @@ def test_g2_greedy_overlap() -> None:
     assert assign_boxes([(0.0, 0.0, 0.2, 0.2)], [(0.13, 0.0, 0.33, 0.2)], 0.25).track_of == {}
 
 
+@pytest.mark.parametrize(("shift", "same"), [(0.1198, True), (0.1202, False)])
+@pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
+def test_g2_a_quarter_of_overlap_is_enough(config: Config, shift: float, same: bool) -> None:
+    """G2: boxes of width 0.2 that are 0.12 apart overlap by 0.08 / 0.32 = 0.25; a little less begins another track."""
+    frames = [seeing(box(BUOY, (0.3 + x, 0.4, 0.5 + x, 0.6))) for x in (0.0, shift)]
+    _, _, tracks = play(frames, config)
+    assert (tracks[1].tracks[0].hits == 2) is same
+    assert len(tracks[1].tracks) == (1 if same else 2)
+
+
 def test_g4_two_hits_confirm() -> None:
     """G4, G11: acceptance is its own field, the score is not touched."""
     _, _, tracks = play([seeing(BUOY_AHEAD)] * 2)
@@ -52,11 +63,41 @@ def test_g4_two_hits_confirm() -> None:
     assert (second.hits, second.confirmed, second.accepted, second.id) == (2, True, True, first.id)
 
 
+def test_g11_what_a_track_is_stands_in_fields_of_its_own() -> None:
+    """G11: sighted, confirmed, then only predicted, and in danger at first sight; the score stays what it was."""
+    near = box(BUOY, (0.40, 0.50, 0.60, 0.70))
+
+    def fields(track: m.Track) -> tuple[bool, bool, bool, bool, float]:
+        return track.confirmed, track.immediate_danger, track.accepted, track.held, track.confidence
+
+    _, _, tracks = play([seeing(BUOY_AHEAD), seeing(BUOY_AHEAD), CLEAR])
+    assert [fields(frame.tracks[0]) for frame in tracks] == [
+        (False, False, False, False, 0.8),
+        (True, False, True, False, 0.8),
+        (True, False, True, True, 0.8),
+    ]
+    _, _, tracks = play([seeing(near)])
+    assert fields(tracks[0].tracks[0]) == (False, True, True, False, 0.8)
+
+
+def test_g10_no_motion_filter_and_no_reidentification() -> None:
+    """G10: a box is matched with the last one seen, neither smoothed nor moved on; unseen it stays, elsewhere is new.
+
+    Steps of 0.11 at a width of 0.2 leave an IoU of 0.29 with the last box, and of 0.15 with the smoothed one.
+    """
+    steps = [seeing(box(BUOY, (x, 0.4, x + 0.2, 0.6))) for x in (0.10, 0.21, 0.32, 0.43)]
+    elsewhere = seeing(box(BUOY, (0.75, 0.4, 0.95, 0.6)))
+    _, _, tracks = play([*steps, CLEAR, CLEAR, elsewhere])
+    assert [[t.id for t in frame.tracks] for frame in tracks[:6]] == [[1]] * 6
+    assert tracks[3].tracks[0].box_xyxy == tracks[4].tracks[0].box_xyxy == tracks[5].tracks[0].box_xyxy
+    assert [t.id for t in tracks[6].tracks] == [1, 2]
+
+
 @pytest.mark.parametrize(
     ("xyxy", "danger"),
     [
         ((0.40, 0.55, 0.6001, 0.65), True),  # bottom 0.65, area 0.02
-        ((0.40, 0.55, 0.60, 0.649), False),
+        ((0.40, 0.53, 0.60, 0.649), False),  # area 0.0238
         ((0.40, 0.56, 0.60, 0.65), False),  # area 0.018
     ],
 )
@@ -128,6 +169,15 @@ def test_h2_centering_and_h3_maximum() -> None:
     assert tracks[2].tracks[0].urgency == pytest.approx(0.0, abs=1e-9)  # moving away is no urgency
 
 
+@pytest.mark.parametrize(("half", "urgency"), [(0.104, 0.5), (0.112, 0.75)])
+def test_h3_the_larger_of_both_counts(half: float, urgency: float) -> None:
+    """H3: half of full scale towards the centre, beside a quarter or three quarters of growth: the larger, no sum."""
+    before = box(BUOY, (0.2, 0.4, 0.4, 0.6))
+    after = box(BUOY, (0.32 - half, 0.5 - half, 0.32 + half, 0.5 + half))
+    _, _, tracks = play([seeing(before), seeing(after)])
+    assert tracks[1].tracks[0].urgency == pytest.approx(urgency)
+
+
 def test_h4_h5_held_urgency_decays() -> None:
     """H4: exp(-dt / 1 s) while held; H5: a miss adds no motion sample."""
     _, _, tracks = play(
@@ -178,12 +228,40 @@ def test_i2_margin_by_hand() -> None:
     assert (found.state, found.cause) == (S.UNKNOWN, C.LOW_QUALITY)  # I7, I8: 0.8 * 5/8 * 1 * .04/.3 = 0.067
 
 
+def zigzag(beta_per_s: float, margin_per_s: float, confidence: float) -> MotionHistory:
+    """Five samples over 0.8 s whose slope and margin are these: residuals as in `test_i2_margin_by_hand`, scaled."""
+    history = MotionHistory()
+    for i, residual in enumerate((0.0, 0.1, 0.0, 0.1, 0.0)):
+        y = beta_per_s * 0.2 * i + residual * margin_per_s / 0.3
+        xyxy = (0.4, 0.4, 0.6, 0.6)
+        measurement = SizeMeasurement(i * 200_000, xyxy, y, confidence, False)
+        history = add_measurement(history, measurement, WINDOW, PAPER.advisor.motion)
+    return history
+
+
+def test_i7_each_factor_of_the_quality_counts() -> None:
+    """I7: duration 0.8 / 1.0, samples 5 / 8, confidence 0.42 / 0.6, margin 0.04 / 0.05: 0.8 * 0.625 * 0.7 * 0.8."""
+    found = estimate_motion(zigzag(0.3, 0.05, 0.42), 800_000, WINDOW, PAPER.advisor.motion)
+    assert [found.rate_per_s, found.margin_per_s, found.confidence] == pytest.approx([0.3, 0.05, 0.28])
+    assert found.state is S.APPROACHING
+
+
+@pytest.mark.parametrize(("confidence", "state"), [(0.415, S.APPROACHING), (0.412, S.UNKNOWN)])
+def test_i8_a_quality_below_a_quarter_is_unknown(confidence: float, state: m.MotionState) -> None:
+    """I8: 0.5 * 0.725 * confidence / 0.6 on either side of 0.25; exactly 0.25 is in `test_i5_i6_samples`."""
+    found = estimate_motion(zigzag(0.3, 0.04 / 0.725, confidence), 800_000, WINDOW, PAPER.advisor.motion)
+    assert found.state is state
+    assert found.cause is (C.NONE if state is S.APPROACHING else C.LOW_QUALITY)
+
+
 def test_i5_i6_samples() -> None:
     """I5: 1.5 s and 24 samples at most; I6: five over 0.4 s at least."""
     _, _, tracks = play(growing(0.3, 5), PAPER)
     assert [frame.tracks[0].motion_cause for frame in tracks] == [C.TOO_FEW_SAMPLES] * 4 + [C.NONE]
-    _, _, tracks = play(growing(0.3, 5, 0.05), PAPER, period_s=0.05)
+    _, _, tracks = play(growing(0.3, 5, 0.0999), PAPER, period_s=0.0999)
     assert tracks[-1].tracks[0].motion_cause is C.TOO_SHORT
+    _, _, tracks = play(growing(0.3, 5, 0.1), PAPER, period_s=0.1)  # its quality is 0.4 * 5/8 = 0.25, and no less (I8)
+    assert (tracks[-1].tracks[0].motion, tracks[-1].tracks[0].motion_cause) == (S.APPROACHING, C.NONE)
     state, _, _ = play(growing(0.1, 40, 0.02), PAPER, period_s=0.02)
     assert len(state.tracker.tracks[0].identity.motion.samples) == 24
     state, _, _ = play(growing(0.1, 20), PAPER)
@@ -197,19 +275,19 @@ def test_i9_confidence_is_capped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("last", "cause"),
+    ("before", "last", "cause"),
     [
-        pytest.param(box(BUOY, (0.0, 0.44, 0.56, 0.56)), C.CLIPPED_BY_FRAME, id="I10"),
-        pytest.param(box(BUOY, (0.44, 0.44, 0.56, 0.56), 0.39), C.WEAK_DETECTION, id="I11"),
-        pytest.param(box(BUOY, (0.40, 0.46, 0.60, 0.54)), C.SHAPE_CHANGE, id="I13"),
+        pytest.param((0.02, 0.44, 0.56, 0.56), box(BUOY, (0.0, 0.44, 0.56, 0.56)), C.CLIPPED_BY_FRAME, id="I10-left"),
+        pytest.param((0.44, 0.02, 0.56, 0.56), box(BUOY, (0.44, 0.0, 0.56, 0.56)), C.CLIPPED_BY_FRAME, id="I10-top"),
+        pytest.param((0.44, 0.44, 0.98, 0.56), box(BUOY, (0.44, 0.44, 1.0, 0.56)), C.CLIPPED_BY_FRAME, id="I10-right"),
+        pytest.param((0.44, 0.44, 0.56, 0.98), box(BUOY, (0.44, 0.44, 0.56, 1.0)), C.CLIPPED_BY_FRAME, id="I10-bottom"),
+        pytest.param((0.44, 0.44, 0.56, 0.56), box(BUOY, (0.44, 0.44, 0.56, 0.56), 0.39), C.WEAK_DETECTION, id="I11"),
+        pytest.param((0.44, 0.44, 0.56, 0.56), box(BUOY, (0.40, 0.46, 0.60, 0.54)), C.SHAPE_CHANGE, id="I13"),
     ],
 )
-def test_resets_by_the_box(last: m.Detection, cause: m.MotionCause) -> None:
+def test_resets_by_the_box(before: m.BoxXyxy, last: m.Detection, cause: m.MotionCause) -> None:
     """I10, I11, I13: each with its code."""
-    before = [seeing(box(BUOY, (0.44, 0.44, 0.56, 0.56)))] * 6
-    if cause is C.CLIPPED_BY_FRAME:
-        before = [seeing(box(BUOY, (0.02, 0.44, 0.56, 0.56)))] * 6
-    _, _, tracks = play([*before, seeing(last)], PAPER)
+    _, _, tracks = play([*[seeing(box(BUOY, before))] * 6, seeing(last)], PAPER)
     assert tracks[5].tracks[0].motion_cause is C.NONE
     assert (tracks[6].tracks[0].motion, tracks[6].tracks[0].motion_cause) == (S.UNKNOWN, cause)
 

@@ -100,6 +100,21 @@ def test_l5_stopped_flag(boat: EstimatedBoat) -> None:
     assert not boat.global_estimate.stopped
 
 
+@pytest.mark.parametrize("surge_mps", [0.0, 0.04, 0.07])
+def test_l5_a_boat_is_stopped_after_two_seconds_below_0_05_mps(boat: EstimatedBoat, surge_mps: float) -> None:
+    """L5: by the estimated speed of every step, of a boat that slows down to this speed."""
+    boat.sail(3.0, surge_mps=0.4)
+    slow_since_us, flags = None, []
+    for estimate in boat.sail(15.0, surge_mps=surge_mps):
+        if math.hypot(estimate.surge_mps, estimate.sway_mps) > 0.05:
+            slow_since_us = None
+        elif slow_since_us is None:
+            slow_since_us = estimate.source_us
+        flags.append(estimate.stopped)
+        assert estimate.stopped is (slow_since_us is not None and estimate.source_us - slow_since_us >= 2_000_000)
+    assert any(flags) is (surge_mps < 0.05)
+
+
 def test_gyro_bias_is_estimated_at_rest(boat: EstimatedBoat) -> None:
     rates = [one.yaw_rate_radps for one in boat.sail(2.0)]
     assert statistics.fmean(rates) == pytest.approx(0.0, abs=6e-4)

@@ -96,6 +96,16 @@ def test_m4_straight_is_the_waypoint_bearing() -> None:
     assert (order.enable, order.speed_mps, order.inhibits) == (True, 0.15, ())
 
 
+def test_m4_the_papers_bearing_has_no_memory_of_drift() -> None:
+    """M4: half a minute 2 m off the leg adds nothing to the bearing in the paper; here it is read as drift."""
+    adrift = pose(3.0, -2.0)
+    paper, paani = GuidanceRun(PAPER), GuidanceRun(PAANI)
+    for _ in range(300):
+        assert paper.order(Direction.STRAIGHT, adrift).heading_rad == pytest.approx(math.atan2(2.0, 7.0))
+    orders = [paani.order(Direction.STRAIGHT, adrift).heading_rad for _ in range(300)]
+    assert orders[-1] > orders[0] + math.radians(5.0)
+
+
 def test_line_of_sight_steers_back_onto_the_leg() -> None:
     """Line of sight: 2 m right of the leg with 4 m look-ahead steers atan(2/4) to the left."""
     _, order = run(PAANI, inputs(odometry=pose(3.0, -2.0)))

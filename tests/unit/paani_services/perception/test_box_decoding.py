@@ -57,7 +57,7 @@ def test_c5_non_finite_candidates_are_dropped() -> None:
 @pytest.mark.parametrize(("score", "n"), [(0.40, 0), (0.4001, 1), (0.39, 0)])
 def test_c6_threshold_is_exclusive(score: float, n: int) -> None:
     """C6: more than 0.40."""
-    exact = DetectorConfig(confidence=float(np.float32(0.4)))
+    exact = DetectorConfig(confidence=float(np.float32(RULES.confidence)))
     assert len(decode_boxes(output((160, 128, 40, 40, score, 0, 0, 0)), SAME, exact)) == n
 
 
@@ -90,3 +90,19 @@ def test_c10_boxes_are_cut_at_the_picture() -> None:
     """C10: normalised to the source; what lies in the grey bars is cut off, what lies in them whole is dropped."""
     found = decode_boxes(output((0, 8, 100, 100, 0.9, 0, 0, 0), (200, 3, 20, 6, 0.9, 0, 0, 0)), SAME, RULES)
     assert [d.box_xyxy for d in found] == [pytest.approx((0.0, 0.0, 50 / 320, 50 / 240))]
+    beyond = decode_boxes(output((320, 248, 100, 100, 0.9, 0, 0, 0)), SAME, RULES)
+    assert [d.box_xyxy for d in beyond] == [pytest.approx((270 / 320, 190 / 240, 1.0, 1.0))]
+
+
+@pytest.mark.parametrize(("distinct", "n"), [(255, 2), (256, 1)])
+def test_c7_the_best_256_are_suppressed(distinct: int, n: int) -> None:
+    """C7: a box apart from the others is found as the 256th of the ranking, and not as the 257th."""
+    stacked = [(160.0, 128.0, 40.0, 40.0, 0.9, 0, 0, 0)] * distinct + [(40.0, 128.0, 20.0, 20.0, 0.5, 0, 0, 0)]
+    assert len(decode_boxes(output(*stacked), SAME, RULES)) == n
+
+
+@pytest.mark.parametrize(("shift", "n"), [(15.0, 1), (15.4, 2)])
+def test_c8_boxes_overlap_by_more_than_0_45(shift: float, n: int) -> None:
+    """C8: boxes of width 40 with an IoU of 25 / 55 = 0.4545 and of 24.6 / 55.4 = 0.4440."""
+    pair = ((100, 100, 40, 40, 0.8, 0, 0, 0), (100 + shift, 100, 40, 40, 0, 0.9, 0, 0))
+    assert len(decode_boxes(output(*pair), SAME, RULES)) == n

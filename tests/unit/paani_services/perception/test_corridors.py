@@ -54,10 +54,41 @@ def test_e2_e3_cells_on_a_border_count_in_part() -> None:
     assert overlap_fractions(10, 0.25, 0.50) == pytest.approx([0, 0, 0.5, 1, 1, 0, 0, 0, 0, 0])
 
 
+@pytest.mark.parametrize(
+    ("column", "left", "center", "right"),
+    [
+        (1, 0.0, 0.0, 0.0),
+        (2, 0.6, 0.0, 0.0),
+        (24, 1.0, 0.2, 0.0),
+        (31, 0.2, 1.0, 0.0),
+        (48, 0.0, 1.0, 0.2),
+        (55, 0.0, 0.2, 1.0),
+        (77, 0.0, 0.0, 0.6),
+        (78, 0.0, 0.0, 0.0),
+    ],
+)
+def test_e3_each_corridor_has_its_columns(column: int, left: float, center: float, right: float) -> None:
+    """E3: of 80 columns [2.4, 31.2], [24.8, 55.2] and [48.8, 77.6]; how much of one column each corridor counts."""
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[:, column] = OBSTACLE
+    lanes = summarise_corridors(mask, ALL, CorridorConfig())
+    counted = [lanes.left.non_water * 28.8, lanes.center.non_water * 30.4, lanes.right.non_water * 28.8]
+    assert counted == pytest.approx([left, center, right], abs=1e-9)
+
+
+@pytest.mark.parametrize(("row", "counted"), [(18, 0.0), (19, 0.8), (20, 1.0), (63, 1.0)])
+def test_e2_the_region_begins_at_its_row(row: int, counted: float) -> None:
+    """E2: 0.30 of 64 rows are 19.2."""
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[row] = OBSTACLE
+    for lane in summarise_corridors(mask, ALL, CorridorConfig()):
+        assert lane.non_water * 44.8 == pytest.approx(counted, abs=1e-9)
+
+
 def test_e4_e5_e6_by_hand() -> None:
-    """E4-E6: an obstacle in the right half, from the top of the region to the bottom."""
+    """E4-E6: obstacle below sky in the right half, from the top of the region to the bottom."""
     mask = np.zeros((64, 80), np.uint8)
-    mask[:, 40:] = 1
+    mask[30:, 40:], mask[:30, 40:] = OBSTACLE, SKY
     confidence = np.full((64, 80), 0.9, np.float32)
     confidence[:, 40:] = 0.6
     lanes = summarise_corridors(mask, confidence, CorridorConfig())

@@ -31,8 +31,16 @@ def test_c3_letterbox() -> None:
 
 
 def test_d7_stretch() -> None:
-    """D7, D8: the whole picture fills the input, ImageNet mean and deviation, RGB."""
+    """D7: the whole picture fills the input, ImageNet mean and deviation, RGB."""
     tensor = stretch_picture(solid(10, 20, 200), 256, 320, IMAGENET)
     expected = [(200 / 255 - 0.485) / 0.229, (20 / 255 - 0.456) / 0.224, (10 / 255 - 0.406) / 0.225]
     assert tensor[0, :, 100, 100] == pytest.approx(expected, abs=1e-5)
     assert tensor.flags.c_contiguous
+
+
+def test_d8_the_picture_is_stretched_bilinearly() -> None:
+    """D8: from two pixels to four, each centre lies a quarter or three quarters of the way between."""
+    picture = np.zeros((2, 2, 3), np.uint8)
+    picture[:, 1] = 240
+    row = stretch_picture(picture, 2, 4, UNITY)[0, 0, 0] * 255
+    assert row == pytest.approx([0.0, 60.0, 180.0, 240.0], abs=1.0)
