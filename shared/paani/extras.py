@@ -18,6 +18,7 @@ EXTRA_OF = {
     "ncnn": "ncnn",
     "shtab": "completion",
     "cryptography": "certs",
+    "distributed": "cluster",
 }  # module -> extra
 
 

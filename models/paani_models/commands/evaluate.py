@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
+from paani.cluster import Workers, add_cluster_argument, open_workers
 from paani.errors import UserError
 from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import write_json
@@ -62,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a sheet of the detector's misses and false alarms, outside any repository: it holds pictures",
     )
+    add_cluster_argument(parser)
 
 
 @dataclass(frozen=True)
@@ -75,21 +78,26 @@ class ScoredPair:
 
 def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Exit 0, or raise UserError."""
-    catalogue = load_catalogue(arguments.weights)
     if arguments.html:
         refuse_inside_repository(arguments.html, "--html")
     if arguments.faults:
         _print_and_record("gate", image_quality_figures(read_faults(arguments.faults)), arguments)
         return 0
+    with open_workers(arguments.cluster, os.cpu_count() or 1) as workers:
+        _measure(arguments, pictures, workers)
+    return 0
+
+
+def _measure(arguments: argparse.Namespace, pictures: PictureSelection, workers: Workers) -> None:
+    catalogue = load_catalogue(arguments.weights)
     for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
         if net not in catalogue or not is_scored(catalogue[net].classes):
             raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
-        _print_and_record(net, measure_network(net, arguments.weights, pictures), arguments)
+        _print_and_record(net, measure_network(net, arguments.weights, pictures, workers), arguments)
         if is_detector(catalogue[net].classes) and pictures.boxed_samples(held_out=True):
             compare_detectors(net, arguments.weights, pictures, arguments.html)
     if arguments.json:
-        write_evaluation(arguments.json, score_pair(arguments.weights, pictures).evaluation)
-    return 0
+        write_evaluation(arguments.json, score_pair(arguments.weights, pictures, workers).evaluation)
 
 
 def _print_and_record(net: str, figures: list[Figure], arguments: argparse.Namespace) -> None:
@@ -124,28 +132,32 @@ def is_scored(classes: tuple[str, ...]) -> bool:
     return "water" in classes or is_detector(classes)
 
 
-def measure_network(net: str, weights: Path, pictures: PictureSelection) -> list[Figure]:
+def measure_network(
+    net: str, weights: Path, pictures: PictureSelection, workers: Workers | None = None
+) -> list[Figure]:
     """The manifest's figures of one net."""
     path = verified_path(net, weights)
     if "water" in load_catalogue(weights)[net].classes:
-        return measure_segmenter(path, pictures.segmented_samples(held_out=True))
+        return measure_segmenter(path, pictures.segmented_samples(held_out=True), workers)
     return [
-        *measure_detector(path, pictures.boxed_samples(held_out=True)),
-        *measure_false_alarms(path, pictures.segmented_samples(held_out=True)),
+        *measure_detector(path, pictures.boxed_samples(held_out=True), workers),
+        *measure_false_alarms(path, pictures.segmented_samples(held_out=True), workers),
     ]
 
 
-def score_pair(weights: Path, pictures: PictureSelection) -> ScoredPair:
+def score_pair(weights: Path, pictures: PictureSelection, workers: Workers | None = None) -> ScoredPair:
     """The shipped pair, picture by picture. Raises UserError where nothing is held out."""
     segmented, boxed = pictures.segmented_samples(held_out=True), pictures.boxed_samples(held_out=True)
     if not segmented and not boxed:
         raise UserError("sources: nothing is held out")
     catalogue = load_catalogue(weights)
-    masks = score_masks(verified_path("segmenter", weights), segmented) if segmented else []
-    boxes = score_boxes(verified_path("detector", weights), boxed) if boxed else []
+    masks = score_masks(verified_path("segmenter", weights), segmented, workers) if segmented else []
+    boxes = score_boxes(verified_path("detector", weights), boxed, workers) if boxed else []
     rivers = [sample for sample in segmented if sample.source.empty_of]
     alarms = (
-        estimate_false_alarms(rivers, count_false_alarms(verified_path("detector", weights), rivers)) if rivers else ()
+        estimate_false_alarms(rivers, count_false_alarms(verified_path("detector", weights), rivers, workers))
+        if rivers
+        else ()
     )
     evaluation = Evaluation(
         models=tuple(

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
+from paani.cluster import Workers
+from paani_models.datasets.batches import Batch, network_of, score_batches
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, read_picture
 from paani_models.detector.data import letterbox_example, read_boxed
 from paani_models.detector.metrics import CONFIDENCE, ClassMatches, Detections, decode_boxes, iou_matrix, match_class
@@ -40,11 +41,19 @@ class ScoredBoxes:
         return int(table.sum() - np.trace(table))
 
 
-def score_boxes(net: Path, samples: Sequence[Sample]) -> list[ScoredBoxes]:
-    """Run the network over samples with boxes. Raises UserError naming a file that cannot be read."""
-    run = open_network(net)
+def score_boxes(net: Path, samples: Sequence[Sample], workers: Workers | None = None) -> list[ScoredBoxes]:
+    """Run the network over samples with boxes. workers: who does; this process if not given.
+
+    Raises UserError naming a file that cannot be read.
+    """
+    return score_batches(score_box_batch, net, samples, workers, "detector")
+
+
+def score_box_batch(batch: Batch) -> list[ScoredBoxes]:
+    """As `score_boxes`, of one batch."""
+    run = open_network(network_of(batch))
     scored = []
-    for sample in tqdm(samples, "detector", unit="picture", mininterval=2.0):
+    for sample in batch.samples:
         item = read_boxed(sample)
         output = run(detector_input(item.picture))[0]
         scored.append(
@@ -55,11 +64,16 @@ def score_boxes(net: Path, samples: Sequence[Sample]) -> list[ScoredBoxes]:
     return scored
 
 
-def count_false_alarms(net: Path, samples: Sequence[Sample]) -> list[int]:
-    """Count per picture the boxes above CONFIDENCE of classes that its source does not show."""
-    run = open_network(net)
+def count_false_alarms(net: Path, samples: Sequence[Sample], workers: Workers | None = None) -> list[int]:
+    """Count per picture the boxes above CONFIDENCE of classes that its source does not show; as `score_boxes`."""
+    return score_batches(count_batch_alarms, net, samples, workers, "false alarms")
+
+
+def count_batch_alarms(batch: Batch) -> list[int]:
+    """As `count_false_alarms`, of one batch."""
+    run = open_network(network_of(batch))
     alarms = []
-    for sample in tqdm(samples, "false alarms", unit="picture", mininterval=2.0):
+    for sample in batch.samples:
         found = decode_boxes(run(detector_input(read_picture(sample.picture)))[0], CONFIDENCE)
         absent = [DETECTOR_CLASSES.index(kind) for kind in sample.source.empty_of]
         alarms.append(int(np.isin(found.classes, absent).sum()))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from paani.cluster import Workers
 from paani_models.catalogue import Figure
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample
 from paani_models.detector.metrics import summarise_class
@@ -17,12 +18,12 @@ from paani_models.training.augment import draw_null_picture
 NULL_PICTURES = 200
 
 
-def measure_segmenter(net: Path, samples: list[Sample]) -> list[Figure]:
+def measure_segmenter(net: Path, samples: list[Sample], workers: Workers | None = None) -> list[Figure]:
     """IoU per class, their mean, and edge F1 per source, at the mask's own size; and the share of water in nothing.
 
     A source whose people marked only water is scored on water against the rest.
     """
-    scored = score_masks(net, samples)
+    scored = score_masks(net, samples, workers)
     figures = []
     for source in dict.fromkeys(item.sample.source for item in scored):
         chosen = [item for item in scored if item.sample.source == source]
@@ -41,9 +42,9 @@ def measure_null_pictures(net: Path) -> Figure:
     return Figure("max_water_frac", "null_pictures", round(worst, 4), NULL_PICTURES)
 
 
-def measure_detector(net: Path, samples: list[Sample]) -> list[Figure]:
+def measure_detector(net: Path, samples: list[Sample], workers: Workers | None = None) -> list[Figure]:
     """AP50, AP50:95, recall and precision at 0.40 per class and source that annotates it, and over all sources."""
-    scored = score_boxes(net, samples)
+    scored = score_boxes(net, samples, workers)
     figures: list[Figure] = []
     for kind, label in enumerate(DETECTOR_CLASSES):
         matches = [(item.sample.source.name, item.class_matches(kind)) for item in select_annotated(scored, kind)]
@@ -58,11 +59,11 @@ def measure_detector(net: Path, samples: list[Sample]) -> list[Figure]:
     return figures
 
 
-def measure_false_alarms(net: Path, samples: list[Sample]) -> list[Figure]:
+def measure_false_alarms(net: Path, samples: list[Sample], workers: Workers | None = None) -> list[Figure]:
     """Boxes above 0.40 per picture, of classes that a source's pictures do not show; n counts pictures."""
     figures = []
     for source in dict.fromkeys(sample.source for sample in samples if sample.source.empty_of):
-        alarms = count_false_alarms(net, [sample for sample in samples if sample.source == source])
+        alarms = count_false_alarms(net, [sample for sample in samples if sample.source == source], workers)
         rate = round(sum(alarms) / len(alarms), 4)
         figures.append(Figure("false_alarms_per_picture", source.name, rate, len(alarms)))
     return figures

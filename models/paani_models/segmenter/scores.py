@@ -9,11 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from paani.arrays import F32, I64, U8
+from paani.cluster import Workers
 from paani.errors import UserError
 from paani_models.catalogue import read_contract
+from paani_models.datasets.batches import Batch, network_of, score_batches
 from paani_models.datasets.sources import SEGMENTER_CLASSES, WATER_MASKS, Sample, Source, read_mask, read_picture
 from paani_models.engines.onnx_runner import open_network
 from paani_models.segmenter.metrics import class_iou, confusion_matrix, count_edge_matches, f1_score
@@ -36,11 +37,19 @@ class ScoredMask:
         return float(np.nanmean(iou)) if np.isfinite(iou).any() else 1.0
 
 
-def score_masks(net: Path, samples: Sequence[Sample]) -> list[ScoredMask]:
-    """Run the network over samples with masks. Raises UserError naming a file that cannot be read."""
-    segment = open_segmenter(net)
+def score_masks(net: Path, samples: Sequence[Sample], workers: Workers | None = None) -> list[ScoredMask]:
+    """Run the network over samples with masks. workers: who does; this process if not given.
+
+    Raises UserError naming a file that cannot be read.
+    """
+    return score_batches(score_mask_batch, net, samples, workers, "segmenter")
+
+
+def score_mask_batch(batch: Batch) -> list[ScoredMask]:
+    """As `score_masks`, of one batch."""
+    segment = open_segmenter(network_of(batch))
     scored = []
-    for sample in tqdm(samples, "segmenter", unit="picture", mininterval=2.0):
+    for sample in batch.samples:
         truth = read_truth(sample)
         label = merge_undrawn_sky(segment(read_picture(sample.picture), truth.shape), sample.source)
         counts = confusion_matrix(label, truth, len(SEGMENTER_CLASSES))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import signal
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import msgspec
 from tqdm import tqdm
 
+from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import indented_json, write_json
@@ -20,7 +23,7 @@ from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.ledger import Ledger
 from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
-from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases
+from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases, run_cases_on
 from paani_sim.trials.run_trial import load_case_config, run_trial
 from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
 from paani_sim.trials.suite_summary import summarise_suite
@@ -59,10 +62,11 @@ def _run_suite(options: argparse.Namespace) -> int:
     results, failures, code = dict(kept.results), list[FailedDrive](), 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # or the processes that drive would go on without it
     try:
-        with tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar:
-            for case, result in (
-                run_cases(out, kept.missing, reader, options.sets, options.jobs) if kept.missing else ()
-            ):
+        with (
+            tqdm(total=len(cases), initial=len(kept.results), unit="drive", desc="trial") as bar,
+            _drives(options, out, kept.missing, reader) as drives,
+        ):
+            for case, result in drives:
                 if isinstance(result, TrialResult):
                     results[case] = result
                     if ledger is not None:
@@ -74,6 +78,9 @@ def _run_suite(options: argparse.Namespace) -> int:
                 bar.update()
     except KeyboardInterrupt:
         results, code = dict(find_stored_results(out, cases, reader).results), 130
+        if ledger is not None:
+            for case, stored in results.items():
+                ledger.enter_result(case, stored)
         sys.stderr.write(f"\n{out}: {len(results)} of {len(cases)} drives done; the same command goes on\n")
     for failure in failures:
         sys.stderr.write(f"{failure.case.name}: {failure.reason}\n")
@@ -107,6 +114,24 @@ def _open_ledger(options: argparse.Namespace) -> tuple[SeedChoice, Ledger | None
     path: Path = options.ledger or root / LEDGER_NAME
     choice = msgspec.structs.replace(choice, commit=resolve_commit(root, choice.commit or "HEAD", path))
     return choice, Ledger(path, choice.commit, options.sets)
+
+
+@contextlib.contextmanager
+def _drives(
+    options: argparse.Namespace, out: Path, cases: Sequence[TrialCase], reader: FingerprintReader
+) -> Iterator[Iterator[tuple[TrialCase, TrialResult | FailedDrive]]]:
+    """The cases as they are driven, by processes of this command or by a cluster; on leaving, what is ready is kept."""
+    if not cases:
+        yield iter(())
+    elif options.cluster is None:
+        with contextlib.closing(run_cases(out, cases, reader, options.sets, options.jobs)) as drives:
+            yield drives
+    else:
+        with (
+            open_workers(options.cluster, options.jobs) as workers,
+            contextlib.closing(run_cases_on(workers, out, cases, reader, options.sets)) as drives,
+        ):
+            yield drives
 
 
 def _run_one(options: argparse.Namespace) -> int:
@@ -166,6 +191,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
     parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
     parser.add_argument("--jobs", type=_count, default=os.cpu_count() or 1, metavar="N", help="drives side by side")
+    add_cluster_argument(parser)
     parser.add_argument(
         "--out", type=output_folder("--out"), metavar="DIR", help="where results are kept (default: runs/trial-SUITE)"
     )

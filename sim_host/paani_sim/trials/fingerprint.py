@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 
 import msgspec
 
 from paani.config import encode_config
+from paani.source_checksum import checksum_files, checksum_packages
 from paani_sim.trials.policies import load_policy_config
 from paani_sim.trials.trial_cases import TrialCase
 
@@ -38,8 +38,8 @@ class FingerprintReader:
     def __init__(self, sets: Iterable[str]) -> None:
         """Raises UserError for a setting."""
         self._sets = tuple(sets)
-        self._code = _checksum_files(file for package in CODE_PACKAGES for file in _list_files(package, CODE_SUFFIXES))
-        self._models = _checksum_files(_list_files(MODELS_PACKAGE, (".onnx", ".json", ".py")))
+        self._code = checksum_packages(CODE_PACKAGES, CODE_SUFFIXES)
+        self._models = checksum_packages((MODELS_PACKAGE,), (".onnx", ".json", ".py"))
         self._settings: dict[str, str] = {}
 
     def fingerprint(self, case: TrialCase) -> Fingerprint:
@@ -50,22 +50,8 @@ class FingerprintReader:
             code=self._code,
             models=self._models,
             settings=self._settings[case.policy],
-            scenario=_checksum_files([Path(case.world)]) if case.world.endswith(SCENARIO_SUFFIX) else case.condition,
+            scenario=checksum_files([Path(case.world)]) if case.world.endswith(SCENARIO_SUFFIX) else case.condition,
         )
-
-
-def _list_files(package: str, endings: tuple[str, ...]) -> list[Path]:
-    spec = find_spec(package)
-    folders = list(spec.submodule_search_locations or ()) if spec is not None else []
-    return sorted(file for folder in folders for file in Path(folder).rglob("*") if file.suffix in endings)
-
-
-def _checksum_files(files: Iterable[Path]) -> str:
-    digest = hashlib.sha256()
-    for file in files:
-        if file.is_file():
-            digest.update(file.name.encode() + file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _checksum(data: bytes) -> str:

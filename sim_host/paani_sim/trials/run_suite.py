@@ -1,23 +1,27 @@
-"""Runs many cases in worker processes and stores one file each, so that an interrupted suite can go on."""
+"""Runs many cases, in processes here or on a cluster, and stores one file each: an interrupted suite can go on."""
 
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
+import functools
 import multiprocessing
 import os
+import platform
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import cv2
 import msgspec
 
+from paani.cluster import Workers
 from paani.errors import UserError
 from paani.whole_file import indented_json, write_whole
 from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.result import TrialResult
-from paani_sim.trials.run_trial import run_trial
+from paani_sim.trials.run_trial import ComputeEffort, run_trial
 from paani_sim.trials.trial_cases import TrialCase
 
 RESULTS_FOLDER, EFFORTS_FOLDER = "trials", "efforts"
@@ -42,12 +46,31 @@ class FailedDrive(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
 
 
+class DriveOrder(msgspec.Struct, frozen=True):
+    """One piece of work: a case, what its result is to depend on, and settings. threads: as of `run_trial`."""
+
+    case: TrialCase
+    fingerprint: Fingerprint
+    sets: tuple[str, ...]
+    threads: bool = False
+
+
+class DriveOutput(msgspec.Struct, frozen=True):
+    """What a drive gave, and what it took."""
+
+    result: TrialResult
+    effort: ComputeEffort
+
+
 class StoredSuite(msgspec.Struct, frozen=True, kw_only=True):
     """Results that a run folder holds, cases still to be driven, and counts of outdated results by what differs."""
 
     results: dict[TrialCase, TrialResult]
     missing: tuple[TrialCase, ...]
     outdated: dict[str, int]
+
+
+Driven = Generator[tuple[TrialCase, TrialResult | FailedDrive], None, None]
 
 
 def find_stored_results(folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader) -> StoredSuite:
@@ -69,13 +92,12 @@ def find_stored_results(folder: Path, cases: Sequence[TrialCase], reader: Finger
 
 def run_cases(
     folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
-) -> Iterator[tuple[TrialCase, TrialResult | FailedDrive]]:
+) -> Driven:
     """Run each case and yield it when its files are written. When interrupted, workers end and written files stay.
 
     Raises UserError for the folder, and for a setting or a scenario that no drive can use.
     """
-    for name in (RESULTS_FOLDER, EFFORTS_FOLDER):
-        _make_folder(folder / name)
+    make_result_folders(folder)
     for name in THREAD_COUNT_VARIABLES:
         os.environ[name] = "1"
     batch = DRIVES_PER_PROCESS * jobs
@@ -83,15 +105,36 @@ def run_cases(
         yield from _run_batch(folder, cases[first : first + batch], reader, sets, jobs)
 
 
+def run_cases_on(
+    workers: Workers, folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str]
+) -> Driven:
+    """As `run_cases`, on the workers of a cluster; the files are written here, so that the workers need no such folder.
+
+    Raises UserError also where a worker finds another scenario file than is here.
+    """
+    make_result_folders(folder)
+    orders = [DriveOrder(case, reader.fingerprint(case), tuple(sets)) for case in cases]
+    results: dict[int, TrialResult | FailedDrive] = {}
+
+    def keep(index: int, outcome: DriveOutput | FailedDrive) -> None:
+        results[index] = store_drive(folder, orders[index], outcome)
+
+    with contextlib.closing(workers.run(drive_order, orders, keep)) as done:
+        for index in done:
+            yield cases[index], results.pop(index)
+
+
 def _run_batch(
     folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
-) -> Iterator[tuple[TrialCase, TrialResult | FailedDrive]]:
+) -> Driven:
     executor = concurrent.futures.ProcessPoolExecutor(
         min(jobs, len(cases)), mp_context=multiprocessing.get_context("spawn"), initializer=_initialise_worker
     )
     try:
         running = {
-            executor.submit(_run_and_store, folder, case, reader.fingerprint(case), tuple(sets), jobs == 1): case
+            executor.submit(
+                _drive_and_store, folder, DriveOrder(case, reader.fingerprint(case), tuple(sets), jobs == 1)
+            ): case
             for case in cases
         }
         for future in concurrent.futures.as_completed(running):
@@ -106,6 +149,42 @@ def _run_batch(
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+def drive_order(order: DriveOrder) -> DriveOutput | FailedDrive:
+    """Drive one case in this process. Raises UserError for a setting or a scenario that no drive can use."""
+    found = _fingerprint_reader(order.sets).fingerprint(order.case)
+    if found != order.fingerprint:
+        raise UserError(
+            f"trial {order.case.name}: other {', '.join(found.list_differences(order.fingerprint))} on "
+            f"{platform.node()} than where it was asked for"
+        )
+    try:
+        result, effort = run_trial(order.case, order.sets, threads=order.threads)
+    except UserError:
+        raise
+    except Exception as error:  # noqa: BLE001  # one drive that fails is a finding, not the end of the run
+        return FailedDrive(case=order.case, reason=f"{type(error).__name__}: {error}")
+    return DriveOutput(result, effort)
+
+
+def store_drive(folder: Path, order: DriveOrder, output: DriveOutput | FailedDrive) -> TrialResult | FailedDrive:
+    """Write the files of a drive into a folder of `make_result_folders`. Raises UserError naming the file."""
+    if isinstance(output, FailedDrive):
+        return output
+    write_whole(folder / EFFORTS_FOLDER / f"{order.case.stem}.json", msgspec.json.encode(output.effort) + b"\n")
+    record = StoredResult(fingerprint=order.fingerprint, result=output.result)
+    write_whole(result_path(folder, order.case), encode_stored_result(record))
+    return output.result
+
+
+def make_result_folders(folder: Path) -> None:
+    """Raises UserError for a folder that cannot be made."""
+    for path in (folder / RESULTS_FOLDER, folder / EFFORTS_FOLDER):
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"--out {path}: {error.strerror}") from error
 
 
 def result_path(folder: Path, case: TrialCase) -> Path:
@@ -126,32 +205,20 @@ def encode_stored_result(record: StoredResult) -> bytes:
     return indented_json(record)
 
 
-def _run_and_store(
-    folder: Path, case: TrialCase, fingerprint: Fingerprint, sets: tuple[str, ...], threads: bool
-) -> TrialResult | FailedDrive:
-    """Run one case in a worker process. The worker ends when its parent has ended."""
+def _drive_and_store(folder: Path, order: DriveOrder) -> TrialResult | FailedDrive:
+    """In a worker process, which ends when its parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None and not parent.is_alive():
         os._exit(1)
-    try:
-        result, effort = run_trial(case, sets, threads=threads)
-    except UserError:
-        raise
-    except Exception as error:  # noqa: BLE001  # one drive that fails is a finding, not the end of the run
-        return FailedDrive(case=case, reason=f"{type(error).__name__}: {error}")
-    write_whole(folder / EFFORTS_FOLDER / f"{case.stem}.json", msgspec.json.encode(effort) + b"\n")
-    write_whole(result_path(folder, case), encode_stored_result(StoredResult(fingerprint=fingerprint, result=result)))
-    return result
+    return store_drive(folder, order, drive_order(order))
+
+
+@functools.cache
+def _fingerprint_reader(sets: tuple[str, ...]) -> FingerprintReader:
+    return FingerprintReader(sets)
 
 
 def _initialise_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     os.nice(NICENESS)
     cv2.setNumThreads(1)
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {path}: {error.strerror}") from error

@@ -1,12 +1,14 @@
 """`paani world`: list scenarios, draw one, write its MuJoCo model, or check scenario files."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 import cv2
 from tqdm import tqdm
 
+from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
@@ -84,7 +86,8 @@ def _mjcf(options: argparse.Namespace) -> int:
 def _dataset(options: argparse.Namespace) -> int:
     from paani_sim.worlds.dataset import write_dataset  # noqa: PLC0415  the rest needs no OpenGL
 
-    manifest = write_dataset(options.out, options.n, options.seed, options.worlds)
+    with open_workers(options.cluster, os.cpu_count() or 1) as workers:
+        manifest = write_dataset(options.out, options.n, options.seed, options.worlds, workers=workers)
     boxes = ", ".join(f"{number} {name}" for name, number in manifest.boxes.items())
     sys.stdout.write(f"{options.out}: {manifest.images} pictures, boxes: {boxes}\n")
     return 0
@@ -135,5 +138,6 @@ def _parser() -> argparse.ArgumentParser:
     dataset.add_argument("--seed", type=seed, default=0)
     dataset.add_argument("--out", type=output_folder("--out"), required=True, metavar="DIR")
     dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
+    add_cluster_argument(dataset)
     dataset.set_defaults(run=_dataset)
     return parser

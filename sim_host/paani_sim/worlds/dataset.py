@@ -5,6 +5,8 @@ The folder has the form of the real sources: `images/*.jpg`, `masks/*.png` (0 ob
 order, C2) and `manifest.json`. The same arguments give the same files.
 """
 
+import collections
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from paani.arrays import U8
-from paani.errors import UserError
+from paani.cluster import InProcess, Workers
 from paani.whole_file import indented_json, new_folder
 from paani_sim.eye.camera import Camera
 from paani_sim.eye.labels import CLASSES, Labelled, select_visible_boxes
@@ -63,6 +65,25 @@ class Manifest(msgspec.Struct, frozen=True, kw_only=True):
     items: tuple[Item, ...]
 
 
+class Session(msgspec.Struct, frozen=True, kw_only=True):
+    """One piece of work: pictures of one shore. number: from 0; it chooses the world and seeds the pictures."""
+
+    number: int
+    pictures: int
+    seed: int
+    world: str
+    width_px: int
+    height_px: int
+
+
+class DrawnSession(msgspec.Struct, frozen=True):
+    """Files by their path in the folder, their rows of the manifest, and the number of boxes of each kind."""
+
+    files: dict[str, bytes]
+    items: tuple[Item, ...]
+    boxes: dict[str, int]
+
+
 def write_dataset(
     out: Path,
     n: int,
@@ -71,47 +92,74 @@ def write_dataset(
     *,
     width_px: int = 320,
     height_px: int = 240,
+    workers: Workers | None = None,
 ) -> Manifest:
     """Write `n` labelled pictures to the new folder `out` and return its manifest.
 
-    Some are flatter than `height_px`. Written beside and renamed when complete. Raises `UserError` for a folder that
-    exists, an unknown world or missing OpenGL.
+    Some are flatter than `height_px`. Written beside and renamed when complete. workers: who draws; this process if not
+    given. Raises `UserError` for a folder that exists, an unknown world or missing OpenGL.
     """
-    places = [load_world(name) for name in worlds]
+    for name in worlds:
+        load_world(name)
+    sessions = [
+        Session(
+            number=number,
+            pictures=min(PICTURES_PER_SESSION, n - first),
+            seed=seed,
+            world=worlds[number % len(worlds)],
+            width_px=width_px,
+            height_px=height_px,
+        )
+        for number, first in enumerate(range(0, n, PICTURES_PER_SESSION))
+    ]
     with new_folder(out, "--out") as beside:
         for folder in ("images", "masks", "labels"):
             (beside / folder).mkdir()
-        return _draw_pictures(beside, n, seed, places, (width_px, height_px))
+        rows: dict[int, DrawnSession] = {}
+
+        def keep(index: int, drawn: DrawnSession) -> None:
+            for name, data in drawn.files.items():
+                (beside / name).write_bytes(data)
+            rows[index] = msgspec.structs.replace(drawn, files={})
+
+        with (
+            tqdm(total=n, unit="picture", desc="pictures") as progress,
+            contextlib.closing((workers or InProcess()).run(draw_session, sessions, keep)) as done,
+        ):
+            for index in done:
+                progress.update(sessions[index].pictures)
+        manifest = _list_sessions(seed, [rows[index] for index in range(len(sessions))])
+        (beside / "manifest.json").write_bytes(indented_json(manifest))
+        return manifest
 
 
-def _draw_pictures(folder: Path, n: int, seed: int, places: Sequence[World], size_px: tuple[int, int]) -> Manifest:
-    width_px, height_px = size_px
+def draw_session(session: Session) -> DrawnSession:
+    """Draw the pictures of one session. Raises UserError for missing OpenGL."""
+    rng = np.random.default_rng([session.seed, session.number])
+    world = _vary_world(load_world(session.world), rng)
+    seq = f"{world.name}_{session.seed}_{session.number:03d}"
+    height = round(session.height_px * FLATTER) if rng.random() < FLAT_FRAC else session.height_px
+    files: dict[str, bytes] = {}
     items: list[Item] = []
-    boxes = dict.fromkeys((str(kind) for kind in CLASSES), 0)
-    with tqdm(total=n, unit="picture", desc="pictures") as progress:
-        session = 0
-        while len(items) < n:
-            rng = np.random.default_rng([seed, session])
-            world = _vary_world(places[session % len(places)], rng)
-            seq = f"{world.name}_{seed}_{session:03d}"
-            height = round(height_px * FLATTER) if rng.random() < FLAT_FRAC else height_px
-            with Eye(world, Camera(width_px=width_px, height_px=height), supersample=2) as eye:
-                for k in range(min(PICTURES_PER_SESSION, n - len(items))):
-                    view = _render_picture(eye, k, rng)
-                    items.append(_write_picture(folder, seq, k, view, rng))
-                    for box in view.boxes:
-                        boxes[str(box.kind)] += 1
-                    progress.update()
-            session += 1
-    manifest = Manifest(
+    boxes: collections.Counter[str] = collections.Counter()
+    with Eye(world, Camera(width_px=session.width_px, height_px=height), supersample=2) as eye:
+        for k in range(session.pictures):
+            view = _render_picture(eye, k, rng)
+            items.append(_encode_picture(files, seq, k, view, rng))
+            boxes.update(str(box.kind) for box in view.boxes)
+    return DrawnSession(files, tuple(items), dict(boxes))
+
+
+def _list_sessions(seed: int, sessions: Sequence[DrawnSession]) -> Manifest:
+    kinds = tuple(str(kind) for kind in CLASSES)
+    items = tuple(item for drawn in sessions for item in drawn.items)
+    return Manifest(
         seed=seed,
-        class_ids=tuple(str(kind) for kind in CLASSES),
+        class_ids=kinds,
         images=len(items),
-        boxes=boxes,
-        items=tuple(items),
+        boxes={kind: sum(drawn.boxes.get(kind, 0) for drawn in sessions) for kind in kinds},
+        items=items,
     )
-    (folder / "manifest.json").write_bytes(indented_json(manifest))
-    return manifest
 
 
 def _vary_world(world: World, rng: np.random.Generator) -> World:
@@ -160,19 +208,20 @@ def _render_picture(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
     return dataclasses.replace(view, boxes=select_visible_boxes(view))
 
 
-def _write_picture(folder: Path, seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:
+def _encode_picture(files: dict[str, bytes], seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:
+    """Add picture, mask and label to the files."""
     height, width = view.mask.shape
     stem = f"{seq}_{k:02d}"
     quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(72, 96))]
-    _save_image(folder / f"images/{stem}.jpg", _vary_colours(view.bgr, rng), quality)
-    _save_image(folder / f"masks/{stem}.png", view.mask, [])
+    files[f"images/{stem}.jpg"] = cv2.imencode(".jpg", _vary_colours(view.bgr, rng), quality)[1].tobytes()
+    files[f"masks/{stem}.png"] = cv2.imencode(".png", view.mask)[1].tobytes()
     lines = []
     for box in view.boxes:
         centre = (0.5 * (box.x0_px + box.x1_px) / width, 0.5 * (box.y0_px + box.y1_px) / height)
         size = ((box.x1_px - box.x0_px) / width, (box.y1_px - box.y0_px) / height)
         values = " ".join(f"{v:.6f}" for v in (*centre, *size))
         lines.append(f"{CLASSES.index(box.kind)} {values}\n")
-    (folder / f"labels/{stem}.txt").write_text("".join(lines))
+    files[f"labels/{stem}.txt"] = "".join(lines).encode()
     return Item(f"images/{stem}.jpg", seq, (width, height), f"masks/{stem}.png", f"labels/{stem}.txt")
 
 
@@ -187,8 +236,3 @@ def _vary_colours(bgr: U8, rng: np.random.Generator) -> U8:
     if rng.random() < 0.3:
         colour = colour + rng.normal(0.0, rng.uniform(2.0, 8.0), colour.shape)
     return np.asarray(np.clip(colour, 0.0, 255.0), np.uint8)
-
-
-def _save_image(path: Path, picture: U8, options: list[int]) -> None:
-    if not cv2.imwrite(str(path), picture, options):
-        raise UserError(f"dataset: cannot write {path}")
