@@ -29,6 +29,7 @@ from paani_models.report.height_scores import (
 )
 from paani_models.report.height_table import format_height_table
 from paani_models.report.miss_sheet import find_mistakes, refuse_inside_repository, render_sheet
+from paani_models.report.reliability import format_reliability, measure_reliability
 
 
 def open_shipped(path: Path) -> FindBoxes:
@@ -61,7 +62,7 @@ def compare_detectors(net: str, weights: Path, pictures: PictureSelection, html:
     detectors = [own, *_open_yardsticks(pictures.data)]
     results = run_detectors(detectors, pictures.boxed_samples(held_out=True))
     rows = score_heights(results, detectors)
-    sys.stdout.write(format_height_table(rows))
+    sys.stdout.write(format_height_table(rows) + format_reliability(measure_reliability(results, detectors)))
     if html is not None:
         _write_sheet(html, net, results, detectors)
     return rows

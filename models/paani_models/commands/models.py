@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         metavar="SHARE",
         help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights;"
-        " above 0 the first stages stay as blended",
+        " the first stages stay as they are above 0, and where they are YOLOX-nano's",
     )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")

@@ -38,6 +38,7 @@ class Source:
     is what is scored. soft_edges: its masks leave a band between classes undecided, so edges are not scored.
     annotated: detector classes whose every instance is boxed; only for those may background be penalised. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
+    loose_boxes: its boxes say that something is there, not where its edges are: they are no truth for an IoU.
     drawn: boxes are in ANNOTATIONS; its sequences pass several places, so ten consecutive frames count as one sequence.
     held_out: sequences for validation; empty means one in `one_in` by name. twins: pictures
     that show what a picture of the other side shows; they are left out. splits: of a prepared public set, which name
@@ -53,6 +54,7 @@ class Source:
     annotated: frozenset[str] = frozenset()
     empty_of: frozenset[str] = frozenset()
     own_hull: bool = False
+    loose_boxes: bool = False
     drawn: bool = False
     held_out: tuple[str, ...] = ()
     one_in: int = 8
@@ -143,6 +145,7 @@ SOURCES = (
         "surf_people",
         labels="labels",
         annotated=frozenset({"person"}),
+        loose_boxes=True,
         held_out=("block01", "block12"),
     ),
     Source("pennfudan", "pennfudan", labels="labels", annotated=frozenset({"person"}), one_in=4),
@@ -183,6 +186,8 @@ SOURCES = (
     ),
     Source(RENDERED, RENDERED, masks="masks", labels="labels", annotated=frozenset(DETECTOR_CLASSES)),
 )
+
+LOOSE_SOURCES = frozenset(source.name for source in SOURCES if source.loose_boxes)
 
 _BOXED = Source("waterscenes", "waterscenes", labels="labels", annotated=frozenset(DETECTOR_CLASSES))
 

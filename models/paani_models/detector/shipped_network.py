@@ -23,6 +23,7 @@ STRIDES = (8, 16, 32)
 CANDIDATES = sum((INPUT_HEIGHT_PX // s) * (INPUT_WIDTH_PX // s) for s in STRIDES)  # C4: 1,680
 
 HEAD_CHANNELS = 64
+FIRST_STAGES = ("stem", "dark2", "dark3")  # edges and parts, not objects; half of a pass
 
 # Which of the 80 COCO rows each class of ours starts from: the nearest in kind, or in shape where COCO has no kind.
 COCO_ROWS = {
@@ -136,11 +137,13 @@ class Detector(nn.Module):
         self.out5 = CspLayer(256, 256, 1, residual=False)
         self.heads = nn.ModuleList(Head(channels) for channels in (64, 128, 256))
 
-    def features(self, x: Tensor) -> list[Tensor]:
-        """Fused feature maps at strides 8, 16, 32 (64, 128, 256 channels)."""
+    def first_stages(self, x: Tensor) -> Tensor:
+        """Feature map at stride 8 (64 channels) of pictures [N,3,H,W], by the parts in FIRST_STAGES."""
         corners = [x[..., row::2, column::2] for column in (0, 1) for row in (0, 1)]
-        c2 = self.dark2(self.stem(torch.cat(corners, 1)))
-        c3 = self.dark3(c2)
+        return cast(Tensor, self.dark3(self.dark2(self.stem(torch.cat(corners, 1)))))
+
+    def features(self, c3: Tensor) -> list[Tensor]:
+        """What `first_stages` gives -> fused feature maps at strides 8, 16, 32 (64, 128, 256 channels)."""
         c4 = self.dark4(c3)
         c5 = self.narrow5(self.dark5(c4))
         p4 = self.narrow4(self.merge4(torch.cat([F.interpolate(c5, scale_factor=2.0), c4], 1)))
@@ -151,8 +154,12 @@ class Detector(nn.Module):
 
     def raw(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """Boxes cx, cy, w, h in input pixels [N,A,4], and logits [N,A,5]: objectness, then the classes."""
+        return self.raw_after(self.first_stages(x))
+
+    def raw_after(self, c3: Tensor) -> tuple[Tensor, Tensor]:
+        """`raw` from what `first_stages` gives."""
         boxes, logits = [], []
-        for feature, head, stride in zip(self.features(x), self.heads, STRIDES, strict=True):
+        for feature, head, stride in zip(self.features(c3), self.heads, STRIDES, strict=True):
             output = head(feature)
             flat = output.flatten(2).transpose(1, 2)
             cells = cell_corners(output.shape[2], output.shape[3], output.device)

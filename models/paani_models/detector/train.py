@@ -18,7 +18,7 @@ from paani_models.detector.data import BoxedPicture, TrainingExample, augment_ex
 from paani_models.detector.distillation import Teacher
 from paani_models.detector.loss import detector_loss
 from paani_models.detector.metrics import Detections, class_figures, decode_boxes
-from paani_models.detector.shipped_network import Detector
+from paani_models.detector.shipped_network import FIRST_STAGES, Detector
 from paani_models.network_input import SIZE_WH, detector_batch
 from paani_models.training.augment import draw_null_picture
 from paani_models.training.training_state import (
@@ -33,10 +33,10 @@ from paani_models.training.training_state import (
 # Pictures drawn per epoch and source; a source not named here is drawn once each.
 DRAWS_PER_EPOCH = {
     "hsu_shore_tiles": 420,
-    "uon_robotx": 150,
+    "uon_robotx": 220,
     "tunai_sooke": 120,
     "inland_vessel": 48,
-    "redyellow_buoy": 45,
+    "redyellow_buoy": 60,
     "dasha_pier": 160,
     "tampere_pier": 200,
     "tbiseg_usvinland": 160,
@@ -45,12 +45,12 @@ DRAWS_PER_EPOCH = {
     "bath_river": 140,
     "mastr1325": 40,
     "oasis": 40,
-    "rendered": 700,
-    "lifeguard_swim": 426,
+    "rendered": 800,
+    "lifeguard_swim": 600,
     "surf_people": 270,
     "coco_mini": 178,
     "typesofships_kayak_buoy": 321,
-    "lake_robotx_buoys": 92,
+    "lake_robotx_buoys": 140,
 }
 NULL_DRAWS = 60  # pictures per epoch that show nothing
 
@@ -131,15 +131,19 @@ class DetectorTraining:
             return self._batch(order, index, epoch)
 
         self.model.train()
+        is_frozen = set(FIRST_STAGES) <= set(recipe.frozen)
+        is_shared = is_frozen and self.teacher is not None and self.teacher.has_first_stages_of(self.model)
         losses = []
         title = f"epoch {epoch + 1}/{recipe.epochs}"
         for pictures, truths, judged in tqdm(Prefetch[Batch]()(make, steps), title, steps, mininterval=5.0):
             seen = to_device(pictures)
-            boxes, logits = self.model.raw(seen)
+            first = self.model.first_stages(seen)
+            boxes, logits = self.model.raw_after(first)
             known = [truth.to(training_device()) for truth in truths]
             box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
             if self.teacher is not None:
-                score_loss = score_loss + self.teacher.loss(seen, boxes, logits, to_device(judged))
+                taught = first.detach() if is_shared else self.teacher.first_stages(seen)
+                score_loss = score_loss + self.teacher.loss(taught, boxes, logits, to_device(judged))
             rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps)
             state.update(box_loss + score_loss, rate, clip_norm=10.0)
             losses.append((box_loss.item(), score_loss.item()))

@@ -18,7 +18,7 @@ from paani_models.detector.data import read_boxed_pictures
 from paani_models.detector.distillation import Teacher, add_teachers_boxes, blend_weights
 from paani_models.detector.off_the_shelf import open_off_the_shelf
 from paani_models.detector.paper_network import Yolo11n
-from paani_models.detector.shipped_network import Detector, load_yolox_weights
+from paani_models.detector.shipped_network import FIRST_STAGES, Detector, load_yolox_weights
 from paani_models.detector.train import DetectorRecipe, DetectorTraining
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
 from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
@@ -34,7 +34,6 @@ from paani_models.training.training_state import Stage, load_averaged_weights
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
-FROZEN_PARTS = ("stem", "dark2", "dark3")  # of a detector that keeps what it knew: edges and parts, not objects
 COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
 IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
@@ -126,7 +125,6 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         epochs=options.epochs or recipe.epochs,
         peak_rate=options.peak_rate or recipe.peak_rate,
         draws_frac=options.draws_frac,
-        frozen=FROZEN_PARTS if options.blend else (),
         distilled=keeps,
     )
     torch.manual_seed(recipe.seed)
@@ -143,7 +141,10 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
     if options.blend is not None:
         teacher = Teacher(pictures.data / COCO_FILE)
         blend_weights(model, teacher.net, options.blend)
-        cached = add_teachers_boxes(cached, open_off_the_shelf(pictures.data, torch.get_num_threads()))
+        if options.blend > 0 or teacher.has_first_stages_of(model):
+            recipe = replace(recipe, frozen=FIRST_STAGES)
+        found = options.folder / "teachers_boxes.json"
+        cached = add_teachers_boxes(cached, open_off_the_shelf(pictures.data, torch.get_num_threads()), found)
     training = DetectorTraining(model, recipe, options.folder, cached, held_out, teacher)
     if keeps:
         training.state.average_from_model()

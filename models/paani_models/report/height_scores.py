@@ -83,7 +83,7 @@ def run_detectors(detectors: Sequence[DetectorRun], samples: Sequence[Sample]) -
 
 
 @dataclass(frozen=True)
-class _Matched:
+class MatchedBoxes:
     """Boxes of one class and range over pictures, best score first; positives: true boxes of each sequence."""
 
     scores: F32
@@ -123,23 +123,39 @@ def _in_range(boxes: F32, range_px: tuple[float, float]) -> Bools:
     return np.asarray((heights >= range_px[0]) & (heights < range_px[1]), np.bool_)
 
 
+def truth_pictures(results: Sequence[PictureResult], label: str) -> list[PictureResult]:
+    """Those whose source boxes every object of a class, and tightly."""
+    sources = ((each, each.sample.source) for each in results)
+    return [each for each, source in sources if label in source.annotated and not source.loose_boxes]
+
+
 def score_heights(results: Sequence[PictureResult], detectors: Sequence[DetectorRun]) -> list[HeightRow]:
-    """Every class, source that annotates it and range that has true boxes, and every detector that knows the class."""
+    """Every class, source that annotates it and range that has true boxes, and every detector that knows the class.
+
+    Sources with loose boxes have rows of their own and are no part of `all`.
+    """
     rows = []
     for kind, label in enumerate(DETECTOR_CLASSES):
         annotated = [r for r in results if label in r.sample.source.annotated]
         names = list(dict.fromkeys(r.sample.source.name for r in annotated))
         for source in [*names, *([ALL_SOURCES] if len(names) > 1 else [])]:
-            chosen = [r for r in annotated if source in (r.sample.source.name, ALL_SOURCES)]
+            chosen = [r for r in annotated if r.sample.source.name == source]
+            if source == ALL_SOURCES:
+                chosen = truth_pictures(results, label)
             for range_px in (*HEIGHTS_PX, ANY_HEIGHT_PX):
                 scored = (
-                    (each, _match(chosen, each.name, kind, range_px)) for each in detectors if label in each.known
+                    (each, match_pictures(chosen, each.name, kind, range_px))
+                    for each in detectors
+                    if label in each.known
                 )
                 rows += [_row(each.name, label, source, range_px, m) for each, m in scored if m.positives.sum()]
     return rows
 
 
-def _match(results: Sequence[PictureResult], detector: str, kind: int, range_px: tuple[float, float]) -> _Matched:
+def match_pictures(
+    results: Sequence[PictureResult], detector: str, kind: int, range_px: tuple[float, float]
+) -> MatchedBoxes:
+    """One detector's boxes of one class over pictures that annotate it."""
     places = {key: i for i, key in enumerate(dict.fromkeys((r.sample.source.name, r.sample.sequence) for r in results))}
     positives = np.zeros(len(places), np.int64)
     scores, hits, owners = [np.zeros(0, np.float32)], [np.zeros(0, np.bool_)], [np.zeros(0, np.int64)]
@@ -152,10 +168,10 @@ def _match(results: Sequence[PictureResult], detector: str, kind: int, range_px:
         owners.append(np.full(len(score), place))
     joined = np.concatenate(scores)
     order = np.argsort(-joined, kind="stable")
-    return _Matched(joined[order], np.concatenate(hits)[order], np.concatenate(owners)[order], positives)
+    return MatchedBoxes(joined[order], np.concatenate(hits)[order], np.concatenate(owners)[order], positives)
 
 
-def _row(detector: str, kind: str, source: str, range_px: tuple[float, float], matched: _Matched) -> HeightRow:
+def _row(detector: str, kind: str, source: str, range_px: tuple[float, float], matched: MatchedBoxes) -> HeightRow:
     confident = matched.scores > CONFIDENCE
     right = matched.hits & confident
     size = len(matched.positives)
@@ -184,7 +200,7 @@ def _row(detector: str, kind: str, source: str, range_px: tuple[float, float], m
     )
 
 
-def weighted_average_precision(matched: _Matched, weights: NDArray[np.int64]) -> float:
+def weighted_average_precision(matched: MatchedBoxes, weights: NDArray[np.int64]) -> float:
     """Average precision where sequence i stands weights[i] times; NaN where no true box is drawn."""
     positives = int(matched.positives @ weights)
     if positives == 0:

@@ -20,9 +20,10 @@ def decode_boxes(
     output: float32 [1, 4 + classes, N], rows cx, cy, w, h in pixels of the network's input, then scores in [0, 1].
     transform: from the picture to that input. classes: what each score row stands for; rows of classes that are no
     `Label` are ignored.
-    Candidates with a number that is not finite are dropped (C5), the threshold is exclusive (C6), at most `nms_input`
-    candidates enter the suppression, which ignores classes (C7, C8), and at most `max_boxes` boxes leave it (C9), in
-    normalised coordinates of the picture (C10).
+    Candidates with a number that is not finite are dropped (C5), thresholds are exclusive (C6), and a candidate is of
+    the class that scores highest among those above their own. At most `nms_input` candidates enter the suppression,
+    which ignores classes (C7, C8), and at most `max_boxes` boxes leave it (C9), in normalised coordinates of the
+    picture (C10).
     """
     rows = output[0]
     if classes != LABELS:
@@ -31,15 +32,17 @@ def decode_boxes(
         rows = rows[[0, 1, 2, 3, *(4 + i for i in known)]]
     else:
         labels = list(LABELS)
+    thresholds = np.array([[config.threshold(label.value)] for label in labels], np.float32)
     with np.errstate(invalid="ignore"):
-        confidence = rows[4:].max(axis=0)
-        valid = np.flatnonzero(np.isfinite(rows).all(axis=0) & (confidence > config.confidence))
+        scores = np.where(rows[4:] > thresholds, rows[4:], 0.0)
+        confidence = scores.max(axis=0, initial=0.0)
+        valid = np.flatnonzero(np.isfinite(rows).all(axis=0) & (confidence > 0.0))
     ranked = valid[np.argsort(-confidence[valid], kind="stable")][: config.nms_input]
     boxes = to_picture_coordinates(rows[:4, ranked], transform)
     has_size = (boxes[2] - boxes[0] > MIN_SIDE) & (boxes[3] - boxes[1] > MIN_SIDE)
     ranked, boxes = ranked[has_size], boxes[:, has_size]
     kept = suppress_overlaps(boxes, config.nms_iou)[: config.max_boxes]
-    best_class = rows[4:, ranked].argmax(axis=0)
+    best_class = scores[:, ranked].argmax(axis=0)
     return tuple(
         Detection(
             label=labels[int(best_class[i])],

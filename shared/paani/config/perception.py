@@ -62,10 +62,20 @@ class ImageQualityConfig(Section, frozen=True):
 
 
 class DetectorConfig(Section, frozen=True):
+    """A box counts above `confidence`, or above the threshold of its own class where that is not 0."""
+
     confidence: Fraction = 0.40  # C6
+    person_confidence: Fraction = 0.0
+    vessel_confidence: Fraction = 0.0
+    pier_confidence: Fraction = 0.0
+    buoy_confidence: Fraction = 0.0
     nms_input: Size = 256  # C7
     nms_iou: Fraction = 0.45  # C8
     max_boxes: Size = 24  # C9
+
+    def threshold(self, kind: str) -> float:
+        """Above which a box of a class (`person`, `vessel`, `pier`, `buoy`) counts."""
+        return float(getattr(self, f"{kind}_confidence")) or self.confidence
 
 
 class CorridorConfig(Section, frozen=True):

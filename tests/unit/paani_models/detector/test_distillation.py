@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,8 +42,9 @@ def test_weights_are_blended_by_share() -> None:
 
 
 def test_the_teacher_speaks_only_where_nothing_is_annotated_and_of_what_it_knows(teacher: Teacher) -> None:
-    x = torch.rand(1, 3, 64, 64)
-    boxes, logits = teacher.net.raw(x)
+    pictures = torch.rand(1, 3, 64, 64)
+    x = teacher.first_stages(pictures)
+    boxes, logits = teacher.net.raw(pictures)
     silent = torch.zeros(1, 4, 8, 8, dtype=torch.bool)
     assert teacher.loss(x, boxes, logits + 1.0, ~silent).item() == 0.0
     assert teacher.loss(x, boxes, logits + 1.0, silent).item() > teacher.loss(x, boxes, logits, silent).item()
@@ -52,7 +54,7 @@ def test_the_teacher_speaks_only_where_nothing_is_annotated_and_of_what_it_knows
     assert teacher.loss(x, boxes, logits + 1.0, unknown).item() == 0.0
 
 
-def test_teachers_boxes_fill_what_a_source_leaves_out_once_each() -> None:
+def test_teachers_boxes_fill_what_a_source_leaves_out_once_each_and_are_kept(tmp_path: Path) -> None:
     """Both teachers see the person that a source of vessels leaves out, one a vessel too, which is not its to say."""
 
     def find(picture: np.ndarray, confidence: float, limit: int) -> Detections:
@@ -60,10 +62,49 @@ def test_teachers_boxes_fill_what_a_source_leaves_out_once_each() -> None:
         return Detections(boxes, np.array([0.9, 0.8], np.float32), np.array([0, 1]))
 
     item = BoxedPicture("mcoe_boats", SEEN, np.zeros((0, 5), np.float32), np.array([0, 1, 0, 1], np.uint8))
-    (filled,) = add_teachers_boxes([item], (OffTheShelf("a", find), OffTheShelf("b", find)))
+    cache = tmp_path / "boxes.json"
+    (filled,) = add_teachers_boxes([item], (OffTheShelf("a", find), OffTheShelf("b", find)), cache)
     np.testing.assert_allclose(filled.boxes, [[0, 0.1, 0.25, 0.3, 0.5]])
     whole = BoxedPicture("coco_mini", SEEN, item.boxes, np.array([1, 1, 0, 0], np.uint8))
-    assert add_teachers_boxes([whole], (OffTheShelf("a", find),))[0] is whole
+    masked = BoxedPicture("bath_river", SEEN, item.boxes, np.zeros((4, 256, 320), np.uint8))
+    again = add_teachers_boxes([whole, masked, item], (OffTheShelf("a", refuse),), cache)
+    assert again[0] is whole
+    assert again[1] is masked
+    np.testing.assert_array_equal(again[2].boxes, filled.boxes)
+    with pytest.raises(AssertionError, match="asked again"):
+        add_teachers_boxes([replace(item, picture=SEEN + 1)], (OffTheShelf("a", refuse),), cache)
+
+
+def refuse(picture: np.ndarray, confidence: float, limit: int) -> Detections:
+    raise AssertionError("asked again")
+
+
+def test_loose_boxes_give_way_to_the_teachers_inside_them(tmp_path: Path) -> None:
+    """A loose box holds two people, one of them unsure; an unsure one outside it is no hint, a sure one is somebody."""
+
+    def find(picture: np.ndarray, confidence: float, limit: int) -> Detections:
+        boxes = np.array([[40, 40, 60, 80], [70, 40, 90, 80], [200, 40, 220, 80], [260, 40, 280, 80]], np.float32)
+        scores = np.array([0.9, 0.2, 0.2, 0.9], np.float32)
+        kept = scores > confidence
+        return Detections(boxes[kept], scores[kept], np.zeros(int(kept.sum()), np.int64))
+
+    loose = np.array([[0, 32 / 320, 32 / 256, 96 / 320, 96 / 256]], np.float32)
+    item = BoxedPicture("surf_people", SEEN, loose, np.array([1, 0, 0, 0], np.uint8))
+    (tight,) = add_teachers_boxes([item], (OffTheShelf("a", find),), tmp_path / "boxes.json")
+    assert sorted((tight.boxes[:, 1] * 320).round().tolist()) == [40, 70, 260]
+    assert not tight.exhaustive_mask.any()
+
+
+def test_first_stages_serve_both_only_while_they_are_the_same(teacher: Teacher) -> None:
+    other = Detector()
+    assert not teacher.has_first_stages_of(other)
+    other.load_state_dict(teacher.net.state_dict())
+    other.dark4[0][0].conv.weight.data += 1.0
+    assert teacher.has_first_stages_of(other)
+    x = torch.rand(1, 3, 64, 64)
+    torch.testing.assert_close(other.first_stages(x), teacher.first_stages(x))
+    other.dark3[0][0].conv.bias.data[0] += 1e-6
+    assert not teacher.has_first_stages_of(other)
 
 
 def test_frozen_parts_do_not_learn_and_the_rest_does(

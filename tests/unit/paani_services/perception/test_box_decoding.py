@@ -61,6 +61,24 @@ def test_c6_threshold_is_exclusive(score: float, n: int) -> None:
     assert len(decode_boxes(output((160, 128, 40, 40, score, 0, 0, 0)), SAME, exact)) == n
 
 
+def test_a_class_counts_above_its_own_threshold_and_the_others_above_the_common_one() -> None:
+    """A person at 0.30 counts, and so does one that a vessel outdoes which is not sure enough to count itself."""
+    config = DetectorConfig(person_confidence=0.25, buoy_confidence=0.6)
+    columns = [
+        (40, 128, 30, 30, 0.30, 0.0, 0.0, 0.0),
+        (110, 128, 30, 30, 0.30, 0.35, 0.0, 0.0),
+        (180, 128, 30, 30, 0.30, 0.45, 0.0, 0.0),
+        (250, 128, 30, 30, 0.0, 0.0, 0.0, 0.55),
+    ]
+    found = decode_boxes(output(*columns), SAME, config)
+    assert [(d.label, round(d.confidence, 2)) for d in found] == [
+        (Label.VESSEL, 0.45),
+        (Label.PERSON, 0.30),
+        (Label.PERSON, 0.30),
+    ]
+    assert [d.label for d in decode_boxes(output(*columns), SAME, RULES)] == [Label.BUOY, Label.VESSEL]
+
+
 def test_c2_class_order() -> None:
     """C2: person, vessel, pier, buoy."""
     rows = [(40.0 + 70 * i, 128.0, 30.0, 30.0, *np.eye(4)[i] * 0.9) for i in range(4)]
