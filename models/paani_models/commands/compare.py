@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from paani.arrays import F32, U8
+from paani.config import DetectorConfig
 from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue, verified_path
@@ -30,6 +31,7 @@ from paani_models.report.height_scores import (
 from paani_models.report.height_table import format_height_table
 from paani_models.report.miss_sheet import find_mistakes, refuse_inside_repository, render_sheet
 from paani_models.report.reliability import format_reliability, measure_reliability
+from paani_models.report.track_recall import format_tracks, measure_tracks
 
 
 def open_shipped(path: Path) -> FindBoxes:
@@ -61,17 +63,20 @@ def compare_detectors(net: str, weights: Path, pictures: PictureSelection, html:
     own = DetectorRun(net, frozenset(contract.classes), open_shipped(verified_path(net, weights)))
     detectors = [own, *_open_yardsticks(pictures.data)]
     results = run_detectors(detectors, pictures.boxed_samples(held_out=True))
-    rows = score_heights(results, detectors)
-    sys.stdout.write(format_height_table(rows) + format_reliability(measure_reliability(results, detectors)))
+    threshold = DetectorConfig().threshold
+    rows = score_heights(results, detectors, threshold)
+    counted = ", ".join(f"{kind} {threshold(kind):.2f}" for kind in DETECTOR_CLASSES)
+    sys.stdout.write(f"Recall and precision of boxes above {counted}.\n{format_height_table(rows)}")
+    sys.stdout.write(format_reliability(measure_reliability(results, detectors)))
+    sys.stdout.write(format_tracks(measure_tracks(results, detectors, threshold)))
     if html is not None:
         _write_sheet(html, net, results, detectors)
     return rows
 
 
 def _write_sheet(html: Path, net: str, results: Sequence[PictureResult], detectors: Sequence[DetectorRun]) -> None:
-    write_whole(
-        html, render_sheet(f"Misses and false alarms of {net}", find_mistakes(results, net, detectors)).encode()
-    )
+    mistakes = find_mistakes(results, net, detectors, DetectorConfig().threshold)
+    write_whole(html, render_sheet(f"Misses and false alarms of {net}", mistakes).encode())
     sys.stdout.write(f"{html}\n")
 
 

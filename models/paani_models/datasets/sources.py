@@ -39,6 +39,7 @@ class Source:
     annotated: detector classes whose every instance is boxed; only for those may background be penalised. empty_of:
     classes that its pictures do not show, boxes or none. own_hull: the boat's own bow fills the bottom middle.
     loose_boxes: its boxes say that something is there, not where its edges are: they are no truth for an IoU.
+    video: the pictures of a sequence, in the order of the manifest, follow each other closely enough to track things.
     drawn: boxes are in ANNOTATIONS; its sequences pass several places, so ten consecutive frames count as one sequence.
     held_out: sequences for validation; empty means one in `one_in` by name. twins: pictures
     that show what a picture of the other side shows; they are left out. splits: of a prepared public set, which name
@@ -55,6 +56,7 @@ class Source:
     empty_of: frozenset[str] = frozenset()
     own_hull: bool = False
     loose_boxes: bool = False
+    video: bool = False
     drawn: bool = False
     held_out: tuple[str, ...] = ()
     one_in: int = 8
@@ -131,12 +133,13 @@ SOURCES = (
     ),
     Source("inland_vessel", "inland_vessel", labels="labels", annotated=frozenset({"vessel"})),
     Source("redyellow_buoy", "redyellow_buoy", labels="labels", annotated=frozenset({"buoy"})),
-    Source("dasha_pier", "tbiseg_dasha", annotated=frozenset({"pier"}), drawn=True, held_out=("none",)),
+    Source("dasha_pier", "tbiseg_dasha", annotated=frozenset({"pier"}), drawn=True, video=True, held_out=("none",)),
     Source(
         "tampere_pier",
         "tbiseg_tampere",
         annotated=frozenset({"pier"}),
         drawn=True,
+        video=True,
         held_out=("dock_image_07", "dock_image_08", "dock_image_09"),  # one place, seen nowhere else
     ),
     Source("lifeguard_swim", "lifeguard_swim", labels="labels", annotated=frozenset({"person"}), one_in=4),
@@ -172,6 +175,7 @@ SOURCES = (
         "lake_robotx_buoys",
         labels="labels",
         annotated=frozenset({"buoy"}),
+        video=True,
         held_out=("block05", "block07"),
         twins=frozenset(
             {

@@ -26,6 +26,7 @@ MATCH_IOU = 0.5
 ALL_SOURCES = "all"
 
 FindBoxes = Callable[[U8, float, int], Detections]
+Threshold = Callable[[str], float]  # class -> above which a box counts
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Interval(msgspec.Struct, frozen=True):
 
 
 class HeightRow(msgspec.Struct, frozen=True, kw_only=True):
-    """One detector on one class, source and range of heights. n: true boxes; recall and precision at CONFIDENCE."""
+    """One detector on one class, source and range of heights. n: true boxes; recall and precision at the threshold."""
 
     detector: str
     kind: str
@@ -129,7 +130,15 @@ def truth_pictures(results: Sequence[PictureResult], label: str) -> list[Picture
     return [each for each, source in sources if label in source.annotated and not source.loose_boxes]
 
 
-def score_heights(results: Sequence[PictureResult], detectors: Sequence[DetectorRun]) -> list[HeightRow]:
+def common_threshold(kind: str) -> float:
+    """C6, whatever the class."""
+    del kind
+    return CONFIDENCE
+
+
+def score_heights(
+    results: Sequence[PictureResult], detectors: Sequence[DetectorRun], threshold: Threshold = common_threshold
+) -> list[HeightRow]:
     """Every class, source that annotates it and range that has true boxes, and every detector that knows the class.
 
     Sources with loose boxes have rows of their own and are no part of `all`.
@@ -148,7 +157,8 @@ def score_heights(results: Sequence[PictureResult], detectors: Sequence[Detector
                     for each in detectors
                     if label in each.known
                 )
-                rows += [_row(each.name, label, source, range_px, m) for each, m in scored if m.positives.sum()]
+                limit = threshold(label)
+                rows += [_row(each.name, label, source, range_px, m, limit) for each, m in scored if m.positives.sum()]
     return rows
 
 
@@ -171,8 +181,10 @@ def match_pictures(
     return MatchedBoxes(joined[order], np.concatenate(hits)[order], np.concatenate(owners)[order], positives)
 
 
-def _row(detector: str, kind: str, source: str, range_px: tuple[float, float], matched: MatchedBoxes) -> HeightRow:
-    confident = matched.scores > CONFIDENCE
+def _row(
+    detector: str, kind: str, source: str, range_px: tuple[float, float], matched: MatchedBoxes, threshold: float
+) -> HeightRow:
+    confident = matched.scores > threshold
     right = matched.hits & confident
     size = len(matched.positives)
     per_sequence = np.stack(

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from itertools import groupby
 
-from paani_models.detector.metrics import CONFIDENCE
 from paani_models.report.height_scores import HeightRow, Interval
 
 _WIDTHS = (7, 24, 8, 5, 5, 20, 18, 18, 18)
@@ -14,7 +13,7 @@ _WIDTHS = (7, 24, 8, 5, 5, 20, 18, 18, 18)
 
 def format_height_table(rows: Sequence[HeightRow]) -> str:
     """One line per detector, class, source and range; values with their 95 % interval over sequences."""
-    heads = ("class", "source", "height", "n", "seq", "detector", "AP50", f"recall {CONFIDENCE:.2f}", "precision")
+    heads = ("class", "source", "height", "n", "seq", "detector", "AP50", "recall", "precision")
     lines = ["Height of the true box in pixels of the source picture; 95 % intervals over sequences.", _line(heads)]
     for _, group in groupby(rows, lambda row: (row.kind, row.source, row.low_px, row.high_px)):
         for row in group:

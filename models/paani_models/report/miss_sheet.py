@@ -18,8 +18,8 @@ import numpy as np
 from paani.arrays import F32, U8, Bools
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, read_picture
-from paani_models.detector.metrics import CONFIDENCE, iou_matrix, match_boxes
-from paani_models.report.height_scores import MATCH_IOU, DetectorRun, PictureResult
+from paani_models.detector.metrics import iou_matrix, match_boxes
+from paani_models.report.height_scores import MATCH_IOU, DetectorRun, PictureResult, Threshold, common_threshold
 
 MAX_PER_GROUP = 24  # of each class, source and kind of mistake
 CONTEXT = 1.0  # of the box's longer side, around it on each side
@@ -57,23 +57,32 @@ def refuse_inside_repository(path: Path, option: str) -> None:
         raise UserError(f"{option}: {path} is inside the repository {repository}; the sheet holds pictures")
 
 
-def find_mistakes(results: Sequence[PictureResult], name: str, detectors: Sequence[DetectorRun]) -> list[Mistake]:
-    """Mistakes of one detector at CONFIDENCE and IoU 0.5, with the others that made the same (or did not).
+def find_mistakes(
+    results: Sequence[PictureResult],
+    name: str,
+    detectors: Sequence[DetectorRun],
+    threshold: Threshold = common_threshold,
+) -> list[Mistake]:
+    """Mistakes of one detector above the threshold and at IoU 0.5, with the others that made the same (or did not).
 
     For a miss `seen_by` are the detectors that found the object, for a false alarm those that raised it too.
     """
     others = [each for each in detectors if each.name != name]
-    return [mistake for result in results for mistake in _mistakes_in(result, name, others)]
+    return [mistake for result in results for mistake in _mistakes_in(result, name, others, threshold)]
 
 
-def _mistakes_in(result: PictureResult, name: str, others: Sequence[DetectorRun]) -> list[Mistake]:
+def _mistakes_in(
+    result: PictureResult, name: str, others: Sequence[DetectorRun], threshold: Threshold
+) -> list[Mistake]:
     mistakes = []
     for kind, label in enumerate(DETECTOR_CLASSES):
         if label not in result.sample.source.annotated:
             continue
         real = result.truth[result.truth[:, 0] == kind, 1:]
-        boxes, scores, missed = _judge(result, name, kind, real)
-        theirs = {each.name: _judge(result, each.name, kind, real) for each in others if label in each.known}
+        boxes, scores, missed = _judge(result, name, kind, real, threshold(label))
+        theirs = {
+            each.name: _judge(result, each.name, kind, real, threshold(label)) for each in others if label in each.known
+        }
         place = (result.sample.picture, result.sample.source.name, label)
         for index in np.flatnonzero(missed):
             seen = tuple(who for who, (_, _, lost) in theirs.items() if not lost[index])
@@ -88,10 +97,10 @@ def _mistakes_in(result: PictureResult, name: str, others: Sequence[DetectorRun]
     return mistakes
 
 
-def _judge(result: PictureResult, name: str, kind: int, real: F32) -> tuple[F32, F32, Bools]:
+def _judge(result: PictureResult, name: str, kind: int, real: F32, threshold: float) -> tuple[F32, F32, Bools]:
     """Confident boxes and scores of a class, and which of the true boxes they miss."""
     found = result.found[name]
-    mine = (found.classes == kind) & (found.scores > CONFIDENCE)
+    mine = (found.classes == kind) & (found.scores > threshold)
     boxes, scores = found.boxes[mine], found.scores[mine]
     missed = np.ones(len(real), np.bool_)
     shared = iou_matrix(boxes, real)
