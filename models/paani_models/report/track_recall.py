@@ -84,10 +84,10 @@ def measure_tracks(
                 sequences.setdefault((source.name, each.sample.sequence), []).append(each)
         for name in dict.fromkeys(source for source, _ in sequences):
             chosen = [frames for (source, _), frames in sequences.items() if source == name]
-            for each in detectors:
-                seen = [s for frames in chosen for s in _seen_frames(frames, each.name, kind, threshold(label))]
-                if seen and label in each.known:
-                    rows.append(_row(each.name, label, name, seen))
+            for detector in detectors:
+                seen = [s for frames in chosen for s in _seen_frames(frames, detector.name, kind, threshold(label))]
+                if seen and label in detector.known:
+                    rows.append(_row(detector.name, label, name, seen))
     return rows
 
 
