@@ -65,10 +65,10 @@ class DetectorConfig(Section, frozen=True):
     """A box counts above `confidence`, or above the threshold of its own class where that is not 0."""
 
     confidence: Fraction = 0.40  # C6
-    person_confidence: Fraction = 0.0
-    vessel_confidence: Fraction = 0.0
-    pier_confidence: Fraction = 0.0
-    buoy_confidence: Fraction = 0.0
+    person_confidence: Fraction = 0.0  # 0: as `confidence`; lower finds more people, and more that are none
+    vessel_confidence: Fraction = 0.0  # 0: as `confidence`
+    pier_confidence: Fraction = 0.0  # 0: as `confidence`
+    buoy_confidence: Fraction = 0.0  # 0: as `confidence`
     nms_input: Size = 256  # C7
     nms_iou: Fraction = 0.45  # C8
     max_boxes: Size = 24  # C9
