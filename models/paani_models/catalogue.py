@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 
 WEIGHTS = Path(__file__).parent / "weights"
@@ -101,7 +102,7 @@ def load_catalogue(folder: Path | None = None) -> dict[str, Model]:
     path = (folder or WEIGHTS) / MANIFEST
     try:
         models = msgspec.json.decode(path.read_bytes(), type=_Manifest).models
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     catalogue = {model.name: model for model in models}
     if len(catalogue) != len(models):

@@ -21,6 +21,7 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.sides import Side
+from paani.undecodable import UNDECODABLE
 
 INDEX_FILE = "identities.json"
 AUTHORITY = "authority"
@@ -61,7 +62,7 @@ def read_identities(folder: Path) -> Identities:
         return msgspec.json.decode(path.read_bytes(), type=Identities)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror} (`paani certs make` makes it)") from error
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"{path}: {error}") from error
 
 

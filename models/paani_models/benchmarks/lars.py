@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from paani.arrays import U8, Bools
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.sources import IGNORE
 from paani_models.segmenter.metrics import class_iou, confusion_matrix
@@ -166,7 +167,7 @@ def read_segments(root: Path) -> dict[str, tuple[Segment, ...]]:
     path = root / "panoptic_annotations.json"
     try:
         panoptic = msgspec.json.decode(path.read_bytes(), type=_Panoptic)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     names = {image.id: Path(image.file_name).stem for image in panoptic.images}
     return {names[each.image_id]: each.segments_info for each in panoptic.annotations if each.image_id in names}

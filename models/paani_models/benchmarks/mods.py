@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from paani.arrays import F64, U8, Bools
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 
 OBSTACLE, WATER, SKY = 0, 1, 2
 COLOURS = ((0, 0, 0), (255, 0, 0), (0, 255, 0))  # RGB
@@ -231,7 +232,7 @@ def read_dataset(path: Path) -> Dataset:
     """Annotations of `mods.json`. Raises UserError naming a file that is missing or malformed."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=_File).dataset
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
 
 

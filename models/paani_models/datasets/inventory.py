@@ -12,6 +12,7 @@ import msgspec
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 from paani_models.datasets.checked_files import decode_picture, raise_first_mistake, read_whole_file, sha256_hex
 from paani_models.datasets.leaks import Fingerprint, Leak, find_leaks, fingerprint_picture
@@ -102,7 +103,7 @@ def read_terms(folder: Path, source: Source) -> _Terms:
     path = folder / "manifest.json"
     try:
         stated = msgspec.json.decode(path.read_bytes(), type=_Terms)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     return (
         msgspec.structs.replace(stated, repo="paani_sim", licence="Apache-2.0") if source.name == RENDERED else stated

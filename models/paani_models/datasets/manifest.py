@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import indented_json
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
@@ -69,7 +70,7 @@ def load_manifest(folder: Path) -> SourceManifest:
     path = folder / MANIFEST
     try:
         manifest = msgspec.json.decode(path.read_bytes(), type=SourceManifest)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     twice = [name for name, count in Counter(item.file for item in manifest.items).items() if count > 1]
     if twice:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import write_whole
 from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.inventory import FolderOf, read_terms
@@ -184,7 +185,7 @@ def _encode_packed_manifest(root: Path, folder: str, samples: Sequence[Sample], 
     terms = read_terms(root, source)
     try:
         listed = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_SourceItems).items
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{root / MANIFEST}: {error}") from error
     packed = PackedSource(
         repo=terms.repo,

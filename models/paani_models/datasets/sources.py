@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 
 IGNORE = 255
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
@@ -269,7 +270,7 @@ def _read_source(folder: Path, source: Source) -> list[Sample]:
     path = folder / "manifest.json"
     try:
         items = msgspec.json.decode(path.read_bytes(), type=_Manifest).items
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     named = len({item.seq for item in items}) > 1
     seen: set[str] = set()

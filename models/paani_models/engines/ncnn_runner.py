@@ -14,6 +14,7 @@ import numpy as np
 
 from paani.arrays import F32
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani_models.catalogue import Record, file_sha256
 
 Run = Callable[[F32], F32]
@@ -66,7 +67,7 @@ def verified_ncnn_files(model: Path) -> NcnnFiles:
             raise UserError(f"{path}: missing; {remedy}")
     try:
         record = msgspec.json.decode(files.record.read_bytes(), type=Conversion)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{files.record}: {error}; {remedy}") from error
     if record.source_sha256 != file_sha256(model):
         raise UserError(f"{files.param}: made from another {model.name}; {remedy}")

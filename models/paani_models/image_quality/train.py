@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from paani.arrays import U8
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 from paani.whole_file import write_json
 from paani_models.catalogue import file_sha256
 from paani_models.datasets.sources import Sample
@@ -118,7 +119,7 @@ class ImageQualityTraining:
         if path.exists():
             try:
                 return msgspec.json.decode(path.read_bytes(), type=list[FaultLevel])
-            except msgspec.DecodeError as error:
+            except UNDECODABLE as error:
                 raise UserError(f"{path}: {error}") from error
         found = measure_fault_levels(scenes[:: max(1, len(scenes) // MEASURED_SCENES)], segment)
         write_json(path, found)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import replacement_file
 from paani_models.catalogue import (
     Model,
@@ -222,6 +223,6 @@ def read_origin(folder: Path, source: Source) -> Origin:
     path = folder / "manifest.json"
     try:
         stated = msgspec.json.decode(path.read_bytes(), type=_DeclaredTerms)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     return Origin(source.name, stated.repo, stated.commit, stated.licence)

@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 
 
 class Evidence(StrEnum):
@@ -65,7 +66,7 @@ def read_findings(path: Path) -> Findings:
     """Raises UserError naming a file that is missing or malformed, or holds another class than it declares."""
     try:
         findings = msgspec.json.decode(path.read_bytes(), type=Findings)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
     strange = next((f for f in findings.findings if f.evidence is not findings.evidence), None)
     if strange is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import indented_json
 from paani_models.catalogue import Figure, Model, Record
 from paani_models.report.requirements import RequirementResult
@@ -47,7 +48,7 @@ def read_experiments(weights: Path) -> tuple[Experiment, ...]:
         return ()
     try:
         return msgspec.json.decode(path.read_bytes(), type=_Record).experiments
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
 
 

@@ -10,6 +10,7 @@ import msgspec
 from paani.errors import UserError
 from paani.picture_faults import required_verdict
 from paani.statistics.charts import Points, lines
+from paani.undecodable import UNDECODABLE, UNREADABLE
 from paani_models.catalogue import Figure
 
 RECORDS = ("epochs.jsonl", "log.jsonl")
@@ -59,7 +60,7 @@ def read_faults(path: Path) -> FaultReport:
     """Raises UserError naming a file that is missing or malformed."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=FaultReport)
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{path}: {error}") from error
 
 
@@ -92,7 +93,7 @@ def read_training_record(folder: Path) -> list[dict[str, float]]:
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         try:
             row = msgspec.json.decode(line, type=dict[str, object])
-        except msgspec.MsgspecError as error:
+        except UNDECODABLE as error:
             raise UserError(f"{path}:{number}: {error}") from error
         rows.append(_flatten_numbers(row))
     return rows

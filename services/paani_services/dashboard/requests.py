@@ -8,6 +8,8 @@ from urllib.parse import urlsplit
 
 import msgspec
 
+from paani.undecodable import UNDECODABLE
+
 MAX_PRESS = 2**53 - 1  # what a script of the page can count to
 
 T = TypeVar("T")
@@ -41,17 +43,15 @@ def decode_body(body: bytes, kind: type[T]) -> T:
     """The body as this type. Raises BadRequestError naming the field."""
     try:
         return msgspec.json.decode(body, type=kind)
-    except msgspec.MsgspecError as error:
+    except UNDECODABLE as error:
         raise _bad_request(error, "body") from error
-    except UnicodeDecodeError as error:
-        raise BadRequestError("body: not UTF-8", "body") from error
 
 
 def decode_query(query: dict[str, str], kind: type[T]) -> T:
     """The query as this type. Raises BadRequestError naming the parameter."""
     try:
         return msgspec.convert(query, kind, strict=False)
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         raise _bad_request(error, "query") from error
 
 
@@ -60,11 +60,10 @@ def is_own_host(host_header: str, bound_host: str) -> bool:
 
     Any other name may belong to a foreign page whose name was made to resolve to this machine (DNS rebinding).
     """
-    name = urlsplit(f"//{host_header}").hostname or ""
-    if name in {"localhost", bound_host.lower()}:
-        return True
     try:
-        ipaddress.ip_address(name)
+        name = urlsplit(f"//{host_header}").hostname or ""
+        if name not in {"localhost", bound_host.lower()}:
+            ipaddress.ip_address(name)
     except ValueError:
         return False
     return True
@@ -81,5 +80,5 @@ def _bad_request(error: Exception, whole: str) -> BadRequestError:
     for marker in ("missing required field `", "unknown field `"):
         _, found, name = text.partition(marker)
         if found:
-            field = name.rstrip("`")
+            field = name.rstrip("`") or field
     return BadRequestError(f"{field}: {text}", field)

@@ -16,6 +16,7 @@ from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.statistics.dithering import dithering
 from paani.statistics.figure_table import FigureTable
+from paani.undecodable import UNDECODABLE
 
 STEP_US = 200_000  # J17: between pictures the advice is given again
 PROMPT_US = 100_000  # from picture to evidence: a machine that was busy while recording is not the policy's doing
@@ -89,6 +90,6 @@ def _recorded_inputs(drive: Path) -> Iterator[tuple[int, m.Message]]:
     for record in open_log(drive).records([topic.name for topic in READ]):
         try:
             message = decoders[record.topic].decode(record.data)
-        except msgspec.MsgspecError as error:
+        except UNDECODABLE as error:
             raise UserError(f"{drive}: {record.topic} {record.seq}: {error}") from error
         yield (message.source_us + PROMPT_US if isinstance(message, m.Evidence) else record.log_us), message

@@ -17,6 +17,7 @@ from paani.config import BusConfig
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.messages import Evidence, Message, Odometry, TimeBase
+from paani.undecodable import UNDECODABLE
 from paani_tools.calibrate.horizon import fit_waterline
 from paani_tools.calibrate.mount import WaterlineObservation
 from paani_tools.inspect.listen import observer
@@ -42,7 +43,7 @@ def collect_recorded(path: Path) -> Collected:
     with Progress("reading") as bar:
         for record in log.records(wanted):
             bar.at((record.log_us - log.start_us) / span_us)
-            with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+            with contextlib.suppress(*UNDECODABLE):
                 if record.topic == keys.EVIDENCE.name:
                     evidence.append(msgspec.json.decode(record.data, type=Evidence))
                 else:

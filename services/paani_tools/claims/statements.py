@@ -13,6 +13,7 @@ from typing import Literal
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 
 SHIPPED = "claims.toml"
 IN_CHECKOUT = Path(__file__).parents[3] / "tests" / SHIPPED
@@ -48,7 +49,7 @@ def read_statements() -> tuple[Statement, ...]:
     source = shipped if shipped.is_file() else IN_CHECKOUT
     try:
         rows = msgspec.toml.decode(source.read_bytes(), type=dict[str, _Row])
-    except (OSError, msgspec.DecodeError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{source}: {error}") from error
     return tuple(_statement(name, row) for name, row in rows.items())
 

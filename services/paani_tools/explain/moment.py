@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.errors import UserError
 from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log
+from paani.undecodable import UNDECODABLE
 
 BEFORE_US, AFTER_US = 5_000_000, 3_000_000  # where the rest of a decision is looked for
 
@@ -94,7 +95,7 @@ def _runs(log: Log, end_us: int | None) -> Iterator[_Run]:
     for record in log.records([keys.ADVISORY.name], None, end_us):
         try:
             direction = decoder.decode(record.data).direction
-        except msgspec.MsgspecError:
+        except UNDECODABLE:
             continue
         if run is None or run.direction != direction:
             if run is not None:
@@ -113,7 +114,7 @@ def _messages(
     for record in log.records(decoders, start_us, end_us):
         try:
             found[record.topic].append((record.log_us, decoders[record.topic].decode(record.data)))
-        except (msgspec.MsgspecError, UnicodeDecodeError):
+        except UNDECODABLE:
             continue
     return found
 
@@ -127,7 +128,7 @@ def _pictures(log: Log, frame: tuple[int, int], near_us: int) -> Iterator[Record
         if isinstance(item, RecordedPicture):
             try:
                 header = decoder.decode(item.header)
-            except msgspec.MsgspecError:
+            except UNDECODABLE:
                 continue
             if (header.frame_epoch, header.frame_seq) == frame:
                 yield item

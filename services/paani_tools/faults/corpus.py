@@ -9,6 +9,7 @@ import numpy as np
 
 from paani.arrays import U8
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 
 T = TypeVar("T")
 SIZE_WH = (320, 240)
@@ -72,7 +73,7 @@ def read_scenes(source: Path, at_most: int, only: frozenset[str] | None = None) 
     manifest = source / "manifest.json"
     try:
         items = msgspec.json.decode(manifest.read_bytes(), type=_Manifest).items
-    except (OSError, msgspec.DecodeError) as error:
+    except UNREADABLE as error:
         raise UserError(f"{manifest}: {error}") from error
     folders = [source / name for name in MASK_FOLDERS if (source / name).is_dir()]
     if not folders:

@@ -17,6 +17,7 @@ from paani.errors import UserError
 from paani.logs.reader import Log, Record
 from paani.logs.schema import json_schema
 from paani.logs.writer import HEADER
+from paani.undecodable import UNDECODABLE
 from paani.whole_file import new_folder, write_whole
 
 EVERY_US = 1_000_000  # a map needs no more points
@@ -45,8 +46,8 @@ class Table:
     def add(self, record: Record) -> bool:
         """False for what is no JSON object."""
         try:
-            fields = dict(_flat(msgspec.json.decode(record.data)))
-        except (msgspec.MsgspecError, UnicodeDecodeError, AttributeError):
+            fields = dict(_flat(msgspec.json.decode(record.data, type=dict[str, Any])))
+        except UNDECODABLE:
             return False
         self._rows.writerow([record.log_us, *(fields.get(column, "") for column in self._columns)])
         return True
@@ -136,7 +137,7 @@ def _place(record: Record) -> Point | None:
             fix = msgspec.json.decode(record.data, type=m.GpsFix)
             return Point(fix.source_us, fix.latitude_deg, fix.longitude_deg) if fix.fix else None
         pose = msgspec.json.decode(record.data, type=m.Odometry)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except UNDECODABLE:
         return None
     known = (pose.latitude_deg, pose.longitude_deg) != (0.0, 0.0)  # zero where the origin is not known
     return Point(pose.source_us, pose.latitude_deg, pose.longitude_deg) if known else None

@@ -14,6 +14,7 @@ from paani import messages as m
 from paani.logs.folder import KEEP, recordings
 from paani.logs.reader import Log, Record
 from paani.logs.repair import is_finished
+from paani.undecodable import UNDECODABLE
 
 DROPPED = re.compile(r"\bdropped=(\d+)")
 MISSING = re.compile(r"\bmissing=(\d+)")
@@ -128,7 +129,7 @@ class DirectionChanges:
         """One advisory; what cannot be decoded does not count."""
         try:
             direction = self._decoder.decode(data).direction
-        except (msgspec.MsgspecError, UnicodeDecodeError):
+        except UNDECODABLE:
             return
         self.changes += self._last not in {None, direction}
         self._last = direction
@@ -186,13 +187,13 @@ def _sum(pattern: re.Pattern[str], records: Iterable[dict[str, str]], topic: str
 def _versions(data: bytes | None) -> dict[str, str]:
     try:
         return msgspec.json.decode(data or b"{}", type=dict[str, str])
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except UNDECODABLE:
         return {}
 
 
 def _models(data: bytes | None) -> tuple[ModelInfo, ...]:
     try:
         manifest = msgspec.json.decode(data or b"{}", type=Manifest)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except UNDECODABLE:
         return ()
     return tuple(ModelInfo(model.name, model.sha256) for model in manifest.models)

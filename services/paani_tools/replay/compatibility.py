@@ -15,6 +15,7 @@ from paani.config.loading import with_present_names
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.logs.reader import CONFIG_FILE, Log
+from paani.undecodable import UNDECODABLE
 
 MODELS_FILE, VERSIONS_FILE = "models.json", "versions.json"
 WEIGHTS_PACKAGE = "paani_models"  # looked up, not imported: the contract depends on no model
@@ -69,7 +70,7 @@ def recorded_version(log: Log) -> str:
         return ""
     try:
         return msgspec.json.decode(data, type=_Versions).paani
-    except msgspec.MsgspecError:
+    except UNDECODABLE:
         return ""
 
 
@@ -84,7 +85,7 @@ def _config(log: Log, notes: list[str], *, force: bool) -> Config:
             raise UserError(f"{error} (of another version? --force leaves out what is unknown)") from error
     try:
         tree = with_present_names(msgspec.json.decode(data, type=dict[str, Any]))
-    except msgspec.MsgspecError as error:
+    except UNDECODABLE as error:
         raise UserError(f"{log.path}: {CONFIG_FILE}: {error}") from error
     dropped = list(_drop_unknown(tree, Config, ""))
     try:
@@ -115,7 +116,7 @@ def _changed_weights(log: Log) -> list[str]:
 def _checksums(data: bytes | None) -> dict[str, str]:
     try:
         manifest = msgspec.json.decode(data or b"{}", type=_Manifest)
-    except msgspec.MsgspecError:
+    except UNDECODABLE:
         return {}
     return {model.name: model.sha256 for model in manifest.models}
 

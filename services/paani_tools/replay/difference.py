@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from paani import messages as m
+from paani.undecodable import UNDECODABLE
 
 ABSENT = "(absent)"
 
@@ -49,7 +50,7 @@ def as_recorded(computed: bytes, recorded: bytes | None) -> bytes:
         return computed
     try:
         before, now = msgspec.json.decode(recorded), msgspec.json.decode(computed)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except UNDECODABLE:
         return computed
     return msgspec.json.encode(_without_added(before, now))
 
@@ -66,7 +67,7 @@ def differing_fields(recorded: bytes, computed: bytes) -> Iterator[tuple[str, An
     """(path, recorded value, computed value) of every leaf that differs; nothing where either is not JSON."""
     try:
         trees = msgspec.json.decode(recorded), msgspec.json.decode(computed)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except UNDECODABLE:
         return
     yield from _leaves("", *trees)
 

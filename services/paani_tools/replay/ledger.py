@@ -16,6 +16,7 @@ from paani import keys
 from paani import messages as m
 from paani.decider import Decider, Input
 from paani.logs.reader import Record
+from paani.undecodable import UNDECODABLE
 
 KEEP_US = 60_000_000
 FORGET_EVERY_US = 1_000_000
@@ -92,7 +93,7 @@ class Ledger:
                 else:
                     name = head.decode(data)
                     self._keep((topic, name.epoch, name.seq), _StoredMessage(data, log_us))
-            except (msgspec.MsgspecError, UnicodeDecodeError):
+            except UNDECODABLE:
                 self.malformed[topic] += 1
             while waiting and waiting[0][0] + LATE_US <= log_us:
                 yield self._recorded_step(*waiting.popleft())
@@ -148,7 +149,7 @@ class Ledger:
             return None, f"{message_id.topic} it had heard is not in the log"
         try:
             message = self._decoders[message_id.topic].decode(self._instead.get(name, held.data))
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        except UNDECODABLE as error:
             return None, f"{message_id.topic} it had heard does not decode: {error}"
         self._newest_heard[message_id.topic] = message_id.epoch, message_id.seq, message
         return message, ""

@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
+from paani.undecodable import UNDECODABLE
 from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import LATE_US, NO_PAYLOADS, Ledger, MessageId, RecordedStep
 
@@ -126,7 +127,7 @@ class Recomputation:
         if step.state:
             try:
                 recorded = self._states.decode(step.state)
-            except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            except UNDECODABLE as error:
                 self._lose(SkipReason.STATE_UNREADABLE, None)
                 return RecomputedStep(given, skip=SkipReason.STATE_UNREADABLE, detail=str(error))
             if self._state is not None and not self._evolve:

@@ -23,6 +23,7 @@ from paani.config import Config, encode_config
 from paani.errors import UserError
 from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log, Record
+from paani.undecodable import UNDECODABLE
 from paani_tools.replay.shift import TimeShift
 
 # Whoever hears these may move a boat or change how it is guided.
@@ -168,7 +169,7 @@ class Player:
         if isinstance(item, Record):
             publisher.forward(shift.shift_message(item.data))
         elif isinstance(publisher, PicturePublisher):
-            with contextlib.suppress(msgspec.MsgspecError):  # of another version
+            with contextlib.suppress(*UNDECODABLE):  # of another version
                 publisher.forward_picture(self._header.decode(shift.shift_message(item.header)), item.data)
         self._messages += 1
 

@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
+from paani.undecodable import UNDECODABLE
 from paani_tools.replay.check import StepCallback
 from paani_tools.replay.decision_text import decision_text, reason_text
 from paani_tools.replay.difference import differing_fields
@@ -93,7 +94,7 @@ class _Changes:
         decode = self._decoders[topic].decode
         try:
             before, now = decode(recorded), decode(computed)
-        except msgspec.MsgspecError:
+        except UNDECODABLE:
             self.skipped += 1
             return
         if decision_text(before) == decision_text(now):

@@ -10,6 +10,7 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Shadow
 from paani.operator_key import ensure_operator_key
+from paani.undecodable import UNDECODABLE
 
 TIMEOUT_S = 5.0
 
@@ -58,5 +59,5 @@ class Client:
             if status in {http.client.OK, http.client.CONFLICT}:
                 return msgspec.json.decode(body, type=Shadow)
             raise UserError(f"{self._origin}: {msgspec.json.decode(body, type=Refused).error}")
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        except UNDECODABLE as error:
             raise UserError(f"{self._origin}: answers {status}, but is no dashboard") from error

@@ -13,6 +13,7 @@ from paani.config import Config, with_settings
 from paani.config.tuning import TUNABLE
 from paani.errors import UserError
 from paani.messages import Change, Shadow, TuningRefusal
+from paani.undecodable import UNDECODABLE
 from paani_tools.tune.client import Client
 from paani_tools.tune.shadow_text import refusal_text, status_text
 
@@ -54,7 +55,7 @@ def changes_from(settings: list[str], config: Config) -> tuple[Change, ...]:
     with_settings(config, settings)
     try:
         return msgspec.convert(msgspec.to_builtins(changes), tuple[Change, ...])
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         raise UserError(f"{settings[0]}: {error}") from error
 
 

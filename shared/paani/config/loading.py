@@ -13,6 +13,7 @@ import msgspec
 from paani.config.profiles import PROFILES
 from paani.config.tree import Config
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 
 ENV_PREFIX = "PAANI_"
 NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
@@ -38,17 +39,17 @@ def load_config(
     """
     layers: list[tuple[str, dict[str, object]]] = []
     if file is not None:
-        layers.append((str(file), with_present_names(_read_settings(file))))
-    layers.append(("environment", with_present_names(_from_environ(environ or {}))))
-    for text in sets:
-        layers.append((f"--set {text}", with_present_names(_from_set(text))))
+        layers.append(_layer(str(file), _read_settings(file)))
+    layers.append(_layer("environment", _from_environ(environ or {})))
+    layers += [_layer(f"--set {text}", _from_set(text)) for text in sets]
 
-    chosen = profile
-    if chosen is None:
-        for _, layer in layers:
-            chosen = str(layer.get("profile", chosen or "paani"))
+    chosen, where = "paani" if profile is None else profile, ""
+    if profile is None:
+        for origin, layer in layers:
+            if "profile" in layer:
+                chosen, where = str(layer["profile"]), f"{origin}: "
     if chosen not in PROFILES:
-        raise UserError(f"profile: unknown profile '{chosen}' (one of {', '.join(PROFILES)})")
+        raise UserError(f"{where}profile: unknown profile '{chosen[:60]}' (one of {', '.join(PROFILES)})")
 
     tree: dict[str, object] = {}
     _merge(tree, PROFILES[chosen])
@@ -77,7 +78,7 @@ def decode_config(data: bytes) -> Config:
         _merge(tree, PROFILES.get(profile, {}) if isinstance(profile, str) else {})
         _merge(tree, recorded)
         return msgspec.convert(tree, Config)
-    except msgspec.MsgspecError as error:
+    except UNDECODABLE as error:
         raise UserError(f"configuration: {error}") from error
 
 
@@ -106,10 +107,18 @@ def with_present_names(settings: Mapping[str, object]) -> dict[str, object]:
     return tree
 
 
+def _layer(origin: str, settings: Mapping[str, object]) -> tuple[str, dict[str, object]]:
+    """Where settings come from, and the settings under their present names. Raises UserError for a bottomless tree."""
+    try:
+        return origin, with_present_names(settings)
+    except RecursionError as error:
+        raise UserError(f"{origin}: settings are not nested that deep") from error
+
+
 def _decode(tree: dict[str, object], origin: str) -> Config:
     try:
         return msgspec.convert(tree, Config, strict=False)
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         raise UserError(f"{origin}: {_with_path(str(error))}") from error
 
 
@@ -141,7 +150,7 @@ def _read_settings(file: Path) -> dict[str, object]:
         return msgspec.json.decode(text, type=dict[str, object]) if file.suffix == ".json" else tomllib.loads(text)
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"{file}: {error}") from error
 
 
@@ -164,7 +173,7 @@ def _from_set(text: str) -> dict[str, object]:
 def _value(text: str) -> object:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except UNDECODABLE:
         return text
 
 

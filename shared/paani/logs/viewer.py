@@ -11,6 +11,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.logs import protobuf as pb
+from paani.undecodable import UNDECODABLE
 
 GPS, POSE, ANNOTATIONS, LINES = "viewer/gps", "viewer/pose", "viewer/annotations", "viewer/log"
 CHANNELS = {GPS: pb.LOCATION_FIX, POSE: pb.POSE_IN_FRAME, ANNOTATIONS: pb.IMAGE_ANNOTATIONS, LINES: pb.LOG}
@@ -66,7 +67,7 @@ class Viewer:
         decoder, view = self._views[topic]
         try:
             message = decoder.decode(data)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        except UNDECODABLE:
             return []
         return view(message)
 

@@ -19,6 +19,7 @@ from paani.logs import protobuf, viewer
 from paani.logs.layout import FORMAT, PROFILE
 from paani.logs.schema import json_schema
 from paani.messages.header import Count, Stamp
+from paani.undecodable import UNDECODABLE
 
 CHUNK_BYTES = 256 * 1024
 HEADER, UNREADABLE = "/header", "/unreadable"
@@ -81,7 +82,7 @@ class LogWriter:
             return
         try:
             picture = viewer.picture(self._header.decode(attachment), data)
-        except msgspec.MsgspecError:
+        except UNDECODABLE:
             self._add(self._unreadable(topic), log_us, sent_us, seq, attachment + data)
             return
         self._add(self._channels[topic.name], log_us, sent_us, seq, picture)
@@ -158,7 +159,7 @@ def read_head(data: bytes) -> Head | None:
     """The header of a message, or None where it cannot be read."""
     try:
         return _HEAD.decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+    except UNDECODABLE:
         return None
 
 

@@ -13,6 +13,7 @@ from typing import Any, Final
 import msgspec
 
 from paani.microcontroller.payloads import has_valid_crc
+from paani.undecodable import UNDECODABLE
 
 MAX_MESSAGE_BYTES = 256  # the sketch's library takes no longer ones
 MAX_DEPTH = 4  # a message holds parameters, an error its code and text
@@ -97,7 +98,7 @@ class MessageScanner:
     def _read(self, data: bytes) -> RpcMessage | None:
         try:
             fields = msgspec.msgpack.decode(data)
-        except (msgspec.MsgspecError, ValueError, OverflowError):
+        except UNDECODABLE:
             return None
         message = _message_of(fields)
         if message is not None and not all(has_valid_crc(payload) for payload in _bins(fields)):

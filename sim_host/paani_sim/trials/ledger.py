@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import TrialResult
@@ -142,7 +143,7 @@ def read_ledger(path: Path) -> list[LedgerEntry]:
     for number, line in enumerate(lines, 1):
         try:
             found.append(msgspec.json.decode(line, type=LedgerEntry))
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        except UNDECODABLE as error:
             raise UserError(f"--ledger {path}: line {number} is no entry: {error}") from error
     return found
 

@@ -18,6 +18,7 @@ import msgspec
 
 from paani.cluster import Workers
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import indented_json, write_whole
 from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.result import TrialResult
@@ -196,7 +197,7 @@ def read_stored_result(path: Path) -> StoredResult | None:
     """Read a stored result; None if there is none or it cannot be read."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=StoredResult)
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+    except UNREADABLE:
         return None
 
 

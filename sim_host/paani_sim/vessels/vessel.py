@@ -10,6 +10,7 @@ import msgspec
 
 from paani.config.section import Fraction, NonNegative, Positive, Section
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 
 _FOLDER = Path(__file__).parent
 VESSELS = tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
@@ -107,9 +108,7 @@ def load_vessel(name: str) -> Vessel:
         return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), Vessel)
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{file}: {error}") from error
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         text, _, path = str(error).partition(" - at ")
         field = path.strip("`").removeprefix("$").lstrip(".")
         raise UserError(f"{file}: {field}: {text}" if field else f"{file}: {text}") from error

@@ -12,6 +12,7 @@ import msgspec
 
 from paani.config.section import Fraction, Section
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 from paani_sim.worlds.encounter_paths import Encounter
 from paani_sim.worlds.faults import FaultKind
 from paani_sim.worlds.world import Behaviour
@@ -161,5 +162,5 @@ def read_scenario_file(path: Path) -> ScenarioFile:
         return msgspec.convert(tomllib.loads(data.decode("utf-8")), ScenarioFile)
     except OSError as error:
         raise UserError(f"scenario {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError, RecursionError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"scenario {path}: {error}") from error

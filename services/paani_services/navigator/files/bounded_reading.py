@@ -9,6 +9,7 @@ from typing import TypeVar
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 
 MAX_BYTES = 32 << 20  # a route of 100,000 points with names and times is smaller
 
@@ -30,7 +31,7 @@ def read_toml(path: Path, where: str, kind: type[T]) -> T:
     data = read_bytes(path, where)
     try:
         return msgspec.convert(tomllib.loads(data.decode()), kind)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError, RecursionError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"{where}: {one_line(error)}") from error
 
 

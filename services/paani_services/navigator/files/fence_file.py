@@ -12,6 +12,7 @@ import msgspec
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
+from paani.undecodable import UNDECODABLE
 from paani_services.navigator.avoidance.fence import do_segments_meet
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.geojson import (
@@ -83,7 +84,7 @@ def _areas_of_geometry(geometry: Geometry, at: str) -> list[tuple[Keep, tuple[Fi
         return []
     try:
         keep = msgspec.convert(geometry.properties.get("keep"), Keep)
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         raise UserError(f'{geometry.where}: properties.keep of a Polygon is "in" or "out"') from error
     rings = decode_coordinates(geometry, tuple[tuple[Position, ...], ...])
     if not rings or (keep is Keep.OUT and len(rings) > 1):

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 from paani.whole_file import indented_json
 from paani_services.navigator.files.bounded_reading import one_line, read_bytes
 from paani_services.navigator.files.map_frame import FilePoint, LatLon
@@ -74,7 +75,7 @@ def read_geometries(path: Path, where: str) -> list[Geometry]:
     data = read_bytes(path, where)
     try:
         root = msgspec.json.decode(data, type=_Node)
-    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"{where}: {one_line(error)}") from error
     if root.type == "FeatureCollection":
         return [
@@ -89,7 +90,7 @@ def decode_coordinates(geometry: Geometry, kind: type[T]) -> T:
     """The geometry's coordinates as this type. Raises UserError."""
     try:
         return msgspec.json.decode(geometry.coordinates, type=kind)
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except UNDECODABLE as error:
         raise UserError(f"{geometry.where}: coordinates: {one_line(error)}") from error
 
 

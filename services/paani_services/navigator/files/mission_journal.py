@@ -16,6 +16,7 @@ import msgspec
 from paani.bus import Latest
 from paani.messages import Arming, Mission
 from paani.runtime import write_private
+from paani.undecodable import UNREADABLE
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 
 LOG = logging.getLogger(__name__)
@@ -77,5 +78,5 @@ def read_entry(path: Path) -> JournalEntry | None:
     """The entry on disk; None where there is none, or none that can be read."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=JournalEntry)
-    except (OSError, msgspec.MsgspecError):
+    except UNREADABLE:
         return None

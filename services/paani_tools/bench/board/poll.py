@@ -13,6 +13,7 @@ import msgspec
 
 from paani.board_status import STATUS_PATH, BoardStatus
 from paani.clock import Clock
+from paani.undecodable import UNDECODABLE
 from paani_tools.bench.board.host_counters import HostSample
 
 PERIOD_S = 1.0  # U10
@@ -84,5 +85,5 @@ async def _fetch_status(fetch: Fetch) -> tuple[BoardStatus | None, str]:
         return None, str(error.reason)
     except (OSError, http.client.HTTPException) as error:
         return None, str(error) or type(error).__name__
-    except (msgspec.MsgspecError, ValueError) as error:
+    except UNDECODABLE as error:
         return None, f"not a status: {error}"

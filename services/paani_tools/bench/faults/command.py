@@ -13,6 +13,7 @@ import msgspec
 
 from paani.errors import UserError
 from paani.option_paths import output_file
+from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 from paani_tools.bench.faults.drives import driving, faults_of, missing
 from paani_tools.bench.faults.fault import Drive, Fault
@@ -69,7 +70,7 @@ def read_runs(file: Path) -> list[FaultRun]:
         return []
     try:
         return msgspec.json.decode(file.read_bytes(), type=list[FaultRun])
-    except (OSError, msgspec.MsgspecError) as error:
+    except UNREADABLE as error:
         raise UserError(f"--out {file}: {error}") from error
 
 

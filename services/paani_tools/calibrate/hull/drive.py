@@ -16,6 +16,7 @@ from paani.arrays import F64
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.messages import GpsFix, ImuSample, Odometry, ThrustApplied, ZeroCause
+from paani.undecodable import UNDECODABLE
 from paani_tools.progress import Progress
 
 STEP_S = 0.05  # of the simulation below: a sixth of the shortest time constant of the hulls that ship, or less
@@ -53,7 +54,7 @@ def read_drive(path: Path) -> Drive:
     with Progress("reading") as bar:
         for record in log.records(found):
             bar.at((record.log_us - log.start_us) / span_us)
-            with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+            with contextlib.suppress(*UNDECODABLE):
                 found[record.topic].append(decoders[record.topic].decode(record.data))
     for name, messages in found.items():
         if not messages:

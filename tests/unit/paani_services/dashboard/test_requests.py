@@ -71,6 +71,11 @@ def test_a_name_that_is_not_ours_is_refused(host: str, ours: bool) -> None:
     assert is_own_host(host, "otter.lan") is ours
 
 
+@pytest.mark.parametrize("host", ["[", "[x]", "[::1", "a]", "[127.0.0.1].x", "\x00"])
+def test_a_name_that_is_none_is_refused(host: str) -> None:
+    assert not is_own_host(host, "otter.lan")
+
+
 def test_same_origin_is_exact() -> None:
     assert is_same_origin("http://127.0.0.1:8043", "127.0.0.1:8043")
     assert not is_same_origin("http://127.0.0.1:8044", "127.0.0.1:8043")
