@@ -19,11 +19,11 @@ from tqdm import tqdm
 
 from paani import keys
 from paani import messages as m
+from paani.boxes import iou
 from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
 from paani.statistics.figure_table import FigureTable, table_text
-from paani_services.advisor.association import iou
 from paani_services.perception.pipeline import Perceiver
 from paani_sim.eye.camera import BoatPose, Camera
 from paani_sim.eye.renderer import Eye

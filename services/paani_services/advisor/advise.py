@@ -6,8 +6,10 @@ from paani.config import Config
 from paani.geometry import clip
 from paani.messages import (
     Advisory,
+    Candidate,
     ChangedBy,
     Counterfactual,
+    Detection,
     Direction,
     Evidence,
     Odometry,
@@ -16,6 +18,7 @@ from paani.messages import (
     Tracks,
     UnusableCause,
 )
+from paani_services.advisor.candidates import candidate_obstacles
 from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.frame_facts import FrameFacts, PolicyState, frame_facts, side_block_risk
@@ -24,7 +27,7 @@ from paani_services.advisor.policy import Decision, advised_purpose, decide, fra
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
     TrackerState,
-    is_valid_detection,
+    is_valid_box,
     remember_attitude,
     tracks_message,
     update_tracks,
@@ -97,7 +100,10 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
     policy = state.policy
     if evidence.usable and fits:
         water = {lane: lane_water(evidence, lane, config) for lane in LANES}
-        obstacles = obstacles_from_tracks(tracker, config, evidence.width_px / max(1, evidence.height_px), water)
+        obstacles = obstacles_from_tracks(
+            tracker, config, evidence.width_px / max(1, evidence.height_px), water, evidence.water_edge
+        )
+        obstacles += candidate_obstacles(evidence, tracker, config)
         facts = frame_facts(state.policy, water, obstacles, config)
         policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
         decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
@@ -111,11 +117,14 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
 def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decision:
     """The decision with who is ahead and how fast the boat may go; the same decision where nobody is near."""
     limit_mps, ahead = speed_limit_mps(facts.obstacles, config), facts.lanes["center"].people
+    people = [facts.obstacles[i] for i in ahead if facts.obstacles[i].candidate is None]
+    candidates = tuple(n for i in ahead if (n := facts.obstacles[i].candidate) is not None)
     distance_m = nearest_ahead_m(facts.obstacles, ahead)
     return msgspec.structs.replace(
         decision,
         speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
-        people_ahead=tuple(facts.obstacles[i].id for i in ahead) if config.advisor.people.use else msgspec.UNSET,
+        people_ahead=tuple(person.id for person in people) if config.advisor.people.use else msgspec.UNSET,
+        candidates_ahead=candidates or msgspec.UNSET,
         person_distance_m=msgspec.UNSET if distance_m is None else distance_m,
     )
 
@@ -123,9 +132,10 @@ def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decisi
 def is_well_formed(evidence: Evidence) -> bool:
     """Whether every fraction lies in [0, 1] and every box has an area. NaN fails each comparison."""
     lanes = (evidence.left, evidence.center, evidence.right)
+    boxed: tuple[Detection | Candidate, ...] = (*evidence.detections, *(evidence.candidates or ()))
     return all(
         0.0 <= value <= 1.0 for lane in lanes for value in (lane.non_water, lane.uncertainty, lane.clear_width)
-    ) and all(map(is_valid_detection, evidence.detections))
+    ) and all(map(is_valid_box, boxed))
 
 
 def _decision_at(state: AdvisorState, now_us: int, config: Config) -> Decision:
@@ -166,4 +176,5 @@ def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, confi
         speed_limit_mps=decision.speed_limit_mps,
         people_ahead=decision.people_ahead,
         person_distance_m=decision.person_distance_m,
+        candidates_ahead=decision.candidates_ahead,
     )

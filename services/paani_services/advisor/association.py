@@ -7,6 +7,7 @@ with the last box of each track, and with that box rotated to where it must be n
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from paani.boxes import iou
 from paani.messages import BoxXyxy
 
 
@@ -53,20 +54,3 @@ def merge_assignments(by_place: Assignment, by_prediction: Assignment) -> Assign
     taken = set(by_prediction.track_of.values())
     left = {d: t for d, t in by_place.track_of.items() if d not in by_prediction.track_of and t not in taken}
     return Assignment(by_prediction.track_of | left, by_prediction.ambiguous | left.keys())
-
-
-def iou(a: BoxXyxy, b: BoxXyxy) -> float:
-    """Intersection over union of two valid boxes."""
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    if width <= 0.0:
-        return 0.0
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    if height <= 0.0:
-        return 0.0
-    both = width * height
-    return both / (area(a) + area(b) - both)
-
-
-def area(box: BoxXyxy) -> float:
-    """Area of a box as a fraction of the picture."""
-    return (box[2] - box[0]) * (box[3] - box[1])

@@ -241,8 +241,10 @@ def _subsets(pieces: int, size: int) -> Subsets:
 
 def _removal(facts: FrameFacts, pieces: Pieces, taken: Sequence[int], direction: Direction) -> Removal:
     tracks = len(pieces.obstacles)
+    obstacles = [facts.obstacles[pieces.obstacles[i]] for i in taken if i < tracks]
     return Removal(
         direction=direction,
-        track_ids=tuple(facts.obstacles[pieces.obstacles[i]].id for i in taken if i < tracks),
+        track_ids=tuple(o.id for o in obstacles if o.candidate is None),
+        candidates=tuple(o.candidate for o in obstacles if o.candidate is not None) or msgspec.UNSET,
         water=tuple(Lane(pieces.water[i - tracks]) for i in taken if i >= tracks),
     )

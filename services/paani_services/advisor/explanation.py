@@ -44,6 +44,7 @@ UNUSABLE_TEXT = {
     UnusableCause.UNFIT: "is not fit to be judged",
     UnusableCause.STALE: "was too old to look at",
 }
+CANDIDATE_TEXT = "something that may be a person"
 MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
 ALTERNATIVE_TEXT = {
     Direction.STRAIGHT: "go STRAIGHT",
@@ -67,11 +68,16 @@ def explain_advisory(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
 
 
 def _people_text(advisory: Advisory) -> str:
-    """What was decided about the people in the way ahead, as a sentence of its own; empty where there is none."""
-    if not advisory.people_ahead or advisory.reason in INPUT_FAULTS:
+    """What was decided about who is, or may be, in the way ahead, as a sentence; empty where there is nobody."""
+    if advisory.reason in INPUT_FAULTS:
         return ""
-    count = len(advisory.people_ahead)
-    who = "swimmer ahead" if count == 1 else f"{count} swimmers ahead"
+    if advisory.people_ahead:
+        count = len(advisory.people_ahead)
+        who = "swimmer ahead" if count == 1 else f"{count} swimmers ahead"
+    elif advisory.candidates_ahead:
+        who = f"{CANDIDATE_TEXT} ahead"
+    else:
+        return ""
     if not isinstance(advisory.person_distance_m, msgspec.UnsetType):
         who += f" at about {advisory.person_distance_m:.0f} m"
     if advisory.direction is Direction.STOP:
@@ -106,6 +112,8 @@ def _removal_text(removal: Removal, advisory: Advisory, tracks: tuple[Track, ...
             for i in removal.track_ids
         ]
         parts.append(f"without {_join_names(names)}")
+    if removal.candidates:
+        parts.append(f"without what may be {'a person' if len(removal.candidates) == 1 else 'people'}")
     if removal.water:
         parts.append(f"with clear water {_join_names([WATER_TEXT[lane] for lane in removal.water])}")
     condition = " and ".join(parts)
@@ -122,6 +130,10 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     by = f" by {names}" if names else ""
     centre = f"centre risk {center.risk:.2f} (limit {_limit(center, advisory.center_block_risk):.2f})"
     centre += f" with {names} in it" if names else ""
+    someone = bool(advisory.people_ahead or advisory.candidates_ahead)
+    if someone and center.risk < center.limit:
+        who = "somebody is" if advisory.people_ahead else f"{CANDIDATE_TEXT} is"
+        centre = f"{who} in the way ahead or beside it"
     limits = [_limit(side, advisory.side_block_risk) for side in (left, right)]
     if limits[0] == limits[1]:
         sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {limits[0]:.2f})"
@@ -146,6 +158,8 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"the way ahead is clear, {centre}"
         case Reason.TURN_RETAINED:
             return f"keeping the turn until the way ahead stays clear, {centre}"
+        case Reason.CENTER_OCCUPIED if someone and not center.occupied:
+            return f"{centre}; {sides}"
         case Reason.CENTER_OCCUPIED if not names and not center.occupied:
             return f"the way ahead shows no open water; {sides}"
         case Reason.CENTER_OCCUPIED:

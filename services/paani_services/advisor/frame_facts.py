@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import msgspec
 
+from paani.boxes import area
 from paani.config import Config, PolicyConfig
 from paani.messages import SIDE_OF, BoxXyxy, Direction, LaneEvidence
-from paani_services.advisor.association import area
 from paani_services.advisor.people import people_in_lane
 from paani_services.advisor.risk import LANES, LaneTerms, Obstacle, lane_span, lane_terms, overlap, shared_width
 
@@ -158,12 +158,16 @@ def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:
     """Whether the obstacle is a vessel whose part inside the centre corridor is large (J7).
 
     Inside its core where the metric planner acts, because a vessel in an edge of the corridor leaves a way beside it.
+    Without a calibration nothing says how far off it is: one that stands in the middle is ahead if it is tall enough.
     """
     if not obstacle.is_vessel or obstacle.presence < MIN_OCCUPYING_PRESENCE:
         return False
     policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
     if config.is_planner_active:
         span = (policy.core_left, policy.core_right)
+    tall, box = policy.center_vessel_height, obstacle.box
+    if tall and not config.calibration.valid and span[0] < (box[0] + box[2]) / 2.0 < span[1]:
+        return box[3] - box[1] >= tall or area(box) * overlap(box, span) >= policy.center_vessel_area
     return 0.0 < area(obstacle.box) * overlap(obstacle.box, span) >= policy.center_vessel_area
 
 

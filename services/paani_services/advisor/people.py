@@ -1,4 +1,4 @@
-"""People in the picture: who blocks which corridor, and how fast the boat may go while somebody is near. Pure.
+"""Who blocks which corridor, people and what may be one, and how fast the boat may go near them. Pure.
 
 A person is no obstacle to be weighed: one sighting blocks a corridor, whatever its risk is, for as long as the track is
 held. Distances are those of the box's foot where the camera is calibrated; without a calibration everybody is near.
@@ -13,24 +13,35 @@ MIN_GLIMPSE_PRESENCE = 0.5  # presence below which a person seen once, and no mo
 
 
 def people_in_lane(lane: str, obstacles: tuple[Obstacle, ...], config: Config) -> tuple[int, ...]:
-    """Indices of the people who block the lane: in it, about to drift into it, or so close that nothing is passed."""
+    """Indices of the people who block the lane: in it, about to drift into it, or so close that nothing is passed.
+
+    What may be a person blocks as well, at any size, but is not taken to drift.
+    """
     if not config.advisor.people.use:
         return ()
     start, end = lane_span(lane, config.perception.corridors)
     drift = config.advisor.people.drift_frac if lane == "center" else 0.0
-    span = (start - drift, end + drift)
+    beside = (start - drift, end + drift)
     return tuple(
         i
         for i, person in enumerate(obstacles)
-        if counts(person) and (is_close(person, config) or _is_in(person, lane, span, config))
+        if counts(person)
+        and (
+            is_close(person, config)
+            or _is_in(person, lane, beside if person.candidate is None else (start, end), config)
+        )
     )
 
 
 def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | None:
     """The speed that must not be exceeded; None while nobody is within `slow_m`."""
     people = config.advisor.people
+    center = lane_span("center", config.perception.corridors)
     is_near = people.use and any(
-        counts(person) and (person.distance_m is None or person.distance_m <= people.slow_m) for person in obstacles
+        counts(person)
+        and (person.candidate is None or shared_width(person.box, center) > 0.0)
+        and (person.distance_m is None or person.distance_m <= people.slow_m)
+        for person in obstacles
     )
     return people.slow_mps if is_near else None
 
@@ -42,13 +53,24 @@ def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> fl
 
 
 def counts(obstacle: Obstacle) -> bool:
-    """Whether the obstacle is a person seen now, seen more than once, or glimpsed a moment ago."""
-    return obstacle.is_person and (obstacle.is_confirmed or obstacle.presence >= MIN_GLIMPSE_PRESENCE)
+    """Whether the obstacle may be in the way as a person: seen now, seen more than once, or glimpsed a moment ago.
+
+    Somebody ashore or aboard is not in the way; a candidate is of the present picture.
+    """
+    if obstacle.candidate is not None:
+        return True
+    return (
+        obstacle.is_person
+        and not obstacle.is_ashore
+        and (obstacle.is_confirmed or obstacle.presence >= MIN_GLIMPSE_PRESENCE)
+    )
 
 
 def is_close(person: Obstacle, config: Config) -> bool:
     """Whether the boat stops for the person: within `stop_m`, or a box in the way of `stop_height` and more."""
     people = config.advisor.people
+    if person.candidate is not None:
+        return False
     if shared_width(person.box, lane_span("center", config.perception.corridors)) <= 0.0:
         return False
     if person.distance_m is not None:

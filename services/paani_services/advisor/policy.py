@@ -71,6 +71,7 @@ class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"})
     speed_limit_mps: float | msgspec.UnsetType = msgspec.UNSET
     people_ahead: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
     person_distance_m: float | msgspec.UnsetType = msgspec.UNSET
+    candidates_ahead: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 def frame_components(facts: FrameFacts, evidence: Selection, config: Config) -> dict[str, LaneComponents]:

@@ -27,6 +27,8 @@ Value = float | F64
 Operands = tuple[tuple[int, float], ...]  # of a noisy-OR: index of an obstacle, and its value
 NEAR_FROM, NEAR_SPAN = 0.30, 0.70  # of the picture: a bottom at 0.30 is far, at 1.0 as near as can be
 TALL_SPAN = 0.50  # of the picture: a box of half its height, or more, is as tall as counts
+ASHORE_ROWS, MASK_ROWS = 3, 64  # of the mask: its edge is seldom off by more than two
+ASHORE_HEIGHT = 0.20  # of the picture: an adult 8 m away through a lens of 70 degrees; who is nearer is in the way
 NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # weights of nearness and height in the severity; the paper gives none
 
 
@@ -34,7 +36,8 @@ class Obstacle(msgspec.Struct, frozen=True):
     """An accepted track as the policy weighs it; `presence` decays from 1 while it is not seen.
 
     is_danger: it is low and large in the picture (G5). exempt_lanes: lanes it does not occupy, because the mask shows
-    clear water across most of them. distance_m: of its foot; None without a calibration.
+    clear water across most of them. distance_m: of its foot; None without a calibration. is_ashore: it stands beyond
+    the water's edge. candidate: of what is no track and may be a person, its number in the evidence, from 1.
     """
 
     id: int
@@ -48,6 +51,8 @@ class Obstacle(msgspec.Struct, frozen=True):
     is_person: bool = False
     is_confirmed: bool = True
     distance_m: float | None = None
+    is_ashore: bool = False
+    candidate: int | None = None
 
 
 class LaneTerms(NamedTuple):
@@ -175,12 +180,17 @@ def corridor_risk(non_water: Value, obstacle: Value, urgency: Value, uncertainty
 
 
 def obstacles_from_tracks(
-    state: TrackerState, config: Config, aspect: float, water: dict[str, LaneEvidence]
+    state: TrackerState,
+    config: Config,
+    aspect: float,
+    water: dict[str, LaneEvidence],
+    water_edge: tuple[float, ...] = (),
 ) -> tuple[Obstacle, ...]:
     """Obstacles: accepted tracks, and people at first sight, that reach below the top of the corridors.
 
-    aspect: width of the picture over its height. water: of each lane. The box of a quay that runs obliquely reaches its
-    lower edge on one side only: where the metric planner acts, a quay occupies no lane that the mask shows clear.
+    aspect: width of the picture over its height. water: of each lane. water_edge: of the evidence. The box of a quay
+    that runs obliquely reaches its lower edge on one side only: where the metric planner acts, a quay occupies no lane
+    that the mask shows clear.
     """
     settings, sees_people = config.advisor.tracker, config.advisor.people.use
     open_lanes: tuple[str, ...] = ()
@@ -204,11 +214,25 @@ def obstacles_from_tracks(
             is_person=track.label == "person",
             is_confirmed=is_confirmed(track, settings),
             distance_m=foot_range_m(track.box, aspect, config.calibration),
+            is_ashore=sees_people and not track.held and stands_ashore(track.box, water_edge),
         )
         for track in state.tracks
         if track.box[3] > config.perception.corridors.top
         and (is_accepted(track, settings) or (sees_people and track.label == "person"))
     )
+
+
+def stands_ashore(box: BoxXyxy, water_edge: tuple[float, ...]) -> bool:
+    """Whether what is boxed stands on land or aboard: it ends above the water's edge, there and on both sides.
+
+    The water ends below the box by `ASHORE_ROWS` of the mask and more, across the box and as far again on each side;
+    so somebody in the water before a shore, or beside it, is not ashore. Nobody of `ASHORE_HEIGHT` and more is.
+    """
+    if not water_edge or box[3] - box[1] >= ASHORE_HEIGHT:
+        return False
+    columns, width = len(water_edge), box[2] - box[0]
+    first, last = max(0, int((box[0] - width) * columns)), min(columns, math.ceil((box[2] + width) * columns))
+    return min(water_edge[first:last], default=0.0) >= box[3] + ASHORE_ROWS / MASK_ROWS
 
 
 def lane_water(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:
@@ -227,7 +251,7 @@ def lane_terms(water: LaneEvidence, obstacles: tuple[Obstacle, ...], lane: str, 
         water=water,
         obstacles=tuple((i, o.severity * share * o.presence) for i, o, share in inside),
         urgencies=tuple((i, o.urgency * share) for i, o, share in inside if o.urgency > 0.0),
-        track_ids=tuple(o.id for _, o, _ in inside),
+        track_ids=tuple(o.id for _, o, _ in inside if o.candidate is None),
     )
 
 

@@ -13,10 +13,12 @@ from collections.abc import Iterator
 import msgspec
 
 from paani import portable
+from paani.boxes import area
 from paani.config import AdvisorConfig, Config, TrackerConfig
 from paani.geometry import clip
 from paani.messages import (
     BoxXyxy,
+    Candidate,
     Detection,
     Evidence,
     Hazard,
@@ -28,7 +30,7 @@ from paani.messages import (
     Track,
     Tracks,
 )
-from paani_services.advisor.association import Assignment, area, assign_boxes, merge_assignments
+from paani_services.advisor.association import Assignment, assign_boxes, merge_assignments
 from paani_services.advisor.motion import (
     MotionHistory,
     SizeMeasurement,
@@ -136,7 +138,7 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
     settings = config.advisor.tracker
     state = _advance_clock(state, evidence)
     detections = evidence.detections if evidence.usable else ()
-    valid = sorted((d for d in detections if is_valid_detection(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
+    valid = sorted((d for d in detections if is_valid_box(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
     frame = _Frame(
         state.at_us,
         camera_view(state.attitudes, evidence, config),
@@ -179,7 +181,7 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
         tracks=tuple(alive[i] for i in sorted(newest[: settings.max_tracks])),
         next_id=next(new_ids),
         epoch_changed=False,
-        malformed=state.malformed + sum(not is_valid_detection(d) for d in detections),
+        malformed=state.malformed + sum(not is_valid_box(d) for d in detections),
         rotation=frame.view.use,
     )
 
@@ -212,8 +214,8 @@ def _assign_detections(
     return by_place, merge_assignments(by_place, assign_boxes(predicted, boxes, min_iou))
 
 
-def is_valid_detection(detection: Detection) -> bool:
-    """Whether the box is finite, inside the picture and not empty. NaN fails each comparison."""
+def is_valid_box(detection: Detection | Candidate) -> bool:
+    """Whether its box is finite, inside the picture and not empty. NaN fails each comparison."""
     x1, y1, x2, y2 = detection.box_xyxy
     inside = all(0.0 <= value <= 1.0 for value in (x1, y1, x2, y2, detection.confidence))
     return inside and x2 - x1 >= MIN_SIDE and y2 - y1 >= MIN_SIDE

@@ -1,5 +1,6 @@
 """Detector output to boxes in the picture: confidence threshold, then non-maximum suppression (C4-C10). Pure."""
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,6 +52,19 @@ def decode_boxes(
         )
         for i in kept
     )
+
+
+def decode_people(
+    output: F32, transform: LetterboxTransform, config: DetectorConfig, above: float, classes: tuple[str, ...] = LABELS
+) -> tuple[Detection, ...]:
+    """People by their own score alone, whatever else scores higher in the same place, above a threshold of their own.
+
+    Otherwise as `decode_boxes`; empty where the detector has no class person.
+    """
+    if Label.PERSON not in classes:
+        return ()
+    person = output[:, [0, 1, 2, 3, 4 + classes.index(Label.PERSON)]]
+    return decode_boxes(person, transform, msgspec.structs.replace(config, person_confidence=above), (Label.PERSON,))
 
 
 def to_picture_coordinates(centred: F32, transform: LetterboxTransform) -> NDArray[np.float64]:

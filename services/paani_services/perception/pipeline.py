@@ -10,6 +10,7 @@ import numpy as np
 from paani.arrays import F32, U8
 from paani.config import PerceptionConfig
 from paani.messages import (
+    Candidate,
     Detection,
     Evidence,
     InferenceTiming,
@@ -19,7 +20,8 @@ from paani.messages import (
     SegmentationSource,
     UnusableCause,
 )
-from paani_services.perception.box_decoding import decode_boxes
+from paani_services.perception.box_decoding import decode_boxes, decode_people
+from paani_services.perception.candidates import find_candidates
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
 from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
@@ -30,19 +32,28 @@ from paani_services.perception.picture_decoding import decode_picture
 from paani_services.perception.preprocessing import letterbox_picture, lookup_tables_for, stretch_picture
 from paani_services.perception.roll_compensation import level_mask, limit_roll_rad
 
-TimedDetections = tuple[tuple[Detection, ...], float]  # detections, and the time they took [ms]
 NO_SEGMENTER = "none"  # value of `perception.segmenter` for colour segmentation alone
 MIN_SLOWER_RATIO = 1.2  # of two run times; networks that take about as long keep their order, whatever one run says
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
+class Found(NamedTuple):
+    """Detections, boxes that may be people by a lower threshold, and the time both took [ms]."""
+
+    detections: tuple[Detection, ...]
+    people: tuple[Detection, ...]
+    duration_ms: float
+
+
 class Segmentation(NamedTuple):
-    """Class mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), what follows from it, its source, and the time spent.
+    """Class mask uint8 [64, 80] (0 water, 1 obstacle, 2 sky), its confidence [64, 80], what follows from it, its
+    source, and the time spent.
 
     `run_ms`: the part of `duration_ms` that the network itself took; 0 where there is none.
     """
 
     mask: U8
+    confidence: F32
     water_edge: tuple[float, ...]
     corridors: CorridorEvidence
     source: SegmentationSource
@@ -92,7 +103,7 @@ class Perceiver:
         decoded_ms = self._stopwatch_ms()
         roll_rad = limit_roll_rad(roll_rad, self._config.max_roll_rad) if self._config.follow_roll else 0.0
         # The slower network starts while the picture is still checked; for a refused picture its result is dropped.
-        detecting: Future[TimedDetections] | None = None
+        detecting: Future[Found] | None = None
         segmenting: Future[Segmentation] | None = None
         if self._second_thread and bgr is not None and age_s <= self._config.max_frame_age_s:
             wait(self._pending)  # so that runs never pile up, however fast pictures are refused
@@ -111,19 +122,21 @@ class Perceiver:
             return self._build_evidence(header, bgr, cause, (), None, timing, start_ms), None
         if detecting:
             segmentation = self._segment(bgr, roll_rad)
-            detections, detector_ms = detecting.result()
+            found = detecting.result()
         else:
-            detections, detector_ms = self._detect(bgr)
+            found = self._detect(bgr)
             segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
         timing = msgspec.structs.replace(
             timing,
-            detector_ms=detector_ms,
+            detector_ms=found.duration_ms,
             segmenter_ms=segmentation.duration_ms,
             segmenter_run_ms=segmentation.run_ms,
             inference_ms=self._stopwatch_ms() - checked_ms,
         )
-        evidence = self._build_evidence(header, bgr, cause, detections, segmentation, timing, start_ms)
-        return msgspec.structs.replace(evidence, roll_rad=roll_rad), segmentation.mask
+        evidence = self._build_evidence(header, bgr, cause, found.detections, segmentation, timing, start_ms)
+        return msgspec.structs.replace(
+            evidence, roll_rad=roll_rad, candidates=self._find_candidates(found, segmentation)
+        ), segmentation.mask
 
     def close(self) -> None:
         """Ends the second thread."""
@@ -150,16 +163,33 @@ class Perceiver:
         )
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
 
-    def _detect(self, bgr: U8) -> TimedDetections:
+    def _detect(self, bgr: U8) -> Found:
         start_ms = self._stopwatch_ms()
         contract = self._detector.contract
         height, width = contract.size_hw
         tensor, transform = letterbox_picture(bgr, height, width, contract.preprocessing.pad_grey, self._tables[0])
-        detections = decode_boxes(self._detector.run(tensor), transform, self._config.detections, contract.classes)
-        if self._config.ego_polygon:
+        output, config = self._detector.run(tensor), self._config
+        detections = decode_boxes(output, transform, config.detections, contract.classes)
+        people: tuple[Detection, ...] = ()
+        if config.candidates.use:
+            above = min(config.candidates.person_confidence, config.detections.threshold(Label.PERSON))
+            people = decode_people(output, transform, config.detections, above, contract.classes)
+        if config.ego_polygon:
             visible_frac = self._visible_fractions_of((64, 80))
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, visible_frac))
-        return detections, self._stopwatch_ms() - start_ms
+            people = tuple(d for d in people if not is_own_hull(d.box_xyxy, visible_frac))
+        return Found(detections, people, self._stopwatch_ms() - start_ms)
+
+    def _find_candidates(self, found: Found, segmentation: Segmentation) -> tuple[Candidate, ...] | msgspec.UnsetType:
+        """What may be a person; nothing by a mask that was drawn by rule, unset where it is not asked."""
+        if not self._config.candidates.use:
+            return msgspec.UNSET
+        if segmentation.source is not SegmentationSource.LEARNED:
+            return ()
+        mask, confidence = segmentation.mask, segmentation.confidence
+        visible_frac = self._visible_fractions_of(mask.shape)
+        config = self._config.candidates
+        return find_candidates(mask, confidence, visible_frac, found.people, found.detections, config)
 
     def _visible_fractions_of(self, shape: tuple[int, ...]) -> F32:
         """Fraction of each cell of a grid that lies outside the own hull, computed once for each shape."""
@@ -181,7 +211,13 @@ class Perceiver:
             levelled.mask, levelled.confidence, self._config.corridors, levelled.visible_frac
         )
         return Segmentation(
-            mask, find_water_edge(mask, visible_frac), corridors, source, self._stopwatch_ms() - start_ms, run_ms
+            mask,
+            confidence,
+            find_water_edge(mask, visible_frac),
+            corridors,
+            source,
+            self._stopwatch_ms() - start_ms,
+            run_ms,
         )
 
     def _segment_by_network(self, bgr: U8) -> tuple[U8, F32, float]:

@@ -14,6 +14,7 @@ from paani.config.guidance import ControllerConfig, LocalizationConfig, Navigato
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.perception import (
     CameraConfig,
+    CandidateConfig,
     CorridorConfig,
     DetectorConfig,
     EngineName,
@@ -36,6 +37,7 @@ __all__ = [
     "BusConfig",
     "CalibrationConfig",
     "CameraConfig",
+    "CandidateConfig",
     "Config",
     "ControllerConfig",
     "CorridorConfig",

@@ -93,6 +93,7 @@ class PolicyConfig(Section, frozen=True):
     not_water: Fraction = 0.80  # a lane of which more is no water is no way, where the mask tells open water
     dry: Fraction = 0.95  # a lane of which more is no water is blocked, as water alone is a risk of 0.7 at most
     center_vessel_area: Fraction = 0.04  # J7
+    center_vessel_height: Fraction = 0.10  # without a calibration, which tells no range; 0: by area alone (J7)
     core_left: Fraction = 0.405  # J9
     core_right: Fraction = 0.595  # J9
     tie: Fraction = 0.02  # two sides that differ by less are equally good
@@ -116,6 +117,8 @@ class PeopleConfig(Section, frozen=True):
     slow_mps: Positive = 0.3  # half of cruise: the boat stops within 0.4 m
     stop_height: Fraction = 0.6  # of the picture
     drift_frac: Fraction = 0.05  # of the picture, beside the centre: who is there may drift into the way
+    widest_m: Positive = 3.0  # somebody on a board, or two together: what is calibrated and wider is no person
+    recognised_confidence: Fraction = 0.60  # of a confirmed obstacle, which is then no person to a calibrated camera
 
 
 class TuningConfig(Section, frozen=True):

@@ -78,6 +78,16 @@ class DetectorConfig(Section, frozen=True):
         return float(getattr(self, f"{kind}_confidence")) or self.confidence
 
 
+class CandidateConfig(Section, frozen=True):
+    """What may be a person although no box says so; `use=false` passes on detections alone, as the paper does."""
+
+    use: bool = True  # C6: what is below the threshold is nothing
+    person_confidence: Fraction = 0.15  # of a box that is not sure of a person; below `detections.confidence`
+    water_share: Fraction = 0.80  # of the mask beside and below such a box, which then stands in water
+    min_cells: Size = 4  # of the mask: 4 of its 5,120 are 0.1 m seen from 2 m
+    max_count: Size = 12  # handed on, the most confident first
+
+
 class CorridorConfig(Section, frozen=True):
     """Where the boat may go in the picture: normalised x ranges (they overlap) below normalised height `top`."""
 
@@ -121,6 +131,7 @@ class PerceptionConfig(Section, frozen=True):
     corridors: CorridorConfig = CorridorConfig()
     image_quality: ImageQualityConfig = ImageQualityConfig()
     detections: DetectorConfig = DetectorConfig()
+    candidates: CandidateConfig = CandidateConfig()
 
     def __post_init__(self) -> None:
         """A hull has an area."""

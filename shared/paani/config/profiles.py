@@ -12,6 +12,7 @@ PAPER: dict[str, object] = {
         "concurrent": False,  # B4
         "intra_op_threads": 2,  # C14, D11
         "corridors": {"open_water": False},  # J5: risk alone
+        "candidates": {"use": False},  # C6: what is below the threshold is nothing
         "follow_roll": False,  # E3: corridors are fixed in the picture
         "image_quality": {"enabled": False},  # J19
     },
@@ -30,6 +31,7 @@ PAPER: dict[str, object] = {
         "risk": {"far_m": 0.0},  # J1: by the picture alone
         "tracker": {"held_decay_s": 1e9},  # G3: a held box weighs as much as a seen one
         "policy": {
+            "center_vessel_height": 0.0,  # J7: by area alone
             "side_change_margin": 0.0,  # J5: thresholds without memory
             "release_margin": 0.0,
             "open_width": 0.0,

@@ -34,6 +34,8 @@ from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, Re
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
 from paani.messages.operator import ArmRefusal, OperatorRequest, OperatorState, RequestAct
 from paani.messages.perception import (
+    Candidate,
+    CandidateKind,
     Detection,
     Evidence,
     InferenceTiming,
@@ -56,6 +58,8 @@ __all__ = [
     "Arming",
     "BoxXyxy",
     "BridgeState",
+    "Candidate",
+    "CandidateKind",
     "Change",
     "ChangedBy",
     "Count",

@@ -209,11 +209,15 @@ class Limit(StrEnum):
 
 
 class Removal(msgspec.Struct, frozen=True, kw_only=True):
-    """Evidence without which the direction would be another: tracks, and lanes taken as clear, certain water."""
+    """Evidence without which the direction would be another: tracks, and lanes taken as clear, certain water.
+
+    candidates: numbers of `Evidence.candidates`, from 1; unset where none is taken away.
+    """
 
     direction: Direction
     track_ids: tuple[Count, ...] = ()
     water: tuple[Lane, ...] = ()
+    candidates: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
@@ -239,7 +243,8 @@ class Advisory(Message, frozen=True, kw_only=True):
 
     speed_limit_mps: not to be exceeded while somebody is near; unset while nobody is. people_ahead: tracks of people
     who block the way ahead, unset where people are weighed as anything else.
-    person_distance_m: of the nearest of them, unset where no calibration tells it.
+    candidates_ahead: numbers of `Evidence.candidates`, from 1, that block the way ahead, as they may be people; unset
+    where none does. person_distance_m: of the nearest of all of these, unset where no calibration tells it.
     """
 
     direction: Direction
@@ -262,3 +267,4 @@ class Advisory(Message, frozen=True, kw_only=True):
     speed_limit_mps: NonNegative | msgspec.UnsetType = msgspec.UNSET
     people_ahead: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET
     person_distance_m: NonNegative | msgspec.UnsetType = msgspec.UNSET
+    candidates_ahead: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET

@@ -53,6 +53,24 @@ class Detection(msgspec.Struct, frozen=True, kw_only=True):
     box_xyxy: BoxXyxy
 
 
+class CandidateKind(StrEnum):
+    """Why something may be a person: a box that is not sure of it, or an obstacle that stands alone in the water."""
+
+    UNSURE_BOX = "unsure_box"
+    LONE_OBSTACLE = "lone_obstacle"
+
+
+class Candidate(msgspec.Struct, frozen=True, kw_only=True):
+    """What may be a person, and is no detection.
+
+    confidence: of the person in an unsure box; of a lone obstacle, the largest that the mask has in it.
+    """
+
+    kind: CandidateKind
+    confidence: Unit
+    box_xyxy: BoxXyxy
+
+
 class LaneEvidence(msgspec.Struct, frozen=True, kw_only=True):
     """One corridor of the mask: non-water fraction N_j, uncertainty U_j and clear width, all of 1 (E4-E6).
 
@@ -90,6 +108,7 @@ class Evidence(Message, frozen=True, kw_only=True):
     `water_edge`: for each column of the mask as it is, left to right, the lower edge of the first cell that is not
     water, from the bottom up and own hull skipped, as a fraction of the picture's height from its top. 1: no water at
     the bottom of that column; 0: water to the top. Empty: no mask.
+    `candidates`: what may be a person, the most confident first; unset where that is not asked.
     """
 
     frame_seq: Count
@@ -111,3 +130,4 @@ class Evidence(Message, frozen=True, kw_only=True):
     media_us: Stamp = 0
     roll_rad: Finite = 0.0
     water_edge: tuple[Unit, ...] = ()
+    candidates: tuple[Candidate, ...] | msgspec.UnsetType = msgspec.UNSET

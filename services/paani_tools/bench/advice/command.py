@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -23,6 +24,8 @@ from paani_tools.bench.advice.ahead import annotated_ahead, not_water_share
 from paani_tools.bench.advice.tally import Judged, advised_lane, count_advice, tabulate
 from paani_tools.look.verdict import judge_still
 from paani_tools.progress import Progress
+
+OCCUPIED = Path(__file__).with_name("occupied_centres.txt")
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True):
@@ -82,11 +85,21 @@ def judge_pictures(pictures: Sequence[Sequence[Sample]], data: Path, config: Con
         perceiver.close()
 
 
+@cache
+def occupied_centres() -> frozenset[str]:
+    """Pictures without boxes in whose centre something floats or stands before the far shore, by eye: a path a line."""
+    return frozenset(OCCUPIED.read_text().split())
+
+
 def _judge(samples: Sequence[Sample], number: int, perceiver: Perceiver, data: Path, config: Config) -> Judged:
     picture, corridors = samples[0].picture, config.perception.corridors
     boxes = next((read_boxes(sample.label) for sample in samples if sample.label), None)
     mask = next((read_mask(sample.mask) for sample in samples if sample.mask), None)
     frame = next(iter(read_frames(picture, config.camera)))
+    name = picture.relative_to(data).as_posix()
+    ahead = annotated_ahead(boxes, mask, corridors)
+    if name in occupied_centres():
+        ahead = ahead._replace(open_water=False)
     verdict = judge_still(frame, number, perceiver, config)
     lane = advised_lane(verdict.advisory.direction)
     own = human = None
@@ -94,13 +107,13 @@ def _judge(samples: Sequence[Sample], number: int, perceiver: Perceiver, data: P
         own = getattr(verdict.evidence, lane).non_water
         human = None if mask is None else not_water_share(mask, getattr(corridors, lane), corridors.top)
     return Judged(
-        picture=str(picture.relative_to(data)),
+        picture=name,
         source=samples[0].source.name,
         sequence=samples[0].sequence,
         direction=verdict.advisory.direction,
         reason=verdict.advisory.reason,
         explanation=verdict.advisory.explanation,
-        counts=count_advice(annotated_ahead(boxes, mask, corridors), verdict.advisory, own, human),
+        counts=count_advice(ahead, verdict.advisory, own, human),
     )
 
 

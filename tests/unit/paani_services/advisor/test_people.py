@@ -92,6 +92,103 @@ def test_the_sentence_says_what_was_decided_about_the_person() -> None:
     assert near.explanation.startswith("Stop: swimmer ahead, waiting. ")
 
 
+def maybe(kind: m.CandidateKind, x: float, y: float, width: float = 0.05, height: float = 0.06) -> m.Candidate:
+    return m.Candidate(kind=kind, confidence=0.3, box_xyxy=(x, y, min(1.0, x + width), min(1.0, y + height)))
+
+
+KINDS = st.sampled_from(list(m.CandidateKind))
+
+
+@given(FRAMES, KINDS, st.floats(0.27, 0.68), st.floats(0.30, 0.9))
+def test_one_picture_of_what_may_be_a_person_ahead_is_never_clear(
+    frame: m.Evidence, kind: m.CandidateKind, x: float, y: float
+) -> None:
+    before = play([frame])[1][0]
+    advisory = play([msgspec.structs.replace(frame, candidates=(maybe(kind, x, y),))])[1][0]
+    assert advisory.direction is not m.Direction.STRAIGHT
+    assert "clear," not in advisory.explanation
+    assert advisory.candidates_ahead == (1,)
+    assert advisory.people_ahead == ()
+    assert advisory.speed_limit_mps == PAANI.advisor.people.slow_mps
+    assert BOLDNESS[advisory.direction] <= BOLDNESS[before.direction]
+
+
+@given(FRAMES, st.lists(st.builds(maybe, KINDS, st.floats(0.0, 0.9), st.floats(0.0, 0.9)), max_size=3))
+def test_candidates_make_no_advice_bolder(frame: m.Evidence, candidates: list[m.Candidate]) -> None:
+    without = play([msgspec.structs.replace(frame, candidates=())])[1][0]
+    advisory = play([msgspec.structs.replace(frame, candidates=tuple(candidates))])[1][0]
+    assert BOLDNESS[advisory.direction] <= BOLDNESS[without.direction]
+    assert advisory.center.risk == without.center.risk
+    assert advisory.contributing_track_ids == without.contributing_track_ids
+
+
+def test_the_sentence_and_what_would_change_it_name_what_may_be_a_person() -> None:
+    frame = msgspec.structs.replace(CLEAR, candidates=(maybe(m.CandidateKind.LONE_OBSTACLE, 0.47, 0.5),))
+    advisory = play([frame])[1][0]
+    assert advisory.explanation == (
+        "Slow: something that may be a person ahead, passing on the right. "
+        "Turn right: something that may be a person is in the way ahead or beside it; "
+        "the sides are alike, starboard by rule, left 0.05, right 0.05 (limit 0.58). "
+        "Without what may be a person it would go STRAIGHT."
+    )
+    assert advisory.counterfactual.removals[0] == m.Removal(direction=m.Direction.STRAIGHT, candidates=(1,))
+    shore = msgspec.structs.replace(CLEAR, candidates=(maybe(m.CandidateKind.LONE_OBSTACLE, 0.47, 0.2),))
+    assert play([shore])[1][0].direction is m.Direction.STRAIGHT
+
+
+def test_a_calibrated_camera_leaves_a_candidate_to_the_obstacle_that_it_is_and_to_its_size() -> None:
+    buoy = box(m.Label.BUOY, (0.46, 0.49, 0.53, 0.57), 0.9)
+    lone = maybe(m.CandidateKind.LONE_OBSTACLE, 0.47, 0.5)
+    frame = msgspec.structs.replace(seeing(buoy), candidates=(lone,))
+    assert play([frame] * 3, CALIBRATED)[1][-1].candidates_ahead is msgspec.UNSET
+    assert play([frame] * 3)[1][-1].candidates_ahead == (1,)
+    doubtful = msgspec.structs.replace(frame, detections=(box(m.Label.BUOY, buoy.box_xyxy, 0.5),))
+    assert play([doubtful] * 3, CALIBRATED)[1][-1].candidates_ahead == (1,)
+    assert play([frame], CALIBRATED)[1][-1].candidates_ahead == (1,)  # seen once, the buoy is not confirmed
+    raft = maybe(m.CandidateKind.LONE_OBSTACLE, 0.2, 0.4, width=0.6)
+    floating = msgspec.structs.replace(CLEAR, candidates=(raft,))
+    assert play([floating], CALIBRATED)[1][-1].candidates_ahead is msgspec.UNSET
+    assert play([floating])[1][-1].candidates_ahead == (1,)
+
+
+EDGE = st.lists(st.floats(0.0, 1.0), min_size=80, max_size=80)
+
+
+@given(EDGE, st.floats(0.35, 0.6), st.floats(0.35, 0.75), st.floats(0.03, 0.3))
+def test_whoever_the_water_reaches_is_never_taken_to_be_ashore(
+    edge: list[float], x: float, y: float, height: float
+) -> None:
+    person = box(m.Label.PERSON, (x, y, x + 0.05, y + height))
+    column = int((x + 0.025) * 80)
+    edge[column] = min(edge[column], person.box_xyxy[3])
+    frame = msgspec.structs.replace(seeing(person), water_edge=tuple(edge))
+    advisory = play([frame])[1][0]
+    assert advisory.direction is not m.Direction.STRAIGHT
+    assert advisory.people_ahead
+
+
+def test_somebody_on_a_far_bank_is_not_in_the_way_but_somebody_near_is() -> None:
+    """The boat goes on where it stopped before: between it and them lies what is no water, on both sides as well."""
+    angler = box(m.Label.PERSON, (0.47, 0.32, 0.52, 0.45))
+    bank = msgspec.structs.replace(seeing(angler), water_edge=(0.55,) * 80)
+    assert play([bank] * 3)[1][-1].direction is m.Direction.STRAIGHT
+    for column in (36, 39, 43):  # beside and below the angler
+        inlet = msgspec.structs.replace(bank, water_edge=tuple(0.4 if i == column else 0.55 for i in range(80)))
+        assert play([inlet])[1][0].direction is not m.Direction.STRAIGHT
+    near = box(m.Label.PERSON, (0.45, 0.32, 0.53, 0.53))
+    assert play([msgspec.structs.replace(bank, detections=(near,), water_edge=(0.6,) * 80)])[1][0].people_ahead
+    unknown = msgspec.structs.replace(bank, water_edge=())
+    assert play([unknown])[1][0].people_ahead
+
+
+def test_without_a_calibration_a_tall_vessel_in_the_middle_is_ahead_however_small_it_looks() -> None:
+    sail = box(m.Label.VESSEL, (0.48, 0.30, 0.52, 0.42))
+    assert play([seeing(sail)] * 3)[1][-1].direction is not m.Direction.STRAIGHT
+    low = box(m.Label.VESSEL, (0.48, 0.35, 0.52, 0.42))
+    assert play([seeing(low)] * 3)[1][-1].direction is m.Direction.STRAIGHT
+    assert play([seeing(sail)] * 3, CALIBRATED)[1][-1].direction is m.Direction.STRAIGHT
+
+
 @pytest.mark.parametrize("config", [PAPER])
 def test_the_paper_weighs_a_person_as_anything_else(config: Config) -> None:
     as_person, as_buoy = (
@@ -100,6 +197,8 @@ def test_the_paper_weighs_a_person_as_anything_else(config: Config) -> None:
     )
     assert (as_person.direction, as_person.center) == (as_buoy.direction, as_buoy.center)
     assert b"speed_limit" not in msgspec.json.encode(as_person)
+    lone = msgspec.structs.replace(CLEAR, candidates=(maybe(m.CandidateKind.LONE_OBSTACLE, 0.47, 0.5),))
+    assert play([lone], config)[1][-1].direction is m.Direction.STRAIGHT
     closed = msgspec.structs.replace(lane(0.2), open_width=0.0)
     frame = msgspec.structs.replace(CLEAR, left=closed, center=closed, right=closed)
     assert play([frame], config)[1][-1].direction is m.Direction.STRAIGHT

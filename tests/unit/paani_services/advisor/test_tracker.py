@@ -8,9 +8,10 @@ import msgspec
 import pytest
 
 from paani import messages as m
+from paani.boxes import iou
 from paani.config import Config
 from paani_services.advisor.advise import AdvisorState, advise
-from paani_services.advisor.association import assign_boxes, iou
+from paani_services.advisor.association import assign_boxes
 from paani_services.advisor.motion import MotionHistory, SizeMeasurement, Window, add_measurement, estimate_motion
 from paani_services.advisor.tracker import HAZARDS
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, play, seeing

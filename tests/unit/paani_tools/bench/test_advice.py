@@ -14,6 +14,7 @@ from paani.cli import main as paani
 from paani.config import Config
 from paani.messages import Advisory, Direction, Reason
 from paani_models.datasets.sources import Sample, Source
+from paani_tools.bench.advice import command
 from paani_tools.bench.advice.ahead import Ahead, annotated_ahead, not_water_share
 from paani_tools.bench.advice.command import main, thin_out
 from paani_tools.bench.advice.tally import Judged, advised_lane, count_advice, tabulate
@@ -142,6 +143,16 @@ def test_a_data_folder_becomes_a_table_and_one_line_per_picture(
     assert by_picture["a"]["counts"]["open_water"] is (by_picture["a"]["direction"] == "STRAIGHT")
     assert main([str(data), "--sources", "bath_river", "--held-out"]) == 0
     assert "advice on 1 annotated pictures, held-out sequences" in capsys.readouterr().out
+
+
+def test_a_centre_that_is_occupied_by_eye_is_no_open_water(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert all(line.count("/") >= 2 for line in command.occupied_centres())
+    monkeypatch.setattr(command, "occupied_centres", lambda: frozenset({"bath_river/images/a.png"}))
+    out = tmp_path / "advice.json"
+    assert main([str(data), "--sources", "bath_river", "--json", str(out)]) == 0
+    assert "open_water" not in json.loads(out.read_bytes())["pictures"][0]["counts"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,118 @@
+"""What may be a person: unsure boxes that stand in water, and obstacles that the water surrounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani.arrays import F32, U8
+from paani.config import CandidateConfig, DetectorConfig
+from paani.messages import BoxXyxy, CandidateKind, Detection, Label
+from paani_services.perception.box_decoding import decode_people
+from paani_services.perception.candidates import find_candidates, find_lone_obstacles, stands_in_water
+from paani_services.perception.preprocessing import LetterboxTransform
+
+RULES = CandidateConfig()
+ROWS, COLUMNS = 64, 80
+VISIBLE = np.ones((ROWS, COLUMNS), np.float32)
+SURE = np.full((ROWS, COLUMNS), 0.9, np.float32)
+WATER, OBSTACLE, SKY = 0, 1, 2
+SHORE_ROW = 24
+
+
+def lake(*things: tuple[int, int, int, int]) -> U8:
+    """Sky, shore, and water with obstacles at rows and columns (top, left, bottom, right)."""
+    mask = np.full((ROWS, COLUMNS), WATER, np.uint8)
+    mask[:16], mask[16:SHORE_ROW] = SKY, OBSTACLE
+    for top, left, bottom, right in things:
+        mask[top:bottom, left:right] = OBSTACLE
+    return mask
+
+
+def person(box: BoxXyxy, confidence: float = 0.3) -> Detection:
+    return Detection(label=Label.PERSON, confidence=confidence, box_xyxy=box)
+
+
+def lone(mask: U8, visible: F32 = VISIBLE) -> list[BoxXyxy]:
+    return [found.box_xyxy for found in find_lone_obstacles(mask, SURE, visible, RULES.min_cells)]
+
+
+@given(st.integers(SHORE_ROW + 1, 56), st.integers(0, 70), st.integers(2, 7), st.integers(2, 9))
+def test_what_the_water_surrounds_is_found_where_it_is(top: int, left: int, height: int, width: int) -> None:
+    found = find_lone_obstacles(lake((top, left, top + height, left + width)), SURE, VISIBLE, RULES.min_cells)
+    assert [c.kind for c in found] == [CandidateKind.LONE_OBSTACLE]
+    box = (left / COLUMNS, top / ROWS, (left + width) / COLUMNS, (top + height) / ROWS)
+    assert found[0].box_xyxy == pytest.approx(box)
+    assert found[0].confidence == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        (SHORE_ROW, 30, 40, 36),  # a jetty from the shore
+        (50, 30, ROWS, 50),  # what the boat itself carries
+        (40, 0, 42, COLUMNS),  # from side to side
+        (40, 30, 41, 33),  # three cells
+    ],
+)
+def test_what_belongs_to_the_shore_or_the_boat_and_specks_are_nothing(thing: tuple[int, int, int, int]) -> None:
+    assert lone(lake(thing)) == []
+
+
+def test_what_hangs_from_the_top_of_the_picture_does_not_stand_alone() -> None:
+    mask = np.full((ROWS, COLUMNS), WATER, np.uint8)
+    mask[:20, 30:36] = OBSTACLE
+    assert lone(mask) == []
+    mask[0] = WATER
+    assert len(lone(mask)) == 1
+
+
+def test_own_hull_is_no_obstacle() -> None:
+    visible = VISIBLE.copy()
+    visible[44:50, 36:44] = 0.0
+    assert lone(lake((44, 36, 50, 44)), visible) == []
+    assert lone(lake((44, 36, 50, 44))) != []
+
+
+def test_an_unsure_box_counts_where_it_stands_in_water() -> None:
+    mask = lake((36, 36, 42, 40))
+    in_water, on_shore = (0.45, 0.55, 0.52, 0.68), (0.45, 0.20, 0.52, 0.36)
+    assert stands_in_water(mask, in_water, RULES.water_share)
+    assert not stands_in_water(mask, on_shore, RULES.water_share)
+    found = find_candidates(mask, SURE, VISIBLE, (person(in_water), person(on_shore)), (), RULES)
+    assert [(c.kind, c.box_xyxy) for c in found] == [(CandidateKind.UNSURE_BOX, in_water)]
+
+
+def test_who_is_detected_is_no_candidate_as_well() -> None:
+    mask, box = lake((36, 36, 42, 40)), (0.44, 0.55, 0.51, 0.68)
+    detected = (person(box, 0.8),)
+    assert find_candidates(mask, SURE, VISIBLE, (person(box, 0.8),), detected, RULES) == ()
+    vessel = (Detection(label=Label.VESSEL, confidence=0.8, box_xyxy=box),)
+    assert len(find_candidates(mask, SURE, VISIBLE, (), vessel, RULES)) == 1
+
+
+def test_small_things_before_the_bow_are_glints() -> None:
+    glint, swimmer = (55, 30, 58, 33), (52, 30, 58, 36)
+    assert find_candidates(lake(glint), SURE, VISIBLE, (), (), RULES) == ()
+    assert len(find_candidates(lake(swimmer), SURE, VISIBLE, (), (), RULES)) == 1
+    assert len(find_candidates(lake((40, 30, 43, 33)), SURE, VISIBLE, (), (), RULES)) == 1
+
+
+def test_the_most_confident_are_handed_on() -> None:
+    mask = lake(*((30, left, 33, left + 2) for left in range(2, 78, 4)))
+    confidence = SURE * np.linspace(0.5, 1.0, COLUMNS, dtype=np.float32)
+    found = find_candidates(mask, confidence, VISIBLE, (), (), RULES)
+    assert len(found) == RULES.max_count
+    assert [c.confidence for c in found] == sorted((c.confidence for c in found), reverse=True)
+    assert min(c.box_xyxy[0] for c in found) > 0.3
+
+
+def test_people_are_decoded_by_their_own_score_with_their_own_threshold() -> None:
+    rows = np.array([[100, 100, 40, 40, 0.2, 0.7, 0, 0], [200, 100, 40, 40, 0.1, 0, 0, 0]], np.float32).T[None]
+    place = LetterboxTransform(1.0, 1.0, 0, 0, 320, 256)
+    found = decode_people(rows, place, DetectorConfig(), 0.15)
+    assert [(d.label, round(d.confidence, 3), round(d.box_xyxy[0] * 320)) for d in found] == [(Label.PERSON, 0.2, 80)]
+    assert decode_people(rows, place, DetectorConfig(), 0.15, ("vessel", "person")) != found
+    assert decode_people(rows, place, DetectorConfig(), 0.15, ("vessel", "pier", "buoy", "raft")) == ()
