@@ -30,6 +30,16 @@ DESCRIBE = """async ([mode, messages, stale]) => {
   const { id, word, reason } = describeActivity(store, 10);
   return [id, word, reason];
 }"""
+INHIBITS = """async ([messages, stale]) => {
+  const { findInhibits } = await import("/static/inhibits.js");
+  const { Store } = await import("/static/store.js");
+  const store = new Store();
+  store.put("dashboard/settings", { mode: "sim", topics: [] }, 0, 0);
+  for (const [key, text] of Object.entries(messages)) {
+    store.put(key, JSON.parse(text), stale.includes(key) ? 9000 : 0, 0);
+  }
+  return findInhibits(store, 10).map(({ stage, code }) => `${stage} ${code}`);
+}"""
 APPLIED = m.ThrustApplied(source_us=1, left=0.1, right=0.1, left_n=7.0, right_n=7.0, zero_cause=m.ZeroCause.NONE)
 ARMED = m.OperatorState(source_us=1, armed=True, stopped=False, by="dashboard")
 PERSON = m.Track(
@@ -111,6 +121,25 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
 ]  # fmt: skip
 
 
+EVERYTHING = still(
+    m.ZeroCause.PULSE_LOST, m.Inhibit.OUTSIDE_FENCE, m.Inhibit.NO_FREE_PATH, m.Inhibit.NO_ROUTE, m.Inhibit.NOT_ARMED,
+    m.Inhibit.STALE_ODOMETRY, m.Inhibit.ADVISED_NO_DATA, m.Inhibit.CLOCK_STOPPED,
+) | {"operator/state": STOPPED, "controller/thrust": m.Thrust(
+    source_us=1, left=0.0, right=0.0, enabled=False, inhibits=(m.Inhibit.NOT_ARMED, m.Inhibit.STALE_COMMAND),
+)}  # fmt: skip
+IN_ORDER = [
+    "camera SILENT", "advisor ADVISED_NO_DATA", "localization STALE_ODOMETRY", "operator NOT_ARMED", "mission NO_ROUTE",
+    "planner NO_FREE_PATH", "fence OUTSIDE_FENCE", "navigator CLOCK_STOPPED", "controller STALE_COMMAND",
+    "gate pulse_lost",
+]  # fmt: skip
+
+
+def encoded(changes: dict[str, m.Message | None]) -> dict[str, str]:
+    """The messages of a boat under way with these changes, as JSON by key."""
+    messages = UNDER_WAY | changes
+    return {key: msgspec.json.encode(value).decode() for key, value in messages.items() if value is not None}
+
+
 async def test_what_the_boat_does_comes_first(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -119,12 +148,9 @@ async def test_what_the_boat_does_comes_first(
         watched = await watch(browser, config)
         page = watched.page
         for changes, stale, expected in CASES:
-            messages = {
-                key: msgspec.json.encode(value).decode()
-                for key, value in (UNDER_WAY | changes).items()
-                if value is not None
-            }
-            assert await page.evaluate(DESCRIBE, ["sim", messages, list(stale)]) == expected, expected
+            assert await page.evaluate(DESCRIBE, ["sim", encoded(changes), list(stale)]) == expected, expected
+        assert await page.evaluate(INHIBITS, [encoded(EVERYTHING), ["camera/picture"]]) == IN_ORDER
+        assert await page.evaluate(INHIBITS, [encoded({}), ["camera/picture"]]) == [], "thrust is applied"
         recorded = {"plant/thrust_applied": msgspec.json.encode(APPLIED).decode()}
         replayed = await page.evaluate(DESCRIBE, ["replay", recorded, []])
         assert replayed == ["REPLAY", "RECORDING", "the boat was under way"]
@@ -135,10 +161,16 @@ async def test_what_the_boat_does_comes_first(
         await hold_to_arm(page)
         await wait_for_arming(boat, armed=True, stopped=False)
         await until(page, f"{word} === 'FOLLOWING ROUTE'")
+        assert "Follow route, lap 2, waypoint 2 of 4 of survey" in await page.inner_text("#stages")
+        assert await page.inner_text("#inhibits") == "Nothing inhibits thrust"
         await page.screenshot(path=tmp_path / "route.png")
         guidance.order = replace(ORDER, enable=False, inhibits=(m.Inhibit.HOLDING,), leg="hold station")
         boat.zero_cause = m.ZeroCause.NOT_ENABLED
         await until(page, f"{word} === 'HOLDING'")
+        assert (await page.inner_text("#inhibits .first")).split("\n") == ["Mission", "Holding station"]
+        assert (
+            await page.evaluate("document.querySelector('#stages [data-state=failed] span').textContent") == "Mission"
+        )
         await until(page, "document.querySelector('#announcer').textContent === 'HOLDING. Advice: RIGHT.'")
         assert watched.errors == []
 

@@ -115,6 +115,6 @@ export class Camera {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    return { ctx: this.ctx, width, height, unit: ratio * Math.max(0.8, Math.min(1, width / ratio / 560)) };
+    return { ctx: this.ctx, width, height, unit: ratio };
   }
 }

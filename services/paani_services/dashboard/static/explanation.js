@@ -1,7 +1,7 @@
 // @ts-check
 // The explanation panel: steps of the decision, risk of the three corridors, input; and the panel of tracks.
 
-import { ageText, byId, fixed, make, reasonText, setFacts, setText, words } from "./text.js";
+import { ageText, byId, fixed, make, reasonText, setFacts, setText, trackLabel, words } from "./text.js";
 import { weightsInForce } from "./tuning.js";
 
 const CORRIDORS = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
@@ -98,11 +98,9 @@ function renderTracks(message, counting) {
   }
   list.replaceChildren(
     ...tracks.map((/** @type {any} */ track) => {
-      const row = make("div"), state = track.immediate_danger ? "immediate" : track.accepted ? "accepted" : "tentative";
-      const known = track.motion === "unknown" ? "" : track.motion;
+      const row = make("div"), known = track.motion === "unknown" ? "" : track.motion;
       row.dataset.counts = String(counting.has(track.id));
-      row.append(make("span", "", `#${track.id}`), make("span", "", track.label), make("span", "", fixed(track.confidence)));
-      row.append(make("span", "", [state, track.held ? "unseen" : "", known].filter(Boolean).join(", ")));
+      row.append(make("span", "", trackLabel(track)), make("span", "", [track.held ? "unseen" : "", known].filter(Boolean).join(", ")));
       return row;
     }),
   );

@@ -31,11 +31,12 @@ export function renderHealth(store, open, now) {
     ready += alive ? 1 : 0;
     cpu += alive ? report.cpu_cores : 0;
     const [service, state, rate, age, cores, memory, dropped, starts] = rowCells(name);
-    const [word, kind] = alive ? ["ready", "good"] : life?.alive && open ? ["no report", "bad"] : life?.starts ? ["stopped", "bad"] : ["not started", "warn"];
+    const isRecorded = settings.mode === "replay" && name !== "dashboard"; // it need not run
+    const [word, kind] = isRecorded ? [fresh ? "recorded" : "not played", "quiet"] : alive ? ["ready", "good"] : life?.alive && open ? ["no report", "bad"] : life?.starts ? ["stopped", "bad"] : ["not started", "warn"];
     setText(service, name);
     setText(state, word);
     state.className = kind;
-    setText(rate, input && alive ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–");
+    setText(rate, input && (alive || (isRecorded && fresh)) ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–");
     rate.className = alive && input && !input.rate_ok ? "warn" : "";
     setText(age, report ? ageText(store.ageS(`health/${name}`, now)) : "–");
     setText(cores, report ? `${fixed(report.cpu_cores * 100, 0)} %` : "–");
@@ -48,7 +49,7 @@ export function renderHealth(store, open, now) {
     dropped.title = (report?.drops ?? []).map((/** @type {any} */ drop) => `${drop.cause}: ${drop.count}`).join(", ");
     for (const cell of [rate, age, cores, memory, dropped]) cell.classList.toggle("stale", !fresh);
   }
-  setText(byId("health-sum"), `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`);
+  setText(byId("health-sum"), settings.mode === "replay" ? "of the recorded drive" : `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`);
 }
 
 /** @param {string} name */

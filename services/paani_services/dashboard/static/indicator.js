@@ -1,13 +1,14 @@
 // @ts-check
 // The indicator strip: what the microcontroller shows, and how well it is reached. Hidden where no bridge runs.
 
+import { isReplay } from "./inhibits.js";
 import { byId, fixed, setText } from "./text.js";
 import { ADVICE } from "./topbar.js";
 
 /** @param {import("./store.js").Store} store @param {number} now */
 export function renderIndicator(store, now) {
   const strip = byId("indicator");
-  strip.hidden = !store.get("dashboard/settings")?.services.includes("bridge");
+  strip.hidden = !store.get("dashboard/settings")?.services.includes("bridge") || (isReplay(store) && !store.isFresh("bridge/state", now));
   if (strip.hidden) return;
   const state = store.get("bridge/state"), fresh = store.isFresh("bridge/state", now);
   const problem = !state ? "no report from the bridge yet" : !fresh ? "the bridge is silent" : state.problem;

@@ -22,6 +22,6 @@ export function renderLink(store, open, now) {
   document.body.dataset.loss = unseen ? "unseen" : "";
   byId("link-seen").hidden = !unseen;
   setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : silent ? "not playing" : `live ${fixed(silenceS, 1)} s`);
-  setText(byId("link-age"), unseen ? `was lost ${ageText(longestLossS)} at ${lostAt}` : !open ? "no connection" : silent ? "no data" : never ? "for data" : "age of data");
+  setText(byId("link-age"), unseen ? `was lost ${ageText(longestLossS)}, ${lostAt}` : !open ? "no connection" : silent ? "no data" : never ? "for data" : "age of data");
   document.title = lost ? "LOST · PAANI" : "PAANI";
 }

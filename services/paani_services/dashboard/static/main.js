@@ -11,8 +11,10 @@ import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
 import { bindOperatorControls, renderOperatorState } from "./operator.js";
+import { bindPalette, nextPalette } from "./palette.js";
 import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
+import { renderStages } from "./stages.js";
 import { Store } from "./store.js";
 import { renderTopbar } from "./topbar.js";
 import { renderTuning } from "./tuning.js";
@@ -57,6 +59,7 @@ function render() {
   if (document.hidden) return;
   renderTuning(store, now);
   renderExplanation(store, now);
+  renderStages(store, now);
   renderMotion(store, now);
   renderIndicator(store, now);
   renderSensors(store, now);
@@ -67,10 +70,13 @@ function render() {
 
 addEventListener("keydown", (event) => {
   const layer = LAYERS[Number(event.key) - 1];
-  if (layer && !event.ctrlKey && !event.metaKey && !event.altKey) camera.toggle(layer);
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (layer) camera.toggle(layer);
+  if (event.key === "d" || event.key === "D") nextPalette();
 });
 buildExplanation();
 bindLink();
+bindPalette();
 bindOperatorControls();
 connect(onMessage, onOpen);
 setInterval(render, RENDER_PERIOD_MS);

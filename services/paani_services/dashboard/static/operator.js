@@ -112,7 +112,7 @@ export function renderOperatorState(store, open, now) {
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  const shown = isStopPending ? pendingStop(now) : operatorState(operator, isHeard, store.ageS("operator/state", now));
+  const shown = isStopPending ? pendingStop(now) : isReplay(store) ? { state: "", word: "READ-ONLY", detail: "a recording is played" } : operatorState(operator, isHeard, store.ageS("operator/state", now));
   state.dataset.state = shown.state;
   setText(byId("order-word"), shown.word);
   setText(byId("order-detail"), refusal || shown.detail);

@@ -1,7 +1,7 @@
 // @ts-check
 // Draws the results of perception and advisor over the picture they belong to, in its normalised coordinates.
 
-import { fixed, words } from "./text.js";
+import { fixed, trackLabel, words } from "./text.js";
 
 export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
@@ -65,8 +65,7 @@ export function drawBoxes(pane, evidence, tracks) {
       if (track.held && !track.accepted) continue; // neither seen in this picture nor counted by the advisor
       drawBox(pane, track.box_xyxy, colour, track.immediate_danger ? 3 : 2, track.held ? [6, 4] : []);
       if (track.held) continue; // no label: the dashed box says enough, and labels would cover the picture
-      const state = track.immediate_danger ? " immediate" : track.accepted ? "" : " tentative";
-      labels.push([`#${track.id} ${track.label} ${fixed(track.confidence)}${state}`, track.box_xyxy, colour]);
+      labels.push([trackLabel(track), track.box_xyxy, colour]);
     }
   } else {
     for (const found of evidence.detections) {

@@ -1,6 +1,7 @@
 // @ts-check
 // The sensor strip: each device of a real hull, and what is wrong with it. Hidden where no sensor process runs.
 
+import { isReplay } from "./inhibits.js";
 import { byId, fixed, make, setText } from "./text.js";
 
 /** @type {Map<string, HTMLElement>} */
@@ -9,7 +10,7 @@ const rows = new Map();
 /** @param {import("./store.js").Store} store @param {number} now */
 export function renderSensors(store, now) {
   const strip = byId("sensors");
-  strip.hidden = !store.get("dashboard/settings")?.services.includes("sensors");
+  strip.hidden = !store.get("dashboard/settings")?.services.includes("sensors") || (isReplay(store) && !store.isFresh("sensors/state", now));
   if (strip.hidden) return;
   const state = store.get("sensors/state"), fresh = store.isFresh("sensors/state", now);
   const devices = state?.devices ?? [{ role: "sensors", status: "silent", note: "no report from the sensor process yet" }];

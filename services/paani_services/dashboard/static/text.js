@@ -13,6 +13,12 @@ export const reasonText = (reason) => sentence(words(reason).replace(/^center/, 
 /** Tracks by number as on the picture, "person #3". @param {{id: number, label: string}[]} tracks @param {number[]} ids */
 export const trackNames = (tracks, ids) => ids.map((id) => `${tracks.find((track) => track.id === id)?.label ?? "track"} #${id}`).join(", ");
 
+/** What kind of track it is. @param {any} track */
+export const trackState = (track) => (track.immediate_danger ? "immediate" : track.accepted ? "accepted" : "tentative");
+
+/** The label of a track, the same wherever it stands. @param {any} track */
+export const trackLabel = (track) => `#${track.id} ${track.label} ${fixed(track.confidence)} ${trackState(track)}`;
+
 /** @param {number} value @param {number} [digits] */
 export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
 
@@ -87,6 +93,9 @@ export const ACTIVITIES = {
   REPLAY: ["RECORDING", "none"],
   UNKNOWN: ["UNKNOWN", "none"],
 };
+
+/** @type {Record<string, string>} */
+export const PALETTES = { auto: "Auto", day: "Day", dusk: "Dusk", night: "Night" };
 
 /** What the thrust moves. @type {Record<string, string>} */
 export const MODES = { sim: "SIM", hil: "HIL", hull: "HULL", replay: "REPLAY" };

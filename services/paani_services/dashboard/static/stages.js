@@ -1,0 +1,51 @@
+// @ts-check
+// The way from the advice to the thrust, stage by stage: what each does now, or why it lets nothing through.
+
+import { findInhibits } from "./inhibits.js";
+import { STAGES, byId, fixed, headingDeg, make, operatorText, sentence, setText, trackNames, words } from "./text.js";
+
+const SHOWN = ["operator", "mission", "planner", "fence", "controller", "gate"];
+
+/** @param {import("./store.js").Store} store @param {number} now */
+export function renderStages(store, now) {
+  const list = byId("stages"), inhibits = findInhibits(store, now), does = describeStages(store);
+  if (!list.children.length) {
+    list.append(...SHOWN.map((stage) => {
+      const item = make("li");
+      item.append(make("span", "", STAGES[stage][0]), make("b"));
+      return item;
+    }));
+  }
+  SHOWN.forEach((stage, index) => {
+    const reasons = inhibits.filter((reason) => reason.stage === stage).map((reason) => reason.text);
+    const item = /** @type {HTMLElement} */ (list.children[index]), [text, acts] = does[stage];
+    item.hidden = !text && !reasons.length;
+    item.dataset.state = reasons.length ? "failed" : acts ? "acts" : "passed";
+    setText(item.lastElementChild, sentence(reasons.join("; ") || text));
+  });
+}
+
+/** What each stage does, and whether it changes what the advice or the route alone would do. @param {import("./store.js").Store} store @returns {Record<string, [string, boolean]>} */
+function describeStages(store) {
+  const operator = store.get("operator/state"), command = store.get("navigator/command"), route = store.get("navigator/route");
+  const mission = store.get("navigator/mission"), thrust = store.get("controller/thrust"), applied = store.get("plant/thrust_applied");
+  const waypoint = route && command ? `, waypoint ${command.waypoint_index + 1} of ${route.waypoints.length} of ${route.name}` : "";
+  const name = mission && mission.name !== route?.name ? `${mission.name}: ` : "";
+  return {
+    operator: [operator?.armed ? `armed by ${operatorText(operator.by)}` : "", false],
+    mission: [command?.leg ? `${name}${command.leg}${command.leg.startsWith("follow route") ? waypoint : ""}` : "", false],
+    planner: describePlanner(store, command),
+    fence: [mission?.fence.length ? `inside ${mission.fence.map((/** @type {any} */ area) => area.name || `keep ${area.keep}`).join(", ")}` : "", false],
+    controller: [thrust?.enabled ? `speed error ${fixed(thrust.speed_error_mps)} m/s, heading error ${fixed((thrust.heading_error_rad * 180) / Math.PI, 0)}°` : "", false],
+    gate: [applied ? `port ${fixed(applied.left_n, 1)} N, starboard ${fixed(applied.right_n, 1)} N` : "", false],
+  };
+}
+
+/** @param {import("./store.js").Store} store @param {any} command @returns {[string, boolean]} */
+function describePlanner(store, command) {
+  if (!store.get("dashboard/settings")?.planner) return ["off: turns as advised", false];
+  if (!command?.enable) return ["", false];
+  const ids = command.obstacle_track_ids, heading = `steers ${fixed(headingDeg(command.heading_rad), 0)}° at ${fixed(command.speed_mps)} m/s`;
+  const turn = /LEFT|RIGHT/.test(command.direction) ? `, advised ${words(command.direction)}` : "";
+  return [`${heading}${turn}${ids.length ? `, for ${trackNames(store.get("advisor/tracks")?.tracks ?? [], ids)}` : ""}`, Boolean(ids.length || turn)];
+}

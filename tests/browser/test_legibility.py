@@ -1,0 +1,73 @@
+"""The page on a desk, a small laptop and a phone, by day, at dusk and at night: legible, reachable, nothing serious."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from paani import messages as m
+from paani.config import Config
+from tests.browser.conftest import Boat
+from tests.browser.guidance import ORDER, guiding
+from tests.browser.test_page import Watched, until
+from tests.conftest import OpenAs, Spawn
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+
+AXE = Path(__file__).parent / "axe" / "axe.min.js"
+SERIOUS = """axe.run(document, { resultTypes: ["violations"] }).then((found) => found.violations
+  .filter((rule) => rule.impact === "serious" || rule.impact === "critical")
+  .flatMap((rule) => rule.nodes.map((node) => `${rule.id}: ${node.target} ${node.any[0]?.message ?? ""}`)))"""
+SMALL_TEXT = """[...document.querySelectorAll("body *")].filter((e) => e.offsetParent &&
+  [...e.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim()) &&
+  parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.outerHTML.slice(0, 80))"""
+SMALL_TARGETS = """(least) => [...document.querySelectorAll("button")].filter((e) => e.offsetParent)
+  .filter((e) => Math.min(e.getBoundingClientRect().width, e.getBoundingClientRect().height) < least)
+  .map((e) => e.outerHTML.slice(0, 80))"""
+BOX = "(name) => { const b = document.querySelector(name).getBoundingClientRect(); return [b.top, b.bottom]; }"
+VIEWS = [("day", 1440, 900, 24), ("dusk", 360, 740, 44), ("night", 1024, 768, 24)]
+STANDING = replace(
+    ORDER, enable=False, speed_mps=0.0, inhibits=(m.Inhibit.NOT_ARMED, m.Inhibit.NO_FREE_PATH, m.Inhibit.OUTSIDE_FENCE)
+)
+
+
+def test_axe_is_the_one_that_its_readme_names() -> None:
+    assert hashlib.sha256(AXE.read_bytes()).hexdigest() in AXE.with_name("README.md").read_text(encoding="utf-8")
+
+
+async def test_every_palette_and_size_is_legible(
+    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    axe = AXE.read_text(encoding="utf-8")
+    origin = f"http://127.0.0.1:{config.dashboard.port}"
+    async with spawn("operator"), spawn("dashboard"), guiding(open_as) as guidance:
+        guidance.order = STANDING
+        page = await browser.new_page(color_scheme="dark")
+        watched = Watched(page, origin)
+        await page.goto(origin)
+        await until(page, "document.querySelector('#activity-word').textContent === 'STOPPED'")
+        await until(page, "paani.overlay.mask_seq !== null")
+        await page.evaluate(axe)
+        for palette, width, height, least_px in VIEWS:
+            await page.set_viewport_size({"width": width, "height": height})
+            while await page.evaluate("document.documentElement.dataset.palette") != palette or (
+                await page.inner_text("#palette-name") == "Auto"
+            ):
+                await page.keyboard.press("d")
+            await page.wait_for_timeout(300)
+            await page.screenshot(path=tmp_path / f"{palette}.png")
+            assert await page.evaluate(SERIOUS) == [], palette
+            assert await page.evaluate(SMALL_TEXT) == [], palette
+            assert await page.evaluate(SMALL_TARGETS, least_px) == [], palette
+            assert await page.evaluate("document.documentElement.scrollWidth") == width, palette
+            top, bottom = await page.evaluate(BOX, ".panel.map")
+            assert bottom <= height or (width < 400 and top < 540), f"{palette}: the map needs scrolling"
+        await page.evaluate("scrollTo(0, document.body.scrollHeight)")
+        assert (await page.evaluate(BOX, ".bar"))[0] == 0, "the bar stays"
+        await page.reload()
+        assert await page.evaluate("document.documentElement.dataset.palette") == "night"
+        assert watched.errors == []
