@@ -13,6 +13,7 @@ from typing import Any
 from paani.keys import Graph, Stance, Topic, command_line_clients_in, every_topic, services_in
 
 ROUTER = "router"
+STOP_CLIENT = "stop"  # `paani stop`, on either machine
 TRUTH = "@truth/"
 
 
@@ -41,6 +42,14 @@ ON_BOARD: Mapping[Graph, frozenset[str]] = {
     ),
 }  # fmt: skip
 
+# Whose pulse tells the other machine this one's time: a vital process that its side has in every graph.
+ECHOES: Mapping[Side, str] = {Side.BOARD: "advisor", Side.HOST: "operator"}
+
+
+def is_sent_from(side: Side, topic: Topic[Any], graph: Graph) -> bool:
+    """Whether a topic is written on this side of two alone, and not on the other."""
+    return topic.producer in services_on(side, graph) and topic.producer not in services_on(side.other, graph)
+
 
 def services_on(side: Side, graph: Graph) -> tuple[str, ...]:
     """Processes of this side, in the order they start."""
@@ -56,7 +65,7 @@ def writers_on(side: Side, graph: Graph) -> tuple[str, ...]:
 
     STOP may be asked for on either machine; arming only where the operator is.
     """
-    clients = tuple(name for name in command_line_clients_in(graph) if name == "stop" or side is not Side.BOARD)
+    clients = tuple(name for name in command_line_clients_in(graph) if name == STOP_CLIENT or side is not Side.BOARD)
     return (*services_on(side, graph), *clients)
 
 

@@ -13,7 +13,17 @@ from paani.config import BusConfig, Config, load_config
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.link_access import LINK
-from paani.sides import ON_BOARD, ROUTER, Side, pictures_sent, services_on, topics_sent, writers_on
+from paani.sides import (
+    ECHOES,
+    ON_BOARD,
+    ROUTER,
+    Side,
+    is_sent_from,
+    pictures_sent,
+    services_on,
+    topics_sent,
+    writers_on,
+)
 
 SIDES = (Side.BOARD, Side.HOST)
 PROFILE = {Graph.SIMULATION: "paani", Graph.HIL: "hil", Graph.HULL: "hull"}
@@ -135,3 +145,13 @@ def test_a_host_takes_the_boards_credentials_and_makes_none(tmp_path: Path) -> N
     assert not authority.credentials_folder(host).exists()
     made = authority.ensure_credentials(BusConfig(runtime_dir=str(tmp_path), side=Side.BOARD, link=host.link))
     assert authority.ensure_credentials(host) == made
+
+
+@pytest.mark.parametrize("graph", Graph)
+def test_who_echoes_for_its_side_has_a_pulse_and_is_on_no_other(graph: Graph) -> None:
+    for side in SIDES:
+        assert ECHOES[side] in keys.VITAL_SERVICES
+        assert is_sent_from(side, keys.pulse(ECHOES[side]), graph)
+        assert not is_sent_from(side.other, keys.pulse(ECHOES[side]), graph)
+        assert keys.pulse(ECHOES[side]).name in {topic.name for topic in topics_sent(side, graph)}
+    assert not any(is_sent_from(side, keys.health(ROUTER), graph) for side in SIDES)

@@ -13,10 +13,11 @@ from msgspec.structs import replace
 from paani import keys
 from paani import messages as m
 from paani.authority import OBSERVER, ensure_credentials
-from paani.bus import Bus, open_bus
+from paani.bus import Bus, Stepper, open_bus
 from paani.bus.routing import open_router
 from paani.clock import WallClock
-from paani.config import BusConfig, load_config
+from paani.config import BusConfig, Config, load_config
+from paani.decider import decider_of
 from paani.errors import UserError
 from paani.link_access import LINK
 from paani.sides import Side
@@ -26,6 +27,7 @@ from tests.conftest import find_free_port, put_raw
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
+NAVIGATOR = decider_of("navigator")
 
 
 class Sides(NamedTuple):
@@ -194,3 +196,72 @@ async def test_a_door_that_stays_shut_is_told_from_one_that_is_not_there(
         await until(lambda: f"{other.router} lets nobody in by these credentials" in caplog.text)
         opening.cancel()
         await asyncio.wait([opening])
+
+
+class ClockApart:
+    """A wall clock that is set otherwise than this machine's."""
+
+    def __init__(self, ahead_s: float) -> None:
+        self._ahead_us = round(ahead_s * 1e6)
+
+    def now_us(self) -> int:
+        return CLOCK.now_us() + self._ahead_us
+
+
+@pytest.mark.parametrize("ahead_s", [-3600.0, -5.0, 5.0, 3600.0])
+async def test_board_and_host_need_no_common_time(sides: Sides, ahead_s: float) -> None:
+    """What the board says is as old on the host as it is, and a step of the host writes down by which stamp it went."""
+    there = ClockApart(ahead_s)
+    async with contextlib.AsyncExitStack() as stack:
+        for router in sides:
+            await stack.enter_async_context(routing(router))
+        advisor = await open_bus(sides.board, "advisor", there)
+        stack.push_async_callback(advisor.close)
+        operator, navigator, observer = [
+            await stack.enter_async_context(joined(sides.host, user)) for user in ("operator", "navigator", OBSERVER)
+        ]
+        stack.enter_context(advisor.alive())
+        stack.enter_context(operator.alive())
+        stepper, steps = (
+            Stepper(navigator, CLOCK, Config(), NAVIGATOR),
+            observer.queue(keys.STEPS["navigator"]),
+        )
+        advice, armed = advisor.publisher(keys.ADVISORY), operator.publisher(keys.ARMING)
+        heard_there = advisor.latest(keys.ARMING)
+        inbox = stepper.inboxes[keys.ADVISORY.name]
+
+        def say() -> None:
+            straight = m.Advisory(
+                source_us=there.now_us() - 200_000, direction=m.Direction.STRAIGHT, reason=m.Reason.CENTER_CLEAR
+            )
+            advice.put(straight)
+            armed.put(m.Arming(source_us=CLOCK.now_us(), armed=True))
+
+        def age_s(value: m.Message | None, now_us: int) -> float:
+            return float("inf") if value is None else (now_us - value.source_us) * 1e-6
+
+        await until(lambda: 0.2 <= age_s(inbox.value, CLOCK.now_us()) < 2.0, say)
+        await until(lambda: 0.0 <= age_s(heard_there.value, there.now_us()) < 2.0, say)
+        await until(lambda: steps.received > 0, lambda: stepper.conclude(stepper.decide()[1]))
+        given, step = inbox.value, steps.drain()[-1]
+        stamp_us = {heard.topic: heard.source_us for heard in step.heard}[keys.ADVISORY.name]
+        assert given is not None
+        assert stamp_us == given.source_us
+        assert all(sent.steady_us for sent in step.sent)
+        refused, received = navigator.drops.total(), inbox.received
+        await until(lambda: inbox.received > received + 5, say)
+        assert navigator.drops.total() == refused
+
+
+async def test_stop_is_heard_from_a_board_whose_clock_is_ahead(sides: Sides) -> None:
+    """Whatever else is known of its clock: nobody on the board echoes here."""
+    async with routing(sides.board), routing(sides.host), joined(sides.host, "operator") as operator:
+        stop = await open_bus(sides.board, "stop", ClockApart(5.0))
+        try:
+            asked, ask = operator.latest(keys.REQUESTS["stop"]), stop.publisher(keys.REQUESTS["stop"])
+            await until(
+                lambda: asked.received > 0,
+                lambda: ask.put(m.OperatorRequest(source_us=CLOCK.now_us(), act=m.RequestAct.STOP, press=1)),
+            )
+        finally:
+            await stop.close()

@@ -151,6 +151,8 @@ class Ledger:
             message = self._decoders[message_id.topic].decode(self._instead.get(name, held.data))
         except UNDECODABLE as error:
             return None, f"{message_id.topic} it had heard does not decode: {error}"
+        if message_id.source_us:
+            message = msgspec.structs.replace(message, source_us=message_id.source_us)
         self._newest_heard[message_id.topic] = message_id.epoch, message_id.seq, message
         return message, ""
 

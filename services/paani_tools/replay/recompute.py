@@ -164,6 +164,7 @@ class Recomputation:
                 domain=self._config.bus.domain,
                 producer=self._producers[sent.topic],
                 sent_us=sent.sent_us,
+                steady_us=sent.steady_us,
             )
         )
 

@@ -13,19 +13,21 @@ import zenoh
 
 from paani import keys
 from paani import messages as m
-from paani.bus.admission import Admission
+from paani.bus.admission import Admission, ShiftUs, same_clock, since_sent
 from paani.bus.hearing import Hearing
 from paani.bus.inbox import Inbox, Latest, Queue
+from paani.bus.other_machine import OtherMachine
 from paani.bus.publish import LONG_POLL_S, PicturePublisher, Publisher
 from paani.bus.raw import RawInbox
 from paani.bus.session import open_client
-from paani.clock import Clock, MonotonicClock
+from paani.clock import Clock, MachineClock, MonotonicClock
 from paani.config import BusConfig
 from paani.health import HealthReporter
 from paani.heartbeat import Heartbeat
+from paani.link_access import LINK
 from paani.memory import RECYCLE_S, recycle, set_loaded_apart
 from paani.runtime import runtime_dir
-from paani.sides import ROUTER
+from paani.sides import ECHOES, ROUTER, STOP_CLIENT, Side, is_sent_from
 
 T = TypeVar("T", bound=m.Message)
 MAX_PICTURE_BYTES = 16 << 20  # encoded; a 12-megapixel JPEG of the best quality is half of it
@@ -45,6 +47,8 @@ class Bus:
         self._session, self._config, self.user, self._clock = session, config, user, clock
         self._loop = asyncio.get_running_loop()
         self._declared: list[object] = []
+        self._steady = MachineClock() if config.side is not Side.BOTH else None
+        self._other: OtherMachine | None = None
         self.inputs: list[tuple[keys.Topic[Any], Inbox[Any]]] = []
         self.drops: collections.Counter[str] = collections.Counter()
         self.note_text = ""
@@ -101,12 +105,13 @@ class Bus:
 
     def publisher(self, topic: keys.Topic[T]) -> Publisher[T]:
         """The right to write is the router's to give: only the topic's producer in this graph is heard."""
-        return Publisher(self._session, self._row(topic), self._key(topic), self._config.domain, self._clock)
+        row, domain = self._row(topic), self._config.domain
+        return Publisher(self._session, row, self._key(topic), domain, self._clock, self._steady)
 
     def picture_publisher(self, topic: keys.Topic[m.PictureHeader], *, push: bool = True) -> PicturePublisher:
         """Pictures: pushed on this machine unless `push` is false, and always there to be pulled."""
-        row = self._row(topic)
-        return PicturePublisher(self._session, row, self._key(topic), self._config.domain, self._clock, push=push)
+        row, domain = self._row(topic), self._config.domain
+        return PicturePublisher(self._session, row, self._key(topic), domain, self._clock, self._steady, push=push)
 
     @contextlib.contextmanager
     def alive(self) -> Iterator[None]:
@@ -195,7 +200,29 @@ class Bus:
         return topic.key(self._config.domain, self._config.vessel)
 
     def _admission(self, topic: keys.Topic[T]) -> Admission[T]:
-        return Admission(self._row(topic), self._config.domain, self._config.max_future_s)
+        row, domain, max_future_s = self._row(topic), self._config.domain, self._config.max_future_s
+        return Admission(row, domain, max_future_s, self._clock_difference(row), as_sent=self.user == LINK)
+
+    def _clock_difference(self, row: keys.Topic[T]) -> ShiftUs:
+        """By how much this machine's clock is ahead of the one that stamps a topic; see `other_machine`.
+
+        The other machine's pulses, and STOP, which may come from either, are never of the future: their receivers ask
+        when they came, not when they were sent. Nor are the pictures that a router only hands on.
+        """
+        side = self._config.side
+        is_other = is_sent_from(side.other, row, self._config.graph)
+        if side is Side.BOTH or not (is_other or row.producer == STOP_CLIENT):
+            return same_clock
+        if not is_other or row.type is m.Pulse or self.user == LINK:
+            return since_sent
+        return self._listen_to_other().shift_us
+
+    def _listen_to_other(self) -> OtherMachine:
+        """The other machine's clock, learnt from the pulses of the process that echoes there."""
+        if self._other is None:
+            self._other = OtherMachine(MachineClock())
+            self._subscribe(keys.pulse(ECHOES[self._config.side.other]), self._other.note_pulse)
+        return self._other
 
     def _row(self, topic: keys.Topic[T]) -> keys.Topic[T]:
         return keys.topic_in(topic, self._config.graph)
@@ -240,8 +267,10 @@ class Bus:
     async def _beat(self) -> None:
         topic = keys.pulse(self.user)
         publisher = self.publisher(topic)
+        other = self._listen_to_other() if self.user == ECHOES.get(self._config.side) else None
         while True:
-            publisher.put(m.Pulse(source_us=self._clock.now_us()))
+            echo_us, heard_us = other.echo if other is not None else (0, 0)
+            publisher.put(m.Pulse(source_us=self._clock.now_us(), echo_us=echo_us, heard_us=heard_us))
             await asyncio.sleep(1.0 / topic.rate_hz)
 
     def _is_connected(self) -> bool:

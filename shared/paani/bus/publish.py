@@ -52,8 +52,11 @@ class Numbering:
 class Publisher(Generic[T]):
     """Publishes messages of one topic."""
 
-    def __init__(self, session: zenoh.Session, topic: Topic[T], key: str, domain: int, clock: Clock) -> None:
-        self._topic, self._domain, self._clock = topic, domain, clock
+    def __init__(
+        self, session: zenoh.Session, topic: Topic[T], key: str, domain: int, clock: Clock, steady: Clock | None
+    ) -> None:
+        """steady: the clock of `steady_us`; None on a boat of one machine."""
+        self._topic, self._domain, self._clock, self._steady = topic, domain, clock, steady
         self._numbering = Numbering(clock)
         self._encoder = msgspec.json.Encoder()
         self._publisher = session.declare_publisher(
@@ -87,6 +90,7 @@ class Publisher(Generic[T]):
             domain=self._domain,
             producer=self._topic.producer,
             sent_us=self._clock.now_us(),
+            steady_us=0 if self._steady is None else self._steady.now_us(),
         )
 
 
@@ -94,9 +98,17 @@ class PicturePublisher(Publisher[m.PictureHeader]):
     """Pushes pictures on this machine and answers long-poll pulls with the newest."""
 
     def __init__(
-        self, session: zenoh.Session, topic: Topic[m.PictureHeader], key: str, domain: int, clock: Clock, *, push: bool
+        self,
+        session: zenoh.Session,
+        topic: Topic[m.PictureHeader],
+        key: str,
+        domain: int,
+        clock: Clock,
+        steady: Clock | None,
+        *,
+        push: bool,
     ) -> None:
-        super().__init__(session, topic, key, domain, clock)
+        super().__init__(session, topic, key, domain, clock, steady)
         self._push = push
         self._asked_us: int | None = None
         self._newest: tuple[m.PictureHeader, bytes, bytes] | None = None

@@ -85,13 +85,23 @@ class Stepper(Generic[S, I]):
                 source_us=self._now_us,
                 heard=tuple(
                     m.InputMessage(
-                        topic=name, epoch=given.message.epoch, seq=given.message.seq, received_us=given.received_us
+                        topic=name,
+                        epoch=given.message.epoch,
+                        seq=given.message.seq,
+                        received_us=given.received_us,
+                        source_us=given.message.source_us if given.message.steady_us else 0,
                     )
                     for name, given in self._inputs.items()
                     if given.message is not None
                 ),
                 sent=tuple(
-                    m.OutputMessage(topic=name, epoch=message.epoch, seq=message.seq, sent_us=message.sent_us)
+                    m.OutputMessage(
+                        topic=name,
+                        epoch=message.epoch,
+                        seq=message.seq,
+                        sent_us=message.sent_us,
+                        steady_us=message.steady_us,
+                    )
                     for name, message in sent.items()
                 ),
                 state=state,

@@ -12,12 +12,16 @@ State = Annotated[str, msgspec.Meta(max_length=1_000_000)]
 
 
 class InputMessage(msgspec.Struct, frozen=True, kw_only=True):
-    """One message that a step was given, and when it came."""
+    """One message that a step was given, and when it came.
+
+    `source_us`: its stamp as the step was given it, by this machine's clock, where board and host are two; else 0.
+    """
 
     topic: Text
     epoch: Count
     seq: Count
     received_us: Stamp
+    source_us: Stamp = 0
 
 
 class OutputMessage(msgspec.Struct, frozen=True, kw_only=True):
@@ -27,6 +31,7 @@ class OutputMessage(msgspec.Struct, frozen=True, kw_only=True):
     epoch: Count
     seq: Count
     sent_us: Stamp
+    steady_us: Stamp = 0
 
 
 class Step(Message, frozen=True, kw_only=True):

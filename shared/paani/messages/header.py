@@ -20,7 +20,8 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     """Common header. `source_us` dates the evidence, not this message; a republish keeps it.
 
     The bus fills the rest when it publishes: `seq` counts this producer's messages on the key, `epoch`
-    changes when the producer restarts or its source begins again, `sent_us` is when it left.
+    changes when the producer restarts or its source begins again, `sent_us` is when it left. Where board and host are
+    two machines, `steady_us` is that too, by a clock of the producer's machine that is never set; else it is 0.
     """
 
     source_us: Stamp
@@ -29,3 +30,4 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     domain: Count = 43
     producer: Text = ""
     sent_us: Stamp = 0
+    steady_us: Stamp = 0

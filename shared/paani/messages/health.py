@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import msgspec
 
-from paani.messages.header import Count, Message, NonNegative, Text
+from paani.messages.header import Count, Message, NonNegative, Stamp, Text
 
 
 class Pulse(Message, frozen=True, kw_only=True):
-    """Ten times a second from the event loop of each vital process: silence means dead or hung."""
+    """Ten times a second from the event loop of each vital process: silence means dead or hung.
+
+    `echo_us`: of the process that echoes for its side, the newest `steady_us` heard of the other machine's; `heard_us`:
+    when that came, by the clock of `steady_us`. Zeros before any, and from every other process.
+    """
+
+    echo_us: Stamp = 0
+    heard_us: Stamp = 0
 
 
 class InputHealth(msgspec.Struct, frozen=True, kw_only=True):

@@ -12,7 +12,9 @@ from paani import keys
 from paani import messages as m
 from paani.config import with_settings
 from paani.decider import decider_of
+from paani.keys import Graph
 from paani.logs.reader import Record
+from paani.sides import ON_BOARD
 from paani_tools.replay.check import ServiceCheck, check_service
 from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import Ledger
@@ -71,6 +73,49 @@ def test_every_decision_is_the_same_to_the_byte(service: str) -> None:
     recorded = [r for r in DRIVE if r.topic in outputs]
     assert result.messages == len(recorded)
     assert result.message_bytes == sum(len(r.data) for r in recorded)
+
+
+def as_of_two_machines(records: list[Record]) -> list[Record]:
+    """The drive as board and host record it: the board's wall clock is 5 s ahead, and every message says when it left.
+
+    The host's steps write down the stamps of the board's messages as they were given them, by the host's clock.
+    """
+    on_board = {topic.name: topic.producer in ON_BOARD[Graph.SIMULATION] for topic in keys.TOPICS}
+    ahead_us, stamps_us, moved = 5_000_000, dict[tuple[str, int, int], int](), list[Record]()
+    for record in records:
+        message = msgspec.json.decode(record.data)
+        stamps_us[record.topic, message["epoch"], message["seq"]] = message["source_us"]
+        message["steady_us"] = 77 + record.seq
+        if on_board[record.topic]:
+            message["source_us"] += ahead_us
+            message["sent_us"] += ahead_us
+        if message.get("advisory_sent_us"):
+            message["advisory_sent_us"] += ahead_us
+        if record.topic == keys.STEPS["navigator"].name:
+            for heard in message["heard"]:
+                heard["source_us"] = stamps_us[heard["topic"], heard["epoch"], heard["seq"]]
+            for sent in message["sent"]:
+                sent["steady_us"] = 77 + sent["seq"]
+        data = msgspec.json.encode(msgspec.json.decode(msgspec.json.encode(message), type=keys_type(record.topic)))
+        moved.append(record._replace(data=data))
+    return moved
+
+
+def keys_type(name: str) -> type[m.Message]:
+    return next(topic.type for topic in keys.TOPICS if topic.name == name)
+
+
+def test_a_drive_of_two_machines_is_decided_again_by_the_stamps_that_the_steps_were_given() -> None:
+    """The navigator, on the host, hears advice of a board whose clock is 5 s ahead."""
+    alone, apart = drive(14.0), as_of_two_machines(drive(14.0))
+    navigator = decider_of("navigator")
+    topics = Ledger(navigator).topics
+    before, after = (
+        check_service(navigator, CONFIG, [r for r in records if r.topic in topics], Losses({}, ()))
+        for records in (alone, apart)
+    )
+    assert after.is_exact, after.differences[:3]
+    assert after.decisions == before.decisions
 
 
 def test_the_drive_has_decisions_of_every_kind() -> None:
