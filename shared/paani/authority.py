@@ -1,8 +1,9 @@
 """Who may do what on the bus: credentials, and the routers' access control from the table of keys.
 
 Default deny. A service may write exactly the keys whose producer it is in the graph (`bus.graph`), and read everything
-but the simulator's truth, which is for `TRUTH_READERS` alone. `OBSERVER` reads and never writes. A process without a
-place in the graph has no credential there and is no subject: no simulator joins a hull (A7).
+but the simulator's truth, which is for `TRUTH_READERS` alone. `OBSERVER` reads and never writes; the shore of a fleet
+hears `topics_ashore` and nothing else, and may write its requests to the operator's process. A process without a place
+in the graph has no credential there and is no subject: no simulator joins a hull (A7).
 """
 
 from __future__ import annotations
@@ -119,8 +120,15 @@ def access_control(config: BusConfig) -> dict[str, object]:
             rule("hear-truth", ["put"], "egress", truth_keys),
             rule("subscribe-truth", ["declare_subscriber"], "ingress", truth_keys),
         ]
+    heard_ashore = [f"{prefix}/{topic.name}" for topic in keys.topics_ashore(config.graph)]
+    requests = [f"{prefix}/{keys.REQUESTS[keys.SHORE].name}"]
+    ashore = [
+        rule("hear-ashore", ["put"], "egress", heard_ashore),
+        rule("subscribe-ashore", ["declare_subscriber"], "ingress", heard_ashore),
+        rule("see-subscribers-ashore", ["declare_subscriber"], "egress", requests),
+    ]
     for user in users:
-        mine = list(everyone) + (truth if user in TRUTH_READERS else [])
+        mine = list(ashore) if user == keys.SHORE else list(everyone) + (truth if user in TRUTH_READERS else [])
         if user != OBSERVER:
             written = [f"{prefix}/{name}" for name in written_at(config.side, user, config.graph)]
             mine.append(rule(f"write-{user}", ["put", "delete"], "ingress", written))

@@ -179,13 +179,16 @@ STEPS = {
     for service in DECIDING_SERVICES
 }
 
-# Who may ask the operator's process to stop or to arm: the page, `paani stop`, and `paani up` for a simulated boat.
-STATION = "dashboard"
-COMMAND_LINE_CLIENTS = ("stop", "arm")
+# Who may ask the operator's process to stop or to arm: the page, `paani stop`, the shore of a fleet (`paani fleet`),
+# and `paani up` for a simulated boat.
+STATION, SHORE = "dashboard", "shore"
+STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing
+COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm")
 REQUESTS = {
     client: Topic(
         name=f"operator/request/{client}", type=m.OperatorRequest, producer=client, rate_hz=10.0, fresh_s=0.6,
-        stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP, or a hold that arms",
+        stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP"
+        + ("" if client in STOPPING_CLIENTS else ", or a hold that arms"),
     )
     for client in (STATION, *COMMAND_LINE_CLIENTS)
 }
@@ -266,6 +269,12 @@ def topics_in(graph: Graph) -> tuple[Topic[Any], ...]:
     """The rows that somebody writes in this graph."""
     rows = (topic_in(topic, graph) for topic in TOPICS)
     return tuple(row for row in rows if row.producer != NOBODY)
+
+
+def topics_ashore(graph: Graph) -> tuple[Topic[Any], ...]:
+    """What the shore of a fleet may hear of a vessel: where it is, what it is about, who has stopped it, and health."""
+    rows = (ODOMETRY, ADVISORY, COMMAND, OPERATOR_STATE, THRUST_APPLIED)
+    return (*(topic_in(row, graph) for row in rows), *(health(name) for name in services_in(graph)))
 
 
 def producers_text(topic: Topic[Any]) -> str:

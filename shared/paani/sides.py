@@ -10,10 +10,17 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
 
-from paani.keys import Graph, Stance, Topic, command_line_clients_in, every_topic, services_in
+from paani.keys import (
+    STOPPING_CLIENTS,
+    Graph,
+    Stance,
+    Topic,
+    command_line_clients_in,
+    every_topic,
+    services_in,
+)
 
 ROUTER = "router"
-STOP_CLIENT = "stop"  # `paani stop`, on either machine
 TRUTH = "@truth/"
 
 
@@ -65,7 +72,9 @@ def writers_on(side: Side, graph: Graph) -> tuple[str, ...]:
 
     STOP may be asked for on either machine; arming only where the operator is.
     """
-    clients = tuple(name for name in command_line_clients_in(graph) if name == STOP_CLIENT or side is not Side.BOARD)
+    clients = tuple(
+        name for name in command_line_clients_in(graph) if name in STOPPING_CLIENTS or side is not Side.BOARD
+    )
     return (*services_on(side, graph), *clients)
 
 

@@ -75,6 +75,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("from pyubx2", "services/paani_services/sensors/"),
         ("from mcap", "shared/paani/logs/"),
         ("from cryptography", "services/paani_tools/certs/"),
+        ("from distributed", "shared/paani/cluster.py"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
         ("MsgspecError", "shared/paani/undecodable.py"),  # what decoders raise has one list
         ("msgspec.ValidationError", "shared/paani/bus/admission.py"),

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from paani import authority, keys
+from paani.bus.routing import listening
 from paani.config import BusConfig, Config, load_config
 from paani.errors import UserError
 from paani.keys import Graph
@@ -68,7 +69,7 @@ def test_stop_may_be_asked_for_on_either_machine_and_arming_only_where_the_opera
     for side in SIDES:
         clients = set(writers_on(side, graph)) - set(services_on(side, graph))
         arms = {"arm"} if side is Side.HOST and graph is Graph.SIMULATION else set()
-        assert clients == {"stop"} | arms
+        assert clients == {"stop", "shore"} | arms
 
 
 def test_the_papers_split_and_a_hulls() -> None:
@@ -130,6 +131,16 @@ def test_each_router_knows_the_other_by_what_it_is_told(runtime: str) -> None:
     }
     assert len(board_id) == 32
     assert board_id != authority.board_router_id(config_on(Side.HOST, Graph.HULL, runtime).bus)
+
+
+def test_the_shore_signs_in_at_the_board_where_there_are_two_machines(runtime: str) -> None:
+    """At a door of its own, and only where one is set."""
+    sets = ("bus.shore=tcp/127.0.0.1:7450", "bus.link=tcp/127.0.0.1:7448", f"bus.runtime_dir={runtime}")
+    doors = {side: listening(load_config(sets=(f"bus.side={side}", *sets)).bus) for side in Side}
+    router = Config().bus.router
+    assert doors[Side.BOTH] == [router, "tcp/127.0.0.1:7450"]
+    assert doors[Side.BOARD] == [router, "tcp/127.0.0.1:7448", "tcp/127.0.0.1:7450"]
+    assert doors[Side.HOST] == [router] == listening(Config().bus)
 
 
 def test_one_machine_has_no_link(runtime: str) -> None:

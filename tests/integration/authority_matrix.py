@@ -23,7 +23,7 @@ from paani.bus.routing import router_config
 from paani.bus.session import client_config
 from paani.clock import WallClock
 from paani.config import BusConfig
-from paani.keys import Graph, Stance
+from paani.keys import SHORE, Graph, Stance
 from paani.link_access import LINK
 from paani_tools.certs.folder import make
 from tests.conftest import find_free_port
@@ -68,6 +68,8 @@ def expected_heard(graph: Graph, reader: str, topic: keys.Topic[Any]) -> set[tup
     """By the table of keys alone: a topic's producer, and the simulator's truth for its readers only."""
     if reader in {LINK, topic.producer}:
         return set()
+    if reader == SHORE:
+        return {(topic.producer, "put")} if topic in keys.topics_ashore(graph) else set()
     if topic.name.startswith("@truth/"):
         return {(topic.producer, "put")} if reader in TRUTH_READERS else set()
     return {(topic.producer, "put"), (topic.producer, "delete")}
@@ -75,7 +77,7 @@ def expected_heard(graph: Graph, reader: str, topic: keys.Topic[Any]) -> set[tup
 
 def expected_answers(asker: str, topic: keys.Topic[Any]) -> set[str]:
     """By the table of keys alone: only pictures are asked for, and only their producer answers."""
-    if asker in {LINK, topic.producer} or topic.stance is not Stance.PICTURE:
+    if asker in {LINK, SHORE, topic.producer} or topic.stance is not Stance.PICTURE:
         return set()
     return {topic.producer}
 

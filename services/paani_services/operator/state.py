@@ -10,7 +10,7 @@ import msgspec
 from msgspec.structs import replace
 
 from paani import messages as m
-from paani.keys import STATION
+from paani.keys import STATION, STOPPING_CLIENTS
 
 HOLD_MIN_S, HOLD_MAX_S = 1.0, 5.0
 REFRESH_MAX_S = 0.6  # three times what a page takes to say it again
@@ -71,8 +71,10 @@ def latch_stop(operator: Operator, client: str, now_us: int) -> Operator:
 def hold(operator: Operator, client: str, press: int, now_us: int) -> Operator:
     """A client says that its button is held: the hold begins, or goes on where it was never silent for too long.
 
-    One hold at a time; a press that has ended does not begin again.
+    One hold at a time; a press that has ended does not begin again. Of clients that may only stop it is passed over.
     """
+    if client in STOPPING_CLIENTS:
+        return operator
     held = operator.hold
     if held is not None and (held.client, held.press) == (client, press):
         if is_silent(held, now_us):

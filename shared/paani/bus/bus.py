@@ -27,7 +27,7 @@ from paani.heartbeat import Heartbeat
 from paani.link_access import LINK
 from paani.memory import RECYCLE_S, recycle, set_loaded_apart
 from paani.runtime import runtime_dir
-from paani.sides import ECHOES, ROUTER, STOP_CLIENT, Side, is_sent_from
+from paani.sides import ECHOES, ROUTER, Side, is_sent_from
 
 T = TypeVar("T", bound=m.Message)
 MAX_PICTURE_BYTES = 16 << 20  # encoded; a 12-megapixel JPEG of the best quality is half of it
@@ -207,11 +207,14 @@ class Bus:
         """By how much this machine's clock is ahead of the one that stamps a topic; see `other_machine`.
 
         The other machine's pulses, and STOP, which may come from either, are never of the future: their receivers ask
-        when they came, not when they were sent. Nor are the pictures that a router only hands on.
+        when they came, not when they were sent. Nor are the pictures that a router only hands on. The shore of a fleet
+        has a clock of its own, which nobody learns.
         """
         side = self._config.side
+        if keys.SHORE in {self.user, row.producer}:
+            return since_sent
         is_other = is_sent_from(side.other, row, self._config.graph)
-        if side is Side.BOTH or not (is_other or row.producer == STOP_CLIENT):
+        if side is Side.BOTH or not (is_other or row.producer in keys.STOPPING_CLIENTS):
             return same_clock
         if not is_other or row.type is m.Pulse or self.user == LINK:
             return since_sent

@@ -40,8 +40,17 @@ def router_config(config: BusConfig) -> zenoh.Config:
 
 def listening(config: BusConfig) -> list[str]:
     """Endpoints at which this side's router listens."""
-    addresses = [config.router, config.link] if config.side is Side.BOARD else [config.router]
-    return [endpoint(config, address) for address in addresses]
+    return [endpoint(config, address) for address in _doors(config).values()]
+
+
+def _doors(config: BusConfig) -> dict[str, str]:
+    """Where this side's router listens, by the setting."""
+    doors = {"bus.router": config.router}
+    if config.side is Side.BOARD:
+        doors["bus.link"] = config.link
+    if config.shore and config.side is not Side.HOST:
+        doors["bus.shore"] = config.shore
+    return doors
 
 
 def _identity(config: BusConfig) -> dict[str, object]:
@@ -89,11 +98,11 @@ def require_addresses(config: BusConfig) -> None:
         raise UserError(
             f"bus.link: not set (board and host meet at tcp/ADDRESS:PORT of the board; this is the {config.side})"
         )
-    for name, address in (("bus.router", config.router), ("bus.link", config.link)):
+    for name, address in (("bus.router", config.router), ("bus.link", config.link), ("bus.shore", config.shore)):
         if address.startswith("tls/") and not config.certificates:
             raise UserError(f"{name} {address}: needs certificates (`paani certs make`, then bus.certificates)")
-    for name, address in zip(("bus.router", "bus.link"), listening(config), strict=False):
-        _require_free(name, address)
+    for name, address in _doors(config).items():
+        _require_free(name, endpoint(config, address))
     if config.side is Side.HOST:
         parse_endpoint("bus.link", config.link)
 

@@ -38,6 +38,8 @@ class BusConfig(Section, frozen=True):
     side: Side = Side.BOTH  # which processes run here; `paani up --only` sets it
     # Where board and host meet (tcp/ADDRESS:PORT of the board): the board's router listens there, the host's connects.
     link: str = ""
+    # Where the shore of a fleet signs in (tcp/ADDRESS:PORT of the vessel; of two machines the board's). Empty: nowhere.
+    shore: str = ""
     # Folder of `paani certs make`: the bus is encrypted, and who speaks is told by certificate. Empty: by password.
     certificates: str = ""
     runtime_dir: str = ""

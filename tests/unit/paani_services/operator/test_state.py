@@ -78,6 +78,16 @@ def test_a_command_may_not_release_a_stop() -> None:
     assert op.judge_release(state, "arm", 7, BEGUN_US + 1_200_000) is m.ArmRefusal.NONE
 
 
+@pytest.mark.parametrize("client", ["stop", "shore"])
+def test_who_may_only_stop_holds_nothing(client: str) -> None:
+    """Neither arms nor keeps somebody else's button from arming."""
+    state = held(op.initial_state(op.CLEAR), 1.2, client=client)
+    assert state == op.initial_state(op.CLEAR)
+    assert op.judge_release(state, client, 7, BEGUN_US + 1_200_000) is m.ArmRefusal.BROKEN
+    state = held(op.initial_state(op.CLEAR), 1.2)
+    assert op.hold(state, client, 8, BEGUN_US + 1_200_000) == state
+
+
 def test_a_stop_ends_the_hold() -> None:
     state = op.latch_stop(held(op.initial_state(op.CLEAR), 1.2), "stop", BEGUN_US)
     assert (state.hold, state.ended) == (None, op.Ended(STATION, 7, m.ArmRefusal.STOPPED))
@@ -119,7 +129,7 @@ def test_the_boat_is_armed_for_as_long_as_the_pages_process_lives() -> None:
 ACTS = st.lists(
     st.tuples(
         st.sampled_from(["hold", "release", "stop", "station"]),
-        st.sampled_from([STATION, "stop", "arm"]),
+        st.sampled_from([STATION, "stop", "shore", "arm"]),
         st.integers(1, 2),
         st.integers(0, 900_000),
     ),

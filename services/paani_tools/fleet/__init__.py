@@ -1,0 +1,1 @@
+"""`paani fleet`: many vessels, watched and stopped from the shore."""
