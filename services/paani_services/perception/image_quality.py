@@ -82,7 +82,7 @@ def check_image_quality(
     cause = find_cause(measure_statistics(luma, thumbnail), config)
     if fitness is not None and cause in (UnusableCause.NONE, UnusableCause.SKEWED):
         cause = _apply_fitness(fitness, reduced, cause, config)
-    if cause is UnusableCause.NONE and state.repeats >= config.frozen_frames:
+    if cause in (UnusableCause.NONE, UnusableCause.UNFIT) and state.repeats >= config.frozen_frames:
         cause = UnusableCause.FROZEN
     return state, cause
 

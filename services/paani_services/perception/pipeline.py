@@ -31,6 +31,7 @@ from paani_services.perception.image_quality import ImageQualityState, check_ima
 from paani_services.perception.picture_decoding import decode_picture
 from paani_services.perception.preprocessing import letterbox_picture, lookup_tables_for, stretch_picture
 from paani_services.perception.roll_compensation import level_mask, limit_roll_rad
+from paani_services.perception.view import judge_view
 
 NO_SEGMENTER = "none"  # value of `perception.segmenter` for colour segmentation alone
 MIN_SLOWER_RATIO = 1.2  # of two run times; networks that take about as long keep their order, whatever one run says
@@ -118,7 +119,7 @@ class Perceiver:
         timing = InferenceTiming(
             frame_age_ms=max(0.0, age_s) * 1e3, decode_ms=decoded_ms - start_ms, gate_ms=checked_ms - decoded_ms
         )
-        if bgr is None or cause is not UnusableCause.NONE:
+        if bgr is None or not self._may_be_usable(cause):
             return self._build_evidence(header, bgr, cause, (), None, timing, start_ms), None
         if detecting:
             segmentation = self._segment(bgr, roll_rad)
@@ -126,6 +127,7 @@ class Perceiver:
         else:
             found = self._detect(bgr)
             segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
+        cause = self._judge_view(cause, found, segmentation)
         timing = msgspec.structs.replace(
             timing,
             detector_ms=found.duration_ms,
@@ -133,6 +135,8 @@ class Perceiver:
             segmenter_run_ms=segmentation.run_ms,
             inference_ms=self._stopwatch_ms() - checked_ms,
         )
+        if cause is not UnusableCause.NONE:
+            return self._build_evidence(header, bgr, cause, (), None, timing, start_ms), None
         evidence = self._build_evidence(header, bgr, cause, found.detections, segmentation, timing, start_ms)
         return msgspec.structs.replace(
             evidence, roll_rad=roll_rad, candidates=self._find_candidates(found, segmentation)
@@ -162,6 +166,19 @@ class Perceiver:
             self._quality, bgr, header.frame_epoch, self._config.image_quality, self._fitness
         )
         return UnusableCause.STALE if age_s > self._config.max_frame_age_s else cause
+
+    def _may_be_usable(self, cause: UnusableCause) -> bool:
+        """Whether the networks are asked: the picture is sound, or only the fitness network doubts it."""
+        is_doubted = cause is UnusableCause.UNFIT and self._config.image_quality.swimmer_height > 0.0
+        return cause is UnusableCause.NONE or is_doubted
+
+    def _judge_view(self, cause: UnusableCause, found: Found, segmentation: Segmentation) -> UnusableCause:
+        if not self._config.image_quality.enabled or segmentation.source is not SegmentationSource.LEARNED:
+            return cause
+        mask, confidence = segmentation.mask, segmentation.confidence
+        visible_frac = self._visible_fractions_of(mask.shape)
+        detections, config = found.detections, self._config
+        return judge_view(cause, mask, confidence, visible_frac, detections, config.corridors, config.image_quality)
 
     def _detect(self, bgr: U8) -> Found:
         start_ms = self._stopwatch_ms()

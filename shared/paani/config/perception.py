@@ -59,6 +59,10 @@ class ImageQualityConfig(Section, frozen=True):
     model: str = ""  # path of an ONNX file; empty: the shipped model
     min_fitness: Fraction = 0.37  # `paani models train gate` says how much each refuses and lets through
     sure_fitness: Fraction = 0.97
+    min_water: Fraction = 0.01  # of the mask; land that fills the picture is no boat's view
+    max_endless: Fraction = 0.95  # of the mask's columns that are water to the top: seen from above, or no horizon
+    swimmer_height: Fraction = 0.10  # of the picture: who is in the centre wins over the network's doubt; 0: nobody
+    swimmer_water_confidence: Fraction = 0.80  # of the mask where it shows water, for that
 
 
 class DetectorConfig(Section, frozen=True):

@@ -34,6 +34,8 @@ class UnusableCause(StrEnum):
     SKEWED = "skewed"
     FROZEN = "frozen"
     UNFIT = "unfit"
+    NO_WATER = "no_water"
+    NO_HORIZON = "no_horizon"
     STALE = "stale"
 
 

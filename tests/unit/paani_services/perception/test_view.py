@@ -1,0 +1,111 @@
+"""Views that no boat has are unusable by their cause, and a swimmer's close-up is usable."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from paani.arrays import F32, U8
+from paani.clock import stopwatch_ms
+from paani.config import load_config
+from paani.messages import BoxXyxy, Detection, Label, PictureHeader, UnusableCause
+from paani_services.perception.pipeline import Perceiver
+from paani_services.perception.view import judge_view
+from tests.pictures import river
+
+CONFIG = load_config().perception
+ROWS, COLUMNS = 64, 80
+VISIBLE = np.ones((ROWS, COLUMNS), np.float32)
+NONE, UNFIT = UnusableCause.NONE, UnusableCause.UNFIT
+WATER, OBSTACLE = 0, 1
+SWIMMER = (0.45, 0.45, 0.55, 0.60)
+
+
+def view(
+    mask: U8, cause: UnusableCause = NONE, box: BoxXyxy | None = None, sure: float = 0.9, visible: F32 = VISIBLE
+) -> UnusableCause:
+    people = () if box is None else (Detection(label=Label.PERSON, confidence=0.6, box_xyxy=box),)
+    confidence = np.full(mask.shape, sure, np.float32)
+    return judge_view(cause, mask, confidence, visible, people, CONFIG.corridors, CONFIG.image_quality)
+
+
+def below(row: int) -> U8:
+    """Water below a row of the mask, obstacle above."""
+    mask = np.full((ROWS, COLUMNS), OBSTACLE, np.uint8)
+    mask[row:] = WATER
+    return mask
+
+
+@pytest.mark.parametrize("row", [1, 20, 40, 62])
+def test_water_below_something_is_a_boat_s_view(row: int) -> None:
+    assert view(below(row)) is NONE
+
+
+def test_land_that_fills_the_picture_is_named() -> None:
+    assert view(below(ROWS)) is UnusableCause.NO_WATER
+    puddle = below(ROWS)
+    puddle[60:63, 40:55] = WATER  # 45 cells of 5,120
+    assert view(puddle) is UnusableCause.NO_WATER
+    puddle[60:64, 40:55] = WATER
+    assert view(puddle) is NONE
+    hidden = VISIBLE.copy()
+    hidden[60:, 40:55] = 0.0  # what shows there is the own hull
+    assert view(puddle, visible=hidden) is UnusableCause.NO_WATER
+
+
+def test_water_to_the_top_is_seen_from_above_or_has_no_horizon() -> None:
+    endless = below(0)
+    assert view(endless) is UnusableCause.NO_HORIZON
+    endless[0, :5] = OBSTACLE
+    assert view(endless) is NONE
+
+
+def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> None:
+    pool = below(0)
+    assert view(below(20), UNFIT) is UNFIT
+    assert view(below(20), UNFIT, SWIMMER) is NONE
+    assert view(pool, UNFIT, SWIMMER) is NONE
+    assert view(pool, NONE, SWIMMER) is NONE
+
+
+@pytest.mark.parametrize(
+    ("box", "sure", "row"),
+    [
+        (SWIMMER, 0.7, 20),  # the mask is not sure of the water
+        ((0.45, 0.45, 0.55, 0.54), 0.9, 20),  # small
+        ((0.05, 0.45, 0.15, 0.60), 0.9, 20),  # beside the way, which would be straight on
+        (SWIMMER, 0.9, 40),  # on the bank
+        (SWIMMER, 0.9, ROWS),  # ashore
+        ((0.45, 0.10, 0.55, 0.29), 0.9, 0),  # above the corridors
+    ],
+)
+def test_doubt_stays_without_a_near_swimmer_in_water_that_is_sure(box: BoxXyxy, sure: float, row: int) -> None:
+    assert view(below(row), UNFIT, box, sure) is UNFIT
+
+
+def header(seq: int) -> PictureHeader:
+    return PictureHeader(source_us=1 + seq, frame_seq=seq, frame_epoch=1, width_px=320, height_px=240)
+
+
+def test_the_pipeline_names_the_view_and_gives_no_mask() -> None:
+    """A limit that no picture meets makes any view one without water."""
+    quality = msgspec.structs.replace(CONFIG.image_quality, min_water=1.0)
+    perceiver = Perceiver(msgspec.structs.replace(CONFIG, image_quality=quality), stopwatch_ms)
+    try:
+        evidence, mask = perceiver.perceive(river(), header(0), 0.0)
+    finally:
+        perceiver.close()
+    assert (evidence.usable, evidence.cause, mask) == (False, UnusableCause.NO_WATER, None)
+    assert evidence.detections == ()
+    assert evidence.center.non_water == 1.0
+
+
+def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_itself_is_frozen() -> None:
+    quality = msgspec.structs.replace(CONFIG.image_quality, min_fitness=1.0, sure_fitness=1.0)
+    perceiver = Perceiver(msgspec.structs.replace(CONFIG, image_quality=quality), stopwatch_ms)
+    try:
+        causes = [perceiver.perceive(river(), header(seq), 0.0)[0].cause for seq in range(4)]
+    finally:
+        perceiver.close()
+    assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]
