@@ -28,8 +28,9 @@ from paani_sim.trials.run_trial import load_case_config, run_trial
 from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
 from paani_sim.trials.suite_summary import summarise_suite
 from paani_sim.trials.summary_table import format_summary
-from paani_sim.trials.trial_cases import SUITES, TrialCase, list_cases, parse_case
+from paani_sim.trials.trial_cases import SUITES, TrialCase, is_fixed_scenario, list_cases, parse_case
 from paani_sim.worlds import WORLDS
+from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import load_scenario
 
 
@@ -108,8 +109,9 @@ def _open_ledger(options: argparse.Namespace) -> tuple[SeedChoice, Ledger | None
         if options.ledger:
             raise UserError("--ledger is for validation and fresh seeds")
         return choice, None
-    if options.scenario:
-        raise UserError(f"--scenario: written scenarios are for development, not for {choice.part.value} seeds")
+    worlds = options.scenario or options.worlds or SUITES[options.suite].worlds
+    if any(is_fixed_scenario(world) for world in worlds):
+        raise UserError(f"--seeds: written scenarios are for development, not for {choice.part.value} seeds")
     root = find_checkout()
     path: Path = options.ledger or root / LEDGER_NAME
     choice = msgspec.structs.replace(choice, commit=resolve_commit(root, choice.commit or "HEAD", path))
@@ -160,11 +162,12 @@ def _run_one(options: argparse.Namespace) -> int:
 
 
 def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[TrialCase]:
-    worlds = options.scenario or options.worlds or list(WORLDS)
+    worlds = options.scenario or options.worlds or list(SUITES[options.suite].worlds)
+    known = (*WORLDS, *IMAZU_SCENARIOS)
     for world in worlds:
         if options.scenario:
             load_scenario(world)
-        elif world not in WORLDS:
+        elif world not in known:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
     return list_cases(SUITES[options.suite], worlds, options.policy, choice)
 

@@ -2,7 +2,17 @@
 
 import math
 
+import msgspec
+
 Z_95 = 1.959963984540054
+
+
+class Share(msgspec.Struct, frozen=True, kw_only=True):
+    """A share of trials with its 95 % Wilson interval, in [0, 1]."""
+
+    share: float
+    low: float
+    high: float
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -23,3 +33,9 @@ def poisson_interval(count: int) -> tuple[float, float]:
     low = count * (1.0 - 1.0 / (9.0 * count) - Z_95 / (3.0 * math.sqrt(count))) ** 3 if count else 0.0
     more = count + 1
     return low, more * (1.0 - 1.0 / (9.0 * more) + Z_95 / (3.0 * math.sqrt(more))) ** 3
+
+
+def share_with_interval(successes: int, trials: int) -> Share:
+    """A share with its Wilson interval."""
+    low, high = wilson_interval(successes, trials)
+    return Share(share=round(successes / trials, 4) if trials else 0.0, low=round(low, 4), high=round(high, 4))

@@ -11,9 +11,13 @@ from string import Template
 
 from paani.statistics.charts import bar
 from paani.whole_file import write_whole
+from paani_sim.trials.imazu_sheet import draw_imazu_sheet
+from paani_sim.trials.imazu_summary import ImazuSummary
+from paani_sim.trials.intervals import Share
+from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import CLOSENESS_LIMIT_M, Closeness, TrialResult
 from paani_sim.trials.seed_parts import SeedPart
-from paani_sim.trials.suite_summary import PolicyFigures, Share, Summary
+from paani_sim.trials.suite_summary import PolicyFigures, Summary
 from paani_sim.trials.summary_table import describe_seeds
 from paani_sim.trials.track_chart import draw_track_chart
 from paani_sim.trials.trial_cases import TrialCase, build_scenario
@@ -26,6 +30,14 @@ LEGEND = (
     '<span style="background:#8a6d4b"></span>vessel'
     '<span style="background:#77685a"></span>pier<span style="background:#b0317a"></span>swimmer. '
     "Dashed: the route, and the ways of what moves, drawn where it would be at the worst moment.</p>"
+)
+
+IMAZU_LEGEND = (
+    "<p>One to three vessels that reach one point together with the boat, if nobody manoeuvres; none gives way. The "
+    "groups say what the lens sees of them at the start: from outside the lens nothing comes into it on a collision "
+    "course, unless the boat turns. Scores by the class's own rule, 0 to 1. In the sheets: the boat in blue from the "
+    "left, vessels in brown from the large dot on, a dot every ten seconds, the lens to 14 m, contacts in red; the "
+    "caption has the least clearance.</p>"
 )
 
 
@@ -66,6 +78,10 @@ def render_page(
     ]
     if summary.faults:
         body += ["<h2>Faults</h2>", _fault_table(summary)]
+    if summary.imazu:
+        body += ["<h2>Imazu cases</h2>", IMAZU_LEGEND, _imazu_table(summary.imazu)]
+        for policy in summary.imazu:
+            body += [f"<h3>{escape(policy)}</h3>", draw_imazu_sheet(results, Policy(policy))]
     body += [
         "<h2>Worst drives</h2>",
         LEGEND if repeated else '<p class="faint">None is shown.</p>',
@@ -127,6 +143,25 @@ def _closeness_table(rows: Mapping[str, PolicyFigures]) -> str:
     return _table(
         ("", "contact", *(f"under {under_m}&nbsp;m" for under_m in CLOSENESS_LIMIT_M.values()), "farther"), body
     )
+
+
+def _imazu_table(summary: ImazuSummary) -> str:
+    head = (
+        "", "form and group", "drives", "completed", "without contact", "contacts", "under 0.5&nbsp;m",
+        "domain entered", "time lost [s]", "scores (encounters)",
+    )  # fmt: skip
+    rows = [
+        (
+            escape(policy), escape(f"{form}, {group}"), str(f.drives), str(f.completed), _share_cell(f.untouched_share),
+            _count_cell(f.contacts), str(f.near), str(f.domain_entered),
+            "-" if f.time_lost_s is None else f"{f.time_lost_s:.1f}",
+            "<br>".join(f"{kind.replace('_', ' ')} {s.mean:.2f} ({s.encounters})" for kind, s in f.scores.items()),
+        )
+        for policy, forms in summary.items()
+        for form, groups in forms.items()
+        for group, f in groups.items()
+    ]  # fmt: skip
+    return _table(head, rows, "words")
 
 
 def _stop_table(rows: Mapping[str, PolicyFigures]) -> str:

@@ -9,6 +9,7 @@ import msgspec
 from paani.statistics.dithering import Dithering
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.policies import Policy
+from paani_sim.trials.rule_encounters import RuleEncounter
 from paani_sim.trials.seed_parts import SeedPart
 
 
@@ -96,6 +97,7 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     """One drive. `track`: time, x, y every two seconds. Cross-track error is that of the true position.
 
     `part`: what the seed may be used for. `profile`: of the settings that it was driven with; `hfov_deg`: of its lens.
+    `rule_encounters`: of the Imazu cases alone.
     """
 
     scenario: str
@@ -133,3 +135,4 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     dithering: Dithering
     track: tuple[tuple[float, float, float], ...]
     state_hash: str
+    rule_encounters: tuple[RuleEncounter, ...] = ()

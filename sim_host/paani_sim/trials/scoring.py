@@ -36,9 +36,11 @@ from paani_sim.trials.result import (
     TrialResult,
     is_near_miss,
 )
+from paani_sim.trials.rule_encounters import RuleEncounter, measure_rule_encounters
 from paani_sim.trials.seed_parts import part_of_seed
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
+from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 
 ENCOUNTER_RANGE_M = {
     "thing": 5.0,
@@ -62,6 +64,11 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
     cross_track_m = np.array([sample.cross_track_m for sample in samples] or [0.0])
     things = [encounter for encounter in encounters if encounter.what != BANK]
     banks = [encounter for encounter in encounters if encounter.what == BANK]
+    rule_encounters: tuple[RuleEncounter, ...] = ()
+    if scenario.name in IMAZU_SCENARIOS:
+        surge_mps = np.array([sample.surge_mps for sample in samples])
+        cruise_mps = drive.config.navigator.cruise_mps
+        rule_encounters = measure_rule_encounters(world, hull_path, surge_mps, cruise_mps, eye.hfov_deg)
     every = round(TRACK_INTERVAL_S * SAMPLE_HZ)
     return TrialResult(
         scenario=scenario.name,
@@ -99,6 +106,7 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
         dithering=dithering(history.advisories),
         track=tuple((round(s.t_s, 1), round(s.x_m, 2), round(s.y_m, 2)) for s in samples[::every]),
         state_hash=drive.plant.state_hash(),
+        rule_encounters=rule_encounters,
     )
 
 

@@ -8,21 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 
 from paani.statistics.order_statistics import nearest_rank
-from paani_sim.trials.intervals import poisson_interval, wilson_interval
+from paani_sim.trials.imazu_summary import ImazuSummary, summarise_imazu
+from paani_sim.trials.intervals import Share, poisson_interval, share_with_interval
 from paani_sim.trials.ledger import LedgerCounts
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import PERSON_CLEARANCE_M, Closeness, TrialResult, is_near_miss
 from paani_sim.trials.seed_parts import SeedPart, part_of_parts
 from paani_sim.trials.trial_cases import TrialCase
 from paani_sim.worlds import Kind
-
-
-class Share(msgspec.Struct, frozen=True, kw_only=True):
-    """A share of trials with its 95 % Wilson interval, in [0, 1]."""
-
-    share: float
-    low: float
-    high: float
 
 
 class StopFigures(msgspec.Struct, frozen=True, kw_only=True):
@@ -118,6 +111,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     policies: dict[str, PolicyFigures]
     worlds: dict[str, dict[str, PolicyFigures]]
     faults: dict[str, FaultFigures]
+    imazu: ImazuSummary = {}
 
 
 def summarise_suite(
@@ -154,6 +148,7 @@ def summarise_suite(
         faults={
             kind: summarise_fault_drives([r for c, r in sorted(results.items()) if c.fault == kind]) for kind in kinds
         },
+        imazu=summarise_imazu(results),
     )
 
 
@@ -232,12 +227,6 @@ def summarise_fault_drives(results: Sequence[TrialResult]) -> FaultFigures:
         worst_zero_thrust_s=max(zero, default=None),
         worst_rest_s=max(rest, default=None),
     )
-
-
-def share_with_interval(successes: int, trials: int) -> Share:
-    """A share with its Wilson interval."""
-    low, high = wilson_interval(successes, trials)
-    return Share(share=round(successes / trials, 4) if trials else 0.0, low=round(low, 4), high=round(high, 4))
 
 
 def _rate_interval(count: int, km: float) -> tuple[float, float]:

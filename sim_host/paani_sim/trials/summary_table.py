@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from paani_sim.trials.suite_summary import PolicyFigures, SeedsDriven, Share, Summary
+from paani_sim.trials.imazu_summary import format_imazu
+from paani_sim.trials.intervals import Share
+from paani_sim.trials.suite_summary import PolicyFigures, SeedsDriven, Summary
 
 _Column = tuple[str, int]
 _DRIVE_COLUMNS: tuple[_Column, ...] = (
@@ -33,6 +35,7 @@ def format_summary(summary: Summary) -> str:
             judged = f"{f.in_time}/{f.judged}" if f.judged else "-"
             worst = "-" if f.worst_zero_thrust_s is None else f"{f.worst_zero_thrust_s:.2f}"
             lines.append(f"{name:16} {f.trials:6} {f.completed:9} {f.collisions:8} {judged:>9} {worst:>12}")
+    lines += format_imazu(summary.imazu)
     return "\n".join(lines) + "\n"
 
 

@@ -15,6 +15,7 @@ from paani_sim.trials.policies import Policy
 from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import draw_random_scenario
+from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
 FIELD_SEPARATOR, FAULT_SEPARATOR = ":", "+"
@@ -62,12 +63,13 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
 
 
 class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
-    """`seed_count` seeds in every world for every policy; then, for `paani`, each fault in every world so many times.
+    """`seed_count` seeds in every one of `worlds` for every policy; for `paani` also each fault in each so many times.
 
     `paper_seed_stride`: distance between the seeds of PAPER, whose drives take four times as long.
     """
 
     seed_count: int
+    worlds: tuple[str, ...] = tuple(WORLDS)
     paper_seed_stride: int = 1
     camera_faults: int = 0
     other_faults: int = 0
@@ -76,12 +78,13 @@ class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
 SUITES = {
     "quick": TrialSuite(seed_count=2, paper_seed_stride=2),
     "standard": TrialSuite(seed_count=50, paper_seed_stride=10, camera_faults=3, other_faults=1),
+    "imazu": TrialSuite(seed_count=1, worlds=IMAZU_SCENARIOS),
 }
 
 
 def is_fixed_scenario(world: str) -> bool:
     """Whether this names a written scenario, by name or as a file, and not a kind of world to draw one in."""
-    return world.endswith(".toml") or world in SCENARIOS
+    return world.endswith(".toml") or world in SCENARIOS or world in IMAZU_SCENARIOS
 
 
 def list_cases(

@@ -16,6 +16,7 @@ from paani_sim.worlds import WORLDS, load_world
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS
 from paani_sim.worlds.faults import Fault
 from paani_sim.worlds.generate import draw_random_scenario
+from paani_sim.worlds.imazu import IMAZU_SCENARIOS, build_imazu_scenario
 from paani_sim.worlds.route_frame import cut_route, start_pose
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.scenario_check import check_legs, check_scenario
@@ -37,13 +38,15 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         return Scenario(name, world, task=Task(0.0, _time_limit_s(world.route_length_m)))
     if drawn := _RANDOM.fullmatch(name):
         return draw_random_scenario(drawn[1], int(drawn[2]))
+    if name in IMAZU_SCENARIOS:
+        return build_imazu_scenario(name)
     if name in SCENARIOS:
         return _load_file(FOLDER / f"{name}.toml")
     if isinstance(name_or_path, Path) or name.endswith(".toml"):
         return _load_file(Path(name))
     raise UserError(
         f"world: unknown world {name!r} (worlds: {', '.join(WORLDS)}; scenarios: {', '.join(SCENARIOS)}; "
-        "random:WORLD:SEED; or a TOML file)"
+        "random:WORLD:SEED; imazu-01 to imazu-22 and imazu-fair-01 to imazu-fair-22; or a TOML file)"
     )
 
 

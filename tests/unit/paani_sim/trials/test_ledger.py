@@ -154,6 +154,7 @@ def test_a_place_without_git_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
     ("words", "says"),
     [
         (["--seeds", "fresh:2@HEAD", "--scenario", "river_swimmer"], "written scenarios are for development"),
+        (["--seeds", "fresh:2@HEAD", "--suite", "imazu"], "written scenarios are for development"),
         (["--seeds", "1..2", "--ledger", "ledger.jsonl"], "--ledger is for validation and fresh"),
         (["--seeds", "fresh:2@deadbeef"], "no commit 'deadbeef'"),
         (["--one", "lake:10001:paani"], "never looked into"),

@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from paani_sim.trials.drive_recorder import DriveRecorder
+from paani_sim.trials.imazu_sheet import draw_imazu_sheet
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.report import render_page
 from paani_sim.trials.result import Contact, TrialResult
@@ -66,6 +67,23 @@ def test_the_page_stands_alone() -> None:
     assert "driven again it went otherwise" in text
     assert not re.search(r"(src|href)=.(https?:)?//", text)
     assert "NaN" not in text
+
+
+def test_the_page_has_a_sheet_of_the_imazu_cases() -> None:
+    """Each driven case once, with its vessels, the boat's track and contacts; worlds are not on it."""
+    track = tuple((2.0 * k, 1.2 * k, 0.0) for k in range(40))
+    hit = touched(msgspec.structs.replace(RESULT, track=track))
+    results = {TrialCase(name, 1, Policy.PAANI): hit for name in ("imazu-05", "imazu-fair-18", "lake")}
+    sheet = draw_imazu_sheet(results, Policy.PAANI)
+    drawn = ElementTree.fromstring(sheet)
+    kinds = [element.get("class") for element in drawn]
+    assert [kinds.count(kind) for kind in ("sea", "track", "target", "hit", "bad")] == [2, 2, 5, 2, 2]
+    captions = [element.text for element in drawn.iter("text")]
+    assert captions == ["5 plain: H A, 0.0 m", "18 camera-fair: F D C, 0.0 m"]
+    assert draw_imazu_sheet(results, Policy.ORACLE) == ""
+    page = render_page(summarise_suite("imazu", results), results, [], "all-drives")
+    assert sheet in page
+    assert "camera-fair, all seen" in page
 
 
 def test_a_recording_that_failed_is_not_there(tmp_path: Path) -> None:

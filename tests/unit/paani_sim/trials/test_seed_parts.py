@@ -16,7 +16,7 @@ from paani_sim.trials.seed_parts import (
     parse_seeds,
     part_of_seed,
 )
-from paani_sim.trials.trial_cases import SUITES, list_cases
+from paani_sim.trials.trial_cases import SUITES, list_cases, parse_case
 from paani_sim.worlds.load import load_scenario
 
 COMMITS = st.text("0123456789abcdef", min_size=40, max_size=40)
@@ -86,6 +86,13 @@ def test_a_choice_names_its_seeds(text: str, expected: list[int]) -> None:
 def test_what_is_no_choice_is_refused(text: str, says: str) -> None:
     with pytest.raises(UserError, match=says):
         parse_seeds(text)
+
+
+def test_the_imazu_suite_drives_every_case_of_both_forms_once() -> None:
+    cases = list_cases(SUITES["imazu"], SUITES["imazu"].worlds, [Policy.PAANI, Policy.ORACLE])
+    assert len(cases) == 2 * 2 * 24
+    assert {case.fault for case in cases} == {""}
+    assert all(parse_case(case.name) == case for case in cases)
 
 
 def test_a_suite_drives_the_seeds_that_were_chosen() -> None:
