@@ -19,6 +19,7 @@ EXTRA_OF = {
     "shtab": "completion",
     "cryptography": "certs",
     "distributed": "cluster",
+    "prometheus_client": "metrics",
 }  # module -> extra
 
 

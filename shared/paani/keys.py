@@ -105,6 +105,10 @@ MISSION = Topic(
     name="navigator/mission", type=m.Mission, producer="navigator", rate_hz=0.5, fresh_s=10.0,
     stance=Stance.STATE, summary="the legs of the mission, and the fence",
 )
+PREDICTION = Topic(
+    name="navigator/prediction", type=m.Prediction, producer="navigator", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.STATE, summary="the way ahead by the order in force, moving obstacles, and home; for people",
+)
 THRUST = Topic(
     name="controller/thrust", type=m.Thrust, producer="controller", rate_hz=10.0, fresh_s=0.5,
     stance=Stance.COMMAND, summary="normalised thrust of the two fans",
@@ -194,7 +198,7 @@ REQUESTS = {
 }
 
 TOPICS: tuple[Topic[Any], ...] = (
-    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, THRUST,
+    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED,
     THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *REQUESTS.values(), *STEPS.values(),

@@ -29,7 +29,7 @@ class Guidance:
     """`order`, `odometry` and `route` are published until they are changed; None: nothing is said."""
 
     def __init__(self, navigator: Bus, localization: Bus, controller: Bus) -> None:
-        self._clock = WallClock()
+        self.navigator, self._clock = navigator, WallClock()
         self._orders, self._routes = navigator.publisher(keys.COMMAND), navigator.publisher(keys.ROUTE)
         self._odometry, self._thrust = localization.publisher(keys.ODOMETRY), controller.publisher(keys.THRUST)
         self.order: m.NavCommand | None = ORDER

@@ -115,6 +115,32 @@ async def test_snapshot(client: aiohttp.ClientSession, spawn: Spawn, boat: Boat)
             assert (answer.status, (await answer.json())["field"]) == (400, "max_age_s")
 
 
+async def test_machines_ask_for_life_readiness_and_metrics(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    """The processes of this test send no reports but the dashboard: it lives, the whole is not ready."""
+    async with spawn("dashboard"):
+        async with client.get("/healthz") as answer:
+            assert (answer.status, (await answer.json())["ok"]) == (200, True)
+        async with asyncio.timeout(10):
+            while True:
+                async with client.get("/readyz") as answer:
+                    assert answer.status == 503
+                    unready = (await answer.json())["unready"]
+                if "dashboard" not in unready:
+                    break
+                await asyncio.sleep(0.1)
+        assert set(unready) == {name for name in config.services if name != "dashboard"}
+        async with client.get("/metrics") as answer:
+            assert (answer.status, answer.content_type) == (200, "text/plain")
+            lines = (await answer.text()).splitlines()
+        assert 'paani_service_ready{service="dashboard"} 1.0' in lines
+        assert 'paani_service_ready{service="navigator"} 0.0' in lines
+        assert 'paani_advice{direction="RIGHT"} 1.0' in lines
+        async with client.get("/metrics?all=1") as answer:
+            assert answer.status == 400
+
+
 async def test_a_client_that_never_reads_delays_nobody(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:

@@ -17,11 +17,13 @@ from paani.bus import Picture
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
 from paani.errors import UserError
+from paani.extras import missing_module
 from paani.operator_client import OperatorClient
 from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
+from paani_services.dashboard.readiness import find_unready
 from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
@@ -62,7 +64,7 @@ class Server:
         key: str,
     ) -> None:
         self._hub, self._operator, self._tuner = hub, operator, tuner
-        self._clock, self._profile, self._config = clock, config.profile, config.dashboard
+        self._clock, self._whole, self._config = clock, config, config.dashboard
         self._pages, self._key = pages, key
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
@@ -76,6 +78,8 @@ class Server:
                 web.get("/ws", self._socket),
                 web.get("/snapshot.jpg", self._snapshot),
                 web.get("/healthz", self._healthz),
+                web.get("/readyz", self._readyz),
+                web.get("/metrics", self._metrics),
                 web.get("/api/topics", self._topics),
                 web.get(STATUS_PATH, self._status),
                 web.post(STOP_PATH, self._stop),
@@ -202,13 +206,29 @@ class Server:
         armed, stopped = (None, None) if state is None else (state.armed, state.stopped)
         return json_response({"ok": True, "clients": len(self._hub.clients), "armed": armed, "stopped": stopped})
 
+    async def _readyz(self, request: web.Request) -> web.Response:
+        decode_query(dict(request.query), NoQuery)
+        unready = find_unready(self._hub, self._whole.services, self._clock.now_us())
+        return json_response({"ready": not unready, "unready": unready}, 503 if unready else 200)
+
+    async def _metrics(self, request: web.Request) -> web.Response:
+        decode_query(dict(request.query), NoQuery)
+        try:
+            from paani_services.dashboard.metrics import CONTENT_TYPE, metrics_text  # noqa: PLC0415  # of an extra
+        except ModuleNotFoundError as error:
+            if (remedy := missing_module("/metrics", error)) is None:
+                raise
+            return error_response(501, str(remedy), request.path)
+        text = metrics_text(self._hub, self._whole, self._clock.now_us())
+        return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
+
     async def _topics(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
         return json_response([topic_row(topic) for topic in keys.TOPICS])
 
     async def _status(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
-        return json_response(board_status(self._hub, self._profile, self._clock.now_us()))
+        return json_response(board_status(self._hub, self._whole.profile, self._clock.now_us()))
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):

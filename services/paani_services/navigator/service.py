@@ -15,6 +15,8 @@ from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.files.mission_file import load_route_and_mission, next_route
 from paani_services.navigator.files.mission_journal import MissionJournal
+from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.predict import predict
 
 EARLY_US = 5_000  # a step this much before the end of its period counts as on time: timers are not exact
 
@@ -28,7 +30,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
     sent: m.NavCommand | None = None
-    sent_us = route_us = 0
+    sent_us = route_us = predicted_us = 0
+    predictions, camera = bus.publisher(keys.PREDICTION), Camera(config.calibration, config.perception.ego_polygon)
     with bus.alive():
         async with asyncio.TaskGroup() as group:
             journal = None
@@ -60,6 +63,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     bus.note(", ".join(order.inhibits))
                 else:
                     stepper.conclude({})
+                if now_us - predicted_us >= 1e6 / keys.PREDICTION.rate_hz:
+                    odometry = stepper.inboxes[keys.ODOMETRY.name].value
+                    predictions.put(predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator))
+                    predicted_us = now_us
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(period_s):
                         await wake.wait()

@@ -45,6 +45,7 @@ from paani.messages.perception import (
     UnusableCause,
 )
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
+from paani.messages.prediction import MovingObstacle, Prediction
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
@@ -93,6 +94,7 @@ __all__ = [
     "MissionLeg",
     "MotionCause",
     "MotionState",
+    "MovingObstacle",
     "NavCommand",
     "NonNegative",
     "Odometry",
@@ -100,6 +102,7 @@ __all__ = [
     "OperatorState",
     "OutputMessage",
     "PictureHeader",
+    "Prediction",
     "Pulse",
     "Purpose",
     "Reason",

@@ -100,7 +100,7 @@ export class Camera {
     setText(byId("camera-id"), `frame ${header.frame_seq}${behind > 0 ? ` of ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
     setText(
       byId("camera-note"),
-      !fresh ? `Last picture ${ageText(ageS)} ago`
+      !fresh ? (ageS > this.store.limitS("camera/picture") ? `Last picture ${ageText(ageS)} ago` : "Pictures come with gaps")
         : !evidence ? "No evidence for this frame: overlay left out"
         : !evidence.usable ? `Picture unusable: ${words(evidence.cause)}` : "",
     );

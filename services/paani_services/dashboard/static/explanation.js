@@ -40,7 +40,7 @@ export function buildExplanation() {
 export function renderExplanation(store, now) {
   const advisory = store.get("advisor/advisory"), settings = store.get("dashboard/settings");
   const fresh = store.isFresh("advisor/advisory", now), panel = /** @type {HTMLElement} */ (document.querySelector(".why"));
-  for (const part of panel.children) if (part.tagName !== "HEADER") part.classList.toggle("stale", !fresh);
+  for (const part of panel.children) if (part.tagName !== "HEADER" && part.id !== "stages") part.classList.toggle("stale", !fresh);
   setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice received");
   if (!advisory || !settings) return;
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));

@@ -1,6 +1,7 @@
 // @ts-check
-// The map panel: route, estimated and true track in local metres, north up.
+// The map panel in local metres, north up: fence, mission, route, way ahead, moving obstacles, estimated and true track.
 
+import { drawFence, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
 import { byId, fixed, headingDeg, setText } from "./text.js";
 
 const MAX_TRACK_POINTS = 4000, TRACK_STEP_M = 0.15;
@@ -61,7 +62,9 @@ export class MapPanel {
       this.canvas.width = Math.round(width * ratio);
       this.canvas.height = Math.round(height * ratio);
     }
-    if (this.fitRoute && route) this.fitTo(route.waypoints, width, height);
+    const mission = store.get("navigator/mission");
+    const bounds = route?.waypoints ?? mission?.fence[0]?.corners;
+    if (this.fitRoute && bounds) this.fitTo(bounds, width, height);
     const pose = odometry ?? truth;
     if (this.follow && pose) this.centre = { x: pose.x_m, y: pose.y_m };
     const { ctx } = this;
@@ -70,9 +73,16 @@ export class MapPanel {
     const toScreen = (/** @type {number} */ x, /** @type {number} */ y) =>
       /** @type {[number, number]} */ ([width / 2 + (x - this.centre.x) * this.pxPerM, height / 2 - (y - this.centre.y) * this.pxPerM]);
     this.drawGrid(width, height, toScreen, colour("--line"));
+    const chart = { ctx, toScreen, pxPerM: this.pxPerM, colour };
+    const key = "navigator/prediction", prediction = store.isFresh(key, now) ? store.get(key) : undefined;
+    if (mission) drawFence(chart, mission);
+    if (mission) drawStations(chart, mission);
     if (route) this.drawRoute(route, store, toScreen, colour("--route"), colour("--quiet"));
     this.drawTrack(this.tracks["@truth/pose"], toScreen, colour("--text"), 1.5, [2, 4]);
     this.drawTrack(this.tracks["localization/odometry"], toScreen, colour("--cyan"), 2, []);
+    if (prediction?.home.length) drawHome(chart, prediction.home[0]);
+    if (prediction?.path.length) drawPath(chart, prediction.path);
+    if (prediction) drawObstacles(chart, prediction.obstacles, store.ageS(key, now), store.get("advisor/tracks")?.tracks ?? []);
     if (truth) this.drawBoat(truth, toScreen, colour("--text"), false, store.isFresh("@truth/pose", now));
     if (odometry) this.drawBoat(odometry, toScreen, colour("--cyan"), true, store.isFresh("localization/odometry", now));
     this.drawScaleAndNorth(width, height, colour("--text"), colour("--quiet"));

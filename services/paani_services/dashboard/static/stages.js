@@ -35,10 +35,16 @@ function describeStages(store) {
     operator: [operator?.armed ? `armed by ${operatorText(operator.by)}` : "", false],
     mission: [command?.leg ? `${name}${command.leg}${command.leg.startsWith("follow route") ? waypoint : ""}` : "", false],
     planner: describePlanner(store, command),
-    fence: [mission?.fence.length ? `inside ${mission.fence.map((/** @type {any} */ area) => area.name || `keep ${area.keep}`).join(", ")}` : "", false],
+    fence: [describeFence(mission?.fence ?? []), false],
     controller: [thrust?.enabled ? `speed error ${fixed(thrust.speed_error_mps)} m/s, heading error ${fixed((thrust.heading_error_rad * 180) / Math.PI, 0)}°` : "", false],
     gate: [applied ? `port ${fixed(applied.left_n, 1)} N, starboard ${fixed(applied.right_n, 1)} N` : "", false],
   };
+}
+
+/** @param {{keep: string, name: string}[]} areas */
+function describeFence(areas) {
+  const names = (/** @type {string} */ keep) => areas.filter((area) => area.keep === keep).map((area) => area.name || "unnamed").join(", ");
+  return [names("in") && `stays in ${names("in")}`, names("out") && `keeps out of ${names("out")}`].filter(Boolean).join("; ");
 }
 
 /** @param {import("./store.js").Store} store @param {any} command @returns {[string, boolean]} */

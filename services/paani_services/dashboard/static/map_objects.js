@@ -1,0 +1,106 @@
+// @ts-check
+// Draws on the map what the boat is told and what it sees coming: fence, stations, home, the way ahead, moving obstacles.
+
+import { trackNames } from "./text.js";
+
+const ARROW_S = 5; // a velocity is drawn as the way of this long
+const FONT = "12px system-ui, sans-serif";
+
+/** @typedef {{ctx: CanvasRenderingContext2D, toScreen: import("./map.js").ToScreen, pxPerM: number, colour: (name: string) => string}} Chart */
+
+/** Areas to keep in are outlined, areas to keep out are hatched too. @param {Chart} chart @param {any} mission */
+export function drawFence({ ctx, toScreen, colour }, mission) {
+  for (const area of mission.fence) {
+    const isOut = area.keep === "out";
+    ctx.strokeStyle = colour(isOut ? "--red" : "--green");
+    ctx.lineWidth = 2;
+    ctx.setLineDash(isOut ? [] : [8, 4]);
+    ctx.beginPath();
+    for (const corner of area.corners) ctx.lineTo(...toScreen(corner.x_m, corner.y_m));
+    ctx.closePath();
+    ctx.stroke();
+    ctx.setLineDash([]);
+    if (isOut) hatch(ctx, area.corners.map((/** @type {any} */ corner) => toScreen(corner.x_m, corner.y_m)));
+  }
+}
+
+/** Hatch the polygon whose path is the current one. @param {CanvasRenderingContext2D} ctx @param {[number, number][]} corners */
+function hatch(ctx, corners) {
+  const xs = corners.map(([x]) => x), ys = corners.map(([, y]) => y);
+  const [left, right] = [Math.max(0, Math.min(...xs)), Math.min(ctx.canvas.width, Math.max(...xs))];
+  const [top, bottom] = [Math.max(0, Math.min(...ys)), Math.min(ctx.canvas.height, Math.max(...ys))];
+  if (right <= left || bottom <= top) return;
+  ctx.save();
+  ctx.clip();
+  ctx.lineWidth = 1;
+  ctx.globalAlpha = 0.6;
+  ctx.beginPath();
+  for (let x = left - (bottom - top); x < right; x += 8) {
+    ctx.moveTo(x, bottom);
+    ctx.lineTo(x + bottom - top, top);
+  }
+  ctx.stroke();
+  ctx.restore();
+}
+
+/** The stations of the mission, by their radius. @param {Chart} chart @param {any} mission */
+export function drawStations({ ctx, toScreen, pxPerM, colour }, mission) {
+  ctx.strokeStyle = colour("--route");
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([3, 3]);
+  for (const leg of mission.legs) {
+    if (leg.kind !== "hold_station" || !leg.waypoints.length) continue;
+    const [x, y] = toScreen(leg.waypoints[0].x_m, leg.waypoints[0].y_m);
+    ctx.beginPath();
+    ctx.arc(x, y, Math.max(6, leg.radius_m * pxPerM), 0, 7);
+    ctx.stroke();
+  }
+  ctx.setLineDash([]);
+}
+
+/** Home, a house. @param {Chart} chart @param {{x_m: number, y_m: number}} home */
+export function drawHome({ ctx, toScreen, colour }, home) {
+  const [x, y] = toScreen(home.x_m, home.y_m);
+  ctx.strokeStyle = ctx.fillStyle = colour("--route");
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  ctx.moveTo(x - 8, y); ctx.lineTo(x, y - 8); ctx.lineTo(x + 8, y); ctx.moveTo(x - 5, y - 2); ctx.lineTo(x - 5, y + 7); ctx.lineTo(x + 5, y + 7); ctx.lineTo(x + 5, y - 2);
+  ctx.stroke();
+}
+
+/** The way ahead by the order in force. @param {Chart} chart @param {{x_m: number, y_m: number}[]} path */
+export function drawPath({ ctx, toScreen, colour }, path) {
+  ctx.strokeStyle = colour("--amber");
+  ctx.lineWidth = 4;
+  ctx.lineCap = "round";
+  ctx.beginPath();
+  for (const point of path) ctx.lineTo(...toScreen(point.x_m, point.y_m));
+  ctx.stroke();
+  ctx.lineCap = "butt";
+}
+
+/**
+ * Moving obstacles where they are by now, with the way they make in `ARROW_S` and their number.
+ * @param {Chart} chart @param {any[]} obstacles @param {number} ageS of the message @param {{id: number, label: string}[]} tracks
+ */
+export function drawObstacles({ ctx, toScreen, pxPerM, colour }, obstacles, ageS, tracks) {
+  for (const obstacle of obstacles) {
+    const east = obstacle.x_m + obstacle.east_mps * ageS, north = obstacle.y_m + obstacle.north_mps * ageS;
+    const [x, y] = toScreen(east, north), radius = Math.max(6, obstacle.radius_m * pxPerM);
+    ctx.strokeStyle = ctx.fillStyle = colour("--orange");
+    ctx.lineWidth = 2;
+    ctx.beginPath();
+    ctx.arc(x, y, radius, 0, 7);
+    ctx.stroke();
+    ctx.beginPath();
+    ctx.arc(x, y, 2, 0, 7);
+    ctx.fill();
+    ctx.beginPath();
+    ctx.moveTo(x, y);
+    ctx.lineTo(...toScreen(east + obstacle.east_mps * ARROW_S, north + obstacle.north_mps * ARROW_S));
+    ctx.stroke();
+    ctx.font = FONT;
+    ctx.fillStyle = colour("--text");
+    ctx.fillText(trackNames(tracks, [obstacle.track_id]), x + radius + 4, y + 4);
+  }
+}
