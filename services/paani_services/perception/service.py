@@ -32,6 +32,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     perceiver = await loop.run_in_executor(worker, Perceiver, config.perception, stopwatch_ms)
     await loop.run_in_executor(worker, release_freed_memory)  # what loading the networks took: some 15 MiB
     require_people_seen(perceiver, config)
+    warn_uncalibrated(config)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
@@ -64,7 +65,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 worker.submit(write_to_journal, sent)
                 if mask is not None:
                     mask_publisher.put_picture(mask.header, mask.data)
-                bus.note(f"unusable: {sent.cause}" if not sent.usable else sent.models)
+                bus.note(sight_note(sent, config))
     finally:
         worker.shutdown(wait=False)
         perceiver.close()
@@ -78,6 +79,23 @@ def require_people_seen(perceiver: Perceiver, config: Config) -> None:
     if config.bus.graph is Graph.HULL:
         raise UserError(f"{text}; a hull needs one that sees people")
     LOG.warning("%s: people are not seen", text)
+
+
+def warn_uncalibrated(config: Config) -> None:
+    """Log what is taken for granted of a camera that nobody measured, and what measures it; nothing in `paper`."""
+    if not config.calibration.valid and config.perception.candidates.use:
+        LOG.warning(
+            "calibration.valid is false: no distance is known, so everybody in view counts as near, and so does a "
+            "vessel in the middle of the way; `paani calibrate RECORDING` measures the camera"
+        )
+
+
+def sight_note(evidence: m.Evidence, config: Config) -> str:
+    """What the page says of perception: why a picture is unusable, else by which networks, and whether in metres."""
+    if not evidence.usable:
+        return f"unusable: {evidence.cause}"
+    is_assumed = not config.calibration.valid and config.perception.candidates.use
+    return f"uncalibrated camera, everybody counts as near; {evidence.models}" if is_assumed else evidence.models
 
 
 def roll_at_capture_rad(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:
