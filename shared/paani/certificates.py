@@ -31,12 +31,15 @@ BOARD_ROUTER, HOST_ROUTER = "board_router", "host_router"
 LISTENERS = (BOARD_ROUTER, HOST_ROUTER)
 
 
+UnixTime = Annotated[int, msgspec.Meta(ge=0, le=253_402_300_799)]  # [s]; up to the year 9999, as X.509 has it
+
+
 class Certificate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One certificate in force: the number in its name, when it is valid (Unix time), the SHA-256 of its DER bytes."""
 
     number: Annotated[int, msgspec.Meta(ge=1)]
-    not_before_s: int
-    not_after_s: int
+    not_before_s: UnixTime
+    not_after_s: UnixTime
     sha256: str
 
 

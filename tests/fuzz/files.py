@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from paani.certificates import INDEX_FILE, Certificate, Identities, read_identities
+from paani.certificates import INDEX_FILE, Certificate, Identities, date_text, read_identities
 from paani.config import Config, decode_config, encode_config, load_config
 from paani.errors import UserError
 from paani.keys import Graph
@@ -289,7 +289,9 @@ class CertificatesIndex(FileTarget):
         path = self.folder / INDEX_FILE
         path.write_bytes(data)
         try:
-            read_identities(self.folder).common_name("advisor")
+            identities = read_identities(self.folder)
+            for certificate in (identities.authority, *identities.holders.values()):
+                date_text(certificate.not_after_s)
         except UserError as error:
             return refusal_of(error, path)
         return ""

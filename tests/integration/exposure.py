@@ -13,13 +13,7 @@ LISTENING = "0A"
 
 def listening(pid: int) -> set[tuple[str, int]]:
     """Address and port of each TCP socket that the process listens at, and of each UDP socket that it has bound."""
-    inodes = set()
-    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
-        with contextlib.suppress(OSError):
-            target = str(descriptor.readlink())
-            if target.startswith("socket:["):
-                inodes.add(target[8:-1])
-    found = set()
+    inodes, found = sockets_of(pid), set()
     for table in ("tcp", "tcp6", "udp", "udp6"):
         for line in Path(f"/proc/{pid}/net/{table}").read_text(encoding="ascii").splitlines()[1:]:
             words = line.split()
@@ -27,6 +21,17 @@ def listening(pid: int) -> set[tuple[str, int]]:
             if words[9] in inodes and is_open:
                 found.add(_address(words[1]))
     return found
+
+
+def sockets_of(pid: int) -> set[str]:
+    """Inodes of the sockets that the process has."""
+    inodes = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            target = str(descriptor.readlink())
+            if target.startswith("socket:["):
+                inodes.add(target[8:-1])
+    return inodes
 
 
 def readable_by_others(folder: Path) -> set[Path]:

@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 
 import msgspec
 
+from paani.errors import one_line
 from paani.undecodable import UNDECODABLE
 
 MAX_PRESS = 2**53 - 1  # what a script of the page can count to
@@ -19,8 +20,8 @@ class BadRequestError(Exception):
     """A malformed request: one line that says why, and the field at fault."""
 
     def __init__(self, text: str, field: str) -> None:
-        super().__init__(text)
-        self.field = field
+        super().__init__(one_line(text))
+        self.field = one_line(field)
 
 
 class PressRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -80,5 +81,5 @@ def _bad_request(error: Exception, whole: str) -> BadRequestError:
     for marker in ("missing required field `", "unknown field `"):
         _, found, name = text.partition(marker)
         if found:
-            field = name.rstrip("`") or field
+            field = name.rstrip("`").strip() or field
     return BadRequestError(f"{field}: {text}", field)

@@ -35,6 +35,15 @@ def layout_of(path: Path) -> Layout:
         raise UserError(f"{path}: {error.strerror}") from error
 
 
+def has_damaged_summary(path: Path, data: mmap.mmap) -> bool:
+    """Whether there is a summary that does not say what it did when it was written."""
+    try:
+        _read_summary(Layout(path), data)
+    except DAMAGE:
+        return True
+    return False
+
+
 def _layout(path: Path, data: mmap.mmap) -> Layout:
     layout = Layout(path)
     begins_right = data[: len(MAGIC)] == MAGIC

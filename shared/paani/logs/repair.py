@@ -36,6 +36,7 @@ from mcap.records import (
 
 from paani.errors import UserError
 from paani.logs.layout import MAGIC, PROFILE
+from paani.logs.locate import has_damaged_summary
 from paani.logs.scan import HEAD, Damage, Data, ScannedRecord, content, records_in, scan, stream_of, unpacked
 from paani.whole_file import replacement_file
 
@@ -93,14 +94,14 @@ def repair(path: Path, told_to_stop: Callable[[], bool] = lambda: False) -> Repa
         raise UserError(f"{path}: {error.strerror}") from error
 
 
-def _repair(path: Path, data: Data, told_to_stop: Callable[[], bool]) -> Repaired:
+def _repair(path: Path, data: mmap.mmap, told_to_stop: Callable[[], bool]) -> Repaired:
     pieces: list[ScannedRecord | Damage] = []
     for piece in scan(data):
         pieces.append(piece)
         if told_to_stop():
             raise Interrupted
     damage = [piece for piece in pieces if isinstance(piece, Damage)]
-    if not damage and is_finished(path):
+    if not damage and is_finished(path) and not has_damaged_summary(path, data):
         return Repaired(path=path, changed=False)
     _require_ours(path, data, pieces)
     lost = tuple(f"bytes {d.start} to {d.end}: {d.cause}" for d in damage)

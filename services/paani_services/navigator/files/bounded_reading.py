@@ -1,4 +1,4 @@
-"""Reading files that anybody may have written: bounded in size, and every fault is one line that names the file."""
+"""Reading files that anybody may have written: bounded in size, and every fault names the file."""
 
 from __future__ import annotations
 
@@ -32,9 +32,4 @@ def read_toml(path: Path, where: str, kind: type[T]) -> T:
     try:
         return msgspec.convert(tomllib.loads(data.decode()), kind)
     except UNDECODABLE as error:
-        raise UserError(f"{where}: {one_line(error)}") from error
-
-
-def one_line(error: Exception) -> str:
-    """The error's text without line breaks."""
-    return " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{where}: {error}") from error

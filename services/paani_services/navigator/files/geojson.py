@@ -11,7 +11,7 @@ import msgspec
 from paani.errors import UserError
 from paani.undecodable import UNDECODABLE
 from paani.whole_file import indented_json
-from paani_services.navigator.files.bounded_reading import one_line, read_bytes
+from paani_services.navigator.files.bounded_reading import read_bytes
 from paani_services.navigator.files.map_frame import FilePoint, LatLon
 from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine, clean_name
 
@@ -76,7 +76,7 @@ def read_geometries(path: Path, where: str) -> list[Geometry]:
     try:
         root = msgspec.json.decode(data, type=_Node)
     except UNDECODABLE as error:
-        raise UserError(f"{where}: {one_line(error)}") from error
+        raise UserError(f"{where}: {error}") from error
     if root.type == "FeatureCollection":
         return [
             geometry
@@ -91,7 +91,7 @@ def decode_coordinates(geometry: Geometry, kind: type[T]) -> T:
     try:
         return msgspec.json.decode(geometry.coordinates, type=kind)
     except UNDECODABLE as error:
-        raise UserError(f"{geometry.where}: coordinates: {one_line(error)}") from error
+        raise UserError(f"{geometry.where}: coordinates: {error}") from error
 
 
 def point_of_position(position: Position, where: str) -> FilePoint:

@@ -11,7 +11,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from paani.errors import UserError
-from paani_services.navigator.files.bounded_reading import one_line, read_bytes
+from paani_services.navigator.files.bounded_reading import read_bytes
 from paani_services.navigator.files.map_frame import FilePoint, LatLon
 from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine, clean_name
 
@@ -27,7 +27,7 @@ def read_gpx(path: Path, where: str) -> RouteLine:
     try:
         gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError, RecursionError) as error:
-        raise UserError(f"{where}: {_find_bad_point(text) or one_line(error)}") from error
+        raise UserError(f"{where}: {_find_bad_point(text) or error}") from error
     name, kind, element, found = _select_points(gpx, where)
     points = tuple(_point_of_element(point, f"{where}: {element}[{number}]") for number, point in enumerate(found))
     repeat = kind == REPEAT

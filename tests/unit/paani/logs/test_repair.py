@@ -235,3 +235,14 @@ def test_all_of_a_folder_but_what_is_being_written(tmp_path: Path) -> None:
     assert is_finished(used.path)
     assert is_finished(torn)
     assert is_finished(whole_one)
+
+
+def test_a_damaged_summary_is_written_anew(tmp_path: Path) -> None:
+    data = bytearray(whole())
+    data[-40] ^= 0xFF
+    path = write(tmp_path, bytes(data))
+    assert open_log(path).problems
+    repaired = repair(path)
+    assert (repaired.changed, repaired.lost) == (True, ())
+    assert open_log(path).problems == []
+    assert poses(path) == list(range(N))
