@@ -21,6 +21,9 @@ from paani.bus import Bus, open_bus
 from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import Config, load_config
+from tests.claims_check.left_out import left_out_text
+from tests.claims_check.table import read_table
+from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
@@ -75,6 +78,41 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         import torch  # noqa: PLC0415  only these tests have it
 
         torch.set_num_threads(1)  # steps of networks this small wait for each other's threads most of the time
+
+
+class WhatRan:
+    """The tests that ran and those that skipped, from the reports of all workers; told at the very end."""
+
+    def __init__(self) -> None:
+        self.ran: set[str] = set()
+        self.skipped: dict[str, str] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        name = report.nodeid.partition("[")[0]
+        if report.skipped:
+            self._skip(name, report.longrepr)
+        elif report.when == "call":
+            self.ran.add(name)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.skipped:
+            self._skip(report.nodeid, report.longrepr)
+
+    def _skip(self, name: str, why: object) -> None:
+        self.skipped[name] = str(why[2]).removeprefix("Skipped: ") if isinstance(why, tuple) else str(why)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A run of everything ends with the statements of the paper that it left out."""
+    if not WORKER and [Path(arg).resolve() for arg in config.args] == [ROOT / "tests"]:
+        config.pluginmanager.register(WhatRan(), WhatRan.__name__)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    found = config.pluginmanager.get_plugin(WhatRan.__name__)
+    if found is not None and found.ran:
+        print(left_out_text(read_table(ROOT), found.ran, found.skipped), end="\n")
 
 
 @pytest.fixture

@@ -10,12 +10,16 @@ from pathlib import Path
 import pytest
 
 from paani import keys
-from paani import messages as m
 from paani.errors import UserError
+from paani.logs.reader import open_log
 from paani.statistics.figure_table import FigureTable, table_text
 from paani_tools.bench.judgement import BOXES, crowded_evidence
 from paani_tools.bench.steadiness import steadiness
-from tests.unit.paani.logs.small_logs import START_US, begin, put
+from paani_tools.logs.info import info_of
+from paani_tools.replay.compatibility import provenance_of
+from paani_tools.replay.verify import check_log
+from tests.places import ROOT
+from tests.unit.paani.logs.small_logs import begin, put
 
 pytestmark = pytest.mark.integration
 
@@ -54,23 +58,34 @@ def test_a_mistake_is_one_line(words: tuple[str, ...], named: str) -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_dithering_counts_a_recorded_drive_by_both_profiles(tmp_path: Path) -> None:
+def test_dithering_agrees_with_logs_info_and_with_the_replay() -> None:
+    """The recorded advice, decided again step by step by the drive's own settings, changes as often as the log says."""
+    path = ROOT / "tests" / "replay" / "river_paper.mcap"
+    log = open_log(path)
+    info = info_of(log)
+    assert check_log(log, provenance_of(log, force=True).config).differ == 0
+    rows = {str(row[1]): row for row in steadiness([path]).rows}
+    assert rows["as recorded"][2:] == rows["its settings"][2:]
+    assert rows["as recorded"][3] == 3
+    assert info.direction_changes_per_min == round(60 * 3 / info.duration_s, 2)
+    assert rows["paper"][2:] == rows["as recorded"][2:]  # the drive was one of that profile
+
+
+def test_dithering_counts_other_settings_on_what_was_recorded() -> None:
+    """A drive whose camera went black changes as its log says; the paper, which checks no picture, otherwise."""
+    path = ROOT / "tests" / "replay" / "river_camera_black.mcap"
+    rows = {str(row[1]): row for row in steadiness([path]).rows}
+    assert info_of(open_log(path)).direction_changes_per_min == 6.0
+    assert (rows["as recorded"][2], rows["as recorded"][3]) == (30, 3)
+    assert rows["paper"][3] != 3
+
+
+def test_dithering_needs_steps_to_decide_again(tmp_path: Path) -> None:
     log = begin(tmp_path)
-    for number, evidence in enumerate(crowded_evidence(40)):
-        sent_us = START_US + number * 200_000
-        stamped = m.Evidence(**{
-            **{name: getattr(evidence, name) for name in evidence.__struct_fields__},
-            "source_us": sent_us - 150_000, "seq": number, "epoch": 5, "producer": "perception", "sent_us": sent_us,
-        })  # fmt: skip
-        put(log, keys.EVIDENCE, stamped)
+    put(log, keys.EVIDENCE, next(iter(crowded_evidence(1))))
     log.finish({})
-    part = steadiness([log.path])
-    assert {row[1] for row in part.rows} >= {"paper", "paani"}
-    for row in part.rows:
-        assert row[0] == log.path.name
-        assert row[2] == 8  # 39 periods, to the last step
-        assert isinstance(row[3], int)
-        assert row[3] > 0
+    with pytest.raises(UserError, match=f"{log.path}: no steps of the advisor"):
+        steadiness([log.path])
     with pytest.raises(UserError, match="absent"):
         steadiness([tmp_path / "absent.mcap"])
 

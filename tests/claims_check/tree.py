@@ -83,7 +83,8 @@ class Tree:
         finally:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            with process:  # closes its pipe and waits
+                pass
         return Outcome(process.returncode, text.strip()[-2000:], _read_report(report))
 
 

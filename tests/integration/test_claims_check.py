@@ -15,7 +15,7 @@ from tests.places import ROOT
 DRAWN = 5  # rows, two seconds each
 HEAVY = ("tests/unit/paani_models/", "tests/unit/mcu/")  # need what not everybody has
 
-pytestmark = pytest.mark.integration
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]  # every mutant is a process that imports everything
 
 PRODUCT = """
 def less() -> bool:

@@ -4,41 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from paani import keys
 from paani import messages as m
-from paani.config import Config, load_config
-from paani.decider import Input, decider_of
+from paani.config import Config, load_config, with_settings
+from paani.decider import decider_of
 from paani.errors import UserError
-from paani.logs.reader import open_log
+from paani.logs.reader import Log, open_log
 from paani.statistics.dithering import dithering
 from paani.statistics.figure_table import FigureTable
 from paani.undecodable import UNDECODABLE
+from paani_tools.replay.compatibility import provenance_of
+from paani_tools.replay.ledger import Ledger
+from paani_tools.replay.recompute import Recomputation
+from paani_tools.replay.verify import losses_of
 
-STEP_US = 200_000  # J17: between pictures the advice is given again
-PROMPT_US = 100_000  # from picture to evidence: a machine that was busy while recording is not the policy's doing
-READ = (keys.EVIDENCE, keys.ODOMETRY)
 STEADYING = ("advisor.policy.release_margin", "advisor.policy.side_change_margin")
 WITHOUT = tuple(f"{path}=0" for path in STEADYING)
 
 
 def steadiness(drives: list[Path]) -> FigureTable:
-    """Every drive judged by `paper`, by `paani`, and by `paani` without what steadies it. Raises UserError."""
-    settings = {
-        "paper": load_config(profile="paper"),
-        "paani, both margins 0": load_config(sets=WITHOUT),
-        "paani, release margin 0": load_config(sets=WITHOUT[:1]),
-        "paani, side change margin 0": load_config(sets=WITHOUT[1:]),
-        "paani": load_config(),
-    }
+    """What every drive's advisor said, and what it would have said by its own settings, without what steadies it, and
+    by the paper's. Raises UserError for a log that cannot be read or has no steps of an advisor.
+    """
     rows = []
     for drive in drives:
-        recorded = tuple(sorted(_recorded_inputs(drive), key=lambda each: each[0]))
-        for name, config in settings.items():
-            found = dithering(advice(recorded, config))
+        log = open_log(drive)
+        given = provenance_of(log, force=True).config
+        advice = {
+            "as recorded": tuple(_recorded_advice(log)),
+            "its settings": _advice_by(log, given),
+            "both margins 0": _advice_by(log, with_settings(given, WITHOUT)),
+            "release margin 0": _advice_by(log, with_settings(given, WITHOUT[:1])),
+            "side change margin 0": _advice_by(log, with_settings(given, WITHOUT[1:])),
+            "paper": _advice_by(log, msgspec.structs.replace(given, advisor=load_config(profile="paper").advisor)),
+        }
+        if not advice["its settings"]:
+            raise UserError(f"{drive}: no steps of the advisor, so that nothing can be decided again")
+        for name, advisories in advice.items():
+            found = dithering(advisories)
             rows.append((
                 drive.name, name, round(found.seconds), found.changes, found.interruptions, found.side_flips,
                 found.stop_go_flips, found.changes_per_min, found.side_flips_per_min, found.stop_go_flips_per_min,
@@ -58,38 +64,27 @@ def steadiness(drives: list[Path]) -> FigureTable:
             "stop-go/min",
         ),
         rows=tuple(rows),
-        note="the same evidence through each, 0.1 s after its picture. "
+        note="the same inputs through each, step by step as they came. "
         "by input: changes that begin or end with late or unusable pictures.",
     )
 
 
-def advice(recorded: tuple[tuple[int, m.Message], ...], config: Config) -> Iterator[m.Advisory]:
-    """What the advisor says at each new evidence and between, as the messages came [us]."""
-    decider = decider_of("advisor")
-    state: Any = decider.state()
-    inputs = {topic.name: Input() for topic in decider.inputs}
-    due_us = recorded[0][0] if recorded else 0
-    for at_us, message in recorded:
-        steps = list(range(due_us, at_us, STEP_US))
-        if isinstance(message, m.Evidence):
-            steps.append(at_us)
-        for now_us in steps:
-            if now_us == at_us:
-                inputs[keys.EVIDENCE.name] = Input(message, at_us)
-            state, outputs = decider.decide(state, inputs, now_us, config)
-            advisory = outputs[keys.ADVISORY.name]
-            assert isinstance(advisory, m.Advisory)
-            yield advisory
-            due_us = now_us + STEP_US
-        if isinstance(message, m.Odometry):
-            inputs[keys.ODOMETRY.name] = Input(message, at_us)
-
-
-def _recorded_inputs(drive: Path) -> Iterator[tuple[int, m.Message]]:
-    decoders = {topic.name: msgspec.json.Decoder(topic.type) for topic in READ}
-    for record in open_log(drive).records([topic.name for topic in READ]):
+def _recorded_advice(log: Log) -> Iterator[m.Advisory]:
+    decoder = msgspec.json.Decoder(m.Advisory)
+    for record in log.records([keys.ADVISORY.name]):
         try:
-            message = decoders[record.topic].decode(record.data)
+            yield decoder.decode(record.data)
         except UNDECODABLE as error:
-            raise UserError(f"{drive}: {record.topic} {record.seq}: {error}") from error
-        yield (message.source_us + PROMPT_US if isinstance(message, m.Evidence) else record.log_us), message
+            raise UserError(f"{log.path}: {record.topic} {record.seq}: {error}") from error
+
+
+def _advice_by(log: Log, config: Config) -> tuple[m.Advisory, ...]:
+    """What each recorded step of the advisor says with these settings, on what it had been given."""
+    decider, decoder = decider_of("advisor"), msgspec.json.Decoder(m.Advisory)
+    again = Recomputation(decider, config, losses_of(log), evolve=True)
+    return tuple(
+        decoder.decode(computed)
+        for step in again.steps(log.records(Ledger(decider).topics))
+        for sent, _, computed in step.outputs
+        if sent.topic == keys.ADVISORY.name
+    )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -14,10 +15,12 @@ from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
+from paani_models.network_input import segmenter_batch  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, build_network, largest_export_difference, write_onnx  # noqa: E402
 from paani_models.recipes.train_and_export import parse_stages  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
-from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
+from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
+from paani_models.segmenter.paper_network import DECODER_CHANNELS, PaperSegmenter  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
 from paani_models.training.training_state import (  # noqa: E402
     AveragedWeights,
@@ -71,8 +74,41 @@ def test_a_resumed_run_equals_an_unbroken_one_s11(tmp_path: Path, river: list[Ca
 def test_records_hold_loss_and_iou_per_class_s10(tmp_path: Path, river: list[CachedPicture]) -> None:
     segmenter_run(tmp_path, river).run(until=1)
     record = msgspec.json.decode((tmp_path / "epochs.jsonl").read_bytes())
-    assert {"epoch", "loss", "miou", "water", "obstacle", "sky"} <= set(record)
+    assert set(record) == {"epoch", "seed", "loss", "miou", "edge_f1", "water", "obstacle", "sky"}  # no validation loss
     assert record["seed"] == SMALL.seed
+
+
+@pytest.mark.train
+def test_the_recorded_edge_f1_is_that_of_the_labels_s10(tmp_path: Path, river: list[CachedPicture]) -> None:
+    """A net that says what the masks say has 1; one that says water everywhere has no edge, and 0."""
+    training = segmenter_run(tmp_path, river)
+    size = (SMALL.stages[0].width_px, SMALL.stages[0].height_px)
+    masks = np.stack([cv2.resize(p.mask, size, interpolation=cv2.INTER_NEAREST) for p in training.held_out])
+    labels = torch.from_numpy(masks.astype(np.int64))
+    right = torch.nn.functional.one_hot(labels, 3).permute(0, 3, 1, 2).float()
+    for logits, edge_f1 in ((right, 1.0), (torch.zeros_like(right), 0.0)):
+        training.state.average.model.forward = lambda _, logits=logits: logits
+        assert training.validate()["edge_f1"] == edge_f1
+
+
+def test_an_epoch_of_the_paper_shows_every_picture_once_by_its_own_augmentation_s7_s8(
+    tmp_path: Path, river: list[CachedPicture]
+) -> None:
+    """No picture that shows nothing, no balance of sources, and the last incomplete batch is dropped."""
+    recipe = replace(segmenter_train.PAPER_RECIPE, stages=(Stage(1, 64, 64),), batch=4)
+    order = segmenter_train.draw_epoch(river, recipe, 0)
+    assert sorted(order) == list(range(6))
+    assert order != segmenter_train.draw_epoch(river, recipe, 1)
+    torch.manual_seed(0)
+    training = SegmenterTraining(PaperSegmenter(), recipe, tmp_path, river, river[:2])
+    pictures, masks = training._batch(order[:4], recipe.stages[0], (0, 0))
+    for slot, index in enumerate(order[:4]):
+        rng = np.random.default_rng((recipe.seed, 0, 0, slot))
+        picture, mask = augment_paper_pair(rng, river[index].picture, river[index].mask, (64, 64))
+        assert np.array_equal(masks[slot].numpy(), mask)
+        assert np.array_equal(pictures[slot].numpy(), segmenter_batch(picture[None])[0])
+    training.run()
+    assert training.state.step == 1
 
 
 @pytest.mark.train
@@ -127,7 +163,8 @@ def test_the_papers_recipe_for_its_segmenter_s6_s7() -> None:
     """50 epochs, batch 16, 320x256; AdamW at 3e-4, decay 1e-4, cosine over all 50 epochs to zero; seed 42."""
     recipe = segmenter_train.PAPER_RECIPE
     assert recipe.stages == (Stage(50, 256, 320),)
-    assert (recipe.epochs, recipe.batch, recipe.seed) == (50, 16, 42)
+    assert (recipe.epochs, recipe.batch, recipe.workers, recipe.seed) == (50, 16, 4, 42)
+    assert DECODER_CHANNELS == PaperSegmenter().project.out_channels == 64
     assert (recipe.peak_rate, recipe.weight_decay) == (3e-4, 1e-4)
     rates = [learning_rate(recipe.peak_rate, s, 500, recipe.warmup_steps, recipe.final_frac) for s in (0, 250, 500)]
     assert rates == pytest.approx([3e-4, 1.5e-4, 0.0], abs=1e-12)

@@ -1,10 +1,13 @@
 """Augmentation is seeded, and picture, mask and boxes move together (S8, S12)."""
 
+import math
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import pytest
 
+from paani_models.segmenter.paper_augmentation import augment_paper_pair, jitter_colour_slightly
 from paani_models.training import augment
 
 SIZE_WH = (320, 256)
@@ -48,8 +51,52 @@ def test_glare_leaves_its_input_alone_and_brightens_the_dark_s8() -> None:
     assert sum(bool((out[dark] > 60).any()) for out in lit) >= 15
 
 
-def test_glare_frequencies_s8() -> None:
-    assert (augment.GLARE_FRAC, augment.BLOB_FRAC, augment.GLITTER_FRAC) == (0.35, 0.7, 0.6)
+def is_within(count: int, n: int, frac: float) -> bool:
+    """Whether a count of `n` draws is within four standard deviations of this share."""
+    return abs(count - n * frac) < 4.0 * math.sqrt(n * frac * (1.0 - frac))
+
+
+def test_glare_has_a_blob_in_seven_and_glitter_in_six_of_ten_s8() -> None:
+    """On black only light shows: a blob above the lower half, or wide and soft; strokes of glitter are in the lower."""
+    black, n = np.zeros((256, 320, 3), np.uint8), 600
+    lit = [augment.add_glare(np.random.default_rng(s), black)[..., 0] for s in range(n)]
+    sharp = [int(np.abs(np.diff(out[128:].astype(int), axis=0)).max()) > 100 for out in lit]
+    assert is_within(sum(sharp), n, 0.6)
+    assert is_within(sum(not out.any() for out in lit), n, 0.3 * 0.4)
+
+
+def test_the_papers_augmentation_has_its_shares_s8() -> None:
+    """Mirrored in half, other colours in half, glare in 0.35: told apart on a picture of two even greys."""
+    picture, mask = np.full((256, 320, 3), 90, np.uint8), np.zeros((256, 320), np.uint8)
+    picture[:, :160], mask[:, :160] = 60, OBSTACLE_CLASS
+    n, mirrored, jittered, plain = 800, 0, 0, 0
+    for seed in range(n):
+        out, labels = augment_paper_pair(np.random.default_rng(seed), picture, mask, SIZE_WH)
+        flipped = bool(labels[0, 0] == 0)
+        mirrored += flipped
+        assert labels[:, :160].min() == labels[:, :160].max() != labels[0, 300]
+        upright = out[:, ::-1] if flipped else out
+        corner = (int(upright[0, 0, 0]), int(upright[0, -1, 0]))  # glare seldom reaches the upper corners
+        jittered += corner != (60, 90)
+        plain += np.array_equal(upright, picture)
+    assert is_within(mirrored, n, 0.5)
+    assert is_within(jittered, n, 0.5)
+    assert 0.30 * n < plain < 0.5 * n  # neither glare (0.35, an eighth of it without light) nor jitter
+
+
+def test_the_papers_jitter_stays_within_its_ranges_s8() -> None:
+    """Brightness and contrast by a fifth of a grey; hue by 0.05 of the circle and saturation by a fifth of a colour."""
+    grey, n = np.full((8, 8, 3), 100, np.uint8), 400
+    levels = [int(jitter_colour_slightly(np.random.default_rng(s), grey)[0, 0, 0]) for s in range(n)]
+    assert 80 <= min(levels) < 84
+    assert 116 < max(levels) <= 120
+    colour = np.asarray(cv2.cvtColor(np.full((8, 8, 3), (90, 150, 150), np.uint8), cv2.COLOR_HSV2RGB), np.uint8)
+    drawn = [jitter_colour_slightly(np.random.default_rng(s), colour) for s in range(n)]
+    hsv = np.array([cv2.cvtColor(each, cv2.COLOR_RGB2HSV)[0, 0] for each in drawn]).astype(int)
+    assert 80 <= hsv[:, 0].min() <= 82
+    assert 98 <= hsv[:, 0].max() <= 100
+    assert 96 <= hsv[:, 1].min() < 114  # contrast changes it by a fifth as well
+    assert 186 < hsv[:, 1].max() <= 216
 
 
 def test_mask_follows_the_picture() -> None:

@@ -181,6 +181,17 @@ def test_i20_motion_never_reaches_the_advice(
     )
 
 
+@pytest.mark.parametrize(("growth", "state"), [(0.05, S.APPROACHING), (-0.05, S.RECEDING), (0.0, S.STEADY)])
+def test_i20_a_known_state_and_an_unknown_one_give_the_same_advice(growth: float, state: m.MotionState) -> None:
+    """I20: with room for four samples nothing is ever known of the same boxes, and nothing else changes."""
+    blind = load_config(sets=["advisor.motion.max_samples=4"])
+    frames = drifting(box(BUOY, (0.42, 0.42, 0.58, 0.58), 0.9), (0.0, 0.0, growth), 10)
+    (_, advice, tracks), (_, blind_advice, blind_tracks) = play(frames, PAANI), play(frames, blind)
+    assert (tracks[-1].tracks[0].motion, blind_tracks[-1].tracks[0].motion) == (state, S.UNKNOWN)
+    assert advice[-1].center.obstacle > 0.2
+    assert msgspec.json.encode(advice) == msgspec.json.encode(blind_advice)
+
+
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.floats(0.0, 1.0)
 UNIT, FINITE = st.floats(0.0, 1.0), st.floats(-1e9, 1e9)
 STAMP = st.integers(0, 2**53) | st.integers(10**9, 10**9 + 10**7)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import ClassVar
 
 import cv2
 import numpy as np
 import pytest
 
 from paani.clock import patience_us
-from paani.config import CameraConfig
+from paani.config import CameraConfig, load_config
 from paani.errors import UserError
 from paani.messages import TimeBase
 from paani_services.camera.own_pictures import encode_jpeg
@@ -113,6 +114,37 @@ def test_an_unusable_path_is_named(tmp_path: Path) -> None:
 def test_a_missing_webcam_is_named() -> None:
     with pytest.raises(UserError, match=r"webcam:77.*/dev/video77"):
         Webcam(77, 320, 240)
+
+
+class UvcCamera:
+    """Stands for V4L2: takes what is asked for, and gives pictures of increasing grey, faster than they are read."""
+
+    asked: ClassVar[dict[int, float]] = {}
+
+    def __init__(self, index: int, api: int) -> None:
+        assert (index, api) == (7, cv2.CAP_V4L2)
+
+    def set(self, name: int, value: float) -> bool:
+        self.asked[name] = value
+        return True
+
+    def isOpened(self) -> bool:
+        return True
+
+    def read(self) -> tuple[bool, np.ndarray]:
+        wh = (int(self.asked[cv2.CAP_PROP_FRAME_WIDTH]), int(self.asked[cv2.CAP_PROP_FRAME_HEIGHT]))
+        return True, np.zeros((wh[1], wh[0], 3), np.uint8)
+
+
+def test_a8_a_webcam_is_asked_for_320_by_240_and_its_newest_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A8: by the `paper` profile's size; with one picture of buffer what is read is the newest."""
+    monkeypatch.setattr(cv2, "VideoCapture", UvcCamera)
+    monkeypatch.setattr(Path, "exists", lambda path: path == Path("/dev/video7"))
+    paper = load_config(profile="paper").camera
+    picture = Webcam(7, paper.width_px, paper.height_px).read()
+    assert picture is not None
+    assert picture.shape == (240, 320, 3)
+    assert UvcCamera.asked[cv2.CAP_PROP_BUFFERSIZE] == 1
 
 
 def test_webcam_sources_are_parsed() -> None:

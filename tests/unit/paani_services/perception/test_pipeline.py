@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
+import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,25 @@ def test_concurrent_and_sequential_agree() -> None:
     one, _ = perceiver(PerceptionConfig(concurrent=True)).perceive(river(), HEADER, 0.0)
     two, _ = perceiver(PerceptionConfig(concurrent=False)).perceive(river(), HEADER, 0.0)
     assert (one.detections, one.left, one.center, one.right) == (two.detections, two.left, two.center, two.right)
+
+
+def test_b4_the_paper_runs_the_detector_and_then_the_segmenter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """B4: one run ends before the next begins, in one thread, on the same picture; one frame id names both."""
+    eyes, runs = perceiver(load_config(profile="paper").perception), []
+    run = OnnxEngine.run
+
+    def watched(engine: OnnxEngine, tensor: Any) -> Any:
+        runs.append(("begins", engine.info().split()[0], threading.get_ident()))
+        output = run(engine, tensor)
+        runs.append(("ends", engine.info().split()[0], threading.get_ident()))
+        return output
+
+    monkeypatch.setattr(OnnxEngine, "run", watched)
+    evidence, mask = eyes.perceive(river(), HEADER, 0.0)
+    here = threading.get_ident()
+    assert runs == [(what, name, here) for name in ("detector", "segmenter") for what in ("begins", "ends")]
+    assert (evidence.frame_epoch, evidence.frame_seq) == (HEADER.frame_epoch, HEADER.frame_seq)
+    assert mask is not None
 
 
 @pytest.mark.parametrize(("detector_ms", "begins"), [(30.0, "_detect"), (11.0, "_segment"), (5.0, "_segment")])
