@@ -16,6 +16,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Topic
+from paani.motion_planning import MotionPlanner
 
 S = TypeVar("S")
 
@@ -36,6 +37,7 @@ class Decider(msgspec.Struct, Generic[S], frozen=True, kw_only=True):
 
     inputs: topics heard, newest message each. own: the process's own topics whose last message it also needs.
     outputs: topics said. A state encodes to JSON and back without loss.
+    with_planner: the same step with another motion planner; None for a process without one.
     """
 
     service: str
@@ -44,6 +46,7 @@ class Decider(msgspec.Struct, Generic[S], frozen=True, kw_only=True):
     outputs: tuple[Topic[Any], ...]
     decide: Callable[[S, Inputs, int, Config], tuple[S, Outputs]]
     own: tuple[Topic[Any], ...] = ()
+    with_planner: Callable[[MotionPlanner], Decider[S]] | None = None
 
 
 def deciders() -> dict[str, Decider[Any]]:

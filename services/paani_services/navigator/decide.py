@@ -1,15 +1,22 @@
 """The navigator as a decider: what it heard and its own mission in, one order out."""
 
+import functools
+
+import msgspec
+
 from paani import keys
 from paani.config import Config
 from paani.decider import Decider, Inputs, Outputs
 from paani.messages import Mission, Route
+from paani.motion_planning import MotionPlanner
 from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 
 
-def decide(state: NavigatorState, inputs: Inputs, now_us: int, config: Config) -> tuple[NavigatorState, Outputs]:
+def decide(
+    state: NavigatorState, inputs: Inputs, now_us: int, config: Config, planner: MotionPlanner | None = None
+) -> tuple[NavigatorState, Outputs]:
     """One step; see `navigate`."""
     advisory, odometry = inputs[keys.ADVISORY.name], inputs[keys.ODOMETRY.name]
     clock, arming = inputs[keys.SIM_TIME.name], inputs[keys.ARMING.name]
@@ -27,7 +34,7 @@ def decide(state: NavigatorState, inputs: Inputs, now_us: int, config: Config) -
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
     state, order = navigate(
-        state, navigator_inputs, _mission(inputs), now_us, config.bus.domain, config.navigator, camera
+        state, navigator_inputs, _mission(inputs), now_us, config.bus.domain, config.navigator, camera, planner
     )
     return state, {keys.COMMAND.name: order}
 
@@ -43,6 +50,10 @@ def _mission(inputs: Inputs) -> Mission | None:
     return None
 
 
+def _with_planner(planner: MotionPlanner) -> Decider[NavigatorState]:
+    return msgspec.structs.replace(DECIDER, decide=functools.partial(decide, planner=planner))
+
+
 DECIDER = Decider(
     service="navigator",
     state=NavigatorState,
@@ -50,4 +61,5 @@ DECIDER = Decider(
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,
+    with_planner=_with_planner,
 )

@@ -23,6 +23,7 @@ from paani.messages import (
     SimTime,
     Tracks,
 )
+from paani.motion_planning import MotionPlanner
 from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
 from paani_services.navigator.avoidance.replanning import (
     COURSE_TOLERANCE_RAD,
@@ -100,10 +101,12 @@ def navigate(
     domain: int,
     config: NavigatorConfig,
     camera: Camera = UNCALIBRATED_CAMERA,
+    planner: MotionPlanner | None = None,
 ) -> tuple[NavigatorState, NavCommand]:
     """One step. The order carries the advisory's `source_us` and the plant's newest stamp.
 
-    With a valid calibration the metric planner chooses heading and speed; it never overrides an inhibit.
+    With a valid calibration the metric planner chooses heading and speed; it never overrides an inhibit. Nor does
+    `planner`, which chooses in its place.
     """
     state = _note_clock_advance(state, inputs, now_us)
     inhibits = _find_inhibits(state, inputs, now_us, domain, config)
@@ -154,7 +157,7 @@ def navigate(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=_is_turn_to_look(advisory)
         )
         state, heading_rad, speed_mps, is_path_free = _steer_planned(
-            state, odometry, planner_setpoint, now_us, camera, config, mission.fence
+            state, odometry, planner_setpoint, now_us, camera, config, mission.fence, planner
         )
         if not is_path_free:
             inhibits.append(Inhibit.NO_FREE_PATH)
@@ -204,9 +207,12 @@ def _steer_planned(
     camera: Camera,
     config: NavigatorConfig,
     fence: Fence,
+    planner: MotionPlanner | None,
 ) -> tuple[NavigatorState, float, float, bool]:
     """The state, the planner's heading and speed, and whether it has a path or is still braking for want of one."""
-    planner_state, plan = replan(state.planner_state, odometry, setpoint, now_us, camera, config.planner, fence)
+    planner_state, plan = replan(
+        state.planner_state, odometry, setpoint, now_us, camera, config.planner, fence, planner
+    )
     state = msgspec.structs.replace(state, planner_state=planner_state)
     is_path_free = plan.speed_mps > 0.0 or is_braking(planner_state, odometry, now_us, config.planner)
     return state, plan.heading_rad, plan.speed_mps, is_path_free

@@ -16,6 +16,7 @@ from paani.bus import Stepper
 from paani.clock import Clock
 from paani.config import Config
 from paani.decider import decider_of
+from paani.motion_planning import MotionPlanner
 from paani_sim.trials.lockstep_bus import LockstepBus, LockstepInbox
 
 SILENCE_PERIODS = 1.5  # the controller steps without a new command after so many of its periods, as its live service
@@ -26,18 +27,28 @@ STRAIGHT_AHEAD = m.Advisory(source_us=0, direction=m.Direction.STRAIGHT, reason=
 class AutonomyStack:
     """Advisor, navigator and controller. `blind`: no advisor; the advice is always to go straight on.
 
-    mission: its first leg follows a route.
+    mission: its first leg follows a route. planner: in place of the navigator's own.
     """
 
     def __init__(
-        self, config: Config, mission: m.Mission, bus: LockstepBus, clock: Clock, *, blind: bool = False
+        self,
+        config: Config,
+        mission: m.Mission,
+        bus: LockstepBus,
+        clock: Clock,
+        *,
+        blind: bool = False,
+        planner: MotionPlanner | None = None,
     ) -> None:
-        def open_stepper(service: str) -> Stepper[Any, LockstepInbox]:
-            return Stepper(bus, clock, config, decider_of(service))
+        def open_stepper(service: str, planner: MotionPlanner | None = None) -> Stepper[Any, LockstepInbox]:
+            decider = decider_of(service)
+            if planner is not None and decider.with_planner is not None:
+                decider = decider.with_planner(planner)
+            return Stepper(bus, clock, config, decider)
 
         self._config, self._mission, self._bus, self._clock = config, mission, bus, clock
         self._advisor = None if blind else open_stepper("advisor")
-        self._navigator = open_stepper("navigator")
+        self._navigator = open_stepper("navigator", planner)
         self._controller = open_stepper("controller")
         self._advise_due_us = self._navigate_due_us = self._control_due_us = self._route_due_us = 0
         self._evidence_stale_us: int | None = None

@@ -21,7 +21,7 @@ from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.ledger import Ledger
-from paani_sim.trials.policies import Policy, load_policy_config
+from paani_sim.trials.policies import PEERS, Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases, run_cases_on
 from paani_sim.trials.run_trial import load_case_config, run_trial
@@ -188,8 +188,9 @@ def _parser() -> argparse.ArgumentParser:
         help=f"where validation and fresh drives are entered, before and after (default: {LEDGER_NAME})",
     )  # fmt: skip
     parser.add_argument(
-        "--policy", nargs="+", type=Policy, choices=tuple(Policy), default=list(Policy), metavar="POLICY",
-        help=f"who drives: {', '.join(Policy)} (default: all)",
+        "--policy", nargs="+", type=Policy, choices=tuple(Policy), metavar="POLICY",
+        default=[policy for policy in Policy if policy not in PEERS],
+        help=f"who drives: {', '.join(Policy)} (default: all but the peers {', '.join(PEERS)})",
     )  # fmt: skip
     parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
     parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")

@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config
 from paani.cores import load_estimator
+from paani.motion_planning import MotionPlanner
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import gps_message, imu_message, pose_message
@@ -61,8 +62,9 @@ class Drive:
         *,
         tap: MessageTap | None = None,
         perception_latency_s: float = PERCEPTION_LATENCY_S,
+        planner: MotionPlanner | None = None,
     ) -> None:
-        """evidence_source None: no advisor; the advice is always to go straight on."""
+        """evidence_source None: no advisor; the advice is always to go straight on. planner: see `AutonomyStack`."""
         world = scenario.world
         self.scenario, self.config = scenario, config
         self._evidence_source = evidence_source
@@ -72,7 +74,7 @@ class Drive:
         self._clock = PlantClock(self.plant)
         self._bus = LockstepBus(self._clock, config.bus.domain, tap)
         self.autonomy = AutonomyStack(
-            config, build_mission(scenario), self._bus, self._clock, blind=evidence_source is None
+            config, build_mission(scenario), self._bus, self._clock, blind=evidence_source is None, planner=planner
         )
         self.adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
         self.applied: AppliedThrust = self.adapter.decide(START_US)

@@ -8,6 +8,10 @@ from enum import StrEnum
 import msgspec
 
 from paani.config import Config, calibration_of, load_config
+from paani.motion_planning import MotionPlanner
+from paani_sim.trials.peers.bendy_ruler import plan_bendy_ruler
+from paani_sim.trials.peers.dynamic_window import plan_dynamic_window
+from paani_sim.trials.peers.velocity_obstacles import plan_velocity_obstacles
 
 NOMINAL_SPEED_MPS = Config().navigator.cruise_mps
 
@@ -17,7 +21,8 @@ class Policy(StrEnum):
 
     PAANI: camera and deciders of the profile `paani`, which `paani up` runs where none is asked for. PAANI_WIDE: those
     of the profile `wide`. PAPER: those of the profile `paper`, at its rates and speed. BLIND: PAANI without evidence
-    and without a planner. ORACLE: PAANI with evidence from ground truth.
+    and without a planner. ORACLE: PAANI with evidence from ground truth. BENDY_RULER, DWA, VO: PAANI with a planner of
+    the literature in place of the navigator's own.
     """
 
     PAANI = "paani"
@@ -25,9 +30,17 @@ class Policy(StrEnum):
     PAPER = "paper"
     BLIND = "blind"
     ORACLE = "oracle"
+    BENDY_RULER = "bendy-ruler"
+    DWA = "dwa"
+    VO = "vo"
 
 
-CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAANI_WIDE, Policy.PAPER})
+PEERS: dict[Policy, MotionPlanner] = {
+    Policy.BENDY_RULER: plan_bendy_ruler,
+    Policy.DWA: plan_dynamic_window,
+    Policy.VO: plan_velocity_obstacles,
+}
+CAMERA_POLICIES = frozenset({Policy.PAANI, Policy.PAANI_WIDE, Policy.PAPER, *PEERS})
 OWN_PROFILE = {Policy.PAANI_WIDE: "wide", Policy.PAPER: "paper"}  # of policies whose profile no setting changes
 
 

@@ -12,7 +12,7 @@ from paani_sim.trials.drive import Drive
 from paani_sim.trials.evidence_source import CameraEvidenceSource, EvidenceSource
 from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource
 from paani_sim.trials.lockstep_bus import MessageTap
-from paani_sim.trials.policies import CAMERA_POLICIES, Policy, load_policy_config
+from paani_sim.trials.policies import CAMERA_POLICIES, PEERS, Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.scoring import score_drive
 from paani_sim.trials.trial_cases import TrialCase, build_scenario
@@ -49,7 +49,7 @@ def build_drive(
     config, scenario = load_case_config(case, sets, threads=threads), build_scenario(case)
     evidence_source = open_evidence_source(case.policy, scenario, config)
     try:
-        return Drive(scenario, config, evidence_source, tap=tap)
+        return Drive(scenario, config, evidence_source, tap=tap, planner=PEERS.get(case.policy))
     except BaseException:
         if evidence_source is not None:
             evidence_source.close()

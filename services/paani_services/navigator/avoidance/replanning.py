@@ -1,20 +1,22 @@
 """When the local planner makes a new plan, and from which observations. Pure."""
 
 import math
+from collections.abc import Sequence
 
 import msgspec
 
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry, Tracks
+from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence import Fence
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import Plan, plan_motion
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint
-from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles, is_refuted
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles, is_refuted
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
-from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.mapping.occupancy_grid import BoxIds, build_occupancy_grid
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.occupancy_grid import BoxIds, OccupancyGrid, build_occupancy_grid
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
 
@@ -61,8 +63,9 @@ def replan(
     camera: Camera,
     config: PlannerConfig,
     fence: Fence = (),
+    planner: MotionPlanner | None = None,
 ) -> tuple[PlannerState, Plan]:
-    """The plan for this setpoint, within the fence and no faster than the setpoint allows.
+    """The plan for this setpoint, within the fence and no faster than the setpoint allows; by `planner` where given.
 
     A new plan is made for a new frame, another course or advised side, or after `replan_s`. Without an odometry pose
     the boat stops.
@@ -84,7 +87,10 @@ def replan(
         start = BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
         since_us = now_us if state.waiting_since_us is None else state.waiting_since_us
         may_wait = (now_us - since_us) * 1e-6 < config.patience_s
-        plan = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
+        if planner is None:
+            plan = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
+        else:
+            plan = Plan(*planner(_planning_inputs(grid, start, setpoint, plan, config, obstacles)))
         state = PlannerState(
             state.memory,
             plan,
@@ -96,6 +102,35 @@ def replan(
             tuple(sorted({obstacle.track_id for obstacle in obstacles} - {0})),
         )
     return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
+
+
+def _planning_inputs(
+    grid: OccupancyGrid,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    previous: Plan | None,
+    config: PlannerConfig,
+    obstacles: Sequence[DynamicObstacle],
+) -> PlanningInputs:
+    return PlanningInputs(
+        start.x_m,
+        start.y_m,
+        start.yaw_rad,
+        start.surge_mps,
+        start.yaw_rate_radps,
+        setpoint.course_rad,
+        min(setpoint.speed_mps, config.speed_mps),
+        None if previous is None else previous.heading_rad,
+        grid.occupied,
+        grid.west_m,
+        grid.south_m,
+        CELL_M,
+        tuple(
+            MovingObstacle(each.east_m, each.north_m, each.velocity.east_mps, each.velocity.north_mps)
+            for each in obstacles
+            if each.age_s <= config.unseen_s
+        ),
+    )
 
 
 def is_braking(state: PlannerState, odometry: Odometry, now_us: int, config: PlannerConfig) -> bool:
