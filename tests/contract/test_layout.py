@@ -69,7 +69,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("import mujoco", "sim_host/paani_sim/"),
         ("import filterpy", "services/paani_services/localization/"),
         ("from filterpy", "services/paani_services/localization/"),
-        ("from aiohttp", "services/paani_services/dashboard/"),
+        ("from aiohttp", "services/paani_services/dashboard/ services/paani_tools/fleet/page.py"),
         ("import serial", "shared/paani/serial_port.py"),
         ("from pynmeagps", "services/paani_services/sensors/"),
         ("from pyubx2", "services/paani_services/sensors/"),
@@ -102,7 +102,8 @@ def test_every_top_level_folder_explains_itself() -> None:
 
 
 def test_served_files_name_no_other_host() -> None:
-    for path in (ROOT / "services/paani_services/dashboard/static").rglob("*"):
+    folders = (ROOT / "services/paani_services/dashboard/static", ROOT / "services/paani_tools/fleet/static")
+    for path in (path for folder in folders for path in folder.rglob("*")):
         if path.suffix in {".js", ".html", ".css"}:
             text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
             assert "http://" not in text, path

@@ -8,6 +8,7 @@ import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import aiohttp
 import pytest
 from msgspec.structs import replace
 
@@ -19,6 +20,7 @@ from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani_services.operator import service as operator
 from paani_tools.fleet.fleet_file import read_fleet
+from paani_tools.fleet.page import serve_page
 from paani_tools.fleet.shore import Vessel, stop_vessels, watch_fleet
 from paani_tools.fleet.vessel_state import Contact
 from tests.bus_peers import joined, routing, until
@@ -188,6 +190,41 @@ async def test_the_shore_hears_what_it_may_and_can_do_nothing_but_stop(tmp_path:
         assert sum(on_board.drops.values()) == drops
 
 
+async def test_the_page_shows_the_vessels_and_stops_them(tmp_path: Path) -> None:
+    """Only to whom it belongs, with a policy that lets nothing else in; a STOP that is not latched is an error."""
+    otter, swan = await asyncio.to_thread(make_vessels, tmp_path, "otter", "swan")
+    file = await asyncio.to_thread(fleet_file, tmp_path, otter, swan)
+    fleet = await asyncio.to_thread(read_fleet, file)
+    port = asyncio.get_running_loop().create_future()
+    async with afloat(otter), watch_fleet(fleet, CLOCK) as vessels:
+        serving = asyncio.create_task(serve_page(vessels, 0, port.set_result))
+        await until(lambda: is_known(vessels[0]))
+        async with aiohttp.ClientSession(f"http://127.0.0.1:{await port}") as client:
+            for path in ("/", "/static/fleet.js", "/static/fleet.css", "/api/fleet"):
+                async with client.get(path) as response:
+                    assert response.status == 200
+                    assert "default-src 'self'" in response.headers["Content-Security-Policy"]
+            async with client.get("/api/fleet") as response:
+                rows = await response.json()
+            assert [(row["name"], row["contact"], row["x_m"]) for row in rows] == [
+                ("otter", "live", 1.0),
+                ("swan", "away", None),
+            ]
+            async with client.get("/api/fleet", headers={"Host": "evil.example"}) as response:
+                assert response.status == 403
+            for path, status, latched in (
+                ("/api/stop/beaver", 404, None),
+                ("/api/stop/otter", 200, {"otter": True}),
+                ("/api/stop", 503, {"otter": True, "swan": False}),
+            ):
+                async with client.post(path) as response:
+                    assert (response.status, (await response.json()).get("latched")) == (status, latched)
+            assert vessels[0].state.mode == "STOPPED"
+            assert vessels[0].state.changed_by == "shore"
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+
+
 async def test_the_command_lists_and_stops(tmp_path: Path) -> None:
     """`paani fleet`: a line for each vessel, and an exit code that says whether all is as asked."""
     otter, swan = await asyncio.to_thread(make_vessels, tmp_path, "otter", "swan")
@@ -201,7 +238,7 @@ async def test_the_command_lists_and_stops(tmp_path: Path) -> None:
         return process.returncode, output.decode().splitlines()
 
     async with afloat(otter):
-        (code, lines), (stop_code, stopped) = await asyncio.gather(fleet(), fleet("--stop-all"))
+        (code, lines), (stop_code, stopped) = await asyncio.gather(fleet("--list"), fleet("--stop-all"))
     assert (code, [line.split()[:2] for line in lines[1:]]) == (1, [["otter", "live"], ["swan", "away"]])
     assert (stop_code, stopped) == (
         1,

@@ -14,9 +14,11 @@ from paani.clock import MonotonicClock, WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani_tools.fleet.fleet_file import read_fleet
+from paani_tools.fleet.page import HOST, serve_page
 from paani_tools.fleet.shore import Vessel, stop_vessels, watch_fleet
 from paani_tools.fleet.vessel_state import Contact, fleet_table
 
+PORT = 8044  # beside a vessel's page
 HEAR_S = 5.0  # within which a vessel that is there is heard, its router's session included
 POLL_S = 0.05
 
@@ -31,7 +33,20 @@ def main(argv: list[str]) -> int:
             raise UserError(f"--stop {name}: no such vessel in {options.fleet} (have: {', '.join(names)})")
     if options.stop or options.stop_all:
         return asyncio.run(_stop(fleet, options.stop or names))
-    return asyncio.run(_list(fleet, options.json))
+    if options.list or options.json:
+        return asyncio.run(_list(fleet, options.json))
+    return asyncio.run(_serve(fleet, options.port))
+
+
+async def _serve(fleet: Sequence[BusConfig], port: int) -> int:
+    """The page, until Ctrl-C."""
+    async with watch_fleet(fleet, WallClock()) as vessels:
+        await serve_page(vessels, port, _say_where)
+    return 0
+
+
+def _say_where(port: int) -> None:
+    sys.stderr.write(f"the fleet: http://{HOST}:{port}\n")
 
 
 async def _list(fleet: Sequence[BusConfig], as_json: bool) -> int:
@@ -80,8 +95,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("fleet", type=Path, metavar="FILE", help="the vessels, in TOML")
     acts = parser.add_mutually_exclusive_group()
-    acts.add_argument("--list", action="store_true", help="one line for each vessel, as now (the default)")
+    acts.add_argument("--list", action="store_true", help="one line for each vessel, as now, and no page")
     acts.add_argument("--json", action="store_true", help="the same, for a program")
     acts.add_argument("--stop", nargs="+", default=[], metavar="VESSEL", help="STOP these")
     acts.add_argument("--stop-all", action="store_true", help="STOP every vessel")
+    parser.add_argument("--port", type=_port, default=PORT, help=f"of the page (default: {PORT})")
     return parser
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError("between 0 and 65535")
+    return port
