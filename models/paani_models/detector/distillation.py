@@ -21,16 +21,14 @@ from paani.errors import UserError
 from paani.whole_file import write_json
 from paani_models.datasets.sources import DETECTOR_CLASSES, LOOSE_SOURCES
 from paani_models.detector.data import BoxedPicture
-from paani_models.detector.loss import box_corners, exhaustive_candidates, generalised_iou, log_scores
+from paani_models.detector.loss import Taught, log_scores
 from paani_models.detector.metrics import iou_matrix
 from paani_models.detector.off_the_shelf import KNOWN, OffTheShelf
 from paani_models.detector.shipped_network import FIRST_STAGES, Detector, load_yolox_weights
 
-BOX_MIN_SCORE = 0.3  # of a teacher's candidate whose box is learnt too
 LABEL_MIN_SCORE = 0.5  # of a box that a teacher adds to a picture's own
 HINTED_MIN_SCORE, INSIDE_FRAC = 0.15, 0.7  # of one that lies to that share inside a loose box of its class
 SAME_OBJECT_IOU = 0.5  # of two boxes of which the lower scored one is dropped
-BOX_GAIN, SCORE_GAIN = 2.0, 1.0
 
 
 class Teacher:
@@ -56,27 +54,11 @@ class Teacher:
         return self.net.to(pictures.device).first_stages(pictures)
 
     @torch.no_grad()
-    def answer(self, c3: Tensor) -> tuple[Tensor, Tensor]:
-        """Boxes cx, cy, w, h in input pixels [N,A,4], and joint scores [N,A,4], 0 for classes unknown to it.
-
-        c3: what its first stages made of the pictures.
-        """
+    def answer(self, c3: Tensor) -> Taught:
+        """Its candidates; scores are 0 for classes unknown to it. c3: what its first stages made of the pictures."""
         boxes, logits = self.net.to(c3.device).raw_after(c3)
-        return boxes, log_scores(logits)[0].exp() * self.known.to(c3.device)
-
-    def loss(self, c3: Tensor, boxes: Tensor, logits: Tensor, exhaustive_mask: Tensor) -> Tensor:
-        """How far the student's raw answers lie from the teacher's where nothing is annotated.
-
-        Divided by the sum of the teacher's scores there, as the other losses are by the number of assigned candidates.
-        """
-        taught, scores = self.answer(c3)
-        silent = ~exhaustive_candidates(exhaustive_mask) & self.known.to(c3.device)
-        log_p, log_not_p = log_scores(logits)
-        score_loss = -(silent * (scores * log_p + (1.0 - scores) * log_not_p)).sum()
-        sure = (scores * silent).amax(2)
-        sure = sure * (sure > BOX_MIN_SCORE)
-        box_loss = (sure * (1.0 - generalised_iou(box_corners(boxes), box_corners(taught)))).sum()
-        return (BOX_GAIN * box_loss + SCORE_GAIN * score_loss) / (scores * silent).sum().clamp(min=1.0)
+        known = self.known.to(c3.device)
+        return Taught(boxes, log_scores(logits)[0].exp() * known, known)
 
 
 def blend_weights(model: Detector, other: Detector, share: float) -> None:

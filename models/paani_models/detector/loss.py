@@ -10,6 +10,8 @@ is penalised for a class only where the mask holds for every cell under it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -21,6 +23,7 @@ IOU_COST = 3.0
 FAR_COST = 1e5
 TOP_K = 10
 BOX_GAIN, SCORE_GAIN = 5.0, 1.0
+TAUGHT_BOX_MIN_SCORE = 0.3  # of a teacher's candidate whose box is learnt too
 
 
 def box_corners(boxes: Tensor) -> Tensor:
@@ -95,10 +98,26 @@ def exhaustive_candidates(exhaustive_mask: Tensor) -> Tensor:
     return torch.cat(levels, 2).transpose(1, 2) < 0.5
 
 
+@dataclass(frozen=True)
+class Taught:
+    """A teacher's answer: boxes cx, cy, w, h [N,A,4], joint scores [N,A,C], and which classes it knows [C]."""
+
+    boxes: Tensor
+    scores: Tensor
+    known: Tensor
+
+
 def detector_loss(
-    boxes: Tensor, logits: Tensor, truths: list[Tensor], exhaustive_mask: Tensor, size_hw: tuple[int, int]
+    boxes: Tensor,
+    logits: Tensor,
+    truths: list[Tensor],
+    exhaustive_mask: Tensor,
+    size_hw: tuple[int, int],
+    taught: Taught | None = None,
 ) -> tuple[Tensor, Tensor]:
     """Box loss and score loss, each divided by the number of assigned candidates.
+
+    taught: where nothing is annotated, a background candidate learns its scores, and its box as far as it is sure.
 
     boxes [N,A,4] and logits [N,A,5] as `Detector.raw` gives them. The score target of an assigned candidate is the
     square root of its IoU, so that a good box of a small object still scores above the 0.40 threshold (C6).
@@ -108,6 +127,11 @@ def detector_loss(
     log_p, log_not_p = log_scores(logits)
     target = torch.zeros_like(log_p)
     weight = exhaustive_candidates(exhaustive_mask).to(log_p.dtype)
+    sure = torch.zeros_like(log_p[..., 0])
+    if taught is not None:
+        silent = (weight < 0.5) & taught.known
+        target, weight = target + silent * taught.scores, weight + silent
+        sure = target.amax(2)
     box_loss = boxes.sum() * 0.0
     assigned = 0
     for index, truth in enumerate(truths):
@@ -116,9 +140,15 @@ def detector_loss(
         owner, quality = assign_simota(corners[index], log_p[index], truth, centres, strides)
         own = (owner >= 0).nonzero().squeeze(1)
         objects = truth[owner[own]]
+        sure[index, own] = 0.0
+        target[index, own] = 0.0
         target[index, own, objects[:, 0].long()] = quality[own].sqrt()
         weight[index, own] = 1.0
         box_loss = box_loss + (1.0 - generalised_iou(corners[index, own], objects[:, 1:])).sum()
         assigned += len(own)
+    if taught is not None:
+        sure = sure * (sure > TAUGHT_BOX_MIN_SCORE)
+        box_loss = box_loss + (sure * (1.0 - generalised_iou(corners, box_corners(taught.boxes)))).sum()
+        assigned += int((sure > 0).sum())
     score_loss = -(weight * (target * log_p + (1.0 - target) * log_not_p)).sum()
     return BOX_GAIN * box_loss / max(1, assigned), SCORE_GAIN * score_loss / max(1, assigned)

@@ -140,10 +140,11 @@ class DetectorTraining:
             first = self.model.first_stages(seen)
             boxes, logits = self.model.raw_after(first)
             known = [truth.to(training_device()) for truth in truths]
-            box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), (SIZE_WH[1], SIZE_WH[0]))
+            taught = None
             if self.teacher is not None:
-                taught = first.detach() if is_shared else self.teacher.first_stages(seen)
-                score_loss = score_loss + self.teacher.loss(taught, boxes, logits, to_device(judged))
+                taught = self.teacher.answer(first.detach() if is_shared else self.teacher.first_stages(seen))
+            size_hw = (SIZE_WH[1], SIZE_WH[0])
+            box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), size_hw, taught)
             rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps)
             state.update(box_loss + score_loss, rate, clip_norm=10.0)
             losses.append((box_loss.item(), score_loss.item()))

@@ -15,9 +15,10 @@ from paani_models.detector import distillation  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.distillation import Teacher, add_teachers_boxes, blend_weights  # noqa: E402
+from paani_models.detector.loss import Taught, assign_simota, box_corners, detector_loss, log_scores  # noqa: E402
 from paani_models.detector.metrics import Detections  # noqa: E402
 from paani_models.detector.off_the_shelf import OffTheShelf  # noqa: E402
-from paani_models.detector.shipped_network import Detector  # noqa: E402
+from paani_models.detector.shipped_network import Detector, candidate_grid  # noqa: E402
 
 pytestmark = pytest.mark.train
 SEEN = np.full((256, 320, 3), 90, np.uint8)
@@ -43,15 +44,46 @@ def test_weights_are_blended_by_share() -> None:
 
 def test_the_teacher_speaks_only_where_nothing_is_annotated_and_of_what_it_knows(teacher: Teacher) -> None:
     pictures = torch.rand(1, 3, 64, 64)
-    x = teacher.first_stages(pictures)
+    taught = teacher.answer(teacher.first_stages(pictures))
     boxes, logits = teacher.net.raw(pictures)
+    assert (taught.scores[..., 2:] == 0).all()
     silent = torch.zeros(1, 4, 8, 8, dtype=torch.bool)
-    assert teacher.loss(x, boxes, logits + 1.0, ~silent).item() == 0.0
-    assert teacher.loss(x, boxes, logits + 1.0, silent).item() > teacher.loss(x, boxes, logits, silent).item()
-    assert (teacher.answer(x)[1][..., 2:] == 0).all()
+
+    def loss(mask: torch.Tensor, logits: torch.Tensor, *truth: list[float], taught: Taught | None = taught) -> float:
+        known = torch.tensor(truth).reshape(-1, 5)
+        return float(detector_loss(boxes, logits, [known], mask, (64, 64), taught)[1])
+
+    assert loss(~silent, logits) == loss(~silent, logits, taught=None) > 0.0
+    assert loss(silent, logits, taught=None) == 0.0
+    assert loss(silent, logits + 1.0) > loss(silent, logits) > 0.0
     unknown = silent.clone()
     unknown[:, :2] = True
-    assert teacher.loss(x, boxes, logits + 1.0, unknown).item() == 0.0
+    assert loss(unknown, logits) == loss(unknown, logits, taught=None)
+
+
+def test_what_people_drew_outdoes_the_teacher() -> None:
+    """A candidate on a drawn person learns that, whatever the teacher says; a sure teacher moves boxes elsewhere."""
+    centres, strides = candidate_grid(64, 64)
+    boxes = torch.cat([centres, strides[:, None].expand(-1, 2) * 2], 1)[None]
+    logits = torch.zeros(1, len(centres), 5)
+    silent = torch.zeros(1, 4, 8, 8, dtype=torch.bool)
+    drawn = torch.tensor([[0.0, 8, 8, 24, 24]])
+    owner, _ = assign_simota(box_corners(boxes[0]), log_scores(logits)[0][0], drawn, centres, strides)
+    own = owner >= 0
+    known = torch.tensor([True, True, False, False])
+    says_no, says_vessel = torch.zeros(1, len(centres), 4), torch.zeros(1, len(centres), 4)
+    says_vessel[0, own, 1] = 0.9
+    first, second = (
+        detector_loss(boxes, logits, [drawn], silent, (64, 64), Taught(boxes + 3.0, says, known))
+        for says in (says_no, says_vessel)
+    )
+    assert first == second
+    elsewhere = says_no.clone()
+    elsewhere[0, int((~own).nonzero()[0]), 1] = 0.9
+    third = detector_loss(boxes, logits, [drawn], silent, (64, 64), Taught(boxes + 3.0, elsewhere, known))
+    unsure = detector_loss(boxes, logits, [drawn], silent, (64, 64), Taught(boxes + 3.0, elsewhere / 4, known))
+    assert third[0] != first[0]
+    assert unsure[0] == first[0]
 
 
 def test_teachers_boxes_fill_what_a_source_leaves_out_once_each_and_are_kept(tmp_path: Path) -> None:
