@@ -113,6 +113,9 @@ def _parser() -> argparse.ArgumentParser:
         help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights;"
         " the first stages stay as they are above 0, and where they are YOLOX-nano's",
     )
+    train.add_argument(
+        "--mean-with", type=Path, metavar="FILE", help="detector: start from the mean of --start's weights and these"
+    )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
     train.add_argument("--threads", type=int, default=2)
@@ -232,6 +235,7 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
             peak_rate=arguments.peak_rate,
             unchecked=arguments.unchecked,
             blend=arguments.blend,
+            mean_with=arguments.mean_with,
             draws_frac=arguments.draws,
         )
         train_and_export.train_network(arguments.net, pictures, options, arguments.threads)

@@ -52,6 +52,7 @@ class TrainingOptions:
     peak_rate: float | None = None
     unchecked: bool = False
     blend: float | None = None
+    mean_with: Path | None = None
     draws_frac: float = 1.0
 
 
@@ -128,13 +129,7 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         distilled=keeps,
     )
     torch.manual_seed(recipe.seed)
-    model = Detector()
-    if options.start is None:
-        load_yolox_weights(model, pictures.data / COCO_FILE)
-    elif options.start.suffix == ".onnx":
-        load_exported(model, options.start, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
-    else:
-        load_averaged_weights(model, options.start)
+    model = start_detector(pictures.data, options)
     cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
     held_out = read_boxed_pictures(pictures.boxed_samples(held_out=True))
     teacher = None
@@ -149,6 +144,28 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
     if keeps:
         training.state.average_from_model()
     training.run()
+
+
+def start_detector(data: Path, options: TrainingOptions) -> Detector:
+    """The detector that a training begins with: YOLOX-nano's weights, `start`, or the mean of that and `mean_with`."""
+    model = Detector()
+    if options.start is None:
+        load_yolox_weights(model, data / COCO_FILE)
+    else:
+        _load_detector(model, options.start)
+    if options.mean_with is not None:
+        other = Detector()
+        _load_detector(other, options.mean_with)
+        blend_weights(model, other, 0.5)
+    return model
+
+
+def _load_detector(model: Detector, path: Path) -> None:
+    """From a checkpoint or an exported ONNX file."""
+    if path.suffix == ".onnx":
+        load_exported(model, path, torch.zeros(1, 3, SIZE_WH[1], SIZE_WH[0]))
+    else:
+        load_averaged_weights(model, path)
 
 
 def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None:

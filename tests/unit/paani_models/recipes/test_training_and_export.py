@@ -11,13 +11,14 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 from paani.errors import UserError  # noqa: E402
+from paani_models.catalogue import verified_path  # noqa: E402
 from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
 from paani_models.network_input import segmenter_batch  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, build_network, largest_export_difference, write_onnx  # noqa: E402
-from paani_models.recipes.train_and_export import parse_stages  # noqa: E402
+from paani_models.recipes.train_and_export import TrainingOptions, parse_stages, start_detector  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
 from paani_models.segmenter.paper_network import DECODER_CHANNELS, PaperSegmenter  # noqa: E402
@@ -29,6 +30,7 @@ from paani_models.training.training_state import (  # noqa: E402
     TrainingState,
     learning_rate,
     load_checkpoint,
+    save_checkpoint,
     stage_at_epoch,
 )
 
@@ -134,6 +136,21 @@ def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.Monk
     assert rows[0]["vessel"]["n"] == 1
     assert rows[0]["person"]["n"] == 0
     assert sum(rows[1][k] for k in ("box_loss", "score_loss")) < sum(rows[0][k] for k in ("box_loss", "score_loss"))
+
+
+@pytest.mark.train
+def test_a_detector_may_start_from_the_mean_of_two(tmp_path: Path) -> None:
+    """A checkpoint and an exported file."""
+    stored = Detector()
+    save_checkpoint(tmp_path / "a.pt", {"average": stored.state_dict()})
+    options = TrainingOptions(tmp_path, start=tmp_path / "a.pt", mean_with=verified_path("detector"))
+    mean = start_detector(tmp_path, options).dark4[0][0].conv.weight
+    alone = [
+        start_detector(tmp_path, TrainingOptions(tmp_path, start=path)).dark4[0][0].conv.weight
+        for path in (options.start, options.mean_with)
+    ]
+    assert not torch.equal(*alone)
+    torch.testing.assert_close(mean, (alone[0] + alone[1]) / 2)
 
 
 def test_epoch_order_depends_on_seed_and_epoch_only_and_holds_the_nulls(
