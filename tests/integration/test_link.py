@@ -13,9 +13,9 @@ from msgspec.structs import replace
 from paani import keys
 from paani import messages as m
 from paani.authority import OBSERVER, ensure_credentials
-from paani.bus import Bus, Stepper, open_bus
+from paani.bus import Bus, Latest, Picture, Stepper, open_bus
 from paani.bus.routing import open_router
-from paani.clock import WallClock
+from paani.clock import Clock, WallClock
 from paani.config import BusConfig, Config, load_config
 from paani.decider import decider_of
 from paani.errors import UserError
@@ -251,6 +251,52 @@ async def test_board_and_host_need_no_common_time(sides: Sides, ahead_s: float) 
         refused, received = navigator.drops.total(), inbox.received
         await until(lambda: inbox.received > received + 5, say)
         assert navigator.drops.total() == refused
+
+
+@pytest.mark.parametrize("ahead_s", [-5.0, 5.0])
+async def test_pictures_are_as_old_on_the_other_machine_as_they_are(sides: Sides, ahead_s: float) -> None:
+    """Though the host's router hands them on in between."""
+    there = ClockApart(ahead_s)
+    async with contextlib.AsyncExitStack() as stack:
+        for router in sides:
+            await stack.enter_async_context(routing(router))
+        advisor, camera = [await open_bus(sides.board, user, there) for user in ("advisor", "camera")]
+        stack.push_async_callback(advisor.close)
+        stack.push_async_callback(camera.close)
+        operator, eye, hands_on, watcher = [
+            await stack.enter_async_context(joined(sides.host, user))
+            for user in ("operator", "eye", "router", OBSERVER)
+        ]
+        stack.enter_context(advisor.alive())
+        stack.enter_context(operator.alive())
+        taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
+        seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
+        tasks = [
+            asyncio.create_task(exchange_pictures(hands_on, sides.host, CLOCK)),
+            asyncio.create_task(keep_up(pulled)),
+        ]
+
+        def show() -> None:
+            for output, clock in ((taken, there), (drawn, CLOCK)):
+                source_us = clock.now_us() - 200_000
+                header = m.PictureHeader(source_us=source_us, frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
+                output.put_picture(header, b"data")
+
+        def age_s(inbox: Latest[Picture], clock: Clock) -> float:
+            return float("inf") if inbox.value is None else (clock.now_us() - inbox.value.header.source_us) * 1e-6
+
+        try:
+            await until(lambda: 0.2 <= age_s(seen, CLOCK) < 2.0, show)
+            await until(lambda: 0.2 <= age_s(pulled, there) < 2.0, show)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
+
+
+async def keep_up(pulled: Latest[Picture]) -> None:
+    while True:
+        await pulled.next()
 
 
 async def test_stop_is_heard_from_a_board_whose_clock_is_ahead(sides: Sides) -> None:
