@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import os
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import msgspec
 from paani import keys
 from paani.bus import Bus
 from paani_tools.bench.faults.fault import ZERO_S, Drive, Expected, Fault
+from paani_tools.bench.faults.hostile import hostile_topics
 from paani_tools.bench.faults.running import Loop, until
 
 WINDOW_S, FIRST_S, APART_S = 2.5, 14.0, 9.0  # of the scenario's faults, by its own clock
@@ -27,6 +28,7 @@ WORDS = {
 }
 TIMES, PERIOD_S = 20, 0.05
 JUMP_S = 3600.0
+SEED = 1
 
 
 def scenario_text() -> str:
@@ -72,21 +74,46 @@ def peer_faults() -> list[Fault]:
 
 
 def _garbage() -> Fault:
-    """Random bytes on every key, by its own producer."""
+    """What no receiver may take, on every key, by its own producer. No process ends."""
 
     async def begin(loop: Loop) -> None:
-        by_producer: dict[str, list[keys.Topic[Any]]] = {}
-        for topic in keys.every_topic(loop.config.bus.graph):
-            if topic.producer in loop.config.services and topic.stance is not keys.Stance.PICTURE:
-                by_producer.setdefault(topic.producer, []).append(topic)
         loop.mark()
-        for producer, topics in by_producer.items():
-            async with loop.joined(producer) as bus:
-                for publisher in [bus.publisher(topic) for topic in topics]:
-                    for size in (0, 1, 100, 10_000):
-                        publisher.forward(os.urandom(size))
+        await flood(loop, 40, refused=True)
 
-    return Fault(name="garbage on every key", expected=Expected.GOES_ON, begin=begin, end=_nothing, lasts_s=0.5)
+    async def end(loop: Loop) -> None:
+        if ended := ended_since(loop, loop.hit_us):
+            raise ChildProcessError(f"ended: {', '.join(ended)}")
+
+    return Fault(name="garbage on every key", expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=0.5)
+
+
+async def flood(loop: Loop, each: int, *, refused: bool) -> int:
+    """As many hostile messages on each key, by whoever may write it, as fast as they go; returns how many.
+
+    refused: only such as no receiver may take. Others may take the place of what the real producer says.
+    """
+    hostile = hostile_topics(loop.config.bus.graph, loop.config.bus.domain, random.Random(SEED))
+    for name in (keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name):
+        hostile[name].heard_epoch = 2  # everything real is of a later one
+    by_producer: dict[str, list[keys.Topic[Any]]] = {}
+    for topic in keys.every_topic(loop.config.bus.graph):
+        if topic.producer in loop.config.services:
+            by_producer.setdefault(topic.producer, []).append(topic)
+    sent = 0
+    for producer, topics in by_producer.items():
+        async with loop.joined(producer) as bus:
+            for topic in topics:
+                publisher = bus.publisher(topic)
+                for _ in range(each):
+                    publisher.forward(hostile[topic.name].next(loop.clock.now_us(), refused=refused).data)
+                    sent += 1
+                await asyncio.sleep(0)
+    return sent
+
+
+def ended_since(loop: Loop, at_us: int) -> list[str]:
+    """Processes that have ended since then, whether they were started again or not."""
+    return sorted(name for name, changed_us in loop.watch.changed_us.items() if changed_us > at_us)
 
 
 def _forged(name: str, change: Callable[[bytes], bytes]) -> Fault:
