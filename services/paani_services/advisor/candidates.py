@@ -8,6 +8,7 @@ import math
 
 import msgspec
 
+from paani import portable
 from paani.boxes import covered_frac
 from paani.config import CalibrationConfig, Config
 from paani.messages import BoxXyxy, Candidate, Evidence
@@ -45,7 +46,7 @@ def width_m(box: BoxXyxy, distance_m: float, calibration: CalibrationConfig) -> 
     """Width of what is boxed at this distance; infinite at the horizon and above."""
     if math.isinf(distance_m):
         return math.inf
-    return 2.0 * math.tan(0.5 * math.radians(calibration.hfov_deg)) * distance_m * (box[2] - box[0])
+    return 2.0 * portable.tan(0.5 * math.radians(calibration.hfov_deg)) * distance_m * (box[2] - box[0])
 
 
 def _obstacle(number: int, candidate: Candidate, distance_m: float | None) -> Obstacle:

@@ -1,5 +1,7 @@
 """What the map shows of the navigator's intent: the way ahead, moving obstacles, home. Pure; it decides nothing."""
 
+import math
+
 import numpy as np
 
 from paani.config import NavigatorConfig
@@ -67,7 +69,7 @@ def _moving_obstacles(
 
 def _on_map(obstacle: DynamicObstacle, to_map_m: tuple[float, float]) -> MovingObstacle:
     east_m, north_m = obstacle.east_m, obstacle.north_m
-    middle_m = float(np.mean(east_m)), float(np.mean(north_m))
+    middle_m = math.fsum(east_m) / east_m.size, math.fsum(north_m) / north_m.size
     return MovingObstacle(
         track_id=obstacle.track_id,
         x_m=middle_m[0] + to_map_m[0],
