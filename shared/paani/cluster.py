@@ -16,6 +16,7 @@ import platform
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
+from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
 from urllib.parse import urlsplit
 
@@ -228,6 +229,7 @@ def _local_cluster(processes: int) -> Iterator[Any]:
     """Processes that take no Ctrl-C, so that what they have done can be fetched; a killed one is replaced."""
     from distributed import LocalCluster  # noqa: PLC0415
 
+    resource_tracker.ensure_running()  # its first start unblocks the signal in the thread that starts a worker
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited by the threads that start them
     try:
         cluster = LocalCluster(

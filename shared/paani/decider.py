@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import msgspec
 
@@ -16,7 +16,9 @@ from paani import messages as m
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Topic
-from paani.motion_planning import MotionPlanner
+
+if TYPE_CHECKING:  # numpy comes with it, 12 MiB for every process
+    from paani.motion_planning import MotionPlanner
 
 S = TypeVar("S")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -169,3 +170,9 @@ def test_names_are_nouns_and_verbs_of_the_field() -> None:
             if name.lstrip("_") in NO_NAMES:
                 found.append(f"{path.relative_to(ROOT)}:{node.lineno}: {name}")
     assert found == []
+
+
+def test_the_contract_takes_no_numpy() -> None:
+    """Every process imports the bus; 12 MiB in each of them are for those alone that compute with arrays."""
+    code = "import sys, paani.bus, paani.decider; raise SystemExit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

@@ -271,8 +271,9 @@ def test_j7_center_vessel() -> None:
     """J7: a vessel whose part inside the centre is at least 0.04 blocks it, a pier of that size does not."""
     large = (0.40, 0.22, 0.60, 0.43)
     sides = {"left": lane(0.2), "right": lane(0.05)}
+    config = load_config(sets=["advisor.policy.center_vessel_height=0"])
     for label, direction in ((VESSEL, D.RIGHT), (PIER, D.STRAIGHT)):
-        _, advice, _ = play([msgspec.structs.replace(seeing(box(label, large, 0.6)), **sides)] * 2)
+        _, advice, _ = play([msgspec.structs.replace(seeing(box(label, large, 0.6)), **sides)] * 2, config)
         assert advice[1].center.risk < 0.48
         assert advice[1].direction is direction
         if label is VESSEL:
