@@ -26,6 +26,9 @@ from tests.claims_check.table import read_table
 from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
+BESIDE = {  # files in them that wait for results alone
+    f"tests/integration/test_{name}.py" for name in ("claims_check", "cluster", "docs", "examples", "trials")
+}
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
 
@@ -45,8 +48,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def is_alone(nodeid: str) -> bool:
-    """Whether a test starts processes or watches the clock, by its folder."""
-    return nodeid.split("/")[1] in ALONE
+    """Whether a test starts processes or watches the clock, by its folder and file."""
+    return nodeid.split("/")[1] in ALONE and nodeid.partition("::")[0] not in BESIDE
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
