@@ -148,13 +148,8 @@ class DisarmedChain(Target):
         if topic.name != keys.ARMING.name:
             self._bus.deliver(topic, message)
         self._summary.feed(message)
+        _give(self._adapter, message, now_us)
         match message:
-            case m.Thrust():
-                self._adapter.offer(message, now_us)
-            case m.Arming():
-                self._adapter.receive_arming(message, now_us)
-            case m.Pulse():
-                self._adapter.receive_pulse(message.producer, now_us)
             case m.ImuSample():
                 self._samples = [*self._samples[-63:], message]
             case m.GpsFix():
@@ -244,15 +239,20 @@ class ArmedBoat(Target):
 
     def _hear(self, name: str, data: bytes, now_us: int) -> str:
         message, cause = self._receivers.judge(name, data, now_us)
-        match message:
-            case m.Thrust():
-                self._adapter.offer(message, now_us)
-            case m.Arming():
-                self._adapter.receive_arming(message, now_us)
-            case m.Pulse():
-                self._adapter.receive_pulse(message.producer, now_us)
+        _give(self._adapter, message, now_us)
         return cause
 
 
 def _corner(number: int) -> m.Waypoint:
     return m.Waypoint(x_m=30.0 * (number > 0), y_m=30.0 * (number > 1))
+
+
+def _give(adapter: ThrustAdapter, message: m.Message | None, now_us: int) -> None:
+    """To the thrust adapter, if it takes such a message."""
+    match message:
+        case m.Thrust():
+            adapter.offer(message, now_us)
+        case m.Arming():
+            adapter.receive_arming(message, now_us)
+        case m.Pulse():
+            adapter.receive_pulse(message.producer, now_us)
