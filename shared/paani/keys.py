@@ -188,13 +188,17 @@ STEPS = {
 STATION, SHORE = "dashboard", "shore"
 STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing
 COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm")
+# Processes that carry the bus to what others use, and run only where `up.ports` names them. Some of them ask the
+# operator's process for what a person asks of them.
+PORTS = ("mavlink", "ros2", "foxglove", "nmea")
+ASKING_PORTS = ("mavlink", "ros2")
 REQUESTS = {
     client: Topic(
         name=f"operator/request/{client}", type=m.OperatorRequest, producer=client, rate_hz=10.0, fresh_s=0.6,
         stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP"
         + ("" if client in STOPPING_CLIENTS else ", or a hold that arms"),
     )
-    for client in (STATION, *COMMAND_LINE_CLIENTS)
+    for client in (STATION, *ASKING_PORTS, *COMMAND_LINE_CLIENTS)
 }
 
 TOPICS: tuple[Topic[Any], ...] = (
@@ -236,6 +240,7 @@ SERVICES = (
     "bridge",
     "operator",
     "dashboard",
+    *PORTS,
 )
 # Who has no place in a graph: no credential there, and no rights. Only a simulated boat is armed without a hand.
 ABSENT: Mapping[Graph, frozenset[str]] = {

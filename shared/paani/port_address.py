@@ -45,3 +45,12 @@ def require_line(address: str) -> None:
             parse_address(address)
         except ValueError as error:
             raise ValueError(str(error).replace(PORT_FORMATS, LINE_FORMATS)) from error
+
+
+def tcp_address(address: str) -> tuple[str, int]:
+    """Host and port of `HOST:PORT`, IPv6 hosts in brackets. Raises ValueError, in one line."""
+    with contextlib.suppress(ValueError):
+        parts = urlsplit(f"//{address}")
+        if parts.hostname and parts.port and address.rpartition(":")[0].strip("[]").lower() == parts.hostname:
+            return parts.hostname, parts.port
+    raise ValueError(f"'{address}' is no HOST:PORT")

@@ -22,7 +22,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     await console.restore()
     station = bus.latest(keys.pulse(keys.STATION))
     applied = bus.latest(keys.THRUST_APPLIED)
-    clients = (keys.STATION, *keys.command_line_clients_in(bus.graph))
+    clients = (keys.STATION, *keys.ASKING_PORTS, *keys.command_line_clients_in(bus.graph))
     requests = {client: bus.queue(keys.REQUESTS[client]) for client in clients}
     try:
         with bus.alive():

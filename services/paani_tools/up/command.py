@@ -6,12 +6,13 @@ import argparse
 import asyncio
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config
 from paani.errors import UserError
-from paani.keys import Graph
+from paani.keys import PORTS, Graph
 from paani.option_paths import input_file, output_file, output_folder
 from paani.sides import Side
 from paani.whole_file import write_json
@@ -50,6 +51,7 @@ def up_sets(
     mission: Path | None = None,
     fence: Path | None = None,
     only: str | None = None,
+    ports: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Settings that the options of `paani up` stand for. A simulated boat is armed at start."""
     sets = ["up.arm_at_start=true"] if simulated else []
@@ -64,6 +66,8 @@ def up_sets(
     for field, file in (("mission", mission), ("fence", fence)):
         if file is not None:
             sets.append(f"navigator.{field}={json.dumps(str(file.absolute()))}")
+    if ports:
+        sets.append(f"up.ports={json.dumps(list(ports))}")
     if record is not None:
         sets.append(f"recorder.folder={json.dumps(str(record.absolute()))}")
     return tuple(sets)
@@ -108,6 +112,7 @@ def _config(options: argparse.Namespace) -> Config:
         mission=options.mission,
         fence=options.fence,
         only=options.only,
+        ports=options.ports,
     )
     return config_from(options, sets)
 
@@ -139,6 +144,9 @@ def _parser() -> argparse.ArgumentParser:
         "--only",
         choices=(Side.BOARD.value, Side.HOST.value),
         help="the processes of this machine of two, which meet at bus.link",
+    )
+    parser.add_argument(
+        "--with", dest="ports", nargs="+", choices=PORTS, default=(), help="ports to what others use, each a process"
     )
     parser.add_argument("--headless", action="store_true", help="serve no page")
     add_config_arguments(parser)

@@ -9,6 +9,7 @@ import msgspec
 from paani.config.advisor import AdvisorConfig
 from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
+from paani.config.nmea import NmeaConfig
 from paani.config.perception import CameraConfig, PerceptionConfig
 from paani.config.planner import CalibrationConfig
 from paani.config.recorder import RecorderConfig
@@ -16,7 +17,7 @@ from paani.config.section import Positive, Section
 from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
 from paani.config.thrusters import ThrustersConfig
-from paani.keys import Graph
+from paani.keys import PORTS, Graph
 from paani.port_address import parse_address
 from paani.sides import Side, services_on
 
@@ -57,6 +58,7 @@ class DashboardConfig(Section, frozen=True):
 
 class UpConfig(Section, frozen=True):
     arm_at_start: bool = False  # `paani up` asks once for a simulated boat to be armed: never again after a restart
+    ports: tuple[Literal["mavlink", "ros2", "foxglove", "nmea"], ...] = ()  # to what others use; `paani up --with`
 
 
 class Config(Section, frozen=True):
@@ -81,11 +83,12 @@ class Config(Section, frozen=True):
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
     bridge: BridgeConfig = BridgeConfig()
+    nmea: NmeaConfig = NmeaConfig()
 
     @property
     def services(self) -> tuple[str, ...]:
         """Processes that run with these settings, in the order they start."""
-        idle = set[str]()
+        idle = set[str](PORTS) - {*self.up.ports}
         if self.camera.source != "sim":
             idle.add("eye")
         if not self.recorder.folder:

@@ -25,7 +25,7 @@ from paani_tools.up.terminal import Display
 from tests.pictures import river
 
 pytestmark = pytest.mark.slow
-SIMULATED = keys.services_in(keys.Graph.SIMULATION)
+SIMULATED = [name for name in keys.services_in(keys.Graph.SIMULATION) if name not in keys.PORTS]
 
 
 @pytest.mark.parametrize("name", sorted(WORLDS))
@@ -156,3 +156,12 @@ def test_a_terminal_has_one_line_that_is_updated() -> None:
     display.print_line("alive")
     assert stream.getvalue().count("\n") == 1
     assert stream.getvalue().endswith("\x1b[Kalive\n")
+
+
+async def test_a_port_runs_where_it_is_asked_for(private_sets: tuple[str, ...]) -> None:
+    plan = await make_plan(
+        load_config(sets=(*private_sets, *up_sets(world=None, camera=None, headless=True, ports=("nmea",))))
+    )
+    assert set(plan.services) & {*keys.PORTS} == {"nmea"}
+    with pytest.raises(UserError, match="ports"):
+        load_config(sets=(*private_sets, 'up.ports=["telex"]'))

@@ -1,0 +1,1 @@
+"""NMEA 0183 port: position, heading and targets for chart plotters."""
