@@ -89,6 +89,7 @@ def add_teachers_boxes(
     for i in tqdm(missing, "teachers", unit="picture", mininterval=2.0):
         stored[keys[i]] = _find_boxes(pictures[i], teachers)
     if missing:
+        cache.parent.mkdir(parents=True, exist_ok=True)
         write_json(cache, stored)
     return [_with_boxes(item, stored[key]) if _asked(item) else item for item, key in zip(pictures, keys, strict=True)]
 

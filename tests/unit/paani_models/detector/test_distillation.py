@@ -95,7 +95,7 @@ def test_teachers_boxes_fill_what_a_source_leaves_out_once_each_and_are_kept(tmp
         return Detections(boxes, np.array([0.9, 0.8], np.float32), np.array([0, 1]))
 
     item = BoxedPicture("mcoe_boats", SEEN, np.zeros((0, 5), np.float32), np.array([0, 1, 0, 1], np.uint8))
-    cache = tmp_path / "boxes.json"
+    cache = tmp_path / "run" / "boxes.json"
     (filled,) = add_teachers_boxes([item], (OffTheShelf("a", find), OffTheShelf("b", find)), cache)
     np.testing.assert_allclose(filled.boxes, [[0, 0.1, 0.25, 0.3, 0.5]])
     whole = BoxedPicture("coco_mini", SEEN, item.boxes, np.array([1, 1, 0, 0], np.uint8))
