@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from paani_tools.bench.faults.drives import faked_clock
 from tests.link.namespaces import missing
 from tests.link.two_hosts import driving
 
@@ -18,11 +19,22 @@ WIFI = {"delay_ms": 20.0, "jitter_ms": 5.0, "loss": 0.02, "rate_bps": 4e6}
 BACK_S = 10.0
 
 
-def test_a_cut_stops_the_boat_and_it_goes_on_by_itself(tmp_path: Path) -> None:
-    """The river over a link like a poor radio's: under way, cut for a second, under way again without hands."""
+@pytest.mark.parametrize(
+    "board_ahead_s", [0.0, pytest.param(5.0, marks=pytest.mark.long), pytest.param(-5.0, marks=pytest.mark.long)]
+)
+def test_a_cut_stops_the_boat_and_it_goes_on_by_itself(tmp_path: Path, board_ahead_s: float) -> None:
+    """The river over a link like a poor radio's: under way, cut for a second, under way again without hands.
+
+    Board and host need no common time: neither may stop the boat for the other's clock, nor let it drive on by it.
+    """
     if reason := missing():
         pytest.skip(reason)
-    with driving(tmp_path) as drive:
+    clock = {}
+    if board_ahead_s:
+        clock = faked_clock() | {"FAKETIME": f"{board_ahead_s:+g}"}
+        if "LD_PRELOAD" not in clock:
+            pytest.skip("needs libfaketime (Debian: faketime)")
+    with driving(tmp_path, board_env=clock) as drive:
         drive.link.set(**WIFI)
         drive.await_under_way()
         cut_us, back_us = drive.cut(1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import msgspec
@@ -102,7 +102,14 @@ class Drive:
 
 
 @contextlib.contextmanager
-def driving(folder: Path, *, world: str = "river", sets: tuple[str, ...] = (), seed: int = 1) -> Iterator[Drive]:
+def driving(
+    folder: Path,
+    *,
+    world: str = "river",
+    sets: tuple[str, ...] = (),
+    seed: int = 1,
+    board_env: Mapping[str, str] | None = None,
+) -> Iterator[Drive]:
     """Both sides alive, with the same credentials; stopped afterwards. The host's figures are in host.json then."""
     with emulated_link(seed) as link, contextlib.ExitStack() as stack:
         processes = {}
@@ -131,6 +138,7 @@ def driving(folder: Path, *, world: str = "river", sets: tuple[str, ...] = (), s
                 world,
                 *summary,
                 *words,
+                env=board_env if side == "board" else None,
                 stdout=output,
             )
         drive = Drive(link, folder, processes["host"], processes["board"])

@@ -33,7 +33,7 @@ def faults_of(drive: Drive) -> list[Fault]:
 
 def missing(drive: Drive) -> str:
     """What this machine lacks for this drive; empty where nothing."""
-    return "needs libfaketime (Debian: faketime)" if drive is Drive.CLOCK and not _library() else ""
+    return "needs libfaketime (Debian: faketime)" if drive is Drive.CLOCK and not faked_clock() else ""
 
 
 @contextlib.asynccontextmanager
@@ -59,12 +59,7 @@ async def _start(drive: Drive, folder: Path) -> AsyncIterator[tuple[Loop, list[F
         case Drive.CLOCK:
             file = folder / "clock"
             await asyncio.to_thread(file.write_text, "+0\n", encoding="ascii")
-            environ = {
-                "LD_PRELOAD": _library(),
-                "FAKETIME_TIMESTAMP_FILE": str(file),
-                "FAKETIME_NO_CACHE": "1",
-                "DONT_FAKE_MONOTONIC": "1",
-            }
+            environ = faked_clock() | {"FAKETIME_TIMESTAMP_FILE": str(file)}
             async with running([Side((), _own(folder))], folder, environ) as loop:
                 yield loop, clock_faults(file)
         case Drive.LINK:
@@ -91,6 +86,7 @@ def _own(folder: Path) -> tuple[str, ...]:
     )
 
 
-def _library() -> str:
+def faked_clock() -> dict[str, str]:
+    """Environment of processes whose wall clock a further variable of libfaketime shifts; empty without libfaketime."""
     found = [str(path) for pattern in LIBRARIES for path in Path("/").glob(pattern.lstrip("/"))]
-    return found[0] if found else ""
+    return {"LD_PRELOAD": found[0], "FAKETIME_NO_CACHE": "1", "DONT_FAKE_MONOTONIC": "1"} if found else {}
