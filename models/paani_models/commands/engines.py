@@ -11,6 +11,7 @@ from pathlib import Path
 
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.whole_file import write_json
 from paani_models.catalogue import read_contract, verified_path
@@ -35,7 +36,9 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `paani models bench`."""
     parser.add_argument("--engine", choices=("all", *benchmark.ENGINES), default="all")
     parser.add_argument("--threads", type=_parse_thread_counts, default=(1, 2), metavar="N,N", help="default: 1,2")
-    parser.add_argument("--rounds", type=_parse_count, default=30, metavar="N", help="runs of each (default: 30)")
+    parser.add_argument(
+        "--rounds", type=whole_number(1, 10_000), default=30, metavar="N", help="runs of each (default: 30)"
+    )
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
 
 
@@ -122,13 +125,6 @@ def _held_out_pictures(arguments: argparse.Namespace) -> list[Path]:
     names = [name for name in arguments.sources.split(",") if name]
     samples = PictureSelection(arguments.data, names, arguments.rendered).samples
     return [sample.picture for sample in samples if sample.held_out]
-
-
-def _parse_count(text: str) -> int:
-    value = int(text)
-    if not 1 <= value <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text} is not from 1 to 10000")
-    return value
 
 
 def _parse_thread_counts(text: str) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ import msgspec
 
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.statistics.figure_table import FigureTable, installed_commands, installed_tables, table_text
 from paani.statistics.measured import Machine, Report, measure_tables
@@ -45,7 +46,7 @@ def main(argv: list[str]) -> int:
     judgement = benches.add_parser("judgement", help="the advisor: its step, its counterfactuals, its messages")
     judgement.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     judgement.add_argument(
-        "--frames", type=_count, default=1000, metavar="N", help="frames to step over; default: 1000"
+        "--frames", type=whole_number(), default=1000, metavar="N", help="frames to step over; default: 1000"
     )
     judgement.add_argument(
         "--drive",
@@ -119,10 +120,3 @@ def _recorder(options: argparse.Namespace) -> int:
     if options.json:
         write_whole(options.json, msgspec.json.encode(Report(machine=machine, parts=(part,))) + b"\n", "--json")
     return 0
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return count

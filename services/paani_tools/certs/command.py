@@ -10,6 +10,7 @@ from paani.certificates import AUTHORITY, Identities, date_text, read_identities
 from paani.cli import add_config_arguments, config_from
 from paani.clock import WallClock
 from paani.extras import require_modules
+from paani.option_numbers import whole_number
 
 DAYS = 365
 MAX_DAYS = 3650
@@ -77,12 +78,9 @@ def _parser() -> argparse.ArgumentParser:
         action.add_argument("--folder", type=Path, required=True, metavar="FOLDER", help="where the certificates lie")
     for action in (make, rotate):
         action.add_argument(
-            "--days", type=_days, default=DAYS, help=f"how long they are valid, 1 to {MAX_DAYS} (default: {DAYS})"
+            "--days",
+            type=whole_number(1, MAX_DAYS),
+            default=DAYS,
+            help=f"how long they are valid, 1 to {MAX_DAYS} (default: {DAYS})",
         )
     return parser
-
-
-def _days(text: str) -> int:
-    if not text.isascii() or not text.isdecimal() or not 1 <= int(text) <= MAX_DAYS:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected whole days, 1 to {MAX_DAYS}")
-    return int(text)

@@ -13,6 +13,7 @@ import msgspec
 from paani.clock import MonotonicClock, WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani_tools.fleet.fleet_file import read_fleet
 from paani_tools.fleet.page import HOST, serve_page
 from paani_tools.fleet.shore import Vessel, stop_vessels, watch_fleet
@@ -99,12 +100,5 @@ def _parser() -> argparse.ArgumentParser:
     acts.add_argument("--json", action="store_true", help="the same, for a program")
     acts.add_argument("--stop", nargs="+", default=[], metavar="VESSEL", help="STOP these")
     acts.add_argument("--stop-all", action="store_true", help="STOP every vessel")
-    parser.add_argument("--port", type=_port, default=PORT, help=f"of the page (default: {PORT})")
+    parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, help=f"of the page (default: {PORT})")
     return parser
-
-
-def _port(text: str) -> int:
-    port = int(text)
-    if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError("between 0 and 65535")
-    return port

@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import indented_json, write_json
 from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
@@ -194,7 +195,9 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
     parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
-    parser.add_argument("--jobs", type=_count, default=os.cpu_count() or 1, metavar="N", help="drives side by side")
+    parser.add_argument(
+        "--jobs", type=whole_number(), default=os.cpu_count() or 1, metavar="N", help="drives side by side"
+    )
     add_cluster_argument(parser)
     parser.add_argument(
         "--out", type=output_folder("--out"), metavar="DIR", help="where results are kept (default: runs/trial-SUITE)"
@@ -212,10 +215,3 @@ def _parser() -> argparse.ArgumentParser:
         "--record", type=output_file("--record"), metavar="FILE", help="write the one drive there as MCAP"
     )
     return parser
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return count

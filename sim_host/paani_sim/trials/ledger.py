@@ -23,26 +23,24 @@ from paani_sim.trials.seed_parts import SeedPart, part_of_seed
 from paani_sim.trials.trial_cases import TrialCase
 
 
-class LedgerDraw(msgspec.Struct, frozen=True, kw_only=True, tag="drawn", tag_field="entry"):
+class LedgerKey(msgspec.Struct, frozen=True, kw_only=True):
+    """Which drive: of this commit with these settings."""
+
+    part: SeedPart
+    commit: str
+    condition: str
+    seed: int
+    policy: Policy
+    sets: tuple[str, ...] = ()
+
+
+class LedgerDraw(LedgerKey, frozen=True, kw_only=True, tag="drawn", tag_field="entry"):
     """A drive that was asked for: written before it begins."""
 
-    part: SeedPart
-    commit: str
-    condition: str
-    seed: int
-    policy: Policy
-    sets: tuple[str, ...] = ()
 
-
-class LedgerResult(msgspec.Struct, frozen=True, kw_only=True, tag="driven", tag_field="entry"):
+class LedgerResult(LedgerKey, frozen=True, kw_only=True, tag="driven", tag_field="entry"):
     """What came of it. `result_sha256`: of the result's JSON, which an equal drive of the same code repeats."""
 
-    part: SeedPart
-    commit: str
-    condition: str
-    seed: int
-    policy: Policy
-    sets: tuple[str, ...] = ()
     why: DriveOutcome
     collisions: int
     collisions_visible: int

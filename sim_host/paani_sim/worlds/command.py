@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
 from paani_sim.worlds import WORLDS
@@ -102,22 +103,6 @@ def size(text: str) -> tuple[int, int]:
     return sides
 
 
-def count(text: str) -> int:
-    """How many, from 1 to a million."""
-    number = int(text)
-    if not 1 <= number <= 1_000_000:
-        raise ValueError(text)
-    return number
-
-
-def seed(text: str) -> int:
-    """A whole number that is not negative."""
-    number = int(text)
-    if number < 0:
-        raise ValueError(text)
-    return number
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani world", description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -134,8 +119,8 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--out", type=output_file("--out"), required=True, metavar="FILE")
         command.set_defaults(run=run)
     dataset = commands.add_parser("dataset", help="labelled pictures for training")
-    dataset.add_argument("--n", type=count, required=True, help="how many pictures")
-    dataset.add_argument("--seed", type=seed, default=0)
+    dataset.add_argument("--n", type=whole_number(1, 1_000_000), required=True, help="how many pictures")
+    dataset.add_argument("--seed", type=whole_number(0), default=0)
     dataset.add_argument("--out", type=output_folder("--out"), required=True, metavar="DIR")
     dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
     add_cluster_argument(dataset)

@@ -13,6 +13,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config
+from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.whole_file import write_whole
@@ -126,14 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("data", type=input_folder(), metavar="DATA", help="folder of annotated sources")
     parser.add_argument("--sources", metavar="NAMES", help="some sources only, separated by commas")
     parser.add_argument("--held-out", action="store_true", help="the held-out sequences, not those to develop on")
-    parser.add_argument("--most", type=_count, metavar="N", help="at most so many pictures of each source")
+    parser.add_argument("--most", type=whole_number(), metavar="N", help="at most so many pictures of each source")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write each picture's advice there")
     add_config_arguments(parser)
     return parser
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return count

@@ -21,6 +21,7 @@ from paani.clock import Clock, WallClock
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Graph
+from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_folder
 from paani.statistics.figure_table import table_text
 from paani.whole_file import write_whole
@@ -166,7 +167,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="paani bench board",
         description="Poll the board's loop once a second and put its figures beside the paper's (--profile paper).",
     )
-    parser.add_argument("--polls", type=_polls, default=POLLS, metavar="N", help=f"default: {POLLS}, five minutes")
+    parser.add_argument(
+        "--polls", type=whole_number(1, MAX_POLLS), default=POLLS, metavar="N", help=f"default: {POLLS}, five minutes"
+    )
     parser.add_argument("--camera", metavar="sim|webcam|PATH", help="where pictures come from (default: sim)")
     parser.add_argument("--world", metavar="NAME|FILE", help="world or scenario of `sim` (default: river)")
     parser.add_argument("--attach", type=_url, metavar="URL", help="poll a running loop, such as http://127.0.0.1:8043")
@@ -176,13 +179,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_config_arguments(parser)
     return parser
-
-
-def _polls(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= MAX_POLLS:
-        raise argparse.ArgumentTypeError(f"from 1 to {MAX_POLLS}")
-    return count
 
 
 def _url(text: str) -> str:

@@ -16,6 +16,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config, with_settings
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.statistics.measured import Machine, Report
 from paani.statistics.order_statistics import median, nearest_rank
@@ -35,7 +36,9 @@ def main(argv: list[str]) -> int:
         prog="paani bench bridge", description="The bridge against the firmware on an emulated microcontroller."
     )
     parser.add_argument("--image", type=Path, default=IMAGE, metavar="ELF", help=f"the firmware; default: {IMAGE}")
-    parser.add_argument("--count", type=_count, default=100, metavar="N", help="samples of each figure; default: 100")
+    parser.add_argument(
+        "--count", type=whole_number(2, 100_000), default=100, metavar="N", help="samples of each figure; default: 100"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON; progress goes to standard error")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
@@ -95,10 +98,3 @@ def _private(config: Config) -> Config:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return with_settings(config, (f"bus.router=tcp/127.0.0.1:{probe.getsockname()[1]}",))
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 2 <= count <= 100_000:
-        raise argparse.ArgumentTypeError("must be 2 to 100000")
-    return count

@@ -16,6 +16,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config, PerceptionConfig
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_json
 from paani_models.catalogue import verified_path
@@ -50,7 +51,9 @@ class Eyes(msgspec.Struct, frozen=True):
 def main(argv: list[str]) -> int:
     """Measure, print, write. Raises UserError naming the folder or model that cannot be used."""
     parser = argparse.ArgumentParser(prog="paani bench eyes", description="Time every step of perception.")
-    parser.add_argument("--rounds", type=_count, default=100, metavar="N", help="runs of each step (default: 100)")
+    parser.add_argument(
+        "--rounds", type=whole_number(), default=100, metavar="N", help="runs of each step (default: 100)"
+    )
     parser.add_argument("--folder", type=input_folder("--folder"), help="pictures to perceive; drawn ones if not given")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     parser.add_argument(
@@ -189,13 +192,6 @@ def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair:
     if paper_pair is not None:
         found.append(count_work("paper's pair", (paper_pair / "yolo11n.onnx", paper_pair / "paper-segmenter.onnx")))
     return tuple(found)
-
-
-def _count(word: str) -> int:
-    count = int(word)
-    if count < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return count
 
 
 if __name__ == "__main__":

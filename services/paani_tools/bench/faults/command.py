@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
@@ -32,7 +33,7 @@ def main(argv: list[str]) -> int:
     )
     parser.add_argument("--list", action="store_true", help="name the faults, and what is expected of the boat")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="these faults alone; a word of the name is enough")
-    parser.add_argument("--runs", type=_count, default=1, metavar="N", help="of each; default: 1")
+    parser.add_argument("--runs", type=whole_number(), default=1, metavar="N", help="of each; default: 1")
     parser.add_argument(
         "--out", type=output_file("--out"), metavar="FILE", help="keep each run there, and go on where it ended"
     )
@@ -101,10 +102,3 @@ def _tell(fault: Fault, run: FaultRun, number: int, times: int) -> None:
     words = run.problem or f"{zero}, {back}{', by hand' if run.hands else ''}"
     sys.stdout.write(f"{number}/{times} {fault.name}: {words}{'' if keeps_bars(fault, run) else '  NOT AS EXPECTED'}\n")
     sys.stdout.flush()
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return count

@@ -19,6 +19,7 @@ import msgspec
 from paani.clock import MonotonicClock, WallClock, process_cpu_s
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.whole_file import write_json
 from paani_tools.bench.fleet.boats import prepare_boats, run_boats
@@ -53,7 +54,9 @@ class ShoreCost(msgspec.Struct, frozen=True, kw_only=True):
 def main(argv: list[str]) -> int:
     """Measure and print. Exit codes: 0 done, 1 not all vessels were heard, 2 user's mistake."""
     parser = argparse.ArgumentParser(prog="paani bench fleet", description=__doc__)
-    parser.add_argument("--vessels", nargs="+", type=_count, default=list(BOATS), metavar="N", help="default: 1 10 30")
+    parser.add_argument(
+        "--vessels", nargs="+", type=whole_number(1, 300), default=list(BOATS), metavar="N", help="default: 1 10 30"
+    )
     parser.add_argument("--for", dest="seconds", type=float, default=10.0, metavar="S", help="each; default: 10")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     options = parser.parse_args(argv)
@@ -181,10 +184,3 @@ def _free_ports(count: int) -> list[int]:
         if len(ports) == count:
             return ports
     raise UserError(f"of the ports {FIRST_PORT} to {LAST_PORT}, fewer than {count} are free")
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= 300:
-        raise argparse.ArgumentTypeError("between 1 and 300")
-    return count

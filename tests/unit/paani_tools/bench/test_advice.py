@@ -160,7 +160,7 @@ def test_a_centre_that_is_occupied_by_eye_is_no_open_water(
     [
         (["nowhere"], "nowhere: no such folder"),
         (["DATA", "--sources", "puddles"], "'puddles' is not one of"),
-        (["DATA", "--most", "0"], "must be at least 1"),
+        (["DATA", "--most", "0"], "0 is not at least 1"),
     ],
 )
 def test_a_mistake_is_one_line(
