@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -87,17 +87,18 @@ def _garbage() -> Fault:
     return Fault(name="garbage on every key", expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=0.5)
 
 
-async def flood(loop: Loop, each: int, *, refused: bool) -> int:
+async def flood(loop: Loop, each: int, *, refused: bool, spared: Collection[str] = ()) -> int:
     """As many hostile messages on each key, by whoever may write it, as fast as they go; returns how many.
 
-    refused: only such as no receiver may take. Others may take the place of what the real producer says.
+    refused: only such as no receiver may take. Others may take the place of what the real producer says. spared: names
+    of topics on which nothing is said.
     """
     hostile = hostile_topics(loop.config.bus.graph, loop.config.bus.domain, random.Random(SEED))
     for name in (keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name):
         hostile[name].heard_epoch = 2  # everything real is of a later one
     by_producer: dict[str, list[keys.Topic[Any]]] = {}
     for topic in keys.every_topic(loop.config.bus.graph):
-        if topic.producer in loop.config.services:
+        if topic.producer in loop.config.services and topic.name not in spared:
             by_producer.setdefault(topic.producer, []).append(topic)
     sent = 0
     for producer, topics in by_producer.items():
