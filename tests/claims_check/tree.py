@@ -51,16 +51,22 @@ class Tree:
 
     @contextlib.contextmanager
     def changed_by(self, mutant: Mutant) -> Iterator[None]:
-        """The mutant lives inside the context; afterwards the file is as it was."""
+        """The mutant lives inside the context; afterwards the file is as it was.
+
+        What a compiler reads has the time of each change instead, so that `make` builds it anew.
+        """
         path = self.root / mutant.file
         source, stat = path.read_bytes(), path.stat()
+        is_python = path.suffix == ".py"
         path.write_bytes(source.replace(mutant.before.encode(), mutant.after.encode()))
-        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + MTIME_STEP_NS))
+        if is_python:
+            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + MTIME_STEP_NS))
         try:
             yield
         finally:
             path.write_bytes(source)
-            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+            if is_python:
+                os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
     def run_tests(self, tests: list[str], limit_s: float, *options: str) -> Outcome:
         """Run these tests in a process of its own, and end it with all that it started beyond `limit_s`."""

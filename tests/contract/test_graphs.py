@@ -9,6 +9,7 @@ import pytest
 
 from paani import authority, keys
 from paani.config import BusConfig, Config, load_config
+from paani.decider import deciders
 from paani.errors import UserError
 from paani.keys import Graph
 
@@ -62,6 +63,24 @@ def test_no_graph_but_hil_and_hull_has_a_publisher_to_motors() -> None:
     assert [graph for graph in GRAPHS if "thrusters" in keys.services_in(graph)] == [Graph.HIL, Graph.HULL]
     assert load_config().bus.graph is Graph.SIMULATION
     assert "thrusters" not in written(Graph.SIMULATION)
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_l4_truth_reaches_nobody_that_estimates_or_decides(graph: Graph) -> None:
+    """L4: the router lets the eye, the page, the recorder and an observer hear it; no decider asks for it."""
+    control = access(graph)
+    rules: Mapping[str, Any] = {rule["id"]: rule for rule in control["rules"]}
+    readers = {
+        subject
+        for policy in control["policies"]
+        for name in policy["rules"]
+        if "egress" in rules[name]["flows"] and "put" in rules[name]["messages"]
+        and any("@truth" in key for key in rules[name]["key_exprs"])
+        for subject in policy["subjects"]
+    }  # fmt: skip
+    assert readers == (set() if graph is Graph.HULL else {"eye", "dashboard", "recorder", authority.OBSERVER})
+    for decider in deciders().values():
+        assert not any(topic.name.startswith("@truth/") for topic in (*decider.inputs, *decider.own))
 
 
 @pytest.mark.parametrize("graph", GRAPHS)

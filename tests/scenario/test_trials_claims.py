@@ -6,16 +6,17 @@ import json
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from paani_sim import vessels
 from paani_sim.trials import command
 from paani_sim.trials.drive_states import DriveOutcome
-from paani_sim.trials.policies import Policy
+from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_trial import load_case_config, run_trial
 from paani_sim.trials.trial_cases import TrialCase, build_scenario
-from paani_sim.worlds import WORLDS
+from paani_sim.worlds import WORLDS, load_world
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -105,6 +106,9 @@ def test_w12_other_waters_ask_for_other_files_alone(world: str, tmp_path: Path) 
     text = f'seed = 2\n[world]\nkind = "{world}"\nactors = false\n[task]\ndistance_m = 12.0\ntime_limit_s = 60.0\n'
     result = driven(tmp_path, text, Policy.ORACLE)
     assert (result.why, result.collisions) == (DriveOutcome.COMPLETED, 0)
+    case = TrialCase(str(tmp_path / "given.toml"), 5, Policy.ORACLE)
+    assert np.array_equal(build_scenario(case).world.shore_m, load_world(world).shore_m)
+    assert load_case_config(case) == load_policy_config(Policy.ORACLE), "no setting knows which water it is"
 
 
 def test_w12_other_rules_are_settings(tmp_path: Path) -> None:

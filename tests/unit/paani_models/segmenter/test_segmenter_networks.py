@@ -27,6 +27,22 @@ def test_segmenter_taps_d1() -> None:
     ]
 
 
+def test_the_encoders_weights_have_torchvisions_names_d1() -> None:
+    """D1: those of `mobilenet_v3_small().features`, so that ImageNet weights load as they are."""
+    names = [name for name in segmenter.PaperSegmenter().state_dict() if name.startswith("features.")]
+    assert {name.split(".")[1] for name in names} == {str(index) for index in range(13)}
+    assert {
+        "features.0.0.weight",
+        "features.0.1.running_mean",
+        "features.1.block.0.0.weight",
+        "features.1.block.1.fc1.weight",
+        "features.1.block.1.fc2.bias",
+        "features.4.block.2.fc1.weight",
+        "features.11.block.3.1.bias",
+        "features.12.0.weight",
+    } <= set(names)
+
+
 def test_segmenter_decoder_d2_d3_d4() -> None:
     net = segmenter.PaperSegmenter()
     assert net.project.kernel_size == (1, 1)

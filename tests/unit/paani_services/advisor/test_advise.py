@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 from typing import Any
@@ -184,6 +185,19 @@ def test_j12_the_explanation_is_made_last_from_the_same_numbers() -> None:
     assert late.explanation == "Stop: the last picture is 2.0 s old. Only new evidence can change that."
     black = msgspec.structs.replace(CLEAR, usable=False, cause=m.UnusableCause.BLACK)
     assert at(black, 0.1).explanation == "Stop: the picture is black. Only new evidence can change that."
+
+
+def test_j18_the_directions_are_these_seven_under_these_names() -> None:
+    """J18: whoever reads an advisory from the bus or a recording meets no other word."""
+    assert [json.loads(msgspec.json.encode(direction)) for direction in D] == [
+        "STRAIGHT",
+        "SLIGHT_LEFT",
+        "SLIGHT_RIGHT",
+        "LEFT",
+        "RIGHT",
+        "STOP",
+        "NO_DATA",
+    ]
 
 
 def test_b17_reasons_of_different_kinds_never_share_a_code() -> None:

@@ -37,12 +37,14 @@ def test_l2_l3_follows_the_boat_in_the_map(boat: EstimatedBoat) -> None:
 
 
 def test_l1_local_estimate_is_smooth_and_ignores_gps(boat: EstimatedBoat) -> None:
-    """L1: a jump of the receiver does not reach the local frame."""
+    """L1: a jump of the receiver does not reach the local frame; what the gyro measures does, without delay."""
     before = boat.local_estimate
     boat.fix_offset_m = 3.0
     boat.sail(2.0)
     assert math.hypot(boat.local_estimate.x_m - before.x_m, boat.local_estimate.y_m - before.y_m) < 0.2
     assert boat.local_estimate.healthy
+    assert boat.local_estimate.yaw_rad == pytest.approx(boat.yaw_rad, abs=0.03)
+    boat.sail(4.0, surge_mps=0.5, yaw_rate_radps=0.3)
     assert boat.local_estimate.yaw_rad == pytest.approx(boat.yaw_rad, abs=0.03)
 
 

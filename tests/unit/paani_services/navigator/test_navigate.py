@@ -210,7 +210,7 @@ def test_the_course_does_not_turn_towards_an_occupied_side() -> None:
 
 
 def test_m2_acceptance_radius_and_m3_repeat() -> None:
-    """M2: 1 m; M3: after the last waypoint comes the first."""
+    """M2: 1 m; M3: after the last waypoint comes the first, lap after lap."""
     run_10_hz = GuidanceRun(PAPER)
     assert run_10_hz.order(Direction.STRAIGHT, pose(8.9, 0.0)).waypoint_index == 1
     assert run_10_hz.order(Direction.STRAIGHT, pose(9.1, 0.0)).waypoint_index == 2
@@ -218,6 +218,10 @@ def test_m2_acceptance_radius_and_m3_repeat() -> None:
     assert (order.waypoint_index, order.waypoints_reached) == (3, 2)
     order = run_10_hz.order(Direction.STRAIGHT, pose(0.5, 10.0))
     assert (order.waypoint_index, order.waypoints_reached) == (0, 3)
+    for reached, (x_m, y_m) in enumerate(2 * [(0.2, 0.2), (9.8, 0.2), (9.8, 9.8), (0.2, 9.8)], start=4):
+        order = run_10_hz.order(Direction.STRAIGHT, pose(x_m, y_m))
+        assert (order.enable, order.inhibits) == (True, ())
+        assert (order.waypoint_index, order.waypoints_reached) == ((reached + 1) % 4, reached)
 
 
 def test_m1_the_target_waypoint_is_kept_during_visual_turns() -> None:

@@ -16,7 +16,7 @@ import pytest
 from mcap.reader import make_reader
 
 from paani import keys
-from paani.config import Config, RecorderConfig, load_config
+from paani.config import Config, RecorderConfig, decode_config, load_config
 from paani.errors import UserError
 from paani.logs.folder import Recording as File
 from paani.logs.folder import free_path, recordings, require_folder, too_old
@@ -221,14 +221,16 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 
 
 def test_settings_models_and_versions_are_attached() -> None:
-    """A10: the recording names profile, settings, models and versions."""
-    about = describe_system(Config())
+    """A10: the recording names profile, settings, models and versions; the settings are those of this system."""
+    config = load_config(profile="paper", sets=["advisor.rate_hz=4.0"])
+    about = describe_system(config)
+    assert decode_config(about.attachments["config.json"]) == config
     versions = msgspec.json.decode(about.attachments["versions.json"])
     assert versions["paani"] == about.version
     assert versions["numpy"]
     assert versions["python"].startswith("3.")
     assert b"sha256" in about.attachments["models.json"]
-    assert about.facts == {"domain": "43", "vessel": "otter", "profile": "paani"}
+    assert about.facts == {"domain": "43", "vessel": "otter", "profile": "paper"}
 
 
 def test_a_finished_file_opens_with_the_official_reader(tmp_path: Path) -> None:
