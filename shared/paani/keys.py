@@ -129,6 +129,10 @@ OPERATOR_STATE = Topic(
     name="operator/state", type=m.OperatorState, producer="operator", rate_hz=5.0, fresh_s=1.0,
     stance=Stance.STATE, summary="armed or stopped, who asked for it, and whether the latch is on disk",
 )
+OPERATOR_ORDER = Topic(
+    name="operator/order", type=m.OperatorOrder, producer="operator", rate_hz=10.0, fresh_s=0.5,
+    stance=Stance.COMMAND, summary="the mode in force, its station, and what a hand says",
+)
 TUNING = Topic(
     name="operator/tuning", type=m.Tuning, producer="dashboard", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.COMMAND, summary="the operator's request to try, promote or take back parameters of the policy",
@@ -183,10 +187,10 @@ STEPS = {
     for service in DECIDING_SERVICES
 }
 
-# Who may ask the operator's process to stop or to arm: the page, `paani stop`, the shore of a fleet (`paani fleet`),
-# and `paani up` for a simulated boat.
+# Who may ask the operator's process to stop, to arm or to drive: the page, `paani stop`, the shore of a fleet
+# (`paani fleet`), and `paani up` for a simulated boat.
 STATION, SHORE = "dashboard", "shore"
-STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing
+STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing, and they drive nothing
 COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm")
 # Processes that carry the bus to what others use, and run only where `up.ports` names them. Some of them ask the
 # operator's process for what a person asks of them.
@@ -196,15 +200,15 @@ REQUESTS = {
     client: Topic(
         name=f"operator/request/{client}", type=m.OperatorRequest, producer=client, rate_hz=10.0, fresh_s=0.6,
         stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP"
-        + ("" if client in STOPPING_CLIENTS else ", or a hold that arms"),
+        + ("" if client in STOPPING_CLIENTS else ", a hold that arms, a mode, or the wheel"),
     )
     for client in (STATION, *ASKING_PORTS, *COMMAND_LINE_CLIENTS)
 }
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, THRUST,
-    LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, TUNING, SHADOW, SIM_TIME, GPS, IMU, THRUST_APPLIED,
-    THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, TUNING, SHADOW, SIM_TIME, GPS, IMU,
+    THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *REQUESTS.values(), *STEPS.values(),
 )
 # fmt: on

@@ -1,4 +1,4 @@
-"""Asks the operator's process, as one of its clients, to stop the boat or to arm it."""
+"""Asks the operator's process, as one of its clients, to stop the boat, to arm it, or to drive it."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ class OperatorClient:
     """A client that is named by the user of its bus. Requests are said again until they are answered.
 
     `states`: the operator's state, for one reader who awaits each; the client itself only looks at the newest.
+    `hand`: who asks, where a request names no other; of one client several hands may ask, as each page does.
     """
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self.name, self._clock = bus.user, clock
         self._requests = bus.publisher(keys.REQUESTS[bus.user])
         self.states = bus.latest(keys.OPERATOR_STATE)
+        self.hand = secrets.randbits(32) + 1
+        self._drives = 0
 
     @property
     def state(self) -> m.OperatorState | None:
@@ -62,20 +65,81 @@ class OperatorClient:
             await asyncio.sleep(REPEAT_S)
         return await self.release(press, timeout_s)
 
+    @property
+    def holds_wheel(self) -> bool:
+        """Whether this client's own hand holds the wheel, as far as that is known now."""
+        state = self.state
+        return state is not None and (state.wheel_by, state.wheel_hand) == (self.name, self.hand)
+
+    async def set_mode(self, mode: m.DriveMode, timeout_s: float = 1.0, hand: int = 0) -> m.ModeRefusal | None:
+        """Ask for a mode: why it is not in force, NONE where it is; None where nobody has answered in time.
+
+        A hand that MANUAL is given to drives within 2 s, or it ends.
+        """
+        return await self._ask_wheel(m.RequestAct.MODE, timeout_s, hand, mode)
+
+    async def take_wheel(self, timeout_s: float = 1.0, hand: int = 0) -> m.ModeRefusal | None:
+        """Take the wheel from whoever holds it; answered as `set_mode` is. MANUAL of another hand ends."""
+        return await self._ask_wheel(m.RequestAct.WHEEL, timeout_s, hand)
+
+    async def override(self, timeout_s: float = 1.0, hand: int = 0) -> m.ModeRefusal | None:
+        """In MANUAL, for 10 s from now, the advice does not veto; answered as `set_mode` is."""
+        return await self._ask_wheel(m.RequestAct.OVERRIDE, timeout_s, hand)
+
+    def drive(self, surge: float, turn: float, hand: int = 0, number: int = 0) -> None:
+        """Say what the hand wants in MANUAL, ahead and to port in [-1, 1]; to be said again at least every 0.3 s.
+
+        number: grows with each set-point of a hand that is not the client's own. Without the wheel nothing happens.
+        Raises ValueError beyond the range.
+        """
+        if not (-1.0 <= surge <= 1.0 and -1.0 <= turn <= 1.0):
+            raise ValueError(f"surge {surge} or turn {turn} is not in [-1, 1]")
+        self._drives += 1
+        self._put(m.RequestAct.DRIVE, number or self._drives, hand or self.hand, surge=surge, turn=turn)
+
+    async def _ask_wheel(
+        self, act: m.RequestAct, timeout_s: float, hand: int, mode: m.DriveMode = m.DriveMode.IDLE
+    ) -> m.ModeRefusal | None:
+        press = secrets.randbits(32) + 1
+
+        def is_answered(state: m.OperatorState) -> bool:
+            return (state.answered_by, state.answered) == (self.name, press)
+
+        state = await self._ask(act, press, is_answered, timeout_s, hand or self.hand, mode)
+        return None if state is None else state.mode_refusal
+
     async def _ask(
-        self, act: m.RequestAct, press: int, is_answer: Callable[[m.OperatorState], bool], timeout_s: float
+        self,
+        act: m.RequestAct,
+        press: int,
+        is_answer: Callable[[m.OperatorState], bool],
+        timeout_s: float,
+        hand: int = 0,
+        mode: m.DriveMode = m.DriveMode.IDLE,
     ) -> m.OperatorState | None:
         due_us = 0
         try:
             async with asyncio.timeout(timeout_s):
                 while (state := self.state) is None or not is_answer(state):
                     if (now_us := self._clock.now_us()) >= due_us:
-                        self._put(act, press)
+                        self._put(act, press, hand, mode=mode)
                         due_us = now_us + round(REPEAT_S * 1e6)
                     await asyncio.sleep(POLL_S)
         except TimeoutError:
             return None
         return state
 
-    def _put(self, act: m.RequestAct, press: int) -> None:
-        self._requests.put(m.OperatorRequest(source_us=self._clock.now_us(), act=act, press=press))
+    def _put(
+        self,
+        act: m.RequestAct,
+        press: int,
+        hand: int = 0,
+        *,
+        mode: m.DriveMode = m.DriveMode.IDLE,
+        surge: float = 0.0,
+        turn: float = 0.0,
+    ) -> None:
+        now_us = self._clock.now_us()
+        self._requests.put(
+            m.OperatorRequest(source_us=now_us, act=act, press=press, hand=hand, mode=mode, surge=surge, turn=turn)
+        )

@@ -104,11 +104,11 @@ def test_stamps_are_safe_in_javascript() -> None:
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_only_the_controller_may_write_thrust(graph: keys.Graph) -> None:
     """A7 B13: neither perception nor advisor can write anything that moves the boat."""
-    moving = {keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name, keys.TUNING.name}
+    moving = {keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name, keys.OPERATOR_ORDER.name, keys.TUNING.name}
     expected = {
         "controller": {keys.THRUST.name},
         "navigator": {keys.COMMAND.name},
-        "operator": {keys.ARMING.name},
+        "operator": {keys.ARMING.name, keys.OPERATOR_ORDER.name},
         "dashboard": {keys.TUNING.name},
     }
     for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):

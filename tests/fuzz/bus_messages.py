@@ -97,6 +97,7 @@ class DisarmedChain(Target):
         self._console = Console(
             self._honest.publisher(keys.ARMING),  # type: ignore[arg-type]  # the bus of lockstep in the live one's place
             self._honest.publisher(keys.OPERATOR_STATE),  # type: ignore[arg-type]
+            self._honest.publisher(keys.OPERATOR_ORDER),  # type: ignore[arg-type]
             folder,
             self._clock,
         )

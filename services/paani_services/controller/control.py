@@ -118,8 +118,8 @@ def _forward_thrust(
     config: ControllerConfig,
 ) -> tuple[float, float, float]:
     """Speed error [m/s], forward thrust in [-astern, max_forward], and the new integral."""
-    ordered_mps = min(command.speed_mps, config.max_speed_mps)
-    if odometry.stopped and ordered_mps < STANDSTILL_ORDER_MPS:
+    ordered_mps = clip(command.speed_mps - command.astern_mps, -config.max_speed_mps, config.max_speed_mps)
+    if odometry.stopped and abs(ordered_mps) < STANDSTILL_ORDER_MPS:
         return 0.0, 0.0, 0.0  # L5: the noise of the speed at rest shall not turn the fans
     error_mps = ordered_mps - (0.0 if odometry.stopped else odometry.surge_mps)
     base = config.speed_kp * error_mps + _feed_forward_thrust(ordered_mps, config)
@@ -133,7 +133,7 @@ def _feed_forward_thrust(speed_mps: float, config: ControllerConfig) -> float:
     """Normalised thrust of each fan that holds this speed: the hull's drag, or the paper's fixed gain (N3)."""
     if not config.drag_feed_forward:
         return config.speed_feed_forward * speed_mps
-    drag_n = config.drag_linear * speed_mps + config.drag_quadratic * speed_mps * speed_mps
+    drag_n = config.drag_linear * speed_mps + config.drag_quadratic * speed_mps * abs(speed_mps)
     return drag_n / (2.0 * config.force_per_unit_n)
 
 
@@ -147,6 +147,8 @@ def _is_valid(command: NavCommand) -> bool:
         math.isfinite(command.heading_rad)
         and math.isfinite(command.speed_mps)
         and command.speed_mps >= 0.0
+        and 0.0 <= command.astern_mps < math.inf
+        and not (command.speed_mps > 0.0 and command.astern_mps > 0.0)
         and command.frame == MAP_FRAME
         and not (command.enable and command.inhibits)
     )

@@ -1,4 +1,4 @@
-"""The navigator as a decider: what it heard and its own mission in, one order out."""
+"""The navigator as a decider: what it heard, the mode ordered, and its own mission in; one order out."""
 
 import functools
 
@@ -11,15 +11,17 @@ from paani.messages import Mission, Route
 from paani.motion_planning import MotionPlanner
 from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
+from paani_services.navigator.modes import follow_order
+from paani_services.navigator.navigate import NavigatorInputs, NavigatorState
 
 
 def decide(
     state: NavigatorState, inputs: Inputs, now_us: int, config: Config, planner: MotionPlanner | None = None
 ) -> tuple[NavigatorState, Outputs]:
-    """One step; see `navigate`."""
+    """One step; see `follow_order`."""
     advisory, odometry = inputs[keys.ADVISORY.name], inputs[keys.ODOMETRY.name]
     clock, arming = inputs[keys.SIM_TIME.name], inputs[keys.ARMING.name]
+    ordered = inputs[keys.OPERATOR_ORDER.name]
     navigator_inputs = NavigatorInputs(
         advisory=advisory.message,
         advisory_us=advisory.received_us,
@@ -31,12 +33,14 @@ def decide(
         arming_us=arming.received_us,
         evidence=inputs[keys.EVIDENCE.name].message,
         tracks=inputs[keys.TRACKS.name].message,
+        order=ordered.message,
+        order_us=ordered.received_us,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
-    state, order = navigate(
+    state, command = follow_order(
         state, navigator_inputs, _mission(inputs), now_us, config.bus.domain, config.navigator, camera, planner
     )
-    return state, {keys.COMMAND.name: order}
+    return state, {keys.COMMAND.name: command}
 
 
 def _mission(inputs: Inputs) -> Mission | None:
@@ -57,7 +61,7 @@ def _with_planner(planner: MotionPlanner) -> Decider[NavigatorState]:
 DECIDER = Decider(
     service="navigator",
     state=NavigatorState,
-    inputs=(keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING),
+    inputs=(keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING, keys.OPERATOR_ORDER),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,

@@ -19,6 +19,7 @@ from paani.messages import (
     Mission,
     NavCommand,
     Odometry,
+    OperatorOrder,
     Purpose,
     SimTime,
     Tracks,
@@ -67,6 +68,8 @@ class NavigatorState(
     """What one step leaves for the next. It is recorded under the field names given by `rename`.
 
     `sim_us` is the newest simulated time, -1 before the first; `clock_advanced_us` is when it last moved forward.
+    `is_ordered`: an order of a mode was heard. Of HOLD or RETURN: `errand` is how far that has come, `errand_ilos` its
+    integral, `errand_since_us` when it was ordered. `progress` and `ilos` are those of the mission throughout.
     """
 
     progress: MissionProgress = MissionProgress()
@@ -76,6 +79,10 @@ class NavigatorState(
     planner_state: PlannerState = PlannerState()
     sim_us: int = -1
     clock_advanced_us: int | None = None
+    is_ordered: bool = False
+    errand: MissionProgress = MissionProgress()
+    errand_ilos: IlosState = IlosState()
+    errand_since_us: int = 0
 
 
 class NavigatorInputs(msgspec.Struct, frozen=True):
@@ -91,6 +98,8 @@ class NavigatorInputs(msgspec.Struct, frozen=True):
     arming_us: int = 0
     evidence: Evidence | None = None
     tracks: Tracks | None = None
+    order: OperatorOrder | None = None
+    order_us: int = 0
 
 
 def navigate(
@@ -103,23 +112,18 @@ def navigate(
     camera: Camera = UNCALIBRATED_CAMERA,
     planner: MotionPlanner | None = None,
 ) -> tuple[NavigatorState, NavCommand]:
-    """One step. The order carries the advisory's `source_us` and the plant's newest stamp.
+    """One step along a mission. The order carries the advisory's `source_us` and the plant's newest stamp.
 
     With a valid calibration the metric planner chooses heading and speed; it never overrides an inhibit. Nor does
     `planner`, which chooses in its place.
     """
-    state = _note_clock_advance(state, inputs, now_us)
-    inhibits = _find_inhibits(state, inputs, now_us, domain, config)
+    state, inhibits = begin_step(state, inputs, now_us, domain, config, camera)
     if mission is None:
         inhibits.append(Inhibit.NO_ROUTE)
-    state = _end_visual_turn(state, inputs)
     is_planned = config.planner.acts_on(camera.calibration)
-    if is_planned:
-        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
-        state = msgspec.structs.replace(state, planner_state=planner_state)
     odometry, advisory = inputs.odometry, inputs.advisory
     if odometry is None or Inhibit.UNHEALTHY_ODOMETRY in inhibits or mission is None:
-        return state, _build_command(state, inputs, now_us, inhibits)
+        return state, build_command(state, inputs, now_us, inhibits)
 
     position_m = (odometry.x_m, odometry.y_m)
     direction = advisory.direction if advisory is not None else Direction.NO_DATA
@@ -138,11 +142,11 @@ def navigate(
     leg = describe_leg(state.progress, mission)
     cross_m = setpoint.cross_track_m
     if inhibits:
-        return _hold_integral(state, now_us), _build_command(state, inputs, now_us, inhibits, cross_m=cross_m, leg=leg)
-    heading_rad, limit_mps = setpoint.course_rad, _speed_limit_mps(advisory)
+        return hold_cross_track(state, now_us), build_command(state, inputs, now_us, inhibits, cross_m=cross_m, leg=leg)
+    heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
     if direction in TURN_DIRECTIONS:
-        state = _hold_integral(state, now_us)
+        state = hold_cross_track(state, now_us)
         speed_mps *= config.turn_speed_frac
         if not is_planned:
             state, heading_rad, is_capped = _steer_visual_turn(state, direction, odometry.yaw_rad, now_us, config)
@@ -167,7 +171,7 @@ def navigate(
     bounded_mps = limit_speed(mission.fence, odometry, heading_rad, min(speed_mps, limit_mps), config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
-    return state, _build_command(
+    return state, build_command(
         state,
         inputs,
         now_us,
@@ -178,6 +182,19 @@ def navigate(
         leg=leg,
         obstacle_track_ids=state.planner_state.obstacle_track_ids if is_planned else (),
     )
+
+
+def begin_step(
+    state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig, camera: Camera
+) -> tuple[NavigatorState, list[Inhibit]]:
+    """What every mode begins with: the state with what this step shows, and what about the inputs forbids motion."""
+    state = note_clock_advance(state, inputs, now_us)
+    inhibits = _find_inhibits(state, inputs, now_us, domain, config)
+    state = _end_visual_turn(state, inputs)
+    if config.planner.acts_on(camera.calibration):
+        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
+        state = msgspec.structs.replace(state, planner_state=planner_state)
+    return state, inhibits
 
 
 def _advance_mission(
@@ -218,7 +235,7 @@ def _steer_planned(
     return state, plan.heading_rad, plan.speed_mps, is_path_free
 
 
-def _speed_limit_mps(advisory: Advisory | None) -> float:
+def speed_limit_mps(advisory: Advisory | None) -> float:
     """The advised limit, which only ever lowers a speed; infinite where nothing is advised."""
     if advisory is None or isinstance(advisory.speed_limit_mps, msgspec.UnsetType):
         return math.inf
@@ -251,16 +268,17 @@ def _integrate_cross_track(
 ) -> NavigatorState:
     """Step the integral while the boat is ordered along its path; hold it otherwise."""
     if setpoint.path is None or config.lookahead_m <= 0.0 or not is_on_course:
-        return _hold_integral(state, now_us)
+        return hold_cross_track(state, now_us)
     ilos = integrate(state.ilos, setpoint.path, setpoint.target, setpoint.cross_track_m, odometry, now_us, config)
     return msgspec.structs.replace(state, ilos=ilos)
 
 
-def _hold_integral(state: NavigatorState, now_us: int) -> NavigatorState:
+def hold_cross_track(state: NavigatorState, now_us: int) -> NavigatorState:
+    """The integral stays as it is over this step."""
     return msgspec.structs.replace(state, ilos=hold_integral(state.ilos, now_us))
 
 
-def _note_clock_advance(state: NavigatorState, inputs: NavigatorInputs, now_us: int) -> NavigatorState:
+def note_clock_advance(state: NavigatorState, inputs: NavigatorInputs, now_us: int) -> NavigatorState:
     """Note when simulated time last moved forward.
 
     A time set back means that the simulation was reset and the boat may be anywhere, so it joins its route anew.
@@ -277,13 +295,18 @@ def _note_clock_advance(state: NavigatorState, inputs: NavigatorInputs, now_us: 
     return msgspec.structs.replace(state, sim_us=sim_us, clock_advanced_us=now_us)
 
 
+def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:
+    """Whether a stamp is older than the limit, or of the future."""
+    return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
+
+
 def _find_inhibits(
     state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig
 ) -> list[Inhibit]:
     """Everything about the inputs that forbids motion (M8-M11)."""
 
     def is_old(stamp_us: int, limit_s: float) -> bool:
-        return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
+        return is_out_of_date(stamp_us, limit_s, now_us, config)
 
     found: list[Inhibit] = []
     advisory, odometry, clock, arming = inputs.advisory, inputs.odometry, inputs.clock, inputs.arming
@@ -331,7 +354,7 @@ def _end_visual_turn(state: NavigatorState, inputs: NavigatorInputs) -> Navigato
     return state
 
 
-def _build_command(
+def build_command(
     state: NavigatorState,
     inputs: NavigatorInputs,
     now_us: int,
@@ -339,10 +362,13 @@ def _build_command(
     heading_rad: float = 0.0,
     speed_mps: float = 0.0,
     *,
+    astern_mps: float = 0.0,
+    vetoes: tuple[Inhibit, ...] = (),
     cross_m: float = 0.0,
     leg: str = "",
     obstacle_track_ids: tuple[int, ...] = (),
 ) -> NavCommand:
+    """The order; one with an inhibit is disabled, whatever else is asked for."""
     advisory = inputs.advisory
     enable = not inhibits
     return NavCommand(
@@ -350,6 +376,8 @@ def _build_command(
         enable=enable,
         heading_rad=heading_rad if enable else 0.0,
         speed_mps=speed_mps if enable else 0.0,
+        astern_mps=astern_mps if enable else 0.0,
+        vetoes=vetoes,
         echo_us=inputs.clock.stamp_us if inputs.clock is not None else 0,
         inhibits=tuple(inhibits),
         direction=advisory.direction if advisory is not None else Direction.NO_DATA,

@@ -1,4 +1,4 @@
-"""Navigator process: advisory, evidence, odometry, clock and arming in, one order out."""
+"""Navigator process: advisory, evidence, odometry, clock, arming and the mode ordered in, one order out."""
 
 import asyncio
 import contextlib
@@ -40,7 +40,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 progress = await journal.restore(stepper.inboxes[keys.ARMING.name])
                 stepper.state = msgspec.structs.replace(stepper.state, progress=progress)
                 group.create_task(journal.write_changes())
-            for topic in (keys.ADVISORY, keys.ODOMETRY, keys.ARMING):
+            for topic in (keys.ADVISORY, keys.ODOMETRY, keys.ARMING, keys.OPERATOR_ORDER):
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
                 now_us = clock.now_us()

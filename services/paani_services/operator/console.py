@@ -1,33 +1,49 @@
-"""Operator console: answers requests, publishes the state, and keeps the STOP latch on disk."""
+"""Operator console: answers requests, publishes the state and the mode in force, and keeps the STOP latch on disk."""
 
 from __future__ import annotations
 
 import asyncio
+import logging
+from collections.abc import Callable
 from pathlib import Path
+
+import msgspec
 
 from paani import keys
 from paani import messages as m
 from paani.bus import Publisher
 from paani.clock import Clock
 from paani_services.operator import state as op
+from paani_services.operator import wheel as w
 from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
+
+LOG = logging.getLogger(__name__)
+WATCH_PERIOD_S = 0.02  # how late a stick that nobody holds may be let go
 
 
 class Console:
     """A STOP is published before anything else is tried; whoever arms waits until the latch on disk says so.
 
     On disk the latch is clear only while nobody is armed and no STOP holds: a STOP that cannot be written, or a process
-    that dies while the boat is armed, is a STOP for the next start.
+    that dies while the boat is armed, is a STOP for the next start. The order of what to do is published before the
+    word that arms. read_facts: what the modes need, at any time.
     """
 
     def __init__(
-        self, arming: Publisher[m.Arming], states: Publisher[m.OperatorState], folder: Path, clock: Clock
+        self,
+        arming: Publisher[m.Arming],
+        states: Publisher[m.OperatorState],
+        orders: Publisher[m.OperatorOrder],
+        folder: Path,
+        clock: Clock,
+        read_facts: Callable[[], w.Facts] = w.Facts,
     ) -> None:
-        self._arming, self._states, self._clock = arming, states, clock
+        self._arming, self._states, self._orders, self._clock = arming, states, orders, clock
+        self._read_facts = read_facts
         self._path = folder / LATCH_FILE
         self._write_lock = asyncio.Lock()
         self._latch_kept = True
-        self.state = op.Operator()
+        self.state, self.wheel = op.Operator(), w.Wheel()
 
     async def restore(self) -> None:
         """Restore the latch of an earlier run. A missing or unreadable latch counts as a STOP."""
@@ -51,6 +67,9 @@ class Console:
                     refusal = await self._arm(client, request.press, station_epoch or 0)
                 if refusal is not m.ArmRefusal.NONE:
                     self._become(op.refuse(self.state, client, request.press, refusal))
+            case m.RequestAct.MODE | m.RequestAct.WHEEL | m.RequestAct.DRIVE | m.RequestAct.OVERRIDE:
+                facts, armed = self._read_facts(), self.state.armed
+                self._turn(w.answer(self.wheel, client, request, facts, now_us, armed=armed))
 
     async def stop(self, client: str) -> None:
         """Latch a STOP."""
@@ -71,14 +90,29 @@ class Console:
     def publish(self) -> None:
         """Publish the present state now."""
         now_us = self._clock.now_us()
+        self.wheel = w.lapse(self.wheel, now_us, armed=self.state.armed)
+        self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
         self._arming.put(op.arming_message(self.state, now_us))
-        self._states.put(op.state_message(self.state, now_us, latch_kept=self._latch_kept))
+        state = op.state_message(self.state, now_us, latch_kept=self._latch_kept)
+        self._states.put(w.with_wheel(state, self.wheel, self._read_facts(), now_us))
 
     async def publish_forever(self) -> None:
         """Publish the state at the rate of its topic."""
         while True:
             self.publish()
             await asyncio.sleep(1.0 / keys.ARMING.rate_hz)
+
+    async def watch_wheel(self) -> None:
+        """Let a stick go that nobody holds, and publish the order at the rate of its topic."""
+        due_us, period_us = 0, round(1e6 / keys.OPERATOR_ORDER.rate_hz)
+        while True:
+            now_us = self._clock.now_us()
+            self._turn(self.wheel)
+            if not 0 < due_us - now_us <= period_us:
+                self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
+                late_us = now_us - due_us
+                due_us = now_us + period_us - (late_us if 0 <= late_us < period_us else 0)
+            await asyncio.sleep(WATCH_PERIOD_S)
 
     async def end(self) -> None:
         """The end in good order: nobody arms any more, and only a STOP is left on disk."""
@@ -109,6 +143,17 @@ class Console:
         before, self.state = self.state, state
         if before != state:
             self.publish()
+
+    def _turn(self, wheel: w.Wheel) -> None:
+        """Take a new wheel, and publish it at once where it says something new; another set-point is the order's."""
+        before, now_us = self.wheel, self._clock.now_us()
+        self.wheel = w.lapse(wheel, now_us, armed=self.state.armed)
+        if self.wheel.override_until_us > now_us and not before.override_until_us:
+            LOG.warning("%s overrides the advice for %g s", self.wheel.by, w.OVERRIDE_S)
+        if msgspec.structs.replace(self.wheel, stick=before.stick) != before:
+            self.publish()
+        elif self.wheel != before:
+            self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
 
     async def _keep(self) -> None:
         """Write the latch of the present state to disk."""

@@ -1,8 +1,9 @@
-"""Operator process: requests of its clients in, arming and its state out."""
+"""Operator process: requests of its clients in; arming, the mode in force and its state out."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 from paani import keys
 from paani import messages as m
@@ -11,6 +12,7 @@ from paani.clock import Clock
 from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.operator.console import Console
+from paani_services.operator.wheel import Facts
 
 STATION_PERIOD_S = 0.2
 
@@ -18,7 +20,14 @@ STATION_PERIOD_S = 0.2
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Publish the operator's state and answer each client, until told to stop; at the end nobody arms."""
     folder = await asyncio.to_thread(runtime_dir, config.bus)
-    console = Console(bus.publisher(keys.ARMING), bus.publisher(keys.OPERATOR_STATE), folder, clock)
+    console = Console(
+        bus.publisher(keys.ARMING),
+        bus.publisher(keys.OPERATOR_STATE),
+        bus.publisher(keys.OPERATOR_ORDER),
+        folder,
+        clock,
+        facts_reader(bus),
+    )
     await console.restore()
     station = bus.latest(keys.pulse(keys.STATION))
     applied = bus.latest(keys.THRUST_APPLIED)
@@ -28,12 +37,30 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         with bus.alive():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(console.publish_forever())
+                tasks.create_task(console.watch_wheel())
                 for client, inbox in requests.items():
                     tasks.create_task(answer_forever(console, client, inbox, station))
                 tasks.create_task(follow_station(console, station))
                 tasks.create_task(confirm_stops(console, applied))
     finally:
         await console.end()
+
+
+def facts_reader(bus: Bus) -> Callable[[], Facts]:
+    """Reads what the modes need from the newest messages of localization and navigator; what is stale is unknown."""
+    odometry, prediction = bus.latest(keys.ODOMETRY), bus.latest(keys.PREDICTION)
+    missions = {topic: bus.latest(topic) for topic in (keys.MISSION, keys.ROUTE)}
+
+    def read() -> Facts:
+        pose = odometry.value if odometry.receipt_age_s() <= keys.ODOMETRY.fresh_s else None
+        ahead = prediction.value if prediction.receipt_age_s() <= keys.PREDICTION.fresh_s else None
+        return Facts(
+            position=m.Waypoint(x_m=pose.x_m, y_m=pose.y_m) if pose is not None and pose.healthy else None,
+            home=ahead.home[0] if ahead is not None and ahead.home else None,
+            has_mission=any(inbox.receipt_age_s() <= topic.fresh_s for topic, inbox in missions.items()),
+        )
+
+    return read
 
 
 async def answer_forever(

@@ -149,7 +149,8 @@ def latch_text(operator: Operator) -> str:
 
 def arming_message(operator: Operator, now_us: int) -> m.Arming:
     """What the thrust adapter is told."""
-    return m.Arming(source_us=now_us, armed=operator.armed and not operator.stopped, stopped=operator.stopped)
+    armed = operator.armed and not operator.stopped
+    return m.Arming(source_us=now_us, armed=armed, stopped=operator.stopped, mode_ordered=True)
 
 
 def state_message(operator: Operator, now_us: int, *, latch_kept: bool) -> m.OperatorState:

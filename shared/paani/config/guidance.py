@@ -72,6 +72,10 @@ class NavigatorConfig(Section, frozen=True):
     odometry_max_age_s: Positive = 0.4  # eight periods of `localization.rate_hz`
     clock_max_age_s: Positive = 0.4  # eight periods of the plant's clock
     arming_max_age_s: Positive = 1.0  # five periods of the operator's arming message
+    order_max_age_s: Positive = 1.0  # of the mode ordered, ten periods of it; then no thrust
+    stick_max_age_s: Positive = 0.4  # of what a hand says in MANUAL; then no thrust
+    hold_radius_m: Positive = 4.0  # of the station of HOLD and RETURN, on which there is no thrust
+    manual_turn_deg: Positive = 28.0  # off the bow at full stick: of the controller's gain, its most steering
     max_future_s: NonNegative = 0.1  # clocks on one machine agree to less
     planner: PlannerConfig = PlannerConfig()
 

@@ -32,7 +32,16 @@ from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, 
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
-from paani.messages.operator import ArmRefusal, OperatorRequest, OperatorState, RequestAct
+from paani.messages.operator import (
+    ArmRefusal,
+    BarredMode,
+    DriveMode,
+    ModeRefusal,
+    OperatorOrder,
+    OperatorRequest,
+    OperatorState,
+    RequestAct,
+)
 from paani.messages.perception import (
     Candidate,
     CandidateKind,
@@ -57,6 +66,7 @@ __all__ = [
     "Advisory",
     "ArmRefusal",
     "Arming",
+    "BarredMode",
     "BoxXyxy",
     "BridgeState",
     "Candidate",
@@ -68,6 +78,7 @@ __all__ = [
     "Detection",
     "Direction",
     "Disagreement",
+    "DriveMode",
     "DropCount",
     "Evidence",
     "FenceArea",
@@ -92,12 +103,14 @@ __all__ = [
     "Message",
     "Mission",
     "MissionLeg",
+    "ModeRefusal",
     "MotionCause",
     "MotionState",
     "MovingObstacle",
     "NavCommand",
     "NonNegative",
     "Odometry",
+    "OperatorOrder",
     "OperatorRequest",
     "OperatorState",
     "OutputMessage",

@@ -34,6 +34,11 @@ class Inhibit(StrEnum):
     NO_COMMAND = "NO_COMMAND"
     STALE_COMMAND = "STALE_COMMAND"
     COMMAND_INVALID = "COMMAND_INVALID"
+    NO_ORDER = "NO_ORDER"
+    STALE_ORDER = "STALE_ORDER"
+    IDLE = "IDLE"
+    NEUTRAL = "NEUTRAL"
+    BLOCKED_AHEAD = "BLOCKED_AHEAD"
 
 
 class NavCommand(Message, frozen=True, kw_only=True):
@@ -46,6 +51,8 @@ class NavCommand(Message, frozen=True, kw_only=True):
     distance from the line of the leg, positive to its left. `leg_index`: the leg of the mission that is due; `leg`:
     the same in words.
     `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
+    `astern_mps`: the speed astern that a hand asks for, only where `speed_mps` is 0. `vetoes`: why a hand gets no
+    thrust ahead, while it may turn and go astern.
     """
 
     enable: bool
@@ -62,6 +69,8 @@ class NavCommand(Message, frozen=True, kw_only=True):
     leg_index: Count = 0
     leg: Text = ""
     obstacle_track_ids: tuple[Count, ...] = ()
+    astern_mps: NonNegative = 0.0
+    vetoes: tuple[Inhibit, ...] = ()
 
     def is_news_after(self, sent: NavCommand | None) -> bool:
         """Whether evidence, advice or inhibits differ from those of the order sent before: then it is sent at once."""
@@ -106,10 +115,14 @@ class Thrust(Message, frozen=True, kw_only=True):
 
 
 class Arming(Message, frozen=True, kw_only=True):
-    """Whether the operator has armed the boat. `stopped`: a stop was pressed; held until the boat is armed again."""
+    """Whether the operator has armed the boat. `stopped`: a stop was pressed; held until the boat is armed again.
+
+    `mode_ordered`: an `OperatorOrder` says what for; a boat that has not heard it does not move.
+    """
 
     armed: bool
     stopped: bool = False
+    mode_ordered: bool = False
 
 
 class Odometry(Message, frozen=True, kw_only=True):

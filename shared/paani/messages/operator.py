@@ -4,22 +4,56 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from paani.messages.header import Count, Message, NonNegative, Stamp, Text
+import msgspec
+
+from paani.messages.guidance import Waypoint
+from paani.messages.header import Count, Message, NonNegative, Signed, Stamp, Text
+
+
+class DriveMode(StrEnum):
+    """What the boat does while it is armed.
+
+    ROUTE: follows its mission or route. HOLD: keeps the station where it was ordered to. RETURN: goes home and keeps
+    the station there. MANUAL: does what a hand says. IDLE: no thrust.
+    """
+
+    ROUTE = "ROUTE"
+    HOLD = "HOLD"
+    RETURN = "RETURN"
+    MANUAL = "MANUAL"
+    IDLE = "IDLE"
 
 
 class RequestAct(StrEnum):
-    """STOP: at once. HOLD: the button that arms is held, said again while it is. RELEASE: it was let go."""
+    """STOP: at once. HOLD: the button that arms is held, said again while it is. RELEASE: it was let go.
+
+    MODE: another mode, which takes a wheel that nobody holds. WHEEL: takes the wheel, whoever holds it. DRIVE: what the
+    hand says in MANUAL, said again at least every 0.35 s. OVERRIDE: in MANUAL the advice does not veto for 10 s.
+    """
 
     STOP = "STOP"
     HOLD = "HOLD"
     RELEASE = "RELEASE"
+    MODE = "MODE"
+    WHEEL = "WHEEL"
+    DRIVE = "DRIVE"
+    OVERRIDE = "OVERRIDE"
 
 
 class OperatorRequest(Message, frozen=True, kw_only=True):
-    """What a client asks. `press`: a number of its own for each press of the button, the same while it is held."""
+    """What a client asks. `press`: a number of its own for each press of a button, the same while it is held or said
+    again; of DRIVE one that grows with each set-point.
+
+    `hand`: a number of its own for each hand of the client, as each page is. `surge` and `turn` of DRIVE: ahead and to
+    port, each as a part of the most that MANUAL gives.
+    """
 
     act: RequestAct
     press: Count = 0
+    hand: Count = 0
+    mode: DriveMode = DriveMode.IDLE
+    surge: Signed = 0.0
+    turn: Signed = 0.0
 
 
 class ArmRefusal(StrEnum):
@@ -40,6 +74,50 @@ class ArmRefusal(StrEnum):
     NO_STATION = "NO_STATION"
 
 
+class ModeRefusal(StrEnum):
+    """Why the mode is not another one, or the wheel not in another hand; NONE where nothing stands in the way.
+
+    NOT_HOLDER: another hand holds the wheel. NOT_ALLOWED: this client may only stop. NO_POSITION: the estimate is not
+    healthy, or too old. NO_HOME: the boat was never free to move, and no mission names a home. NO_MISSION: there is
+    neither a mission nor a route. NOT_ARMED: a hand may not drive before, so that arming never follows a stick.
+    NOT_MANUAL: only in MANUAL is there a veto to override.
+    """
+
+    NONE = "NONE"
+    NOT_HOLDER = "NOT_HOLDER"
+    NOT_ALLOWED = "NOT_ALLOWED"
+    NO_POSITION = "NO_POSITION"
+    NO_HOME = "NO_HOME"
+    NO_MISSION = "NO_MISSION"
+    NOT_ARMED = "NOT_ARMED"
+    NOT_MANUAL = "NOT_MANUAL"
+
+
+class BarredMode(msgspec.Struct, frozen=True, kw_only=True):
+    """A mode that may not start now, whoever asks, and why."""
+
+    mode: DriveMode
+    refusal: ModeRefusal
+
+
+class OperatorOrder(Message, frozen=True, kw_only=True):
+    """The mode in force. It arms nothing.
+
+    `source_us`: of MANUAL when the set-point was received, else now. `since_us`: when the mode was ordered, 0 for that
+    of the start. `target`: the station of HOLD, or home of RETURN. `surge`, `turn`: what the hand says, ahead and to
+    port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto.
+    """
+
+    mode: DriveMode
+    since_us: Stamp = 0
+    target: tuple[Waypoint, ...] = ()
+    surge: Signed = 0.0
+    turn: Signed = 0.0
+    by: Text = ""
+    hand: Count = 0
+    override: bool = False
+
+
 class OperatorState(Message, frozen=True, kw_only=True):
     """Armed, or stopped until armed again.
 
@@ -47,6 +125,11 @@ class OperatorState(Message, frozen=True, kw_only=True):
     the process. `stops`: STOPs since it began; `asked_us`: the first of those that wait for, or had, the confirmation
     of zero thrust at `confirmed_us` (0: not yet). `held_ms`: how long the press of `hold_by` has been held; 0: none.
     `press_by`, `press`, `refusal`: the press that ended last.
+
+    `mode`, `mode_since_us`: the mode in force, as in `OperatorOrder`. `wheel_by`, `wheel_hand`: who holds the wheel,
+    empty while nobody does. `override_ms`: for how long the advice does not veto yet. `answered_by`, `answered`,
+    `mode_refusal`: the request for a mode, the wheel or an override that was answered last. `barred`: modes that may
+    not start now.
     """
 
     armed: bool
@@ -61,3 +144,12 @@ class OperatorState(Message, frozen=True, kw_only=True):
     press_by: Text = ""
     press: Count = 0
     refusal: ArmRefusal = ArmRefusal.NONE
+    mode: DriveMode = DriveMode.ROUTE
+    mode_since_us: Stamp = 0
+    wheel_by: Text = ""
+    wheel_hand: Count = 0
+    override_ms: NonNegative = 0.0
+    answered_by: Text = ""
+    answered: Count = 0
+    mode_refusal: ModeRefusal = ModeRefusal.NONE
+    barred: tuple[BarredMode, ...] = ()

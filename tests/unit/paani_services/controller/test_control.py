@@ -222,3 +222,28 @@ def test_a_disabled_order_is_not_driven_astern() -> None:
     start = ControllerState(integral=-0.03, left=-0.1, right=-0.1, last_us=NOW_US - 100_000)
     _, thrust = run(PAANI, command(enable=False, speed_mps=0.0), odometry(surge_mps=0.9), start)
     assert (thrust.left, thrust.right, thrust.enabled) == (0.0, 0.0, False)
+
+
+def test_a_hand_may_go_astern_and_the_papers_fans_still_only_push() -> None:
+    """Astern the drag is held against as ahead; a boat that still goes ahead brakes as hard as it may."""
+    astern = command(speed_mps=0.0, astern_mps=0.3)
+    at_rest = settle(PAANI, astern, odometry(surge_mps=0.0, stopped=True), steps=10)
+    assert at_rest.enabled
+    assert -PAANI.astern <= at_rest.left < 0.0
+    steady, ahead = (
+        settle(PAANI, order, odometry(surge_mps=surge_mps), steps=10)
+        for order, surge_mps in ((astern, -0.3), (command(speed_mps=0.3), 0.3))
+    )
+    assert steady.left == pytest.approx(-ahead.left)
+    assert settle(PAANI, astern, odometry(surge_mps=0.8)).left == -PAANI.astern
+    paper = settle(PAPER, astern, odometry(surge_mps=0.0))
+    assert (paper.left, paper.right) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("astern_mps", [-0.1, math.nan, math.inf])
+def test_an_order_astern_that_makes_no_sense_is_invalid(astern_mps: float) -> None:
+    for speed_mps in (0.0, 0.2):
+        _, thrust = run(PAANI, command(speed_mps=speed_mps, astern_mps=astern_mps), odometry())
+        assert thrust.inhibits == (Inhibit.COMMAND_INVALID,)
+    _, both = run(PAANI, command(speed_mps=0.2, astern_mps=0.2), odometry())
+    assert both.inhibits == (Inhibit.COMMAND_INVALID,)

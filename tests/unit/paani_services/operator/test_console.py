@@ -32,10 +32,11 @@ class Desk:
     """A console on a folder, and a clock that moves when a button is held."""
 
     def __init__(self, folder: Path) -> None:
-        self.clock, self.arming, self.states = ManualClock(), Published(), Published()
+        self.clock, self.arming, self.states, self.orders = ManualClock(), Published(), Published(), Published()
         self.clock.advance(1000.0)
         self.path = folder / LATCH_FILE
-        self.console = Console(self.arming, self.states, folder, self.clock)  # type: ignore[arg-type]  # the bus's place
+        publishers = self.arming, self.states, self.orders
+        self.console = Console(*publishers, folder, self.clock)  # type: ignore[arg-type]  # the bus's place
 
     async def ask(self, act: m.RequestAct, press: int = 1, client: str = STATION) -> None:
         await self.console.answer(client, m.OperatorRequest(source_us=1, act=act, press=press), EPOCH)

@@ -1,0 +1,217 @@
+"""The modes: what the operator has ordered, to one order to the controller. Pure, as the step along a mission is.
+
+ROUTE is the mission. HOLD and RETURN are errands: short missions of their own, with the fence, the vetoes and the
+planner of every mission, while the progress of the boat's own waits. In MANUAL a hand asks for speed and turn; what
+forbids motion forbids it there too, and the advice vetoes thrust ahead unless the hand overrides it on purpose. In
+IDLE, and where the order is missing or stale, there is no thrust.
+"""
+
+import math
+
+import msgspec
+
+from paani.config import NavigatorConfig
+from paani.geometry import wrap_rad
+from paani.messages import (
+    DriveMode,
+    Inhibit,
+    LegKind,
+    Mission,
+    MissionLeg,
+    NavCommand,
+    Odometry,
+    OperatorOrder,
+    Waypoint,
+)
+from paani.motion_planning import MotionPlanner
+from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
+from paani_services.navigator.guidance.ilos import IlosState
+from paani_services.navigator.guidance.mission_progress import MissionProgress
+from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
+from paani_services.navigator.navigate import (
+    NavigatorInputs,
+    NavigatorState,
+    begin_step,
+    build_command,
+    hold_cross_track,
+    is_out_of_date,
+    navigate,
+    note_clock_advance,
+    speed_limit_mps,
+)
+
+ENDLESS_S = 1e9  # on station, until another mode is ordered
+VETOES = (Inhibit.ADVISED_STOP, Inhibit.ADVISED_NO_DATA)  # of the advice; every other inhibit holds for a hand too
+
+
+def follow_order(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    mission: Mission | None,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
+    camera: Camera = UNCALIBRATED_CAMERA,
+    planner: MotionPlanner | None = None,
+) -> tuple[NavigatorState, NavCommand]:
+    """One step in the mode that is ordered; ROUTE where nobody orders modes, as in a trial without an operator."""
+    state = note_clock_advance(state, inputs, now_us)
+    order = inputs.order
+    if order is not None and not state.is_ordered:
+        state = msgspec.structs.replace(state, is_ordered=True)
+    faults = _find_faults(state, inputs, now_us, domain, config)
+    if faults or (order is not None and order.mode is DriveMode.IDLE):
+        leg = "idle" if order is not None and order.mode is DriveMode.IDLE else ""
+        return _stand(state, inputs, now_us, domain, config, camera, faults or [Inhibit.IDLE], leg)
+    if order is None or order.mode is DriveMode.ROUTE:
+        return navigate(state, inputs, mission, now_us, domain, config, camera, planner)
+    fence = mission.fence if mission is not None else ()
+    if order.mode is DriveMode.MANUAL:
+        return _steer_by_hand(state, inputs, order, fence, now_us, domain, config, camera)
+    return _run_errand(state, inputs, order, fence, now_us, domain, config, camera, planner)
+
+
+def _find_faults(
+    state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig
+) -> list[Inhibit]:
+    """Why the order may not be followed. None is heard where none is due: no operator who orders modes has armed."""
+    order, arming = inputs.order, inputs.arming
+    if order is None:
+        is_due = state.is_ordered or (arming is not None and arming.mode_ordered)
+        return [Inhibit.NO_ORDER] if is_due else []
+    if order.domain != domain:
+        return [Inhibit.WRONG_DOMAIN]
+    is_old = is_out_of_date(inputs.order_us, config.order_max_age_s, now_us, config)
+    if order.mode is DriveMode.MANUAL and not _is_neutral(order):
+        stamps_us = inputs.order_us, order.source_us
+        is_old = is_old or any(is_out_of_date(each, config.stick_max_age_s, now_us, config) for each in stamps_us)
+    return [Inhibit.STALE_ORDER] if is_old else []
+
+
+def _stand(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
+    camera: Camera,
+    reasons: list[Inhibit],
+    leg: str,
+) -> tuple[NavigatorState, NavCommand]:
+    """No thrust, for these reasons and those that there would be anyway."""
+    state, inhibits = begin_step(state, inputs, now_us, domain, config, camera)
+    state = hold_cross_track(state, now_us)
+    return state, build_command(state, inputs, now_us, [*inhibits, *reasons], leg=leg)
+
+
+def _run_errand(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    order: OperatorOrder,
+    fence: Fence,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
+    camera: Camera,
+    planner: MotionPlanner | None,
+) -> tuple[NavigatorState, NavCommand]:
+    """One step of HOLD or RETURN, which begins anew where it is ordered anew."""
+    if order.since_us != state.errand_since_us:
+        state = msgspec.structs.replace(
+            state, errand=MissionProgress(), errand_ilos=IlosState(), errand_since_us=order.since_us
+        )
+    away = msgspec.structs.replace(state, progress=state.errand, ilos=state.errand_ilos)
+    away, command = navigate(away, inputs, _make_errand(order, fence, config), now_us, domain, config, camera, planner)
+    progress = state.progress
+    if progress.home is None:
+        progress = msgspec.structs.replace(progress, home=away.progress.home)
+    after = msgspec.structs.replace(
+        away, progress=progress, ilos=state.ilos, errand=away.progress, errand_ilos=away.ilos
+    )
+    command = msgspec.structs.replace(
+        command,
+        waypoint_index=progress.target or 0,
+        waypoints_reached=progress.waypoints_reached,
+        leg_index=progress.leg_index,
+    )
+    return hold_cross_track(after, now_us), command
+
+
+def _make_errand(order: OperatorOrder, fence: Fence, config: NavigatorConfig) -> Mission:
+    """The errand as a mission: to the target, and there on station."""
+    station = MissionLeg(
+        kind=LegKind.HOLD_STATION, waypoints=order.target, radius_m=config.hold_radius_m, duration_s=ENDLESS_S
+    )
+    way_home = MissionLeg(kind=LegKind.RETURN_HOME, waypoints=order.target)
+    legs = (way_home, station) if order.mode is DriveMode.RETURN else (station,)
+    return Mission(source_us=order.source_us, name=order.mode.lower(), legs=legs, fence=fence)
+
+
+def _steer_by_hand(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    order: OperatorOrder,
+    fence: Fence,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
+    camera: Camera,
+) -> tuple[NavigatorState, NavCommand]:
+    """One step of MANUAL. A hand that asks for nothing gets no thrust; one that may not go ahead may turn and back."""
+    state, inhibits = begin_step(state, inputs, now_us, domain, config, camera)
+    state = hold_cross_track(state, now_us)
+    vetoes = [] if order.override else _find_vetoes(inputs, inhibits)
+    inhibits = [each for each in inhibits if each not in VETOES]
+    odometry = inputs.odometry
+    surge = 0.0 if vetoes and order.surge > 0.0 else order.surge
+    if _is_neutral(order):
+        inhibits.append(Inhibit.NEUTRAL)
+    elif surge == 0.0 and order.turn == 0.0:
+        inhibits += vetoes
+    heading_rad = speed_mps = 0.0
+    if odometry is not None and not inhibits:
+        heading_rad = wrap_rad(odometry.yaw_rad + order.turn * math.radians(config.manual_turn_deg))
+        bounded_mps = _bound_speed(surge, inputs, odometry, fence, config)
+        if bounded_mps is None:
+            inhibits.append(Inhibit.OUTSIDE_FENCE)
+        speed_mps = bounded_mps or 0.0
+        if not inhibits and state.progress.home is None:
+            here = Waypoint(x_m=odometry.x_m, y_m=odometry.y_m)
+            state = msgspec.structs.replace(state, progress=msgspec.structs.replace(state.progress, home=here))
+    return state, build_command(
+        state,
+        inputs,
+        now_us,
+        inhibits,
+        heading_rad,
+        speed_mps if surge > 0.0 else 0.0,
+        astern_mps=speed_mps if surge < 0.0 else 0.0,
+        vetoes=tuple(vetoes),
+        leg="manual",
+    )
+
+
+def _find_vetoes(inputs: NavigatorInputs, inhibits: list[Inhibit]) -> list[Inhibit]:
+    """Why the advice gives a hand no thrust ahead."""
+    vetoes = [each for each in inhibits if each in VETOES]
+    if inputs.advisory is not None and inputs.advisory.center.blocked:
+        vetoes.append(Inhibit.BLOCKED_AHEAD)
+    return vetoes
+
+
+def _bound_speed(
+    surge: float, inputs: NavigatorInputs, odometry: Odometry, fence: Fence, config: NavigatorConfig
+) -> float | None:
+    """The speed ahead or astern that the hand gets [m/s]; None where the fence gives it none."""
+    if not is_allowed(fence, (odometry.x_m, odometry.y_m)) and not config.fence_return:
+        return None
+    course_rad = odometry.yaw_rad if surge >= 0.0 else wrap_rad(odometry.yaw_rad + math.pi)
+    wanted_mps = abs(surge) * config.cruise_mps
+    if surge > 0.0:
+        wanted_mps = min(wanted_mps, speed_limit_mps(inputs.advisory))
+    return limit_speed(fence, odometry, course_rad, wanted_mps, config)
+
+
+def _is_neutral(order: OperatorOrder) -> bool:
+    return order.surge == 0.0 and order.turn == 0.0

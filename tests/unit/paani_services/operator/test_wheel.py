@@ -1,0 +1,228 @@
+"""The wheel: no sequence of requests gives an old set-point, arms, or drives by another hand than the holder's."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani import messages as m
+from paani.keys import SHORE, STATION
+from paani.messages import DriveMode, ModeRefusal, RequestAct
+from paani_services.operator import wheel as w
+
+BEGUN_US = 1_000_000_000
+HERE, HOME = m.Waypoint(x_m=3.0, y_m=4.0), m.Waypoint(x_m=0.0, y_m=1.0)
+ALL = w.Facts(HERE, HOME, has_mission=True)
+
+
+class Bridge:
+    """A wheel, the time, and whether the boat is armed."""
+
+    def __init__(self, facts: w.Facts = ALL, *, armed: bool = True) -> None:
+        self.wheel, self.now_us, self.facts, self.armed, self._press = w.Wheel(), BEGUN_US, facts, armed, 0
+
+    def ask(
+        self, act: RequestAct, client: str = STATION, hand: int = 1, mode: DriveMode = DriveMode.IDLE
+    ) -> ModeRefusal:
+        self._press += 1
+        self._tell(client, m.OperatorRequest(source_us=1, act=act, press=self._press, hand=hand, mode=mode))
+        assert (self.wheel.answer.client, self.wheel.answer.press) == (client, self._press)
+        return self.wheel.answer.refusal
+
+    def mode(self, mode: DriveMode, client: str = STATION, hand: int = 1) -> ModeRefusal:
+        return self.ask(RequestAct.MODE, client, hand, mode)
+
+    def drive(self, surge: float, turn: float = 0.0, hand: int = 1, number: int | None = None) -> None:
+        self._press += 1
+        number = self._press if number is None else number
+        request = m.OperatorRequest(source_us=1, act=RequestAct.DRIVE, press=number, hand=hand, surge=surge, turn=turn)
+        self._tell(STATION, request)
+
+    def wait(self, waited_s: float) -> None:
+        self.now_us += round(waited_s * 1e6)
+        self.wheel = w.lapse(self.wheel, self.now_us, armed=self.armed)
+
+    @property
+    def order(self) -> m.OperatorOrder:
+        return w.order_message(self.wheel, self.now_us, armed=self.armed)
+
+    def _tell(self, client: str, request: m.OperatorRequest) -> None:
+        self.wheel = w.answer(self.wheel, client, request, self.facts, self.now_us, armed=self.armed)
+
+
+def at_the_wheel(surge: float = 0.5) -> Bridge:
+    bridge = Bridge()
+    assert bridge.mode(DriveMode.MANUAL) is ModeRefusal.NONE
+    bridge.drive(surge)
+    return bridge
+
+
+def test_a_boat_that_nobody_has_ordered_follows_its_route() -> None:
+    assert (Bridge().order.mode, Bridge().order.by) == (DriveMode.ROUTE, "")
+
+
+@pytest.mark.parametrize(
+    ("mode", "facts", "armed", "refusal"),
+    [
+        (DriveMode.ROUTE, w.Facts(HERE, HOME), True, ModeRefusal.NO_MISSION),
+        (DriveMode.HOLD, w.Facts(None, HOME, has_mission=True), True, ModeRefusal.NO_POSITION),
+        (DriveMode.RETURN, w.Facts(None, HOME, has_mission=True), True, ModeRefusal.NO_POSITION),
+        (DriveMode.RETURN, w.Facts(HERE, None, has_mission=True), True, ModeRefusal.NO_HOME),
+        (DriveMode.MANUAL, ALL, False, ModeRefusal.NOT_ARMED),
+        (DriveMode.MANUAL, w.Facts(), True, ModeRefusal.NONE),
+        (DriveMode.IDLE, w.Facts(), False, ModeRefusal.NONE),
+        *((mode, ALL, True, ModeRefusal.NONE) for mode in DriveMode),
+    ],
+)
+def test_a_mode_starts_or_says_why_not_and_is_barred_beforehand(
+    mode: DriveMode, facts: w.Facts, armed: bool, refusal: ModeRefusal
+) -> None:
+    bridge = Bridge(facts, armed=armed)
+    state = w.with_wheel(m.OperatorState(source_us=1, armed=armed, stopped=False), bridge.wheel, facts, bridge.now_us)
+    assert {bar.mode: bar.refusal for bar in state.barred}.get(mode, ModeRefusal.NONE) is refusal
+    before = bridge.wheel
+    assert bridge.mode(mode) is refusal
+    if refusal is ModeRefusal.NONE:
+        assert (bridge.order.mode, bridge.order.since_us, bridge.order.by) == (mode, BEGUN_US, STATION)
+    else:
+        assert (bridge.wheel.mode, bridge.wheel.by) == (before.mode, "")
+
+
+def test_a_station_is_where_the_mode_was_asked_for_and_home_is_what_is_known_then() -> None:
+    bridge = Bridge()
+    bridge.mode(DriveMode.HOLD)
+    bridge.facts = w.Facts(m.Waypoint(x_m=50.0, y_m=0.0), HOME)
+    assert bridge.order.target == (HERE,)
+    bridge.mode(DriveMode.RETURN)
+    assert bridge.order.target == (HOME,)
+    bridge.mode(DriveMode.IDLE)
+    assert not bridge.order.target
+
+
+def test_a_request_that_is_said_again_is_answered_once() -> None:
+    bridge = Bridge()
+    request = m.OperatorRequest(source_us=1, act=RequestAct.MODE, press=9, hand=1, mode=DriveMode.HOLD)
+    first = w.answer(bridge.wheel, STATION, request, ALL, BEGUN_US, armed=True)
+    assert w.answer(first, STATION, request, w.Facts(HOME), BEGUN_US + 100_000, armed=True) == first
+
+
+def test_another_hand_takes_the_wheel_over_or_nothing() -> None:
+    bridge = at_the_wheel()
+    assert bridge.mode(DriveMode.HOLD, hand=2) is ModeRefusal.NOT_HOLDER
+    assert bridge.mode(DriveMode.HOLD, client="arm") is ModeRefusal.NOT_HOLDER
+    assert bridge.ask(RequestAct.OVERRIDE, hand=2) is ModeRefusal.NOT_HOLDER
+    bridge.drive(-1.0, hand=2)
+    assert (bridge.order.mode, bridge.order.surge) == (DriveMode.MANUAL, 0.5)
+    assert bridge.ask(RequestAct.WHEEL, hand=2) is ModeRefusal.NONE
+    assert (bridge.order.mode, bridge.order.surge, bridge.order.hand) == (DriveMode.IDLE, 0.0, 2)
+    bridge.drive(0.5, hand=2)
+    assert bridge.order.mode is DriveMode.IDLE, "nobody drives before asking for MANUAL"
+    assert bridge.mode(DriveMode.HOLD, hand=2) is ModeRefusal.NONE
+    assert bridge.mode(DriveMode.IDLE, hand=1) is ModeRefusal.NOT_HOLDER
+
+
+def test_a_wheel_taken_over_leaves_every_other_mode_as_it_is() -> None:
+    bridge = Bridge()
+    bridge.mode(DriveMode.HOLD)
+    bridge.ask(RequestAct.WHEEL, client="arm", hand=7)
+    assert (bridge.order.mode, bridge.order.target, bridge.order.by) == (DriveMode.HOLD, (HERE,), "arm")
+
+
+def test_a_client_that_may_only_stop_takes_no_wheel() -> None:
+    bridge = Bridge()
+    for act in (RequestAct.WHEEL, RequestAct.MODE, RequestAct.OVERRIDE):
+        assert bridge.ask(act, client=SHORE) is ModeRefusal.NOT_ALLOWED
+    assert (bridge.order.mode, bridge.order.by) == (DriveMode.ROUTE, "")
+
+
+@pytest.mark.parametrize(("surge", "limit_s"), [(0.5, w.DEFLECTED_MAX_S), (-0.1, w.DEFLECTED_MAX_S), (0.0, 2.0)])
+def test_a_silent_hand_has_let_go_and_its_return_drives_nothing(surge: float, limit_s: float) -> None:
+    bridge = at_the_wheel(surge)
+    bridge.wait(limit_s)
+    assert (bridge.order.mode, bridge.order.surge) == (DriveMode.MANUAL, surge)
+    late = bridge.now_us + 1
+    assert w.order_message(bridge.wheel, late, armed=True).mode is DriveMode.IDLE, "before anybody has noticed"
+    bridge.wait(1e-6)
+    bridge.drive(surge)
+    assert (bridge.order.mode, bridge.order.surge, bridge.order.since_us) == (DriveMode.IDLE, 0.0, bridge.now_us)
+
+
+def test_a_boat_that_is_disarmed_or_stopped_has_no_hand_at_the_stick_when_it_is_armed_again() -> None:
+    bridge = at_the_wheel()
+    bridge.armed = False
+    bridge.wait(0.0)
+    bridge.armed = True
+    bridge.drive(1.0)
+    assert (bridge.order.mode, bridge.order.surge) == (DriveMode.IDLE, 0.0)
+
+
+def test_a_set_point_that_was_overtaken_is_passed_over_also_after_manual_began_again() -> None:
+    bridge = at_the_wheel()
+    bridge.drive(0.0, number=1000)
+    bridge.drive(0.5, number=999)
+    assert bridge.order.surge == 0.0
+    bridge.mode(DriveMode.IDLE)
+    bridge.mode(DriveMode.MANUAL)
+    bridge.drive(0.5, number=1000)
+    assert bridge.order.surge == 0.0
+    bridge.drive(0.5, number=1001)
+    assert bridge.order.surge == 0.5
+
+
+def test_an_override_is_of_manual_alone_and_ends_by_itself() -> None:
+    bridge = Bridge()
+    assert bridge.ask(RequestAct.OVERRIDE) is ModeRefusal.NOT_MANUAL
+    bridge.mode(DriveMode.MANUAL)
+    assert bridge.ask(RequestAct.OVERRIDE) is ModeRefusal.NONE
+    for _ in range(100):
+        assert bridge.order.override
+        bridge.wait(0.1)
+        bridge.drive(0.2)
+    assert not bridge.order.override
+    assert bridge.order.mode is DriveMode.MANUAL
+    bridge.ask(RequestAct.OVERRIDE)
+    bridge.mode(DriveMode.MANUAL)
+    assert not bridge.order.override, "it belongs to the MANUAL it was asked for in"
+
+
+REQUESTS = st.builds(
+    m.OperatorRequest,
+    source_us=st.just(1),
+    act=st.sampled_from(RequestAct),
+    press=st.integers(0, 5),
+    hand=st.integers(0, 2),
+    mode=st.sampled_from(DriveMode),
+    surge=st.sampled_from((-1.0, 0.0, 0.4)),
+    turn=st.sampled_from((0.0, 1.0)),
+)
+STEPS = st.tuples(
+    st.sampled_from((STATION, "arm", SHORE)), REQUESTS, st.integers(0, 400_000), st.sampled_from((True, True, False))
+)
+
+
+@given(st.lists(STEPS, max_size=40))
+def test_no_sequence_of_requests_gives_an_old_set_point_or_one_of_another_hand(
+    steps: list[tuple[str, m.OperatorRequest, int, bool]],
+) -> None:
+    wheel, now_us = w.Wheel(), BEGUN_US
+    received_us: dict[tuple[str, int, float, float], int] = {}
+    asked_manual: set[tuple[str, int]] = set()
+    for client, request, waited_us, armed in steps:
+        now_us += waited_us
+        wheel = w.lapse(wheel, now_us, armed=armed)
+        if request.act in {RequestAct.MODE, RequestAct.WHEEL, RequestAct.DRIVE, RequestAct.OVERRIDE}:
+            wheel = w.answer(wheel, client, request, ALL, now_us, armed=armed)
+        if request.act is RequestAct.DRIVE:
+            received_us[client, request.hand, request.surge, request.turn] = now_us
+        if request.act is RequestAct.MODE and request.mode is DriveMode.MANUAL:
+            asked_manual.add((client, request.hand))
+        order = w.order_message(wheel, now_us, armed=armed)
+        if order.mode is not DriveMode.MANUAL:
+            assert (order.surge, order.turn, order.override) == (0.0, 0.0, False)
+            continue
+        assert armed
+        assert (order.by, order.hand) in asked_manual
+        if (order.surge, order.turn) != (0.0, 0.0):
+            age_us = now_us - received_us[order.by, order.hand, order.surge, order.turn]
+            assert age_us <= now_us - order.source_us <= w.DEFLECTED_MAX_S * 1e6
