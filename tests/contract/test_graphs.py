@@ -9,7 +9,7 @@ import pytest
 
 from paani import authority, keys
 from paani.config import BusConfig, Config, load_config
-from paani.decider import deciders
+from paani.decider import decider_of, deciders
 from paani.errors import UserError
 from paani.keys import Graph
 
@@ -81,6 +81,19 @@ def test_l4_truth_reaches_nobody_that_estimates_or_decides(graph: Graph) -> None
     assert readers == (set() if graph is Graph.HULL else {"eye", "dashboard", "recorder", authority.OBSERVER})
     for decider in deciders().values():
         assert not any(topic.name.startswith("@truth/") for topic in (*decider.inputs, *decider.own))
+
+
+def test_b8_b9_b10_who_judges_what() -> None:
+    """B8, B9, B10: evidence is judged where tracks and advice are made, and the navigator hears that advice."""
+    advisor, navigator, controller = (decider_of(name) for name in keys.DECIDING_SERVICES)
+    assert keys.EVIDENCE.producer == "perception"
+    assert keys.TRACKS.producer == keys.ADVISORY.producer == "advisor"
+    assert keys.EVIDENCE in advisor.inputs
+    assert {keys.TRACKS, keys.ADVISORY} <= set(advisor.outputs)
+    assert {keys.ADVISORY, keys.ODOMETRY, keys.ARMING} <= set(navigator.inputs)
+    assert navigator.outputs == (keys.COMMAND,)
+    assert keys.COMMAND in controller.inputs
+    assert controller.outputs == (keys.THRUST,)
 
 
 @pytest.mark.parametrize("graph", GRAPHS)

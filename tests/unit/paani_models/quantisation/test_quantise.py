@@ -247,6 +247,14 @@ def test_acceptance_decides_by_rule_and_says_why_t5(
     assert decision.rule
 
 
+def test_the_papers_own_int8_segmenter_is_rejected_v10() -> None:
+    """V10, T5: by its mIoU of .730281 beside .975037, whether or not only its size matters."""
+    for for_size in (False, True):
+        verdict = decide_acceptance(100.0 * (0.975037 - 0.730281), 10.651 / 6.969, for_size=for_size, metric="mIoU")
+        assert not verdict.accepted
+        assert verdict.reason == "loses 24.48 points of mIoU, more than 1"
+
+
 @pytest.mark.parametrize(("best", "word"), [(0.0, "0.000 where FP32 gives 0.900"), (1.65, "1.650 is no probability")])
 def test_a_blind_net_is_rejected_whatever_its_other_figures(best: float, word: str) -> None:
     decision = decide_acceptance(0.0, 0.5, for_size=True, largest_score=best, float_largest_score=0.9)

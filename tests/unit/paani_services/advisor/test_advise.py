@@ -164,6 +164,8 @@ def test_j11_everything_that_decided_is_in_the_advisory() -> None:
     assert given.contributing_track_ids == (tracks[1].tracks[0].id,)
     assert given.evidence_age_s == pytest.approx(0.1)
     assert given.lifetime_s == 3.5
+    judged = at(water(0.1, 0.5, 0.3), 0.0)
+    assert (judged.left.risk, judged.center.risk, judged.right.risk) == pytest.approx((0.1, 0.5, 0.3))
     parts = given.center
     assert parts.risk == pytest.approx(
         min(1.0, 0.55 * parts.non_water + 0.65 * parts.obstacle + 0.20 * parts.urgency + 0.15 * parts.uncertainty)

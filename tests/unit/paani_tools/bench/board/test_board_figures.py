@@ -142,8 +142,12 @@ def test_v22_failures_stale_advice_kills_and_throttling_are_counted() -> None:
     run[3] = replace(run[3], status=status(3.5, 2.0, starts=2, drops=4))
     run[4] = replace(run[4], status=status(4.5, 2.0, starts=2, drops=5))
     run[5] = replace(run[5], status=status(5.5, 2.0, starts=2, drops=1))
+    by_colour = status(0.5, 2.0, starts=0)
+    assert by_colour.evidence is not None
+    by_colour = replace(by_colour, evidence=replace(by_colour.evidence, segmentation=m.SegmentationSource.FALLBACK))
+    run[0] = replace(run[0], status=by_colour)
     figures = board_figures(run, 6)
-    assert (figures.answered, figures.failures, figures.stale, figures.learned) == (5, {"timed out": 1}, 1, 5)
+    assert (figures.answered, figures.failures, figures.stale, figures.learned) == (5, {"timed out": 1}, 1, 4)
     assert (figures.oom_kills, figures.throttled_periods, figures.major_faults) == (0, 1, 15)
     assert (figures.returns, figures.drops) == (1, 6)
 
@@ -183,11 +187,18 @@ def test_the_table_stands_beside_the_papers_column() -> None:
         "467.842 / 580.341 / 643.857",
         "474.500 / 542.000 / 549.000",
     )
+    assert rows["detector median [ms]"][:2] == ("254.408", "274.500")
     assert rows["segmenter run median [ms]"][:2] == ("165.593", "224.500")
+    assert rows["inference cadence [Hz]"][:2] == ("0.500", "0.500")
+    assert rows["capture [pictures/s]"][:2] == ("2.58", "2.579")
     assert rows["frame age at completion median / p95 [s]"][:2] == ("0.6838 / 0.8888", "0.6745 / 0.7420")
     assert rows["CPU median [%]"][:2] == ("46.32", "25.00")
+    assert rows["memory of the control group median [MiB]"][:2] == ("1665.7", "1149.5")
     assert rows["temperature median / max [C]"][:2] == ("45.3 / 50.3", "194.5 / 344.0")
     assert rows["requests answered"][:2] == ("300 of 300", "300 of 300")
+    assert rows["polls with learned segmentation"][:2] == ("300", "300")
+    assert rows["polls with stale advice"][:2] == ("0", "0")
+    assert (rows["OOM kills"][0], rows["CPU quota throttling"][0]) == ("0", "0")
     assert "test bench" in table.name
     assert NOT_THE_BOARD in table.note
     assert NOT_THE_BOARD not in board_table(run_of(polls(3, 2.0), 3, {}, replace(MACHINE, is_board=True))).note
