@@ -18,6 +18,7 @@ from docs.reference.messages import messages_page
 from docs.reference.settings import settings_page
 from docs.reference.statements import statements_page
 from docs.reference.topics import topics_page
+from paani_tools.paper_report.command import report_text
 
 HERE = Path(__file__).parent
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # the generator colours what it says, and ends with its own stack
@@ -28,6 +29,7 @@ GENERATED: dict[str, Callable[[], str]] = {
     "commands": commands_page,
     "messages": messages_page,
     "statements": statements_page,
+    "paper-results": lambda: report_text(None),
 }
 
 

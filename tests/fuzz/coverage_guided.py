@@ -4,8 +4,9 @@ pip install atheris (Python 3.11 to 3.13 on Linux), then
 
 python -m tests.fuzz.coverage_guided TARGET FOLDER [-max_total_time=SECONDS and other options of libFuzzer]
 
-TARGET is a class of tests/fuzz, such as RouteGpx. Inputs that reached something new, and a first one of each, are kept
-in FOLDER; one that breaks the decoder is written to the working directory, and ends the search.
+TARGET is a class of tests/fuzz, such as RouteGpx; not ArmedBoat, which a search by coverage soon gives what is valid.
+Inputs that reached something new, and a first one of each, are kept in FOLDER; one that breaks the decoder is written
+to the working directory, and ends the search.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from paani.undecodable import UNDECODABLE
 
 ENV_PREFIX = "PAANI_"
 NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
+MAX_SHOWN = 200  # characters of a setting that an error repeats
 # Earlier names of settings and sections, and their present ones: old files, `--set` paths and recordings still load.
 RENAMED_SETTINGS = {
     "perception.gate": "perception.image_quality",
@@ -41,7 +42,7 @@ def load_config(
     if file is not None:
         layers.append(_layer(str(file), _read_settings(file)))
     layers.append(_layer("environment", _from_environ(environ or {})))
-    layers += [_layer(f"--set {text}", _from_set(text)) for text in sets]
+    layers += [_layer(_set_name(text), _from_set(text)) for text in sets]
 
     chosen, where = "paani" if profile is None else profile, ""
     if profile is None:
@@ -166,7 +167,7 @@ def _from_environ(environ: Mapping[str, str]) -> dict[str, object]:
 def _from_set(text: str) -> dict[str, object]:
     path, separator, value = text.partition("=")
     if not separator or not path.strip():
-        raise UserError(f"--set {text}: expected section.field=value")
+        raise UserError(f"{_set_name(text)}: expected section.field=value")
     return _nest(path.strip().split("."), _value(value.strip()))
 
 
@@ -194,3 +195,8 @@ def _merge(tree: dict[str, object], layer: Mapping[str, object]) -> None:
             _merge(tree[name], value)  # type: ignore[arg-type]  # just made, a dict
         else:
             tree[name] = value
+
+
+def _set_name(text: str) -> str:
+    """How an error names it: whole, unless nobody would read it."""
+    return f"--set {text}" if len(text) <= MAX_SHOWN else f"--set {text[:MAX_SHOWN]}..."

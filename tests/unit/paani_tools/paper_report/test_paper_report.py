@@ -1,0 +1,95 @@
+"""`paani paper-report`: the paper's column is what its statements say, and ours is what ships and decides here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from paani.cli import main as paani
+from paani.config import load_config
+from paani_models.catalogue import load_catalogue
+from paani_tools.claims.statements import read_statements
+from paani_tools.paper_report import published
+from paani_tools.paper_report.command import markdown, report_text
+from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table
+from tests.unit.paani_tools.bench.board.test_board_figures import polls, run_of
+
+SAYS = {statement.id: statement.says for statement in read_statements()}
+PAPER, OURS = load_config(profile="paper"), load_config()
+
+
+def column(table: Any, name: str) -> list[Any]:
+    return [row[table.columns.index(name)] for row in table.rows]
+
+
+def test_the_papers_figures_are_those_of_its_statements() -> None:
+    for name, value in published.DETECTOR_VALIDATION.items():
+        assert f"{value:.6f}" in SAYS[published.DETECTOR_STATEMENTS[name]]
+    assert all(f"{value:.6f}" in SAYS["V8"] for value in published.SEGMENTER.values())
+    assert all(f"{value:.6f}" in SAYS["V10"] for value in published.INT8.values())
+    for still in published.STILLS:
+        assert all(f"{risk:.4f}" in SAYS[still.statement] for risk in still.risks)
+        assert still.direction in SAYS[still.statement]
+    assert f"{published.STALE_AGE_S} s" in SAYS["V16"]
+    table = board_tables(None)
+    for statement, figures in zip(column(table, "statement"), column(table, "paper"), strict=True):
+        numbers = [word for word in figures.replace("/", " ").split() if word[0].isdigit()]
+        assert all(number.rstrip("0").rstrip(".") in SAYS[statement] for number in numbers), statement
+
+
+def test_pictures_are_decided_anew_and_the_papers_advice_comes_out() -> None:
+    table = stills_table(PAPER, OURS)
+    assert column(table, "here") == column(table, "paper")
+    assert column(table, "statement") == ["V11", "V12", "V13", "V14", "V15", "V16"]
+    assert "STOP (UNUSABLE_IMAGE)" in column(table, "what differs")[4]  # a black picture is refused here
+    careful = load_config(profile="paper", sets=("advisor.policy.center_block_risk=0.2",))
+    assert column(stills_table(careful, OURS), "here")[0] != column(table, "paper")[0]
+
+
+def test_figures_of_networks_are_the_manifests() -> None:
+    catalogue = load_catalogue()
+    detector, segmenter = catalogue["detector"], catalogue["segmenter"]
+    figures = {(each.metric, each.source): each for each in (*detector.figures, *segmenter.figures)}
+    here = dict(zip(column(detector_table(detector), "figure"), column(detector_table(detector), "here"), strict=True))
+    assert here["AP50-95, buoy"] == figures["buoy_ap50_95", "all"].value
+    four = [figures[f"{name}_ap50_95", "all"].value for name in ("person", "vessel", "pier", "buoy")]
+    assert here["AP50-95, mean"] == pytest.approx(sum(four) / 4)
+    found = dict(
+        zip(column(segmenter_table(segmenter), "figure"), column(segmenter_table(segmenter), "here"), strict=True)
+    )
+    assert found["iou_water"] == figures["iou_water", "mastr1325"].value
+    assert found["miou, INT8"] is None
+
+
+def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
+    file = tmp_path / "report.md"
+    assert paani(["paper-report", "--out", str(file)]) == 0
+    text = file.read_text(encoding="utf-8")
+    assert text == report_text(None)
+    assert [line for line in text.splitlines() if line.startswith("## ")] == [
+        "## Detector", "## Segmenter", "## Single pictures, paper profile", "## Board protocol",
+    ]  # fmt: skip
+    assert "| V10 | miou, INT8 | 0.7303 | - |" in text
+    assert markdown(board_tables(None)).count("| - | 0 |") == 7
+
+
+@pytest.mark.parametrize("content", [None, b"{", b'{"run": {}}'])
+def test_a_folder_without_a_run_is_named(
+    tmp_path: Path, content: bytes | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        (tmp_path / "board.json").write_bytes(content)
+    assert paani(["paper-report", "--board", str(tmp_path)]) == 2
+    assert str(tmp_path / "board.json") in capsys.readouterr().err
+
+
+def test_a_run_of_the_board_protocol_takes_its_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = run_of(polls(12, 2.0), 12, {})
+    (tmp_path / "board.json").write_bytes(msgspec.json.encode({"run": run, "polls": []}))
+    assert paani(["paper-report", "--board", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "paper, UNO Q" in printed
+    assert "| 300 / 151 | 12 / 6 |" in printed
