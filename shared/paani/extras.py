@@ -20,6 +20,7 @@ EXTRA_OF = {
     "cryptography": "certs",
     "distributed": "cluster",
     "prometheus_client": "metrics",
+    "pymavlink": "mavlink",
 }  # module -> extra
 
 

@@ -21,6 +21,8 @@ KNOWN = {  # section that another process owns, and why it is read
     ("navigator", "perception"): "the own hull in the picture, in which nothing was looked for",
     ("navigator", "localization"): "the origin of the map, at which routes and fences in degrees are placed",
     ("thrusters", "plant"): "the thrust adapter, which the plant has in a simulation and the thrusters on a hull",
+    ("mavlink", "advisor"): "the parameters of the policy that ground stations read",
+    ("mavlink", "navigator"): "the cruise speed that ground stations read",
     ("dashboard", "camera"): "what the page shows of the source of pictures",
     ("dashboard", "world"): "what the page shows of the simulated world",
     ("dashboard", "perception"): "the corridors that the page draws",

@@ -23,7 +23,8 @@ from paani_services.navigator.files.mission_file import load_route_and_mission
 
 EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
 EYE = "eye"
-NEEDED = {"plant": ("mujoco",), EYE: ("OpenGL",), "localization": ("filterpy",)}  # modules of extras, by service
+# Modules of extras, by service.
+NEEDED = {"plant": ("mujoco",), EYE: ("OpenGL",), "localization": ("filterpy",), "mavlink": ("pymavlink",)}
 
 
 class Plan(NamedTuple):

@@ -12,6 +12,7 @@ from paani.config.advisor import (
 from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
+from paani.config.mavlink import MavlinkConfig
 from paani.config.perception import (
     CameraConfig,
     CandidateConfig,
@@ -51,6 +52,7 @@ __all__ = [
     "ImageQualityConfig",
     "ImuConfig",
     "LocalizationConfig",
+    "MavlinkConfig",
     "MotionConfig",
     "NavigatorConfig",
     "PeopleConfig",

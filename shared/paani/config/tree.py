@@ -9,6 +9,7 @@ import msgspec
 from paani.config.advisor import AdvisorConfig
 from paani.config.bridge import BridgeConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
+from paani.config.mavlink import MavlinkConfig
 from paani.config.nmea import NmeaConfig
 from paani.config.perception import CameraConfig, PerceptionConfig
 from paani.config.planner import CalibrationConfig
@@ -83,6 +84,7 @@ class Config(Section, frozen=True):
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
     bridge: BridgeConfig = BridgeConfig()
+    mavlink: MavlinkConfig = MavlinkConfig()
     nmea: NmeaConfig = NmeaConfig()
 
     @property

@@ -1,0 +1,79 @@
+"""What ground stations ask of the operator's process, done by a client of it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from paani import messages as m
+from paani.clock import Clock
+from paani.operator_client import OperatorClient
+from paani_services.mavlink.commands import IN_PROGRESS, LATER, Act, arm_result, stop_result
+from paani_services.mavlink.gateway import Request
+from paani_services.mavlink.snapshot import Snapshot
+
+PROGRESS_S = 0.4  # stations ask again after half a second without an answer
+STOP_TIMEOUT_S = 1.0
+
+
+class Acts:
+    """One press of the button at a time; a STOP waits for nothing. count: something refused, by its cause."""
+
+    def __init__(self, client: OperatorClient, clock: Clock, count: Callable[[str], None]) -> None:
+        self._client, self._clock, self._count = client, clock, count
+        self._tasks = set[asyncio.Task[None]]()
+        self._arming: Request | None = None
+        self._stopping: asyncio.Task[m.OperatorState | None] | None = None
+
+    def ask(self, request: Request) -> None:
+        """Begin; the station is told how it ended."""
+        if request.act is Act.STOP:
+            self._start(self._stop(request))
+        elif self._arming is None:
+            self._arming = request
+            self._start(self._arm(request))
+        else:
+            is_repeated = request.station is self._arming.station
+            self._acknowledge(request, IN_PROGRESS if is_repeated else LATER, "")
+
+    async def stop(self) -> m.OperatorState | None:
+        """The state in which STOP is latched, None where nobody answers. Whoever asks meanwhile has the same answer."""
+        if self._stopping is None or self._stopping.done():
+            self._stopping = asyncio.create_task(self._client.stop(STOP_TIMEOUT_S), name="stop")
+        return await asyncio.shield(self._stopping)
+
+    def close(self) -> None:
+        """End what is under way: a button that is no longer held arms nothing."""
+        for task in (*self._tasks, *([self._stopping] if self._stopping is not None else [])):
+            task.cancel()
+
+    async def _stop(self, request: Request) -> None:
+        self._acknowledge(request, *stop_result(await self.stop()))
+
+    async def _arm(self, request: Request) -> None:
+        holding = asyncio.create_task(self._client.hold_to_arm(), name="hold")
+        try:
+            while not holding.done():
+                self._acknowledge(request, IN_PROGRESS, "")
+                await asyncio.wait({holding}, timeout=PROGRESS_S)
+            self._acknowledge(request, *arm_result(holding.result()))
+        finally:
+            holding.cancel()
+            self._arming = None
+
+    def _start(self, work: Awaitable[None]) -> None:
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _acknowledge(self, request: Request, result: int, text: str) -> None:
+        if text:
+            self._count("mavlink_refused")
+        request.station.acknowledge(request.command, result, request.target, self._clock.now_us(), text)
+
+
+def is_link_lost(snapshot: Snapshot, name: str, heard_us: int, limit_s: float) -> bool:
+    """Whether a boat that this client armed is to be stopped, as no station has been heard for too long."""
+    operator = snapshot.operator
+    is_ours = snapshot.is_armed and operator is not None and operator.by == name
+    return is_ours and not 0 <= snapshot.now_us - heard_us <= limit_s * 1e6

@@ -1,0 +1,133 @@
+"""UDP and TCP links to ground stations. Each has its own frames: numbers, signatures, damage."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import ipaddress
+import itertools
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from paani.clock import Clock
+from paani.config import MavlinkConfig
+from paani.errors import UserError
+from paani.port_address import tcp_address
+from paani_services.mavlink.codec import Codec
+from paani_services.mavlink.gateway import Gateway
+from paani_services.mavlink.signing import Signer
+from paani_services.mavlink.station import Station
+
+LOG = logging.getLogger(__name__)
+MAX_UNREAD_BYTES = 65_536  # ten seconds of telemetry: whoever has not read it is not there
+CHUNK_BYTES = 4096
+PAUSE_S = 0.1  # before the next chunk is read, after one that came too fast and was thrown away
+
+
+def is_local(host: str) -> bool:
+    """Whether an address is this machine's loopback interface."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host.partition("%")[0]).is_loopback
+    return host == "localhost"
+
+
+class UdpLink(asyncio.DatagramProtocol):
+    """To one station at its address, from where alone anything is taken."""
+
+    def __init__(self) -> None:
+        self.receive: Callable[[bytes], object] | None = None
+        self._transport: Any = None  # of the event loop, whose buffer is not part of its published type
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = transport
+
+    def datagram_received(self, data: bytes, addr: tuple[object, ...]) -> None:  # it is connected
+        if self.receive is not None:
+            self.receive(data)
+
+    def error_received(self, exc: Exception) -> None:
+        """Nobody listens there, or not yet."""
+        LOG.debug("UDP: %s", exc)
+
+    def write(self, data: bytes) -> None:
+        """One frame, which is lost where the socket's buffer is full."""
+        if self._transport is not None and self._transport.get_write_buffer_size() <= MAX_UNREAD_BYTES:
+            self._transport.sendto(data)
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.abort()
+
+
+class Endpoints:
+    """All links of this process; the gateway answers on each."""
+
+    def __init__(self, gateway: Gateway, settings: MavlinkConfig, signer: Signer | None, clock: Clock) -> None:
+        self._gateway, self._settings, self._signer, self._clock = gateway, settings, signer, clock
+        self._link_ids = itertools.count()
+        self._udp: list[UdpLink] = []
+        self._writers = set[asyncio.StreamWriter]()
+        self._server: asyncio.Server | None = None
+
+    async def open(self) -> None:
+        """Raises UserError that names the setting whose address cannot be had."""
+        loop = asyncio.get_running_loop()
+        for host, port in self._settings.udp_addresses:
+            try:
+                _, link = await loop.create_datagram_endpoint(UdpLink, remote_addr=(host, port))
+            except OSError as error:
+                raise UserError(f"mavlink.udp {host}:{port}: {error.strerror}") from error
+            station = self._add(f"udp {host}:{port}", link.write, host)
+            link.receive = functools.partial(self._receive, station)
+            self._udp.append(link)
+        if self._settings.tcp:
+            host, port = tcp_address(self._settings.tcp)
+            try:
+                self._server = await asyncio.start_server(self._serve, host, port)
+            except OSError as error:
+                raise UserError(f"mavlink.tcp {self._settings.tcp}: {error.strerror}") from error
+
+    def close(self) -> None:
+        """End every link."""
+        if self._server is not None:
+            self._server.close()
+        for writer in tuple(self._writers):
+            writer.transport.abort()
+        for link in self._udp:
+            link.close()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One connection, to its end."""
+        with contextlib.closing(writer), contextlib.suppress(OSError):
+            if len(self._writers) >= self._settings.max_clients:
+                return
+            self._writers.add(writer)
+            address = writer.get_extra_info("peername")
+            station = self._add(f"tcp {address[0]}:{address[1]}", lambda data: _write(writer, data), address[0])
+            try:
+                while data := await reader.read(CHUNK_BYTES):
+                    if not self._gateway.receive(station, data, self._clock.now_us()):
+                        await asyncio.sleep(PAUSE_S)
+            finally:
+                self._gateway.remove(station)
+                self._writers.discard(writer)
+
+    def _receive(self, station: Station, data: bytes) -> None:
+        self._gateway.receive(station, data, self._clock.now_us())
+
+    def _add(self, name: str, write: Callable[[bytes], None], host: str) -> Station:
+        station = Station(name, Codec(next(self._link_ids), self._signer), write, is_local=is_local(host))
+        self._gateway.stations.append(station)
+        return station
+
+
+def _write(writer: asyncio.StreamWriter, data: bytes) -> None:
+    """Without waiting; a station that does not read is let go."""
+    if writer.transport.is_closing():
+        return
+    if writer.transport.get_write_buffer_size() > MAX_UNREAD_BYTES:
+        writer.transport.abort()
+    else:
+        writer.write(data)

@@ -1,0 +1,307 @@
+"""What the boat says to its ground stations, and how it answers each. No input or output of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from paani_services.mavlink import commands, missions
+from paani_services.mavlink.announcements import Announcer, summary
+from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect, text_of
+from paani_services.mavlink.commands import Act, Verdict, judge_command, judge_mode
+from paani_services.mavlink.fields import integer
+from paani_services.mavlink.file_transfer import refuse_file
+from paani_services.mavlink.missions import EMPTY, FENCE, MISSION, RALLY, plan_of
+from paani_services.mavlink.parameters import Parameter, find, param_value
+from paani_services.mavlink.snapshot import Snapshot
+from paani_services.mavlink.station import PARAMETERS_PER_TICK, Station
+from paani_services.mavlink.streams import MISSION_CURRENT, STREAMED
+from paani_services.mavlink.telemetry import BUILDERS
+
+AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+MISSION_UNSUPPORTED = dialect.MAV_MISSION_UNSUPPORTED
+MISSION_INVALID = dialect.MAV_MISSION_INVALID_SEQUENCE
+NO_UPLOAD = "mission: set by a file on the boat, not from here"
+NO_WRITE = "parameter is read-only here; tune on the page"
+SEND_ONE = {  # commands that ask for one message that they name
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION,
+    dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
+}
+
+
+class Request(NamedTuple):
+    """An act that a station asks for, to be acknowledged to it as this command when it is done."""
+
+    act: Act
+    station: Station
+    command: int
+    target: tuple[int, int]
+
+
+class Gateway:
+    """ask: does what is asked of the operator's process. is_signed: whether there is a key.
+
+    parameters: what they are, given what is known. count: something refused, by its cause.
+    """
+
+    def __init__(
+        self,
+        ask: Callable[[Request], None],
+        parameters: Callable[[Snapshot], tuple[Parameter, ...]],
+        count: Callable[[str], None],
+        *,
+        is_signed: bool,
+    ) -> None:
+        self._ask, self._parameters, self._count, self._is_signed = ask, parameters, count, is_signed
+        self.stations: list[Station] = []
+        self.commander_us: int | None = None  # when a station that may command was heard last
+        self._snapshot = Snapshot(now_us=0)
+        self._plan, self._plan_key = EMPTY, (object(), object(), 0)
+        self._announcer = Announcer()
+        self._welcomed = set[Station]()
+        self._current = self._reached = 0
+        self._handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+            "COMMAND_LONG": self._command_long,
+            "COMMAND_INT": self._command_int,
+            "SET_MODE": self._set_mode,
+            "PING": self._ping,
+            "TIMESYNC": self._timesync,
+            "PARAM_REQUEST_LIST": self._param_request_list,
+            "PARAM_REQUEST_READ": self._param_request_read,
+            "PARAM_SET": self._param_set,
+            "MISSION_REQUEST_LIST": self._mission_request_list,
+            "MISSION_REQUEST_INT": self._mission_request,
+            "MISSION_REQUEST": self._mission_request,
+            "MISSION_COUNT": self._refuse_mission,
+            "MISSION_CLEAR_ALL": self._refuse_mission,
+            "MISSION_WRITE_PARTIAL_LIST": self._refuse_mission,
+            "MISSION_SET_CURRENT": self._refuse_current,
+            "FILE_TRANSFER_PROTOCOL": self._refuse_file,
+            "LOG_REQUEST_LIST": self._log_request_list,
+            "MANUAL_CONTROL": self._refuse_manual_control,
+        }
+
+    def tick(self, snapshot: Snapshot) -> None:
+        """Send what is due. To be called 50 times a second."""
+        now_us, self._snapshot = snapshot.now_us, snapshot
+        self._follow_plan(snapshot)
+        texts = self._announcer.observe(snapshot)
+        news = self._mission_news(snapshot)
+        for station in tuple(self.stations):
+            if not station.is_present(now_us):
+                self._welcomed.discard(station)
+                if 0 in station.schedule.due(now_us):
+                    self._send_message(station, 0)
+                continue
+            is_new = station not in self._welcomed
+            self._welcomed.add(station)
+            for message in (*(summary(snapshot) if is_new else texts), *news):
+                station.send(message, now_us)
+            for message_id in station.schedule.due(now_us):
+                self._send_message(station, message_id)
+            self._send_parameters(station)
+
+    def receive(self, station: Station, data: bytes, now_us: int) -> bool:
+        """Answer what a station has sent. Damaged bytes are counted and otherwise without effect.
+
+        False where it was too much of late, so that nothing was read.
+        """
+        damaged = station.damaged
+        messages = station.receive(data, now_us)
+        if messages is None:
+            self._count("mavlink_flood")
+            return False
+        for _ in range(station.damaged - damaged):
+            self._count("mavlink_damaged")
+        for message in messages:
+            source = message.get_srcSystem(), message.get_srcComponent()
+            if source == (SYSTEM, COMPONENT):  # our own, come back
+                continue
+            if message.get_signed() if self._is_signed else station.is_local:
+                self.commander_us = now_us
+            handler = self._handlers.get(message.get_type())
+            if handler is not None and self._is_addressed(message):
+                handler(station, message, source)
+        return True
+
+    def remove(self, station: Station) -> None:
+        """Forget a station whose link has ended."""
+        self._welcomed.discard(station)
+        if station in self.stations:
+            self.stations.remove(station)
+
+    def _is_addressed(self, message: Any) -> bool:
+        """Whether a message is for this boat; 0 is everybody's address."""
+        system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+        return system in {0, SYSTEM} and component in {0, COMPONENT}
+
+    def _is_trusted(self, station: Station, message: Any) -> bool:
+        return bool(message.get_signed()) if self._is_signed else station.is_local
+
+    # What is asked
+
+    def _command_long(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        parameters = [message.param1, message.param2, message.param3, message.param4, message.param5]
+        self._command(station, message, source, parameters)
+
+    def _command_int(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        self._command(station, message, source, [message.param1, message.param2, message.param3, message.param4])
+
+    def _command(self, station: Station, message: Any, source: tuple[int, int], parameters: Sequence[float]) -> None:
+        command, now_us = message.command, self._snapshot.now_us
+        first = integer(parameters[0])
+        if command == dialect.MAV_CMD_REQUEST_MESSAGE or command in SEND_ONE:
+            is_sent = self._send_message(station, SEND_ONE.get(command, -1 if first is None else first))
+            result = commands.ACCEPTED if is_sent else commands.UNSUPPORTED if is_sent is None else commands.LATER
+            station.acknowledge(command, result, source, now_us)
+        elif command == dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
+            is_taken = first is not None and station.schedule.set_interval(first, parameters[1])
+            station.acknowledge(command, commands.ACCEPTED if is_taken else commands.DENIED, source, now_us)
+        elif command == dialect.MAV_CMD_GET_MESSAGE_INTERVAL:
+            message_id = -1 if first is None else first
+            interval_us = station.schedule.interval_us(message_id)
+            station.send(dialect.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us), now_us)
+            station.acknowledge(command, commands.ACCEPTED, source, now_us)
+        else:
+            verdict = judge_command(command, parameters, self._snapshot, is_trusted=self._is_trusted(station, message))
+            if verdict.act is Act.ARM and message.target_system != SYSTEM:
+                verdict = Verdict(commands.DENIED, "arm: name the boat, not everybody")
+            self._answer(station, verdict, command, source)
+
+    def _set_mode(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        """The old way to ask for a mode; its base mode never arms."""
+        verdict = judge_mode(message.custom_mode, self._snapshot)
+        if not self._is_trusted(station, message):
+            verdict = Verdict(commands.DENIED, commands.NOT_TRUSTED)
+        self._answer(station, verdict, dialect.MAVLINK_MSG_ID_SET_MODE, source)
+
+    def _answer(self, station: Station, verdict: Verdict, command: int, source: tuple[int, int]) -> None:
+        if verdict.act is not None:
+            self._ask(Request(verdict.act, station, command, source))
+            return
+        if verdict.result != commands.ACCEPTED:
+            self._count("mavlink_refused")
+        station.acknowledge(command, verdict.result, source, self._snapshot.now_us, verdict.text)
+
+    def _ping(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        if (message.target_system, message.target_component) == (0, 0):
+            answer = dialect.MAVLink_ping_message(message.time_usec, message.seq, *source)
+            station.send(answer, self._snapshot.now_us)
+
+    def _timesync(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        if message.tc1 == 0:
+            now_us = self._snapshot.now_us
+            station.send(dialect.MAVLink_timesync_message(now_us * 1000, message.ts1), now_us)
+
+    # Parameters
+
+    def _param_request_list(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+        station.next_parameter = 0
+
+    def _param_request_read(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        parameters, index = self._parameters(self._snapshot), message.param_index
+        by_name = index < 0
+        found = find(parameters, text_of(message.param_id)) if by_name else index
+        if found is not None and found < len(parameters):
+            station.send(param_value(parameters, found, by_name=by_name), self._snapshot.now_us)
+
+    def _param_set(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        parameters = self._parameters(self._snapshot)
+        found = find(parameters, text_of(message.param_id))
+        if found is not None:
+            self._count("mavlink_refused")
+            station.refuse(NO_WRITE, self._snapshot.now_us)
+            station.send(param_value(parameters, found, by_name=True), self._snapshot.now_us)
+
+    def _send_parameters(self, station: Station) -> None:
+        if station.next_parameter is None:
+            return
+        parameters, begun = self._parameters(self._snapshot), station.next_parameter
+        for index in range(begun, min(begun + PARAMETERS_PER_TICK, len(parameters))):
+            station.send(param_value(parameters, index), self._snapshot.now_us)
+        ended = begun + PARAMETERS_PER_TICK
+        station.next_parameter = ended if ended < len(parameters) else None
+
+    # Mission, fence, files
+
+    def _mission_request_list(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        if message.mission_type in {MISSION, FENCE, RALLY}:
+            station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
+        else:
+            self._mission_ack(station, MISSION_UNSUPPORTED, message, source)
+
+    def _mission_request(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        kind = message.mission_type
+        item = None
+        if kind in {MISSION, FENCE, RALLY}:
+            item = missions.mission_item(self._plan, kind, message.seq, self._current, source)
+        if item is None:
+            self._mission_ack(station, MISSION_INVALID, message, source)
+        else:
+            station.send(item, self._snapshot.now_us)
+
+    def _refuse_mission(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        self._count("mavlink_refused")
+        station.refuse(NO_UPLOAD, self._snapshot.now_us)
+        self._mission_ack(station, MISSION_UNSUPPORTED, message, source)
+
+    def _refuse_current(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+        self._count("mavlink_refused")
+        station.refuse(NO_UPLOAD, self._snapshot.now_us)
+        self._send_message(station, MISSION_CURRENT)
+
+    def _mission_ack(self, station: Station, result: int, message: Any, source: tuple[int, int]) -> None:
+        ack = dialect.MAVLink_mission_ack_message(*source, result, message.mission_type)
+        station.send(ack, self._snapshot.now_us)
+
+    def _refuse_file(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        answer = refuse_file(message)
+        if answer is not None:
+            station.send(answer, self._snapshot.now_us)
+
+    def _log_request_list(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+        """There are none by this way: without an answer stations ask on and on."""
+        station.send(dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0), self._snapshot.now_us)
+
+    def _refuse_manual_control(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+        station.refuse("refused: the boat is not steered from here", self._snapshot.now_us)
+
+    # What is sent
+
+    def _send_message(self, station: Station, message_id: int) -> bool | None:
+        """Send one message of this kind: whether there was one; None for a kind that is never sent."""
+        if message_id not in STREAMED:
+            return None
+        if message_id == MISSION_CURRENT:
+            message = missions.mission_current(self._snapshot, self._plan)
+        else:
+            message = BUILDERS[message_id](self._snapshot)
+        if message is None:
+            return False
+        station.send(message, self._snapshot.now_us)
+        return True
+
+    def _follow_plan(self, snapshot: Snapshot) -> None:
+        """Make the plan anew where the mission, home or the map has changed, and only then: downloads take a while."""
+        legs, prediction = snapshot.legs, snapshot.prediction
+        if legs is None:
+            self._plan, self._plan_key = EMPTY, (object(), object(), 0)
+        elif snapshot.pose is not None:
+            home = prediction.home if prediction is not None else self._plan_key[1]
+            key = ((legs, snapshot.fence), home, snapshot.pose.epoch)
+            if key != self._plan_key:
+                self._plan, self._plan_key = plan_of(snapshot), key
+
+    def _mission_news(self, snapshot: Snapshot) -> list[Any]:
+        """MISSION_CURRENT where another item is steered for, and MISSION_ITEM_REACHED for the last."""
+        if snapshot.command is None:
+            return []
+        news: list[Any] = []
+        current = missions.current_seq(snapshot, self._plan)
+        if snapshot.command.waypoints_reached > self._reached:
+            news.append(dialect.MAVLink_mission_item_reached_message(self._current))
+        if current != self._current:
+            self._current = current
+            news.append(missions.mission_current(snapshot, self._plan))
+        self._reached = snapshot.command.waypoints_reached
+        return news

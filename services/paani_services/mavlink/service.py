@@ -1,0 +1,73 @@
+"""MAVLink process: the bus to ground stations, and what they ask for to the operator's process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import logging
+from typing import Any
+
+from paani import keys
+from paani.bus import Bus
+from paani.clock import Clock, MonotonicClock
+from paani.config import Config
+from paani.operator_client import OperatorClient
+from paani_services.mavlink.acts import Acts, is_link_lost
+from paani_services.mavlink.endpoints import Endpoints
+from paani_services.mavlink.gateway import Gateway
+from paani_services.mavlink.parameters import parameters_of
+from paani_services.mavlink.signing import Signer, read_signing_key
+from paani_services.mavlink.snapshot import TOPICS, Snapshot
+
+LOG = logging.getLogger(__name__)
+PERIOD_S = 0.02
+
+
+class Inputs:
+    """What is on the bus, as far as it is fresh."""
+
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._clock, self._steady = clock, MonotonicClock()
+        self._started_us = self._steady.now_us()
+        rows = {field: keys.topic_in(topic, bus.graph) for field, topic in TOPICS.items()}
+        self._inboxes = {
+            field: (row.fresh_s, bus.latest(row)) for field, row in rows.items() if row.producer != keys.NOBODY
+        }
+
+    def snapshot(self) -> Snapshot:
+        """Now."""
+        fresh: dict[str, Any] = {
+            field: inbox.value for field, (fresh_s, inbox) in self._inboxes.items() if inbox.receipt_age_s() <= fresh_s
+        }
+        boot_ms = (self._steady.now_us() - self._started_us) // 1000
+        return Snapshot(now_us=self._clock.now_us(), boot_ms=boot_ms % (1 << 32), **fresh)
+
+
+async def run(bus: Bus, clock: Clock, config: Config) -> None:
+    """Serve ground stations until told to stop. Raises UserError for an address or a key that cannot be had."""
+    settings = config.mavlink
+    signer = None
+    if settings.signing_key_file:
+        signer = Signer(await asyncio.to_thread(read_signing_key, settings.signing_key_file), clock.now_us())
+    inputs = Inputs(bus, clock)
+    acts = Acts(OperatorClient(bus, clock), clock, bus.count_drop)
+    parameters = functools.partial(parameters_of, cruise_mps=config.navigator.cruise_mps, advisor=config.advisor)
+    gateway = Gateway(acts.ask, parameters, bus.count_drop, is_signed=signer is not None)
+    gateway.tick(inputs.snapshot())
+    endpoints = Endpoints(gateway, settings, signer, clock)
+    with contextlib.closing(endpoints), contextlib.closing(acts):
+        await endpoints.open()
+        with bus.alive():
+            LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")
+            begun_us = clock.now_us()
+            while True:
+                snapshot = inputs.snapshot()
+                gateway.tick(snapshot)
+                heard_us = gateway.commander_us or begun_us
+                if is_link_lost(snapshot, bus.user, heard_us, settings.link_loss_s):
+                    LOG.warning("no ground station for %.1f s: STOP", settings.link_loss_s)
+                    await acts.stop()
+                present = sum(station.is_present(snapshot.now_us) for station in gateway.stations)
+                bus.note(f"{present} ground station{'' if present == 1 else 's'}")
+                await asyncio.sleep(PERIOD_S)

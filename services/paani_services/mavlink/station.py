@@ -1,0 +1,65 @@
+"""One ground station at one link: what it has been sent and asked for. No input or output of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from paani_services.mavlink.announcements import WARNING, statustext
+from paani_services.mavlink.codec import Codec, dialect
+from paani_services.mavlink.streams import Schedule
+
+BYTES_PER_S, BURST_BYTES = 100_000, 64_000  # a station that speaks faster is not heard: a mission takes a tenth of it
+SILENT_S = 10.0  # after which a station that only listens gets nothing but the heartbeat
+REPEAT_TEXT_S = 2.0  # stations repeat what is refused several times in milliseconds
+PARAMETERS_PER_TICK = 5  # 250 a second
+
+
+class Station:
+    """`write` takes the bytes of a frame. is_local: at the loopback interface of this machine."""
+
+    def __init__(self, name: str, codec: Codec, write: Callable[[bytes], None], *, is_local: bool) -> None:
+        self.name, self.is_local, self._codec, self._write = name, is_local, codec, write
+        self.schedule = Schedule()
+        self.next_parameter: int | None = None  # to be sent of the list that it asked for
+        self.heard_us: int | None = None
+        self._allowance_bytes, self._allowed_us = float(BURST_BYTES), 0
+        self._texts_us: dict[str, int] = {}
+
+    @property
+    def damaged(self) -> int:
+        """Frames and runs of bytes that could not be read."""
+        return self._codec.damaged
+
+    def receive(self, data: bytes, now_us: int) -> list[Any] | None:
+        """The messages in these bytes; None where there were too many of late, and none is read."""
+        passed_s = max(0.0, (now_us - self._allowed_us) * 1e-6)
+        self._allowance_bytes = min(BURST_BYTES, self._allowance_bytes + passed_s * BYTES_PER_S)
+        self._allowed_us = now_us
+        if len(data) > self._allowance_bytes:
+            return None
+        self._allowance_bytes -= len(data)
+        messages = self._codec.decode(data)
+        if messages:
+            self.heard_us = now_us
+        return messages
+
+    def is_present(self, now_us: int) -> bool:
+        """Whether it has spoken of late."""
+        return self.heard_us is not None and 0 <= now_us - self.heard_us <= SILENT_S * 1e6
+
+    def send(self, message: Any, now_us: int) -> None:
+        """One message."""
+        self._write(self._codec.encode(message, now_us))
+
+    def refuse(self, text: str, now_us: int) -> None:
+        """Say why something is refused, the same thing no more than once in a while."""
+        said_us = self._texts_us.get(text)
+        if text and (said_us is None or not 0 <= now_us - said_us < REPEAT_TEXT_S * 1e6):
+            self._texts_us[text] = now_us
+            self.send(statustext(WARNING, text), now_us)
+
+    def acknowledge(self, command: int, result: int, target: tuple[int, int], now_us: int, text: str = "") -> None:
+        """The text first, as stations show the last they had with the result."""
+        self.refuse(text, now_us)
+        self.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, *target), now_us)

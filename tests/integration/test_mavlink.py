@@ -1,0 +1,217 @@
+"""The MAVLink port on the simulated river, with stations that others wrote: MAVSDK, and MAVProxy as a process."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+
+from paani import keys
+from paani.bus import Bus, open_bus
+from paani.clock import WallClock
+from paani.config import Config, load_config
+from paani_services.operator.latch import LATCH_FILE
+from paani_services.operator.state import CLEAR
+from tests.arming import arm_on_page
+from tests.conftest import find_free_port
+from tests.integration.test_up import READY_S, Up, words_of
+
+pytest.importorskip("mavsdk", reason="needs mavsdk")
+from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.param import ParamAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.component_type import ComponentType
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(200)]
+T = TypeVar("T")
+RIVER_DEG = (50.1072, 8.6928)
+HOLD, AUTO = 3, 4  # TelemetryFlightMode
+LINK_LOSS_S = 3.0
+
+
+class River:
+    """One drive that all tests share: `paani up --with mavlink`, in order, not armed, no STOP."""
+
+    def __init__(self, folder: Path) -> None:
+        self.udp, self.tcp = find_free_port(), find_free_port()
+        self.sets = (
+            f"bus.router=tcp/127.0.0.1:{find_free_port()}",
+            f"bus.runtime_dir={folder / 'runtime'}",
+            f"dashboard.port={find_free_port()}",
+            f"mavlink.udp=127.0.0.1:{self.udp}",
+            f"mavlink.tcp=127.0.0.1:{self.tcp}",
+            f"mavlink.link_loss_s={LINK_LOSS_S}",
+            "up.arm_at_start=false",
+        )
+        self.config: Config = load_config(sets=self.sets)
+        (folder / "runtime").mkdir(mode=0o700)
+        (folder / "runtime" / LATCH_FILE).write_text(CLEAR)
+        self.up = Up(folder, *words_of(self.sets, "--with", "mavlink"))
+
+
+@pytest.fixture(scope="module")
+def river(tmp_path_factory: pytest.TempPathFactory) -> Iterator[River]:
+    started = River(tmp_path_factory.mktemp("mavlink"))
+    try:
+        started.up.until(lambda: "http://127.0.0.1:" in started.up.out, READY_S)
+        yield started
+    finally:
+        started.up.process.send_signal(signal.SIGINT)
+        assert started.up.process.wait(20.0) == 0
+
+
+@pytest.fixture
+async def observer(river: River) -> AsyncIterator[Bus]:
+    bus = await open_bus(river.config.bus, "observer", WallClock())
+    yield bus
+    await bus.close()
+
+
+class GroundStation:
+    """MAVSDK, connected to the first autopilot that it finds."""
+
+    def __init__(self, system: Any) -> None:
+        self.system = system
+        self.telemetry, self.action = TelemetryAsync(system), ActionAsync(system)
+        self.mission, self.parameters = MissionRawAsync(system), ParamAsync(system)
+        self.texts: list[str] = []
+
+    async def collect_texts(self) -> None:
+        async for text in self.telemetry.subscribe_status_text():
+            self.texts.append(text.text)
+
+
+async def until(read: Callable[[], Awaitable[T]], is_reached: Callable[[T], bool], limit_s: float = 20.0) -> T:
+    """The first value that is; fails after `limit_s`."""
+    async with asyncio.timeout(limit_s):
+        while not is_reached(value := await read()):
+            await asyncio.sleep(0.1)
+    return value
+
+
+async def refusal_of(attempt: Awaitable[Any]) -> str:
+    """The result with which MAVSDK reports a refusal."""
+    try:
+        await attempt
+    except Exception as error:  # noqa: BLE001  # each plugin has its own
+        return repr(error)
+    return "taken"
+
+
+async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(river: River, observer: Bus) -> None:
+    states, speeds = observer.latest(keys.OPERATOR_STATE), observer.latest(keys.ODOMETRY)
+    async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{river.udp}")
+        system = await mavsdk.first_autopilot(timeout_s=10.0)
+        assert system is not None
+        station = GroundStation(system)
+        listening = asyncio.create_task(station.collect_texts())
+        telemetry, action = station.telemetry, station.action
+
+        # What it reads.
+        health = await until(telemetry.health, lambda found: found.is_armable)
+        assert health.is_global_position_ok
+        assert health.is_gyrometer_calibration_ok
+        position = await until(telemetry.position, lambda found: found.latitude_deg > 0.0)
+        assert (position.latitude_deg, position.longitude_deg) == pytest.approx(RIVER_DEG, abs=0.005)
+        assert (await telemetry.raw_gps()).horizontal_uncertainty_m == pytest.approx(0.8, abs=0.3)
+        own = await speeds.next()
+        attitude = await telemetry.attitude_euler()
+        assert attitude.yaw_deg == pytest.approx(90.0 - own.yaw_rad * 57.29578, abs=10.0)
+        assert (await telemetry.armed(), await telemetry.flight_mode()) == (False, HOLD)
+        items = await until(station.mission.download_mission, lambda found: len(found) > 0)
+        assert [item.command for item in items] == [16] * (len(items) - 1) + [177]
+        assert (items[1].x * 1e-7, items[1].y * 1e-7) == pytest.approx(RIVER_DEG, abs=0.01)
+        assert await station.parameters.get_param_float("CRUISE_SPEED") == pytest.approx(0.6)
+
+        # What it is refused.
+        assert "TIMEOUT" in await refusal_of(station.parameters.set_param_float("CRUISE_SPEED", 3.0))
+        assert await station.parameters.get_param_float("CRUISE_SPEED") == pytest.approx(0.6)
+        assert "UNSUPPORTED" in await refusal_of(station.mission.upload_mission(items))
+        assert "DENIED" in await refusal_of(station.mission.start_mission())
+        assert await telemetry.armed() is False
+
+        # What it does: armed by a hold of the operator's process, the boat makes way along its route.
+        await action.arm()
+        assert await until(telemetry.armed, bool, 5.0)
+        assert await telemetry.flight_mode() == AUTO
+        await until(telemetry.velocity_ned, lambda v: v.north_m_s**2 + v.east_m_s**2 > 0.04)
+        assert (await states.next()).by == "mavlink"
+        listening.cancel()
+    # The link is lost.
+    async with asyncio.timeout(LINK_LOSS_S + 10.0):
+        while not (state := await states.next()).stopped:
+            pass
+    assert (state.by, state.armed) == ("mavlink", False)
+    await until(speeds.next, lambda own: own.surge_mps < 0.1)
+
+
+async def test_a_stop_of_a_ground_station_is_released_by_a_hand_on_the_page_alone(river: River, observer: Bus) -> None:
+    states = observer.latest(keys.OPERATOR_STATE)
+    async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        await mavsdk.add_any_connection(f"tcpout://127.0.0.1:{river.tcp}")
+        system = await mavsdk.first_autopilot(timeout_s=10.0)
+        assert system is not None
+        station = GroundStation(system)
+        listening = asyncio.create_task(station.collect_texts())
+        assert "COMMAND_DENIED" in await refusal_of(station.action.arm())
+        assert "arm: a STOP holds; release it on the page" in station.texts
+        await arm_on_page(f"http://127.0.0.1:{river.config.dashboard.port}", river.config.bus)
+        assert await until(station.telemetry.armed, bool, 5.0)
+        await station.action.disarm()
+        async with asyncio.timeout(5.0):
+            while not (state := await states.next()).stopped:
+                pass
+        assert state.by == "mavlink"
+        assert not await until(station.telemetry.armed, lambda is_armed: not is_armed, 5.0)
+        listening.cancel()
+
+
+async def test_mavproxy_reads_parameters_and_mission_and_is_refused(river: River, tmp_path: Path) -> None:
+    if importlib.util.find_spec("MAVProxy") is None:
+        pytest.skip("MAVProxy is not installed")
+    modules = "--default-modules=param,wp,arm,mode"
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-W", "ignore", "-m", "MAVProxy.mavproxy", "--master", f"tcp:127.0.0.1:{river.tcp}", "--nowait",
+        f"--state-basedir={tmp_path}", modules, cwd=tmp_path, env={**os.environ, "HOME": str(tmp_path)},
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
+    )  # fmt: skip
+    assert process.stdin is not None
+    assert process.stdout is not None
+    printed = ""
+
+    async def expect(text: str, command: str = "") -> None:
+        """Type a command, and read until this is printed."""
+        nonlocal printed
+        assert process.stdin is not None
+        assert process.stdout is not None
+        printed = ""
+        process.stdin.write(f"{command}\n".encode() if command else b"")
+        async with asyncio.timeout(20.0):
+            while text not in printed:
+                read = await process.stdout.read(4096)
+                assert read, printed
+                printed += read.decode(errors="replace")
+
+    try:
+        await expect("Received")  # all parameters: the refusal of the file was understood
+        await expect("CRUISE_SPEED     0.6", "param show CRUISE_SPEED")
+        await expect("Saved", "wp list")
+        assert "177 3" in printed
+        await expect("COMPONENT_ARM_DISARM: DENIED", "arm throttle")
+        assert "AP: arm: a STOP holds" in printed
+        await expect("DO_SET_MODE: DENIED", "mode RTL")
+        await expect("read-only", "param set CRUISE_SPEED 3")
+        await expect("COMPONENT_ARM_DISARM: ACCEPTED", "disarm")
+    finally:
+        process.kill()
+        await process.wait()
