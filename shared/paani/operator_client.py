@@ -87,7 +87,7 @@ class OperatorClient:
         return await self._ask_wheel(m.RequestAct.OVERRIDE, timeout_s, hand)
 
     def drive(self, surge: float, turn: float, hand: int = 0, number: int = 0) -> None:
-        """Say what the hand wants in MANUAL, ahead and to port in [-1, 1]; to be said again at least every 0.3 s.
+        """Say what the hand wants in MANUAL, ahead and to port in [-1, 1]; to be said again at least every 0.2 s.
 
         number: grows with each set-point of a hand that is not the client's own. Without the wheel nothing happens.
         Raises ValueError beyond the range.

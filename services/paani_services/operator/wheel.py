@@ -14,7 +14,7 @@ from paani.keys import STOPPING_CLIENTS
 from paani.messages import DriveMode, ModeRefusal, RequestAct
 
 # A deflected stick that nobody says again is let go after this: thrust is zero within 0.5 s of the last word.
-DEFLECTED_MAX_S = 0.35
+DEFLECTED_MAX_S = 0.3
 NEUTRAL_MAX_S = 2.0  # a stick in neutral gives no thrust, so its hand may be silent for longer
 OVERRIDE_S = 10.0
 

@@ -28,7 +28,7 @@ class RequestAct(StrEnum):
     """STOP: at once. HOLD: the button that arms is held, said again while it is. RELEASE: it was let go.
 
     MODE: another mode, which takes a wheel that nobody holds. WHEEL: takes the wheel, whoever holds it. DRIVE: what the
-    hand says in MANUAL, said again at least every 0.35 s. OVERRIDE: in MANUAL the advice does not veto for 10 s.
+    hand says in MANUAL, said again at least every 0.3 s. OVERRIDE: in MANUAL the advice does not veto for 10 s.
     """
 
     STOP = "STOP"

@@ -137,6 +137,13 @@ def test_return_goes_home_and_keeps_station_there() -> None:
     assert state.progress.target == RUNNING.progress.target
 
 
+def test_a_return_ordered_anew_goes_home_anew() -> None:
+    state, command = step(ordered(DriveMode.RETURN, target=(HERE,)))
+    assert command.leg == "hold station"
+    _, command = step(ordered(DriveMode.RETURN, target=(HERE,), since_us=2), state, odometry=pose(3.0, 30.0))
+    assert (command.leg, command.speed_mps) == ("return home", PAANI.cruise_mps)
+
+
 @pytest.mark.parametrize("mode", [DriveMode.HOLD, DriveMode.RETURN])
 @pytest.mark.parametrize("direction", [Direction.STOP, Direction.NO_DATA])
 def test_an_errand_has_the_vetoes_of_every_mission(mode: DriveMode, direction: Direction) -> None:
@@ -168,6 +175,12 @@ def test_a_hand_gets_speed_and_turn(
     assert (command.enable, command.leg, command.vetoes) == (True, "manual", ())
     assert [command.speed_mps, command.astern_mps] == pytest.approx([speed_mps, astern_mps])
     assert command.heading_rad == pytest.approx(1.0 + math.radians(off_bow_deg))
+
+
+def test_the_advised_speed_limit_holds_for_a_hand_ahead() -> None:
+    limited = msgspec.structs.replace(advice(Direction.STRAIGHT), speed_limit_mps=0.2)
+    assert step(manual(1.0), advisory=limited)[1].speed_mps == pytest.approx(0.2)
+    assert step(manual(-1.0), advisory=limited)[1].astern_mps == pytest.approx(PAANI.cruise_mps)
 
 
 def test_a_stick_in_neutral_is_no_thrust_however_old_it_is() -> None:

@@ -38,6 +38,15 @@ class Desk:
         publishers = self.arming, self.states, self.orders
         self.console = Console(*publishers, folder, self.clock)  # type: ignore[arg-type]  # the bus's place
 
+    def last_mode(self) -> m.DriveMode:
+        state: m.OperatorState = self.states.messages[-1]
+        return state.mode
+
+    async def order(self, act: m.RequestAct, press: int, mode: m.DriveMode = m.DriveMode.IDLE) -> None:
+        """Ask for a mode, or drive ahead."""
+        request = m.OperatorRequest(source_us=1, act=act, press=press, hand=3, mode=mode, surge=0.5)
+        await self.console.answer(STATION, request, EPOCH)
+
     async def ask(self, act: m.RequestAct, press: int = 1, client: str = STATION) -> None:
         await self.console.answer(client, m.OperatorRequest(source_us=1, act=act, press=press), EPOCH)
 
@@ -149,3 +158,49 @@ def test_an_unreadable_latch_is_a_stop(tmp_path: Path) -> None:
     path.unlink()
     path.mkdir()
     assert op.initial_state(read_latch(path)).stopped
+
+
+async def test_a_stop_ends_manual_and_arming_again_does_not_bring_it_back(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    await desk.order(m.RequestAct.MODE, 90, m.DriveMode.MANUAL)
+    assert desk.states.messages[-1].mode_refusal is m.ModeRefusal.NOT_ARMED
+    await desk.arm(1)
+    await desk.order(m.RequestAct.MODE, 91, m.DriveMode.MANUAL)
+    await desk.order(m.RequestAct.DRIVE, 92)
+    assert (desk.orders.messages[-1].mode, desk.orders.messages[-1].surge) == (m.DriveMode.MANUAL, 0.5)
+    await desk.ask(m.RequestAct.STOP)
+    assert desk.orders.messages[-1].mode is m.DriveMode.IDLE
+    await desk.arm(2)
+    assert desk.console.state.armed
+    await desk.order(m.RequestAct.DRIVE, 93)
+    assert (desk.orders.messages[-1].mode, desk.orders.messages[-1].surge) == (m.DriveMode.IDLE, 0.0)
+
+
+async def test_no_request_for_a_mode_arms(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    for press, mode in enumerate(m.DriveMode):
+        await desk.order(m.RequestAct.MODE, 10 + press, mode)
+    await desk.order(m.RequestAct.WHEEL, 20)
+    await desk.order(m.RequestAct.OVERRIDE, 21)
+    assert not any(word.armed for word in desk.arming.messages)
+
+
+async def test_the_order_is_published_before_the_word_that_arms_and_a_silent_hand_is_noticed(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    published: list[Any] = []
+    for each in (desk.arming, desk.orders):
+        each.messages = published
+    await desk.arm()
+    armed = next(number for number, word in enumerate(published) if isinstance(word, m.Arming) and word.armed)
+    assert isinstance(published[armed - 1], m.OperatorOrder)
+    assert published[armed].mode_ordered
+    await desk.order(m.RequestAct.MODE, 91, m.DriveMode.MANUAL)
+    await desk.order(m.RequestAct.DRIVE, 92)
+    watching = asyncio.create_task(desk.console.watch_wheel())
+    await asyncio.sleep(0)
+    assert desk.last_mode() is m.DriveMode.MANUAL
+    desk.clock.advance(0.31)
+    await asyncio.sleep(0.05)
+    watching.cancel()
+    assert [word for word in published if isinstance(word, m.OperatorOrder)][-1].mode is m.DriveMode.IDLE
+    assert desk.last_mode() is m.DriveMode.IDLE
