@@ -21,6 +21,7 @@ EXTRA_OF = {
     "distributed": "cluster",
     "prometheus_client": "metrics",
     "pymavlink": "mavlink",
+    "rosbags": "ros2",
 }  # module -> extra
 
 

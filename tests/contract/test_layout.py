@@ -75,6 +75,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("from pynmeagps", "services/paani_services/sensors/"),
         ("from pyubx2", "services/paani_services/sensors/"),
         ("from mcap", "shared/paani/logs/"),
+        ("from rosbags", "services/paani_services/ros2/"),
         ("from cryptography", "services/paani_tools/certs/"),
         ("from distributed", "shared/paani/cluster.py"),
         ("from prometheus_client", "services/paani_services/dashboard/metrics.py"),

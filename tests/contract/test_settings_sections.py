@@ -23,6 +23,7 @@ KNOWN = {  # section that another process owns, and why it is read
     ("thrusters", "plant"): "the thrust adapter, which the plant has in a simulation and the thrusters on a hull",
     ("mavlink", "advisor"): "the parameters of the policy that ground stations read",
     ("mavlink", "navigator"): "the cruise speed that ground stations read",
+    ("ros2", "navigator"): "the speed that a hand gets at full stick, by which `cmd_vel` is scaled",
     ("dashboard", "camera"): "what the page shows of the source of pictures",
     ("dashboard", "world"): "what the page shows of the simulated world",
     ("dashboard", "perception"): "the corridors that the page draws",

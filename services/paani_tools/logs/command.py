@@ -14,6 +14,7 @@ from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
 from paani.option_paths import input_folder, input_path, output_file, output_folder
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
+from paani_tools.logs.export_ros2 import export_ros2
 from paani_tools.logs.info import info_of, info_text, list_text
 from paani_tools.progress import Progress
 
@@ -55,11 +56,16 @@ def _repair(path: Path) -> int:
 def _export(options: argparse.Namespace) -> int:
     wanted = [
         (export, path)
-        for export, path in ((export_csv, options.csv), (export_geojson, options.geojson), (export_gpx, options.gpx))
+        for export, path in (
+            (export_csv, options.csv),
+            (export_geojson, options.geojson),
+            (export_gpx, options.gpx),
+            (export_ros2, options.ros2),
+        )
         if path is not None
     ]
     if not wanted:
-        raise UserError("paani logs export: say what to write: --csv DIR, --geojson FILE or --gpx FILE")
+        raise UserError("paani logs export: say what to write: --csv DIR, --geojson FILE, --gpx FILE or --ros2 FILE")
     log = open_log(options.path)
     for export, path in wanted:
         with Progress(path.name) as progress:
@@ -106,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     export.add_argument("--geojson", type=output_file("--geojson"), metavar="FILE", help="the track, for maps")
     export.add_argument("--gpx", type=output_file("--gpx"), metavar="FILE", help="the track, for chart plotters")
+    export.add_argument("--ros2", type=output_file("--ros2"), metavar="FILE", help="a bag of ROS 2 (MCAP)")
     listing = commands.add_parser("list", help="the recordings of a folder")
     listing.add_argument("path", type=input_folder(), metavar="DIR")
     return parser

@@ -102,7 +102,7 @@ def require_addresses(config: BusConfig) -> None:
         if address.startswith("tls/") and not config.certificates:
             raise UserError(f"{name} {address}: needs certificates (`paani certs make`, then bus.certificates)")
     for name, address in _doors(config).items():
-        _require_free(name, endpoint(config, address))
+        require_free(name, endpoint(config, address))
     if config.side is Side.HOST:
         parse_endpoint("bus.link", config.link)
 
@@ -116,7 +116,7 @@ def parse_endpoint(name: str, address: str) -> tuple[str, str, int]:
     return scheme, host, int(port)
 
 
-def _require_free(name: str, address: str) -> None:
+def require_free(name: str, address: str) -> None:
     scheme, host, port = parse_endpoint(name, address)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

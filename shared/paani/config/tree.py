@@ -14,6 +14,7 @@ from paani.config.nmea import NmeaConfig
 from paani.config.perception import CameraConfig, PerceptionConfig
 from paani.config.planner import CalibrationConfig
 from paani.config.recorder import RecorderConfig
+from paani.config.ros2 import Ros2Config, require_ros_name
 from paani.config.section import Positive, Section
 from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
@@ -86,6 +87,7 @@ class Config(Section, frozen=True):
     bridge: BridgeConfig = BridgeConfig()
     mavlink: MavlinkConfig = MavlinkConfig()
     nmea: NmeaConfig = NmeaConfig()
+    ros2: Ros2Config = Ros2Config()
 
     @property
     def services(self) -> tuple[str, ...]:
@@ -113,6 +115,8 @@ class Config(Section, frozen=True):
         """Refuse settings that cannot work together; the message names the fields."""
         self._require_graph()
         self._require_lines()
+        if "ros2" in self.up.ports:
+            require_ros_name(self.bus.vessel)
         motion, rate_hz = self.advisor.motion, min(self.perception.rate_hz, self.camera.rate_hz)
         starved = 1.0 / rate_hz > motion.max_gap_s or rate_hz * motion.history_s + 1 < motion.min_samples
         if self.profile != "paper" and not motion.follow_rate and starved:

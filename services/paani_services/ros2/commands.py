@@ -1,0 +1,119 @@
+"""What ROS nodes may ask of the operator's process: STOP at any time; modes and the stick where `accept_commands`.
+
+Nothing here drives by itself: MANUAL begins with a word on the topic `mode`, as on the page, and `cmd_vel` moves the
+boat only while that holds. A stream of `cmd_vel` that goes on after a STOP, a lost link or another hand moves nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from typing import Any, NamedTuple
+
+from paani import messages as m
+from paani.bus import Bus, Queue
+from paani.bus.ros_graph import RosGraph
+from paani.clock import Clock
+from paani.config import Config
+from paani.geometry import clip
+from paani.operator_client import OperatorClient
+from paani_services.ros2 import topics
+from paani_services.ros2.schemas import decode
+from paani_services.ros2.topics import RosTopic
+
+LOG = logging.getLogger(__name__)
+DEPTH = 16
+ANSWER_S = 2.0
+STICK_PERIOD_S = 0.05  # of several set-points within this time the newest counts
+TAKE_WHEEL = "WHEEL"  # the word that takes the wheel from another hand
+
+
+class Stick(NamedTuple):
+    """Ahead and to port, each as a part of the most that MANUAL gives, in [-1, 1]."""
+
+    surge: float
+    turn: float
+
+
+def stick_of(twist: Any, full_speed_mps: float, full_turn_radps: float) -> Stick:
+    """A geometry_msgs/Twist: `linear.x` [m/s] and `angular.z` [rad/s], cut where they exceed the most.
+
+    A boat can do nothing with the rest. Raises ValueError where any number is not finite.
+    """
+    numbers = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("a number is not finite")
+    return Stick(clip(twist.linear.x / full_speed_mps, -1.0, 1.0), clip(twist.angular.z / full_turn_radps, -1.0, 1.0))
+
+
+class Commands:
+    """Hears the graph and asks the operator's process. What cannot be read or has no sense is counted."""
+
+    def __init__(self, bus: Bus, clock: Clock, config: Config, graph: RosGraph) -> None:
+        vessel, settings = config.bus.vessel, config.ros2
+        self._bus, self._operator = bus, OperatorClient(bus, clock)
+        self._full_speed_mps, self._full_turn_radps = config.navigator.cruise_mps, settings.full_turn_radps
+        heard = topics.COMMANDS if settings.accept_commands else (topics.STOP,)
+        self._inboxes = {topic.name: graph.subscribe(topic.endpoint(vessel), DEPTH) for topic in heard}
+
+    def serve(self, group: asyncio.TaskGroup) -> None:
+        """Take what is asked, each topic by a task of its own."""
+        takers = {topics.STOP.name: self._take_stops, topics.MODE.name: self._take_modes}
+        takers[topics.CMD_VEL.name] = self._take_twists
+        for name, inbox in self._inboxes.items():
+            group.create_task(takers[name](inbox), name=name)
+
+    async def _take_stops(self, inbox: Queue[bytes]) -> None:
+        """Asks until the STOP is latched, for as long as that takes."""
+        while True:
+            message = self._read(await inbox.get(), topics.STOP)
+            while message is not None and message.data and await self._operator.stop(ANSWER_S) is None:
+                LOG.warning("STOP from ROS 2: the operator's process does not answer; asking again")
+
+    async def _take_modes(self, inbox: Queue[bytes]) -> None:
+        while True:
+            message = self._read(await inbox.get(), topics.MODE)
+            if message is None:
+                continue
+            if message.data == TAKE_WHEEL:
+                refusal = await self._operator.take_wheel(ANSWER_S)
+            elif message.data in m.DriveMode.__members__:
+                refusal = await self._operator.set_mode(m.DriveMode[message.data], ANSWER_S)
+            else:
+                self._bus.count_drop("out_of_range")
+                continue
+            answer = "no answer" if refusal is None else "done" if refusal is m.ModeRefusal.NONE else refusal.value
+            self._bus.note(f"{message.data} from ROS 2: {answer}")
+            if refusal is not m.ModeRefusal.NONE:
+                self._bus.count_drop("refused")
+                LOG.warning("%s from ROS 2: %s", message.data, answer)
+
+    async def _take_twists(self, inbox: Queue[bytes]) -> None:
+        """The newest alone, once: a set-point that no node says again is let go by the operator's process."""
+        while True:
+            waiting = [await inbox.get(), *inbox.drain()]
+            self._steer(waiting[-1])
+            await asyncio.sleep(STICK_PERIOD_S)
+
+    def _steer(self, data: bytes) -> None:
+        message, state = self._read(data, topics.CMD_VEL), self._operator.state
+        if message is None:
+            return
+        try:
+            stick = stick_of(message, self._full_speed_mps, self._full_turn_radps)
+        except ValueError:
+            self._bus.count_drop("non_finite")
+            return
+        if state is None or state.mode is not m.DriveMode.MANUAL or not self._operator.holds_wheel:
+            self._bus.count_drop("not_manual")
+            return
+        self._operator.drive(stick.surge, stick.turn)
+
+    def _read(self, data: bytes, topic: RosTopic) -> Any | None:
+        """The message; None for CDR that is cut short, too long or of another type."""
+        try:
+            return decode(data, topic.type)
+        except ValueError:
+            self._bus.count_drop("undecodable")
+            return None

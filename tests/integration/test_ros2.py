@@ -1,0 +1,257 @@
+"""The ROS 2 port as a process, with a node of an implementation that is not ours: zenoh-ros2-sdk.
+
+What the node hears is what the bus says; what it says reaches nothing but STOP.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import struct
+import sys
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import msgspec
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus
+from paani.clock import WallClock
+from paani.operator_client import OperatorClient
+from paani_services.ros2 import topics
+from paani_services.ros2.schemas import type_hash
+from tests.conftest import OpenAs, Spawn, find_free_port
+from tests.places import ROOT
+from tests.unit.paani_services.ros2.test_schemas import HASHES
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
+CLOCK = WallClock()
+JPEG = b"\xff\xd8" + bytes(range(256)) * 40 + b"\xff\xd9"
+BOOL = type_hash("std_msgs/Bool")
+STOP_KEY = f"43/otter/stop/std_msgs::msg::dds_::Bool_/{BOOL}"
+
+
+class Node:
+    """The node, in a process of its own."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+        self.heard: dict[str, list[Any]] = {}
+        self.leaked: list[str] = []
+        self.tokens: list[str] = []
+        self.ready = False
+
+    async def listen(self) -> None:
+        assert self._process.stdout is not None
+        while line := await self._process.stdout.readline():
+            words = json.loads(line)
+            if "topic" in words:
+                self.heard.setdefault(words["topic"], []).append(words["message"])
+            self.ready = self.ready or "ready" in words
+            self.leaked += [words["leaked"]] if "leaked" in words else []
+            self.tokens = words.get("tokens", self.tokens)
+
+    def ask(self, **words: Any) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(words).encode() + b"\n")
+
+    async def until(self, condition: Callable[[], bool], what: str, act: Callable[[], None] | None = None) -> None:
+        try:
+            async with asyncio.timeout(20):
+                while not condition():
+                    if act is not None:
+                        act()
+                    await asyncio.sleep(0.1)
+        except TimeoutError:
+            pytest.fail(f"not within 20 s: {what}; heard { ({name: len(all_) for name, all_ in self.heard.items()}) }")
+
+
+@contextlib.asynccontextmanager
+async def joined(port: int, *wanted: topics.RosTopic, mode: str = "peer") -> AsyncIterator[Node]:
+    """mode: `peer` as every ROS node, which also speaks to other nodes directly; a `client` has the router alone."""
+    hashes = {"tf2_msgs/TFMessage": type_hash("tf2_msgs/TFMessage")}
+    hashes |= {kind: f"RIHS01_{digits}" for kind, digits in HASHES.items()}
+    arguments = ["=".join((t.full_name("otter"), t.type.replace("/", "/msg/"), hashes[t.type])) for t in wanted]
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "tests.ros2_peer", str(port), "43", *arguments, cwd=ROOT,
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, limit=1 << 22,
+        env={**os.environ, "ZENOH_CONFIG_OVERRIDE": f'mode="{mode}"'},
+    )  # fmt: skip
+    node = Node(process)
+    listening = asyncio.create_task(node.listen())
+    try:
+        await node.until(lambda: node.ready, "the node is there")
+        yield node
+    finally:
+        assert process.stdin is not None
+        process.stdin.close()
+        try:
+            async with asyncio.timeout(5):
+                await process.wait()
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+        await listening
+
+
+async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
+    """A boat adrift in the simulated river: its real estimate, beside what other processes would say."""
+    listen = find_free_port()
+    observer = await open_as("observer")
+    poses = observer.queue(keys.ODOMETRY, 4096)
+    camera = (await open_as("camera")).picture_publisher(keys.PICTURE)
+    evidence = (await open_as("perception")).publisher(keys.EVIDENCE)
+    advisory = (await open_as("advisor")).publisher(keys.ADVISORY)
+    estimates: dict[int, m.Odometry] = {}
+
+    def speak() -> None:
+        now_us = CLOCK.now_us()
+        camera.put_picture(m.PictureHeader(source_us=now_us, frame_seq=1, frame_epoch=1, width_px=8, height_px=8), JPEG)
+        evidence.put(m.Evidence(
+            source_us=now_us, frame_seq=1, frame_epoch=1, width_px=320, height_px=240, usable=True,
+            detections=(m.Detection(label=m.Label.BUOY, confidence=0.5, box_xyxy=(0.0, 0.0, 0.5, 0.5)),),
+        ))  # fmt: skip
+        advisory.put(m.Advisory(source_us=now_us, direction=m.Direction.LEFT, reason=m.Reason.CENTER_RISK))
+        estimates.update({pose.source_us: pose for pose in poses.drain()})
+
+    async with (
+        spawn("plant"),
+        spawn("localization"),
+        spawn("ros2", f"ros2.listen=tcp/127.0.0.1:{listen}"),
+        joined(listen, *(topic for topic in topics.SENT if topic is not topics.TRACKS)) as node,
+    ):
+        names = {topic.full_name("otter") for topic in topics.SENT} - {"/otter/tracks"}
+        await node.until(lambda: set(node.heard) == names, f"all of {sorted(names)}", speak)
+        await node.until(lambda: len(node.heard["/otter/odometry/global"]) >= 20, "a second of odometry", speak)
+        node.ask(tokens=True)
+        await node.until(lambda: bool(node.tokens), "the graph")
+        speak()
+    for heard in node.heard["/otter/odometry/global"]:
+        pose = estimates[heard["header"]["stamp"]["sec"] * 1_000_000 + heard["header"]["stamp"]["nanosec"] // 1000]
+        at = heard["pose"]["pose"]["position"]
+        assert (at["x"], at["y"], heard["twist"]["twist"]["linear"]["x"]) == (pose.x_m, pose.y_m, pose.surge_mps)
+    assert bytes.fromhex(node.heard["/otter/camera/image/compressed"][0]["data"]) == JPEG
+    assert node.heard["/otter/detections"][0]["detections"][0]["results"][0]["hypothesis"]["class_id"] == "buoy"
+    advice = msgspec.json.decode(node.heard["/otter/advisory"][0]["data"], type=m.Advisory)
+    assert advice.direction is m.Direction.LEFT
+    children = {link["child_frame_id"] for message in node.heard["/tf"] for link in message["transforms"]}
+    assert children == {"odom", "base_link"}
+    assert abs(node.heard["/otter/imu/data"][0]["linear_acceleration"]["z"] - 9.81) < 2.0
+    ours = [token for token in node.tokens if "/%otter/paani" in token]
+    assert sum("/NN/" in token for token in ours) == 1
+    assert sum("/MP/" in token for token in ours) == len(topics.SENT)
+    assert sum("/MS/" in token for token in ours) == 1, "STOP is heard, and nothing else"
+    assert any("%otter%imu%data/sensor_msgs::msg::dds_::Imu_/RIHS01_" in token for token in ours)
+
+
+TWIST = type_hash("geometry_msgs/Twist")
+STRING = f"RIHS01_{HASHES['std_msgs/String']}"
+
+
+def vector(x: float = 0.0, z: float = 0.0) -> dict[str, float]:
+    return {"x": x, "y": 0.0, "z": z}
+
+
+async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, open_as: OpenAs) -> None:
+    """`cmd_vel` moves the boat in MANUAL alone, which a word begins; whoever falls silent has let go."""
+    listen = find_free_port()
+    observer, station = await open_as("observer"), await open_as("dashboard")
+    orders, health = observer.latest(keys.OPERATOR_ORDER), observer.latest(keys.health("ros2"))
+
+    def order() -> m.OperatorOrder:
+        assert orders.value is not None
+        return orders.value
+
+    def drops() -> dict[str, int]:
+        return {drop.cause: drop.count for drop in health.value.drops} if health.value else {}
+
+    async with (
+        spawn("operator"),
+        spawn("ros2", f"ros2.listen=tcp/127.0.0.1:{listen}", "ros2.accept_commands=true"),
+        joined(listen) as node,
+    ):
+        with station.alive():
+            hand = OperatorClient(station, CLOCK)
+
+            def steer(linear_x: float = 0.3) -> None:
+                fields = {"linear": vector(x=linear_x), "angular": vector(z=0.07)}
+                node.ask(publish="/otter/cmd_vel", type="geometry_msgs/msg/Twist", hash=TWIST, fields=fields)
+
+            def say(word: str) -> None:
+                node.ask(publish="/otter/mode", type="std_msgs/msg/String", hash=STRING, fields={"data": word})
+
+            await node.until(lambda: drops().get("not_manual", 0) > 0, "a stick without MANUAL is passed over", steer)
+            say("MANUAL")
+            await node.until(lambda: drops().get("refused", 0) > 0, "a boat that is not armed takes no MANUAL", steer)
+            assert order().mode is m.DriveMode.ROUTE
+            assert await hand.hold_to_arm(5.0) is m.ArmRefusal.NONE
+            say("MANUAL")
+            await node.until(lambda: order().surge > 0.0, "the boat is steered", steer)
+            assert (order().mode, order().by) == (m.DriveMode.MANUAL, "ros2")
+            assert (order().surge, order().turn) == pytest.approx((0.5, 0.2))
+            steer(math.nan)
+            await node.until(lambda: order().mode is m.DriveMode.IDLE, "a hand that is silent has let go")
+            await node.until(lambda: drops().get("non_finite") == 1, "no number is no stick")
+            before = drops()["not_manual"]
+            await node.until(lambda: drops()["not_manual"] > before, "a stick that moves again begins nothing", steer)
+            assert order().mode is m.DriveMode.IDLE
+            say("FULL AHEAD")
+            await node.until(lambda: drops().get("out_of_range") == 1, "a word that is no mode")
+            assert await hand.take_wheel(5.0) is m.ModeRefusal.NONE
+            say("HOLD")
+            await node.until(lambda: drops()["refused"] == 2, "another hand holds the wheel")
+            say("WHEEL")
+            await node.until(lambda: order().by == "ros2", "which is taken by that word alone")
+
+
+async def test_a_node_stops_the_boat_and_can_say_nothing_else(spawn: Spawn, open_as: OpenAs) -> None:
+    listen = find_free_port()
+    observer = await open_as("observer")
+    state = observer.latest(keys.OPERATOR_STATE)
+    health = observer.latest(keys.health("ros2"))
+    thrust, requests = observer.queue(keys.THRUST, 64), observer.queue(keys.REQUESTS["dashboard"], 64)
+    forged = _forged_thrust(await open_as("controller"))
+    async with (
+        spawn("operator"),
+        spawn("ros2", f"ros2.listen=tcp/127.0.0.1:{listen}"),
+        joined(listen, topics.DIAGNOSTICS) as first,
+        joined(listen, topics.DIAGNOSTICS, mode="client") as second,
+    ):
+        await first.until(lambda: bool(first.heard and second.heard), "the port is heard")
+        twist = struct.pack("<BBH6d", 0, 1, 0, *[1.0] * 6)
+        for data in ("00010000", twist.hex(), bytes(1 << 17).hex()):  # truncated, of another type, too long
+            first.ask(put=STOP_KEY, data=data)
+        first.ask(put=STOP_KEY, data="0001000000")  # false: nobody asks to stop
+        another = STOP_KEY.replace("Bool_", "String_")
+        first.ask(put=another, data="0001000001")  # a type of another name is another key
+        for key in ("paani/43/otter/controller/thrust", "paani/**", "**"):
+            first.ask(put=key, data=forged.hex())
+        first.ask(put="43/other/topic", data="00")
+
+        def refused() -> dict[str, int]:
+            return {drop.cause: drop.count for drop in health.value.drops} if health.value else {}
+
+        await first.until(lambda: refused().get("undecodable") == 3, "three messages are refused and counted")
+        assert state.value is not None
+        assert state.value.stops == 0
+        stop = {"publish": "/otter/stop", "type": "std_msgs/msg/Bool", "hash": BOOL, "fields": {"data": True}}
+        await first.until(
+            lambda: state.value is not None and state.value.stops > 0, "STOP is latched", lambda: first.ask(**stop)
+        )
+        assert (state.value.stopped, state.value.by) == (True, "ros2")
+    assert second.leaked == [], "the graph's router hands on nothing but what is ROS"
+    assert (thrust.drain(), requests.drain()) == ([], [])
+    assert observer.drops == {}
+
+
+def _forged_thrust(controller: Bus) -> bytes:
+    """A message that the bus would take from the process `controller`."""
+    publisher = controller.publisher(keys.THRUST)
+    now_us = CLOCK.now_us()
+    stamped = publisher._stamp(m.Thrust(source_us=now_us, left=1.0, right=1.0, enabled=True, echo_us=now_us))
+    return msgspec.json.encode(stamped)
