@@ -22,6 +22,8 @@ EXTRA_OF = {
     "prometheus_client": "metrics",
     "pymavlink": "mavlink",
     "rosbags": "ros2",
+    "foxglove": "foxglove",
+    "rerun": "rerun",
 }  # module -> extra
 
 

@@ -24,6 +24,8 @@ KNOWN = {  # section that another process owns, and why it is read
     ("mavlink", "advisor"): "the parameters of the policy that ground stations read",
     ("mavlink", "navigator"): "the cruise speed that ground stations read",
     ("ros2", "navigator"): "the speed that a hand gets at full stick, by which `cmd_vel` is scaled",
+    ("foxglove", "perception"): "the corridors that are drawn over the picture and on the water",
+    ("foxglove", "localization"): "the origin of the map, at which route and fence are placed on the earth",
     ("dashboard", "camera"): "what the page shows of the source of pictures",
     ("dashboard", "world"): "what the page shows of the simulated world",
     ("dashboard", "perception"): "the corridors that the page draws",

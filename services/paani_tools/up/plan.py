@@ -24,7 +24,13 @@ from paani_services.navigator.files.mission_file import load_route_and_mission
 EXPORT_ROUTE = "paani_sim.worlds.export_route"  # run as a module: the contract imports no simulator
 EYE = "eye"
 # Modules of extras, by service.
-NEEDED = {"plant": ("mujoco",), EYE: ("OpenGL",), "localization": ("filterpy",), "mavlink": ("pymavlink",)}
+NEEDED = {
+    "plant": ("mujoco",),
+    EYE: ("OpenGL",),
+    "localization": ("filterpy",),
+    "mavlink": ("pymavlink",),
+    "foxglove": ("foxglove",),
+}
 
 
 class Plan(NamedTuple):

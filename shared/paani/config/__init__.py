@@ -10,6 +10,7 @@ from paani.config.advisor import (
     TuningConfig,
 )
 from paani.config.bridge import BridgeConfig
+from paani.config.foxglove import FoxgloveConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
 from paani.config.mavlink import MavlinkConfig
@@ -47,6 +48,7 @@ __all__ = [
     "EngineName",
     "EscConfig",
     "EyeConfig",
+    "FoxgloveConfig",
     "GpsConfig",
     "HeadingConfig",
     "ImageQualityConfig",

@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.advisor import AdvisorConfig
 from paani.config.bridge import BridgeConfig
+from paani.config.foxglove import FoxgloveConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.mavlink import MavlinkConfig
 from paani.config.nmea import NmeaConfig
@@ -88,6 +89,7 @@ class Config(Section, frozen=True):
     mavlink: MavlinkConfig = MavlinkConfig()
     nmea: NmeaConfig = NmeaConfig()
     ros2: Ros2Config = Ros2Config()
+    foxglove: FoxgloveConfig = FoxgloveConfig()
 
     @property
     def services(self) -> tuple[str, ...]:

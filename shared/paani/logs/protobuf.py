@@ -14,7 +14,15 @@ from typing import Any, NamedTuple
 Fields = Mapping[str, Any]
 _POINT = struct.Struct("<BdBd")
 
-DOUBLE, ENUM, STRING, BYTES, FIXED32, MESSAGE = 1, 14, 9, 12, 7, 11  # descriptor.proto: FieldDescriptorProto.Type
+DOUBLE, ENUM, STRING, BYTES, FIXED32, MESSAGE, BOOL = (
+    1,
+    14,
+    9,
+    12,
+    7,
+    11,
+    8,
+)  # descriptor.proto: FieldDescriptorProto.Type
 OPTIONAL, REPEATED = 1, 3
 VARINT, I64, LEN, I32 = 0, 1, 2, 5
 
@@ -28,7 +36,7 @@ class Field(NamedTuple):
     repeated: bool = False
 
 
-TIME = "google.protobuf.Timestamp"
+TIME, DURATION = "google.protobuf.Timestamp", "google.protobuf.Duration"
 COLOR, POINT2 = "foxglove.Color", "foxglove.Point2"
 VECTOR3, QUATERNION, POSE = "foxglove.Vector3", "foxglove.Quaternion", "foxglove.Pose"
 COMPRESSED_IMAGE, LOCATION_FIX, POSE_IN_FRAME = (
@@ -38,7 +46,19 @@ COMPRESSED_IMAGE, LOCATION_FIX, POSE_IN_FRAME = (
 )
 POINTS, TEXTS, CIRCLES = "foxglove.PointsAnnotation", "foxglove.TextAnnotation", "foxglove.CircleAnnotation"
 IMAGE_ANNOTATIONS, LOG = "foxglove.ImageAnnotations", "foxglove.Log"
+CAMERA_CALIBRATION, GEO_JSON = "foxglove.CameraCalibration", "foxglove.GeoJSON"
+FRAME_TRANSFORMS, FRAME_TRANSFORM = "foxglove.FrameTransforms", "foxglove.FrameTransform"
+SCENE_UPDATE, SCENE_ENTITY = "foxglove.SceneUpdate", "foxglove.SceneEntity"
+DELETION, KEY_VALUE, POINT3 = "foxglove.SceneEntityDeletion", "foxglove.KeyValuePair", "foxglove.Point3"
+ARROW, CUBE, SPHERE = "foxglove.ArrowPrimitive", "foxglove.CubePrimitive", "foxglove.SpherePrimitive"
+CYLINDER, LINE, TRIANGLES = (
+    "foxglove.CylinderPrimitive",
+    "foxglove.LinePrimitive",
+    "foxglove.TriangleListPrimitive",
+)
+TEXT, MODEL = "foxglove.TextPrimitive", "foxglove.ModelPrimitive"
 LINE_LOOP = 2
+SCENE_LINE_STRIP, SCENE_LINE_LOOP = 0, 1
 COVARIANCE_APPROXIMATED = 1
 INFO, WARNING = 2, 3
 
@@ -46,10 +66,13 @@ ENUMS: dict[str, tuple[str, ...]] = {
     f"{LOCATION_FIX}.PositionCovarianceType": ("UNKNOWN", "APPROXIMATED", "DIAGONAL_KNOWN", "KNOWN"),
     f"{POINTS}.Type": ("UNKNOWN", "POINTS", "LINE_LOOP", "LINE_STRIP", "LINE_LIST"),
     f"{LOG}.Level": ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"),
+    f"{DELETION}.Type": ("MATCHING_ID", "ALL"),
+    f"{LINE}.Type": ("LINE_STRIP", "LINE_LOOP", "LINE_LIST"),
 }
 INT64, INT32 = 3, 5
 MESSAGES: dict[str, dict[str, Field]] = {
     TIME: {"seconds": Field(1, INT64), "nanos": Field(2, INT32)},
+    DURATION: {"seconds": Field(1, INT64), "nanos": Field(2, INT32)},
     COLOR: {name: Field(number, DOUBLE) for number, name in enumerate("rgba", 1)},
     POINT2: {name: Field(number, DOUBLE) for number, name in enumerate("xy", 1)},
     VECTOR3: {name: Field(number, DOUBLE) for number, name in enumerate("xyz", 1)},
@@ -92,6 +115,66 @@ MESSAGES: dict[str, dict[str, Field]] = {
         "timestamp": Field(1, MESSAGE, TIME), "level": Field(2, ENUM, f"{LOG}.Level"), "message": Field(3, STRING),
         "name": Field(4, STRING), "file": Field(5, STRING), "line": Field(6, FIXED32),
     },
+    GEO_JSON: {"geojson": Field(1, STRING)},
+    CAMERA_CALIBRATION: {
+        "timestamp": Field(1, MESSAGE, TIME), "width": Field(2, FIXED32), "height": Field(3, FIXED32),
+        "distortion_model": Field(4, STRING), "D": Field(5, DOUBLE, repeated=True),
+        "K": Field(6, DOUBLE, repeated=True), "R": Field(7, DOUBLE, repeated=True),
+        "P": Field(8, DOUBLE, repeated=True), "frame_id": Field(9, STRING),
+    },
+    FRAME_TRANSFORM: {
+        "timestamp": Field(1, MESSAGE, TIME), "parent_frame_id": Field(2, STRING), "child_frame_id": Field(3, STRING),
+        "translation": Field(4, MESSAGE, VECTOR3), "rotation": Field(5, MESSAGE, QUATERNION),
+    },
+    FRAME_TRANSFORMS: {"transforms": Field(1, MESSAGE, FRAME_TRANSFORM, repeated=True)},
+    POINT3: {name: Field(number, DOUBLE) for number, name in enumerate("xyz", 1)},
+    KEY_VALUE: {"key": Field(1, STRING), "value": Field(2, STRING)},
+    DELETION: {
+        "timestamp": Field(1, MESSAGE, TIME), "type": Field(2, ENUM, f"{DELETION}.Type"), "id": Field(3, STRING),
+    },
+    ARROW: {
+        "pose": Field(1, MESSAGE, POSE), "shaft_length": Field(2, DOUBLE), "shaft_diameter": Field(3, DOUBLE),
+        "head_length": Field(4, DOUBLE), "head_diameter": Field(5, DOUBLE), "color": Field(6, MESSAGE, COLOR),
+    },
+    CUBE: {"pose": Field(1, MESSAGE, POSE), "size": Field(2, MESSAGE, VECTOR3), "color": Field(3, MESSAGE, COLOR)},
+    SPHERE: {"pose": Field(1, MESSAGE, POSE), "size": Field(2, MESSAGE, VECTOR3), "color": Field(3, MESSAGE, COLOR)},
+    CYLINDER: {
+        "pose": Field(1, MESSAGE, POSE), "size": Field(2, MESSAGE, VECTOR3), "bottom_scale": Field(3, DOUBLE),
+        "top_scale": Field(4, DOUBLE), "color": Field(5, MESSAGE, COLOR),
+    },
+    LINE: {
+        "type": Field(1, ENUM, f"{LINE}.Type"), "pose": Field(2, MESSAGE, POSE), "thickness": Field(3, DOUBLE),
+        "scale_invariant": Field(4, BOOL), "points": Field(5, MESSAGE, POINT3, repeated=True),
+        "color": Field(6, MESSAGE, COLOR), "colors": Field(7, MESSAGE, COLOR, repeated=True),
+        "indices": Field(8, FIXED32, repeated=True),
+    },
+    TRIANGLES: {
+        "pose": Field(1, MESSAGE, POSE), "points": Field(2, MESSAGE, POINT3, repeated=True),
+        "color": Field(3, MESSAGE, COLOR), "colors": Field(4, MESSAGE, COLOR, repeated=True),
+        "indices": Field(5, FIXED32, repeated=True),
+    },
+    TEXT: {
+        "pose": Field(1, MESSAGE, POSE), "billboard": Field(2, BOOL), "font_size": Field(3, DOUBLE),
+        "scale_invariant": Field(4, BOOL), "color": Field(5, MESSAGE, COLOR), "text": Field(6, STRING),
+    },
+    MODEL: {
+        "pose": Field(1, MESSAGE, POSE), "scale": Field(2, MESSAGE, VECTOR3), "color": Field(3, MESSAGE, COLOR),
+        "override_color": Field(4, BOOL), "url": Field(5, STRING), "media_type": Field(6, STRING),
+        "data": Field(7, BYTES),
+    },
+    SCENE_ENTITY: {
+        "timestamp": Field(1, MESSAGE, TIME), "frame_id": Field(2, STRING), "id": Field(3, STRING),
+        "lifetime": Field(4, MESSAGE, DURATION), "frame_locked": Field(5, BOOL),
+        "metadata": Field(6, MESSAGE, KEY_VALUE, repeated=True), "arrows": Field(7, MESSAGE, ARROW, repeated=True),
+        "cubes": Field(8, MESSAGE, CUBE, repeated=True), "spheres": Field(9, MESSAGE, SPHERE, repeated=True),
+        "cylinders": Field(10, MESSAGE, CYLINDER, repeated=True), "lines": Field(11, MESSAGE, LINE, repeated=True),
+        "triangles": Field(12, MESSAGE, TRIANGLES, repeated=True), "texts": Field(13, MESSAGE, TEXT, repeated=True),
+        "models": Field(14, MESSAGE, MODEL, repeated=True),
+    },
+    SCENE_UPDATE: {
+        "deletions": Field(1, MESSAGE, DELETION, repeated=True),
+        "entities": Field(2, MESSAGE, SCENE_ENTITY, repeated=True),
+    },
 }  # fmt: skip
 
 
@@ -119,6 +202,12 @@ def encode(name: str, fields: Fields) -> bytes:
 def timestamp(time_us: int) -> bytes:
     """An encoded google.protobuf.Timestamp."""
     return encode(TIME, {"seconds": time_us // 1_000_000, "nanos": time_us % 1_000_000 * 1000})
+
+
+def duration(seconds: float) -> bytes:
+    """An encoded google.protobuf.Duration."""
+    whole_us = round(seconds * 1e6)
+    return encode(DURATION, {"seconds": whole_us // 1_000_000, "nanos": whole_us % 1_000_000 * 1000})
 
 
 def point(x_px: float, y_px: float) -> bytes:

@@ -15,7 +15,7 @@ from paani.undecodable import UNDECODABLE
 
 GPS, POSE, ANNOTATIONS, LINES = "viewer/gps", "viewer/pose", "viewer/annotations", "viewer/log"
 CHANNELS = {GPS: pb.LOCATION_FIX, POSE: pb.POSE_IN_FRAME, ANNOTATIONS: pb.IMAGE_ANNOTATIONS, LINES: pb.LOG}
-CAMERA_FRAME, MAP_FRAME, GPS_FRAME = "camera", "map", "gps"
+CAMERA_FRAME, MAP_FRAME, GPS_FRAME = "camera_optical", "map", "gps"
 # As on the dashboard: what counts is orange, what is only held or not yet confirmed is pale.
 ACCEPTED, OTHERS = pb.colour(1.0, 0.71, 0.33, 1.0), pb.colour(0.6, 0.65, 0.7, 1.0)
 BACKGROUND = pb.colour(0.03, 0.04, 0.05, 0.8)
@@ -64,12 +64,17 @@ class Viewer:
         """What a message adds to the viewer's channels; nothing for other topics and for what cannot be decoded."""
         if topic not in self._views:
             return []
-        decoder, view = self._views[topic]
+        decoder, _ = self._views[topic]
         try:
             message = decoder.decode(data)
         except UNDECODABLE:
             return []
-        return view(message)
+        return self.derive_from(topic, message)
+
+    def derive_from(self, topic: str, message: m.Message) -> list[Derived]:
+        """The same of a message that is decoded already."""
+        _, view = self._views.get(topic, (None, None))
+        return view(message) if view is not None else []
 
     def _gps(self, fix: m.GpsFix) -> list[Derived]:
         if not fix.fix:

@@ -14,7 +14,12 @@ from paani.extras import EXTRA_OF, require_modules
 from tests.places import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-DISTRIBUTION = {"OpenGL": "PyOpenGL", "prometheus_client": "prometheus-client"}  # where it is not called as its module
+DISTRIBUTION = {  # where it is not called as its module
+    "OpenGL": "PyOpenGL",
+    "prometheus_client": "prometheus-client",
+    "foxglove": "foxglove-sdk",
+    "rerun": "rerun-sdk",
+}
 
 
 @pytest.mark.parametrize(("module", "extra"), EXTRA_OF.items())

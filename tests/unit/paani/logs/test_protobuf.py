@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from typing import Any
 
@@ -14,7 +15,10 @@ from paani.logs import protobuf as pb
 from paani.logs import viewer
 
 NOW_US = 1_700_000_000_123_456
-KINDS = (pb.COMPRESSED_IMAGE, pb.LOCATION_FIX, pb.POSE_IN_FRAME, pb.IMAGE_ANNOTATIONS, pb.LOG)
+KINDS = (
+    pb.COMPRESSED_IMAGE, pb.LOCATION_FIX, pb.POSE_IN_FRAME, pb.IMAGE_ANNOTATIONS, pb.LOG, pb.CAMERA_CALIBRATION,
+    pb.GEO_JSON, pb.FRAME_TRANSFORMS, pb.SCENE_UPDATE,
+)  # fmt: skip
 
 
 def decoder(kind: str) -> Any:
@@ -40,6 +44,23 @@ def test_the_schema_stands_alone(kind: str) -> None:
     assert {field.name for field in decoder(kind).DESCRIPTOR.fields} == set(pb.MESSAGES[kind])
 
 
+@pytest.mark.parametrize("kind", [kind for kind in pb.MESSAGES if kind.startswith("foxglove.")])
+def test_every_field_is_as_published(kind: str) -> None:
+    """Number, type and repetition, against Foxglove's own compiled definitions; its enumerations too."""
+    published = pytest.importorskip(
+        "foxglove_schemas_protobuf", reason="foxglove-schemas-protobuf is not installed"
+    ) and importlib.import_module(f"foxglove_schemas_protobuf.{kind.removeprefix('foxglove.')}_pb2")
+    message = published.DESCRIPTOR.message_types_by_name[kind.removeprefix("foxglove.")]
+    for name, field in pb.MESSAGES[kind].items():
+        found = message.fields_by_name[name]
+        of = found.message_type or found.enum_type
+        assert field == (found.number, found.type, of.full_name if of else "", found.is_repeated), name
+    for enum in message.enum_types:
+        assert pb.ENUMS[enum.full_name] == tuple(value.name for value in enum.values)
+    if kind.startswith(("foxglove.Scene", "foxglove.Frame")) or "Primitive" in kind:
+        assert set(pb.MESSAGES[kind]) == set(message.fields_by_name), "a viewer reads every list of an entity"
+
+
 def test_a_varint_beyond_one_byte() -> None:
     """300 is AC 02, the encoding guide's own example; field 1 of a Timestamp."""
     assert pb.encode(pb.TIME, {"seconds": 300}) == bytes((0x08, 0xAC, 0x02))
@@ -48,7 +69,7 @@ def test_a_varint_beyond_one_byte() -> None:
 def test_a_picture() -> None:
     header = m.PictureHeader(source_us=NOW_US, frame_seq=1, frame_epoch=1, width_px=320, height_px=240)
     image = decoder(pb.COMPRESSED_IMAGE).FromString(viewer.picture(header, b"\xff\xd8 bytes"))
-    assert (image.data, image.format, image.frame_id) == (b"\xff\xd8 bytes", "jpeg", "camera")
+    assert (image.data, image.format, image.frame_id) == (b"\xff\xd8 bytes", "jpeg", "camera_optical")
     assert image.timestamp.seconds * 1_000_000 + image.timestamp.nanos // 1000 == NOW_US
 
 
