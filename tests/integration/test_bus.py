@@ -6,6 +6,7 @@ import asyncio
 import gc
 from collections.abc import Callable
 
+import msgspec
 import pytest
 
 from paani import keys
@@ -124,13 +125,14 @@ async def test_pictures_are_pulled_one_at_a_time(open_as: OpenAs) -> None:
     camera, dashboard = await open_as("camera"), await open_as("dashboard")
     pictures = camera.picture_publisher(keys.PICTURE, push=False)
     pulled = dashboard.pull_picture(keys.PICTURE)
-    header = m.PictureHeader(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
+    taken_us = CLOCK.now_us() - 1_000_000
+    header = m.PictureHeader(source_us=taken_us, frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
     seen = []
     for index in range(5):
-        pictures.put_picture(header, b"jpeg %d" % index)
+        pictures.put_picture(msgspec.structs.replace(header, source_us=taken_us + index), b"jpeg %d" % index)
         picture = await asyncio.wait_for(pulled.next(), 5)
-        seen.append(picture.data)
-    assert seen == [b"jpeg %d" % index for index in range(5)]
+        seen.append((picture.data, picture.header.source_us, picture.header.width_px, picture.header.height_px))
+    assert seen == [(b"jpeg %d" % index, taken_us + index, 4, 3) for index in range(5)], "each with its own stamp (B1)"
     pictures.new_epoch()
     pictures.put_picture(header, b"again")
     assert (await asyncio.wait_for(pulled.next(), 5)).data == b"again"

@@ -34,3 +34,13 @@ def test_a_resumed_run_still_knows_its_best_s9(tmp_path: Path) -> None:
     resumed.resume(tmp_path, {})
     resumed.finish_epoch(tmp_path, {}, 0.6)
     assert load_checkpoint(tmp_path / "best.pt")["epoch"] == 2
+
+
+def test_a_resumed_run_draws_what_an_unbroken_one_draws_s11(tmp_path: Path) -> None:
+    """S11: the random numbers go on where the last finished epoch left them."""
+    torch.manual_seed(7)
+    finished(tmp_path, [0.2, 0.9])
+    unbroken = torch.rand(4)
+    torch.manual_seed(999)
+    TrainingState(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0).resume(tmp_path, {})
+    assert torch.equal(torch.rand(4), unbroken)
