@@ -80,6 +80,7 @@ def test_one_file_one_job(path: Path) -> None:
         ("from distributed", "shared/paani/cluster.py"),
         ("from prometheus_client", "services/paani_services/dashboard/metrics.py"),
         ("from pymavlink", "services/paani_services/mavlink/codec.py"),
+        ("import rerun", "services/paani_tools/logs/rerun_view.py"),
         ("import foxglove", "services/paani_services/foxglove/server.py"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),
         ("MsgspecError", "shared/paani/undecodable.py"),  # what decoders raise has one list

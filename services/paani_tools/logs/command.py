@@ -1,4 +1,4 @@
-"""`paani logs`: what is in recordings, mending them, and handing them to other programs."""
+"""`paani logs`: what is in recordings, mending them, opening them, and handing them to other programs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
+from paani.extras import require_modules
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
@@ -28,6 +29,8 @@ def main(argv: list[str]) -> int:
         return _repair(options.path)
     if options.what == "export":
         return _export(options)
+    if options.what == "view":
+        return _view(options)
     return _list(options.path)
 
 
@@ -76,6 +79,21 @@ def _export(options: argparse.Namespace) -> int:
     return 0
 
 
+def _view(options: argparse.Namespace) -> int:
+    if not options.rerun:
+        raise UserError("paani logs view: say in what: --rerun")
+    require_modules("logs view --rerun", "rerun")
+    from paani_tools.logs.rerun_view import view_in_rerun  # noqa: PLC0415  # of an extra
+
+    log = open_log(options.path)
+    with Progress("converting") as progress:
+        summary = view_in_rerun(log, options.out, ReadProgress(log, progress))
+    sys.stdout.write(summary + "\n")
+    for problem in log.problems:
+        sys.stderr.write(f"{problem}\n")
+    return 0
+
+
 def _list(folder: Path) -> int:
     if not recordings(folder):
         raise UserError(f"{folder}: no recordings in this folder")
@@ -113,6 +131,12 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--geojson", type=output_file("--geojson"), metavar="FILE", help="the track, for maps")
     export.add_argument("--gpx", type=output_file("--gpx"), metavar="FILE", help="the track, for chart plotters")
     export.add_argument("--ros2", type=output_file("--ros2"), metavar="FILE", help="a bag of ROS 2 (MCAP)")
+    view = commands.add_parser("view", help="open a recording in a viewer")
+    view.add_argument("path", type=input_path(), metavar="FILE|DIR")
+    view.add_argument("--rerun", action="store_true", help="in Rerun: pictures, boxes, tracks, map and plots")
+    view.add_argument(
+        "--out", type=output_file("--out"), metavar="FILE", help="write a file for it (.rrd) instead of opening it"
+    )
     listing = commands.add_parser("list", help="the recordings of a folder")
     listing.add_argument("path", type=input_folder(), metavar="DIR")
     return parser
