@@ -88,6 +88,7 @@ def still(cause: m.ZeroCause, *inhibits: m.Inhibit, leg: str = ORDER.leg) -> dic
 
 NOT_ENABLED, NOT_ARMED = m.ZeroCause.NOT_ENABLED, m.ZeroCause.NOT_ARMED
 STOPPED = m.OperatorState(source_us=1, armed=False, stopped=True, by="stop")
+BY_HAND = m.OperatorState(source_us=1, armed=True, stopped=False, mode=m.DriveMode.MANUAL, wheel_by="dashboard")
 STOP_ADVISED = m.Advisory(source_us=1, direction=m.Direction.STOP, reason=m.Reason.NO_SAFE_SIDE)
 SILENT_OPERATOR: dict[str, m.Message | None] = {"operator/state": None}
 CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
@@ -114,6 +115,17 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
      ["STOPPED", "STOPPED", "by paani stop; arming releases it"]),
     # A boat that drives although it is stopped is not said to be still.
     ({"operator/state": STOPPED}, (), ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4"]),
+    # By hand: who, and what the advice has to say in it; without a mode that moves the boat, that.
+    ({"navigator/command": replace(ORDER, leg="manual"), "operator/state": BY_HAND}, (),
+     ["MANUAL", "DRIVEN BY HAND", "by the page"]),
+    ({"navigator/command": replace(ORDER, leg="manual", direction=m.Direction.LEFT),
+      "operator/state": replace(BY_HAND, override_ms=4000.0)}, (),
+     ["MANUAL", "DRIVEN BY HAND", "by the page, the advice is overridden"]),
+    ({"navigator/command": replace(ORDER, leg="manual", speed_mps=0.0, vetoes=(m.Inhibit.BLOCKED_AHEAD,)),
+      "operator/state": BY_HAND}, (), ["MANUAL", "DRIVEN BY HAND", "by the page, the advice gives no thrust ahead"]),
+    (still(NOT_ENABLED, m.Inhibit.NEUTRAL, leg="manual"), (), ["MANUAL", "DRIVEN BY HAND", "the stick is in neutral"]),
+    (still(NOT_ENABLED, m.Inhibit.IDLE, leg="idle"), (), ["IDLE", "IDLE", "nothing else keeps the boat still"]),
+    (still(NOT_ENABLED, m.Inhibit.IDLE, m.Inhibit.STALE_ODOMETRY), (), ["IDLE", "IDLE", "and position too old"]),
     ({}, ("plant/thrust_applied",), ["UNKNOWN", "UNKNOWN", "no recent report of thrust"]),
     (still(m.ZeroCause.PULSE_LOST), ("camera/picture",), ["STANDING", "STANDING STILL", "no recent picture"]),
     (still(m.ZeroCause.ARMING_LOST) | SILENT_OPERATOR, (),

@@ -78,6 +78,50 @@ async def test_arming_needs_the_own_page_the_operators_key_and_a_valid_request(
         await until_arming(boat, armed=True)
 
 
+async def test_driving_needs_the_own_page_the_operators_key_and_a_valid_request(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    """A refused mode says why; another hand of the page takes the wheel over."""
+    page = f"http://127.0.0.1:{config.dashboard.port}"
+    bodies: dict[str, dict[str, object]] = {
+        "mode": {"hand": 1, "mode": "IDLE"},
+        "wheel": {"hand": 1},
+        "override": {"hand": 1},
+        "setpoint": {"hand": 1, "number": 1, "surge": 0.5, "turn": 0.0},
+    }
+    async with spawn("operator"), spawn("dashboard"):
+        ours = await asyncio.to_thread(headers_of, page, config.bus)
+
+        async def ask(act: str, headers: dict[str, str] = ours, **changes: object) -> tuple[int, str]:
+            async with client.post(f"/api/drive/{act}", json=bodies[act] | changes, headers=headers) as answer:
+                return answer.status, await answer.text()
+
+        for act in bodies:
+            assert (await ask(act, {}))[0] == 403
+            assert (await ask(act, {**ours, KEY_HEADER: "guess"}))[0] == 403
+            status, text = await ask(act, hand=0)
+            assert (status, '"field":"hand"' in text) == (400, True)
+        for field, wrong in (("surge", 1.01), ("turn", -2), ("number", 0), ("speed", 1)):
+            status, text = await ask("setpoint", ours, **{field: wrong})
+            assert (status, f'"field":"{field}"' in text) == (400, True)
+        assert (await ask("mode", mode="FAST"))[0] == 400
+        assert await ask("mode") == (200, '{"done":true}')
+        status, text = await ask("mode", mode="MANUAL")
+        assert (status, "the boat is not armed" in text) == (409, True)
+        status, text = await ask("override")
+        assert (status, "not driven by hand" in text) == (409, True)
+        status, text = await ask("mode", hand=2)
+        assert (status, "another hand holds the wheel" in text) == (409, True)
+        assert (await ask("wheel", hand=2))[0] == 200
+        assert (await ask("mode", hand=2))[0] == 200
+        assert (await ask("setpoint", hand=2))[0] == 200
+        assert boat.arming.value is not None
+        assert not boat.arming.value.armed
+    async with spawn("dashboard"):
+        status, text = await ask("wheel")
+        assert (status, "does not answer" in text) == (503, True)
+
+
 async def test_anybody_may_stop_with_any_body(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:

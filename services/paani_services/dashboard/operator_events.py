@@ -15,9 +15,19 @@ REFUSALS = {
     m.ArmRefusal.NO_STATION: "the page's process has no pulse",
 }
 
+MODE_REFUSALS = {
+    m.ModeRefusal.NOT_HOLDER: "another hand holds the wheel",
+    m.ModeRefusal.NOT_ALLOWED: "this client may only stop the boat",
+    m.ModeRefusal.NO_POSITION: "the position is not known well enough",
+    m.ModeRefusal.NO_HOME: "home is not known yet: it is where the boat was first free to move",
+    m.ModeRefusal.NO_MISSION: "there is neither a mission nor a route",
+    m.ModeRefusal.NOT_ARMED: "the boat is not armed",
+    m.ModeRefusal.NOT_MANUAL: "the boat is not driven by hand",
+}
+
 
 def describe_operator_change(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> Event | None:
-    """A line for the page's log when the operator has stopped, armed or disarmed."""
+    """A line for the page's log when the operator has stopped, armed, disarmed or ordered something else."""
     if before is None or before.epoch != now.epoch:
         return Event(now_us, "info", "the operator's process is here: not armed") if not now.armed else None
     if now.stops != before.stops:
@@ -27,4 +37,17 @@ def describe_operator_change(before: m.OperatorState | None, now: m.OperatorStat
         return Event(now_us, "warn", f"armed by {now.by}")
     if before.armed and not now.armed:
         return Event(now_us, "warn", "disarmed: the page's process has gone or begun again")
+    return _describe_wheel_change(before, now, now_us)
+
+
+def _describe_wheel_change(before: m.OperatorState, now: m.OperatorState, now_us: int) -> Event | None:
+    """A line for another mode, an override of the advice, or another hand at the wheel."""
+    if now.override_ms > 0.0 and before.override_ms == 0.0:
+        return Event(now_us, "warn", f"{now.wheel_by} overrides the advice")
+    if (now.mode, now.mode_since_us) != (before.mode, before.mode_since_us):
+        is_let_go = before.mode is m.DriveMode.MANUAL and now.mode is m.DriveMode.IDLE
+        why = "MANUAL has ended" if is_let_go else f"ordered by {now.wheel_by}"
+        return Event(now_us, "warn" if now.mode is m.DriveMode.MANUAL else "info", f"{now.mode}: {why}")
+    if (now.wheel_by, now.wheel_hand) != (before.wheel_by, before.wheel_hand):
+        return Event(now_us, "info", f"the wheel is in another hand of {now.wheel_by}")
     return None

@@ -1,4 +1,4 @@
-"""Web server of the dashboard: the page, its WebSocket, and the requests to stop, arm and tune."""
+"""Web server of the dashboard: the page, its WebSocket, and the requests to stop, arm, drive and tune."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import contextlib
 import hmac
 from collections.abc import AsyncIterator, Awaitable, Callable
 
-import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from paani import keys
@@ -20,6 +19,7 @@ from paani.errors import UserError
 from paani.extras import missing_module
 from paani.operator_client import OperatorClient
 from paani_services.dashboard.connections import BoundedConnections
+from paani_services.dashboard.driving import Driving
 from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
@@ -34,6 +34,7 @@ from paani_services.dashboard.requests import (
     is_own_host,
     is_same_origin,
 )
+from paani_services.dashboard.responses import error_response, json_response
 from paani_services.dashboard.status import board_status
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
@@ -66,6 +67,7 @@ class Server:
         self._hub, self._operator, self._tuner = hub, operator, tuner
         self._clock, self._whole, self._config = clock, config, config.dashboard
         self._pages, self._key = pages, key
+        self._driving = Driving(operator, self._refuse_other_page)
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 
@@ -85,6 +87,7 @@ class Server:
                 web.post(STOP_PATH, self._stop),
                 web.post("/api/arm/hold", self._hold),
                 web.post("/api/arm/release", self._release),
+                *self._driving.routes(),
                 web.get("/api/tune", self._tuning),
                 web.post("/api/tune/propose", self._propose),
                 web.post("/api/tune/promote", self._promote),
@@ -305,11 +308,3 @@ def tuning_response(shadow: m.Shadow | None) -> web.Response:
     if shadow is None:
         return error_response(503, "the advisor did not answer", keys.SHADOW.name)
     return json_response(shadow, 200 if shadow.refusal is m.TuningRefusal.NONE else 409)
-
-
-def json_response(value: object, status: int = 200) -> web.Response:
-    return web.Response(status=status, body=msgspec.json.encode(value), content_type="application/json")
-
-
-def error_response(status: int, text: str, field: str) -> web.Response:
-    return json_response({"error": text, "field": field}, status)

@@ -26,6 +26,8 @@ export function describeActivity(store, now) {
   if (!store.isFresh("plant/thrust_applied", now)) return activity("UNKNOWN", STAGES.gate[1]);
   if (isMoving) return command?.enable ? describeMotion(store, command) : activity("UNDER_WAY", "no order is heard");
   if (inhibits.some((reason) => reason.code === "NOT_ARMED" || reason.code === "not_armed")) return activity("NOT_ARMED", otherReason(inhibits));
+  if (inhibits.some((reason) => reason.code === "IDLE")) return activity("IDLE", otherReason(inhibits.filter((reason) => reason.code !== "IDLE")));
+  if (inhibits.some((reason) => reason.code === "NEUTRAL")) return activity("MANUAL", handReason(store, command, "the stick is in neutral"));
   const inMission = inhibits.find((reason) => reason.stage === "mission");
   const isOnPurpose = inMission && inhibits.every((reason) => reason === inMission || reason.code === "not_enabled");
   if (isOnPurpose && inMission.code === "HOLDING") return activity("HOLDING", command?.leg || inMission.text);
@@ -39,10 +41,18 @@ function otherReason(inhibits) {
   return other ? `and ${other.text}` : "nothing else keeps the boat still";
 }
 
+/** Who drives by hand, and what the advice has to say in it. @param {import("./store.js").Store} store @param {any} command @param {string} what */
+function handReason(store, command, what) {
+  const operator = store.get("operator/state");
+  const advice = operator?.override_ms > 0 ? "the advice is overridden" : command?.vetoes?.length ? "the advice gives no thrust ahead" : "";
+  return [what, advice].filter(Boolean).join(", ");
+}
+
 /** What an order that moves the boat is for. @param {import("./store.js").Store} store @param {any} command @returns {Activity} */
 function describeMotion(store, command) {
   const advisory = store.get("advisor/advisory"), tracks = store.get("advisor/tracks")?.tracks ?? [];
   const planned = command.obstacle_track_ids;
+  if (command.leg === "manual") return activity("MANUAL", handReason(store, command, `by ${operatorText(store.get("operator/state")?.wheel_by ?? "")}`));
   if (/LEFT|RIGHT/.test(command.direction)) {
     const turn = `turning ${words(command.direction)}`;
     if (advisory?.purpose === "LOOK") return activity("LOOKING", `${turn}: ${reasonText(advisory.reason).toLowerCase()}`);

@@ -2,6 +2,7 @@
 // Connects the WebSocket to the store and the panels.
 
 import { Camera } from "./camera.js";
+import { bindDrive, isDriving, renderDrive } from "./drive.js";
 import { buildExplanation, renderExplanation } from "./explanation.js";
 import { decodeJson } from "./frames.js";
 import { renderHealth } from "./health.js";
@@ -56,6 +57,7 @@ function render() {
   const now = performance.now();
   renderTopbar(store, open, now);
   renderOperatorState(store, open, now);
+  renderDrive(store, open, now);
   if (document.hidden) return;
   renderTuning(store, now);
   renderExplanation(store, now);
@@ -70,7 +72,7 @@ function render() {
 
 addEventListener("keydown", (event) => {
   const layer = LAYERS[Number(event.key) - 1];
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || isDriving()) return;
   if (layer) camera.toggle(layer);
   if (event.key === "d" || event.key === "D") nextPalette();
 });
@@ -78,6 +80,7 @@ buildExplanation();
 bindLink();
 bindPalette();
 bindOperatorControls();
+bindDrive();
 connect(onMessage, onOpen);
 setInterval(render, RENDER_PERIOD_MS);
 Object.defineProperty(window, "paani", {

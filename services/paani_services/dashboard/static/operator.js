@@ -2,26 +2,12 @@
 // The operator's controls: STOP is one press, sent until the server answers; arming is a hold that expires.
 
 import { isReplay } from "./inhibits.js";
-import { byId, fixed, operatorText, setText } from "./text.js";
+import { bindKey, hasKey, post } from "./requests.js";
+import { byId, fixed, operatorText, setText, words } from "./text.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400, REFRESH_MS = 150;
 const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
 let isStopPending = false, stopAskedAt = 0, refusal = "", heldFrom = 0, press = 0, refreshing = 0;
-let key = sessionStorage.getItem("paani-key") ?? "";
-
-/** The operator's key comes after the address (`#key=...`), from where no server and no log sees it. */
-function takeKey() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("key");
-  if (!given) return;
-  keepKey(given);
-  history.replaceState(null, "", location.pathname);
-}
-
-/** @param {string} text */
-function keepKey(text) {
-  key = text.trim();
-  sessionStorage.setItem("paani-key", key);
-}
 
 export async function stop() {
   release(false);
@@ -39,26 +25,15 @@ export async function stop() {
 
 /** @param {string} act */
 async function send(act) {
-  try {
-    const answer = await fetch(`/api/arm/${act}`, {
-      method: "POST",
-      headers: { "Content-Type": "application/json", "X-Paani-Key": key },
-      body: JSON.stringify({ press }),
-    });
-    if (answer.ok) return;
-    refusal = (await answer.json()).error;
-    if (answer.status === 403) keepKey("");
-    release(false);
-  } catch {
-    refusal = "not sent: no connection to the dashboard";
-    release(false);
-  }
+  const refused = await post(`/api/arm/${act}`, { press });
+  if (!refused) return;
+  refusal = refused;
+  release(false);
 }
 
 function hold() {
   refusal = "";
-  if (!key) keepKey(prompt("The operator's key, which `paani up` prints:") ?? "");
-  if (!key) return;
+  if (!hasKey()) return;
   press = 1 + Math.floor(Math.random() * 2 ** 50);
   heldFrom = performance.now();
   void send("hold");
@@ -75,8 +50,7 @@ function release(mayArm) {
 }
 
 export function bindOperatorControls() {
-  takeKey();
-  addEventListener("hashchange", takeKey);
+  bindKey();
   byId("stop").addEventListener("pointerdown", stop);
   byId("stop").addEventListener("click", stop);
   addEventListener("keydown", (event) => {
@@ -130,7 +104,7 @@ function operatorState(operator, isHeard, ageS) {
   if (!operator) return { state: "", word: "–", detail: "operator state unknown" };
   const word = operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED", state = operator.stopped ? "stopped" : operator.armed ? "armed" : "";
   if (!isHeard) return { state: "", word, detail: "last known state" };
-  if (!operator.stopped) return { state, word, detail: operator.armed ? `by ${operatorText(operator.by)}` : "thrust not allowed" };
+  if (!operator.stopped) return { state, word, detail: operator.armed ? `by ${operatorText(operator.by)}, ${words(operator.mode)}` : "thrust not allowed" };
   if (operator.confirmed_us && !operator.latch_kept) return { state, word, detail: "could not be written to disk" };
   if (operator.confirmed_us) return { state, word, detail: `confirmed by the thrust adapter in ${fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)} ms` };
   if (!operator.asked_us) return { state, word, detail: "latched before this start" };

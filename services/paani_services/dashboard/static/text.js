@@ -95,12 +95,32 @@ export const ACTIVITIES = {
   STATION: ["GOING TO STATION", "go"],
   HOME: ["RETURNING HOME", "go"],
   UNDER_WAY: ["UNDER WAY", "go"],
+  MANUAL: ["DRIVEN BY HAND", "turn"],
+  IDLE: ["IDLE", "none"],
   REPLAY: ["RECORDING", "none"],
   UNKNOWN: ["UNKNOWN", "none"],
 };
 
 /** @type {Record<string, string>} */
 export const PALETTES = { auto: "Auto", day: "Day", dusk: "Dusk", night: "Night" };
+
+/** Modes: name, and what the boat does in it. @type {Record<string, [string, string]>} */
+export const MODE_TEXTS = {
+  ROUTE: ["Route", "follows its mission or route"],
+  HOLD: ["Hold", "keeps its station here"],
+  RETURN: ["Return", "goes home, keeps station there"],
+  MANUAL: ["Manual", "does what your hand says"],
+  IDLE: ["Idle", "no thrust"],
+};
+
+/** Why a mode may not start, in a few words. @type {Record<string, string>} */
+export const MODE_BARS = {
+  NOT_HOLDER: "another hand holds the wheel",
+  NO_POSITION: "position not known well enough",
+  NO_HOME: "home not known yet",
+  NO_MISSION: "no mission and no route",
+  NOT_ARMED: "arm first",
+};
 
 /** What the thrust moves. @type {Record<string, string>} */
 export const MODES = { sim: "SIM", hil: "HIL", hull: "HULL", replay: "REPLAY" };

@@ -1,0 +1,154 @@
+// @ts-check
+// The drive panel: modes and why they may not start, who holds the wheel, and driving by hand under a dead man's handle.
+// Each page is a hand of its own. What it says is sent again and again while the stick or a key is held, and not at all
+// by a page that is hidden or has lost its link: the operator's process then lets the stick go by itself.
+
+import { isReplay } from "./inhibits.js";
+import { hasKey, post } from "./requests.js";
+import { MODE_BARS, MODE_TEXTS, byId, fixed, make, operatorText, setText } from "./text.js";
+
+const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
+const MAX_UNDER_WAY = 3; // set-points on a slow link; more would only come late
+/** What a key asks for: surge ahead, turn to port. @type {Record<string, [number, number]>} */
+const KEYS = {
+  KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
+  KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
+};
+const hand = 1 + Math.floor(Math.random() * 2 ** 50);
+let number = Date.now(), underWay = 0, refusal = "", canDrive = false;
+/** Keys that are held. @type {Set<string>} */
+const held = new Set();
+/** Where the stick is held: ahead and to port, each in [-1, 1]; null while it is not. @type {[number, number] | null} */
+let stick = null;
+
+/** Whether this page drives by hand now, so that its keys steer. */
+export const isDriving = () => canDrive;
+
+/** What the hand asks for now: ahead and to port. @returns {[number, number]} */
+function wanted() {
+  if (stick) return stick;
+  const sum = (/** @type {number} */ axis) => [...held].reduce((all, code) => all + KEYS[code][axis], 0);
+  return [Math.max(-1, Math.min(1, sum(0))), Math.max(-1, Math.min(1, sum(1)))];
+}
+
+/** @param {boolean} [isLast] */
+async function say(isLast = false) {
+  const [surge, turn] = wanted();
+  const isNeutral = surge === 0 && turn === 0;
+  if (!canDrive || (underWay >= MAX_UNDER_WAY && !isNeutral)) return;
+  underWay++;
+  number = Math.max(number + 1, Date.now());
+  const refused = await post("/api/drive/setpoint", { hand, number, surge, turn }, isLast);
+  underWay--;
+  if (refused) letGo();
+  if (refused) refusal = refused;
+}
+
+/** The stick and every key are let go, which is said at once. @param {boolean} [isLast] */
+function letGo(isLast = false) {
+  const wasHeld = stick !== null || held.size > 0;
+  stick = null;
+  held.clear();
+  renderStick();
+  if (wasHeld) void say(isLast);
+}
+
+/** @param {string} what @param {object} [more] */
+async function ask(what, more = {}) {
+  if (!hasKey()) return;
+  refusal = await post(`/api/drive/${what}`, { hand, ...more });
+}
+
+/** @param {PointerEvent} event */
+function moveStick(event) {
+  const box = byId("stick").getBoundingClientRect(), half = box.width / 2;
+  const part = (/** @type {number} */ value) => Math.round(Math.max(-1, Math.min(1, value / half)) * 20) / 20;
+  stick = [part(box.top + half - event.clientY), part(box.left + half - event.clientX)];
+  renderStick();
+}
+
+function renderStick() {
+  const [surge, turn] = wanted(), scale = 35 / Math.max(1, Math.hypot(surge, turn)); // a corner is drawn on the rim
+  byId("stick-knob").setAttribute("cx", String(50 - scale * turn));
+  byId("stick-knob").setAttribute("cy", String(50 - scale * surge));
+}
+
+function bindStick() {
+  const pad = byId("stick");
+  pad.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+    if (!canDrive) return;
+    pad.setPointerCapture(event.pointerId);
+    moveStick(event);
+    void say();
+  });
+  pad.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => stick && moveStick(event));
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(name, () => letGo());
+  pad.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
+}
+
+function bindKeys() {
+  addEventListener("keydown", (event) => {
+    if (!canDrive || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    if (event.repeat) return; // a key that was held before the wheel was, or while the link was lost, is pressed anew
+    held.add(event.code);
+    renderStick();
+    void say();
+  });
+  addEventListener("keyup", (event) => {
+    if (!held.delete(event.code)) return;
+    renderStick();
+    void say();
+  });
+}
+
+export function bindDrive() {
+  for (const mode of Object.keys(MODE_TEXTS)) {
+    const button = make("button");
+    Object.assign(button, { type: "button" });
+    button.dataset.drive = mode;
+    button.append(make("b", "", MODE_TEXTS[mode][0]), make("span", "", MODE_TEXTS[mode][1]));
+    button.addEventListener("click", () => {
+      button.blur();
+      void ask("mode", { mode });
+    });
+    byId("drive-modes").append(button);
+  }
+  byId("drive-take").addEventListener("click", () => void ask("wheel"));
+  byId("drive-override").addEventListener("click", () => {
+    byId("drive-override").blur();
+    void ask("override");
+  });
+  bindStick();
+  bindKeys();
+  addEventListener("blur", () => letGo());
+  addEventListener("pagehide", () => letGo(true));
+  document.addEventListener("visibilitychange", () => document.hidden && letGo(true));
+  setInterval(() => !document.hidden && void say(), SAY_MS);
+}
+
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
+export function renderDrive(store, open, now) {
+  byId("drive").hidden = isReplay(store);
+  const operator = open && store.isFresh("operator/state", now) ? store.get("operator/state") : undefined;
+  const isHolder = operator?.wheel_by === "dashboard" && operator.wheel_hand === hand;
+  const isFree = operator?.wheel_by === "", isManual = operator?.mode === "MANUAL";
+  if (canDrive && !(isManual && isHolder)) letGo();
+  canDrive = isManual && isHolder;
+  byId("drive").dataset.driving = String(canDrive);
+  setText(byId("drive-wheel"), !operator ? "no word from the operator's process" : isHolder ? "this page holds the wheel" : isFree ? "nobody holds the wheel" : `the wheel: ${operator.wheel_by === "dashboard" ? "another page" : operatorText(operator.wheel_by)}`);
+  byId("drive-take").hidden = !operator || isHolder || isFree;
+  for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("[data-drive]"))) {
+    const mode = String(button.dataset.drive), bar = operator?.barred.find((/** @type {any} */ each) => each.mode === mode)?.refusal;
+    const reason = !operator ? "unknown" : !isHolder && !isFree ? MODE_BARS.NOT_HOLDER : bar ? MODE_BARS[bar] : "";
+    button.disabled = Boolean(reason);
+    button.setAttribute("aria-pressed", String(operator?.mode === mode));
+    setText(button.querySelector("span"), reason || MODE_TEXTS[mode][1]);
+  }
+  byId("drive-hand").hidden = !canDrive;
+  const leftS = operator ? operator.override_ms / 1000 : 0;
+  setText(byId("drive-override"), leftS > 0 ? `Advice overridden, ${fixed(leftS, 0)} s left` : "Override the advice for 10 s");
+  byId("drive-override").dataset.on = String(leftS > 0);
+  const vetoes = canDrive && store.isFresh("navigator/command", now) ? (store.get("navigator/command").vetoes ?? []) : [];
+  setText(byId("drive-note"), refusal || (vetoes.length ? "The advice gives no thrust ahead" : ""));
+}

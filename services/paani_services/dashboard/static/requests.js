@@ -1,0 +1,49 @@
+// @ts-check
+// Requests of the operator's page, with the operator's key.
+
+let key = sessionStorage.getItem("paani-key") ?? "";
+
+/** The operator's key comes after the address (`#key=...`), from where no server and no log sees it. */
+function takeKey() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("key");
+  if (!given) return;
+  keepKey(given);
+  history.replaceState(null, "", location.pathname);
+}
+
+/** @param {string} text */
+function keepKey(text) {
+  key = text.trim();
+  sessionStorage.setItem("paani-key", key);
+}
+
+export function bindKey() {
+  takeKey();
+  addEventListener("hashchange", takeKey);
+}
+
+/** Whether there is a key; asks for one where there is none. */
+export function hasKey() {
+  if (!key) keepKey(prompt("The operator's key, which `paani up` prints:") ?? "");
+  return Boolean(key);
+}
+
+/**
+ * Send a request; why it was refused, empty where it was not. A key that is refused is forgotten.
+ * @param {string} path @param {object} body @param {boolean} [isLast] it is sent although the page goes away
+ */
+export async function post(path, body, isLast = false) {
+  try {
+    const answer = await fetch(path, {
+      method: "POST",
+      headers: { "Content-Type": "application/json", "X-Paani-Key": key },
+      body: JSON.stringify(body),
+      keepalive: isLast,
+    });
+    if (answer.ok) return "";
+    if (answer.status === 403) keepKey("");
+    return String((await answer.json()).error);
+  } catch {
+    return "not sent: no connection to the dashboard";
+  }
+}
