@@ -185,28 +185,32 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
             def say(word: str) -> None:
                 node.ask(publish="/otter/mode", type="std_msgs/msg/String", hash=STRING, fields={"data": word})
 
-            await node.until(lambda: drops().get("not_manual", 0) > 0, "a stick without MANUAL is passed over", steer)
-            say("MANUAL")
-            await node.until(lambda: drops().get("refused", 0) > 0, "a boat that is not armed takes no MANUAL", steer)
+            def drive() -> None:
+                if order().mode is not m.DriveMode.MANUAL:
+                    say("MANUAL")
+                steer()
+
+            async def counted(cause: str, act: Callable[[], None], why: str) -> None:
+                before = drops().get(cause, 0)
+                await node.until(lambda: drops().get(cause, 0) > before, why, act)
+
+            await counted("not_manual", steer, "a stick without MANUAL is passed over")
+            await counted("refused", lambda: say("MANUAL"), "a boat that is not armed takes no MANUAL")
             assert order().mode is m.DriveMode.ROUTE
             assert await hand.hold_to_arm(5.0) is m.ArmRefusal.NONE
-            say("MANUAL")
-            await node.until(lambda: order().surge > 0.0, "the boat is steered", steer)
+            await node.until(lambda: order().surge > 0.0, "the boat is steered", drive)
             assert (order().mode, order().by) == (m.DriveMode.MANUAL, "ros2")
             assert (order().surge, order().turn) == pytest.approx((0.5, 0.2))
-            steer(math.nan)
+            await counted("non_finite", lambda: steer(math.nan), "no number is no stick")
             await node.until(lambda: order().mode is m.DriveMode.IDLE, "a hand that is silent has let go")
-            await node.until(lambda: drops().get("non_finite") == 1, "no number is no stick")
-            before = drops()["not_manual"]
-            await node.until(lambda: drops()["not_manual"] > before, "a stick that moves again begins nothing", steer)
-            assert order().mode is m.DriveMode.IDLE
-            say("FULL AHEAD")
-            await node.until(lambda: drops().get("out_of_range") == 1, "a word that is no mode")
+            for _ in range(10):
+                steer()
+                await asyncio.sleep(0.1)
+                assert order().mode is m.DriveMode.IDLE, "a stick that moves again begins nothing"
+            await counted("out_of_range", lambda: say("FULL AHEAD"), "a word that is no mode")
             assert await hand.take_wheel(5.0) is m.ModeRefusal.NONE
-            say("HOLD")
-            await node.until(lambda: drops()["refused"] == 2, "another hand holds the wheel")
-            say("WHEEL")
-            await node.until(lambda: order().by == "ros2", "which is taken by that word alone")
+            await counted("refused", lambda: say("HOLD"), "another hand holds the wheel")
+            await node.until(lambda: order().by == "ros2", "which that word alone takes", lambda: say("WHEEL"))
 
 
 async def test_a_node_stops_the_boat_and_can_say_nothing_else(spawn: Spawn, open_as: OpenAs) -> None:
@@ -223,20 +227,25 @@ async def test_a_node_stops_the_boat_and_can_say_nothing_else(spawn: Spawn, open
         joined(listen, topics.DIAGNOSTICS, mode="client") as second,
     ):
         await first.until(lambda: bool(first.heard and second.heard), "the port is heard")
-        twist = struct.pack("<BBH6d", 0, 1, 0, *[1.0] * 6)
-        for data in ("00010000", twist.hex(), bytes(1 << 17).hex()):  # truncated, of another type, too long
-            first.ask(put=STOP_KEY, data=data)
-        first.ask(put=STOP_KEY, data="0001000000")  # false: nobody asks to stop
-        another = STOP_KEY.replace("Bool_", "String_")
-        first.ask(put=another, data="0001000001")  # a type of another name is another key
+
+        def refused() -> int:
+            drops = health.value.drops if health.value else ()
+            return sum(drop.count for drop in drops if drop.cause == "undecodable")
+
+        async def is_refused(data: bytes) -> None:
+            before, words = refused(), {"put": STOP_KEY, "data": data.hex()}
+            await first.until(lambda: refused() > before, f"{data[:8]!r} is counted", lambda: first.ask(**words))
+
+        for key in (STOP_KEY.replace("Bool_", "String_"), "43/otter/**"):  # of another type, and of no exact name
+            first.ask(put=key, data="0001000001")
         for key in ("paani/43/otter/controller/thrust", "paani/**", "**"):
             first.ask(put=key, data=forged.hex())
         first.ask(put="43/other/topic", data="00")
 
-        def refused() -> dict[str, int]:
-            return {drop.cause: drop.count for drop in health.value.drops} if health.value else {}
-
-        await first.until(lambda: refused().get("undecodable") == 3, "three messages are refused and counted")
+        first.ask(put=STOP_KEY, data="0001000000")  # false: nobody asks to stop
+        await is_refused(b"\x00\x01\x00\x00")
+        await is_refused(struct.pack("<BBH6d", 0, 1, 0, *[1.0] * 6))
+        await is_refused(bytes(1 << 17))
         assert state.value is not None
         assert state.value.stops == 0
         stop = {"publish": "/otter/stop", "type": "std_msgs/msg/Bool", "hash": BOOL, "fields": {"data": True}}

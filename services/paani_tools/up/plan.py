@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from paani.bus.routing import require_addresses
+from paani.bus.routing import require_addresses, require_free
 from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
 from paani.extras import require_modules
@@ -30,6 +30,7 @@ NEEDED = {
     "localization": ("filterpy",),
     "mavlink": ("pymavlink",),
     "foxglove": ("foxglove",),
+    "ros2": ("rosbags",),
 }
 
 
@@ -53,6 +54,8 @@ async def make_plan(config: Config) -> Plan:
     await asyncio.to_thread(require_addresses, config.bus)
     if config.dashboard.serve and "dashboard" in config.services:
         await _require_free_page(config)
+    if "ros2" in config.services:
+        await asyncio.to_thread(require_free, "ros2.listen", config.ros2.listen)
     return await complete_plan(config)
 
 

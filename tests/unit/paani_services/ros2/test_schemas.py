@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from paani_services.ros2 import schemas, topics
 
@@ -58,6 +61,13 @@ def test_cdr_is_little_endian_and_comes_back() -> None:
 def test_what_is_no_message_is_refused(data: bytes, kind: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         schemas.decode(data, kind)
+
+
+@given(st.sampled_from(sorted({topic.type for topic in (*topics.SENT, *topics.COMMANDS)})), st.binary(max_size=200))
+def test_bytes_of_anybody_are_a_message_or_refused(kind: str, data: bytes) -> None:
+    for payload in (data, b"\x00\x01\x00\x00" + data):
+        with contextlib.suppress(ValueError):
+            schemas.decode(payload, kind)
 
 
 def test_a_number_that_does_not_fit_is_refused() -> None:

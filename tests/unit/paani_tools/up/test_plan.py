@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import socket
+import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -165,3 +166,19 @@ async def test_a_port_runs_where_it_is_asked_for(private_sets: tuple[str, ...]) 
     assert set(plan.services) & {*keys.PORTS} == {"nmea"}
     with pytest.raises(UserError, match="ports"):
         load_config(sets=(*private_sets, 'up.ports=["telex"]'))
+
+
+async def test_the_ros_port_is_ready_or_nothing_begins(
+    private_sets: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with socket.socket() as busy:
+        busy.bind(("127.0.0.1", 0))
+        busy.listen()
+        listen = f"ros2.listen=tcp/127.0.0.1:{busy.getsockname()[1]}"
+        sets = (*private_sets, listen, *up_sets(world=None, camera=None, headless=True, ports=("ros2",)))
+        with pytest.raises(UserError, match=r"ros2\.listen .* in use .*--set ros2\.listen="):
+            await make_plan(load_config(sets=sets))
+    assert "ros2" in (await make_plan(load_config(sets=sets))).services
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(UserError, match=r"pip install 'paani\[ros2\]'"):
+        await make_plan(load_config(sets=sets))
