@@ -28,7 +28,19 @@ from tests.conftest import Spawn
 from tests.places import ROOT
 from tests.unit.paani_tools.replay.recorded_drive import drive, write_log
 
-FINISHES = ("look", "scenario", "route", "world", "logs", "explain", "faults", "topics", "models check", "claims")
+FINISHES = (
+    "paper-report",
+    "look",
+    "scenario",
+    "route",
+    "world",
+    "logs",
+    "explain",
+    "faults",
+    "topics",
+    "models check",
+    "claims",
+)
 NEEDS_A_BOAT = ("echo", "hz", "tune", "replay runs/drive --dashboard")
 TELLS_OF_THE_MACHINE = ("doctor",)
 TAKES_MINUTES = ("trial", "bench")
