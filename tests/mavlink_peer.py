@@ -19,6 +19,7 @@ from paani_services.mavlink.station import Station
 NOW_US = 1_795_568_000_000_000
 STATION = (255, 190)  # as ground stations name themselves
 ORIGIN_DEG = (50.1072, 8.6928)
+HEARTBEAT = common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
 
 
 def odometry(**changes: Any) -> m.Odometry:
@@ -116,5 +117,21 @@ class Port:
         def parameters(now: Snapshot) -> Any:
             return parameters_of(now, 0.6, AdvisorConfig())
 
-        self.gateway = Gateway(self.asked.append, parameters, self.counted.append, is_signed=is_signed)
+        self.driven: list[tuple[float, float, int]] = []
+
+        def drive(surge: float, turn: float, hand: int) -> None:
+            self.driven.append((surge, turn, hand))
+
+        self.gateway = Gateway(self.asked.append, drive, parameters, self.counted.append, is_signed=is_signed)
         self.gateway.tick(snapshot)
+
+
+def kinds(messages: list[Any]) -> list[str]:
+    """Names of messages."""
+    return [message.get_type() for message in messages]
+
+
+def only(messages: list[Any], kind: str) -> Any:
+    """The one message of this kind; fails where there is none, or more."""
+    (found,) = [message for message in messages if message.get_type() == kind]
+    return found

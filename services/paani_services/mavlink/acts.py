@@ -8,19 +8,30 @@ from collections.abc import Awaitable, Callable
 from paani import messages as m
 from paani.clock import Clock
 from paani.operator_client import OperatorClient
-from paani_services.mavlink.commands import IN_PROGRESS, LATER, Act, arm_result, stop_result
+from paani_services.mavlink.commands import IN_PROGRESS, LATER, Act, arm_result, mode_result, stop_result
 from paani_services.mavlink.gateway import Request
 from paani_services.mavlink.snapshot import Snapshot
+from paani_services.mavlink.station import Station
 
 PROGRESS_S = 0.4  # stations ask again after half a second without an answer
 STOP_TIMEOUT_S = 1.0
 
 
 class Acts:
-    """One press of the button at a time; a STOP waits for nothing. count: something refused, by its cause."""
+    """One press of the button at a time, and one mode of a station; a STOP waits for nothing.
 
-    def __init__(self, client: OperatorClient, clock: Clock, count: Callable[[str], None]) -> None:
-        self._client, self._clock, self._count = client, clock, count
+    count: something refused, by its cause. hands: of the stations that are there.
+    """
+
+    def __init__(
+        self,
+        client: OperatorClient,
+        clock: Clock,
+        count: Callable[[str], None],
+        hands: Callable[[], frozenset[int]],
+    ) -> None:
+        self._client, self._clock, self._count, self._hands = client, clock, count, hands
+        self._changing = set[Station]()
         self._tasks = set[asyncio.Task[None]]()
         self._arming: Request | None = None
         self._stopping: asyncio.Task[m.OperatorState | None] | None = None
@@ -29,6 +40,12 @@ class Acts:
         """Begin; the station is told how it ended."""
         if request.act is Act.STOP:
             self._start(self._stop(request))
+        elif request.act in {Act.MODE, Act.WHEEL}:
+            if request.station in self._changing:
+                self._acknowledge(request, IN_PROGRESS, "")
+            else:
+                self._changing.add(request.station)
+                self._start(self._turn_wheel(request))
         elif self._arming is None:
             self._arming = request
             self._start(self._arm(request))
@@ -60,6 +77,29 @@ class Acts:
         finally:
             holding.cancel()
             self._arming = None
+
+    async def _turn_wheel(self, request: Request) -> None:
+        try:
+            if request.act is Act.WHEEL:
+                refusal = await self._client.take_wheel(hand=request.station.hand)
+                is_given = refusal is m.ModeRefusal.NONE
+                request.station.answer_control(request.target[0], self._clock.now_us(), is_given=is_given)
+            else:
+                self._acknowledge(request, *mode_result(await self._change_mode(request)))
+        finally:
+            self._changing.discard(request.station)
+
+    async def _change_mode(self, request: Request) -> m.ModeRefusal | None:
+        """A wheel that was left by a station that is gone is taken; from anybody else it is not."""
+        hand = request.station.hand
+        refusal = await self._client.set_mode(request.mode, hand=hand)
+        state = self._client.state
+        if refusal is not m.ModeRefusal.NOT_HOLDER or state is None:
+            return refusal
+        if state.wheel_by != self._client.name or state.wheel_hand in self._hands():
+            return refusal
+        refusal = await self._client.take_wheel(hand=hand)
+        return await self._client.set_mode(request.mode, hand=hand) if refusal is m.ModeRefusal.NONE else refusal
 
     def _start(self, work: Awaitable[None]) -> None:
         task = asyncio.ensure_future(work)

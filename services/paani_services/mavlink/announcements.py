@@ -68,6 +68,8 @@ def conditions(snapshot: Snapshot) -> dict[str, tuple[int, str]]:
     for inhibit in command.inhibits if command is not None else ():
         if text := INHIBIT_TEXTS.get(inhibit):
             found[inhibit.value] = (INFO if inhibit in CALM else WARNING), text
+    for veto in command.vetoes if command is not None else ():
+        found[f"veto {veto}"] = WARNING, f"no thrust ahead: {veto.replace('_', ' ').lower()}"
     if applied is None:
         found["adapter"] = ERROR, "thrust adapter silent"
     elif snapshot.is_armed and applied.zero_cause not in UNREMARKABLE:

@@ -14,7 +14,7 @@ from paani import messages as m
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.health_bits import prearm_faults
-from paani_services.mavlink.rover_modes import Mode, mode_of
+from paani_services.mavlink.rover_modes import DRIVE_MODES, Mode
 from paani_services.mavlink.snapshot import Snapshot
 
 ACCEPTED, LATER = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -24,7 +24,7 @@ FAILED, IN_PROGRESS = dialect.MAV_RESULT_FAILED, dialect.MAV_RESULT_IN_PROGRESS
 ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 SET_MODE = dialect.MAV_CMD_DO_SET_MODE
-# Commands that would change where the boat goes: there is no request on the bus for any of them.
+# Commands that would change where the boat goes otherwise than by its mode: the bus has no request for any of them.
 GUIDING = frozenset(
     {
         dialect.MAV_CMD_DO_REPOSITION,
@@ -34,12 +34,12 @@ GUIDING = frozenset(
         dialect.MAV_CMD_DO_SET_MISSION_CURRENT,
         dialect.MAV_CMD_DO_FENCE_ENABLE,
         dialect.MAV_CMD_NAV_WAYPOINT,
-        dialect.MAV_CMD_NAV_LOITER_UNLIM,
     }
 )
 # What a command that stands for a mode would switch to.
 MODE_COMMANDS = {
     dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: Mode.RTL,
+    dialect.MAV_CMD_NAV_LOITER_UNLIM: Mode.LOITER,
     dialect.MAV_CMD_MISSION_START: Mode.AUTO,
 }
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
@@ -51,14 +51,17 @@ class Act(Enum):
 
     ARM = "arm"
     STOP = "stop"
+    MODE = "mode"
+    WHEEL = "wheel"
 
 
 class Verdict(NamedTuple):
-    """`result` is final unless there is an act, whose outcome it then is."""
+    """`result` is final unless there is an act, whose outcome it then is. mode: of an act that asks for one."""
 
     result: int
     text: str = ""
     act: Act | None = None
+    mode: m.DriveMode = m.DriveMode.IDLE
 
 
 def judge_command(command: int, parameters: Sequence[float], snapshot: Snapshot, *, is_trusted: bool) -> Verdict:
@@ -72,27 +75,36 @@ def judge_command(command: int, parameters: Sequence[float], snapshot: Snapshot,
     if command == ARM_DISARM:
         return _trusted(_judge_arming(first, second, snapshot), is_trusted)
     if command == SET_MODE:
-        return _trusted(judge_mode(second, snapshot), is_trusted)
+        return _trusted(judge_mode(second), is_trusted)
     if command in MODE_COMMANDS:
-        return _trusted(judge_mode(MODE_COMMANDS[command], snapshot), is_trusted)
+        return _trusted(judge_mode(MODE_COMMANDS[command]), is_trusted)
     if command == PAUSE and first in {0, 1}:
-        return _trusted(judge_mode(Mode.AUTO if first else Mode.HOLD, snapshot), is_trusted)
+        return _trusted(judge_mode(Mode.AUTO if first else Mode.LOITER), is_trusted)
     if command in GUIDING:
         return _trusted(Verdict(DENIED, "refused: the boat follows its own mission"), is_trusted)
     return Verdict(UNSUPPORTED)
 
 
-def judge_mode(number: int | None, snapshot: Snapshot) -> Verdict:
-    """A mode is taken where the boat is in it; by itself no mode arms or moves the boat, nor stops it."""
-    if number == mode_of(snapshot):
-        return Verdict(ACCEPTED)
-    if number == Mode.AUTO:
-        return Verdict(DENIED, "refused: AUTO begins by arming")
-    if number == Mode.HOLD:
-        return Verdict(DENIED, "refused: disarm to stop the boat")
-    if number in {Mode.RTL, Mode.MANUAL}:
-        return Verdict(DENIED, f"refused: no mode {Mode(number).name} on this boat")
-    return Verdict(UNSUPPORTED, "refused: unknown mode")
+def judge_mode(number: int | None) -> Verdict:
+    """A mode is asked of the operator's process, whatever the base mode says beside it: no mode arms."""
+    if number is None or number not in DRIVE_MODES:
+        return Verdict(DENIED, "refused: no such mode on this boat")
+    return Verdict(ACCEPTED, act=Act.MODE, mode=DRIVE_MODES[Mode(number)])
+
+
+def mode_result(refusal: m.ModeRefusal | None) -> tuple[int, str]:
+    """Result and text of an answer of the operator's process to a mode or the wheel; None: it gave none."""
+    match refusal:
+        case m.ModeRefusal.NONE:
+            return ACCEPTED, ""
+        case None:
+            return FAILED, "mode: the operator process does not answer"
+        case m.ModeRefusal.NOT_HOLDER:
+            return DENIED, "mode: another hand holds the wheel"
+        case m.ModeRefusal.NOT_ARMED:
+            return DENIED, "mode: arm first"
+        case _:
+            return DENIED, f"mode: {refusal.replace('_', ' ').lower()}"
 
 
 def arm_result(refusal: m.ArmRefusal | None) -> tuple[int, str]:

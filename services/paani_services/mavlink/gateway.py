@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from paani import messages as m
 from paani_services.mavlink import commands, missions
 from paani_services.mavlink.announcements import Announcer, summary
 from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect, text_of
@@ -14,13 +15,14 @@ from paani_services.mavlink.file_transfer import refuse_file
 from paani_services.mavlink.missions import EMPTY, FENCE, MISSION, RALLY, plan_of
 from paani_services.mavlink.parameters import Parameter, find, param_value
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import PARAMETERS_PER_TICK, Station
+from paani_services.mavlink.station import HAND_SILENT_S, PARAMETERS_PER_TICK, REQUEST_CONTROL, Station
 from paani_services.mavlink.streams import MISSION_CURRENT, STREAMED
 from paani_services.mavlink.telemetry import BUILDERS
 
 AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 MISSION_UNSUPPORTED = dialect.MAV_MISSION_UNSUPPORTED
 MISSION_INVALID = dialect.MAV_MISSION_INVALID_SEQUENCE
+FULL_DEFLECTION = 1000  # of a stick; a field that is not used has 0x7fff
 NO_UPLOAD = "mission: set by a file on the boat, not from here"
 NO_WRITE = "parameter is read-only here; tune on the page"
 SEND_ONE = {  # commands that ask for one message that they name
@@ -30,16 +32,18 @@ SEND_ONE = {  # commands that ask for one message that they name
 
 
 class Request(NamedTuple):
-    """An act that a station asks for, to be acknowledged to it as this command when it is done."""
+    """An act that a station asks for, to be acknowledged to it as this command when it is done; mode: of Act.MODE."""
 
     act: Act
     station: Station
     command: int
     target: tuple[int, int]
+    mode: m.DriveMode = m.DriveMode.IDLE
 
 
 class Gateway:
-    """ask: does what is asked of the operator's process. is_signed: whether there is a key.
+    """ask: does what is asked of the operator's process. drive: says surge and turn of a hand to it. is_signed: whether
+    there is a key.
 
     parameters: what they are, given what is known. count: something refused, by its cause.
     """
@@ -47,12 +51,14 @@ class Gateway:
     def __init__(
         self,
         ask: Callable[[Request], None],
+        drive: Callable[[float, float, int], None],
         parameters: Callable[[Snapshot], tuple[Parameter, ...]],
         count: Callable[[str], None],
         *,
         is_signed: bool,
     ) -> None:
-        self._ask, self._parameters, self._count, self._is_signed = ask, parameters, count, is_signed
+        self._ask, self._drive, self._parameters, self._count = ask, drive, parameters, count
+        self._is_signed = is_signed
         self.stations: list[Station] = []
         self.commander_us: int | None = None  # when a station that may command was heard last
         self._snapshot = Snapshot(now_us=0)
@@ -78,7 +84,8 @@ class Gateway:
             "MISSION_SET_CURRENT": self._refuse_current,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
             "LOG_REQUEST_LIST": self._log_request_list,
-            "MANUAL_CONTROL": self._refuse_manual_control,
+            "MANUAL_CONTROL": self._manual_control,
+            "CHANGE_OPERATOR_CONTROL": self._change_operator_control,
         }
 
     def tick(self, snapshot: Snapshot) -> None:
@@ -88,6 +95,9 @@ class Gateway:
         texts = self._announcer.observe(snapshot)
         news = self._mission_news(snapshot)
         for station in tuple(self.stations):
+            if station.stick is not None:
+                self._drive(*station.stick, station.hand)
+                station.stick = None
             if not station.is_present(now_us):
                 self._welcomed.discard(station)
                 if 0 in station.schedule.due(now_us):
@@ -132,7 +142,8 @@ class Gateway:
 
     def _is_addressed(self, message: Any) -> bool:
         """Whether a message is for this boat; 0 is everybody's address."""
-        system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+        system = getattr(message, "target_system", getattr(message, "target", 0))
+        component = getattr(message, "target_component", 0)
         return system in {0, SYSTEM} and component in {0, COMPONENT}
 
     def _is_trusted(self, station: Station, message: Any) -> bool:
@@ -170,14 +181,14 @@ class Gateway:
 
     def _set_mode(self, station: Station, message: Any, source: tuple[int, int]) -> None:
         """The old way to ask for a mode; its base mode never arms."""
-        verdict = judge_mode(message.custom_mode, self._snapshot)
+        verdict = judge_mode(message.custom_mode)
         if not self._is_trusted(station, message):
             verdict = Verdict(commands.DENIED, commands.NOT_TRUSTED)
         self._answer(station, verdict, dialect.MAVLINK_MSG_ID_SET_MODE, source)
 
     def _answer(self, station: Station, verdict: Verdict, command: int, source: tuple[int, int]) -> None:
         if verdict.act is not None:
-            self._ask(Request(verdict.act, station, command, source))
+            self._ask(Request(verdict.act, station, command, source, verdict.mode))
             return
         if verdict.result != commands.ACCEPTED:
             self._count("mavlink_refused")
@@ -263,8 +274,30 @@ class Gateway:
         """There are none by this way: without an answer stations ask on and on."""
         station.send(dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0), self._snapshot.now_us)
 
-    def _refuse_manual_control(self, station: Station, _: Any, __: tuple[int, int]) -> None:
-        station.refuse("refused: the boat is not steered from here", self._snapshot.now_us)
+    # The wheel
+
+    def _manual_control(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        """As ArduRover and QGroundControl have it: z ahead, y to starboard. Silence lets the stick go."""
+        operator = self._snapshot.operator
+        is_holder = operator is not None and operator.wheel_hand == station.hand
+        if not self._is_trusted(station, message):
+            station.refuse(commands.NOT_TRUSTED, self._snapshot.now_us)
+        elif operator is None or not is_holder or operator.mode is not m.DriveMode.MANUAL:
+            station.refuse("refused: ask for mode MANUAL first", self._snapshot.now_us)
+        elif max(abs(message.y), abs(message.z)) <= FULL_DEFLECTION:
+            station.stick = message.z / FULL_DEFLECTION, -message.y / FULL_DEFLECTION
+
+    def _change_operator_control(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        """Take the wheel from whoever holds it; it is not given back to nobody."""
+        if message.control_request == REQUEST_CONTROL and self._is_trusted(station, message):
+            self._ask(Request(Act.WHEEL, station, dialect.MAVLINK_MSG_ID_CHANGE_OPERATOR_CONTROL, source))
+        else:
+            self._count("mavlink_refused")
+            station.answer_control(source[0], self._snapshot.now_us, is_given=False)
+
+    def hands(self, now_us: int) -> frozenset[int]:
+        """Hands of the stations that are there."""
+        return frozenset(each.hand for each in self.stations if each.is_present(now_us, HAND_SILENT_S))
 
     # What is sent
 

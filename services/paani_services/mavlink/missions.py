@@ -14,13 +14,14 @@ from paani import messages as m
 from paani.geometry import geodetic_from_enu
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import degrees_e7
-from paani_services.mavlink.rover_modes import Mode
+from paani_services.mavlink.rover_modes import Mode, mode_of
 from paani_services.mavlink.snapshot import Snapshot, map_origin_deg
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # mission_type
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
 WAYPOINT = dialect.MAV_CMD_NAV_WAYPOINT
 MAX_ITEMS = 65_000
+IN_MISSION, SUSPENDED = 1, 2  # mission_mode
 NAN = math.nan
 
 Place = Callable[[m.Waypoint], tuple[int, int]]
@@ -131,14 +132,16 @@ def mission_current(snapshot: Snapshot, plan: Plan) -> Any:
     inhibits = snapshot.command.inhibits if snapshot.command is not None else ()
     is_done = m.Inhibit.MISSION_DONE in inhibits or m.Inhibit.ROUTE_FINISHED in inhibits
     total = len(plan.items[MISSION])
+    is_route = mode_of(snapshot) is Mode.AUTO
     if snapshot.command is None:
         state = dialect.MISSION_STATE_UNKNOWN
     elif total == 0:
         state = dialect.MISSION_STATE_NO_MISSION
     elif is_done:
         state = dialect.MISSION_STATE_COMPLETE
-    elif snapshot.is_armed:
+    elif snapshot.is_armed and is_route:
         state = dialect.MISSION_STATE_ACTIVE
     else:
         state = dialect.MISSION_STATE_PAUSED
-    return dialect.MAVLink_mission_current_message(current_seq(snapshot, plan), total, state, 1)
+    mode = IN_MISSION if is_route else SUSPENDED
+    return dialect.MAVLink_mission_current_message(current_seq(snapshot, plan), total, state, mode)

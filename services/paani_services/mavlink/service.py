@@ -51,9 +51,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     if settings.signing_key_file:
         signer = Signer(await asyncio.to_thread(read_signing_key, settings.signing_key_file), clock.now_us())
     inputs = Inputs(bus, clock)
-    acts = Acts(OperatorClient(bus, clock), clock, bus.count_drop)
+    client = OperatorClient(bus, clock)
+    acts = Acts(client, clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
     parameters = functools.partial(parameters_of, cruise_mps=config.navigator.cruise_mps, advisor=config.advisor)
-    gateway = Gateway(acts.ask, parameters, bus.count_drop, is_signed=signer is not None)
+    gateway = Gateway(acts.ask, client.drive, parameters, bus.count_drop, is_signed=signer is not None)
     gateway.tick(inputs.snapshot())
     endpoints = Endpoints(gateway, settings, signer, clock)
     with contextlib.closing(endpoints), contextlib.closing(acts):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,9 @@ from paani_services.mavlink.streams import Schedule
 
 BYTES_PER_S, BURST_BYTES = 100_000, 64_000  # a station that speaks faster is not heard: a mission takes a tenth of it
 SILENT_S = 10.0  # after which a station that only listens gets nothing but the heartbeat
+HAND_SILENT_S = 5.0  # after which another station may have its wheel: five heartbeats
 REPEAT_TEXT_S = 2.0  # stations repeat what is refused several times in milliseconds
+REQUEST_CONTROL, GIVEN, NOT_GIVEN = 0, 0, 2  # of CHANGE_OPERATOR_CONTROL and its answer
 PARAMETERS_PER_TICK = 5  # 250 a second
 
 
@@ -23,6 +26,8 @@ class Station:
         self.schedule = Schedule()
         self.next_parameter: int | None = None  # to be sent of the list that it asked for
         self.heard_us: int | None = None
+        self.hand = secrets.randbits(32) + 1  # by which the operator's process knows who holds the wheel
+        self.stick: tuple[float, float] | None = None  # surge and turn, to be said at the next occasion
         self._allowance_bytes, self._allowed_us = float(BURST_BYTES), 0
         self._texts_us: dict[str, int] = {}
 
@@ -44,9 +49,9 @@ class Station:
             self.heard_us = now_us
         return messages
 
-    def is_present(self, now_us: int) -> bool:
+    def is_present(self, now_us: int, silent_s: float = SILENT_S) -> bool:
         """Whether it has spoken of late."""
-        return self.heard_us is not None and 0 <= now_us - self.heard_us <= SILENT_S * 1e6
+        return self.heard_us is not None and 0 <= now_us - self.heard_us <= silent_s * 1e6
 
     def send(self, message: Any, now_us: int) -> None:
         """One message."""
@@ -63,3 +68,8 @@ class Station:
         """The text first, as stations show the last they had with the result."""
         self.refuse(text, now_us)
         self.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, *target), now_us)
+
+    def answer_control(self, system: int, now_us: int, *, is_given: bool) -> None:
+        """Say to the system that asked whether the wheel is this station's now."""
+        result = GIVEN if is_given else NOT_GIVEN
+        self.send(dialect.MAVLink_change_operator_control_ack_message(system, REQUEST_CONTROL, result), now_us)

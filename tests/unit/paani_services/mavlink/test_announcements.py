@@ -46,6 +46,14 @@ def test_a_condition_is_said_when_it_begins_and_not_again_within_five_seconds() 
     assert heard == ["stopped: advised by the camera"] * 2
 
 
+@pytest.mark.parametrize("veto", m.Inhibit)
+def test_a_veto_of_the_stick_is_told(veto: m.Inhibit) -> None:
+    command = m.NavCommand(source_us=0, enable=True, heading_rad=0.0, speed_mps=0.0, vetoes=(veto,))
+    text = conditions(armed(command=command))[f"veto {veto}"][1]
+    assert text.startswith("no thrust ahead: ")
+    assert len(text) <= MAX_TEXT_BYTES
+
+
 def test_silence_is_told() -> None:
     found = {text for _, text in conditions(Snapshot(now_us=NOW_US)).values()}
     assert found == {"operator process silent: not armed", "navigator silent", "thrust adapter silent"}

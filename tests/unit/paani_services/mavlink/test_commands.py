@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani_services.mavlink import commands
-from paani_services.mavlink.commands import Act, Verdict, arm_result, judge_command, judge_mode, stop_result
+from paani_services.mavlink.commands import Act, Verdict, arm_result, judge_command, mode_result, stop_result
 from tests.mavlink_peer import NOW_US, armed, in_order
 
 NAN = math.nan
@@ -89,17 +89,53 @@ def test_an_unknown_command_is_not_supported(command: int) -> None:
     assert judge(command, 1.0) == Verdict(commands.UNSUPPORTED)
 
 
-def test_a_mode_neither_arms_nor_stops() -> None:
+@pytest.mark.parametrize(
+    ("number", "mode"),
+    [
+        (0.0, m.DriveMode.MANUAL),
+        (4.0, m.DriveMode.IDLE),
+        (5.0, m.DriveMode.HOLD),
+        (10.0, m.DriveMode.ROUTE),
+        (11.0, m.DriveMode.RETURN),
+    ],
+)
+def test_a_mode_is_asked_of_the_operators_process(number: float, mode: m.DriveMode) -> None:
     """base mode 129 is what MAVSDK sends with every mode: its bit of arming is not heard."""
-    assert judge(commands.SET_MODE, 129.0, 4.0) == Verdict(commands.ACCEPTED)
-    assert judge(commands.SET_MODE, 129.0, 10.0).result == commands.DENIED
-    assert judge(commands.SET_MODE, 129.0, 10.0, snapshot=armed()) == Verdict(commands.ACCEPTED)
-    refused = judge(commands.SET_MODE, 1.0, 4.0, snapshot=armed())
-    assert (refused.result, refused.text) == (commands.DENIED, "refused: disarm to stop the boat")
-    assert judge_mode(None, armed()).result == commands.UNSUPPORTED
-    assert judge(commands.SET_MODE, 1.0, 15.0).result == commands.UNSUPPORTED
-    for number in (0.0, 11.0):
-        assert judge(commands.SET_MODE, 1.0, number).result == commands.DENIED
+    verdict = judge(commands.SET_MODE, 129.0, number)
+    assert (verdict.act, verdict.mode) == (Act.MODE, mode)
+
+
+@pytest.mark.parametrize("number", [NAN, 1.0, 15.0, -1.0, 4.5])
+def test_a_mode_that_the_boat_has_not_is_refused(number: float) -> None:
+    verdict = judge(commands.SET_MODE, 1.0, number)
+    assert (verdict.result, verdict.act) == (commands.DENIED, None)
+
+
+@pytest.mark.parametrize(
+    ("command", "first", "mode"),
+    [
+        (20, 0.0, m.DriveMode.RETURN),
+        (300, 0.0, m.DriveMode.ROUTE),
+        (17, 0.0, m.DriveMode.HOLD),
+        (193, 0.0, m.DriveMode.HOLD),
+        (193, 1.0, m.DriveMode.ROUTE),
+    ],
+)
+def test_commands_that_stand_for_a_mode(command: int, first: float, mode: m.DriveMode) -> None:
+    verdict = judge(command, first)
+    assert (verdict.act, verdict.mode) == (Act.MODE, mode)
+
+
+@pytest.mark.parametrize("command", [16, 178, 179, 192, 194, 207, 224])
+def test_the_boat_is_not_guided_from_here(command: int) -> None:
+    assert judge(command, 1.0)[:2] == (commands.DENIED, "refused: the boat follows its own mission")
+
+
+@pytest.mark.parametrize("refusal", [None, *m.ModeRefusal])
+def test_every_answer_about_a_mode_has_a_result(refusal: m.ModeRefusal | None) -> None:
+    result, text = mode_result(refusal)
+    assert (result == commands.ACCEPTED) is (refusal is m.ModeRefusal.NONE) is (text == "")
+    assert len(text) <= 50
 
 
 @pytest.mark.parametrize("refusal", [None, *m.ArmRefusal])

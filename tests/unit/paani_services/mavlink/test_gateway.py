@@ -15,9 +15,14 @@ from paani import messages as m
 from paani_services.mavlink import commands
 from paani_services.mavlink.commands import Act
 from paani_services.mavlink.station import BURST_BYTES
-from tests.mavlink_peer import NOW_US, Peer, Port, armed, in_order, odometry
+from tests.mavlink_peer import HEARTBEAT, NOW_US, Peer, Port, armed, in_order, kinds, odometry, only
 
-HEARTBEAT = common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
+ASKING = {
+    common.MAVLINK_MSG_ID_COMMAND_LONG,
+    common.MAVLINK_MSG_ID_COMMAND_INT,
+    common.MAVLINK_MSG_ID_SET_MODE,
+    common.MAVLINK_MSG_ID_CHANGE_OPERATOR_CONTROL,
+}
 ARM = common.MAV_CMD_COMPONENT_ARM_DISARM
 POINTS = tuple(m.Waypoint(x_m=float(x), y_m=0.0) for x in range(4))
 ROUTE = m.Route(source_us=NOW_US, name="r", waypoints=POINTS)
@@ -26,15 +31,6 @@ ROUTE = m.Route(source_us=NOW_US, name="r", waypoints=POINTS)
 def made(snapshot: Any = None) -> tuple[Port, Peer]:
     port = Port(snapshot or in_order(route=ROUTE))
     return port, Peer(port.gateway)
-
-
-def kinds(messages: list[Any]) -> list[str]:
-    return [message.get_type() for message in messages]
-
-
-def only(messages: list[Any], kind: str) -> Any:
-    (found,) = [message for message in messages if message.get_type() == kind]
-    return found
 
 
 def test_a_station_is_sent_the_heartbeat_alone_until_it_speaks_and_again_when_it_is_silent() -> None:
@@ -112,9 +108,13 @@ def test_the_base_mode_of_a_mode_never_arms() -> None:
     port, peer = made()
     peer.send(common.MAVLink_set_mode_message(1, 129, 4))
     peer.command(common.MAV_CMD_DO_SET_MODE, 129.0, 10.0)
-    ack = only(peer.send(common.MAVLink_set_mode_message(1, 129, 10)), "COMMAND_ACK")
-    assert ack.result == commands.DENIED
-    assert port.asked == []
+    assert [(request.act, request.mode) for request in port.asked] == [
+        (Act.MODE, m.DriveMode.IDLE),
+        (Act.MODE, m.DriveMode.ROUTE),
+    ]
+    elsewhere = Peer(port.gateway, 1, local=False)
+    assert only(elsewhere.send(common.MAVLink_set_mode_message(1, 129, 4)), "COMMAND_ACK").result == commands.DENIED
+    assert len(port.asked) == 2
 
 
 @pytest.mark.parametrize("kind", [0, 1, 33, 42, 148])
@@ -309,7 +309,7 @@ def test_any_message_of_the_dialect_is_survived(data: st.DataObject) -> None:
     peer.send_bytes(frame)
     port.gateway.tick(in_order(now_us=NOW_US + 20_000))
     peer.received()
-    if kind not in {common.MAVLINK_MSG_ID_COMMAND_LONG, common.MAVLINK_MSG_ID_COMMAND_INT}:
+    if kind not in ASKING:
         assert port.asked == []
 
 
@@ -317,11 +317,3 @@ def _packed(message: Any, crc_extra: int, payload: bytes) -> bytes:
     """The frame of a payload of raw bytes."""
     sender = common.MAVLink(None, 255, 190)
     return bytes(common.MAVLink_message._pack(message, sender, crc_extra, payload))
-
-
-def test_steering_by_hand_is_refused_with_a_text_now_and_then() -> None:
-    port, peer = made()
-    steering = common.MAVLink_manual_control_message(1, 0, 500, 800, 0, 0)
-    answers = [message for _ in range(50) for message in peer.send(steering)]
-    assert kinds(answers) == ["STATUSTEXT"]
-    assert port.asked == []

@@ -107,6 +107,12 @@ def test_how_far_the_mission_is() -> None:
     done = m.NavCommand(source_us=0, enable=False, heading_rad=0.0, speed_mps=0.0, inhibits=(m.Inhibit.MISSION_DONE,))
     assert state(armed()) == common.MISSION_STATE_ACTIVE
     assert state(in_order()) == common.MISSION_STATE_PAUSED
+    holding = m.OperatorState(source_us=0, armed=True, stopped=False, mode=m.DriveMode.HOLD)
+    assert state(armed(operator=holding)) == common.MISSION_STATE_PAUSED
+    assert (
+        mission_current(armed(), plan()).mission_mode,
+        mission_current(armed(operator=holding), plan()).mission_mode,
+    ) == (1, 2)
     assert state(armed(command=done)) == common.MISSION_STATE_COMPLETE
     assert state(armed(command=None)) == common.MISSION_STATE_UNKNOWN
     assert mission_current(armed(), EMPTY).mission_state == common.MISSION_STATE_NO_MISSION

@@ -103,10 +103,25 @@ def test_the_heartbeat_says_armed_only_where_the_operator_does() -> None:
         return message.base_mode, message.custom_mode, message.system_status
 
     assert heartbeat(armed()) == (129, 10, common.MAV_STATE_ACTIVE)
-    assert heartbeat(in_order()) == (1, 4, common.MAV_STATE_STANDBY)
+    assert heartbeat(in_order()) == (1, 10, common.MAV_STATE_STANDBY)
     stopped = m.OperatorState(source_us=NOW_US, armed=True, stopped=True)
     assert heartbeat(armed(operator=stopped))[0] == 1
     assert heartbeat(armed(operator=None)) == (1, 4, common.MAV_STATE_UNINIT)
+
+
+@pytest.mark.parametrize(
+    ("mode", "number"),
+    [
+        (m.DriveMode.ROUTE, 10),
+        (m.DriveMode.HOLD, 5),  # LOITER keeps the station
+        (m.DriveMode.RETURN, 11),
+        (m.DriveMode.MANUAL, 0),
+        (m.DriveMode.IDLE, 4),  # in ArduRover's HOLD a boat has no thrust
+    ],
+)
+def test_each_mode_of_the_operator_has_the_number_of_a_rover(mode: m.DriveMode, number: int) -> None:
+    operator = m.OperatorState(source_us=NOW_US, armed=True, stopped=False, mode=mode)
+    assert sent(armed(operator=operator))["HEARTBEAT"].custom_mode == number
 
 
 def test_home_lies_where_the_map_says() -> None:

@@ -1,0 +1,142 @@
+"""The links of the MAVLink port as a process, without a boat: who is heard, who is let go, and what stops it."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from paani import keys
+from paani import messages as m
+from paani.clock import WallClock
+from tests.conftest import OpenAs, Spawn, find_free_port
+
+common: Any = pytest.importorskip("pymavlink.dialects.v20.common", reason="needs pymavlink")
+pytestmark = pytest.mark.integration
+CLOCK = WallClock()
+HEARTBEAT = common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
+DISARM = common.MAVLink_command_long_message(1, 1, 400, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+class Client:
+    """A TCP connection that speaks MAVLink by pymavlink."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+        self._codec = common.MAVLink(None, 255, 190)
+        self._codec.robust_parsing = True
+        self._messages: list[Any] = []
+
+    @classmethod
+    async def connect(cls, port: int) -> Client:
+        return cls(*await asyncio.open_connection("127.0.0.1", port))
+
+    def send(self, message: Any) -> None:
+        self.writer.write(message.pack(self._codec))
+
+    async def until(self, kind: str) -> Any:
+        """The next message of this kind."""
+        async with asyncio.timeout(10.0):
+            while True:
+                while self._messages:
+                    if (message := self._messages.pop(0)).get_type() == kind:
+                        return message
+                data = await self.reader.read(4096)
+                assert data
+                self._messages += self._codec.parse_buffer(data) or []
+
+
+async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, open_as: OpenAs) -> None:
+    tcp, udp = find_free_port(), find_free_port()
+    requests = (await open_as("observer")).queue(keys.REQUESTS["mavlink"])
+    links = (f"mavlink.tcp=127.0.0.1:{tcp}", f"mavlink.udp=127.0.0.1:{udp}", "mavlink.max_clients=3")
+    async with spawn("mavlink", *links) as process:
+        good, noisy, deaf = [await Client.connect(tcp) for _ in range(3)]
+        fourth = await Client.connect(tcp)
+        assert await fourth.reader.read() == b""  # one more than may connect
+        noisy.writer.write(bytes(range(256)) * 4000)
+        deaf.writer.write(HEARTBEAT.pack(common.MAVLink(None, 254, 190)))
+        for client in (good, noisy):
+            client.send(HEARTBEAT)
+        assert (await good.until("HEARTBEAT")).base_mode == 1
+        assert not (await good.until("SYS_STATUS")).onboard_control_sensors_health  # nobody else is there
+        good.send(common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+        while (await good.until("STATUSTEXT")).text != "arm: operator silent":
+            pass
+        assert (await good.until("COMMAND_ACK")).result == 4
+        good.send(DISARM)
+        async with asyncio.timeout(5.0):
+            assert (await requests.get()).act is m.RequestAct.STOP
+        assert (await good.until("COMMAND_ACK")).result == 4  # nobody has latched it
+        for client in (noisy, deaf, fourth):
+            client.writer.transport.abort()
+        for _ in range(20):  # connections that break at once
+            broken = await Client.connect(tcp)
+            broken.writer.transport.abort()
+        good.send(common.MAVLink_ping_message(1, 7, 0, 0))
+        assert (await good.until("PING")).seq == 7
+        good.writer.close()
+        assert process.returncode is None
+
+
+async def test_udp_is_taken_from_its_address_alone(spawn: Spawn, open_as: OpenAs) -> None:
+    """The station hears a heartbeat before it has said anything, and telemetry afterwards."""
+    requests = (await open_as("observer")).queue(keys.REQUESTS["mavlink"])
+    received: asyncio.Queue[tuple[bytes, Any]] = asyncio.Queue()
+
+    class Station(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, addr: Any) -> None:
+            received.put_nowait((data, addr))
+
+    loop, parser = asyncio.get_running_loop(), common.MAVLink(None, 255, 190)
+    station, _ = await loop.create_datagram_endpoint(Station, local_addr=("127.0.0.1", 0))
+    stranger, _ = await loop.create_datagram_endpoint(Station, local_addr=("127.0.0.1", 0))
+    async with spawn("mavlink", f"mavlink.udp=127.0.0.1:{station.get_extra_info('sockname')[1]}"):
+        async with asyncio.timeout(10.0):
+            data, port = await received.get()
+            assert [message.get_type() for message in parser.parse_buffer(data)] == ["HEARTBEAT"]
+            stranger.sendto(DISARM.pack(common.MAVLink(None, 255, 190)), port)
+            station.sendto(HEARTBEAT.pack(parser), port)
+            kinds = set[str]()
+            while "SYS_STATUS" not in kinds:
+                kinds |= {message.get_type() for message in parser.parse_buffer((await received.get())[0]) or ()}
+            assert requests.drain() == []
+            station.sendto(DISARM.pack(parser), port)
+            assert (await requests.get()).act is m.RequestAct.STOP
+    station.close()
+    stranger.close()
+
+
+@pytest.mark.parametrize(
+    ("setting", "text"),
+    [
+        (
+            "mavlink.signing_key_file={folder}/absent",
+            "mavlink.signing_key_file {folder}/absent: No such file or directory",
+        ),
+        (
+            "mavlink.signing_key_file={folder}/open",
+            "mavlink.signing_key_file {folder}/open: others can read it (chmod 600)",
+        ),
+        ("mavlink.tcp=127.0.0.1:{taken}", "mavlink.tcp 127.0.0.1:{taken}: "),
+    ],
+)
+async def test_what_cannot_work_stops_it_with_one_line(
+    setting: str, text: str, open_as: OpenAs, private_sets: tuple[str, ...], tmp_path: Path
+) -> None:
+    await open_as("observer")
+    (tmp_path / "open").write_text("secret")
+    (tmp_path / "open").chmod(0o644)
+    server = await asyncio.start_server(lambda reader, writer: writer.close(), "127.0.0.1", 0)
+    words = {"folder": tmp_path, "taken": server.sockets[0].getsockname()[1]}
+    sets = [word for each in (*private_sets, setting.format(**words)) for word in ("--set", each)]
+    command = [sys.executable, "-m", "paani", "run", "mavlink", *sets]
+    done = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, check=False, timeout=60)
+    server.close()
+    assert done.returncode == 2
+    assert text.format(**words) in done.stderr
+    assert done.stderr.count("\n") == 1
