@@ -90,8 +90,17 @@ class Desk:
             self._numbers.pop(topic.name, None)
 
 
-def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: float | None = None) -> list[Record]:
-    """An armed boat among buoys: evidence at 5 Hz, odometry at 20 Hz, the navigator not always publishing."""
+def drive(
+    seconds: float,
+    config: Config = CONFIG,
+    seed: int = 1,
+    restart_at_s: float | None = None,
+    modes: tuple[m.DriveMode, ...] = (),
+) -> list[Record]:
+    """An armed boat among buoys: evidence at 5 Hz, odometry at 20 Hz, the navigator not always publishing.
+
+    modes: ordered one after the other, each for as long; without any nobody orders one.
+    """
     desk, dice = Desk(config), random.Random(seed)
     route = m.Route(
         source_us=T0_US, name="a", waypoints=(m.Waypoint(x_m=60.0, y_m=0.0), m.Waypoint(x_m=60.0, y_m=40.0))
@@ -106,6 +115,8 @@ def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: 
             desk.restart("controller")
         desk.publish(keys.SIM_TIME, m.SimTime(source_us=desk.now_us, sim_us=tick * 50_000, stamp_us=tick * 50_000 + 7))
         desk.publish(keys.ODOMETRY, _odometry(desk.now_us, at_s, dice))
+        if modes and tick % 2 == 0:
+            desk.publish(keys.OPERATOR_ORDER, _order(desk.now_us, modes, at_s / seconds))
         if tick % 4 == 0:
             desk.publish(keys.ARMING, m.Arming(source_us=desk.now_us, armed=True))
             desk.publish(keys.EVIDENCE, _evidence(desk.now_us - 100_000, tick // 4, dice))
@@ -117,6 +128,15 @@ def drive(seconds: float, config: Config = CONFIG, seed: int = 1, restart_at_s: 
             desk.now_us += 1000
             desk.step("controller")
     return desk.records
+
+
+def _order(now_us: int, modes: tuple[m.DriveMode, ...], part: float) -> m.OperatorOrder:
+    """The mode that is due at this part of the drive."""
+    number = int(part * len(modes))
+    target = (m.Waypoint(x_m=40.0, y_m=5.0),)
+    return m.OperatorOrder(
+        source_us=now_us, mode=modes[number], since_us=number + 1, target=target, surge=0.6, turn=part, by="dashboard"
+    )
 
 
 def write_log(

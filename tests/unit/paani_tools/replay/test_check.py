@@ -346,3 +346,19 @@ def test_a_field_added_since_the_recording_is_left_out_and_a_changed_one_is_not(
     assert as_recorded(b'{"seq":1}', recorded) != recorded
     assert as_recorded(computed, None) == computed
     assert as_recorded(computed, b"{") == computed
+
+
+def test_a_drive_through_every_mode_is_computed_to_the_byte() -> None:
+    """The order of the mode is an input like any other; without it every leg of these orders would be the route's."""
+    records = drive(15.0, modes=(*m.DriveMode, m.DriveMode.ROUTE))
+    found = check("navigator", records)
+    assert (found.is_exact, found.differing_states) == (True, 0)
+    commands = [
+        msgspec.json.decode(each.data, type=m.NavCommand) for each in records if each.topic == keys.COMMAND.name
+    ]
+    legs = [command.leg for command in commands]
+    assert {"return home", "manual", "idle"} <= set(legs)
+    assert any(leg.startswith("hold station") for leg in legs)
+    assert legs[-1].startswith("follow route")
+    unordered = [each for each in records if each.topic != keys.OPERATOR_ORDER.name]
+    assert not check("navigator", unordered).is_exact
