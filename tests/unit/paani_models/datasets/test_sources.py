@@ -49,12 +49,13 @@ def test_bad_boxes_are_refused_with_their_line_r8(tmp_path: Path, text: str) -> 
         read_boxes(label)
 
 
-def test_whole_sequences_are_held_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("held_out", ["seq0", "seq1", "seq2"])
+def test_whole_sequences_are_held_out(tmp_path: Path, held_out: str) -> None:
     write_source(tmp_path / "river", {f"f{i}": f"seq{i % 3}" for i in range(9)})
-    source = Source("river", "river", masks="masks", held_out=("seq1",))
+    source = Source("river", "river", masks="masks", held_out=(held_out,))
     samples = read_samples(tmp_path, [source])
-    assert {s.sequence for s in samples if s.held_out} == {"seq1"}
-    assert {s.sequence for s in samples if not s.held_out} == {"seq0", "seq2"}
+    assert {s.sequence for s in samples if s.held_out} == {held_out}
+    assert {s.sequence for s in samples if not s.held_out} == {"seq0", "seq1", "seq2"} - {held_out}
 
 
 def test_a_source_without_sequences_is_cut_into_runs(tmp_path: Path) -> None:
