@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from collections.abc import AsyncIterator
 from typing import Any, NamedTuple
 
 from paani import messages as m
@@ -25,7 +26,7 @@ from paani_services.ros2.topics import RosTopic
 LOG = logging.getLogger(__name__)
 DEPTH = 16
 ANSWER_S = 2.0
-STICK_PERIOD_S = 0.05  # of several set-points within this time the newest counts
+BATCH_PERIOD_S = 0.05  # of several set-points within this time the newest counts
 TAKE_WHEEL = "WHEEL"  # the word that takes the wheel from another hand
 
 
@@ -47,6 +48,13 @@ def stick_of(twist: Any, full_speed_mps: float, full_turn_radps: float) -> Stick
     return Stick(clip(twist.linear.x / full_speed_mps, -1.0, 1.0), clip(twist.angular.z / full_turn_radps, -1.0, 1.0))
 
 
+async def batches(inbox: Queue[bytes]) -> AsyncIterator[list[bytes]]:
+    """What waits, at least one, oldest first; a node that floods gets this process's attention now and then."""
+    while True:
+        yield [await inbox.get(), *inbox.drain()]
+        await asyncio.sleep(BATCH_PERIOD_S)
+
+
 class Commands:
     """Hears the graph and asks the operator's process. What cannot be read or has no sense is counted."""
 
@@ -66,35 +74,37 @@ class Commands:
 
     async def _take_stops(self, inbox: Queue[bytes]) -> None:
         """Asks until the STOP is latched, for as long as that takes."""
-        while True:
-            message = self._read(await inbox.get(), topics.STOP)
-            while message is not None and message.data and await self._operator.stop(ANSWER_S) is None:
+        async for batch in batches(inbox):
+            messages = [self._read(data, topics.STOP) for data in batch]
+            asked = any(message is not None and message.data for message in messages)
+            while asked and await self._operator.stop(ANSWER_S) is None:
                 LOG.warning("STOP from ROS 2: the operator's process does not answer; asking again")
 
     async def _take_modes(self, inbox: Queue[bytes]) -> None:
-        while True:
-            message = self._read(await inbox.get(), topics.MODE)
-            if message is None:
-                continue
-            if message.data == TAKE_WHEEL:
-                refusal = await self._operator.take_wheel(ANSWER_S)
-            elif message.data in m.DriveMode.__members__:
-                refusal = await self._operator.set_mode(m.DriveMode[message.data], ANSWER_S)
-            else:
-                self._bus.count_drop("out_of_range")
-                continue
-            answer = "no answer" if refusal is None else "done" if refusal is m.ModeRefusal.NONE else refusal.value
-            self._bus.note(f"{message.data} from ROS 2: {answer}")
-            if refusal is not m.ModeRefusal.NONE:
-                self._bus.count_drop("refused")
-                LOG.warning("%s from ROS 2: %s", message.data, answer)
+        async for batch in batches(inbox):
+            for data in batch:
+                if (message := self._read(data, topics.MODE)) is not None:
+                    await self._order(message.data)
+
+    async def _order(self, word: str) -> None:
+        """Ask for what the word says, and tell in this process's health what became of it."""
+        if word == TAKE_WHEEL:
+            refusal = await self._operator.take_wheel(ANSWER_S)
+        elif word in m.DriveMode.__members__:
+            refusal = await self._operator.set_mode(m.DriveMode[word], ANSWER_S)
+        else:
+            self._bus.count_drop("out_of_range")
+            return
+        answer = "no answer" if refusal is None else "done" if refusal is m.ModeRefusal.NONE else refusal.value
+        self._bus.note(f"{word} from ROS 2: {answer}")
+        if refusal is not m.ModeRefusal.NONE:
+            self._bus.count_drop("refused")
+            LOG.warning("%s from ROS 2: %s", word, answer)
 
     async def _take_twists(self, inbox: Queue[bytes]) -> None:
         """The newest alone, once: a set-point that no node says again is let go by the operator's process."""
-        while True:
-            waiting = [await inbox.get(), *inbox.drain()]
-            self._steer(waiting[-1])
-            await asyncio.sleep(STICK_PERIOD_S)
+        async for batch in batches(inbox):
+            self._steer(batch[-1])
 
     def _steer(self, data: bytes) -> None:
         message, state = self._read(data, topics.CMD_VEL), self._operator.state

@@ -11,6 +11,8 @@ from paani_services.ros2 import topics
 from paani_services.ros2.schemas import encode, make
 from paani_services.ros2.translation import RosMessage, header_of
 
+UNDUE = frozenset(topic.name for topic in keys.REQUESTS.values())  # nobody owes one
+
 
 class Level(IntEnum):
     """Of diagnostic_msgs/DiagnosticStatus."""
@@ -124,7 +126,7 @@ class Diagnostics:
 
 
 def _process(report: m.Health) -> Status:
-    late = [each.topic for each in report.inputs if not (each.alive and each.fresh)]
+    late = [each.topic for each in report.inputs if each.received and not each.fresh and each.topic not in UNDUE]
     values: dict[str, object] = {
         "note": report.note, "uptime_s": report.uptime_s, "cpu_cores": report.cpu_cores, "rss_mib": report.rss_mib,
         **{f"{each.topic} rate_hz": each.rate_hz for each in report.inputs},
@@ -132,7 +134,9 @@ def _process(report: m.Health) -> Status:
     }  # fmt: skip
     if not report.ready:
         return Status(Level.WARN, "not ready", values)
-    return Status(Level.WARN, "waits for " + ", ".join(late), values) if late else Status(Level.OK, "ready", values)
+    if late:
+        return Status(Level.WARN, "hears no longer " + ", ".join(late), values)
+    return Status(Level.OK, "ready", values)
 
 
 def _stale() -> Status:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
@@ -9,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from paani.bus import Queue
+from paani.clock import ManualClock
 from paani_services.ros2 import schemas
-from paani_services.ros2.commands import stick_of
+from paani_services.ros2.commands import batches, stick_of
 
 FULL_MPS, FULL_RADPS = 0.6, 0.35
 
@@ -50,3 +53,32 @@ def test_a_stick_is_never_out_of_range(linear_x: float, angular_z: float) -> Non
 def test_what_is_no_number_is_refused(axis: str, number: float) -> None:
     with pytest.raises(ValueError, match="finite"):
         stick_of(twist(**{axis: number}), FULL_MPS, FULL_RADPS)
+
+
+class Flood(Queue[bytes]):
+    """A node that writes faster than anybody reads."""
+
+    async def get(self) -> bytes:
+        return b""
+
+
+@pytest.mark.timeout(20)
+async def test_a_flood_leaves_the_loop_to_others() -> None:
+    """A reader that never waits would keep every other task from running, for ever."""
+
+    async def read() -> None:
+        async for _ in batches(Flood(ManualClock(), 16)):
+            pass
+
+    reading = asyncio.create_task(read())
+    await asyncio.sleep(0)
+    reading.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await reading
+
+
+async def test_a_batch_is_what_waits_in_its_order() -> None:
+    inbox: Queue[bytes] = Queue(ManualClock(), 2)
+    for data in (b"1", b"2", b"3"):
+        inbox.offer(data)
+    assert await anext(batches(inbox)) == [b"2", b"3"], "the oldest gave way"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 from paani import keys
 from paani import messages as m
 from paani_services.ros2 import schemas
@@ -84,7 +86,12 @@ def test_each_process_that_reported() -> None:
     late = m.InputHealth(
         topic="camera/picture", alive=True, fresh=False, rate_ok=True, rate_hz=5.0, age_s=2.0, received=9, superseded=0
     )
-    for service, ready, inputs in (("camera", True, ()), ("advisor", False, ()), ("perception", True, (late,))):
+    never = msgspec.structs.replace(late, topic="navigator/route", alive=False, received=0)
+    undue = msgspec.structs.replace(late, topic="operator/request/stop")
+    reports: list[tuple[str, bool, tuple[m.InputHealth, ...]]] = [
+        ("camera", True, (never, undue)), ("advisor", False, ()), ("perception", True, (late,)),
+    ]  # fmt: skip
+    for service, ready, inputs in reports:
         health = m.Health(
             source_us=NOW_US, service=service, ready=ready, uptime_s=5.0, cpu_cores=0.1, rss_mib=60.0, inputs=inputs,
             drops=(m.DropCount(cause="future", count=2),), note="all well",
@@ -93,6 +100,6 @@ def test_each_process_that_reported() -> None:
     found = report(diagnostics)
     levels = {name: status.level for name, status in found.items() if name.startswith("process ")}
     assert levels == {"process camera": OK, "process advisor": WARN, "process perception": WARN}
-    assert found["process perception"].message == "waits for camera/picture"
+    assert found["process perception"].message == "hears no longer camera/picture"
     assert values(found["process camera"])["refused future"] == "2"
     assert report(diagnostics, NOW_US + 3_000_001)["process camera"].level == STALE
