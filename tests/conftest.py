@@ -27,8 +27,8 @@ from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 BESIDE = {  # files in them that wait for results alone
-    f"tests/integration/test_{name}.py" for name in ("claims_check", "cluster", "docs", "examples", "trials")
-}
+    f"tests/integration/test_{name}.py" for name in ("claims_check", "cluster", "docs", "examples", "package", "trials")
+} | {"tests/browser/test_models_report.py"}
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
