@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import importlib.util
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -109,6 +111,68 @@ async def test_udp_is_taken_from_its_address_alone(spawn: Spawn, open_as: OpenAs
             assert (await requests.get()).act is m.RequestAct.STOP
     station.close()
     stranger.close()
+
+
+@pytest.mark.parametrize("is_told_to_end", [True, False])
+async def test_a_boat_armed_from_here_is_stopped_without_stations(
+    is_told_to_end: bool, spawn: Spawn, open_as: OpenAs
+) -> None:
+    """When nobody has been heard for too long, and when the process ends. What the page has armed is the page's."""
+    requests = (await open_as("observer")).queue(keys.REQUESTS["mavlink"])
+    states = (await open_as("operator")).publisher(keys.OPERATOR_STATE)
+    by = "dashboard"
+
+    async def publish() -> None:
+        while True:
+            states.put(m.OperatorState(source_us=CLOCK.now_us(), armed=True, stopped=False, by=by))
+            await asyncio.sleep(0.1)
+
+    publishing = asyncio.create_task(publish())
+    async with spawn("mavlink", f"mavlink.link_loss_s={60 if is_told_to_end else 1}", 'mavlink.udp=""') as process:
+        await asyncio.sleep(1.5)  # by the process's own clock, too long without a station
+        assert requests.drain() == []
+        by = "mavlink"
+        await asyncio.sleep(0.5)
+        if is_told_to_end:
+            assert requests.drain() == []
+            process.terminate()
+        async with asyncio.timeout(5.0):
+            assert (await requests.get()).act is m.RequestAct.STOP
+    publishing.cancel()
+
+
+async def test_mavproxy_signs_and_is_obeyed_and_before_is_not(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
+    if importlib.util.find_spec("MAVProxy") is None:
+        pytest.skip("MAVProxy is not installed")
+    tcp, key = find_free_port(), tmp_path / "key"
+    key.write_text("secret")
+    key.chmod(0o600)
+    observer = await open_as("observer")
+    requests, health = observer.queue(keys.REQUESTS["mavlink"]), observer.latest(keys.health("mavlink"))
+    async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""', f"mavlink.signing_key_file={key}"):
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-W", "ignore", "-m", "MAVProxy.mavproxy", "--master", f"tcp:127.0.0.1:{tcp}", "--nowait",
+            f"--state-basedir={tmp_path}", "--default-modules=signing,arm", cwd=tmp_path,
+            env={**os.environ, "HOME": str(tmp_path)}, stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+        assert process.stdin is not None
+        try:
+            async with asyncio.timeout(30.0):
+                refused = 0
+                while not refused:
+                    process.stdin.write(b"disarm\n")
+                    report = await health.next()
+                    refused = sum(drop.count for drop in report.drops if drop.cause == "mavlink_damaged")
+                assert requests.drain() == []
+                process.stdin.write(b"signing key secret\n")
+                while not (asked := requests.drain()):
+                    process.stdin.write(b"disarm\n")
+                    await asyncio.sleep(0.5)
+            assert {request.act for request in asked} == {m.RequestAct.STOP}
+        finally:
+            process.kill()
+            await process.wait()
 
 
 @pytest.mark.parametrize(

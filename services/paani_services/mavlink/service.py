@@ -62,13 +62,17 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         with bus.alive():
             LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")
             begun_us = clock.now_us()
-            while True:
-                snapshot = inputs.snapshot()
-                gateway.tick(snapshot)
-                heard_us = gateway.commander_us or begun_us
-                if is_link_lost(snapshot, bus.user, heard_us, settings.link_loss_s):
-                    LOG.warning("no ground station for %.1f s: STOP", settings.link_loss_s)
+            try:
+                while True:
+                    snapshot = inputs.snapshot()
+                    gateway.tick(snapshot)
+                    heard_us = gateway.commander_us or begun_us
+                    if is_link_lost(snapshot, bus.user, heard_us, settings.link_loss_s):
+                        LOG.warning("no ground station for %.1f s: STOP", settings.link_loss_s)
+                        await acts.stop()
+                    present = sum(station.is_present(snapshot.now_us) for station in gateway.stations)
+                    bus.note(f"{present} ground station{'' if present == 1 else 's'}")
+                    await asyncio.sleep(PERIOD_S)
+            finally:  # nobody is left who could be asked
+                if is_link_lost(inputs.snapshot(), bus.user, 0, settings.link_loss_s):
                     await acts.stop()
-                present = sum(station.is_present(snapshot.now_us) for station in gateway.stations)
-                bus.note(f"{present} ground station{'' if present == 1 else 's'}")
-                await asyncio.sleep(PERIOD_S)

@@ -11,6 +11,10 @@ from paani_services.mavlink import health_bits as bits
 from paani_services.mavlink.snapshot import Snapshot
 from tests.mavlink_peer import NOW_US, armed, in_order, odometry
 
+NO_FIX = m.GpsFix(
+    source_us=NOW_US, latitude_deg=0.0, longitude_deg=0.0, sog_mps=0.0, cog_rad=0.0, position_std_m=0.0, fix=False
+)
+
 
 def order(*inhibits: m.Inhibit) -> m.NavCommand:
     return m.NavCommand(source_us=NOW_US, enable=False, heading_rad=0.0, speed_mps=0.0, inhibits=inhibits)
@@ -41,6 +45,7 @@ def test_a_boat_of_which_nothing_is_known_has_none() -> None:
         ({"inertial": None}, bits.INERTIAL),
         ({"inertial": odometry(healthy=False)}, bits.INERTIAL),
         ({"fix": None}, bits.GPS),
+        ({"fix": NO_FIX}, bits.GPS),
         ({"advisory": None}, bits.CAMERA | bits.AVOIDANCE),
         ({"advisory": advice(m.Direction.NO_DATA, m.Reason.NO_EVIDENCE)}, bits.CAMERA | bits.AVOIDANCE),
         ({"advisory": advice(m.Direction.STOP, m.Reason.UNUSABLE_IMAGE)}, bits.CAMERA),

@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import common
 from paani import messages as m
 from paani.geometry import geodetic_from_enu
 from paani_services.mavlink.codec import Codec
+from paani_services.mavlink.fields import degrees_e7
 from paani_services.mavlink.snapshot import Snapshot, map_origin_deg
 from paani_services.mavlink.telemetry import BUILDERS
 from tests.mavlink_peer import NOW_US, ORIGIN_DEG, armed, in_order, odometry
@@ -70,6 +71,15 @@ def test_every_place_is_read_back_to_a_centimetre(latitude_deg: float, longitude
     position = found["GLOBAL_POSITION_INT"]
     assert position.lat * 1e-7 == pytest.approx(latitude_deg, abs=6e-8)
     assert math.remainder(position.lon * 1e-7 - longitude_deg, 360.0) == pytest.approx(0.0, abs=6e-8)
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "number"),
+    [(180.5, -1_795_000_000), (-180.5, 1_795_000_000), (180.0, 1_800_000_000), (-90.0, -900_000_000)],
+)
+def test_a_place_beyond_the_antimeridian_is_turned_back(angle_deg: float, number: int) -> None:
+    """As the map gives it to one that lies on the other side of its origin."""
+    assert degrees_e7(angle_deg) == number
 
 
 def test_a_fix_in_the_units_of_the_protocol() -> None:
