@@ -25,6 +25,10 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 WAIT_S = 20.0
 LET_GO_S = 0.5
 MANUAL = "[data-drive=MANUAL]"
+HIDE = """(hidden) => {
+  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
 
 
 class Orders:
@@ -91,6 +95,7 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
             await orders.until(lambda found: found.stick == (0.0, -1.0))
             await page.evaluate(let_go)
             await orders.until(lambda found: found.stick == (0.0, 0.0))
+            await page.keyboard.down("d")  # as a key repeats that is held
             await asyncio.sleep(0.3)
             assert orders.stick == (0.0, 0.0), "a key that is still down is pressed anew"
             await page.keyboard.up("d")
@@ -104,6 +109,15 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await page.mouse.up()
         await orders.until(lambda found: found.stick == (0.0, 0.0))
 
+        await page.keyboard.down("w")
+        await orders.until(lambda found: found.stick == (1.0, 0.0))
+        await page.evaluate(HIDE, True)
+        await orders.until(lambda found: found.stick == (0.0, 0.0) and found.mode is DriveMode.MANUAL)
+        await orders.until(lambda found: found.mode is DriveMode.IDLE)
+        await page.evaluate(HIDE, False)
+        await page.keyboard.up("w")
+        await drive_manually(page, orders)
+
         other = (await watch(browser, config)).page
         await other.wait_for_selector("#drive-take:visible", timeout=WAIT_S * 1e3)
         assert await other.is_disabled("[data-drive=IDLE]")
@@ -113,6 +127,8 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")
         assert "another page" in await page.inner_text("#drive-wheel")
         await drive_manually(other, orders)
+        await page.keyboard.down("s")
+        assert await page.evaluate("document.querySelector('#drive').dataset.driving") == "false"
 
         await other.keyboard.down("w")
         await orders.until(lambda found: found.stick == (1.0, 0.0))
