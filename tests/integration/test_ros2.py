@@ -207,6 +207,10 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
                 steer()
                 await asyncio.sleep(0.1)
                 assert order().mode is m.DriveMode.IDLE, "a stick that moves again begins nothing"
+            for _ in range(2):  # two reports on, all that was counted until now is told
+                await health.next()
+            await counted("not_manual", steer, "and is counted")
+            await counted("undecodable", lambda: say("M" * 70_000), "longer than any command")
             await counted("out_of_range", lambda: say("FULL AHEAD"), "a word that is no mode")
             assert await hand.take_wheel(5.0) is m.ModeRefusal.NONE
             await counted("refused", lambda: say("HOLD"), "another hand holds the wheel")
