@@ -34,6 +34,7 @@ PICTURE, BOXES, MASK = f"{CAMERA}/picture", f"{CAMERA}/picture/tracks", "mask"
 PLAN, OBSTACLES, ROUTE, FENCE, TRACK = "map/plan", "map/obstacles", "map/route", "map/fence", "map/track"
 EARTH, EARTH_TRACK = "earth/gps", "earth/track"
 ORANGE, GREY, RED, BLUE, GREEN = (255, 181, 84), (160, 170, 178), (242, 92, 92), (89, 168, 242), (87, 214, 155)
+EYE_M, LOOK_AT_M = (-9.0, 3.0, 5.0), (5.0, 0.0, 0.0)  # from astern, in the axes of the boat
 CHART_ZOOM = 18.0  # half a kilometre across
 LINE_M, HULL_M, OBSTACLE_M = 0.06, 0.5, 1.0
 MAX_FRAMES = 32  # pictures whose evidence may still come
@@ -103,7 +104,8 @@ class RerunDrive:
         rr.set_log_tick_enabled(False, recording=stream)
         for path, colour in SERIES.items():
             stream.log(path, rr.SeriesLines(colors=[colour], names=[path.rpartition("/")[2]]), static=True)
-        stream.log(MAP, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for path in (MAP, BOAT):
+            stream.log(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         stream.log(
             f"{BOAT}/hull", rr.Arrows3D(vectors=[[2 * HULL_M, 0.0, 0.0]], origins=[[-HULL_M, 0.0, 0.0]], radii=0.12),
             static=True,
@@ -282,9 +284,9 @@ def layout() -> rrb.Blueprint:
         rrb.Spatial2DView(origin=PICTURE, name="What the boat sees"),
         rrb.Spatial2DView(origin=MASK, name="Water, obstacle, sky"),
     )
-    eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, tracking_entity=BOAT)
+    eye = rrb.EyeControls3D(position=EYE_M, look_target=LOOK_AT_M)
     maps = rrb.Vertical(
-        rrb.Spatial3DView(origin=MAP, name="Boat, plan, obstacles, fence", eye_controls=eye),
+        rrb.Spatial3DView(origin=BOAT, contents=f"/{MAP}/**", name="Boat, plan, obstacles, fence", eye_controls=eye),
         rrb.MapView(origin="earth", name="Chart", zoom=CHART_ZOOM),
         row_shares=[3, 2],
     )
