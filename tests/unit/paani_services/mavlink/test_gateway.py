@@ -62,6 +62,17 @@ def test_telemetry_at_its_default_rates() -> None:
     assert counts["GLOBAL_POSITION_INT"] == counts["ATTITUDE"] == 100
 
 
+def test_what_was_late_is_not_made_up_for() -> None:
+    """After five seconds without a look, ten messages a second are ten a second again."""
+    port, peer = made()
+    peer.send(HEARTBEAT)
+    port.gateway.tick(in_order())
+    peer.received()
+    for step in range(10):
+        port.gateway.tick(in_order(now_us=NOW_US + 5_000_000 + step * 20_000))
+    assert kinds(peer.received()).count("ATTITUDE") <= 4
+
+
 def test_a_new_station_is_told_what_holds() -> None:
     stopped = m.OperatorState(source_us=NOW_US, armed=False, stopped=True, by="stop")
     port, peer = made(in_order(operator=stopped))
