@@ -25,6 +25,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 WAIT_S = 20.0
 LET_GO_S = 0.5
 MANUAL = "[data-drive=MANUAL]"
+PAD = """(axes) => { navigator.getGamepads = () => (axes ? [{ connected: true, axes }] : [null]); }"""
 HIDE = """(hidden) => {
   Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
   document.dispatchEvent(new Event("visibilitychange"));
@@ -108,6 +109,24 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await orders.until(lambda found: found.stick == (0.5, 0.0))
         await page.mouse.up()
         await orders.until(lambda found: found.stick == (0.0, 0.0))
+
+        await page.evaluate(PAD, [0.0, -0.5])
+        await asyncio.sleep(0.3)
+        assert orders.stick == (0.0, 0.0), "a gamepad that was held from before drives nothing"
+        for axes, expected in (([0.1, 0.0], (0.0, 0.0)), ([1.0, -0.5], (0.5, -1.0))):
+            await page.evaluate(PAD, axes)
+            await orders.until(lambda found, expected=expected: found.stick == expected)  # type: ignore[misc]
+            await asyncio.sleep(0.3)
+        await page.evaluate("dispatchEvent(new Event('blur'))")
+        await orders.until(lambda found: found.stick == (0.0, 0.0))
+        await asyncio.sleep(0.3)
+        assert orders.stick == (0.0, 0.0)
+        await page.evaluate(PAD, [0.0, 0.0])
+        await asyncio.sleep(0.3)
+        await page.evaluate(PAD, [0.0, 1.0])
+        await orders.until(lambda found: found.stick == (-1.0, 0.0))
+        await page.evaluate(PAD, None)
+        await orders.until(lambda found: found.stick == (0.0, 0.0) and found.mode is DriveMode.MANUAL)
 
         await page.keyboard.down("w")
         await orders.until(lambda found: found.stick == (1.0, 0.0))

@@ -8,6 +8,7 @@ import { hasKey, post } from "./requests.js";
 import { MODE_BARS, MODE_TEXTS, byId, fixed, make, operatorText, setText } from "./text.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
+const DEAD_ZONE = 0.15; // of a gamepad's stick, which rests nowhere exactly
 const MAX_UNDER_WAY = 3; // set-points on a slow link; more would only come late
 /** What a key asks for: surge ahead, turn to port. @type {Record<string, [number, number]>} */
 const KEYS = {
@@ -20,13 +21,25 @@ let number = Date.now(), underWay = 0, refusal = "", canDrive = false;
 const held = new Set();
 /** Where the stick is held: ahead and to port, each in [-1, 1]; null while it is not. @type {[number, number] | null} */
 let stick = null;
+/** Whether the gamepad was in neutral since it was last let go: one that is held from before drives nothing. */
+let isPadFree = false;
 
 /** Whether this page drives by hand now, so that its keys steer. */
 export const isDriving = () => canDrive;
 
+/** What the left stick of a gamepad asks for; nothing while the page has not the focus. @returns {[number, number]} */
+function readPad() {
+  const pad = document.hasFocus() ? navigator.getGamepads().find((each) => each?.connected) : undefined;
+  const part = (/** @type {number} */ axis) => (Math.abs(axis) < DEAD_ZONE ? 0 : Math.round(Math.max(-1, Math.min(1, -axis)) * 20) / 20);
+  const [surge, turn] = pad ? [part(pad.axes[1] ?? 0), part(pad.axes[0] ?? 0)] : [0, 0];
+  if (pad && surge === 0 && turn === 0) isPadFree = true;
+  return pad && isPadFree ? [surge, turn] : [0, 0];
+}
+
 /** What the hand asks for now: ahead and to port. @returns {[number, number]} */
 function wanted() {
   if (stick) return stick;
+  if (!held.size) return readPad();
   const sum = (/** @type {number} */ axis) => [...held].reduce((all, code) => all + KEYS[code][axis], 0);
   return [Math.max(-1, Math.min(1, sum(0))), Math.max(-1, Math.min(1, sum(1)))];
 }
@@ -46,8 +59,9 @@ async function say(isLast = false) {
 
 /** The stick and every key are let go, which is said at once. @param {boolean} [isLast] */
 function letGo(isLast = false) {
-  const wasHeld = stick !== null || held.size > 0;
+  const wasHeld = stick !== null || held.size > 0 || isPadFree;
   stick = null;
+  isPadFree = false;
   held.clear();
   renderStick();
   if (wasHeld) void say(isLast);
@@ -135,6 +149,8 @@ export function renderDrive(store, open, now) {
   const isFree = operator?.wheel_by === "", isManual = operator?.mode === "MANUAL";
   if (canDrive && !(isManual && isHolder)) letGo();
   canDrive = isManual && isHolder;
+  if (!canDrive) isPadFree = false;
+  else renderStick();
   byId("drive").dataset.driving = String(canDrive);
   setText(byId("drive-wheel"), !operator ? "no word from the operator's process" : isHolder ? "this page holds the wheel" : isFree ? "nobody holds the wheel" : `the wheel: ${operator.wheel_by === "dashboard" ? "another page" : operatorText(operator.wheel_by)}`);
   byId("drive-take").hidden = !operator || isHolder || isFree;
