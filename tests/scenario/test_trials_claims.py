@@ -113,13 +113,14 @@ def test_w12_other_waters_ask_for_other_files_alone(world: str, tmp_path: Path) 
 
 def test_w12_other_rules_are_settings(tmp_path: Path) -> None:
     """W12: a task that asks for slow driving on one side of a line; the thing in the way is passed on the other."""
-    fence = "[fence]\nkeep_in = [[[-5.0, -10.0], [30.0, -10.0], [30.0, 1.8], [-5.0, 1.8]]]\n"
+    fence = "[fence]\nkeep_in = [[[-5.0, -1.4], [30.0, -1.4], [30.0, 10.0], [-5.0, 10.0]]]\n"
     plain = driven(tmp_path, AHEAD, Policy.ORACLE, "profile=paani")
     bound = driven(tmp_path, AHEAD + fence, Policy.ORACLE, "profile=paani", "navigator.cruise_mps=0.3")
     assert plain.completed
     assert bound.completed
     assert bound.seconds > 1.5 * plain.seconds
-    assert max(y_m for _, _, y_m in bound.track) < 1.8
+    assert min(y_m for _, _, y_m in plain.track) < -1.4 < min(y_m for _, _, y_m in bound.track)
+    assert max(y_m for _, _, y_m in bound.track) > 1.0
 
 
 def test_a_drive_that_diverges_is_no_success_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -143,6 +143,7 @@ def test_no_force_without_arming(arming: Arming | None) -> None:
         adapter.receive_arming(arming, NOW_US)
     adapter.offer(thrust(), NOW_US)
     assert adapter.decide(NOW_US).zero_cause is ZeroCause.NOT_ARMED
+    assert not adapter.is_armed
 
 
 def test_arming_must_be_repeated() -> None:

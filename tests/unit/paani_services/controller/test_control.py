@@ -94,6 +94,24 @@ def test_n6_slew_limits_each_fan_both_ways() -> None:
     assert (thrust.left, thrust.right) == pytest.approx((0.035, 0.015))
 
 
+def test_a_step_after_a_pause_is_no_larger_than_after_0_3_s() -> None:
+    """A controller that did not run for long does not make up for it at once."""
+    start = ControllerState(last_us=NOW_US - 10_000_000)
+    _, thrust = run(PAPER, command(speed_mps=0.30), odometry(surge_mps=-2.0), start)
+    assert (thrust.left, thrust.right) == pytest.approx((0.045, 0.045))
+
+
+@pytest.mark.parametrize(
+    ("command_us", "odometry_us", "inhibit"),
+    [(NOW_US + 1, NOW_US, Inhibit.STALE_COMMAND), (NOW_US, NOW_US + 1, Inhibit.STALE_ODOMETRY)],
+)
+def test_what_came_after_now_gives_zero_thrust(command_us: int, odometry_us: int, inhibit: Inhibit) -> None:
+    """A clock that was set back tells no age."""
+    inputs = ControllerInputs(command(), command_us, odometry(), odometry_us)
+    _, thrust = compute_thrust(REST, inputs, NOW_US, 43, PAANI)
+    assert (thrust.left, thrust.right, thrust.enabled, thrust.inhibits) == (0.0, 0.0, False, (inhibit,))
+
+
 def test_a_stop_is_zero_at_once_without_slew_limit() -> None:
     start = ControllerState(left=0.08, right=0.08, integral=0.01, last_us=NOW_US - 100_000)
     state, thrust = run(PAPER, command(enable=False, inhibits=(Inhibit.ADVISED_STOP,)), odometry(), start)
@@ -149,6 +167,8 @@ def test_l5_speed_noise_at_rest_turns_no_fan() -> None:
     unguarded = settle(PAPER, still, odometry(surge_mps=-0.04, stopped=False))
     assert guarded.left == guarded.right == 0.0
     assert unguarded.left > 0.0
+    state, thrust = run(PAANI, still, odometry(surge_mps=0.0, stopped=True), ControllerState(integral=0.05))
+    assert (thrust.left, thrust.right, state.integral) == (0.0, 0.0, 0.0), "nor for what was summed before"
 
 
 @pytest.mark.parametrize("speed_mps", [0.15, 0.3, 0.6, 0.9])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -107,9 +108,20 @@ def test_a_stop_is_confirmed_only_by_zero_thrust_for_want_of_arming() -> None:
     for cause, thrust in ((m.ZeroCause.NONE, 0.1), (m.ZeroCause.TIMEOUT, 0.0), (m.ZeroCause.PULSE_LOST, 0.0)):
         state = op.confirm_stop(state, applied(cause, thrust), 20_000)
         assert state.confirmed_us == 0
+    for side in ("left", "right"):
+        turning = msgspec.structs.replace(applied(m.ZeroCause.NOT_ARMED), **{side: 0.1})
+        assert op.confirm_stop(state, turning, 20_000).confirmed_us == 0, "one fan is enough to move"
     state = op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 51_000)
     assert state.confirmed_us - state.asked_us == 50_000
     assert op.confirm_stop(state, applied(m.ZeroCause.NOT_ARMED), 90_000) == state
+
+
+def test_a_stop_outranks_an_arming_in_every_word() -> None:
+    """In what the thrust adapter is told, and in what the next start finds."""
+    both = op.Operator(armed=True, stopped=True)
+    assert (op.arming_message(both, 5).armed, op.arming_message(both, 5).stopped) == (False, True)
+    assert not op.state_message(both, 5, latch_kept=True).armed
+    assert op.latch_text(both) == op.STOPPED
 
 
 def test_a_repeated_stop_keeps_the_time_of_the_first() -> None:
