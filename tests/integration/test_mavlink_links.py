@@ -59,7 +59,8 @@ async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, ope
     async with spawn("mavlink", *links) as process:
         good, noisy, deaf = [await Client.connect(tcp) for _ in range(3)]
         fourth = await Client.connect(tcp)
-        assert await fourth.reader.read() == b""  # one more than may connect
+        async with asyncio.timeout(5.0):
+            assert await fourth.reader.read() == b""  # one more than may connect
         noisy.writer.write(bytes(range(256)) * 4000)
         deaf.writer.write(HEARTBEAT.pack(common.MAVLink(None, 254, 190)))
         for client in (good, noisy):
@@ -83,6 +84,40 @@ async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, ope
         assert (await good.until("PING")).seq == 7
         good.writer.close()
         assert process.returncode is None
+
+
+async def test_what_falls_silent_is_told_as_unknown_and_not_again(spawn: Spawn, open_as: OpenAs) -> None:
+    tcp = find_free_port()
+    states = (await open_as("operator")).publisher(keys.OPERATOR_STATE)
+    estimates = (await open_as("localization")).publisher(keys.ODOMETRY)
+
+    async def publish() -> None:
+        while True:
+            now_us = CLOCK.now_us()
+            states.put(m.OperatorState(source_us=now_us, armed=True, stopped=False, by="dashboard"))
+            estimates.put(
+                m.Odometry(
+                    source_us=now_us, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.5, healthy=True, latitude_deg=50.0,
+                    longitude_deg=8.0,
+                )
+            )  # fmt: skip
+            await asyncio.sleep(0.05)
+
+    publishing = asyncio.create_task(publish())
+    async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'), asyncio.timeout(20.0):
+        station = await Client.connect(tcp)
+        station.send(HEARTBEAT)
+        while (await station.until("HEARTBEAT")).base_mode != 129:
+            pass
+        assert (await station.until("GLOBAL_POSITION_INT")).lat == 500_000_000
+        publishing.cancel()
+        while (await station.until("HEARTBEAT")).base_mode != 1:
+            station.send(HEARTBEAT)
+        while (await station.until("SYS_STATUS")).onboard_control_sensors_health:
+            station.send(HEARTBEAT)
+        station.send(common.MAVLink_command_long_message(1, 1, 512, 0, 33, 0, 0, 0, 0, 0, 0))
+        assert (await station.until("COMMAND_ACK")).result == common.MAV_RESULT_TEMPORARILY_REJECTED
+        station.writer.close()
 
 
 async def test_udp_is_taken_from_its_address_alone(spawn: Spawn, open_as: OpenAs) -> None:
