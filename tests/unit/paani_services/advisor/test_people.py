@@ -158,7 +158,7 @@ EDGE = st.lists(st.floats(0.0, 1.0), min_size=80, max_size=80)
 def test_whoever_the_water_reaches_is_never_taken_to_be_ashore(
     edge: list[float], x: float, y: float, height: float
 ) -> None:
-    person = box(m.Label.PERSON, (x, y, x + 0.05, y + height))
+    person = box(m.Label.PERSON, (x, y, x + 0.05, min(y + height, 1.0)))
     column = int((x + 0.025) * 80)
     edge[column] = min(edge[column], person.box_xyxy[3])
     frame = msgspec.structs.replace(seeing(person), water_edge=tuple(edge))
