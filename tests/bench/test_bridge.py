@@ -47,7 +47,7 @@ def test_bench_bridge() -> None:
     ("words", "complaint"),
     [
         (["--image", "/nowhere/paani.elf"], "--image /nowhere/paani.elf: no such file (make -C mcu/qemu builds it"),
-        (["--count", "1"], "must be 2 to 100000"),
+        (["--count", "1"], "is not from 2 to 100000"),
     ],
 )
 def test_what_is_missing_is_named_in_one_line(words: list[str], complaint: str, tmp_path: Path) -> None:
