@@ -61,11 +61,12 @@ async def measure(fault: Fault, loop: Loop) -> FaultRun:
     hands, rearmed = False, False
     if fault.expected is Expected.HAND or not await _until(lambda: _moves_after(loop, ended_us), BACK_S):
         hands = await _until(loop.is_unarmed, BACK_S)
-        unarmed_us = MONOTONIC.now_us()
-        await asyncio.sleep(STAYS_S)
-        rearmed = _moves_after(loop, unarmed_us)
-        await loop.arm()
-        ended_us = MONOTONIC.now_us()
+        if hands:
+            unarmed_us = MONOTONIC.now_us()
+            await asyncio.sleep(STAYS_S)
+            rearmed = _moves_after(loop, unarmed_us)
+            await loop.arm()
+            ended_us = MONOTONIC.now_us()
         await _until(lambda: _moves_after(loop, ended_us), BACK_S)
     reports = watch.reports[first:]
     zero_s = zero_after_s(reports, loop.hit_us, loop.hit_wall_us, adapter_away=fault.hurts_adapter)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
 from paani import messages as m
 from paani.errors import UserError
+from paani_tools.bench.faults import measure as measuring
 from paani_tools.bench.faults.command import ALL, choose
 from paani_tools.bench.faults.fault import ZERO_S, Expected, Fault
-from paani_tools.bench.faults.measure import FaultRun, keeps_bars, longest_gap_s, zero_after_s
-from paani_tools.bench.faults.running import Loop, Report
+from paani_tools.bench.faults.measure import FaultRun, keeps_bars, longest_gap_s, measure, zero_after_s
+from paani_tools.bench.faults.running import MONOTONIC, Loop, Report, ShiftedClock
 from paani_tools.bench.faults.table import fault_table
 
 HIT_US, WALL_US = 10_000_000, 90_000_000_000
@@ -113,3 +116,48 @@ def test_each_fault_has_one_name_and_can_be_chosen_by_a_word_of_it() -> None:
     assert {each.name for each in choose(["router"])} == {"router killed", "router not running"}
     with pytest.raises(UserError, match="no such fault"):
         choose(["kraken"])
+
+
+class Heard:
+    """What a drive has said, for a fault after which it is slow to come back."""
+
+    def __init__(self) -> None:
+        self.reports: list[Report] = []
+        self.decided_us: list[int] = []
+
+
+class SlowLoop(Loop):
+    """An armed drive that moves again only some time after its fault has ended; nobody's hand is needed."""
+
+    def __init__(self) -> None:
+        self.watch, self.clock, self.armings = Heard(), ShiftedClock(), 0  # type: ignore[assignment]
+
+    async def settle(self) -> bool:
+        return True
+
+    async def arm(self) -> None:
+        self.armings += 1
+
+
+async def test_a_drive_that_is_slow_to_come_back_has_not_armed_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was armed all the time: the time counts from the fault's end, and no hand is said to have helped."""
+    monkeypatch.setattr(measuring, "BACK_S", 0.2)
+    loop = SlowLoop()
+
+    def hear(*, moves: bool) -> None:
+        now_us = MONOTONIC.now_us()
+        cause = m.ZeroCause.NONE if moves else m.ZeroCause.TIMEOUT
+        loop.watch.reports.append(Report(now_us, moves, cause, now_us, now_us))
+
+    async def begin(loop: Loop) -> None:
+        loop.mark()
+        hear(moves=False)
+        asyncio.get_running_loop().call_later(0.5, lambda: hear(moves=True))
+
+    async def end(loop: Loop) -> None:
+        """At once."""
+
+    run = await measure(Fault(name="slow", expected=Expected.STOPS, begin=begin, end=end), loop)
+    assert (run.rearmed, run.hands, loop.armings) == (False, False, 0)
+    assert run.back_s is not None
+    assert run.back_s >= 0.4
