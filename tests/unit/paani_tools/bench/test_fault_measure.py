@@ -118,7 +118,7 @@ def test_each_fault_has_one_name_and_can_be_chosen_by_a_word_of_it() -> None:
         choose(["kraken"])
 
 
-class Heard:
+class SlowWatch:
     """What a drive has said, for a fault after which it is slow to come back."""
 
     def __init__(self) -> None:
@@ -130,7 +130,7 @@ class SlowLoop(Loop):
     """An armed drive that moves again only some time after its fault has ended; nobody's hand is needed."""
 
     def __init__(self) -> None:
-        self.watch, self.clock, self.armings = Heard(), ShiftedClock(), 0  # type: ignore[assignment]
+        self.watch, self.clock, self.armings = SlowWatch(), ShiftedClock(), 0  # type: ignore[assignment]
 
     async def settle(self) -> bool:
         return True
