@@ -33,7 +33,7 @@ class OperatorClient:
     @property
     def state(self) -> m.OperatorState | None:
         """What the operator's process said last; None where that is too long ago to be true still."""
-        return self.states.value if self.states.receipt_age_s() <= keys.OPERATOR_STATE.fresh_s else None
+        return self.states.fresh(keys.OPERATOR_STATE.fresh_s)
 
     async def stop(self, timeout_s: float) -> m.OperatorState | None:
         """Ask for STOP; the state in which it is latched, or None where nobody has answered in time."""

@@ -64,8 +64,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         with bus.alive():
             LOG.info("NMEA 0183 for plotters at tcp://%s", settings.listen)
             while True:
-                own = odometry.value if odometry.receipt_age_s() <= keys.ODOMETRY.fresh_s else None
-                others = prediction.value if prediction.receipt_age_s() <= keys.PREDICTION.fresh_s else None
+                own = odometry.fresh(keys.ODOMETRY.fresh_s)
+                others = prediction.fresh(keys.PREDICTION.fresh_s)
                 plotters.send("".join((*position_sentences(own), *target_sentences(own, others))).encode("ascii"))
                 await asyncio.sleep(1.0 / settings.rate_hz)
     finally:

@@ -52,8 +52,8 @@ def facts_reader(bus: Bus) -> Callable[[], Facts]:
     missions = {topic: bus.latest(topic) for topic in (keys.MISSION, keys.ROUTE)}
 
     def read() -> Facts:
-        pose = odometry.value if odometry.receipt_age_s() <= keys.ODOMETRY.fresh_s else None
-        ahead = prediction.value if prediction.receipt_age_s() <= keys.PREDICTION.fresh_s else None
+        pose = odometry.fresh(keys.ODOMETRY.fresh_s)
+        ahead = prediction.fresh(keys.PREDICTION.fresh_s)
         return Facts(
             position=m.Waypoint(x_m=pose.x_m, y_m=pose.y_m) if pose is not None and pose.healthy else None,
             home=ahead.home[0] if ahead is not None and ahead.home else None,

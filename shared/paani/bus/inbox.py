@@ -59,6 +59,10 @@ class Latest(Inbox[V]):
         self.newest = Input(value, self.received_us)
         self._wake()
 
+    def fresh(self, limit_s: float) -> V | None:
+        """The newest message where it came within this time, else None."""
+        return self.value if self.receipt_age_s() <= limit_s else None
+
     async def next(self) -> V:
         """The newest message that `next` has not returned yet; waits for one."""
         while self._taken or self.value is None:
