@@ -53,3 +53,16 @@ def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:
     meridian_m = prime_vertical_m * (1.0 - ECCENTRICITY2) / w2
     cosine = math.cos(math.radians(latitude_deg))
     return math.radians(prime_vertical_m * cosine), math.radians(meridian_m)
+
+
+def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> dict[str, float]:
+    """Of a rotation about z, then y, then x."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return {
+        "x": sr * cp * cy - cr * sp * sy,
+        "y": cr * sp * cy + sr * cp * sy,
+        "z": cr * cp * sy - sr * sp * cy,
+        "w": cr * cp * cy + sr * sp * sy,
+    }

@@ -12,8 +12,9 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.config import CalibrationConfig, CorridorConfig
+from paani.geometry import quaternion
 from paani.logs import protobuf as pb
-from paani.logs.viewer import MAP_FRAME, quaternion
+from paani.logs.viewer import MAP_FRAME
 from paani_services.foxglove.overlay import BLOCKED, CLEAR
 from paani_services.foxglove.transforms import BASE_FRAME
 

@@ -10,8 +10,9 @@ import math
 
 from paani import messages as m
 from paani.config import CalibrationConfig
+from paani.geometry import quaternion
 from paani.logs import protobuf as pb
-from paani.logs.viewer import CAMERA_FRAME, MAP_FRAME, quaternion
+from paani.logs.viewer import CAMERA_FRAME, MAP_FRAME
 
 ODOM_FRAME, BASE_FRAME = "odom", "base_link"
 Quaternion = dict[str, float]

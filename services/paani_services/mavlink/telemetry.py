@@ -14,7 +14,7 @@ from importlib.metadata import version
 from typing import Any
 
 from paani import messages as m
-from paani.geometry import geodetic_from_enu
+from paani.geometry import geodetic_from_enu, quaternion
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import (
     I16_MAX,
@@ -155,14 +155,13 @@ def attitude_quaternion(snapshot: Snapshot) -> Any | None:
     pose = snapshot.pose
     if pose is None:
         return None
-    half = [0.5 * angle for angle in attitude_rad(pose)]
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, half), map(math.sin, half)
+    turn = quaternion(*attitude_rad(pose))
     return dialect.MAVLink_attitude_quaternion_message(
         snapshot.boot_ms,
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
+        turn["w"],
+        turn["x"],
+        turn["y"],
+        turn["z"],
         NAN,
         NAN,
         -pose.yaw_rate_radps,

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from paani.config import CalibrationConfig
-from paani.logs.viewer import quaternion
+from paani.geometry import quaternion
 
 
 class Vector(NamedTuple):

@@ -20,9 +20,9 @@ from paani import keys
 from paani import messages as m
 from paani.config import Config
 from paani.errors import UserError
+from paani.geometry import quaternion
 from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log, Record
-from paani.logs.viewer import quaternion
 from paani.undecodable import UNDECODABLE
 from paani.whole_file import replacement_file
 from paani_services.foxglove.mask_colours import tint_mask

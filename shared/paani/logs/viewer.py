@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
+from paani.geometry import quaternion
 from paani.logs import protobuf as pb
 from paani.undecodable import UNDECODABLE
 
@@ -154,16 +154,3 @@ class Viewer:
         self._said[name] = key
         fields = {"timestamp": pb.timestamp(at_us), "level": level, "message": line, "name": name}
         return [Derived(LINES, at_us, pb.encode(pb.LOG, fields))]
-
-
-def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> dict[str, float]:
-    """Of a rotation about z, then y, then x."""
-    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
-    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return {
-        "x": sr * cp * cy - cr * sp * sy,
-        "y": cr * sp * cy + sr * cp * sy,
-        "z": cr * cp * sy - sr * sp * cy,
-        "w": cr * cp * cy + sr * sp * sy,
-    }
