@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from pathlib import Path
 
 import msgspec
@@ -83,17 +84,24 @@ def _fault_of_mutant(mutant: Mutant, root: Path) -> str:
     if path.suffix != ".py":
         return "" if mutant.before != mutant.after else f"changes nothing: {mutant}"
     try:
-        after = ast.parse(source.replace(mutant.before, mutant.after))
+        after = _code(source.replace(mutant.before, mutant.after))
     except SyntaxError as error:
         return f"is no Python any more: {mutant} ({error.msg})"
-    return "" if _code(ast.parse(source)) != _code(after) else f"changes no code: {mutant}"
+    return "" if _code_of_file(source) != after else f"changes no code: {mutant}"
 
 
-def _code(tree: ast.Module) -> str:
-    """The code without its docstrings and comments."""
+def _code(source: str) -> str:
+    """The code without its docstrings and comments. Raises SyntaxError."""
+    tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = [
                 each for each in node.body if not (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
             ]
     return ast.dump(tree)
+
+
+@functools.cache
+def _code_of_file(source: str) -> str:
+    """The code of a file as it stands, which all its mutants are compared with."""
+    return _code(source)
