@@ -24,12 +24,12 @@ import msgspec
 
 from paani.errors import UserError
 from paani.extras import require_modules
+from paani.port_address import is_loopback
 from paani.source_checksum import checksum_packages
 from paani.version import version_text
 
 LOCAL = "local"
 CONNECT_S = 5.0  # a scheduler that does not answer by then is not there
-LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 PACKAGES = ("paani", "paani_models", "paani_services", "paani_sim")
 ENDINGS = (".py", ".toml", ".json", ".onnx")
 LIBRARIES = ("numpy", "opencv-python-headless", "onnxruntime", "msgspec", "mujoco", "scipy", "filterpy")
@@ -151,7 +151,7 @@ def open_workers(address: str | None, processes: int) -> Iterator[Workers]:
         if address == LOCAL:
             client = stack.enter_context(Client(stack.enter_context(_local_cluster(processes))))
         else:
-            if address.startswith("tcp:") and urlsplit(address).hostname not in LOOPBACK:
+            if address.startswith("tcp:") and not is_loopback(urlsplit(address).hostname):
                 sys.stderr.write(
                     f"--cluster {address}: whoever reaches it can run code here; tls:// keeps others out\n"
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import re
 from urllib.parse import urlsplit
 
@@ -54,3 +55,10 @@ def tcp_address(address: str) -> tuple[str, int]:
         if parts.hostname and parts.port and address.rpartition(":")[0].strip("[]").lower() == parts.hostname:
             return parts.hostname, parts.port
     raise ValueError(f"'{address}' is no HOST:PORT")
+
+
+def is_loopback(host: str | None) -> bool:
+    """Whether only programs of this machine reach a host: `localhost`, or an address of the loopback interface."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host or "").is_loopback
+    return host == "localhost"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import ipaddress
 import itertools
 import logging
 from collections.abc import Callable
@@ -14,7 +13,7 @@ from typing import Any
 from paani.clock import Clock
 from paani.config import MavlinkConfig
 from paani.errors import UserError
-from paani.port_address import tcp_address
+from paani.port_address import is_loopback, tcp_address
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.gateway import Gateway
 from paani_services.mavlink.signing import Signer
@@ -24,13 +23,6 @@ LOG = logging.getLogger(__name__)
 MAX_UNREAD_BYTES = 65_536  # ten seconds of telemetry: whoever has not read it is not there
 CHUNK_BYTES = 4096
 PAUSE_S = 0.1  # before the next chunk is read, after one that came too fast and was thrown away
-
-
-def is_local(host: str) -> bool:
-    """Whether an address is this machine's loopback interface."""
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host.partition("%")[0]).is_loopback
-    return host == "localhost"
 
 
 class UdpLink(asyncio.DatagramProtocol):
@@ -118,7 +110,7 @@ class Endpoints:
         self._gateway.receive(station, data, self._clock.now_us())
 
     def _add(self, name: str, write: Callable[[bytes], None], host: str) -> Station:
-        station = Station(name, Codec(next(self._link_ids), self._signer), write, is_local=is_local(host))
+        station = Station(name, Codec(next(self._link_ids), self._signer), write, is_local=is_loopback(host))
         self._gateway.stations.append(station)
         return station
 

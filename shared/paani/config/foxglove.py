@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import ipaddress
 from typing import Annotated
 
 import msgspec
 
 from paani.config.section import Section
+from paani.port_address import is_loopback
 
 TcpPort = Annotated[int, msgspec.Meta(ge=1, le=65535)]
 
@@ -33,11 +33,3 @@ class FoxgloveConfig(Section, frozen=True):
                 f"host {self.host}: other machines reach it, and viewers need no password; set tls_pem before it, or"
                 " keep 127.0.0.1"
             )
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only programs of this machine reach an address."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

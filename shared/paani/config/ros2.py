@@ -7,10 +7,9 @@ from typing import Annotated
 import msgspec
 
 from paani.config.section import Positive, Section
-from paani.port_address import tcp_address
+from paani.port_address import is_loopback, tcp_address
 
 TCP = "tcp/"
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 class Ros2Config(Section, frozen=True):
@@ -33,7 +32,7 @@ class Ros2Config(Section, frozen=True):
         if not self.listen.startswith(TCP):
             raise ValueError(f"listen '{self.listen}': expected tcp/HOST:PORT")
         host, _ = tcp_address(self.listen.removeprefix(TCP))
-        if self.accept_commands and host not in LOOPBACK:
+        if self.accept_commands and not is_loopback(host):
             raise ValueError(f"accept_commands: not where other machines reach listen '{self.listen}'")
 
 

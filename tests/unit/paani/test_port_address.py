@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from paani.port_address import parse_address, require_line
+from paani.port_address import is_loopback, parse_address, require_line
 
 
 @pytest.mark.parametrize(
@@ -50,3 +50,24 @@ def test_a_line_is_a_port_or_the_boards_router(address: str) -> None:
 def test_what_is_no_line_is_refused_with_all_that_would_be_one(address: str) -> None:
     with pytest.raises(ValueError, match=r"^'[^\n]*unix:/PATH\)$"):
         require_line(address)
+
+
+@pytest.mark.parametrize(
+    ("host", "local"),
+    [
+        ("127.0.0.1", True),
+        ("127.8.9.1", True),
+        ("::1", True),
+        ("::1%lo", True),
+        ("localhost", True),
+        ("192.168.1.2", False),
+        ("0.0.0.0", False),
+        ("fe80::1%lo", False),
+        ("127.0.0.1.example", False),
+        ("", False),
+        (None, False),
+        ("::", False),
+    ],
+)
+def test_this_machine_is_its_loopback_interface(host: str | None, local: bool) -> None:
+    assert is_loopback(host) is local

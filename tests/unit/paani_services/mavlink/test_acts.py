@@ -8,7 +8,6 @@ from paani import messages as m
 from paani.config import load_config
 from paani.errors import UserError
 from paani_services.mavlink.acts import is_link_lost
-from paani_services.mavlink.endpoints import is_local
 from tests.mavlink_peer import NOW_US, armed, in_order
 
 OURS = m.OperatorState(source_us=NOW_US, armed=True, stopped=False, by="mavlink")
@@ -27,24 +26,6 @@ def test_a_boat_that_somebody_else_armed_goes_on() -> None:
     assert not is_link_lost(armed(), "mavlink", 0, 5.0)  # by the page
     assert not is_link_lost(in_order(), "mavlink", 0, 5.0)
     assert not is_link_lost(armed(operator=None), "mavlink", 0, 5.0)
-
-
-@pytest.mark.parametrize(
-    ("host", "local"),
-    [
-        ("127.0.0.1", True),
-        ("127.8.9.1", True),
-        ("::1", True),
-        ("localhost", True),
-        ("192.168.1.2", False),
-        ("0.0.0.0", False),
-        ("fe80::1%lo", False),
-        ("127.0.0.1.example", False),
-        ("", False),
-    ],
-)
-def test_this_machine_is_its_loopback_interface(host: str, local: bool) -> None:
-    assert is_local(host) is local
 
 
 @pytest.mark.parametrize(
