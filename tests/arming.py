@@ -8,7 +8,7 @@ import aiohttp
 
 from paani.config import BusConfig
 from paani.operator_key import ensure_operator_key
-from paani_services.dashboard.server import KEY_HEADER
+from paani_services.dashboard.gatekeeper import KEY_HEADER
 
 REFRESH_S = 0.15
 

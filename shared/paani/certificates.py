@@ -26,9 +26,10 @@ from paani.undecodable import UNDECODABLE
 INDEX_FILE = "identities.json"
 AUTHORITY = "authority"
 ALL = "all"  # in place of an identity: each of them, and the authority
-# What listens: clients are told nothing by it but that the authority signed it for this address.
+# What listens: clients are told nothing by it but that the authority signed it for this address. Routers, and the page.
 BOARD_ROUTER, HOST_ROUTER = "board_router", "host_router"
-LISTENERS = (BOARD_ROUTER, HOST_ROUTER)
+PAGE = "page"
+LISTENERS = (BOARD_ROUTER, HOST_ROUTER, PAGE)
 
 
 UnixTime = Annotated[int, msgspec.Meta(ge=0, le=253_402_300_799)]  # [s]; up to the year 9999, as X.509 has it
@@ -113,6 +114,29 @@ def router_settings(config: BusConfig, connecting: str | None) -> dict[str, obje
     listener = listener_of(config)
     identities = require_certificates(config, (listener, *([connecting] if connecting else [])))
     return {"transport/link/tls": _tls(config, identities, connecting=connecting, listening=listener)}
+
+
+def page_server_tls(config: BusConfig) -> ssl.SSLContext:
+    """What the page's server shows. Raises UserError as `require_certificates`, and where there is no certificate."""
+    if not config.certificates:
+        raise UserError(
+            "dashboard.host: beyond this machine the page is encrypted, but bus.certificates is not set (make some: "
+            "paani certs make --folder certs --address ADDRESS; then --set bus.certificates=certs)"
+        )
+    identities = require_certificates(config, (PAGE,))
+    if PAGE not in identities.holders:
+        raise UserError(
+            f"bus.certificates {config.certificates}: none for the page (`paani certs rotate all` makes it)"
+        )
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(_path(config, identities, PAGE, "pem"), _path(config, identities, PAGE, "key"))
+    return context
+
+
+def page_client_tls(config: BusConfig) -> ssl.SSLContext:
+    """Knows the page's server by the authority of `bus.certificates`. Raises UserError."""
+    identities = require_certificates(config, ())
+    return ssl.create_default_context(cafile=_path(config, identities, AUTHORITY, "pem"))
 
 
 def endpoint(config: BusConfig, address: str) -> str:

@@ -15,7 +15,8 @@ import pytest
 
 from paani import keys
 from paani.config import Config
-from paani_services.dashboard.server import GIVEN_AWAY, KEY_HEADER, MAX_CLIENTS
+from paani_services.dashboard.gatekeeper import KEY_HEADER
+from paani_services.dashboard.server import GIVEN_AWAY, MAX_CLIENTS
 from tests.arming import arm_on_page, headers_of, hold_on_page
 from tests.browser.conftest import Boat
 from tests.conftest import OpenAs, Spawn

@@ -217,7 +217,7 @@ class PageRequests(Target):
             except BadRequestError as error:
                 _refused(error)
         for host in (text, f"[{text}]", f"127.0.0.1:{text}", f"localhost{text[:20]}"):
-            is_own_host(host, "127.0.0.1")
+            is_own_host(host, ("127.0.0.1",))
             is_same_origin(f"http://{host}", text)
         return "" if "" in causes else sorted(causes)[0]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+from collections.abc import Iterable
 from typing import Annotated, TypeVar
 from urllib.parse import urlsplit
 
@@ -56,14 +57,14 @@ def decode_query(query: dict[str, str], kind: type[T]) -> T:
         raise _bad_request(error, "query") from error
 
 
-def is_own_host(host_header: str, bound_host: str) -> bool:
-    """Whether a Host header names this server by address, as localhost, or as configured.
+def is_own_host(host_header: str, names: Iterable[str]) -> bool:
+    """Whether a Host header names this server by address, as localhost, or by one of these names.
 
     Any other name may belong to a foreign page whose name was made to resolve to this machine (DNS rebinding).
     """
     try:
         name = urlsplit(f"//{host_header}").hostname or ""
-        if name not in {"localhost", bound_host.lower()}:
+        if name not in {"localhost", *(each.lower() for each in names)}:
             ipaddress.ip_address(name)
     except ValueError:
         return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hmac
+import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -15,12 +15,14 @@ from paani.board_status import STATUS_PATH
 from paani.bus import Picture
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
-from paani.errors import UserError
 from paani.extras import missing_module
 from paani.operator_client import OperatorClient
+from paani.page_address import LOGIN_PATH
 from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.driving import Driving
+from paani_services.dashboard.gatekeeper import Gatekeeper
 from paani_services.dashboard.hub import Client, Hub
+from paani_services.dashboard.listening import listening
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
 from paani_services.dashboard.readiness import find_unready
@@ -31,7 +33,6 @@ from paani_services.dashboard.requests import (
     SnapshotQuery,
     decode_body,
     decode_query,
-    is_own_host,
     is_same_origin,
 )
 from paani_services.dashboard.responses import error_response, json_response
@@ -41,9 +42,9 @@ from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tun
 MAX_CLIENTS = 16  # pages at once: one more takes the place of the page that has been connected longest
 GIVEN_AWAY = 4001  # close code of a page whose place was taken, from the range for private use (RFC 6455, 7.4.2)
 MAX_BODY_BYTES = 4096
+LOGGED_OUT = 4002  # close code of a page whose session was ended
 SEND_TIMEOUT_S = 15.0
 HEARTBEAT_S = 5.0
-KEY_HEADER = "X-Paani-Key"
 ANSWER_TIMEOUT_S = 1.0
 MAX_REPORT_AGE_S = 3.0
 STOP_PATH = "/api/stop"
@@ -62,12 +63,12 @@ class Server:
         clock: Clock,
         config: Config,
         pages: dict[str, StaticFile],
-        key: str,
+        gatekeeper: Gatekeeper,
     ) -> None:
         self._hub, self._operator, self._tuner = hub, operator, tuner
-        self._clock, self._whole, self._config = clock, config, config.dashboard
-        self._pages, self._key = pages, key
-        self._driving = Driving(operator, self._refuse_other_page)
+        self._clock, self._config = clock, config
+        self._pages, self._gatekeeper = pages, gatekeeper
+        self._driving = Driving(operator, gatekeeper.refuse_act)
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 
@@ -77,6 +78,7 @@ class Server:
             [
                 web.get("/", self._page),
                 web.get("/static/{name}", self._page),
+                *([web.get(LOGIN_PATH, self._login)] if self._gatekeeper.asks_login else []),
                 web.get("/ws", self._socket),
                 web.get("/snapshot.jpg", self._snapshot),
                 web.get("/healthz", self._healthz),
@@ -88,6 +90,7 @@ class Server:
                 web.post("/api/arm/hold", self._hold),
                 web.post("/api/arm/release", self._release),
                 *self._driving.routes(),
+                *self._gatekeeper.routes(),
                 web.get("/api/tune", self._tuning),
                 web.post("/api/tune/propose", self._propose),
                 web.post("/api/tune/promote", self._promote),
@@ -107,12 +110,12 @@ class Server:
 
     async def _guarded(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
-            if request.path != STOP_PATH and not is_own_host(request.host, self._config.host):
-                response: web.StreamResponse = error_response(403, "Host: not a name of this server", "Host")
-            else:
-                response = await handler(request)
+            refused = None if request.path == STOP_PATH else self._gatekeeper.refuse(request)
+            response: web.StreamResponse = refused or await handler(request)
         except BadRequestError as error:
             response = error_response(400, str(error), error.field)
+        except web.HTTPRedirection as error:
+            response = web.Response(status=error.status, headers={"Location": error.headers["Location"]})
         except web.HTTPException as error:
             response = error_response(error.status, error.reason, request.path)
         if not response.prepared:
@@ -120,7 +123,13 @@ class Server:
         return response
 
     async def _page(self, request: web.Request) -> web.Response:
-        page = self._pages.get(request.match_info.get("name", "index.html"))
+        return self._file(request.match_info.get("name", "index.html"))
+
+    async def _login(self, request: web.Request) -> web.Response:
+        return self._file("login.html")
+
+    def _file(self, name: str) -> web.Response:
+        page = self._pages.get(name)
         if page is None:
             raise web.HTTPNotFound
         return web.Response(body=page.body, content_type=page.media_type, charset="utf-8")
@@ -151,24 +160,14 @@ class Server:
         return json_response({"armed": True})
 
     def _refuse_to_arm(self, request: web.Request) -> web.Response | None:
-        if (refused := self._refuse_other_page(request, "arm")) is not None:
+        if (refused := self._gatekeeper.refuse_act(request, "arm")) is not None:
             return refused
         if self._tuner.is_waiting:
             return error_response(409, "not armed: a tuning request waits for the advisor", "armed")
         return None
 
-    def _refuse_other_page(self, request: web.Request, action: str) -> web.Response | None:
-        """The error response to a request not from this server's own page, or without the operator's key; else None."""
-        if not is_same_origin(request.headers.get("Origin"), request.host):
-            return error_response(403, f"Origin: only this server's own page may {action}", "Origin")
-        if not hmac.compare_digest(request.headers.get(KEY_HEADER, "").encode(), self._key.encode()):
-            return error_response(
-                403, f"{KEY_HEADER}: not the operator's key, without which nobody may {action}", KEY_HEADER
-            )
-        return None
-
     async def _propose(self, request: web.Request) -> web.Response:
-        if (refused := self._refuse_other_page(request, "tune")) is not None:
+        if (refused := self._gatekeeper.refuse_act(request, "tune")) is not None:
             return refused
         return tuning_response(await self._tuner.propose(decode_body(await request.read(), ProposeRequest).changes))
 
@@ -179,7 +178,7 @@ class Server:
         return await self._send_act(request, m.TuningAct.ROLLBACK)
 
     async def _send_act(self, request: web.Request, act: m.TuningAct) -> web.Response:
-        if (refused := self._refuse_other_page(request, "tune")) is not None:
+        if (refused := self._gatekeeper.refuse_act(request, "tune")) is not None:
             return refused
         return tuning_response(
             await self._tuner.send_act(act, decode_body(await request.read(), ProposalRequest).proposal)
@@ -211,7 +210,7 @@ class Server:
 
     async def _readyz(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
-        unready = find_unready(self._hub, self._whole.services, self._clock.now_us())
+        unready = find_unready(self._hub, self._config.services, self._clock.now_us())
         return json_response({"ready": not unready, "unready": unready}, 503 if unready else 200)
 
     async def _metrics(self, request: web.Request) -> web.Response:
@@ -222,7 +221,7 @@ class Server:
             if (remedy := missing_module("/metrics", error)) is None:
                 raise
             return error_response(501, str(remedy), request.path)
-        text = metrics_text(self._hub, self._whole, self._clock.now_us())
+        text = metrics_text(self._hub, self._config, self._clock.now_us())
         return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
 
     async def _topics(self, request: web.Request) -> web.Response:
@@ -231,7 +230,7 @@ class Server:
 
     async def _status(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
-        return json_response(board_status(self._hub, self._whole.profile, self._clock.now_us()))
+        return json_response(board_status(self._hub, self._config.profile, self._clock.now_us()))
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):
@@ -244,7 +243,7 @@ class Server:
         closing = [
             asyncio.create_task(each.close(code=GIVEN_AWAY)) for each in list(self._sockets.values())[:-MAX_CLIENTS]
         ]
-        sender = asyncio.create_task(send_all(socket, client))
+        sender = asyncio.create_task(send_all(socket, client, lambda: self._gatekeeper.may_watch(request)))
         try:
             async for message in socket:
                 if message.type in {WSMsgType.TEXT, WSMsgType.BINARY}:
@@ -257,13 +256,16 @@ class Server:
         return socket
 
 
-async def send_all(socket: web.WebSocketResponse, client: Client) -> None:
-    """Send the queued frames; a client that takes nothing for `SEND_TIMEOUT_S` is disconnected."""
+async def send_all(socket: web.WebSocketResponse, client: Client, may_watch: Callable[[], bool]) -> None:
+    """Send the queued frames; a client that takes nothing for `SEND_TIMEOUT_S`, or may not watch, is disconnected."""
     try:
         while True:
             await client.frames_ready.wait()
             client.frames_ready.clear()
             while (frame := client.queue.pop()) is not None:
+                if not may_watch():
+                    await socket.close(code=LOGGED_OUT)
+                    return
                 async with asyncio.timeout(SEND_TIMEOUT_S):
                     await socket.send_bytes(frame)
     except (ConnectionError, TimeoutError):
@@ -271,22 +273,15 @@ async def send_all(socket: web.WebSocketResponse, client: Client) -> None:
 
 
 @contextlib.asynccontextmanager
-async def serving(server: Server, config: DashboardConfig) -> AsyncIterator[None]:
-    """Listen on the configured host only. Raises UserError naming `dashboard.port` or `dashboard.host`."""
+async def serving(server: Server, config: DashboardConfig, tls: ssl.SSLContext | None) -> AsyncIterator[None]:
+    """Listen on the configured host only; tls: None: not encrypted. Raises UserError."""
     runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     assert runner.server is not None
-    protocols = BoundedConnections(runner.server, server.busy)
     try:
-        listener = await asyncio.get_running_loop().create_server(protocols, config.host, config.port)
-    except OSError as error:
-        await runner.cleanup()
-        field = "dashboard.host" if isinstance(error.errno, int) and error.errno < 0 else "dashboard.port"
-        raise UserError(f"{field} {config.host}:{config.port}: {error.strerror}") from error
-    try:
-        yield
+        async with listening(BoundedConnections(runner.server, server.busy), config.host, config.port, tls):
+            yield
     finally:
-        listener.close()
         await runner.cleanup()
 
 

@@ -10,10 +10,13 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Latest
+from paani.certificates import identities_of, page_server_tls
 from paani.clock import Clock
 from paani.config import Config
 from paani.operator_client import OperatorClient
 from paani.operator_key import ensure_operator_key
+from paani.page_address import is_page_exposed
+from paani_services.dashboard.gatekeeper import Gatekeeper
 from paani_services.dashboard.hub import Event, Hub
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.page_state import ServiceLiveness, page_settings
@@ -65,8 +68,11 @@ async def web_server(
     """Run the web server while the context lasts."""
     key = await asyncio.to_thread(ensure_operator_key, config.bus)
     pages = await asyncio.to_thread(load_static_files)
-    server = Server(hub, operator, tuner, clock, config, pages, key)
-    async with serving(server, config.dashboard):
+    is_exposed = is_page_exposed(config)
+    tls = await asyncio.to_thread(page_server_tls, config.bus) if is_exposed else None
+    names = identities_of(config.bus).addresses if is_exposed else ()
+    server = Server(hub, operator, tuner, clock, config, pages, Gatekeeper(config, key, clock, names))
+    async with serving(server, config.dashboard, tls):
         yield
 
 

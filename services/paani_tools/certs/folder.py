@@ -47,7 +47,8 @@ def rotate(folder: Path, name: str, now_us: int, days: int) -> Identities:
     """
     with _changing(folder) as old:
         if name == ALL:
-            numbers = {holder: certificate.number + 1 for holder, certificate in old.holders.items()}
+            lives = [each for each in names_in(old.graph) if each not in old.revoked]
+            numbers = {each: old.holders[each].number + 1 if each in old.holders else 1 for each in lives}
             authority = old.authority.number + 1
             new = _issue_all(folder, old.graph, old.addresses, numbers, authority, now_us, days)
             new = replace(new, revoked=old.revoked)

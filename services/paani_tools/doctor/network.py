@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-import urllib.request
 from collections.abc import Iterator
 from http.client import HTTPException
 
 from paani.bus.routing import parse_endpoint, require_addresses
 from paani.config import BusConfig, Config
 from paani.errors import UserError
+from paani.page_address import LOGIN_PATH, is_page_exposed
+from paani.page_connection import connect_to_page
 from paani.sides import Side
 from paani_tools.doctor.finding import Verdict, failed, passed, warned
 from paani_tools.inspect.listen import observer
@@ -68,7 +69,7 @@ def check_page(config: Config) -> Iterator[Verdict]:
         try:
             probe.bind((page.host, page.port))
         except OSError as error:
-            if _shows_page(page.host, page.port):
+            if _shows_page(config):
                 yield passed(f"{address}: a page of PAANI is served there")
             else:
                 yield failed(f"{address}: {error.strerror}", "stop that program, or --set dashboard.port=...")
@@ -76,9 +77,11 @@ def check_page(config: Config) -> Iterator[Verdict]:
     yield passed(f"{address}: free")
 
 
-def _shows_page(host: str, port: int) -> bool:
+def _shows_page(config: Config) -> bool:
     try:
-        with urllib.request.urlopen(f"http://{host}:{port}/", timeout=REACH_S) as answer:
-            return PAGE_MARK in answer.read(1 << 16)
-    except (OSError, HTTPException):
+        connection = connect_to_page(config, REACH_S)
+        with contextlib.closing(connection):
+            connection.request("GET", LOGIN_PATH if is_page_exposed(config) else "/")
+            return PAGE_MARK in connection.getresponse().read(1 << 16)
+    except (OSError, HTTPException, UserError):
         return False

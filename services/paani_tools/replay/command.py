@@ -15,6 +15,7 @@ from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
 from paani.option_paths import input_path, output_file
+from paani.page_address import page_origin
 from paani.whole_file import write_json
 from paani_tools.progress import Progress
 from paani_tools.replay.compatibility import provenance_of
@@ -71,7 +72,7 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
             f" --set bus.vessel={bus.vessel}{profile}\n"
         )
         if what.dashboard:
-            sys.stdout.write(f"  http://{config.dashboard.host}:{config.dashboard.port}\n")
+            sys.stdout.write(f"  {page_origin(config)}\n")
         sys.stdout.flush()
         for problem in log.problems:
             sys.stderr.write(f"damaged: {problem}\n")

@@ -10,6 +10,8 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Shadow
 from paani.operator_key import ensure_operator_key
+from paani.page_address import page_origin
+from paani.page_connection import connect_to_page
 from paani.undecodable import UNDECODABLE
 
 TIMEOUT_S = 5.0
@@ -25,7 +27,7 @@ class Client:
     """One request each to the dashboard of the configuration."""
 
     def __init__(self, config: Config) -> None:
-        self._config, self._bus = config.dashboard, config.bus
+        self._config, self._origin = config, page_origin(config)
 
     def status(self) -> Shadow:
         """The advisor's newest report. Raises UserError when there is none."""
@@ -33,17 +35,13 @@ class Client:
 
     def ask(self, deed: str, body: object) -> Shadow:
         """Ask to "propose", "promote" or "rollback"; the advisor's answer, which may refuse. Raises UserError."""
-        key = ensure_operator_key(self._bus)
-        return self._report(*self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body), key))
+        return self._report(*self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body)))
 
-    @property
-    def _origin(self) -> str:
-        return f"http://{self._config.host}:{self._config.port}"
-
-    def _send(self, method: str, path: str, body: bytes | None = None, key: str = "") -> tuple[int, bytes]:
-        connection = http.client.HTTPConnection(self._config.host, self._config.port, timeout=TIMEOUT_S)
+    def _send(self, method: str, path: str, body: bytes | None = None) -> tuple[int, bytes]:
+        headers = {"Origin": self._origin, "X-Paani-Key": ensure_operator_key(self._config.bus)}
+        connection = connect_to_page(self._config, TIMEOUT_S)
         try:
-            connection.request(method, path, body, {"Origin": self._origin, "X-Paani-Key": key})
+            connection.request(method, path, body, headers)
             answer = connection.getresponse()
             return answer.status, answer.read()
         except (OSError, http.client.HTTPException) as error:

@@ -11,6 +11,7 @@ from paani.config import BusConfig, Config
 from paani.messages import ArmRefusal
 from paani.operator_client import OperatorClient
 from paani.operator_key import ensure_operator_key, operator_key_path
+from paani.page_address import is_page_exposed, page_origin
 
 CLIENT = "arm"
 ATTEMPTS = 5  # a process of a busy machine may miss a beat while everything starts
@@ -34,9 +35,13 @@ async def arm_once(config: BusConfig, clock: Clock, say: Callable[[str], None]) 
 
 def page_line(config: Config) -> str:
     """Where the page is; with the operator's key for a person at a terminal, and for a log without."""
-    page = f"open http://{config.dashboard.host}:{config.dashboard.port}"
+    page = f"open {page_origin(config)}"
     key = ensure_operator_key(config.bus)
-    return f"{page}/#key={key}" if sys.stdout.isatty() else f"{page} (key: {operator_key_path(config.bus)})"
+    return (
+        f"{page}/{'login' if is_page_exposed(config) else ''}#key={key}"
+        if sys.stdout.isatty()
+        else f"{page} (key: {operator_key_path(config.bus)})"
+    )
 
 
 def _why(refusal: ArmRefusal | None) -> str:

@@ -13,10 +13,12 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from paani.bus.routing import require_addresses, require_free
+from paani.certificates import page_server_tls
 from paani.config import CameraConfig, Config, calibration_of
 from paani.errors import UserError
 from paani.extras import require_modules
 from paani.keys import Graph
+from paani.page_address import is_page_exposed
 from paani.runtime import runtime_dir
 from paani_services.camera.picture_sources import read_frames
 from paani_services.navigator.files.mission_file import load_route_and_mission
@@ -53,6 +55,8 @@ async def make_plan(config: Config) -> Plan:
     """What starts on this machine. Raises UserError for what can be known before anything starts."""
     await asyncio.to_thread(require_addresses, config.bus)
     if config.dashboard.serve and "dashboard" in config.services:
+        if is_page_exposed(config):
+            await asyncio.to_thread(page_server_tls, config.bus)
         await _require_free_page(config)
     if "ros2" in config.services:
         await asyncio.to_thread(require_free, "ros2.listen", config.ros2.listen)

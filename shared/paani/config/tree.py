@@ -53,7 +53,11 @@ class BusConfig(Section, frozen=True):
 
 
 class DashboardConfig(Section, frozen=True):
-    host: str = "127.0.0.1"  # this machine alone: whoever reaches the page may watch and stop
+    # This machine alone. Any other address is served by TLS, with a certificate of `bus.certificates`, and to whoever
+    # gives the operator's key; STOP is for everybody.
+    host: str = "127.0.0.1"
+    # Whether what leads to `host` listens on a loopback address itself: a container's published port, or a tunnel.
+    behind_loopback: bool = False
     port: Port = 8043  # ends in the paper's domain
     serve: bool = True  # whether there is a page; the process runs without it too
     picture_rate_hz: Positive = 10.0  # at most so many pictures are sent to a page

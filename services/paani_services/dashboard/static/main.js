@@ -13,6 +13,7 @@ import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
 import { bindOperatorControls, renderOperatorState } from "./operator.js";
 import { bindPalette, nextPalette } from "./palette.js";
+import { requireSession } from "./requests.js";
 import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
 import { renderStages } from "./stages.js";
@@ -50,6 +51,7 @@ function onMessage(key, header, body) {
 /** @param {boolean} isOpen */
 function onOpen(isOpen) {
   open = isOpen;
+  void requireSession();
   if (isOpen && opened++ > 0) document.querySelector("#log")?.replaceChildren();
 }
 

@@ -1,27 +1,13 @@
 // @ts-check
-// The operator's controls: STOP is one press, sent until the server answers; arming is a hold that expires.
+// The operator's controls: arming is a hold that expires; what became of a STOP is shown beside it.
 
 import { isReplay } from "./inhibits.js";
 import { bindKey, hasKey, post } from "./requests.js";
+import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
 import { byId, fixed, operatorText, setText, words } from "./text.js";
 
-const HOLD_MS = 1000, EXPIRES_MS = 5000, RETRY_MS = 400, REFRESH_MS = 150;
-const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
-let isStopPending = false, stopAskedAt = 0, refusal = "", heldFrom = 0, press = 0, refreshing = 0;
-
-export async function stop() {
-  release(false);
-  refusal = "";
-  if (isStopPending) return;
-  isStopPending = true;
-  stopAskedAt = performance.now();
-  while (isStopPending) {
-    try {
-      if ((await fetch("/api/stop", { method: "POST" })).ok) isStopPending = false;
-    } catch { /* asked again below */ }
-    if (isStopPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-  }
-}
+const HOLD_MS = 1000, EXPIRES_MS = 5000, REFRESH_MS = 150;
+let refusal = "", heldFrom = 0, press = 0, refreshing = 0;
 
 /** @param {string} act */
 async function send(act) {
@@ -51,14 +37,10 @@ function release(mayArm) {
 
 export function bindOperatorControls() {
   bindKey();
-  byId("stop").addEventListener("pointerdown", stop);
-  byId("stop").addEventListener("click", stop);
-  addEventListener("keydown", (event) => {
-    if (event.code !== "Space" && event.key !== "Escape") return;
-    event.preventDefault();
-    event.stopPropagation();
-    if (!event.repeat) void stop();
-  }, true);
+  bindStop(() => {
+    release(false);
+    refusal = "";
+  });
   const button = byId("arm");
   button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
     button.setPointerCapture(event.pointerId);
@@ -86,17 +68,10 @@ export function renderOperatorState(store, open, now) {
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  const shown = isStopPending ? pendingStop(now) : isReplay(store) ? { state: "", word: "READ-ONLY", detail: "a recording is played" } : operatorState(operator, isHeard, store.ageS("operator/state", now));
+  const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: "READ-ONLY", detail: "a recording is played" } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
   state.dataset.state = shown.state;
   setText(byId("order-word"), shown.word);
   setText(byId("order-detail"), refusal || shown.detail);
-}
-
-/** A STOP that the server has not answered yet. @param {number} now */
-function pendingStop(now) {
-  const waitedMs = now - stopAskedAt;
-  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: `${fixed(waitedMs, 0)} ms ago` };
-  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: `nobody answers; asked again for ${fixed(waitedMs / 1000, 0)} s` };
 }
 
 /** @param {any} operator @param {boolean} isHeard @param {number} ageS */

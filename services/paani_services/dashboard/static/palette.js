@@ -20,6 +20,6 @@ export function nextPalette() {
 
 export function bindPalette() {
   light.addEventListener("change", apply);
-  byId("palette").addEventListener("click", nextPalette);
+  byId("palette")?.addEventListener("click", nextPalette);
   apply();
 }

@@ -1,6 +1,9 @@
 // @ts-check
-// Requests of the operator's page, with the operator's key.
+// Requests of the operator's page: with the operator's key, or where a login was asked by the session that it began.
 
+import { byId } from "./text.js";
+
+let hasSession = false;
 let key = sessionStorage.getItem("paani-key") ?? "";
 
 /** The operator's key comes after the address (`#key=...`), from where no server and no log sees it. */
@@ -17,13 +20,30 @@ function keepKey(text) {
   sessionStorage.setItem("paani-key", key);
 }
 
+/** To the login where there has to be one, and is none any more. */
+export async function requireSession() {
+  try {
+    const answer = await fetch("/api/session");
+    if (answer.status === 401) location.assign("/login");
+    else hasSession = (await answer.json()).login;
+  } catch { /* no connection: asked again with the next one */ }
+  byId("logout").hidden = !hasSession;
+}
+
+async function logOut() {
+  await post("/api/logout", {});
+  location.assign("/login");
+}
+
 export function bindKey() {
   takeKey();
   addEventListener("hashchange", takeKey);
+  byId("logout").addEventListener("click", () => void logOut());
 }
 
 /** Whether there is a key; asks for one where there is none. */
 export function hasKey() {
+  if (hasSession) return true;
   if (!key) keepKey(prompt("The operator's key, which `paani up` prints:") ?? "");
   return Boolean(key);
 }
@@ -41,6 +61,7 @@ export async function post(path, body, isLast = false) {
       keepalive: isLast,
     });
     if (answer.ok) return "";
+    if (answer.status === 401) void requireSession();
     if (answer.status === 403) keepKey("");
     return String((await answer.json()).error);
   } catch {

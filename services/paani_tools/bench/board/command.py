@@ -23,6 +23,7 @@ from paani.errors import UserError
 from paani.keys import Graph
 from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_folder
+from paani.page_address import page_origin
 from paani.statistics.figure_table import table_text
 from paani.whole_file import write_whole
 from paani_tools.bench.board.figures import board_figures, networks_of
@@ -94,7 +95,7 @@ async def _start(
     failures: list[str] = []
 
     async def poll() -> None:
-        failures.append(await _poll(http_fetch(_url_of(config)), options, counters, clock, polls))
+        failures.append(await _poll(http_fetch(page_origin(config)), options, counters, clock, polls))
 
     outcome = await run_plan(plan, None, Display(sys.stderr), poll)
     condition = f"Pictures from {config.camera.source}; everything is recorded beside {FIGURES_FILE}."
@@ -156,10 +157,6 @@ def _keep(folder: Path, record: BoardRecord) -> None:
     except OSError as error:
         raise UserError(f"--out {folder}: {error.strerror}") from error
     write_whole(folder / FIGURES_FILE, msgspec.json.encode(record) + b"\n", "--out")
-
-
-def _url_of(config: Config) -> str:
-    return f"http://{config.dashboard.host}:{config.dashboard.port}"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,0 +1,50 @@
+// @ts-check
+// The login: the operator's key once, for a session that scripts cannot read. STOP works without it.
+
+import { bindPalette } from "./palette.js";
+import { bindStop, pendingStop } from "./stop.js";
+import { byId, setText } from "./text.js";
+
+const RENDER_PERIOD_MS = 100;
+let isLatched = false;
+
+/** @param {string} key */
+async function logIn(key) {
+  try {
+    const answer = await fetch("/api/login", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ key }) });
+    if (answer.ok) location.replace("/");
+    else setText(byId("login-note"), sentence(answer.status, (await answer.json()).error));
+  } catch {
+    setText(byId("login-note"), "No connection to the dashboard.");
+  }
+}
+
+/** @param {number} status @param {string} error */
+const sentence = (status, error) => (status === 403 && error.startsWith("key") ? "That is not the operator's key." : error);
+
+/** A terminal's address has the key after `#`, from where no server and no log sees it. */
+function takeKey() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("key");
+  if (!given) return;
+  history.replaceState(null, "", location.pathname);
+  void logIn(given);
+}
+
+function renderStop() {
+  const pending = pendingStop(performance.now());
+  if (pending) isLatched = false;
+  const note = byId("stop-note");
+  note.dataset.state = pending?.state ?? (isLatched ? "stopped" : "");
+  if (pending) setText(note, `${pending.word}: ${pending.detail}`);
+  else if (isLatched) setText(note, "STOPPED: latched until an operator arms.");
+}
+
+byId("login").addEventListener("submit", (/** @type {Event} */ event) => {
+  event.preventDefault();
+  void logIn(byId("key").value.trim());
+});
+bindPalette();
+bindStop(() => {}, () => { isLatched = true; });
+setInterval(renderStop, RENDER_PERIOD_MS);
+takeKey();
+addEventListener("hashchange", takeKey);

@@ -1,0 +1,44 @@
+// @ts-check
+// STOP: one press of the button, of Space or of Escape, without login and key, asked until the server answers.
+
+import { byId, fixed } from "./text.js";
+
+const RETRY_MS = 400;
+export const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
+let isPending = false, askedAt = 0;
+
+async function stop() {
+  if (isPending) return;
+  isPending = true;
+  askedAt = performance.now();
+  while (isPending) {
+    try {
+      if ((await fetch("/api/stop", { method: "POST" })).ok) isPending = false;
+    } catch { /* asked again below */ }
+    if (isPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+  }
+}
+
+/** @param {() => void} onAsk called at each press @param {() => void} [onLatched] called when the server says that it is latched */
+export function bindStop(onAsk, onLatched = () => {}) {
+  const press = () => {
+    onAsk();
+    void stop().then(() => isPending || onLatched());
+  };
+  byId("stop").addEventListener("pointerdown", press);
+  byId("stop").addEventListener("click", press);
+  addEventListener("keydown", (event) => {
+    if (event.code !== "Space" && event.key !== "Escape") return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!event.repeat) press();
+  }, true);
+}
+
+/** A STOP that the server has not answered yet; null where there is none. @param {number} now */
+export function pendingStop(now) {
+  if (!isPending) return null;
+  const waitedMs = now - askedAt;
+  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: `${fixed(waitedMs, 0)} ms ago` };
+  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: `nobody answers; asked again for ${fixed(waitedMs / 1000, 0)} s` };
+}
