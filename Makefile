@@ -95,6 +95,7 @@ lock: $(VENV)/release/.stamp ## pin what the next installation takes, with hashe
 	$(COMPILE) pyproject.toml --extra dev -o requirements/dev.lock
 	$(COMPILE) pyproject.toml --extra host -c requirements/dev.lock -o requirements/host.lock
 	$(COMPILE) pyproject.toml -c requirements/dev.lock -o requirements/base.lock
+	$(COMPILE) pyproject.toml --extra mavlink --extra ros2 --extra foxglove -c requirements/dev.lock -o requirements/ports.lock
 	$(COMPILE) --group build -c requirements/dev.lock -o requirements/build.lock
 	$(COMPILE) --group release -o requirements/release.lock
 

@@ -9,6 +9,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from paani.keys import PORTS
 from tests.places import ROOT
 
 LOCKS = sorted((ROOT / "requirements").glob("*.lock"))
@@ -42,6 +43,7 @@ BASE = [Requirement(line) for line in PROJECT["project"]["dependencies"]]
 ASKED = {
     "base": BASE,
     "host": [*BASE, *asked_for("host")],
+    "ports": [*BASE, *(one for port in PORTS if port in EXTRAS for one in asked_for(port))],
     "dev": [*BASE, *asked_for("dev")],
     **{name: [Requirement(line) for line in lines] for name, lines in PROJECT["dependency-groups"].items()},
 }
@@ -71,6 +73,7 @@ def test_a_lock_names_no_place(name: str) -> None:
 def test_board_host_and_tests_take_the_same_versions() -> None:
     everything = pins("dev")
     assert pins("base").items() <= pins("host").items() <= everything.items()
+    assert pins("base").items() <= pins("ports").items() <= everything.items()
     shared = pins("build").keys() & everything.keys()
     assert all(pins("build")[name] == everything[name] for name in shared)
 

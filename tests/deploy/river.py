@@ -8,7 +8,7 @@ import io
 import random
 import tarfile
 import tempfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 
 from paani import keys
@@ -92,11 +92,11 @@ class Drive:
         return stopped_s, max(0.0, (moves()[0] - ended_us) * 1e-6)
 
 
-def build(engine: Engine) -> None:
-    """Both images."""
+def build(engine: Engine, *profiles: str) -> None:
+    """The images of both sides, with those of profiles that have their own."""
     engine.ensure_base_image()
     for side in ("board", "host"):
-        engine.compose(side, "build", "-q")
+        engine.compose(side, *(f"--profile={one}" for one in profiles), "build", "-q")
 
 
 def start(engine: Engine) -> None:
@@ -115,30 +115,40 @@ def stop(engine: Engine) -> None:
 
 
 @contextlib.asynccontextmanager
+async def afloat(engine: Engine, profiles: str, environment: Mapping[str, str]) -> AsyncIterator[None]:
+    """Both sides alive with these profiles, of Compose and what else its environment tells it; nothing is armed."""
+    engine.environment |= {
+        "PAANI_LINK_ADDRESS": engine.docker("network", "inspect", "bridge", "-f", GATEWAY).strip(),
+        "PAANI_LINK_PORT": str(find_free_port()),
+        "COMPOSE_PROFILES": profiles,
+        **environment,
+    }
+    try:
+        await asyncio.to_thread(start, engine)
+        yield
+    finally:
+        await asyncio.to_thread(stop, engine)
+
+
+@contextlib.asynccontextmanager
 async def driving(engine: Engine) -> AsyncIterator[Drive]:
     """Both sides alive, armed on the page, with the microcontroller's image behind a router on the board's machine."""
     port = find_free_port()
     with tempfile.TemporaryDirectory(prefix="paani-", dir="/run") as line, tempfile.TemporaryDirectory() as runtime:
         await asyncio.to_thread(Path(line).chmod, 0o755)
         socket = Path(line) / "router.sock"
-        engine.environment |= {
-            "PAANI_PAGE_PORT": str(port),
-            "PAANI_LINK_ADDRESS": engine.docker("network", "inspect", "bridge", "-f", GATEWAY).strip(),
-            "PAANI_LINK_PORT": str(find_free_port()),
-            "PAANI_BRIDGE": f"unix:/host{socket}",
-            "COMPOSE_PROFILES": f"{BOARD_PROFILES},{HOST_PROFILES}",
-        }
-        async with open_emulator() as mcu, _wired(mcu, socket):
-            try:
-                await asyncio.to_thread(start, engine)
-                config = await asyncio.to_thread(_own_settings, engine, Path(runtime))
-                async with joined(config.bus, OBSERVER, 10.0) as bus:
-                    page = f"http://127.0.0.1:{port}"
-                    drive = Drive(engine, page, mcu, bus)
-                    await arm_on_page(page, config.bus)
-                    yield drive
-            finally:
-                await asyncio.to_thread(stop, engine)
+        places = {"PAANI_PAGE_PORT": str(port), "PAANI_BRIDGE": f"unix:/host{socket}"}
+        async with (
+            open_emulator() as mcu,
+            _wired(mcu, socket),
+            afloat(engine, f"{BOARD_PROFILES},{HOST_PROFILES}", places),
+        ):
+            config = await asyncio.to_thread(_own_settings, engine, Path(runtime))
+            async with joined(config.bus, OBSERVER, 10.0) as bus:
+                page = f"http://127.0.0.1:{port}"
+                drive = Drive(engine, page, mcu, bus)
+                await arm_on_page(page, config.bus)
+                yield drive
 
 
 @contextlib.asynccontextmanager

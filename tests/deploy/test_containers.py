@@ -13,8 +13,10 @@ import pytest
 from paani import messages as m
 from paani.keys import PORTS, Graph
 from paani.sides import Side, services_on
+from tests.conftest import find_free_port
+from tests.deploy.doors import Doors
 from tests.deploy.engine import Engine, NoEngine, running_engine
-from tests.deploy.river import build, driving
+from tests.deploy.river import afloat, build, driving
 
 pytestmark = [pytest.mark.deploy, pytest.mark.timeout(900)]
 
@@ -48,7 +50,7 @@ def test_an_image_holds_no_secret_and_nothing_of_the_build(engine: Engine, side:
 @pytest.mark.parametrize("driven_s", [8.0, pytest.param(60.0, marks=pytest.mark.long)])
 async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, driven_s: float) -> None:
     async with driving(engine) as drive:
-        await asyncio.to_thread(check_confinement, engine)
+        await asyncio.to_thread(check_confinement, engine, {*PORTS})
         await drive.await_under_way()
         begin_m = drive.distance_m
         decisions = drive.decisions
@@ -76,16 +78,29 @@ async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, 
     assert not engine.containers("board") + engine.containers("host")
 
 
-def check_confinement(engine: Engine) -> None:
-    """What runs where, and what it may."""
+@pytest.mark.long
+async def test_ports_speak_at_doors_of_this_machine_alone(engine: Engine) -> None:
+    """Of a boat adrift, to programs of others; none of them may command it from there."""
+    await asyncio.to_thread(build, engine, "ports")
+    doors = Doors()
+    page = {"PAANI_PAGE_PORT": str(find_free_port())}
+    async with afloat(engine, "sim,ports", {**doors.environment, **page}):
+        await asyncio.to_thread(check_confinement, engine, {"recorder", "bridge"})
+        await doors.require_all_speak()
+
+
+def check_confinement(engine: Engine, idle: set[str]) -> None:
+    """What runs where, all but `idle`, and what it may."""
     networks = {}
     for side in (Side.BOARD, Side.HOST):
         containers = engine.containers(side)
         names = {each["Config"]["Labels"]["com.docker.compose.service"] for each in containers}
-        assert names == set(services_on(side, Graph.SIMULATION)) - {*PORTS}
+        assert names == set(services_on(side, Graph.SIMULATION)) - idle
         networks[side] = {name for each in containers for name in each["NetworkSettings"]["Networks"]}
         for each in containers:
             host, name = each["HostConfig"], each["Name"]
+            open_to = {door["HostIp"] for doors in (host["PortBindings"] or {}).values() for door in doors}
+            assert side is Side.BOARD or open_to <= {"127.0.0.1"}, name
             assert each["State"]["Health"]["Status"] == "healthy", name
             assert each["Config"]["User"] == "paani", name
             assert host["ReadonlyRootfs"], name

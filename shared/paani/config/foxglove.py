@@ -23,12 +23,14 @@ class FoxgloveConfig(Section, frozen=True):
     host: str = "127.0.0.1"  # this machine alone
     port: TcpPort = 8765  # where viewers look first
     tls_pem: str = ""
+    # Lets other machines look on unencrypted: for a container, of which the port published to loopback is the one door.
+    open_to_network: bool = False
     # Messages that wait for one viewer; beyond it the oldest go. At 8, a viewer that stalls for 1.5 s is disconnected.
     backlog_messages: Annotated[int, msgspec.Meta(ge=16, le=10_000)] = 256
 
     def __post_init__(self) -> None:
-        """What leaves this machine is encrypted."""
-        if not self.tls_pem and not is_loopback(self.host):
+        """What leaves this machine is encrypted, unless `open_to_network` says that it need not be."""
+        if not self.tls_pem and not self.open_to_network and not is_loopback(self.host):
             raise ValueError(
                 f"host {self.host}: other machines reach it, and viewers need no password; set tls_pem before it, or"
                 " keep 127.0.0.1"

@@ -159,11 +159,11 @@ def test_parameters_are_the_settings_without_the_places_of_keys() -> None:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "boat.local"])
-def test_an_address_that_others_reach_needs_a_certificate(host: str) -> None:
+def test_an_address_that_others_reach_needs_a_certificate_or_leave(host: str) -> None:
     with pytest.raises(UserError, match=r"foxglove.*host .*: other machines reach it.*tls_pem"):
         load_config(sets=(f"foxglove.host={host}",))
-    config = load_config(sets=("foxglove.tls_pem=a.pem", f"foxglove.host={host}"))
-    assert config.foxglove.host == host
+    for leave in ("foxglove.tls_pem=a.pem", "foxglove.open_to_network=true"):
+        assert load_config(sets=(leave, f"foxglove.host={host}")).foxglove.host == host
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.53", "::1", "localhost"])
