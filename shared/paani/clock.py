@@ -78,6 +78,11 @@ class ClockStep:
         return step_us if abs(step_us) > MIN_STEP_S * 1e6 else 0
 
 
+def has_passed(since_us: int, span_us: float, now_us: int) -> bool:
+    """Whether this span of time has passed since then, by a clock that may be set: a start in the future is over."""
+    return not 0 <= now_us - since_us < span_us
+
+
 EARLY_S = 0.02  # a picture this much too early is in time: sources jitter
 
 

@@ -70,7 +70,10 @@ def camera_lens(evidence: Evidence, config: Config) -> Lens | None:
 
 
 def append_attitude(attitudes: tuple[Attitude, ...], odometry: Odometry | None) -> tuple[Attitude, ...]:
-    """Append the attitude of new, healthy odometry, oldest first; odometry of another epoch replaces all."""
+    """Append the attitude of new, healthy odometry, oldest first.
+
+    Odometry of another epoch, or from before the newest, replaces all: the clock was set back.
+    """
     if odometry is None or not odometry.healthy:
         return attitudes
     numbers = (odometry.yaw_rad, odometry.yaw_rate_radps, odometry.roll_rad, odometry.pitch_rad)
@@ -78,9 +81,10 @@ def append_attitude(attitudes: tuple[Attitude, ...], odometry: Odometry | None) 
         return attitudes
     new = Attitude(odometry.source_us, odometry.epoch, *numbers)
     if attitudes and attitudes[-1].epoch == new.epoch:
-        if new.at_us <= attitudes[-1].at_us:
+        if new.at_us == attitudes[-1].at_us:
             return attitudes
-        return (*attitudes, new)[-MAX_ATTITUDES:]
+        if new.at_us > attitudes[-1].at_us:
+            return (*attitudes, new)[-MAX_ATTITUDES:]
     return (new,)
 
 

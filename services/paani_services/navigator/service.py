@@ -9,7 +9,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Latest, Stepper
-from paani.clock import Clock
+from paani.clock import Clock, has_passed
 from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
@@ -44,7 +44,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
                 now_us = clock.now_us()
-                if now_us - route_us >= 1e6 / keys.ROUTE.rate_hz:
+                if has_passed(route_us, 1e6 / keys.ROUTE.rate_hz, now_us):
                     if mission is not None:
                         stepper.publish_own(keys.MISSION, msgspec.structs.replace(mission, source_us=now_us))
                         route = next_route(mission, stepper.state.progress.leg_index) or route
@@ -56,14 +56,14 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     journal.record(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
                 order = outputs[keys.COMMAND.name]
                 assert isinstance(order, m.NavCommand)
-                if now_us - sent_us >= period_s * 1e6 - EARLY_US or order.is_news_after(sent):
+                if has_passed(sent_us, period_s * 1e6 - EARLY_US, now_us) or order.is_news_after(sent):
                     published, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
                     assert isinstance(published, m.NavCommand)
                     sent = published
                     bus.note(", ".join(order.inhibits))
                 else:
                     stepper.conclude({})
-                if now_us - predicted_us >= 1e6 / keys.PREDICTION.rate_hz:
+                if has_passed(predicted_us, 1e6 / keys.PREDICTION.rate_hz, now_us):
                     odometry = stepper.inboxes[keys.ODOMETRY.name].value
                     predictions.put(predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator))
                     predicted_us = now_us

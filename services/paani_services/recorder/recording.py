@@ -12,6 +12,7 @@ from typing import Any
 
 from paani import keys
 from paani import messages as m
+from paani.clock import has_passed
 from paani.config import RecorderConfig
 from paani.logs.folder import free_path, recordings, too_old
 from paani.logs.writer import About, LogWriter
@@ -59,7 +60,7 @@ class Recording:
                 self._log.write(topic, left[0].log_us, left[0].head, left[0].data, left[0].attachment)
                 self._unflushed.append(topic.name)
                 left.popleft()
-            if self._log is not None and now_us - self._flushed_us >= self._settings.flush_s * 1e6:
+            if self._log is not None and has_passed(self._flushed_us, self._settings.flush_s * 1e6, now_us):
                 self._flush(now_us)
         except OSError as error:
             self._fail(f"{self._folder}: {error.strerror}", now_us)
@@ -83,12 +84,12 @@ class Recording:
 
     def _maintain_files(self, now_us: int) -> None:
         settings = self._settings
-        if now_us - self._checked_us >= DISK_CHECK_PERIOD_S * 1e6 or self._log is None:
+        if has_passed(self._checked_us, DISK_CHECK_PERIOD_S * 1e6, now_us) or self._log is None:
             self._checked_us = now_us
             self._check_disk(now_us)
         if self._log is not None:
             full = self._log.size_bytes >= settings.part_mib * MIB
-            if full or now_us - self._log.started_us >= settings.part_s * 1e6:
+            if full or has_passed(self._log.started_us, settings.part_s * 1e6, now_us):
                 self._end_part(now_us)
         if self._log is None and not self.problem:
             self._begin_part(now_us)
@@ -108,7 +109,7 @@ class Recording:
             problem = f"recordings to be kept fill {kept // MIB} MiB (recorder.budget_mib)"
         if problem and self._log is not None:
             self._end_part(now_us)
-        if problem or now_us - self._failed_us >= RETRY_PERIOD_S * 1e6:
+        if problem or has_passed(self._failed_us, RETRY_PERIOD_S * 1e6, now_us):
             self.problem = problem
 
     def _begin_part(self, now_us: int) -> None:

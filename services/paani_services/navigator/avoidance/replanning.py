@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import msgspec
 
+from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry, Tracks
@@ -76,7 +77,7 @@ def replan(
     is_other_side = setpoint.advised_side != state.advised_side
     is_other_course = abs(wrap_rad(setpoint.course_rad - state.course_rad)) > COURSE_TOLERANCE_RAD
     is_new = is_other_side or is_other_course or state.memory.frame_id != state.frame_id
-    if plan is None or is_new or not 0.0 <= (now_us - state.planned_us) * 1e-6 < config.replan_s:
+    if plan is None or is_new or has_passed(state.planned_us, config.replan_s * 1e6, now_us):
         observations = state.memory.observations
         obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
         boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
@@ -85,7 +86,7 @@ def replan(
         grid = apply_fence(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         start = BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
-        since_us = now_us if state.waiting_since_us is None else state.waiting_since_us
+        since_us = now_us if state.waiting_since_us is None else min(state.waiting_since_us, now_us)
         may_wait = (now_us - since_us) * 1e-6 < config.patience_s
         if planner is None:
             plan = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
@@ -139,5 +140,5 @@ def is_braking(state: PlannerState, odometry: Odometry, now_us: int, config: Pla
     It brakes for at most `brake_s`, and only while its surge is more than what wind and current may cause.
     """
     since_us = state.waiting_since_us
-    has_just_stopped = since_us is not None and (now_us - since_us) * 1e-6 < config.brake_s
+    has_just_stopped = since_us is not None and not has_passed(since_us, config.brake_s * 1e6, now_us)
     return has_just_stopped and odometry.surge_mps > RESIDUAL_DRIFT_MPS

@@ -9,6 +9,7 @@ import math
 
 import msgspec
 
+from paani.clock import has_passed
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
 from paani.messages import Direction
@@ -69,7 +70,7 @@ def latch_heading(
         return msgspec.structs.replace(turn, on_heading_since_us=0), False
     if turn.on_heading_since_us == 0:
         return msgspec.structs.replace(turn, on_heading_since_us=now_us), False
-    if (now_us - turn.on_heading_since_us) * 1e-6 < config.turn_hold_s:
+    if not has_passed(turn.on_heading_since_us, config.turn_hold_s * 1e6, now_us):
         return turn, False
     return _latch_next(turn, direction, yaw_rad, config)
 

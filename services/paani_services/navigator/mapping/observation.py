@@ -128,7 +128,7 @@ def update_memory(
 ) -> ObservationMemory:
     """Add the newest odometry and evidence.
 
-    Another odometry epoch, or no odometry for `max_reckon_s`, forgets all observations.
+    Another odometry epoch, no odometry for `max_reckon_s`, or a clock that was set back forgets all observations.
     """
     if odometry is not None and odometry.healthy:
         memory = _add_pose(memory, odometry, config)
@@ -188,9 +188,9 @@ def _add_pose(memory: ObservationMemory, odometry: Odometry, config: PlannerConf
     if odom_pose is None or odometry.epoch != memory.epoch:
         return _restart_memory(memory, odometry)
     step_s = (odometry.source_us - odom_pose.stamp_us) * 1e-6
-    if step_s <= 0.0:
+    if step_s == 0.0:
         return memory
-    if step_s > config.max_reckon_s:
+    if not 0.0 < step_s <= config.max_reckon_s:
         return _restart_memory(memory, odometry)
     cos, sin = portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad)
     east_m = (odometry.surge_mps * cos - odometry.sway_mps * sin) * step_s

@@ -109,6 +109,24 @@ def test_a_crash_loses_at_most_what_was_not_flushed(tmp_path: Path) -> None:
     recording.close([], now_us(95))
 
 
+def test_a_clock_set_back_begins_a_part_that_is_flushed(tmp_path: Path) -> None:
+    """What is heard after it is in a file of its own, in order of time, and on the disk within `flush_s`."""
+    recording = Recording(settings(tmp_path, flush_s=0.5, part_s=3600.0), describe_system(Config()), TOPICS)
+    record(recording, range(1000, 1100))
+    record(recording, range(100))
+    first, second = names(tmp_path)
+    assert is_finished(tmp_path / first) is not is_finished(tmp_path / second)
+    size_bytes = recording.path.stat().st_size if recording.path is not None else 0
+    record(recording, range(100, 300))
+    assert recording.path is not None
+    assert recording.path.stat().st_size > size_bytes
+    recording.close([], now_us(300))
+    assert [len(list(open_log(tmp_path / name).records([keys.ODOMETRY.name]))) for name in (first, second)] == [
+        300,
+        100,
+    ]
+
+
 def test_beyond_the_budget_the_oldest_recording_is_deleted_unless_kept(tmp_path: Path) -> None:
     """P3: rotation."""
     finished(tmp_path, name="20200101T000000Z-1.mcap")

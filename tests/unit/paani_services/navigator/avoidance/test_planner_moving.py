@@ -65,7 +65,10 @@ def test_a_person_who_may_swim_but_does_not_is_passed_in_the_end() -> None:
 
 
 def test_a_boat_waits_for_patience_s_at_most() -> None:
-    """A person 3.6 m ahead, seen twice, may swim anywhere: the boat waits, unless it has for `patience_s`."""
+    """A person 3.6 m ahead, seen twice, may swim anywhere: the boat waits, unless it has for `patience_s`.
+
+    Since a time in the future is since now: the clock was set back.
+    """
     place = (3.6, 0.3, 4.0, 0.9)
     memory, now_us = ObservationMemory(), START_US
     for now_us in (START_US, START_US + 200_000):
@@ -73,13 +76,15 @@ def test_a_boat_waits_for_patience_s_at_most() -> None:
             edge=water_edge_of(AT_REST, (place,)), at_us=now_us, memory=memory, detections=(detection_of(place, 0.4),)
         )
     here = odometry(now_us, AT_REST)
-    for waited_s, moves in ((None, False), (PLANNER.patience_s - 1.0, False), (PLANNER.patience_s + 1.0, True)):
+    patience_s = PLANNER.patience_s
+    for waited_s, moves in ((None, False), (patience_s - 1.0, False), (patience_s + 1.0, True), (-3600.0, False)):
         waiting_since_us = None if waited_s is None else now_us - round(waited_s * 1e6)
+        since_us = now_us if waiting_since_us is None else min(waiting_since_us, now_us)
         state, found = replan(
             PlannerState(memory, waiting_since_us=waiting_since_us), here, AHEAD, now_us, CAMERA, PLANNER
         )
         assert (found.speed_mps > 0.0) is moves
-        assert state.waiting_since_us == (None if moves else now_us if waiting_since_us is None else waiting_since_us)
+        assert state.waiting_since_us == (None if moves else since_us)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
