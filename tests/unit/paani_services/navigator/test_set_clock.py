@@ -53,9 +53,8 @@ class Watch:
 def test_the_boat_goes_on_after_its_clock_was_set_back(by_us: int, was_enclosed: bool, dated_before: int) -> None:
     """Whether it had a way before or not, and whatever was still dated by the clock of before."""
     watch = Watch()
-    for _ in range(5):
-        before = watch.step(ENCLOSED if was_enclosed else OPEN)
-    assert before.enable is not was_enclosed
+    before = [watch.step(ENCLOSED if was_enclosed else OPEN) for _ in range(5)]
+    assert before[-1].enable is not was_enclosed
     watch.set_back(by_us)
     for _ in range(dated_before):
         assert not watch.step(OPEN, stamp_ahead_us=by_us).enable
