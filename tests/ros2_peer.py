@@ -2,7 +2,8 @@
 
 Arguments: the port of the router, the domain, and what to subscribe to (`TOPIC=TYPE=HASH`). Each message becomes a line
 of JSON on standard output, `{"topic": ..., "message": ...}`. Lines on standard input ask for more: `{"publish": TOPIC,
-"type": TYPE, "hash": HASH, "fields": {...}}`, `{"put": KEY, "data": HEX}`, `{"tokens": true}`.
+"type": TYPE, "hash": HASH, "fields": {...}}`, `{"put": KEY, "data": HEX}`, `{"tokens": true}`, `{"latched": KEY}`: the
+last message of a transient local topic, as rmw_zenoh asks for it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import threading
 from typing import Any
 
 import numpy as np
+import zenoh
+import zenoh.ext
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber
 from zenoh_ros2_sdk.session import ZenohSession
@@ -35,6 +38,7 @@ def main(port: int, domain_id: int, wanted: list[str]) -> None:
     foreign = manager.session.declare_subscriber("paani/**", lambda sample: _say({"leaked": str(sample.key_expr)}))
     _say({"ready": True})
     publishers: dict[str, Any] = {}
+    late: list[zenoh.ext.AdvancedSubscriber[None]] = []
     for line in sys.stdin:
         request = json.loads(line)
         if "publish" in request:
@@ -46,11 +50,24 @@ def main(port: int, domain_id: int, wanted: list[str]) -> None:
             publishers[topic].publish(**{name: _filled(manager, value) for name, value in request["fields"].items()})
         elif "put" in request:
             manager.session.put(request["put"], bytes.fromhex(request["data"]))
+        elif "latched" in request:
+            late.append(_subscribe_latched(manager, request["latched"]))
         else:
             found = manager.session.liveliness().get(f"@ros2_lv/{domain_id}/**", timeout=2.0)
             _say({"tokens": [str(reply.ok.key_expr) for reply in found if reply.ok]})
     foreign.undeclare()
     manager.close()
+
+
+def _subscribe_latched(manager: ZenohSession, key: str) -> zenoh.ext.AdvancedSubscriber[None]:
+    def receive(sample: zenoh.Sample) -> None:
+        _say({"latched": sample.payload.to_bytes().hex()})
+
+    return zenoh.ext.declare_advanced_subscriber(
+        manager.session, key, receive, subscriber_detection=True,
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+        recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+    )  # fmt: skip
 
 
 def _preload(manager: ZenohSession) -> None:

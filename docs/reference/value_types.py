@@ -35,6 +35,8 @@ def kind_of(info: types.Type) -> str:
             return "number"
         case types.StrType():
             return "text"
+        case types.BytesType():
+            return "bytes (base64)"
         case types.LiteralType():
             return "one of " + ", ".join(f"`{value}`" for value in info.values)
         case types.EnumType():
@@ -61,6 +63,8 @@ def range_of(info: types.Type) -> str:
             parts = [f"`{info.pattern}`"] if info.pattern else []
             parts += [f"at most {info.max_length} characters"] if info.max_length else []
             return ", ".join(parts) or "-"
+        case types.BytesType():
+            return f"at most {info.max_length} bytes" if info.max_length else "-"
         case types.TupleType():
             return " / ".join(dict.fromkeys(range_of(item) for item in info.item_types))
         case types.VarTupleType():

@@ -109,6 +109,10 @@ PREDICTION = Topic(
     name="navigator/prediction", type=m.Prediction, producer="navigator", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.STATE, summary="the way ahead by the order in force, moving obstacles, and home; for people",
 )
+OCCUPANCY = Topic(
+    name="navigator/occupancy", type=m.OccupancyGrid, producer="navigator", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.STATE, summary="occupied, free and unknown water around the boat; for people and programs",
+)
 THRUST = Topic(
     name="controller/thrust", type=m.Thrust, producer="controller", rate_hz=10.0, fresh_s=0.5,
     stance=Stance.COMMAND, summary="normalised thrust of the two fans",
@@ -206,7 +210,7 @@ REQUESTS = {
 }
 
 TOPICS: tuple[Topic[Any], ...] = (
-    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, THRUST,
+    PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, TUNING, SHADOW, SIM_TIME, GPS, IMU,
     THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *REQUESTS.values(), *STEPS.values(),

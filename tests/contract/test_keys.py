@@ -37,6 +37,8 @@ def _fill(info: Any) -> Any:
             return True
         case msgspec.inspect.StrType():
             return "text"
+        case msgspec.inspect.BytesType():
+            return "AAAA"  # base64
         case msgspec.inspect.EnumType():
             return next(iter(info.cls)).value
         case msgspec.inspect.TupleType():

@@ -16,15 +16,17 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.clock import WallClock
+from paani.occupancy_cells import pack_cells
 from paani.operator_client import OperatorClient
 from paani_services.ros2 import topics
-from paani_services.ros2.schemas import type_hash
+from paani_services.ros2.schemas import decode, type_hash
 from tests.conftest import OpenAs, Spawn, find_free_port
 from tests.places import ROOT
 from tests.unit.paani_services.ros2.test_schemas import HASHES
@@ -32,6 +34,10 @@ from tests.unit.paani_services.ros2.test_schemas import HASHES
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
 CLOCK = WallClock()
 JPEG = b"\xff\xd8" + bytes(range(256)) * 40 + b"\xff\xd9"
+GRID = m.OccupancyGrid(
+    source_us=CLOCK.now_us(), west_m=-4.0, south_m=7.0, cell_m=0.2, columns=3, rows=2,
+    cells=pack_cells(np.array([[0, 1, 2], [3, 1, 2]], np.uint8)),
+)  # fmt: skip
 BOOL = type_hash("std_msgs/Bool")
 STOP_KEY = f"43/otter/stop/std_msgs::msg::dds_::Bool_/{BOOL}"
 
@@ -44,6 +50,7 @@ class Node:
         self.heard: dict[str, list[Any]] = {}
         self.leaked: list[str] = []
         self.tokens: list[str] = []
+        self.latched: list[str] = []
         self.ready = False
 
     async def listen(self) -> None:
@@ -55,6 +62,7 @@ class Node:
             self.ready = self.ready or "ready" in words
             self.leaked += [words["leaked"]] if "leaked" in words else []
             self.tokens = words.get("tokens", self.tokens)
+            self.latched += [words["latched"]] if "latched" in words else []
 
     def ask(self, **words: Any) -> None:
         assert self._process.stdin is not None
@@ -107,7 +115,11 @@ async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
     camera = (await open_as("camera")).picture_publisher(keys.PICTURE)
     evidence = (await open_as("perception")).publisher(keys.EVIDENCE)
     advisory = (await open_as("advisor")).publisher(keys.ADVISORY)
+    map_of = (await open_as("navigator")).publisher(keys.OCCUPANCY)
     estimates: dict[int, m.Odometry] = {}
+
+    def show() -> None:
+        map_of.put(GRID)
 
     def speak() -> None:
         now_us = CLOCK.now_us()
@@ -126,6 +138,9 @@ async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
         joined(listen, *(topic for topic in topics.SENT if topic is not topics.TRACKS)) as node,
     ):
         names = {topic.full_name("otter") for topic in topics.SENT} - {"/otter/tracks"}
+        await node.until(lambda: "/otter/occupancy" in node.heard, "the map", show)
+        node.ask(latched=topics.OCCUPANCY.endpoint("otter").key(43))
+        await node.until(lambda: bool(node.latched), "the map that was said before a node came")
         await node.until(lambda: set(node.heard) == names, f"all of {sorted(names)}", speak)
         await node.until(lambda: len(node.heard["/otter/odometry/global"]) >= 20, "a second of odometry", speak)
         node.ask(tokens=True)
@@ -137,6 +152,11 @@ async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
         assert (at["x"], at["y"], heard["twist"]["twist"]["linear"]["x"]) == (pose.x_m, pose.y_m, pose.surge_mps)
     assert bytes.fromhex(node.heard["/otter/camera/image/compressed"][0]["data"]) == JPEG
     assert node.heard["/otter/detections"][0]["detections"][0]["results"][0]["hypothesis"]["class_id"] == "buoy"
+    grid = node.heard["/otter/occupancy"][0]
+    assert (grid["header"]["frame_id"], grid["info"]["width"], grid["info"]["height"]) == ("map", 3, 2)
+    assert (grid["info"]["origin"]["position"]["x"], grid["data"]) == (-4.0, [-1, 0, 100, -1, 0, 100])
+    later = decode(bytes.fromhex(node.latched[-1]), "nav_msgs/OccupancyGrid")
+    assert later.data.tolist() == grid["data"]
     advice = msgspec.json.decode(node.heard["/otter/advisory"][0]["data"], type=m.Advisory)
     assert advice.direction is m.Direction.LEFT
     children = {link["child_frame_id"] for message in node.heard["/tf"] for link in message["transforms"]}

@@ -16,6 +16,7 @@ from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.files.mission_file import load_route_and_mission, next_route
 from paani_services.navigator.files.mission_journal import MissionJournal
 from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.occupancy import occupancy_around
 from paani_services.navigator.predict import predict
 
 EARLY_US = 5_000  # a step this much before the end of its period counts as on time: timers are not exact
@@ -31,7 +32,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     wake = asyncio.Event()
     sent: m.NavCommand | None = None
     sent_us = route_us = predicted_us = 0
-    predictions, camera = bus.publisher(keys.PREDICTION), Camera(config.calibration, config.perception.ego_polygon)
+    predictions, grids = bus.publisher(keys.PREDICTION), bus.publisher(keys.OCCUPANCY)
+    camera = Camera(config.calibration, config.perception.ego_polygon)
     with bus.alive():
         async with asyncio.TaskGroup() as group:
             journal = None
@@ -66,6 +68,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 if has_passed(predicted_us, 1e6 / keys.PREDICTION.rate_hz, now_us):
                     odometry = stepper.inboxes[keys.ODOMETRY.name].value
                     predictions.put(predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator))
+                    planner_state = stepper.state.planner_state
+                    grid = occupancy_around(planner_state, odometry, now_us, camera, config.navigator)
+                    if grid is not None:
+                        grids.put(grid)
                     predicted_us = now_us
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(period_s):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from paani import keys
-from paani.bus.ros_graph import RELIABLE, SENSOR_DATA, TRANSFORMS, RosEndpoint, RosQos
+from paani.bus.ros_graph import LATCHED, RELIABLE, SENSOR_DATA, TRANSFORMS, RosEndpoint, RosQos
 from paani_services.ros2.schemas import type_hash
 
 
@@ -44,6 +44,7 @@ DETECTIONS = RosTopic(
 )
 TRACKS = RosTopic("tracks", "vision_msgs/Detection2DArray", RELIABLE, "camera_optical", keys.TRACKS.name, 5.0)
 ADVISORY = RosTopic("advisory", "std_msgs/String", RELIABLE, "", keys.ADVISORY.name, 5.0)
+OCCUPANCY = RosTopic("occupancy", "nav_msgs/OccupancyGrid", LATCHED, "map", keys.OCCUPANCY.name, 1.0)
 DIAGNOSTICS = RosTopic("/diagnostics", "diagnostic_msgs/DiagnosticArray", RELIABLE, "", "health/*", 1.0)
 TRANSFORM = RosTopic(
     "/tf", "tf2_msgs/TFMessage", TRANSFORMS, "map, odom", f"{keys.ODOMETRY.name}, {keys.LOCAL_ODOMETRY.name}", 40.0
@@ -54,5 +55,8 @@ STOP = RosTopic("stop", "std_msgs/Bool", RELIABLE, "", keys.REQUESTS["ros2"].nam
 MODE = RosTopic("mode", "std_msgs/String", RELIABLE, "", keys.REQUESTS["ros2"].name, 0.0)
 CMD_VEL = RosTopic("cmd_vel", "geometry_msgs/Twist", RELIABLE, "base_link", keys.REQUESTS["ros2"].name, 0.0)
 
-SENT = (GPS_FIX, IMU, GLOBAL_ODOMETRY, LOCAL_ODOMETRY, IMAGE, DETECTIONS, TRACKS, ADVISORY, DIAGNOSTICS, TRANSFORM)
+SENT = (
+    GPS_FIX, IMU, GLOBAL_ODOMETRY, LOCAL_ODOMETRY, IMAGE, DETECTIONS, TRACKS, ADVISORY, OCCUPANCY, DIAGNOSTICS,
+    TRANSFORM,
+)  # fmt: skip
 COMMANDS = (STOP, MODE, CMD_VEL)  # the last two only where `ros2.accept_commands`

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from paani import keys
 from paani import messages as m
 from paani.config import CalibrationConfig
+from paani.occupancy_cells import unpack_cells
 from paani_services.ros2 import topics
 from paani_services.ros2.frames import Frames, Quaternion, Transform, Vector, camera_mount, parent_between, rotation_of
 from paani_services.ros2.schemas import encode, make
@@ -27,6 +28,14 @@ F64 = npt.NDArray[np.float64]
 UNKNOWN_VARIANCE = 1e6
 NOT_MEASURED = -1.0  # in the first place of a covariance: the message has no such quantity (sensor_msgs)
 STATUS_NO_FIX, STATUS_FIX, SERVICE_GPS = -1, 0, 1
+# Of nav_msgs/OccupancyGrid: 0 to 100 %, or -1. What no camera sees is unknown there, whoever answers for it aboard.
+OCCUPANCY_PERCENT = {
+    m.Occupancy.UNKNOWN: -1,
+    m.Occupancy.FREE: 0,
+    m.Occupancy.OCCUPIED: 100,
+    m.Occupancy.BLIND_ZONE: -1,
+}
+PERCENT_OF_CELL = np.array([OCCUPANCY_PERCENT[each] for each in m.Occupancy], np.int8)
 COVARIANCE_UNKNOWN, COVARIANCE_APPROXIMATED = 0, 1
 
 
@@ -56,6 +65,7 @@ class Translator:
             keys.EVIDENCE.name: self._detections,
             keys.TRACKS.name: self._tracks,
             keys.ADVISORY.name: self._advisory,
+            keys.OCCUPANCY.name: self._occupancy,
         }
 
     @property
@@ -142,18 +152,13 @@ class Translator:
 
     def _odometry(self, pose: m.Odometry, frame: str) -> Any:
         variance_m2, unknown = pose.position_std_m**2, UNKNOWN_VARIANCE
-        at = _pose(pose)
         return make(
             "nav_msgs/Odometry",
             header=self._header(pose.source_us, frame),
             child_frame_id=self._frames.base_link,
             pose=make(
                 "geometry_msgs/PoseWithCovariance",
-                pose=make(
-                    "geometry_msgs/Pose",
-                    position=make("geometry_msgs/Point", **at.translation_m._asdict()),
-                    orientation=_quaternion(at.rotation),
-                ),
+                pose=_ros_pose(_pose(pose)),
                 covariance=_diagonal(variance_m2, variance_m2, unknown, unknown, unknown, pose.yaw_std_rad**2),
             ),
             twist=make(
@@ -221,6 +226,21 @@ class Translator:
     def _advisory(self, advisory: m.Advisory) -> list[tuple[RosTopic, Any]]:
         return [(topics.ADVISORY, make("std_msgs/String", data=msgspec.json.encode(advisory).decode()))]
 
+    def _occupancy(self, grid: m.OccupancyGrid) -> list[tuple[RosTopic, Any]]:
+        """Raises ValueError where the cells are not as many as the grid has."""
+        corner = Transform(Vector(grid.west_m, grid.south_m, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        header = self._header(grid.source_us, self._frames.map)
+        info = make(
+            "nav_msgs/MapMetaData",
+            map_load_time=header.stamp,
+            resolution=grid.cell_m,
+            width=grid.columns,
+            height=grid.rows,
+            origin=_ros_pose(corner),
+        )
+        data = PERCENT_OF_CELL[unpack_cells(grid).ravel()]
+        return [(topics.OCCUPANCY, make("nav_msgs/OccupancyGrid", header=header, info=info, data=data))]
+
     @staticmethod
     def _header(source_us: int, frame: str) -> Any:
         return header_of(source_us, frame)
@@ -238,13 +258,17 @@ def _pose(pose: m.Odometry) -> Transform:
     return Transform(Vector(pose.x_m, pose.y_m, 0.0), rotation)
 
 
+def _ros_pose(at: Transform) -> Any:
+    return make(
+        "geometry_msgs/Pose",
+        position=make("geometry_msgs/Point", **at.translation_m._asdict()),
+        orientation=_quaternion(at.rotation),
+    )
+
+
 def _hypothesis(label: m.Label, score: float) -> Any:
     """A class and its score; where it is in space, a box does not say."""
-    nowhere = make(
-        "geometry_msgs/Pose",
-        position=make("geometry_msgs/Point", x=0.0, y=0.0, z=0.0),
-        orientation=_quaternion(Quaternion(0.0, 0.0, 0.0, 1.0)),
-    )
+    nowhere = _ros_pose(Transform(Vector(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
     return make(
         "vision_msgs/ObjectHypothesisWithPose",
         hypothesis=make("vision_msgs/ObjectHypothesis", class_id=label.value, score=score),

@@ -14,6 +14,7 @@ import struct
 from typing import NamedTuple
 
 import zenoh
+import zenoh.ext
 
 from paani.bus.inbox import Queue
 from paani.bus.publish import PRIORITY
@@ -27,6 +28,7 @@ TOKENS = "@ros2_lv"
 ROOT_ENCLAVE = "%"
 MAX_CDR_BYTES = 1 << 16  # of what is heard: commands alone
 ATTACHMENT = struct.Struct("<qqB16s")  # sequence, source time [ns], length of the gid, gid
+MISS_PERIOD_S = 0.5  # rmw_zenoh's own: how soon a node learns that it missed the last message of a latched topic
 LEASE_MS = 10_000  # Zenoh's own: a ROS node that hangs costs nobody anything
 # Everything that a ROS node says and asks; all of it within the keys of its domain.
 MESSAGES = [
@@ -36,20 +38,23 @@ MESSAGES = [
 
 
 class RosQos(NamedTuple):
-    """Quality of service of a topic: the newest `depth` messages, volatile."""
+    """Quality of service: the newest `depth` messages of a topic. transient_local: who comes later gets them too."""
 
     depth: int
     best_effort: bool = False
+    transient_local: bool = False
 
     @property
     def text(self) -> str:
         """As in a liveliness token; what is left out has rmw's default."""
-        return f"{'2' if self.best_effort else ''}::,{self.depth}:,:,:,,"
+        durability = "1" if self.transient_local else ""
+        return f"{'2' if self.best_effort else ''}:{durability}:,{self.depth}:,:,:,,"
 
 
 SENSOR_DATA = RosQos(5, best_effort=True)
 RELIABLE = RosQos(10)
 TRANSFORMS = RosQos(100)
+LATCHED = RosQos(1, transient_local=True)  # as maps have it
 
 
 class RosEndpoint(NamedTuple):
@@ -77,11 +82,17 @@ class RosPublisher:
     def __init__(self, session: zenoh.Session, key: str, token: str, qos: RosQos) -> None:
         self._gid = hashlib.blake2b(token.encode(), digest_size=16).digest()
         self._sequence = itertools.count(1)
-        self._publisher = session.declare_publisher(
-            key,
-            priority=PRIORITY[Stance.PICTURE if qos.best_effort else Stance.STATE],
-            congestion_control=zenoh.CongestionControl.DROP,
-        )
+        priority = PRIORITY[Stance.PICTURE if qos.best_effort else Stance.STATE]
+        drop = zenoh.CongestionControl.DROP
+        self._publisher: zenoh.Publisher | zenoh.ext.AdvancedPublisher
+        if qos.transient_local:
+            self._publisher = zenoh.ext.declare_advanced_publisher(
+                session, key, priority=priority, congestion_control=drop, publisher_detection=True,
+                cache=zenoh.ext.CacheConfig(qos.depth),
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=MISS_PERIOD_S),
+            )  # fmt: skip
+        else:
+            self._publisher = session.declare_publisher(key, priority=priority, congestion_control=drop)
         self._token = session.liveliness().declare_token(token)
 
     def put(self, data: bytes, source_us: int) -> None:
@@ -91,8 +102,11 @@ class RosPublisher:
         self._publisher.put(data, attachment=attachment)
 
     def is_watched(self) -> bool:
-        """Does any node subscribe to it?"""
-        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]  # zenoh's stubs
+        """Does any node subscribe to it? Of a topic that is kept for whoever comes later, somebody may at any time."""
+        publisher = self._publisher
+        if isinstance(publisher, zenoh.ext.AdvancedPublisher):
+            return True
+        return bool(publisher.matching_status.matching)  # type: ignore[attr-defined]  # zenoh's stubs
 
 
 class RosGraph:

@@ -49,6 +49,8 @@ def _schema(info: inspect.Type, path: str, within: tuple[type, ...]) -> dict[str
             return {"type": "number"}
         case inspect.StrType():
             return {"type": "string"}
+        case inspect.BytesType():
+            return {"type": "string", "contentEncoding": "base64"}
         case inspect.EnumType(cls=kinds):
             return _words([kind.value for kind in kinds], path)
         case inspect.LiteralType(values=values):

@@ -32,6 +32,7 @@ from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, 
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
 from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
+from paani.messages.occupancy import Occupancy, OccupancyGrid
 from paani.messages.operator import (
     ArmRefusal,
     BarredMode,
@@ -109,6 +110,8 @@ __all__ = [
     "MovingObstacle",
     "NavCommand",
     "NonNegative",
+    "Occupancy",
+    "OccupancyGrid",
     "Odometry",
     "OperatorOrder",
     "OperatorRequest",

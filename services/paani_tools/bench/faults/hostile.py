@@ -279,7 +279,7 @@ def _wrong(info: inspect.Type) -> list[Any]:
             wrong = ["0.5", True, [], {}]
         case inspect.BoolType():
             wrong = [0, 1, "true", [], {}]
-        case inspect.StrType():
+        case inspect.StrType() | inspect.BytesType():
             wrong = [5, True, [], {}]
         case inspect.EnumType():
             wrong = [5, "no such word", True, [], {}]

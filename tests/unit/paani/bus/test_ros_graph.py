@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from paani.bus.ros_graph import ATTACHMENT, RELIABLE, SENSOR_DATA, RosEndpoint
+from paani.bus.ros_graph import ATTACHMENT, LATCHED, RELIABLE, SENSOR_DATA, RosEndpoint
 
 HASH = "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"
 
@@ -15,6 +15,7 @@ def test_a_key() -> None:
 def test_quality_of_service() -> None:
     """What is rmw's default is left out: reliable, volatile, keep last, no deadline."""
     assert (RELIABLE.text, SENSOR_DATA.text) == ("::,10:,:,:,,", "2::,5:,:,:,,")
+    assert LATCHED.text == ":1:,1:,:,:,,"
 
 
 def test_an_attachment_is_sequence_time_and_gid() -> None:

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from paani import keys
 from paani import messages as m
 from paani.config import CalibrationConfig
+from paani.occupancy_cells import pack_cells
 from paani_services.ros2 import schemas, topics
 from paani_services.ros2.frames import Frames
 from paani_services.ros2.translation import UNKNOWN_VARIANCE, RosMessage, Translator
@@ -288,6 +289,33 @@ def test_every_translated_topic_is_in_the_table() -> None:
 def test_the_manual_has_the_table() -> None:
     text = (ROOT / "docs/how-to/ros2.md").read_text(encoding="utf-8")
     for topic in topics.SENT:
-        service = f"{'best effort' if topic.qos.best_effort else 'reliable'}, {topic.qos.depth}"
+        kept = ", transient local" if topic.qos.transient_local else ""
+        service = f"{'best effort' if topic.qos.best_effort else 'reliable'}{kept}, {topic.qos.depth}"
         cells = (f"`{topic.name}`", topic.type, service, topic.frame or "-", f"{topic.rate_hz:g}", f"`{topic.source}`")
         assert f"| {' | '.join(cells)} |" in text
+
+
+def grid(values_of_rows: list[list[int]], **changes: Any) -> m.OccupancyGrid:
+    values = np.array(values_of_rows, np.uint8)
+    rows, columns = values.shape
+    fields: dict[str, Any] = {"source_us": NOW_US, "west_m": -4.0, "south_m": 7.0, "cell_m": 0.25, "columns": columns}
+    return m.OccupancyGrid(**(fields | {"rows": rows, "cells": pack_cells(values)} | changes))
+
+
+def test_a_grid_lies_in_the_map_with_its_first_cell_in_the_south_west() -> None:
+    """What no camera sees is unknown (-1); free is 0 and occupied 100, row after row from the south."""
+    seen = grid([[m.Occupancy.UNKNOWN, m.Occupancy.FREE, m.Occupancy.OCCUPIED], [m.Occupancy.BLIND_ZONE] * 3])
+    message = only(translator(prefix="otter/").translate(keys.OCCUPANCY.name, seen), topics.OCCUPANCY)
+    assert (message.header.frame_id, stamp_us(message.header)) == ("otter/map", NOW_US)
+    assert message.data.tolist() == [-1, 0, 100, -1, -1, -1]
+    info = message.info
+    assert (info.width, info.height, info.resolution) == (3, 2, 0.25)
+    corner = info.origin
+    assert (corner.position.x, corner.position.y, corner.position.z) == (-4.0, 7.0, 0.0)
+    assert yaw_of(corner.orientation) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("changes", [{"rows": 200}, {"columns": 40}, {"cells": b""}])
+def test_a_grid_of_other_cells_than_it_says_is_no_map(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="are not the cells of"):
+        translator().translate(keys.OCCUPANCY.name, grid([[1] * 5] * 2, **changes))

@@ -61,6 +61,9 @@ def record(folder: Path, config: Config | None = None) -> Path:
         detections=(m.Detection(label=m.Label.PIER, confidence=0.5, box_xyxy=(0.0, 0.0, 0.5, 0.5)),),
     ))  # fmt: skip
     put(log, keys.ADVISORY, m.Advisory(**head, direction=m.Direction.LEFT, reason=m.Reason.CENTER_RISK))
+    put(log, keys.OCCUPANCY, m.OccupancyGrid(
+        **head, west_m=-4.0, south_m=7.0, cell_m=0.25, columns=2, rows=2, cells=bytes([0b11100100])
+    ))  # fmt: skip
     put(log, keys.THRUST, m.Thrust(**head, left=0.0, right=0.0, enabled=False))  # of no interest to the port
     log._add(log._channels[keys.GPS.name], START_US, START_US, 1, b"{nonsense")
     log.finish({})
@@ -70,8 +73,8 @@ def record(folder: Path, config: Config | None = None) -> Path:
 def test_values_are_those_of_the_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = record(tmp_path), tmp_path / "out.mcap"
     assert main(["logs", "export", str(path), "--ros2", str(out)]) == 0
-    assert "10 topics" not in (printed := capsys.readouterr().out), "nothing was tracked"
-    assert "9 topics" in printed
+    assert "11 topics" not in (printed := capsys.readouterr().out), "nothing was tracked"
+    assert "10 topics" in printed
     assert "1 messages left out" in printed
     found = read(out)
     poses = found["/otter/odometry/global"]
@@ -86,6 +89,9 @@ def test_values_are_those_of_the_recording(tmp_path: Path, capsys: pytest.Captur
     assert (fix.latitude, fix.longitude, fix.position_covariance[0]) == (52.25, 4.5, 4.0)
     [(_, detections)] = found["/otter/detections"]
     assert detections.detections[0].bbox.size_x == 160.0
+    [(_, grid)] = found["/otter/occupancy"]
+    assert (grid.header.frame_id, grid.data.tolist()) == ("map", [-1, 0, 100, -1])
+    assert (grid.info.origin.position.x, grid.info.origin.position.y, grid.info.resolution) == (-4.0, 7.0, 0.25)
     [(_, advisory)] = found["/otter/advisory"]
     assert msgspec.json.decode(advisory.data, type=m.Advisory).direction is m.Direction.LEFT
     parents = {link.header.frame_id for _, message in found["/tf"] for link in message.transforms}

@@ -1,0 +1,43 @@
+"""The occupancy grid of the planner as a message in the map. Pure; it decides nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paani import messages as m
+from paani.config import NavigatorConfig
+from paani.occupancy_cells import pack_cells
+from paani_services.navigator.avoidance.replanning import PlannerState
+from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, build_occupancy_grid
+
+
+def occupancy_around(
+    planner: PlannerState, odometry: m.Odometry | None, now_us: int, camera: Camera, config: NavigatorConfig
+) -> m.OccupancyGrid | None:
+    """The grid that a plan would be made on now, moved from the frame of dead reckoning to the map.
+
+    None where the planner does not act on this camera, before anything was seen, and without a healthy position.
+    """
+    here, observations = planner.memory.odom_pose, planner.memory.observations
+    if not config.planner.acts_on(camera.calibration) or here is None or not observations:
+        return None
+    if odometry is None or not odometry.healthy:
+        return None
+    moving = find_dynamic_obstacles(observations, now_us, camera, config.planner) if config.planner.predict else ()
+    boxes: BoxIds = frozenset().union(*(each.vacated_boxes for each in moving))
+    grid = build_occupancy_grid(observations, (here.x_m, here.y_m), now_us, camera, config.planner, boxes)
+    cells = np.full(grid.occupied.shape, m.Occupancy.UNKNOWN, np.uint8)
+    cells[grid.free] = m.Occupancy.FREE
+    cells[grid.blind_zone] = m.Occupancy.BLIND_ZONE
+    cells[grid.occupied] = m.Occupancy.OCCUPIED
+    return m.OccupancyGrid(
+        source_us=odometry.source_us,
+        west_m=grid.west_m + odometry.x_m - here.x_m,
+        south_m=grid.south_m + odometry.y_m - here.y_m,
+        cell_m=CELL_M,
+        columns=GRID_CELLS,
+        rows=GRID_CELLS,
+        cells=pack_cells(cells),
+    )
