@@ -11,12 +11,21 @@ import sys
 from collections.abc import AsyncIterator
 
 import aiohttp
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from paani import keys
+from paani.clock import WallClock
 from paani.config import Config
-from paani_services.dashboard.gatekeeper import KEY_HEADER
-from paani_services.dashboard.server import GIVEN_AWAY, MAX_CLIENTS
+from paani.operator_client import OperatorClient
+from paani_services.dashboard.answers import ErrorAnswer, ReadyAnswer
+from paani_services.dashboard.gatekeeper import KEY_HEADER, Gatekeeper
+from paani_services.dashboard.hub import Hub
+from paani_services.dashboard.openapi import LOGIN_OPERATIONS, OPERATIONS
+from paani_services.dashboard.picture_stream import MAX_STREAMS
+from paani_services.dashboard.server import GIVEN_AWAY, MAX_CLIENTS, Server
+from paani_services.dashboard.tuning import Tuner
 from tests.arming import arm_on_page, headers_of, hold_on_page
 from tests.browser.conftest import Boat
 from tests.conftest import OpenAs, Spawn
@@ -184,6 +193,57 @@ async def test_machines_ask_for_life_readiness_and_metrics(
         assert 'paani_advice{direction="RIGHT"} 1.0' in lines
         async with client.get("/metrics?all=1") as answer:
             assert answer.status == 400
+        async with client.get("/openapi.json") as answer:
+            described = (await answer.json())["paths"]
+        for each in OPERATIONS:
+            path = each.path.replace("{name}", "main.js")
+            if path in {"/ws", "/stream.mjpg"}:
+                continue
+            async with client.request(each.method, path) as answer:
+                response = described[each.path][each.method]["responses"][str(answer.status)]
+                content = answer.content_type in response["content"] or "{name}" in each.path
+                assert content, (path, answer.status, answer.content_type)
+                if answer.content_type == "application/json":
+                    is_error = answer.status >= 400 and each.answer is not ReadyAnswer
+                    found = msgspec.json.decode(await answer.read(), type=ErrorAnswer if is_error else each.answer)
+                    assert msgspec.json.decode(msgspec.json.encode(found)) == await answer.json(), path
+
+
+async def test_every_route_is_described_and_nothing_else(open_as: OpenAs, config: Config) -> None:
+    bus, clock = await open_as("dashboard"), WallClock()
+    for exposed in (False, True):
+        whole = replace(config, dashboard=replace(config.dashboard, host="0.0.0.0" if exposed else "127.0.0.1"))
+        tuner = Tuner(bus.publisher(keys.TUNING), clock)
+        gatekeeper = Gatekeeper(whole, "key", clock)
+        server = Server(Hub(), OperatorClient(bus, clock), tuner, clock, whole, {}, gatekeeper)
+        routes = {
+            (each.method.lower(), each.resource.canonical) for each in server.app().router.routes() if each.resource
+        }
+        described = {(each.method, each.path) for each in (*OPERATIONS, *(LOGIN_OPERATIONS if exposed else ()))}
+        assert {route for route in routes if route[0] != "head"} == described
+
+
+async def test_streams_send_the_newest_picture_to_a_bounded_number(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat
+) -> None:
+    async with spawn("dashboard"), contextlib.AsyncExitStack() as stack:
+        streams = [await stack.enter_async_context(client.get("/stream.mjpg")) for _ in range(MAX_STREAMS)]
+        async with client.get("/stream.mjpg") as answer:
+            assert (answer.status, (await answer.json())["field"]) == (503, "/stream.mjpg")
+        numbers = []
+        for _ in range(3):
+            head = (await streams[0].content.readuntil(b"\r\n\r\n")).decode()
+            length = int(head.partition("Content-Length: ")[2].partition("\r\n")[0])
+            assert (await streams[0].content.readexactly(length)).startswith(b"\xff\xd8")
+            numbers.append(int(head.partition("X-Frame-Id: ")[2].partition("\r\n")[0].partition(".")[2]))
+        assert numbers == sorted(set(numbers))
+        streams[1].close()
+        async with asyncio.timeout(5.0):
+            while True:
+                async with client.get("/stream.mjpg") as answer:
+                    if answer.status == 200:
+                        break
+                await asyncio.sleep(0.1)
 
 
 async def test_a_client_that_never_reads_delays_nobody(

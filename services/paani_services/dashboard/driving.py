@@ -14,6 +14,7 @@ from aiohttp import web
 
 from paani import messages as m
 from paani.operator_client import OperatorClient
+from paani_services.dashboard.answers import DoneAnswer, SentAnswer
 from paani_services.dashboard.operator_events import MODE_REFUSALS
 from paani_services.dashboard.requests import MAX_PRESS, decode_body
 from paani_services.dashboard.responses import error_response, json_response
@@ -82,7 +83,7 @@ class Driving:
             return refused
         wanted = decode_body(await request.read(), SetpointRequest)
         self._operator.drive(wanted.surge, wanted.turn, wanted.hand, wanted.number)
-        return json_response({"sent": True})
+        return json_response(SentAnswer(True))
 
 
 async def _answer(asking: Awaitable[m.ModeRefusal | None], field: str) -> web.Response:
@@ -92,4 +93,4 @@ async def _answer(asking: Awaitable[m.ModeRefusal | None], field: str) -> web.Re
         return error_response(503, "not done: the operator's process does not answer", field)
     if refusal is not m.ModeRefusal.NONE:
         return error_response(409, f"not done: {MODE_REFUSALS[refusal]}", field)
-    return json_response({"done": True})
+    return json_response(DoneAnswer(True))

@@ -17,6 +17,7 @@ from aiohttp import web
 from paani.clock import Clock
 from paani.config import Config
 from paani.page_address import LOGIN_PATH, is_page_exposed
+from paani_services.dashboard.answers import DoneAnswer, SessionAnswer
 from paani_services.dashboard.requests import decode_body, is_own_host, is_same_origin
 from paani_services.dashboard.responses import error_response, json_response
 from paani_services.dashboard.sessions import Sessions
@@ -84,7 +85,7 @@ class Gatekeeper:
         return hmac.compare_digest(given.encode(errors="surrogateescape"), self._key.encode())
 
     async def _session(self, request: web.Request) -> web.Response:
-        return json_response({"login": self.asks_login})
+        return json_response(SessionAnswer(self.asks_login))
 
     async def _login(self, request: web.Request) -> web.Response:
         if not is_same_origin(request.headers.get("Origin"), request.host):
@@ -96,7 +97,7 @@ class Gatekeeper:
             return error_response(408, "the request did not come to its end", "body")
         if not self._is_key(decode_body(body, LoginRequest).key.strip()):
             return error_response(403, "key: not the operator's key", "key")
-        response = json_response({"done": True})
+        response = json_response(DoneAnswer(True))
         token = self._sessions.begin(self._clock.now_us())
         response.set_cookie(self._cookie, token, path="/", secure=True, httponly=True, samesite="Strict")
         return response
@@ -105,6 +106,6 @@ class Gatekeeper:
         if (refused := self.refuse_act(request, "log out")) is not None:
             return refused
         self._sessions.end(request.cookies.get(self._cookie, ""))
-        response = json_response({"done": True})
+        response = json_response(DoneAnswer(True))
         response.del_cookie(self._cookie, path="/", secure=True, httponly=True, samesite="Strict")
         return response

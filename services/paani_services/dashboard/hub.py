@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections import deque
+from collections.abc import Iterator
 
 import msgspec
 
@@ -40,6 +42,7 @@ class Hub:
         self.clients: set[Client] = set()
         self.has_clients = asyncio.Event()
         self._values: dict[str, tuple[Value, int]] = {}
+        self._watchers: dict[str, set[asyncio.Event]] = {}
         self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
 
     def add_client(self, now_us: int) -> Client:
@@ -62,11 +65,26 @@ class Hub:
     def put(self, key: str, value: Value, received_us: int, now_us: int) -> None:
         """The newest value of a key, received at `received_us`."""
         self._values[key] = (value, received_us)
+        for changed in self._watchers.get(key, ()):
+            changed.set()
         if self.clients:
             frame = encode_value(key, value, now_us - received_us)
             for client in self.clients:
                 client.queue.put_state(key, frame)
                 client.frames_ready.set()
+
+    @contextlib.contextmanager
+    def changes(self, key: str) -> Iterator[asyncio.Event]:
+        """An event that is set whenever there is a newer value of the key; it begins set where there is one."""
+        changed = asyncio.Event()
+        if key in self._values:
+            changed.set()
+        watchers = self._watchers.setdefault(key, set())
+        watchers.add(changed)
+        try:
+            yield changed
+        finally:
+            watchers.discard(changed)
 
     def publish_event(self, event: Event) -> None:
         """Queue an event for every client."""

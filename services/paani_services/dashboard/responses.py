@@ -5,6 +5,8 @@ from __future__ import annotations
 import msgspec
 from aiohttp import web
 
+from paani_services.dashboard.answers import ErrorAnswer
+
 
 def json_response(value: object, status: int = 200) -> web.Response:
     """The value as JSON."""
@@ -13,4 +15,4 @@ def json_response(value: object, status: int = 200) -> web.Response:
 
 def error_response(status: int, text: str, field: str) -> web.Response:
     """An error: what is wrong, and where."""
-    return json_response({"error": text, "field": field}, status)
+    return json_response(ErrorAnswer(text, field), status)

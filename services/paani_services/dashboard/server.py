@@ -11,32 +11,28 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from paani import keys
 from paani import messages as m
-from paani.board_status import STATUS_PATH
-from paani.bus import Picture
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
-from paani.extras import missing_module
 from paani.operator_client import OperatorClient
 from paani.page_address import LOGIN_PATH
+from paani_services.dashboard.answers import ArmedAnswer, HeldAnswer, StopAnswer
 from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.driving import Driving
 from paani_services.dashboard.gatekeeper import Gatekeeper
 from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.listening import listening
+from paani_services.dashboard.machines import Machines
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
-from paani_services.dashboard.readiness import find_unready
 from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
     PressRequest,
-    SnapshotQuery,
     decode_body,
     decode_query,
     is_same_origin,
 )
 from paani_services.dashboard.responses import error_response, json_response
-from paani_services.dashboard.status import board_status
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
 MAX_CLIENTS = 16  # pages at once: one more takes the place of the page that has been connected longest
@@ -68,6 +64,7 @@ class Server:
         self._hub, self._operator, self._tuner = hub, operator, tuner
         self._clock, self._config = clock, config
         self._pages, self._gatekeeper = pages, gatekeeper
+        self._machines = Machines(hub, operator, clock, config, gatekeeper)
         self._driving = Driving(operator, gatekeeper.refuse_act)
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
@@ -80,12 +77,7 @@ class Server:
                 web.get("/static/{name}", self._page),
                 *([web.get(LOGIN_PATH, self._login)] if self._gatekeeper.asks_login else []),
                 web.get("/ws", self._socket),
-                web.get("/snapshot.jpg", self._snapshot),
-                web.get("/healthz", self._healthz),
-                web.get("/readyz", self._readyz),
-                web.get("/metrics", self._metrics),
-                web.get("/api/topics", self._topics),
-                web.get(STATUS_PATH, self._status),
+                *self._machines.routes(),
                 web.post(STOP_PATH, self._stop),
                 web.post("/api/arm/hold", self._hold),
                 web.post("/api/arm/release", self._release),
@@ -139,14 +131,14 @@ class Server:
         state = await self._operator.stop(ANSWER_TIMEOUT_S)
         if state is None:
             return error_response(503, "the operator's process does not answer: no STOP is latched", "stopped")
-        return json_response({"stopped": True, "kept": state.latch_kept})
+        return json_response(StopAnswer(True, state.latch_kept))
 
     async def _hold(self, request: web.Request) -> web.Response:
         """Pass on that the button of a press is held; how long that has lasted is the operator's process's to say."""
         if (refused := self._refuse_to_arm(request)) is not None:
             return refused
         self._operator.hold(decode_body(await request.read(), PressRequest).press)
-        return json_response({"held": True})
+        return json_response(HeldAnswer(True))
 
     async def _release(self, request: web.Request) -> web.Response:
         if (refused := self._refuse_to_arm(request)) is not None:
@@ -157,7 +149,7 @@ class Server:
             return error_response(503, "not armed: the operator's process does not answer", "armed")
         if refusal is not m.ArmRefusal.NONE:
             return error_response(409, f"not armed: {REFUSALS[refusal]}", "armed")
-        return json_response({"armed": True})
+        return json_response(ArmedAnswer(True))
 
     def _refuse_to_arm(self, request: web.Request) -> web.Response | None:
         if (refused := self._gatekeeper.refuse_act(request, "arm")) is not None:
@@ -190,47 +182,6 @@ class Server:
         if shadow is None or (self._clock.now_us() - received_us) * 1e-6 > MAX_REPORT_AGE_S:
             return error_response(503, "the advisor has sent no report within the last seconds", keys.SHADOW.name)
         return json_response(shadow)
-
-    async def _snapshot(self, request: web.Request) -> web.Response:
-        wanted = decode_query(dict(request.query), SnapshotQuery)
-        value, received_us = self._hub.newest(keys.PICTURE.name) or (None, 0)
-        age_s = (self._clock.now_us() - received_us) * 1e-6
-        if not isinstance(value, Picture) or age_s > wanted.max_age_s:
-            return error_response(
-                503, f"{keys.PICTURE.name}: no picture younger than {wanted.max_age_s:g} s", "max_age_s"
-            )
-        headers = {"X-Age-S": f"{age_s:.3f}", "X-Frame-Id": f"{value.header.frame_epoch}.{value.header.frame_seq}"}
-        return web.Response(body=value.data, content_type=value.header.media_type, headers=headers)
-
-    async def _healthz(self, request: web.Request) -> web.Response:
-        decode_query(dict(request.query), NoQuery)
-        state = self._operator.state
-        armed, stopped = (None, None) if state is None else (state.armed, state.stopped)
-        return json_response({"ok": True, "clients": len(self._hub.clients), "armed": armed, "stopped": stopped})
-
-    async def _readyz(self, request: web.Request) -> web.Response:
-        decode_query(dict(request.query), NoQuery)
-        unready = find_unready(self._hub, self._config.services, self._clock.now_us())
-        return json_response({"ready": not unready, "unready": unready}, 503 if unready else 200)
-
-    async def _metrics(self, request: web.Request) -> web.Response:
-        decode_query(dict(request.query), NoQuery)
-        try:
-            from paani_services.dashboard.metrics import CONTENT_TYPE, metrics_text  # noqa: PLC0415  # of an extra
-        except ModuleNotFoundError as error:
-            if (remedy := missing_module("/metrics", error)) is None:
-                raise
-            return error_response(501, str(remedy), request.path)
-        text = metrics_text(self._hub, self._config, self._clock.now_us())
-        return web.Response(body=text, headers={"Content-Type": CONTENT_TYPE})
-
-    async def _topics(self, request: web.Request) -> web.Response:
-        decode_query(dict(request.query), NoQuery)
-        return json_response([topic_row(topic) for topic in keys.TOPICS])
-
-    async def _status(self, request: web.Request) -> web.Response:
-        decode_query(dict(request.query), NoQuery)
-        return json_response(board_status(self._hub, self._config.profile, self._clock.now_us()))
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):
@@ -283,19 +234,6 @@ async def serving(server: Server, config: DashboardConfig, tls: ssl.SSLContext |
             yield
     finally:
         await runner.cleanup()
-
-
-def topic_row(topic: keys.Topic[m.Message]) -> dict[str, object]:
-    """One row of the table of topics."""
-    return {
-        "name": topic.name,
-        "type": topic.type.__name__,
-        "producer": keys.producers_text(topic),
-        "rate_hz": topic.rate_hz,
-        "fresh_s": topic.fresh_s,
-        "stance": topic.stance.value,
-        "summary": topic.summary,
-    }
 
 
 def tuning_response(shadow: m.Shadow | None) -> web.Response:

@@ -95,3 +95,20 @@ def test_the_page_names_what_the_thrust_moves_and_where_pictures_come_from(
     """A video before a camera's place moves a boat as a camera does: only a recording is a replay."""
     settings = page_settings(load_config(sets=sets))
     assert (settings.mode, settings.pictures) == (mode, pictures)
+
+
+def test_a_watcher_of_a_key_is_woken_by_that_key_alone() -> None:
+    hub = Hub()
+    with hub.changes("a") as changed:
+        assert not changed.is_set()
+        hub.put("b", Event(1, "info", "other"), 1, 1)
+        assert not changed.is_set()
+        hub.put("a", Event(1, "info", "own"), 1, 1)
+        assert changed.is_set()
+        with hub.changes("a") as late:
+            assert late.is_set(), "what there is already is news to who comes late"
+        changed.clear()
+        late.clear()
+        hub.put("a", Event(2, "info", "own"), 2, 2)
+        assert changed.is_set()
+        assert not late.is_set(), "who has gone is woken no more"
