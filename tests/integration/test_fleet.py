@@ -63,7 +63,7 @@ def fleet_file(folder: Path, *vessels: Config) -> Path:
 
 
 @contextlib.asynccontextmanager
-async def afloat(config: Config) -> AsyncIterator[None]:
+async def afloat(config: Config, latitude_deg: float = 50.1) -> AsyncIterator[None]:
     """A router, the operator's process, and somebody who knows where the vessel is."""
     async with (
         routing(config.bus),
@@ -72,7 +72,7 @@ async def afloat(config: Config) -> AsyncIterator[None]:
     ):
         tasks = [
             asyncio.create_task(operator.run(desk, CLOCK, config)),
-            asyncio.create_task(tell_position(estimator)),
+            asyncio.create_task(tell_position(estimator, latitude_deg)),
         ]
         try:
             yield
@@ -82,11 +82,16 @@ async def afloat(config: Config) -> AsyncIterator[None]:
             await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def tell_position(bus: Bus) -> None:
+async def tell_position(bus: Bus, latitude_deg: float) -> None:
     poses = bus.publisher(keys.ODOMETRY)
     with bus.alive():
         while True:
-            poses.put(m.Odometry(source_us=CLOCK.now_us(), x_m=1.0, y_m=2.0, yaw_rad=0.0, surge_mps=0.5, healthy=True))
+            poses.put(
+                m.Odometry(
+                    source_us=CLOCK.now_us(), x_m=1.0, y_m=2.0, yaw_rad=0.0, surge_mps=0.5, healthy=True,
+                    latitude_deg=latitude_deg, longitude_deg=8.6,
+                )
+            )  # fmt: skip
             await asyncio.sleep(0.05)
 
 

@@ -10,11 +10,13 @@ import msgspec
 from aiohttp import web
 
 from paani.errors import UserError
+from paani_services.dashboard import pages
 from paani_services.dashboard.pages import MEDIA_TYPES, SECURITY_HEADERS
 from paani_services.dashboard.requests import is_own_host
 from paani_tools.fleet.shore import Vessel, stop_vessels
 
 STATIC = Path(__file__).parent / "static"
+ICON = pages.STATIC / "icon.svg"  # the boat's own
 HOST = "127.0.0.1"  # this machine alone: whoever reaches the page may watch and stop every vessel
 STOP_PATHS = "/api/stop"
 MAX_BODY_BYTES = 1024
@@ -26,7 +28,8 @@ class FleetPage:
 
     def __init__(self, vessels: Sequence[Vessel]) -> None:
         self._vessels = {vessel.name: vessel for vessel in vessels}
-        self._files = {path.name: path.read_bytes() for path in STATIC.iterdir() if path.suffix in MEDIA_TYPES}
+        files = (*STATIC.iterdir(), ICON)
+        self._files = {path.name: path.read_bytes() for path in files if path.suffix in MEDIA_TYPES}
 
     def app(self) -> web.Application:
         """The page, its files, the vessels' rows, and STOP."""
