@@ -89,12 +89,18 @@ def still(cause: m.ZeroCause, *inhibits: m.Inhibit, leg: str = ORDER.leg) -> dic
 NOT_ENABLED, NOT_ARMED = m.ZeroCause.NOT_ENABLED, m.ZeroCause.NOT_ARMED
 STOPPED = m.OperatorState(source_us=1, armed=False, stopped=True, by="stop")
 BY_HAND = m.OperatorState(source_us=1, armed=True, stopped=False, mode=m.DriveMode.MANUAL, wheel_by="dashboard")
+MEETING = m.Prediction(source_us=1, courtesy="Give way: person #3 head on, turning away from it")
 STOP_ADVISED = m.Advisory(source_us=1, direction=m.Direction.STOP, reason=m.Reason.NO_SAFE_SIDE)
 SILENT_OPERATOR: dict[str, m.Message | None] = {"operator/state": None}
 CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     ({}, (), ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4"]),
     ({"navigator/command": replace(ORDER, obstacle_track_ids=(3,))}, (),
      ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4, planned for person #3"]),
+    # Whom it meets is said for as long as the prediction is of now.
+    ({"navigator/command": replace(ORDER, obstacle_track_ids=(3,)), "navigator/prediction": MEETING}, (),
+     ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4, give way: person #3 head on, turning away from it"]),
+    ({"navigator/command": replace(ORDER, obstacle_track_ids=(3,)), "navigator/prediction": MEETING},
+     ("navigator/prediction",), ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4, planned for person #3"]),
     ({"navigator/command": replace(ORDER, speed_mps=0.0, obstacle_track_ids=(3,))}, (),
      ["WAITING", "WAITING", "for person #3"]),
     ({"navigator/command": replace(ORDER, leg="return home")}, (), ["HOME", "RETURNING HOME", ""]),

@@ -1,4 +1,4 @@
-"""What the map shows of the navigator's intent: the way ahead, moving obstacles, home. Pure; it decides nothing."""
+"""What people are shown of the navigator's intent: the way ahead, what it meets, home. Pure; it decides nothing."""
 
 import math
 
@@ -6,10 +6,20 @@ import numpy as np
 
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
-from paani.messages import LegKind, Mission, MovingObstacle, NavCommand, Odometry, Prediction, Waypoint
+from paani.messages import (
+    EncounterClass,
+    LegKind,
+    Mission,
+    MovingObstacle,
+    NavCommand,
+    Odometry,
+    Prediction,
+    Waypoint,
+)
+from paani_services.navigator.avoidance.courtesy import Encounter, assess_encounter, describe_encounter
 from paani_services.navigator.avoidance.replanning import PlannerState
 from paani_services.navigator.avoidance.rollout import BoatState, roll_out
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
+from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import NavigatorState
 
@@ -24,16 +34,26 @@ def predict(
     now_us: int,
     camera: Camera,
     config: NavigatorConfig,
+    before: Prediction | None = None,
 ) -> Prediction:
-    """From the state after a step and its order. Without a position there is nothing to draw but home."""
+    """From the state after a step and its order. Without a position there is nothing to draw but home.
+
+    before: the prediction before this one; encounters that it names keep their class until they are past.
+    """
     home = _home(state, mission)
     if odometry is None:
         return Prediction(source_us=now_us, home=home)
     path = _roll_out_order(order, odometry, config) if order.enable else ()
-    obstacles: tuple[MovingObstacle, ...] = ()
-    if config.planner.acts_on(camera.calibration) and config.planner.predict:
-        obstacles = _moving_obstacles(state.planner_state, odometry, now_us, camera, config)
-    return Prediction(source_us=odometry.source_us, path=path, obstacles=obstacles, home=home)
+    encounters: list[Encounter] = []
+    boat = _boat_among_obstacles(state.planner_state, odometry)
+    if config.planner.acts_on(camera.calibration) and config.planner.predict and boat is not None:
+        encounters = _encounters(state.planner_state, boat, now_us, camera, config, before)
+    courtesy = ""
+    if boat is not None and encounters:
+        nearest = min(encounters, key=lambda each: (each.kind is EncounterClass.NONE, each.approach.tcpa_s))
+        courtesy = describe_encounter(nearest, boat, order)
+    obstacles = tuple(_on_map(each, boat, odometry) for each in encounters if boat is not None)
+    return Prediction(source_us=odometry.source_us, path=path, obstacles=obstacles, home=home, courtesy=courtesy)
 
 
 def _home(state: NavigatorState, mission: Mission | None) -> tuple[Waypoint, ...]:
@@ -55,28 +75,49 @@ def _roll_out_order(order: NavCommand, odometry: Odometry, config: NavigatorConf
     return tuple(Waypoint(x_m=float(x_m), y_m=float(y_m)) for x_m, y_m in points)
 
 
-def _moving_obstacles(
-    planner: PlannerState, odometry: Odometry, now_us: int, camera: Camera, config: NavigatorConfig
-) -> tuple[MovingObstacle, ...]:
-    """Those that the plan was made for, moved from the frame of dead reckoning to the map."""
+def _boat_among_obstacles(planner: PlannerState, odometry: Odometry) -> BoatState | None:
+    """The boat in the frame of dead reckoning, in which obstacles are; None before that begins."""
     here = planner.memory.odom_pose
-    if here is None or not planner.obstacle_track_ids:
-        return ()
-    to_map_m = odometry.x_m - here.x_m, odometry.y_m - here.y_m
-    found = find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
-    return tuple(_on_map(each, to_map_m) for each in found if each.track_id in planner.obstacle_track_ids)
+    if here is None:
+        return None
+    velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
+    return BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
 
 
-def _on_map(obstacle: DynamicObstacle, to_map_m: tuple[float, float]) -> MovingObstacle:
+def _encounters(
+    planner: PlannerState,
+    boat: BoatState,
+    now_us: int,
+    camera: Camera,
+    config: NavigatorConfig,
+    before: Prediction | None,
+) -> list[Encounter]:
+    """Those with the obstacles that the plan was made for."""
+    if not planner.obstacle_track_ids:
+        return []
+    classes = {each.track_id: each.encounter for each in before.obstacles} if before is not None else {}
+    return [
+        assess_encounter(each, boat, classes.get(each.track_id, EncounterClass.NONE))
+        for each in find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
+        if each.track_id in planner.obstacle_track_ids
+    ]
+
+
+def _on_map(encounter: Encounter, boat: BoatState, odometry: Odometry) -> MovingObstacle:
+    obstacle = encounter.obstacle
     east_m, north_m = obstacle.east_m, obstacle.north_m
     middle_m = math.fsum(east_m) / east_m.size, math.fsum(north_m) / north_m.size
     return MovingObstacle(
         track_id=obstacle.track_id,
-        x_m=middle_m[0] + to_map_m[0],
-        y_m=middle_m[1] + to_map_m[1],
+        x_m=middle_m[0] + odometry.x_m - boat.x_m,
+        y_m=middle_m[1] + odometry.y_m - boat.y_m,
         radius_m=float(np.max(np.hypot(east_m - middle_m[0], north_m - middle_m[1]))),
         east_mps=obstacle.velocity.east_mps,
         north_mps=obstacle.velocity.north_mps,
         velocity_std_mps=obstacle.velocity.deviation_mps,
         age_s=max(0.0, obstacle.age_s),
+        cpa_m=encounter.approach.cpa_m,
+        cpa_std_m=max(0.0, encounter.cpa_std_m),
+        tcpa_s=encounter.approach.tcpa_s,
+        encounter=encounter.kind,
     )

@@ -31,6 +31,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
     sent: m.NavCommand | None = None
+    ahead: m.Prediction | None = None
     sent_us = route_us = predicted_us = 0
     predictions, grids = bus.publisher(keys.PREDICTION), bus.publisher(keys.OCCUPANCY)
     camera = Camera(config.calibration, config.perception.ego_polygon)
@@ -67,7 +68,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     stepper.conclude({})
                 if has_passed(predicted_us, 1e6 / keys.PREDICTION.rate_hz, now_us):
                     odometry = stepper.inboxes[keys.ODOMETRY.name].value
-                    predictions.put(predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator))
+                    ahead = predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator, ahead)
+                    predictions.put(ahead)
                     planner_state = stepper.state.planner_state
                     grid = occupancy_around(planner_state, odometry, now_us, camera, config.navigator)
                     if grid is not None:

@@ -17,12 +17,15 @@ from paani.undecodable import UNDECODABLE
 BEFORE_US, AFTER_US = 5_000_000, 3_000_000  # where the rest of a decision is looked for
 
 AROUND: tuple[keys.Topic[Any], ...] = (
-    keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.COMMAND, keys.THRUST, keys.THRUST_APPLIED,
+    keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.COMMAND, keys.PREDICTION, keys.THRUST, keys.THRUST_APPLIED,
 )  # fmt: skip
 
 
 class Moment(msgspec.Struct, frozen=True, kw_only=True):
-    """One decision. What the log has not is None. before: the direction before, first advised at `before_us`."""
+    """One decision. What the log has not is None. before: the direction before, first advised at `before_us`.
+
+    prediction: the newest by then that is not out of date.
+    """
 
     at_us: int
     start_us: int
@@ -32,6 +35,7 @@ class Moment(msgspec.Struct, frozen=True, kw_only=True):
     tracks: m.Tracks | None
     evidence: m.Evidence | None
     order: m.NavCommand | None
+    prediction: m.Prediction | None
     thrust: m.Thrust | None
     applied: m.ThrustApplied | None
     picture: RecordedPicture | None
@@ -82,6 +86,9 @@ def moment_at(log: Log, at_us: int) -> Moment:
         tracks=_last(t for at, t in found[keys.TRACKS.name] if (t.frame_epoch, t.frame_seq) == frame),
         evidence=_first(e for _, e in found[keys.EVIDENCE.name] if (e.frame_epoch, e.frame_seq) == frame),
         order=order,
+        prediction=_last(
+            p for at, p in found[keys.PREDICTION.name] if 0 <= log_us - at <= keys.PREDICTION.fresh_s * 1e6
+        ),
         thrust=thrust,
         applied=applied,
         picture=_first(p for p in pictures if p.topic == keys.PICTURE.name),

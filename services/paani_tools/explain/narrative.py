@@ -5,6 +5,8 @@ from __future__ import annotations
 import datetime
 import math
 
+import msgspec
+
 from paani.config import Config
 from paani.geometry import wrap_rad
 from paani.messages import (
@@ -148,6 +150,7 @@ def _navigator(moment: Moment) -> list[str]:
     if order is None:
         return ["no order on this advice in the log"]
     planned_for = [f"planned for {obstacles}"] if (obstacles := _planned_for(moment, order.obstacle_track_ids)) else []
+    planned_for += _encounters(moment)
     if not order.enable:
         return [f"holds the boat: {inhibits(order.inhibits)}", *planned_for]
     course = f"steer {_heading_deg(order.heading_rad):03.0f} deg at {order.speed_mps:.2f} m/s"
@@ -159,6 +162,21 @@ def _planned_for(moment: Moment, track_ids: tuple[int, ...]) -> str:
     """The moving obstacles of the plan, such as `person #3`; `track #3` where it is tracked no more."""
     labels = {track.id: track.label.value for track in moment.tracks.tracks} if moment.tracks is not None else {}
     return ", ".join(f"{labels.get(number, 'track')} #{number}" for number in track_ids)
+
+
+def _encounters(moment: Moment) -> list[str]:
+    """The nearest encounter in words, and the closest point of approach of every obstacle that has one."""
+    ahead = moment.prediction
+    if ahead is None:
+        return []
+    lines = [ahead.courtesy] if ahead.courtesy else []
+    for each in ahead.obstacles:
+        cpa_m, std_m, tcpa_s = each.cpa_m, each.cpa_std_m, each.tcpa_s
+        if cpa_m is msgspec.UNSET or std_m is msgspec.UNSET or tcpa_s is msgspec.UNSET:
+            continue
+        when = f"in {tcpa_s:.1f} s" if tcpa_s > 0.0 else "now"
+        lines.append(f"{_planned_for(moment, (each.track_id,))} nearest {when}: {cpa_m:.1f} m, +- {std_m:.1f} m")
+    return lines
 
 
 def _controller(moment: Moment) -> list[str]:

@@ -55,7 +55,7 @@ from paani.messages.perception import (
     UnusableCause,
 )
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
-from paani.messages.prediction import MovingObstacle, Prediction
+from paani.messages.prediction import EncounterClass, MovingObstacle, Prediction
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
@@ -81,6 +81,7 @@ __all__ = [
     "Disagreement",
     "DriveMode",
     "DropCount",
+    "EncounterClass",
     "Evidence",
     "FenceArea",
     "Finite",

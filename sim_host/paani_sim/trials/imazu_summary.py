@@ -7,11 +7,11 @@ from enum import StrEnum
 
 import msgspec
 
+from paani.messages import EncounterClass
 from paani_sim.trials.intervals import Share, share_with_interval
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.result import NEAR_MISS_CLEARANCE_M, TrialResult
 from paani_sim.trials.rule_encounters import mean_own_score
-from paani_sim.trials.rule_scores import EncounterClass
 from paani_sim.trials.trial_cases import TrialCase
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS, case_codes, count_seen, is_fair

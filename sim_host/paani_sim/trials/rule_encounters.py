@@ -9,8 +9,10 @@ import msgspec
 import numpy as np
 
 from paani.arrays import F64, Bools
+from paani.encounters import classify_encounter
+from paani.messages import EncounterClass
 from paani_sim.trials.hull_clearance import HullPath, compute_actor_poses, compute_clearances_m
-from paani_sim.trials.rule_scores import CLEAR_M, EncounterClass, Manoeuvre, classify_encounter, score_by_rule
+from paani_sim.trials.rule_scores import CLEAR_M, Manoeuvre, score_by_rule
 from paani_sim.worlds import Actor, Kind, World
 from paani_sim.worlds.footprint import build_outline
 

@@ -1,9 +1,8 @@
-"""Encounter classes and scores for the collision regulations' rules 8 and 13 to 17. Pure.
+"""Scores for the collision regulations' rules 8 and 13 to 17, by the class of the encounter. Pure.
 
-Classes after Woerner et al.: "Quantifying protocol evaluation for autonomous collision avoidance", Autonomous Robots 43
-(2019), doi 10.1007/s10514-018-9765-y. Scores after Hagen, Vassbotn, Skogvold, Johansen, Brekke:
-"Safety and COLREG evaluation for marine collision avoidance algorithms", Ocean Engineering 288 (2023),
-doi 10.1016/j.oceaneng.2023.115991, with ranges from hull to hull and without the term that judges aspect as safety.
+After Hagen, Vassbotn, Skogvold, Johansen, Brekke: "Safety and COLREG evaluation for marine collision avoidance
+algorithms", Ocean Engineering 288 (2023), doi 10.1016/j.oceaneng.2023.115991, with ranges from hull to hull and without
+the term that judges aspect as safety.
 
 Angles are in degrees, clockwise, (-180, 180]: `bearing` of the target from our bow, `aspect` is our bearing from the
 target's bow. A score is in [0, 1]. They measure courtesy: a boat with one camera does not keep the lookout that the
@@ -13,26 +12,15 @@ rules ask for.
 from __future__ import annotations
 
 import math
-from enum import StrEnum
 
 import msgspec
+
+from paani.messages import EncounterClass
 
 CLEAR_M, NEAR_MISS_M = 1.5, 0.5  # hull to hull: twice the hull's width, and `NEAR_MISS_CLEARANCE_M`; contact is 0
 APPARENT_TURN_DEG = 30.0  # a turn that a camera or an eye notices at once
 TOO_LITTLE = 0.3  # of `course_unchanged` or `speed_unchanged`: an action is apparent with either below it
-OVERTAKEN_SECTOR_DEG = 112.5
 CROSSED_AHEAD_DEG = (-165.0, 25.0)  # aspect at the closest point
-
-
-class EncounterClass(StrEnum):
-    """Who meets whom, and who gives way. NONE: none of the rules 13 to 17 speaks of it."""
-
-    OVERTAKEN = "overtaken"
-    OVERTAKING = "overtaking"
-    HEAD_ON = "head_on"
-    GIVE_WAY = "give_way"
-    STAND_ON = "stand_on"
-    NONE = "none"
 
 
 class Manoeuvre(msgspec.Struct, frozen=True, kw_only=True):
@@ -55,21 +43,6 @@ class Manoeuvre(msgspec.Struct, frozen=True, kw_only=True):
     start_mps: float
     least_mps: float
     most_mps: float
-
-
-def classify_encounter(bearing_deg: float, aspect_deg: float, own_mps: float, target_mps: float) -> EncounterClass:
-    """The class of an encounter at its beginning; it is kept until the two are past each other."""
-    if abs(bearing_deg) >= OVERTAKEN_SECTOR_DEG and abs(aspect_deg) < 45.0 and target_mps > own_mps:
-        return EncounterClass.OVERTAKEN
-    if abs(aspect_deg) >= OVERTAKEN_SECTOR_DEG and abs(bearing_deg) < 45.0 and own_mps > target_mps:
-        return EncounterClass.OVERTAKING
-    if abs(aspect_deg) < 13.0 and abs(bearing_deg) < 13.0:
-        return EncounterClass.HEAD_ON
-    if 0.0 <= bearing_deg <= OVERTAKEN_SECTOR_DEG and -OVERTAKEN_SECTOR_DEG <= aspect_deg <= 10.0:
-        return EncounterClass.GIVE_WAY
-    if -OVERTAKEN_SECTOR_DEG <= bearing_deg <= 0.0 and 0.0 <= aspect_deg <= OVERTAKEN_SECTOR_DEG:
-        return EncounterClass.STAND_ON
-    return EncounterClass.NONE
 
 
 def safety(clearance_m: float, clear_m: float = CLEAR_M) -> float:
@@ -148,8 +121,8 @@ def score_by_rule(kind: EncounterClass, each: Manoeuvre, clear_m: float = CLEAR_
     return {
         EncounterClass.OVERTAKING: {"13": rule_13(each, clear_m), **apart},
         EncounterClass.HEAD_ON: {"14": rule_14(each), "8": rule_8(each)},
-        EncounterClass.GIVE_WAY: {"15": rule_15(each, clear_m), **apart},
-        EncounterClass.STAND_ON: kept,
+        EncounterClass.CROSSING_STARBOARD: {"15": rule_15(each, clear_m), **apart},
+        EncounterClass.CROSSING_PORT: kept,
         EncounterClass.OVERTAKEN: kept,
         EncounterClass.NONE: {},
     }[kind]

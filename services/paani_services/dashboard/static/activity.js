@@ -24,7 +24,7 @@ export function describeActivity(store, now) {
   if (isReplay(store) && !command) return activity("REPLAY", isMoving ? "the boat was under way" : `the boat stood still${inhibits.length ? `: ${inhibits[0].text}` : ""}`);
   if (operator?.stopped && !isMoving) return activity("STOPPED", `by ${operatorText(operator.by)}; arming releases it`);
   if (!store.isFresh("plant/thrust_applied", now)) return activity("UNKNOWN", STAGES.gate[1]);
-  if (isMoving) return command?.enable ? describeMotion(store, command) : activity("UNDER_WAY", "no order is heard");
+  if (isMoving) return command?.enable ? describeMotion(store, command, now) : activity("UNDER_WAY", "no order is heard");
   if (inhibits.some((reason) => reason.code === "NOT_ARMED" || reason.code === "not_armed")) return activity("NOT_ARMED", otherReason(inhibits));
   if (inhibits.some((reason) => reason.code === "IDLE")) return activity("IDLE", otherReason(inhibits.filter((reason) => reason.code !== "IDLE")));
   if (inhibits.some((reason) => reason.code === "NEUTRAL")) return activity("MANUAL", handReason(store, command, "the stick is in neutral"));
@@ -48,8 +48,8 @@ function handReason(store, command, what) {
   return [what, advice].filter(Boolean).join(", ");
 }
 
-/** What an order that moves the boat is for. @param {import("./store.js").Store} store @param {any} command @returns {Activity} */
-function describeMotion(store, command) {
+/** What an order that moves the boat is for. @param {import("./store.js").Store} store @param {any} command @param {number} now @returns {Activity} */
+function describeMotion(store, command, now) {
   const advisory = store.get("advisor/advisory"), tracks = store.get("advisor/tracks")?.tracks ?? [];
   const planned = command.obstacle_track_ids;
   if (command.leg === "manual") return activity("MANUAL", handReason(store, command, `by ${operatorText(store.get("operator/state")?.wheel_by ?? "")}`));
@@ -65,6 +65,8 @@ function describeMotion(store, command) {
   const parts = [command.leg.slice(leg.length).replace(/^, /, "")];
   const waypoints = store.get("navigator/route")?.waypoints.length;
   if (id === "ROUTE" && waypoints) parts.push(`waypoint ${command.waypoint_index + 1} of ${waypoints}`);
-  if (planned.length) parts.push(`planned for ${trackNames(tracks, planned)}`);
+  const courtesy = store.isFresh("navigator/prediction", now) ? store.get("navigator/prediction").courtesy : "";
+  if (courtesy) parts.push(courtesy.charAt(0).toLowerCase() + courtesy.slice(1));
+  else if (planned.length) parts.push(`planned for ${trackNames(tracks, planned)}`);
   return activity(id, parts.filter(Boolean).join(", "));
 }

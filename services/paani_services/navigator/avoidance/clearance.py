@@ -10,6 +10,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from paani import portable
 from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani_services.navigator.avoidance.rollout import BoatState, Trajectories
@@ -21,14 +22,13 @@ from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, Occupanc
 # Growth of an obstacle's position uncertainty per second out of sight [m/s], for changes of course and speed; measured:
 # 1.2 m in 12 s.
 UNSEEN_GROWTH_MPS = 0.1
-# Times from now [s] at which the approach of an obstacle is predicted: a boat needs 20 s to turn away from an obstacle
-# that comes at 0.13 m/s.
-APPROACH_TIMES_S = np.arange(0.0, 30.5, 0.5)
+# How far ahead an approach is predicted [s]: a boat needs 20 s to turn away from an obstacle that comes at 0.13 m/s.
+APPROACH_S = 30.0
 ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 
 class Approach(NamedTuple):
-    """The approach of an obstacle to a boat at rest: distance now, and distance and time of its closest point (CPA)."""
+    """The approach of an obstacle's outline to a boat's middle: distance now, and distance and time of its CPA."""
 
     now_m: float
     cpa_m: float
@@ -72,8 +72,12 @@ def predicted_clearance_m(obstacle: DynamicObstacle, x_m: F64, y_m: F64, time_s:
     for x, y in zip(obstacle.east_m.tolist(), obstacle.north_m.tolist(), strict=True):
         east, north = east_m - x, north_m - y
         square = np.minimum(square, east * east + north * north)
-    growth_m = velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
-    return np.asarray(np.sqrt(square) - obstacle.standoff_m - growth_m)
+    return np.asarray(np.sqrt(square) - obstacle.standoff_m - position_deviation_m(obstacle, time_s))
+
+
+def position_deviation_m(obstacle: DynamicObstacle, time_s: F64 | float) -> F64 | float:
+    """Standard deviation of the obstacle's predicted position at these times from now."""
+    return obstacle.velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
 
 
 def least_clearance_m(static_m: F64, obstacles: Sequence[DynamicObstacle], trajectories: Trajectories) -> F64:
@@ -141,23 +145,29 @@ def advanced_in_time(obstacle: DynamicObstacle, lead_s: float) -> DynamicObstacl
     )
 
 
-def closest_point_of_approach(obstacle: DynamicObstacle, x_m: F64, y_m: F64) -> Approach:
-    """CPA and TCPA of an obstacle that keeps its velocity exactly, to a boat at rest at this position [1]."""
-    exact = obstacle._replace(velocity=obstacle.velocity._replace(deviation_mps=0.0))
-    distances_m = predicted_clearance_m(exact, x_m, y_m, APPROACH_TIMES_S)
-    closest = int(distances_m.argmin())
-    return Approach(float(distances_m[0]), float(distances_m[closest]), float(APPROACH_TIMES_S[closest]))
+def closest_point_of_approach(obstacle: DynamicObstacle, boat: BoatState) -> Approach:
+    """The CPA within `APPROACH_S` of an obstacle and a boat that both keep their velocity."""
+    cos, sin = portable.cos(boat.yaw_rad), portable.sin(boat.yaw_rad)
+    east_mps = obstacle.velocity.east_mps - (boat.surge_mps * cos - boat.sway_mps * sin)
+    north_mps = obstacle.velocity.north_mps - (boat.surge_mps * sin + boat.sway_mps * cos)
+    east_m, north_m = obstacle.east_m - boat.x_m, obstacle.north_m - boat.y_m
+    closing = -(east_m * east_mps + north_m * north_mps)
+    time_s = np.clip(closing / max(east_mps * east_mps + north_mps * north_mps, 1e-12), 0.0, APPROACH_S)
+    cpa_m = np.hypot(east_m + time_s * east_mps, north_m + time_s * north_mps)
+    nearest = int(cpa_m.argmin())
+    return Approach(float(np.hypot(east_m, north_m).min()), float(cpa_m[nearest]), float(time_s[nearest]))
 
 
-def is_give_way_needed(obstacles: Sequence[DynamicObstacle], x_m: F64, y_m: F64, limit_m: float) -> bool:
-    """Whether an obstacle that moves for certain will come nearer than the limit to a boat at rest there [1].
+def is_give_way_needed(obstacles: Sequence[DynamicObstacle], at_rest: BoatState, limit_m: float) -> bool:
+    """Whether an obstacle that moves for certain will come nearer than the limit to a boat at rest there.
 
     An obstacle that is as near already, and comes no nearer, does not count.
     """
     for obstacle in obstacles:
         if not obstacle.is_moving:
             continue
-        approach = closest_point_of_approach(obstacle, x_m, y_m)
-        if approach.cpa_m < min(limit_m, approach.now_m - ESCAPE_GAIN_M):
+        approach = closest_point_of_approach(obstacle, at_rest)
+        room_m = limit_m + obstacle.standoff_m + UNSEEN_GROWTH_MPS * obstacle.age_s
+        if approach.cpa_m < min(room_m, approach.now_m - ESCAPE_GAIN_M):
             return True
     return False

@@ -198,6 +198,7 @@ def _evaluate_candidates(
     tight_m = config.hull_radius_m + config.tight_margin_m
     is_in_horizon = (trajectories.time_s <= config.horizon_s + 1e-9)[:, None]
     coasting, last = roll_out_coasting(start, trajectories.time_s, config), int(is_in_horizon.sum()) - 1
+    at_rest = BoatState(float(coasting.x_m[last, 0]), float(coasting.y_m[last, 0]), start.yaw_rad)
     coasting_m = least_clearance_m(interpolate_field(grid, field_m, coasting), obstacles, coasting)
     return CandidateEvaluation(
         obstacles,
@@ -214,7 +215,7 @@ def _evaluate_candidates(
         person_distance_m=interpolate_field(grid, distance_field_m(grid.people), trajectories),
         is_unknown=interpolate_field(grid, distance_field_m(grid.unknown), trajectories) < config.hull_radius_m,
         tight_clearance_m=tight_m,
-        is_give_way_needed=is_give_way_needed(obstacles, coasting.x_m[last], coasting.y_m[last], tight_m),
+        is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
         coasting=coasting,
         coasting_clearance_m=float(np.where(is_in_horizon, coasting_m, np.inf).min()),
     )

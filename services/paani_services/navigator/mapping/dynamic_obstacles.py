@@ -51,7 +51,7 @@ class DynamicObstacle(NamedTuple):
     """A tracked obstacle with a velocity: its outline now [n], when it was last seen, and the room kept around it.
 
     vacated_boxes: boxes that show it where it is no more. Where it was within `free_s` of when it was last seen stays
-    occupied. track_id: the advisor's track that it was last seen as; 0: unknown.
+    occupied. track_id: the advisor's track that it was last seen as; 0: unknown. label: what the detector takes it for.
     """
 
     east_m: F64
@@ -61,6 +61,7 @@ class DynamicObstacle(NamedTuple):
     age_s: float
     vacated_boxes: BoxIds
     track_id: int = 0
+    label: Label = Label.VESSEL
 
     @property
     def is_moving(self) -> bool:
@@ -95,6 +96,7 @@ def find_dynamic_obstacles(
                 -last.time_s,
                 frozenset(each.box_id for each in track if each.time_s < track[-1].time_s - config.free_s),
                 _latest_track_id(track),
+                last.label,
             )
         )
     return tuple(found)
@@ -148,6 +150,7 @@ def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -
         -last.time_s,
         frozenset(),
         _latest_track_id(track),
+        Label.PERSON,
     )
 
 

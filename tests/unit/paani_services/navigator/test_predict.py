@@ -34,6 +34,36 @@ def test_moving_obstacles_stand_in_the_map_with_number_and_velocity() -> None:
     assert 0.1 < seen.radius_m < 1.0
 
 
+def test_encounters_are_told_with_their_closest_point_and_keep_their_class() -> None:
+    """A swimmer crosses the bow of a boat at rest from starboard, 5 m off; once past they are met no more."""
+    planner, tracks, now_us = watch(16, with_tracks=True)
+    here = replace(odometry(now_us, AT_REST), surge_mps=0.4)
+    planner, _ = replan(planner, here, GuidanceSetpoint(0.0, 0.6), now_us, CAMERA, PLANNER)
+    state, waiting = NavigatorState(planner_state=planner), replace(AHEAD, speed_mps=0.0)
+
+    def ahead(before: m.EncounterClass | None) -> m.Prediction:
+        prediction = predict(state, waiting, here, None, now_us, CAMERA, NAVIGATOR)
+        (seen,) = prediction.obstacles
+        if before is None:
+            return prediction
+        prediction = replace(prediction, obstacles=(replace(seen, encounter=before),))
+        return predict(state, waiting, here, None, now_us, CAMERA, NAVIGATOR, prediction)
+
+    (seen,) = ahead(None).obstacles
+    assert isinstance(seen.cpa_m, float)
+    assert isinstance(seen.tcpa_s, float)
+    assert isinstance(seen.cpa_std_m, float)
+    assert 0.0 < seen.tcpa_s < 10.0
+    assert 0.0 < seen.cpa_m < 5.0
+    assert 0.0 < seen.cpa_std_m < 3.0
+    for before in (m.EncounterClass.CROSSING_PORT, m.EncounterClass.CROSSING_STARBOARD):
+        kept = ahead(before)
+        assert kept.obstacles[0].encounter is before
+        side = before.value.removeprefix("crossing_")
+        number = person_of(tracks).id
+        assert kept.courtesy == f"Give way: person #{number} crossing from {side}, waiting until it is past"
+
+
 def test_the_way_ahead_leads_to_the_ordered_heading_and_is_none_where_the_boat_may_not_move() -> None:
     here = replace(odometry(1_000_000, AT_REST), x_m=100.0, y_m=50.0, surge_mps=0.5)
     path = predict(NavigatorState(), AHEAD, here, None, 1_000_000, CAMERA, NAVIGATOR).path

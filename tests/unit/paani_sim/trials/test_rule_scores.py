@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani.encounters import classify_encounter
+from paani.messages import EncounterClass
 from paani_sim.trials.hull_clearance import HullPath
 from paani_sim.trials.imazu_summary import SightGroup, format_imazu, sight_group, summarise_imazu
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.rule_encounters import clear_m_of, is_in_domain, measure_rule_encounters
 from paani_sim.trials.rule_scores import (
-    EncounterClass,
     Manoeuvre,
-    classify_encounter,
     course_unchanged,
     delay,
     not_apparent,
@@ -47,10 +47,12 @@ def changed(**values: object) -> Manoeuvre:
 
 @pytest.mark.parametrize(
     ("name", "code", "expected"),
-    [("imazu-01", "H", "head_on"), ("imazu-01", "F", "give_way"), ("imazu-01", "A", "give_way"),
-     ("imazu-01", "a", "stand_on"), ("imazu-01", "S", "overtaking"), ("imazu-01", "s", "stand_on"),
-     ("imazu-01", "B", "give_way"), ("imazu-01", "b", "stand_on"), ("imazu-01", "E", "give_way"),
-     ("imazu-01", "e", "stand_on"), ("imazu-fair-01", "A", "give_way"), ("imazu-fair-01", "C", "overtaking"),
+    [("imazu-01", "H", "head_on"), ("imazu-01", "F", "crossing_starboard"), ("imazu-01", "A", "crossing_starboard"),
+     ("imazu-01", "a", "crossing_port"), ("imazu-01", "S", "overtaking"), ("imazu-01", "s", "crossing_port"),
+     ("imazu-01", "B", "crossing_starboard"), ("imazu-01", "b", "crossing_port"),
+     ("imazu-01", "E", "crossing_starboard"),
+     ("imazu-01", "e", "crossing_port"), ("imazu-fair-01", "A", "crossing_starboard"),
+     ("imazu-fair-01", "C", "overtaking"),
      ("imazu-fair-01", "D", "overtaking"), ("imazu-fair-01", "E", "overtaking")],
 )  # fmt: skip
 def test_classes_of_the_imazu_vessels(name: str, code: str, expected: str) -> None:
@@ -65,7 +67,7 @@ def test_classes_that_no_imazu_vessel_has() -> None:
     assert classify_encounter(10.0, 170.0, 0.6, 0.7) is EncounterClass.NONE
     assert classify_encounter(120.0, -60.0, 0.6, 0.6) is EncounterClass.NONE
     assert classify_encounter(12.9, -12.9, 0.6, 0.6) is EncounterClass.HEAD_ON
-    assert classify_encounter(13.1, -13.1, 0.6, 0.6) is EncounterClass.GIVE_WAY
+    assert classify_encounter(13.1, -13.1, 0.6, 0.6) is EncounterClass.CROSSING_STARBOARD
 
 
 @pytest.mark.parametrize(
@@ -146,8 +148,8 @@ def test_each_class_is_scored_by_its_own_rule_first() -> None:
         EncounterClass.OVERTAKEN: ["17"],
         EncounterClass.OVERTAKING: ["13", "16", "8"],
         EncounterClass.HEAD_ON: ["14", "8"],
-        EncounterClass.GIVE_WAY: ["15", "16", "8"],
-        EncounterClass.STAND_ON: ["17"],
+        EncounterClass.CROSSING_STARBOARD: ["15", "16", "8"],
+        EncounterClass.CROSSING_PORT: ["17"],
         EncounterClass.NONE: [],
     }
 
@@ -225,7 +227,7 @@ def test_cases_are_summed_by_form_and_group_and_never_over_them() -> None:
     }
     partly = found["plain"]["partly seen"]
     assert (partly.contacts, partly.untouched_share.share, partly.domain_entered) == (2, 0.0, 1)
-    assert partly.scores["head_on"].encounters == partly.scores["give_way"].encounters == 1
+    assert partly.scores["head_on"].encounters == partly.scores["crossing_starboard"].encounters == 1
     assert partly.time_lost_s == pytest.approx(100.0 - 40.0 / 0.6, abs=0.01)
     assert len(format_imazu({"paani": found})) == 2 + 4
     assert summarise_imazu({TrialCase("lake", 1, Policy.PAANI): RESULT}) == {}

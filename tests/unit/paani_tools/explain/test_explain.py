@@ -87,6 +87,31 @@ def test_the_order_names_the_tracks_that_it_was_planned_for(log: Path) -> None:
     assert f"planned for {track.label} #{track.id}, track #99" in printed
 
 
+def test_the_order_tells_the_encounter_that_it_is_for(log: Path) -> None:
+    """In the navigator's own words, with the closest point of approach of every obstacle that has one."""
+    moment = moment_at(open_log(log), T0_US + 8_000_000)
+    obstacle = m.MovingObstacle(track_id=99, x_m=1.0, y_m=2.0, radius_m=0.3, east_mps=0.5, north_mps=0.0)
+    close = msgspec.structs.replace(obstacle, cpa_m=1.25, cpa_std_m=0.5, tcpa_s=6.0)
+    words = "Give way: vessel #99 crossing from starboard, passing astern of it"
+    ahead = m.Prediction(source_us=1, obstacles=(close, obstacle), courtesy=words)
+    printed = narrative_of(msgspec.structs.replace(moment, prediction=ahead), CONFIG)
+    assert f"{words}\n{' ' * 12}track #99 nearest in 6.0 s: 1.2 m, +- 0.5 m\n" in printed
+    assert printed.count("nearest in") == 1
+    assert "nearest in" not in narrative_of(msgspec.structs.replace(moment, prediction=None), CONFIG)
+
+
+def test_the_newest_prediction_by_then_is_told_unless_it_is_old(tmp_path: Path) -> None:
+    at_us = T0_US + 8_000_000
+    put = [
+        Record(keys.PREDICTION.name, at_us + off_us, k, msgspec.json.encode(m.Prediction(source_us=1, courtesy=str(k))))
+        for k, off_us in enumerate((-9_000_000, -1_500_000, -500_000, 500_000))
+    ]
+    for kept, courtesy in ((put, "2"), (put[:1], None)):
+        log = write_log(tmp_path / f"{courtesy}.mcap", sorted([*DRIVE, *kept], key=lambda record: record.log_us))
+        prediction = moment_at(open_log(log), at_us).prediction
+        assert (prediction.courtesy if prediction else None) == courtesy
+
+
 def test_the_chain_is_followed_to_what_this_advice_became(log: Path) -> None:
     moment = moment_at(open_log(log), T0_US + 8_000_000)
     advisory = moment.advisory

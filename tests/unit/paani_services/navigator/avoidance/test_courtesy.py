@@ -1,0 +1,176 @@
+"""Encounters: their class, their closest point of approach, and the words for them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from paani.messages import EncounterClass, Label, NavCommand
+from paani_services.navigator.avoidance.clearance import APPROACH_S
+from paani_services.navigator.avoidance.courtesy import (
+    WANTED_CPA_M,
+    Encounter,
+    assess_encounter,
+    describe_encounter,
+)
+from paani_services.navigator.avoidance.rollout import BoatState
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.velocity_fit import Velocity
+
+NORTHWARD = BoatState(0.0, 0.0, math.pi / 2.0, 0.6)
+MIRRORED = {
+    EncounterClass.CROSSING_PORT: EncounterClass.CROSSING_STARBOARD,
+    EncounterClass.CROSSING_STARBOARD: EncounterClass.CROSSING_PORT,
+}
+PLACES, SPEEDS, ANGLES = st.floats(-15.0, 15.0), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)
+
+
+def kayak(
+    x_m: float, y_m: float, east_mps: float, north_mps: float, *, std_mps: float = 0.0, age_s: float = 0.0
+) -> DynamicObstacle:
+    velocity = Velocity(east_mps, north_mps, std_mps)
+    outline = np.array([x_m - 0.3, x_m, x_m + 0.3]), np.array([y_m, y_m, y_m])
+    return DynamicObstacle(*outline, 0.2, velocity, age_s, frozenset(), 7, Label.VESSEL)
+
+
+def order(heading_rad: float, speed_mps: float, *, enable: bool = True) -> NavCommand:
+    return NavCommand(source_us=1, enable=enable, heading_rad=heading_rad, speed_mps=speed_mps)
+
+
+def rotated(obstacle: DynamicObstacle, angle_rad: float) -> DynamicObstacle:
+    """The obstacle turned about the origin."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    east, north, velocity = obstacle.east_m, obstacle.north_m, obstacle.velocity
+    return obstacle._replace(
+        east_m=cos * east - sin * north,
+        north_m=sin * east + cos * north,
+        velocity=Velocity(
+            cos * velocity.east_mps - sin * velocity.north_mps,
+            sin * velocity.east_mps + cos * velocity.north_mps,
+            velocity.deviation_mps,
+        ),
+    )
+
+
+def is_same(one: Encounter, other: Encounter) -> bool:
+    return one.approach == pytest.approx(other.approach, abs=1e-6) and one.cpa_std_m == pytest.approx(other.cpa_std_m)
+
+
+def assume_within_classes(x_m: float, y_m: float, east_mps: float, north_mps: float, yaw_rad: float) -> None:
+    """Not within rounding of a bound between two classes, and never still."""
+    assume(math.hypot(east_mps, north_mps) > 0.05)
+    towards_rad = math.atan2(y_m, x_m)
+    bearing_deg = math.degrees(towards_rad - yaw_rad) % 360.0
+    aspect_deg = math.degrees(towards_rad + math.pi - math.atan2(north_mps, east_mps)) % 360.0
+    bounds_deg = (0.0, 10.0, 13.0, 45.0, 112.5, 180.0, 247.5, 315.0, 347.0, 350.0, 360.0)
+    assume(all(abs(angle - bound) > 1e-3 for angle in (bearing_deg, aspect_deg) for bound in bounds_deg))
+    assume(abs(math.hypot(east_mps, north_mps) - 0.6) > 1e-3)
+
+
+@given(PLACES, PLACES, SPEEDS, SPEEDS)
+def test_the_mirrored_encounter_has_the_mirrored_class(x: float, y: float, east: float, north: float) -> None:
+    assume_within_classes(x, y, east, north, NORTHWARD.yaw_rad)
+    seen = assess_encounter(kayak(x, y, east, north), NORTHWARD)
+    mirrored = assess_encounter(kayak(-x, y, -east, north), NORTHWARD)
+    assert is_same(seen, mirrored)
+    assume(seen.approach.tcpa_s > 1e-6)
+    assert mirrored.kind is MIRRORED.get(seen.kind, seen.kind)
+
+
+@given(PLACES, PLACES, SPEEDS, SPEEDS, ANGLES)
+def test_encounters_do_not_depend_on_where_north_is(x: float, y: float, east: float, north: float, turn: float) -> None:
+    assume_within_classes(x, y, east, north, NORTHWARD.yaw_rad)
+    near, std = kayak(x, y, east, north, std_mps=0.1, age_s=2.0), WANTED_CPA_M
+    seen = assess_encounter(near, NORTHWARD)
+    turned = assess_encounter(rotated(near, turn), NORTHWARD._replace(yaw_rad=NORTHWARD.yaw_rad + turn))
+    assert is_same(seen, turned)
+    assume(abs(seen.approach.cpa_m - seen.cpa_std_m - std) > 1e-6 and seen.approach.tcpa_s > 1e-6)
+    assert turned.kind is seen.kind
+
+
+@given(PLACES, PLACES, SPEEDS, SPEEDS, st.floats(0.0, 1.0))
+def test_the_closest_point_stays_where_it_is_while_it_comes_nearer(
+    x: float, y: float, east: float, north: float, part: float
+) -> None:
+    """Time shift: after a part of the time to it, what is left of that time remains."""
+    one = DynamicObstacle(np.array([x]), np.array([y]), 0.2, Velocity(east, north, 0.0), 0.0, frozenset())
+    now = assess_encounter(one, NORTHWARD).approach
+    assume(0.0 < now.tcpa_s < APPROACH_S)
+    lead_s = part * now.tcpa_s
+    later = one._replace(east_m=one.east_m + lead_s * east, north_m=one.north_m + lead_s * north)
+    then = assess_encounter(later, NORTHWARD._replace(y_m=0.6 * lead_s)).approach
+    assert then.cpa_m == pytest.approx(now.cpa_m, abs=1e-6)
+    assert then.tcpa_s == pytest.approx(now.tcpa_s - lead_s, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "kind"),
+    [
+        (kayak(0.0, 10.0, 0.0, -1.0), EncounterClass.HEAD_ON),
+        (kayak(8.0, 5.0, -1.0, 0.0), EncounterClass.CROSSING_STARBOARD),
+        (kayak(-8.0, 5.0, 1.0, 0.0), EncounterClass.CROSSING_PORT),
+        (kayak(0.5, 5.0, 0.0, 0.2), EncounterClass.OVERTAKING),
+        (kayak(0.5, -8.0, 0.0, 1.5), EncounterClass.OVERTAKEN),
+        (kayak(8.0, 5.0, 1.0, 0.0), EncounterClass.NONE),  # it goes away
+        (kayak(8.0, 5.0, 0.0, -0.6), EncounterClass.NONE),  # it passes 7.7 m off
+        (kayak(0.0, 5.0, 0.0, 0.0), EncounterClass.NONE),  # it lies still
+    ],
+)
+def test_the_class_is_that_of_the_angles(given: DynamicObstacle, kind: EncounterClass) -> None:
+    assert assess_encounter(given, NORTHWARD).kind is kind
+
+
+def test_the_class_is_kept_until_they_are_past_each_other() -> None:
+    """A kayak that came from starboard is still the one from starboard once the boat has turned behind it."""
+    port = kayak(-2.0, 4.0, -1.0, 0.0)
+    assert (
+        assess_encounter(port, NORTHWARD, EncounterClass.CROSSING_STARBOARD).kind is EncounterClass.CROSSING_STARBOARD
+    )
+    past = kayak(-2.0, -1.0, -1.0, 0.0)
+    assert assess_encounter(past, NORTHWARD, EncounterClass.CROSSING_STARBOARD).kind is EncounterClass.NONE
+
+
+def test_what_is_uncertain_is_met_further_off() -> None:
+    """The standard deviation grows by that of the velocity until the closest point, and while it is out of sight."""
+    certain = assess_encounter(kayak(9.0, 4.0, -0.5, 0.0), NORTHWARD)
+    assert (certain.kind, certain.cpa_std_m) == (EncounterClass.NONE, 0.0)
+    unsure = assess_encounter(kayak(9.0, 4.0, -0.5, 0.0, std_mps=0.1), NORTHWARD)
+    assert unsure.approach == certain.approach
+    assert unsure.cpa_std_m == pytest.approx(0.1 * unsure.approach.tcpa_s)
+    assert unsure.kind is EncounterClass.CROSSING_STARBOARD
+    unseen = assess_encounter(kayak(9.0, 4.0, -0.5, 0.0, std_mps=0.1, age_s=2.0), NORTHWARD)
+    assert unseen.cpa_std_m == pytest.approx(unsure.cpa_std_m + 0.1 * 2.0 + 0.1 * 2.0)
+
+
+ASTERN, AHEAD = math.radians(60.0), math.radians(150.0)  # headings behind and before a kayak from starboard
+
+
+@pytest.mark.parametrize(
+    ("given", "ordered", "words"),
+    [
+        (kayak(8.0, 5.0, -1.0, 0.0), order(ASTERN, 0.6), "vessel #7 crossing from starboard, passing astern of it"),
+        (kayak(8.0, 5.0, -0.7, 0.0), order(AHEAD, 0.6), "vessel #7 crossing from starboard, passing ahead of it"),
+        (kayak(-8.0, 5.0, 1.0, 0.0), order(0.0, 0.0), "vessel #7 crossing from port, waiting until it is past"),
+        (kayak(-8.0, 5.0, 1.0, 0.0), order(math.pi, 0.6), "vessel #7 crossing from port, passing astern of it"),
+        (kayak(0.0, 10.0, 0.0, -1.0), order(ASTERN, 0.6), "vessel #7 head on, passing it on our port side"),
+        (kayak(0.0, 10.0, 0.0, -1.0), order(2.0, 0.6), "vessel #7 head on, passing it on our starboard side"),
+        (kayak(0.0, 10.0, 0.0, -1.0), order(0.0, 0.0, enable=False), "vessel #7 head on, lying without thrust"),
+        (kayak(0.5, -8.0, 0.0, 1.5), order(math.pi / 2, 0.6), "vessel #7 overtaking us, keeping the course"),
+        (kayak(0.5, -8.0, 0.0, 1.5), order(2.5, 0.6), "vessel #7 overtaking us, moving aside"),
+        (kayak(0.0, 5.0, 0.0, 0.3), order(-math.pi / 2, 0.6), "vessel #7 ahead and slower, turning away from it"),
+    ],
+)  # fmt: skip
+def test_the_words_say_how_they_meet_and_what_the_order_does(
+    given: DynamicObstacle, ordered: NavCommand, words: str
+) -> None:
+    encounter = assess_encounter(given, NORTHWARD)
+    assert describe_encounter(encounter, NORTHWARD, ordered) == f"Give way: {words}"
+
+
+def test_without_an_encounter_there_are_no_words() -> None:
+    encounter = assess_encounter(kayak(8.0, 5.0, 1.0, 0.0), NORTHWARD)
+    assert describe_encounter(encounter, NORTHWARD, order(0.0, 0.6)) == ""
