@@ -137,6 +137,10 @@ OPERATOR_ORDER = Topic(
     name="operator/order", type=m.OperatorOrder, producer="operator", rate_hz=10.0, fresh_s=0.5,
     stance=Stance.COMMAND, summary="the mode in force, its station, and what a hand says",
 )
+ORDERED_MISSION = Topic(
+    name="operator/mission", type=m.Mission, producer="operator", rate_hz=0.5, fresh_s=10.0,
+    stance=Stance.STATE, summary="the mission and fence accepted last from a client; without legs and stamp before",
+)
 TUNING = Topic(
     name="operator/tuning", type=m.Tuning, producer="dashboard", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.COMMAND, summary="the operator's request to try, promote or take back parameters of the policy",
@@ -195,7 +199,7 @@ STEPS = {
 # (`paani fleet`), and `paani up` for a simulated boat.
 STATION, SHORE = "dashboard", "shore"
 STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing, and they drive nothing
-COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm")
+COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm", "mission")
 # Processes that carry the bus to what others use, and run only where `up.ports` names them. Some of them ask the
 # operator's process for what a person asks of them.
 PORTS = ("mavlink", "ros2", "foxglove", "nmea")
@@ -206,14 +210,23 @@ REQUESTS = {
         stance=Stance.COMMAND, summary=f"what {client} asks of the operator's process: STOP"
         + ("" if client in STOPPING_CLIENTS else ", a hold that arms, a mode, or the wheel"),
     )
-    for client in (STATION, *ASKING_PORTS, *COMMAND_LINE_CLIENTS)
+    for client in (STATION, *ASKING_PORTS, *STOPPING_CLIENTS, "arm")
 }
+# Who may ask it for another mission or fence; `paani mission` may ask for nothing else.
+MISSION_REQUESTS = {
+    client: Topic(
+        name=f"operator/mission_request/{client}", type=m.MissionRequest, producer=client, rate_hz=1.0, fresh_s=2.0,
+        stance=Stance.EVENT, summary=f"a mission, a fence, or both, that {client} asks the operator's process for",
+    )
+    for client in (STATION, "mavlink", "mission")
+}
+ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values())  # nobody owes one of these
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,
-    LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, TUNING, SHADOW, SIM_TIME, GPS, IMU,
-    THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
-    *REQUESTS.values(), *STEPS.values(),
+    LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, ORDERED_MISSION, TUNING, SHADOW, SIM_TIME, GPS,
+    IMU, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    *ASKED, *STEPS.values(),
 )
 # fmt: on
 

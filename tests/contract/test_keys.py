@@ -106,11 +106,12 @@ def test_stamps_are_safe_in_javascript() -> None:
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_only_the_controller_may_write_thrust(graph: keys.Graph) -> None:
     """A7 B13: neither perception nor advisor can write anything that moves the boat."""
-    moving = {keys.THRUST.name, keys.COMMAND.name, keys.ARMING.name, keys.OPERATOR_ORDER.name, keys.TUNING.name}
+    orders = {keys.ARMING.name, keys.OPERATOR_ORDER.name, keys.ORDERED_MISSION.name}
+    moving = {keys.THRUST.name, keys.COMMAND.name, keys.TUNING.name} | orders
     expected = {
         "controller": {keys.THRUST.name},
         "navigator": {keys.COMMAND.name},
-        "operator": {keys.ARMING.name, keys.OPERATOR_ORDER.name},
+        "operator": orders,
         "dashboard": {keys.TUNING.name},
     }
     for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):
@@ -122,12 +123,14 @@ def test_only_the_controller_may_write_thrust(graph: keys.Graph) -> None:
 def test_each_client_of_the_operator_writes_its_own_requests_and_only_a_simulated_boat_is_armed_by_a_command(
     graph: keys.Graph,
 ) -> None:
-    asked = {topic.name for topic in keys.REQUESTS.values()}
+    asked = {topic.name for topic in keys.ASKED}
     for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):
-        own = {keys.REQUESTS[user].name} if user in keys.REQUESTS and user not in keys.ABSENT[graph] else set()
+        rows = [each[user] for each in (keys.REQUESTS, keys.MISSION_REQUESTS) if user in each]
+        own = {row.name for row in rows if user not in keys.ABSENT[graph]}
         assert asked & set(authority.written_by(user, graph)) == own
     for command in keys.COMMAND_LINE_CLIENTS:
-        assert set(authority.written_by(command, graph)) <= {keys.REQUESTS[command].name}
+        assert set(authority.written_by(command, graph)) <= asked
+    assert set(authority.written_by("mission", graph)) == {keys.MISSION_REQUESTS["mission"].name}, "it arms nothing"
     assert ("arm" in authority.users_in(graph)) is (graph is keys.Graph.SIMULATION)
 
 

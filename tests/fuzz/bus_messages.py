@@ -25,6 +25,8 @@ from paani_services.dashboard.hub import Hub
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.status import board_status
 from paani_services.operator.console import Console
+from paani_services.operator.missions import NO_MISSION
+from paani_services.operator.wheel import Facts
 from paani_services.recorder.backlog import Backlog, QueuedMessage
 from paani_services.recorder.recording import Recording
 from paani_sim.trials.lockstep_bus import LockstepBus
@@ -98,8 +100,10 @@ class DisarmedChain(Target):
             self._honest.publisher(keys.ARMING),  # type: ignore[arg-type]  # the bus of lockstep in the live one's place
             self._honest.publisher(keys.OPERATOR_STATE),  # type: ignore[arg-type]
             self._honest.publisher(keys.OPERATOR_ORDER),  # type: ignore[arg-type]
+            self._honest.publisher(keys.ORDERED_MISSION),  # type: ignore[arg-type]
             folder,
             self._clock,
+            lambda: Facts(mission=NO_MISSION),
         )
         self._count = 0
 
@@ -158,6 +162,9 @@ class DisarmedChain(Target):
             case m.OperatorRequest():
                 client = topic.name.rpartition("/")[2]
                 self._loop.run_until_complete(self._console.answer(client, message, now_us // 1000))
+            case m.MissionRequest():
+                client = topic.name.rpartition("/")[2]
+                self._loop.run_until_complete(self._console.answer_mission(client, message))
             case m.OperatorState():
                 event = describe_operator_change(self._operator_state, message, now_us)
                 if event is not None:

@@ -41,7 +41,7 @@ FINISHES = (
     "models check",
     "claims",
 )
-NEEDS_A_BOAT = ("echo", "hz", "tune", "replay runs/drive --dashboard")
+NEEDS_A_BOAT = ("echo", "hz", "tune", "mission", "replay runs/drive --dashboard")
 TELLS_OF_THE_MACHINE = ("doctor",)
 TAKES_MINUTES = ("trial", "bench")
 README = (ROOT / "README.md").read_text(encoding="utf-8").partition("## What people do next")[2].partition("\n## ")[0]

@@ -108,3 +108,44 @@ async def test_a_route_that_leaves_the_fence_stops_the_process_before_it_starts(
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "mission.toml: legs[1].waypoints[1]: is outside the fence" in done.stderr
+
+
+async def mission_command(private_sets: tuple[str, ...], *words: str) -> tuple[int | None, str]:
+    """`paani mission`: exit code and what it said."""
+    sets = [word for setting in private_sets for word in ("--set", setting)]
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "paani", "mission", *words, *sets),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )
+    async with asyncio.timeout(30):
+        output, _ = await process.communicate()
+    return process.returncode, output.decode()
+
+
+async def test_a_mission_that_is_sent_is_followed_a_bad_one_is_not_and_a_restart_forgets_neither(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path, private_sets: tuple[str, ...]
+) -> None:
+    sets = settings(tmp_path, 100.0)
+    sent, far = tmp_path / "sent.toml", tmp_path / "far.toml"
+    sent.write_text('name = "sent"\n[[legs]]\ndo = "hold_station"\nx_m = 5.0\ny_m = 5.0\n')
+    far.write_text('name = "far"\n[[legs]]\ndo = "hold_station"\nx_m = 500.0\ny_m = 5.0\n')
+    missions = (await open_as("observer")).latest(keys.MISSION)
+
+    async def followed(name: str) -> m.Mission:
+        async with asyncio.timeout(20):
+            while (mission := await missions.next()).name != name:
+                pass
+        return mission
+
+    async with spawn("operator"):
+        async with spawn("navigator", *sets):
+            fence = (await followed("there")).fence
+            assert await mission_command(private_sets, "send", str(sent)) == (0, "sent: 1 legs, in force\n")
+            taken = await followed("sent")
+            assert taken.fence == fence, "the fence of the files stays"
+            code, printed = await mission_command(private_sets, "send", str(far))
+            assert (code, printed) == (2, "paani: refused: legs[0].waypoints[0]: is outside the fence\n")
+            assert (await missions.next()).accepted_us == taken.accepted_us > 0
+        async with spawn("navigator", *sets):
+            assert (await followed("sent")).accepted_us == taken.accepted_us

@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from paani.config import load_config
+from paani.fence_geometry import distance_to_edge_m, is_allowed
 from paani.messages import FenceArea, Inhibit, Keep, Waypoint
-from paani_services.navigator.avoidance.fence import distance_to_edge_m, is_allowed
 from paani_sim.worlds import Current, Wind, World
 from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
 

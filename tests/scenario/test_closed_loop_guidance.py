@@ -27,10 +27,10 @@ from paani.messages import (
     Waypoint,
     ZeroCause,
 )
+from paani.missions import mission_of_route
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.localization.estimator import Estimator
-from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message

@@ -27,9 +27,9 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
+from paani.missions import mission_of_route
 from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION
 from paani_services.navigator.decide import DECIDER
-from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate

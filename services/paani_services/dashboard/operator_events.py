@@ -48,6 +48,8 @@ def _describe_wheel_change(before: m.OperatorState, now: m.OperatorState, now_us
         is_let_go = before.mode is m.DriveMode.MANUAL and now.mode is m.DriveMode.IDLE
         why = "MANUAL has ended" if is_let_go else f"ordered by {now.wheel_by}"
         return Event(now_us, "warn" if now.mode is m.DriveMode.MANUAL else "info", f"{now.mode}: {why}")
+    if now.mission_us != before.mission_us:
+        return Event(now_us, "info", f"another mission is in force, sent by {now.mission_answered_by}")
     if (now.wheel_by, now.wheel_hand) != (before.wheel_by, before.wheel_hand):
         return Event(now_us, "info", f"the wheel is in another hand of {now.wheel_by}")
     return None

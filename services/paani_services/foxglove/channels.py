@@ -38,7 +38,7 @@ class Channel(NamedTuple):
 
 def forwarded_topics(graph: keys.Graph) -> tuple[keys.Topic[Any], ...]:
     """Topics that go out as they are, in JSON: all but the simulator's truth, requests, and steps of deciders."""
-    left_out = {row.name for row in keys.STEPS.values()} | {row.name for row in keys.REQUESTS.values()}
+    left_out = {row.name for row in (*keys.STEPS.values(), *keys.ASKED)}
     rows = (
         topic
         for topic in keys.topics_in(graph)

@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 
 from paani import messages as m
 from paani.geometry import geodetic_from_enu
+from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import degrees_e7
 from paani_services.mavlink.rover_modes import Mode, mode_of
-from paani_services.mavlink.snapshot import Snapshot, map_origin_deg
+from paani_services.mavlink.snapshot import Snapshot
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # mission_type
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT

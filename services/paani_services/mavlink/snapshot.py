@@ -10,7 +10,8 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
-from paani.geometry import geodetic_from_enu, wrap_rad
+from paani.geometry import wrap_rad
+from paani.missions import mission_of_route
 
 # What each field of a snapshot is taken from.
 TOPICS: Mapping[str, keys.Topic[Any]] = {
@@ -59,13 +60,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
         """What the boat is to do: its mission, or the route alone; None while neither is known."""
         if self.mission is not None:
             return self.mission.legs
-        if self.route is None:
-            return None
-        laps = 0 if self.route.repeat else 1
-        leg = m.MissionLeg(
-            kind=m.LegKind.FOLLOW_ROUTE, waypoints=self.route.waypoints, repeat=self.route.repeat, laps=laps
-        )
-        return (leg,)
+        return None if self.route is None else mission_of_route(self.route).legs
 
     @property
     def fence(self) -> tuple[m.FenceArea, ...]:
@@ -87,13 +82,3 @@ def velocity_mps(pose: m.Odometry) -> tuple[float, float]:
 def attitude_rad(pose: m.Odometry) -> tuple[float, float, float]:
     """Roll, pitch and yaw of the axes forward, right, down in the frame north, east, down [rad]."""
     return pose.roll_rad, -pose.pitch_rad, wrap_rad(0.5 * math.pi - pose.yaw_rad)
-
-
-def map_origin_deg(pose: m.Odometry) -> tuple[float, float]:
-    """Latitude and longitude of the map's origin, from where a pose lies in both."""
-    latitude_deg, longitude_deg = pose.latitude_deg, pose.longitude_deg
-    for _ in range(3):  # each step takes out all but the curvature's change over the way to the origin
-        found = geodetic_from_enu(pose.x_m, pose.y_m, latitude_deg, longitude_deg)
-        latitude_deg += pose.latitude_deg - found[0]
-        longitude_deg += math.remainder(pose.longitude_deg - found[1], 360.0)
-    return latitude_deg, longitude_deg

@@ -15,6 +15,7 @@ from typing import Any
 
 from paani import messages as m
 from paani.geometry import geodetic_from_enu, quaternion
+from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import (
     I16_MAX,
@@ -29,7 +30,7 @@ from paani_services.mavlink.fields import (
 from paani_services.mavlink.health_bits import sys_status
 from paani_services.mavlink.obstacles import obstacle_distance
 from paani_services.mavlink.rover_modes import mode_of
-from paani_services.mavlink.snapshot import Snapshot, attitude_rad, map_origin_deg, velocity_mps
+from paani_services.mavlink.snapshot import Snapshot, attitude_rad, velocity_mps
 
 NAN = math.nan
 CUSTOM_MODE = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED

@@ -11,6 +11,7 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
+from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
 from paani.messages import (
     DriveMode,
@@ -24,7 +25,7 @@ from paani.messages import (
     Waypoint,
 )
 from paani.motion_planning import MotionPlanner
-from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
+from paani_services.navigator.avoidance.fence import limit_speed
 from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.mapping.observed_cells import Camera
@@ -56,11 +57,11 @@ def follow_order(
     planner: MotionPlanner | None = None,
 ) -> tuple[NavigatorState, NavCommand]:
     """One step in the mode that is ordered; ROUTE where nobody orders modes, as in a trial without an operator."""
-    state = note_clock_advance(state, inputs, now_us)
+    state = _begin_legs(note_clock_advance(state, inputs, now_us), mission)
     order = inputs.order
     if order is not None and not state.is_ordered:
         state = msgspec.structs.replace(state, is_ordered=True)
-    faults = _find_faults(state, inputs, now_us, domain, config)
+    faults = _find_faults(state, inputs, mission, now_us, domain, config)
     if faults or (order is not None and order.mode is DriveMode.IDLE):
         leg = "idle" if order is not None and order.mode is DriveMode.IDLE else ""
         return _stand(state, inputs, now_us, domain, config, camera, faults or [Inhibit.IDLE], leg)
@@ -72,8 +73,23 @@ def follow_order(
     return _run_errand(state, inputs, order, fence, now_us, domain, config, camera, planner)
 
 
+def _begin_legs(state: NavigatorState, mission: Mission | None) -> NavigatorState:
+    """Other legs than before begin with the first of them. Home, and what was reached before, stay."""
+    legs_us = 0 if mission is None else mission.legs_us
+    if legs_us == state.legs_us:
+        return state
+    reached = state.progress.waypoints_reached
+    progress = MissionProgress(waypoints_reached=reached, waypoints_reached_before=reached, home=state.progress.home)
+    return msgspec.structs.replace(state, progress=progress, ilos=IlosState(), legs_us=legs_us)
+
+
 def _find_faults(
-    state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    mission: Mission | None,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
 ) -> list[Inhibit]:
     """Why the order may not be followed. None is heard where none is due: no operator who orders modes has armed."""
     order, arming = inputs.order, inputs.arming
@@ -86,7 +102,9 @@ def _find_faults(
     if order.mode is DriveMode.MANUAL and not _is_neutral(order):
         stamps_us = inputs.order_us, order.source_us
         is_old = is_old or any(is_out_of_date(each, config.stick_max_age_s, now_us, config) for each in stamps_us)
-    return [Inhibit.STALE_ORDER] if is_old else []
+    # Neither the mission nor the fence that the order is for has come yet.
+    is_for_other = order.mission_us not in {0, 0 if mission is None else mission.accepted_us}
+    return [Inhibit.STALE_ORDER] * is_old + [Inhibit.NO_ROUTE] * is_for_other
 
 
 def _stand(

@@ -9,6 +9,7 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
+from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
@@ -25,7 +26,7 @@ from paani.messages import (
     Tracks,
 )
 from paani.motion_planning import MotionPlanner
-from paani_services.navigator.avoidance.fence import Fence, is_allowed, limit_speed
+from paani_services.navigator.avoidance.fence import limit_speed
 from paani_services.navigator.avoidance.replanning import (
     COURSE_TOLERANCE_RAD,
     PlannerState,
@@ -70,6 +71,7 @@ class NavigatorState(
     `sim_us` is the newest simulated time, -1 before the first; `clock_advanced_us` is when it last moved forward.
     `is_ordered`: an order of a mode was heard. Of HOLD or RETURN: `errand` is how far that has come, `errand_ilos` its
     integral, `errand_since_us` when it was ordered. `progress` and `ilos` are those of the mission throughout.
+    `legs_us`: stamp of the legs that they count for.
     """
 
     progress: MissionProgress = MissionProgress()
@@ -83,6 +85,7 @@ class NavigatorState(
     errand: MissionProgress = MissionProgress()
     errand_ilos: IlosState = IlosState()
     errand_since_us: int = 0
+    legs_us: int = 0
 
 
 class NavigatorInputs(msgspec.Struct, frozen=True):

@@ -14,8 +14,8 @@ from paani.config import Config
 from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.files.mission_file import load_route_and_mission, next_route
-from paani_services.navigator.files.mission_journal import MissionJournal
 from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mission_in_force import MissionInForce
 from paani_services.navigator.occupancy import occupancy_around
 from paani_services.navigator.predict import predict
 
@@ -28,6 +28,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         load_route_and_mission, config.navigator, config.localization.origin_lat_lon_deg
     )
     stepper = Stepper(bus, clock, config, DECIDER)
+    current = MissionInForce(bus, await asyncio.to_thread(runtime_dir, config.bus), route, mission)
+    arming, ordered = stepper.inboxes[keys.ARMING.name], stepper.inboxes[keys.OPERATOR_ORDER.name]
     period_s = 1.0 / config.navigator.rate_hz
     wake = asyncio.Event()
     sent: m.NavCommand | None = None
@@ -37,26 +39,22 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     camera = Camera(config.calibration, config.perception.ego_polygon)
     with bus.alive():
         async with asyncio.TaskGroup() as group:
-            journal = None
-            if mission is not None:
-                journal = MissionJournal(await asyncio.to_thread(runtime_dir, config.bus), mission)
-                progress = await journal.restore(stepper.inboxes[keys.ARMING.name])
-                stepper.state = msgspec.structs.replace(stepper.state, progress=progress)
-                group.create_task(journal.write_changes())
+            progress = await current.resume(arming, ordered)
+            stepper.state = msgspec.structs.replace(stepper.state, progress=progress, legs_us=current.legs_us)
+            group.create_task(current.journal.write_changes())
             for topic in (keys.ADVISORY, keys.ODOMETRY, keys.ARMING, keys.OPERATOR_ORDER):
                 group.create_task(_wake_on(stepper.inboxes[topic.name], wake))
             while True:
                 now_us = clock.now_us()
-                if has_passed(route_us, 1e6 / keys.ROUTE.rate_hz, now_us):
-                    if mission is not None:
-                        stepper.publish_own(keys.MISSION, msgspec.structs.replace(mission, source_us=now_us))
-                        route = next_route(mission, stepper.state.progress.leg_index) or route
-                    if route is not None:
-                        stepper.publish_own(keys.ROUTE, msgspec.structs.replace(route, source_us=now_us))
+                if current.take_ordered(ordered.value) or has_passed(route_us, 1e6 / keys.ROUTE.rate_hz, now_us):
+                    if current.mission is not None:
+                        stepper.publish_own(keys.MISSION, msgspec.structs.replace(current.mission, source_us=now_us))
+                        current.route = next_route(current.mission, stepper.state.progress.leg_index) or current.route
+                    if current.route is not None:
+                        stepper.publish_own(keys.ROUTE, msgspec.structs.replace(current.route, source_us=now_us))
                     route_us = now_us
                 now_us, outputs = stepper.decide()
-                if journal is not None:
-                    journal.record(stepper.state.progress, stepper.inboxes[keys.ARMING.name].value)
+                current.journal.record(stepper.state.progress, arming.value)
                 order = outputs[keys.COMMAND.name]
                 assert isinstance(order, m.NavCommand)
                 if has_passed(sent_us, period_s * 1e6 - EARLY_US, now_us) or order.is_news_after(sent):
@@ -68,7 +66,9 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     stepper.conclude({})
                 if has_passed(predicted_us, 1e6 / keys.PREDICTION.rate_hz, now_us):
                     odometry = stepper.inboxes[keys.ODOMETRY.name].value
-                    ahead = predict(stepper.state, order, odometry, mission, now_us, camera, config.navigator, ahead)
+                    ahead = predict(
+                        stepper.state, order, odometry, current.mission, now_us, camera, config.navigator, ahead
+                    )
                     predictions.put(ahead)
                     planner_state = stepper.state.planner_state
                     grid = occupancy_around(planner_state, odometry, now_us, camera, config.navigator)

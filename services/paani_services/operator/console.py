@@ -1,4 +1,4 @@
-"""Operator console: answers requests, publishes the state and the mode in force, and keeps the STOP latch on disk."""
+"""Operator console: answers requests, publishes state, mode and mission in force, and keeps the STOP latch on disk."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Publisher
 from paani.clock import Clock
+from paani.missions import find_mission_fault
+from paani_services.operator import missions
 from paani_services.operator import state as op
 from paani_services.operator import wheel as w
 from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
@@ -26,7 +28,8 @@ class Console:
 
     On disk the latch is clear only while nobody is armed and no STOP holds: a STOP that cannot be written, or a process
     that dies while the boat is armed, is a STOP for the next start. The order of what to do is published before the
-    word that arms. read_facts: what the modes need, at any time.
+    word that arms, and an accepted mission before the order that names it. read_facts: what the modes need, at any
+    time. margin_m: the least distance of a mission from its fence.
     """
 
     def __init__(
@@ -34,16 +37,20 @@ class Console:
         arming: Publisher[m.Arming],
         states: Publisher[m.OperatorState],
         orders: Publisher[m.OperatorOrder],
+        accepted: Publisher[m.Mission],
         folder: Path,
         clock: Clock,
         read_facts: Callable[[], w.Facts] = w.Facts,
+        margin_m: float = 0.0,
     ) -> None:
-        self._arming, self._states, self._orders, self._clock = arming, states, orders, clock
-        self._read_facts = read_facts
+        self._arming, self._states, self._orders, self._accepted = arming, states, orders, accepted
+        self._clock, self._read_facts, self._margin_m = clock, read_facts, margin_m
         self._path = folder / LATCH_FILE
         self._write_lock = asyncio.Lock()
         self._latch_kept = True
-        self.state, self.wheel = op.Operator(), w.Wheel()
+        self.state, self.wheel, self.mission = op.Operator(), w.Wheel(), missions.NO_MISSION
+        self._mission_answer, self._mission_answers = missions.MissionAnswer(), dict[str, missions.MissionAnswer]()
+        self._is_checking = False
 
     async def restore(self) -> None:
         """Restore the latch of an earlier run. A missing or unreadable latch counts as a STOP."""
@@ -68,8 +75,30 @@ class Console:
                 if refusal is not m.ArmRefusal.NONE:
                     self._become(op.refuse(self.state, client, request.press, refusal))
             case m.RequestAct.MODE | m.RequestAct.WHEEL | m.RequestAct.DRIVE | m.RequestAct.OVERRIDE:
-                facts, armed = self._read_facts(), self.state.armed
+                facts, armed = self._facts(), self.state.armed
                 self._turn(w.answer(self.wheel, client, request, facts, now_us, armed=armed))
+
+    async def answer_mission(self, client: str, request: m.MissionRequest) -> None:
+        """Check a mission, which may take seconds, and put it in force, or leave the present one there.
+
+        Whether it may be is judged before and after: the mode may have changed meanwhile.
+        """
+        answer = self._mission_answers.get(client)
+        if answer is not None and answer.press == request.press:
+            self._say(answer)
+            return
+        refusal, fault = m.MissionRefusal.BUSY, ""
+        if not self._is_checking:
+            situation = self._situation(client, request.hand)
+            refusal = missions.find_refusal(request, situation)
+            if refusal is m.MissionRefusal.NONE and situation.present is not None:
+                fault = await self._check(missions.merge(request, situation.present, 0))
+                situation = self._situation(client, request.hand)
+                refusal = m.MissionRefusal.INVALID if fault else missions.find_refusal(request, situation)
+            if refusal is m.MissionRefusal.NONE and situation.present is not None:
+                self.mission = missions.merge(request, situation.present, self._clock.now_us())
+                self.publish_mission()
+        self._say(missions.MissionAnswer(client, request.press, refusal, fault))
 
     async def stop(self, client: str) -> None:
         """Latch a STOP."""
@@ -91,16 +120,27 @@ class Console:
         """Publish the present state now."""
         now_us = self._clock.now_us()
         self.wheel = w.lapse(self.wheel, now_us, armed=self.state.armed)
-        self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
+        self._orders.put(self._order(now_us))
         self._arming.put(op.arming_message(self.state, now_us))
         state = op.state_message(self.state, now_us, latch_kept=self._latch_kept)
-        self._states.put(w.with_wheel(state, self.wheel, self._read_facts(), now_us))
+        state = w.with_wheel(state, self.wheel, self._facts(), now_us)
+        self._states.put(missions.with_missions(state, self.mission, self._mission_answer))
+
+    def publish_mission(self) -> None:
+        """Publish the mission accepted last now."""
+        self._accepted.put(msgspec.structs.replace(self.mission, source_us=self._clock.now_us()))
 
     async def publish_forever(self) -> None:
         """Publish the state at the rate of its topic."""
         while True:
             self.publish()
             await asyncio.sleep(1.0 / keys.ARMING.rate_hz)
+
+    async def publish_mission_forever(self) -> None:
+        """Publish the mission accepted last at the rate of its topic, for whoever joins late."""
+        while True:
+            self.publish_mission()
+            await asyncio.sleep(1.0 / keys.ORDERED_MISSION.rate_hz)
 
     async def watch_wheel(self) -> None:
         """Let a stick go that nobody holds, and publish the order at the rate of its topic."""
@@ -109,7 +149,7 @@ class Console:
             now_us = self._clock.now_us()
             self._turn(self.wheel)
             if not 0 < due_us - now_us <= period_us:
-                self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
+                self._orders.put(self._order(now_us))
                 late_us = now_us - due_us
                 due_us = now_us + period_us - (late_us if 0 <= late_us < period_us else 0)
             await asyncio.sleep(WATCH_PERIOD_S)
@@ -153,7 +193,39 @@ class Console:
         if msgspec.structs.replace(self.wheel, stick=before.stick) != before:
             self.publish()
         elif self.wheel != before:
-            self._orders.put(w.order_message(self.wheel, now_us, armed=self.state.armed))
+            self._orders.put(self._order(now_us))
+
+    def _order(self, now_us: int) -> m.OperatorOrder:
+        order = w.order_message(self.wheel, now_us, armed=self.state.armed)
+        return msgspec.structs.replace(order, mission_us=self.mission.accepted_us)
+
+    def _facts(self) -> w.Facts:
+        """What the modes need now; what was accepted here is in force as soon as the navigator hears it."""
+        facts = self._read_facts()
+        if self.mission.accepted_us:
+            return msgspec.structs.replace(facts, mission=self.mission, has_mission=bool(self.mission.legs))
+        return facts
+
+    def _situation(self, client: str, hand: int) -> missions.Situation:
+        held = self.state.hold
+        return missions.Situation(
+            mode=self.wheel.mode,
+            armed=self.state.armed,
+            present=self._facts().mission,
+            may_steer=not self.wheel.by or (self.wheel.by, self.wheel.hand) == (client, hand),
+            is_arming=held is not None and not op.is_silent(held, self._clock.now_us()),
+        )
+
+    async def _check(self, mission: m.Mission) -> str:
+        self._is_checking = True
+        try:
+            return await asyncio.to_thread(find_mission_fault, mission.legs, mission.fence, self._margin_m)
+        finally:
+            self._is_checking = False
+
+    def _say(self, answer: missions.MissionAnswer) -> None:
+        self._mission_answer = self._mission_answers[answer.client] = answer
+        self.publish()
 
     async def _keep(self) -> None:
         """Write the latch of the present state to disk."""

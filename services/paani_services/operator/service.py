@@ -1,4 +1,4 @@
-"""Operator process: requests of its clients in; arming, the mode in force and its state out."""
+"""Operator process: requests of its clients in; arming, the mode and the mission in force, and its state out."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ from paani import messages as m
 from paani.bus import Bus, Latest, Queue
 from paani.clock import Clock
 from paani.config import Config
+from paani.missions import mission_of_route
 from paani.runtime import runtime_dir
 from paani_services.operator.console import Console
+from paani_services.operator.missions import NO_MISSION
 from paani_services.operator.wheel import Facts
 
 STATION_PERIOD_S = 0.2
+MISSIONS_WAITING = 2  # of one client; each may be half a megabyte
+LISTENS_S = 5.0  # after which a navigator that publishes no mission has none: it says one twice in this time
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
@@ -24,40 +28,54 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         bus.publisher(keys.ARMING),
         bus.publisher(keys.OPERATOR_STATE),
         bus.publisher(keys.OPERATOR_ORDER),
+        bus.publisher(keys.ORDERED_MISSION),
         folder,
         clock,
-        facts_reader(bus),
+        facts_reader(bus, clock),
+        config.navigator.fence_margin_m,
     )
     await console.restore()
     station = bus.latest(keys.pulse(keys.STATION))
     applied = bus.latest(keys.THRUST_APPLIED)
     clients = (keys.STATION, *keys.ASKING_PORTS, *keys.command_line_clients_in(bus.graph))
-    requests = {client: bus.queue(keys.REQUESTS[client]) for client in clients}
+    requests = {client: bus.queue(keys.REQUESTS[client]) for client in clients if client in keys.REQUESTS}
+    sent = {client: bus.queue(topic, MISSIONS_WAITING) for client, topic in keys.MISSION_REQUESTS.items()}
     try:
         with bus.alive():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(console.publish_forever())
+                tasks.create_task(console.publish_mission_forever())
                 tasks.create_task(console.watch_wheel())
                 for client, inbox in requests.items():
                     tasks.create_task(answer_forever(console, client, inbox, station))
+                for client, missions in sent.items():
+                    tasks.create_task(answer_missions_forever(console, client, missions))
                 tasks.create_task(follow_station(console, station))
                 tasks.create_task(confirm_stops(console, applied))
     finally:
         await console.end()
 
 
-def facts_reader(bus: Bus) -> Callable[[], Facts]:
+def facts_reader(bus: Bus, clock: Clock) -> Callable[[], Facts]:
     """Reads what the modes need from the newest messages of localization and navigator; what is stale is unknown."""
+    begun_us = clock.now_us()
     odometry, prediction = bus.latest(keys.ODOMETRY), bus.latest(keys.PREDICTION)
-    missions = {topic: bus.latest(topic) for topic in (keys.MISSION, keys.ROUTE)}
+    missions, routes = bus.latest(keys.MISSION), bus.latest(keys.ROUTE)
 
     def read() -> Facts:
         pose = odometry.fresh(keys.ODOMETRY.fresh_s)
         ahead = prediction.fresh(keys.PREDICTION.fresh_s)
+        mission, route = missions.fresh(keys.MISSION.fresh_s), routes.fresh(keys.ROUTE.fresh_s)
+        if mission is None and route is not None:
+            mission = mission_of_route(route)
+        has_listened = clock.now_us() - begun_us >= LISTENS_S * 1e6
+        if mission is None and ahead is not None and has_listened:
+            mission = NO_MISSION
         return Facts(
             position=m.Waypoint(x_m=pose.x_m, y_m=pose.y_m) if pose is not None and pose.healthy else None,
             home=ahead.home[0] if ahead is not None and ahead.home else None,
-            has_mission=any(inbox.receipt_age_s() <= topic.fresh_s for topic, inbox in missions.items()),
+            has_mission=mission is not None and bool(mission.legs),
+            mission=mission,
         )
 
     return read
@@ -70,6 +88,12 @@ async def answer_forever(
     while True:
         request = await inbox.get()
         await console.answer(client, request, living_epoch(station))
+
+
+async def answer_missions_forever(console: Console, client: str, inbox: Queue[m.MissionRequest]) -> None:
+    """Answer the missions of one client, in the order it sends them."""
+    while True:
+        await console.answer_mission(client, await inbox.get())
 
 
 async def follow_station(console: Console, station: Latest[m.Pulse]) -> None:

@@ -20,11 +20,15 @@ OVERRIDE_S = 10.0
 
 
 class Facts(msgspec.Struct, frozen=True):
-    """What a mode needs: a trusted position, home, and a mission or a route; None or false where there is none."""
+    """What a mode needs: a trusted position, home, and a mission or a route; None or false where there is none.
+
+    `mission`: the one in force, without legs where there is none; None where that is not known.
+    """
 
     position: m.Waypoint | None = None
     home: m.Waypoint | None = None
     has_mission: bool = False
+    mission: m.Mission | None = None
 
 
 class Stick(msgspec.Struct, frozen=True):

@@ -11,7 +11,7 @@ from paani_services.ros2 import topics
 from paani_services.ros2.schemas import encode, make
 from paani_services.ros2.translation import RosMessage, header_of
 
-UNDUE = frozenset(topic.name for topic in keys.REQUESTS.values())  # nobody owes one
+UNDUE = frozenset(topic.name for topic in keys.ASKED)
 
 
 class Level(IntEnum):

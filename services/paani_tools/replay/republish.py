@@ -28,8 +28,8 @@ from paani_tools.replay.shift import TimeShift
 
 # Whoever hears these may move a boat or change how it is guided.
 COMMANDS = frozenset(
-    {keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name}
-    | {topic.name for topic in keys.REQUESTS.values()}
+    {keys.COMMAND.name, keys.THRUST.name, keys.ARMING.name, keys.TUNING.name, keys.ORDERED_MISSION.name}
+    | {topic.name for topic in keys.ASKED}
 )
 MOVERS = ("plant", "thrusters", "bridge")  # services that turn thrust into motion, or advice into a light
 DASHBOARD = "dashboard"

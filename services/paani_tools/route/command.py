@@ -14,11 +14,11 @@ from msgspec.structs import replace
 
 from paani.config import load_config
 from paani.errors import UserError
+from paani.fence_geometry import find_route_violation
 from paani.geometry import geodetic_from_enu
 from paani.messages import FenceArea
 from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
-from paani_services.navigator.avoidance.fence import find_route_violation
 from paani_services.navigator.files.fence_file import load_fence
 from paani_services.navigator.files.line_simplification import simplify_line
 from paani_services.navigator.files.map_frame import LatLon

@@ -31,7 +31,7 @@ from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
-from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg
+from paani.messages.mission import FenceArea, Keep, LegKind, Mission, MissionLeg, MissionRefusal, MissionRequest
 from paani.messages.occupancy import Occupancy, OccupancyGrid
 from paani.messages.operator import (
     ArmRefusal,
@@ -105,6 +105,8 @@ __all__ = [
     "Message",
     "Mission",
     "MissionLeg",
+    "MissionRefusal",
+    "MissionRequest",
     "ModeRefusal",
     "MotionCause",
     "MotionState",

@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.guidance import Waypoint
-from paani.messages.header import Count, Message, NonNegative, Text
+from paani.messages.header import Count, Message, NonNegative, Stamp, Text
 
 
 class LegKind(StrEnum):
@@ -56,8 +56,47 @@ class Mission(Message, frozen=True, kw_only=True):
     """The legs in order, and the fence.
 
     The boat stays inside at least one of the areas that keep in, if there are any, and outside all that keep out.
+    Without legs there is nothing to do. `accepted_us`: when the operator's process accepted it, which is its name
+    among the missions of a run; 0: of the boat's files. `legs_us`: the same of the mission that these legs were
+    accepted with; a fence that comes later begins no leg anew.
     """
 
     name: Text
     legs: tuple[MissionLeg, ...]
     fence: tuple[FenceArea, ...] = ()
+    accepted_us: Stamp = 0
+    legs_us: Stamp = 0
+
+
+class MissionRequest(Message, frozen=True, kw_only=True):
+    """A whole mission, a fence, or both, that a client asks the operator's process to put in force.
+
+    `press`: a number of its own for each request, the same while it is said again. `hand`: whose of the client it is.
+    `keep_legs`, `keep_fence`: those in force stay, whatever stands here.
+    """
+
+    press: Count
+    hand: Count = 0
+    name: Text = ""
+    legs: tuple[MissionLeg, ...] = ()
+    fence: tuple[FenceArea, ...] = ()
+    keep_legs: bool = False
+    keep_fence: bool = False
+
+
+class MissionRefusal(StrEnum):
+    """Why a mission was not accepted, so that the one before stays in force; NONE where it was.
+
+    INVALID: the navigator could not take it; the text beside it names the place. UNDER_WAY: the boat is armed in ROUTE,
+    where another mission would move it elsewhere. FENCE_IN_USE: the boat is armed in a mode that may move it, which
+    another fence could begin. NOT_HOLDER: another hand holds the wheel. NOT_KNOWN: what is to be kept is not known,
+    as the navigator is not heard. BUSY: another mission is being checked.
+    """
+
+    NONE = "NONE"
+    INVALID = "INVALID"
+    UNDER_WAY = "UNDER_WAY"
+    FENCE_IN_USE = "FENCE_IN_USE"
+    NOT_HOLDER = "NOT_HOLDER"
+    NOT_KNOWN = "NOT_KNOWN"
+    BUSY = "BUSY"

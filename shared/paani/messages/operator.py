@@ -8,6 +8,7 @@ import msgspec
 
 from paani.messages.guidance import Waypoint
 from paani.messages.header import Count, Message, NonNegative, Signed, Stamp, Text
+from paani.messages.mission import MissionRefusal
 
 
 class DriveMode(StrEnum):
@@ -105,7 +106,8 @@ class OperatorOrder(Message, frozen=True, kw_only=True):
 
     `source_us`: of MANUAL when the set-point was received, else now. `since_us`: when the mode was ordered, 0 for that
     of the start. `target`: the station of HOLD, or home of RETURN. `surge`, `turn`: what the hand says, ahead and to
-    port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto.
+    port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto. `mission_us`: `accepted_us` of the
+    mission that is in force; 0: none was accepted in this run of the operator's process.
     """
 
     mode: DriveMode
@@ -116,6 +118,7 @@ class OperatorOrder(Message, frozen=True, kw_only=True):
     by: Text = ""
     hand: Count = 0
     override: bool = False
+    mission_us: Stamp = 0
 
 
 class OperatorState(Message, frozen=True, kw_only=True):
@@ -129,7 +132,8 @@ class OperatorState(Message, frozen=True, kw_only=True):
     `mode`, `mode_since_us`: the mode in force, as in `OperatorOrder`. `wheel_by`, `wheel_hand`: who holds the wheel,
     empty while nobody does. `override_ms`: for how long the advice does not veto yet. `answered_by`, `answered`,
     `mode_refusal`: the request for a mode, the wheel or an override that was answered last. `barred`: modes that may
-    not start now.
+    not start now. `mission_us`: as in `OperatorOrder`. `mission_answered_by`, `mission_answered`, `mission_refusal`,
+    `mission_fault`: the request for a mission that was answered last; of INVALID what is wrong, and where.
     """
 
     armed: bool
@@ -153,3 +157,8 @@ class OperatorState(Message, frozen=True, kw_only=True):
     answered: Count = 0
     mode_refusal: ModeRefusal = ModeRefusal.NONE
     barred: tuple[BarredMode, ...] = ()
+    mission_us: Stamp = 0
+    mission_answered_by: Text = ""
+    mission_answered: Count = 0
+    mission_refusal: MissionRefusal = MissionRefusal.NONE
+    mission_fault: Text = ""

@@ -3,14 +3,14 @@
 import numpy as np
 
 from paani.arrays import Bools
+from paani.fence_geometry import Fence, edges
 from paani.messages import FenceArea, Keep
-from paani_services.navigator.avoidance.fence import Fence, edges
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 
 
 def apply_fence(grid: OccupancyGrid, fence: Fence, offset_m: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:
-    """Occupy every cell whose middle the fence does not allow, in the sense of `fence.is_allowed` but for the edges.
+    """Occupy every cell whose middle the fence does not allow, as `is_allowed` has it but for the edges.
 
     offset_m: a place's east and north in the map, less those on the grid.
     """

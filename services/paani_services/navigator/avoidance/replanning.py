@@ -7,10 +7,10 @@ import msgspec
 
 from paani.clock import has_passed
 from paani.config import PlannerConfig
+from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
 from paani.messages import Evidence, Odometry, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
-from paani_services.navigator.avoidance.fence import Fence
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import Plan, plan_motion
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint

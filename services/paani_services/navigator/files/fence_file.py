@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +10,8 @@ import msgspec
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
+from paani.missions import MAX_CORNERS, find_polygon_fault
 from paani.undecodable import UNDECODABLE
-from paani_services.navigator.avoidance.fence import do_segments_meet
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.geojson import (
     Geometry,
@@ -24,10 +22,6 @@ from paani_services.navigator.files.geojson import (
 )
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
 from paani_services.navigator.files.route_line import clean_name
-from paani_services.navigator.guidance.path_progress import MIN_LEG_M
-
-MAX_CORNERS = 1000  # of all areas together: every edge is tested at each step of the navigator, ten times a second
-MIN_AREA_M2 = 1.0  # of one area: less is a slip of the pen, not water or land
 
 
 class _FenceFileArea(Section, frozen=True):
@@ -72,7 +66,9 @@ def load_fence(path: Path, map_origin_deg: LatLon | None, where: str = "navigato
     if sum(len(area.corners) for area in areas) > MAX_CORNERS:
         raise UserError(f"{where}: more than {MAX_CORNERS} corners")
     for area, (_, _, _, at) in zip(areas, rows, strict=True):
-        _require_simple_polygon(area, f"{where}: {at}")
+        fault = find_polygon_fault(area)
+        if fault:
+            raise UserError(f"{where}: {at}: {fault}")
     return areas
 
 
@@ -106,17 +102,3 @@ def _areas_of_geometry(geometry: Geometry, at: str) -> list[tuple[Keep, tuple[Fi
 
 def _text_or_empty(value: Any) -> str:
     return value if isinstance(value, str) else ""
-
-
-def _require_simple_polygon(area: FenceArea, where: str) -> None:
-    """Raises UserError for an edge without length, edges that cross, or an area below `MIN_AREA_M2`."""
-    corners = [(corner.x_m, corner.y_m) for corner in area.corners]
-    edges = list(itertools.pairwise((*corners, corners[0])))
-    for number, (start, end) in enumerate(edges):
-        if math.dist(start, end) < MIN_LEG_M:
-            raise UserError(f"{where}: corners[{number}] and the next are the same")
-    for (one, first), (other, second) in itertools.combinations(enumerate(edges), 2):
-        if other - one not in {1, len(edges) - 1} and do_segments_meet(first, second):
-            raise UserError(f"{where}: the edges from corners[{one}] and corners[{other}] cross")
-    if abs(sum(x1 * y2 - x2 * y1 for (x1, y1), (x2, y2) in edges)) / 2.0 < MIN_AREA_M2:
-        raise UserError(f"{where}: has an area below {MIN_AREA_M2} m2")

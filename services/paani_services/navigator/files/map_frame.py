@@ -14,10 +14,9 @@ from paani.config.section import Section
 from paani.errors import UserError
 from paani.geometry import enu_from_geodetic, geodetic_from_enu
 from paani.messages import Waypoint
+from paani.missions import MAX_DISTANCE_M
 
-MAX_DISTANCE_M = 1e6  # of a point from the map's origin; a plane is no map long before that
-
-Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+Coordinate = Annotated[float, msgspec.Meta(ge=-MAX_DISTANCE_M, le=MAX_DISTANCE_M)]
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 LatLon = tuple[float, float]  # [deg]

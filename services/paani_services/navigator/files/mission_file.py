@@ -11,15 +11,21 @@ from paani.config import NavigatorConfig
 from paani.config.section import Positive, Section
 from paani.errors import UserError
 from paani.messages import LegKind, Mission, MissionLeg, Route, Waypoint
-from paani_services.navigator.avoidance.fence import find_route_violation
+from paani.missions import (
+    MAX_LAPS,
+    MAX_LEGS,
+    MAX_RADIUS_M,
+    MAX_WAYPOINTS,
+    MIN_RADIUS_M,
+    find_leg_outside,
+    mission_of_route,
+)
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.fence_file import load_fence
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
-from paani_services.navigator.files.route_file import MAX_WAYPOINTS, load_route
-from paani_services.navigator.guidance.mission_progress import mission_of_route
+from paani_services.navigator.files.route_file import load_route
 
-# Of a station [m]; the boat would never rest within a radius below its own length.
-Radius = Annotated[float, msgspec.Meta(ge=1.0, le=1e3)]
+Radius = Annotated[float, msgspec.Meta(ge=MIN_RADIUS_M, le=MAX_RADIUS_M)]
 
 
 class _OptionalPoint(FilePoint, frozen=True):
@@ -35,7 +41,7 @@ class _FollowRouteLeg(Section, frozen=True, tag_field="do", tag=LegKind.FOLLOW_R
 
     route: str = ""
     reverse: bool = False
-    laps: Annotated[int, msgspec.Meta(ge=0, le=1_000_000)] = 1
+    laps: Annotated[int, msgspec.Meta(ge=0, le=MAX_LAPS)] = 1
     speed_mps: Positive | None = None
 
 
@@ -60,7 +66,7 @@ class _StopLeg(Section, frozen=True, tag_field="do", tag=LegKind.STOP.value):
 class _MissionFile(Section, frozen=True):
     legs: Annotated[
         tuple[_FollowRouteLeg | _HoldStationLeg | _ReturnHomeLeg | _StopLeg, ...],
-        msgspec.Meta(min_length=1, max_length=100),
+        msgspec.Meta(min_length=1, max_length=MAX_LEGS),
     ]
     name: Annotated[str, msgspec.Meta(max_length=100)] = ""
     origin: Origin | None = None
@@ -88,13 +94,18 @@ def load_route_and_mission(
         mission = mission_of_route(route)
     if config.fence:
         mission = msgspec.structs.replace(mission, fence=load_fence(Path(config.fence), map_origin_deg))
-        _require_inside_fence(mission, config.fence_margin_m, where, legs=bool(config.mission))
+        found = find_leg_outside(mission.legs, mission.fence, config.fence_margin_m)
+        if found is not None:
+            leg, waypoint, what = found
+            raise UserError(f"{where}: {f'legs[{leg}].' if config.mission else ''}waypoints[{waypoint}]: {what}")
     return next_route(mission) or route, mission
 
 
-def load_mission(path: Path, map_origin_deg: LatLon | None, route: Route | None) -> Mission:
+def load_mission(
+    path: Path, map_origin_deg: LatLon | None, route: Route | None, where: str = "navigator.mission"
+) -> Mission:
     """Read a mission file; `route` is followed by legs that name none. Raises UserError that names file and field."""
-    where = f"navigator.mission {path}"
+    where = f"{where} {path}".lstrip()
     if path.suffix.lower() != ".toml":
         raise UserError(f"{where}: not a mission file (have: .toml)")
     file = read_toml(path, where, _MissionFile)
@@ -162,12 +173,3 @@ def _waypoints_of_point(
     if point.is_given:
         return (frame.waypoint_of(point, field),)
     return () if default is None else (default,)
-
-
-def _require_inside_fence(mission: Mission, margin_m: float, where: str, *, legs: bool) -> None:
-    """Raises UserError for the first waypoint or leg outside the fence or nearer than `margin_m` to it."""
-    for number, leg in enumerate(mission.legs):
-        found = find_route_violation(mission.fence, leg.waypoints, margin_m, repeat=leg.repeat)
-        if found is not None:
-            waypoint, what = found
-            raise UserError(f"{where}: {f'legs[{number}].' if legs else ''}waypoints[{waypoint}]: {what}")

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import msgspec
 
-from paani.bus import Latest
 from paani.messages import Arming, Mission
 from paani.runtime import write_private
 from paani.undecodable import UNREADABLE
@@ -34,24 +33,24 @@ class JournalEntry(msgspec.Struct, frozen=True):
 class MissionJournal:
     """Keeps the newest progress on disk. A disk that fails or stalls delays no step of the navigator."""
 
-    def __init__(self, folder: Path, mission: Mission) -> None:
-        self._path, self._mission = folder / FILE, digest_mission(mission)
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / FILE
+        self._mission = ""
         self._progress = MissionProgress()
         self._epoch = 0
         self._changed = asyncio.Event()
 
-    async def restore(self, arming: Latest[Arming]) -> MissionProgress:
-        """The progress that an earlier run of this process left; waits for the operator's arming if there is any."""
-        entry = await asyncio.to_thread(read_entry, self._path)
-        if entry is not None and entry.mission == self._mission:
-            newest = await arming.next()
-            if newest.epoch == entry.operator_epoch:
-                self._progress = entry.progress
-        return self._progress
+    async def read(self) -> JournalEntry | None:
+        """What an earlier run of this process left; None where there is nothing that can be read."""
+        return await asyncio.to_thread(read_entry, self._path)
+
+    def follow(self, mission: Mission, progress: MissionProgress) -> None:
+        """From now on the progress is that of this mission, and has come so far."""
+        self._mission, self._progress = digest_mission(mission), progress
 
     def record(self, progress: MissionProgress, arming: Arming | None) -> None:
-        """Take the progress after a step; it is written later by `write_changes`."""
-        if arming is not None and progress is not self._progress and progress != self._progress:
+        """Take the progress after a step in the mission that is followed; it is written later by `write_changes`."""
+        if self._mission and arming is not None and progress is not self._progress and progress != self._progress:
             self._progress, self._epoch = progress, arming.epoch
             self._changed.set()
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -14,14 +12,13 @@ from paani.config.section import Section
 from paani.errors import UserError
 from paani.geometry import geodetic_from_enu
 from paani.messages import Route
+from paani.missions import MAX_WAYPOINTS, find_repeated_waypoint
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.geojson import encode_geojson, read_geojson_line
 from paani_services.navigator.files.gpx import encode_gpx, read_gpx
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
 from paani_services.navigator.files.route_line import MAX_POINTS, RouteLine, fixed_point_text
-from paani_services.navigator.guidance.path_progress import MIN_LEG_M
 
-MAX_WAYPOINTS = 10_000  # of a route or mission: the nearest leg is sought among all of them
 SUFFIXES = (".toml", ".gpx", ".geojson", ".json")
 
 
@@ -43,10 +40,9 @@ def load_route(path: Path, map_origin_deg: LatLon | None = None, where: str = "n
     require_waypoint_count(line, where)
     frame = MapFrame(where, line.origin_deg, map_origin_deg)
     waypoints = tuple(frame.waypoint_of(point, f"waypoints[{number}]") for number, point in enumerate(line.points))
-    ring = (*waypoints, waypoints[0]) if line.repeat else waypoints
-    for number, (start, end) in enumerate(itertools.pairwise(ring)):
-        if math.dist((start.x_m, start.y_m), (end.x_m, end.y_m)) < MIN_LEG_M:
-            raise UserError(f"{where}: waypoints[{number}] and the next are the same")
+    repeated = find_repeated_waypoint(waypoints, repeat=line.repeat)
+    if repeated is not None:
+        raise UserError(f"{where}: waypoints[{repeated}] and the next are the same")
     return Route(source_us=0, name=line.name, waypoints=waypoints, repeat=line.repeat)
 
 

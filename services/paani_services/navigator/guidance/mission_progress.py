@@ -10,11 +10,11 @@ from typing import NamedTuple
 import msgspec
 
 from paani.config import NavigatorConfig
-from paani.messages import Arming, Inhibit, LegKind, Mission, MissionLeg, Odometry, Route, Waypoint
+from paani.fence_geometry import Point
+from paani.messages import Arming, Inhibit, LegKind, Mission, MissionLeg, Odometry, Waypoint
+from paani.missions import MIN_LEG_M
 from paani_services.navigator.guidance.ilos import IlosState, integral_offset_m
 from paani_services.navigator.guidance.path_progress import (
-    MIN_LEG_M,
-    Point,
     WaypointPath,
     bearing_rad,
     cross_track_error_m,
@@ -88,13 +88,6 @@ class LegSetpoint(NamedTuple):
     cross_track_m: float = 0.0
     path: WaypointPath | None = None
     target: int = 0
-
-
-def mission_of_route(route: Route) -> Mission:
-    """The mission of a boat that has only a route: followed once, or without end if it repeats."""
-    laps = 0 if route.repeat else 1
-    leg = MissionLeg(kind=LegKind.FOLLOW_ROUTE, waypoints=route.waypoints, repeat=route.repeat, laps=laps)
-    return Mission(source_us=route.source_us, name=route.name, legs=(leg,))
 
 
 def is_mission_done(progress: MissionProgress, mission: Mission) -> bool:

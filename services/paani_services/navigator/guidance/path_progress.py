@@ -9,10 +9,8 @@ from typing import NamedTuple
 
 from paani import portable
 from paani.config import NavigatorConfig
+from paani.fence_geometry import Point
 from paani.messages import Odometry, Waypoint
-
-Point = tuple[float, float]  # east and north in the map [m]
-MIN_LEG_M = 0.01  # waypoints nearer to each other than this are the same: a leg this short has no direction
 
 
 class WaypointPath(NamedTuple):

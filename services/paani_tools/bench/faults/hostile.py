@@ -6,6 +6,7 @@ it for which every receiver has to refuse it, or something odd that a receiver m
 
 from __future__ import annotations
 
+import base64
 import json
 import random
 from collections.abc import Callable, Iterator
@@ -225,6 +226,8 @@ def _value(info: inspect.Type, rng: random.Random) -> Any:
             return rng.random() < 0.5
         case inspect.StrType(max_length=longest, pattern=pattern):
             return "text" if pattern else rng.choice(("", "text", "t" * (longest or 20)))
+        case inspect.BytesType(max_length=longest):
+            return base64.b64encode(rng.randbytes(rng.choice((0, 4, longest or 20)))).decode()
         case inspect.EnumType(cls=kind):
             return rng.choice([member.value for member in kind])
         case inspect.TupleType(item_types=types):

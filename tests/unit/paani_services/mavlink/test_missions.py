@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common
 
 from paani import messages as m
 from paani.geometry import enu_from_geodetic
+from paani.map_origin import map_origin_deg
 from paani_services.mavlink.missions import (
     EMPTY,
     FENCE,
@@ -20,7 +21,6 @@ from paani_services.mavlink.missions import (
     mission_item,
     plan_of,
 )
-from paani_services.mavlink.snapshot import map_origin_deg
 from tests.mavlink_peer import NOW_US, armed, in_order, odometry
 
 HOME = m.Waypoint(x_m=-5.0, y_m=7.0)

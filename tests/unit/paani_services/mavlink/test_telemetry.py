@@ -12,9 +12,10 @@ from pymavlink.dialects.v20 import common
 
 from paani import messages as m
 from paani.geometry import geodetic_from_enu
+from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.fields import degrees_e7
-from paani_services.mavlink.snapshot import Snapshot, map_origin_deg
+from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.telemetry import BUILDERS
 from tests.mavlink_peer import NOW_US, ORIGIN_DEG, armed, in_order, odometry
 

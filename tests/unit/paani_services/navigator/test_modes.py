@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import NavigatorConfig
 from paani.messages import Direction, DriveMode, FenceArea, Inhibit, Keep, Mission, NavCommand, OperatorOrder, Waypoint
-from paani_services.navigator.guidance.mission_progress import MissionProgress, mission_of_route
+from paani.missions import mission_of_route
+from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import NavigatorState, navigate
 from tests.unit.paani_services.navigator.test_navigate import (
@@ -28,6 +29,7 @@ from tests.unit.paani_services.navigator.test_navigate import (
 from tests.unit.paani_services.navigator.test_navigate import advice as plain_advice
 
 CLEAR = m.LaneRisk(blocked=False)
+FAR = tuple(Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in ((-900, -900), (900, -900), (900, 900), (-900, 900)))
 POOL = tuple(Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in ((-5, -5), (5, -5), (5, 5), (-5, 5)))
 
 
@@ -90,6 +92,47 @@ def test_a_navigator_that_begins_under_way_waits_for_the_order_that_an_armed_boa
     """The word that arms may be heard first; it says that there is an order, so the route is not followed yet."""
     _, command = step(None, arming=m.Arming(source_us=NOW_US, armed=True, mode_ordered=True))
     assert (command.enable, command.inhibits) == (False, (Inhibit.NO_ORDER,))
+
+
+OTHER = m.Mission(
+    source_us=1,
+    name="other",
+    legs=(m.MissionLeg(kind=m.LegKind.FOLLOW_ROUTE, waypoints=(HERE, Waypoint(x_m=3.0, y_m=-50.0))),),
+    accepted_us=7,
+    legs_us=7,
+)
+
+
+@pytest.mark.parametrize("mode", [DriveMode.ROUTE, DriveMode.HOLD, DriveMode.RETURN, DriveMode.MANUAL])
+def test_nothing_moves_until_the_mission_and_fence_that_the_order_is_for_have_come(mode: DriveMode) -> None:
+    order = ordered(mode, surge=0.5, target=(Waypoint(x_m=50.0, y_m=0.0),), mission_us=7)
+    for mission in (None, msgspec.structs.replace(OTHER, accepted_us=6)):
+        _, command = step(order, mission=mission)
+        assert (command.enable, command.inhibits) == (False, (Inhibit.NO_ROUTE,))
+    assert step(order, mission=OTHER)[1].enable
+
+
+def test_other_legs_begin_with_the_first_and_another_fence_begins_none_anew() -> None:
+    """Home and what was reached stay; the boat is where it was, and the order of the same mode goes on."""
+    route = mission_of_route(SQUARE)
+    state = msgspec.structs.replace(
+        RUNNING, progress=MissionProgress(target=3, waypoints_reached=9, home=HERE), is_ordered=True
+    )
+    fenced = msgspec.structs.replace(route, fence=(FenceArea(keep=Keep.IN, corners=FAR),), accepted_us=5)
+    after, command = step(ordered(DriveMode.ROUTE, mission_us=5), state, mission=fenced)
+    assert (after.progress.target, command.waypoints_reached, after.legs_us) == (3, 9, 0)
+    after, command = step(ordered(DriveMode.ROUTE, mission_us=7), state, mission=OTHER)
+    assert (after.progress.target, command.waypoints_reached, after.progress.home) == (1, 9, HERE)
+    assert after.legs_us == 7
+    assert command.heading_rad == pytest.approx(-math.pi / 2)
+    again, _ = step(ordered(DriveMode.ROUTE, mission_us=7), after, mission=OTHER)
+    assert again.progress == after.progress
+
+
+def test_a_mission_without_legs_moves_nothing() -> None:
+    cleared = msgspec.structs.replace(OTHER, legs=())
+    _, command = step(ordered(DriveMode.ROUTE, mission_us=7), mission=cleared)
+    assert (command.enable, command.inhibits) == (False, (Inhibit.MISSION_DONE,))
 
 
 def test_idle_is_no_thrust() -> None:

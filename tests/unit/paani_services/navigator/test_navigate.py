@@ -21,7 +21,8 @@ from paani.messages import (
     SimTime,
     Waypoint,
 )
-from paani_services.navigator.guidance.mission_progress import MissionProgress, mission_of_route
+from paani.missions import mission_of_route
+from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 
 NOW_US = 20_000_000

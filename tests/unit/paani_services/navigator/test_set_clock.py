@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani_services.navigator.guidance.mission_progress import mission_of_route
+from paani.missions import mission_of_route
 from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState
 from tests.synthetic_water import AT_REST, CAMERA, CONFIG, START_US, evidence, odometry, water_edge_of

@@ -35,7 +35,8 @@ class Desk:
         self.clock, self.arming, self.states, self.orders = ManualClock(), Published(), Published(), Published()
         self.clock.advance(1000.0)
         self.path = folder / LATCH_FILE
-        publishers = self.arming, self.states, self.orders
+        self.missions = Published()
+        publishers = self.arming, self.states, self.orders, self.missions
         self.console = Console(*publishers, folder, self.clock)  # type: ignore[arg-type]  # the bus's place
 
     def last_mode(self) -> m.DriveMode:

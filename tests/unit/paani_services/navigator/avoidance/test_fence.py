@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 from paani.config import load_config
 from paani.errors import UserError
-from paani.messages import Direction, FenceArea, Inhibit, Keep, Odometry, Route, Waypoint
-from paani_services.navigator.avoidance.fence import (
+from paani.fence_geometry import (
     allowed_distance_m,
     distance_to_edge_m,
     find_route_violation,
     is_allowed,
-    limit_speed,
     return_bearing_rad,
 )
+from paani.messages import Direction, FenceArea, Inhibit, Keep, Odometry, Route, Waypoint
+from paani.missions import mission_of_route
+from paani_services.navigator.avoidance.fence import limit_speed
 from paani_services.navigator.files.fence_file import load_fence
-from paani_services.navigator.guidance.mission_progress import mission_of_route
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
 PAANI = load_config().navigator

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani.fence_geometry import is_allowed
 from paani.messages import FenceArea, Keep, Waypoint
-from paani_services.navigator.avoidance.fence import is_allowed
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import Plan, plan_motion
 from paani_services.navigator.avoidance.replanning import PlannerState, replan

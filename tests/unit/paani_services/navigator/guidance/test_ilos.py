@@ -9,8 +9,8 @@ import pytest
 
 from paani.config import NavigatorConfig, load_config
 from paani.messages import Odometry, Route, Waypoint
+from paani.missions import mission_of_route
 from paani_services.navigator.guidance.ilos import IlosState, integral_offset_m, integrate
-from paani_services.navigator.guidance.mission_progress import mission_of_route
 from paani_services.navigator.guidance.path_progress import WaypointPath
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 

@@ -1,0 +1,1 @@
+"""`paani mission`: another mission or fence for a running boat."""

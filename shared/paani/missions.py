@@ -1,0 +1,138 @@
+"""What is wrong with a mission or a fence, by whichever way it came: file, page, command, ground station. Pure.
+
+A fault is one line for whoever made it, and names leg, waypoint, area or corner.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+
+from paani.fence_geometry import Fence, do_segments_meet, find_route_violation
+from paani.messages import FenceArea, LegKind, Mission, MissionLeg, Route, Waypoint
+
+MAX_LEGS, MAX_LAPS = 100, 1_000_000
+MAX_WAYPOINTS = 10_000  # of a route or mission: the nearest leg is sought among all of them
+MIN_LEG_M = 0.01  # waypoints nearer to each other than this are the same: a leg this short has no direction
+MIN_RADIUS_M, MAX_RADIUS_M = 1.0, 1e3  # of a station; a boat would never rest within a radius below its own length
+MAX_CORNERS = 1000  # of all areas together: every edge is tested at each step of the navigator, ten times a second
+MIN_AREA_M2 = 1.0  # of one area: less is a slip of the pen, not water or land
+MAX_DISTANCE_M = 1e6  # of a point from the map's origin; a plane is no map long before that
+
+WAYPOINT_COUNTS = {  # fewest and most of a leg
+    LegKind.FOLLOW_ROUTE: (2, MAX_WAYPOINTS),
+    LegKind.HOLD_STATION: (0, 1),
+    LegKind.RETURN_HOME: (0, 1),
+    LegKind.STOP: (0, 0),
+}
+
+
+def mission_of_route(route: Route) -> Mission:
+    """The mission of a boat that has only a route: followed once, or without end if it repeats."""
+    laps = 0 if route.repeat else 1
+    leg = MissionLeg(kind=LegKind.FOLLOW_ROUTE, waypoints=route.waypoints, repeat=route.repeat, laps=laps)
+    return Mission(source_us=route.source_us, name=route.name, legs=(leg,))
+
+
+def find_mission_fault(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> str:
+    """Why the navigator could not take these legs within this fence; empty where it can.
+
+    margin_m: the least distance of a waypoint or leg from an edge. Numbers that are none count as out of bounds.
+    """
+    return _find_fence_fault(fence) or _find_legs_fault(legs) or _find_violation(legs, fence, margin_m)
+
+
+def find_leg_outside(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> tuple[int, int, str] | None:
+    """Leg, waypoint and what is wrong with it, of the first outside the fence or nearer than the margin to it."""
+    for number, leg in enumerate(legs):
+        found = find_route_violation(fence, leg.waypoints, margin_m, repeat=leg.repeat)
+        if found is not None:
+            return number, *found
+    return None
+
+
+def find_polygon_fault(area: FenceArea) -> str:
+    """What is wrong with an area: too few corners, an edge without length, edges that cross, hardly any area."""
+    corners = [(corner.x_m, corner.y_m) for corner in area.corners]
+    if len(corners) < 3:
+        return f"has {len(corners)} corners, an area needs 3"
+    edges = list(itertools.pairwise((*corners, corners[0])))
+    for number, (start, end) in enumerate(edges):
+        if math.dist(start, end) < MIN_LEG_M:
+            return f"corners[{number}] and the next are the same"
+    for (one, first), (other, second) in itertools.combinations(enumerate(edges), 2):
+        if other - one not in {1, len(edges) - 1} and do_segments_meet(first, second):
+            return f"the edges from corners[{one}] and corners[{other}] cross"
+    if abs(sum(x1 * y2 - x2 * y1 for (x1, y1), (x2, y2) in edges)) / 2.0 < MIN_AREA_M2:
+        return f"has an area below {MIN_AREA_M2} m2"
+    return ""
+
+
+def find_repeated_waypoint(waypoints: tuple[Waypoint, ...], *, repeat: bool) -> int | None:
+    """The first waypoint that is the same as the next; with repeat the first comes after the last."""
+    ring = (*waypoints, *waypoints[:1]) if repeat else waypoints
+    for number, (start, end) in enumerate(itertools.pairwise(ring)):
+        if math.dist((start.x_m, start.y_m), (end.x_m, end.y_m)) < MIN_LEG_M:
+            return number
+    return None
+
+
+def _find_fence_fault(fence: Fence) -> str:
+    if sum(len(area.corners) for area in fence) > MAX_CORNERS:
+        return f"fence: more than {MAX_CORNERS} corners"
+    for number, area in enumerate(fence):
+        at = f"areas[{number}]"
+        fault = _find_point_fault(area.corners, f"{at}.corners")
+        if fault:
+            return fault
+        fault = find_polygon_fault(area)
+        if fault:
+            return f"{at}{'.' if fault.startswith('corners') else ' '}{fault}"
+    return ""
+
+
+def _find_legs_fault(legs: tuple[MissionLeg, ...]) -> str:
+    if len(legs) > MAX_LEGS:
+        return f"legs: has {len(legs)}, more than {MAX_LEGS}"
+    if sum(len(leg.waypoints) for leg in legs) > MAX_WAYPOINTS:
+        return f"legs: more than {MAX_WAYPOINTS} waypoints together"
+    faults = (_find_leg_fault(leg, f"legs[{number}]") for number, leg in enumerate(legs))
+    fault = next(filter(None, faults), "")
+    if fault:
+        return fault
+    for number, leg in enumerate(legs[:-1]):
+        if leg.kind is LegKind.FOLLOW_ROUTE and leg.laps == 0:
+            return f"legs[{number}].laps: 0 has no end, so no leg may come after it"
+    return ""
+
+
+def _find_leg_fault(leg: MissionLeg, at: str) -> str:
+    fewest, most = WAYPOINT_COUNTS[leg.kind]
+    if not fewest <= len(leg.waypoints) <= most:
+        return f"{at}.waypoints: has {len(leg.waypoints)}, {leg.kind} takes {fewest} to {most}"
+    fault = _find_point_fault(leg.waypoints, f"{at}.waypoints")
+    if fault:
+        return fault
+    if not (0.0 <= leg.speed_mps < math.inf and 0.0 <= leg.duration_s < math.inf):
+        return f"{at}: speed_mps and duration_s are numbers from 0"
+    if leg.kind is LegKind.HOLD_STATION and not MIN_RADIUS_M <= leg.radius_m <= MAX_RADIUS_M:
+        return f"{at}.radius_m: {leg.radius_m:g} is not in {MIN_RADIUS_M:g}..{MAX_RADIUS_M:g}"
+    if leg.kind is not LegKind.FOLLOW_ROUTE:
+        return ""
+    if leg.laps > MAX_LAPS or (leg.laps != 1 and not leg.repeat):
+        return f"{at}.laps: {leg.laps}, but " + (f"at most {MAX_LAPS}" if leg.repeat else "the route does not repeat")
+    repeated = find_repeated_waypoint(leg.waypoints, repeat=leg.repeat)
+    return "" if repeated is None else f"{at}.waypoints[{repeated}] and the next are the same"
+
+
+def _find_violation(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> str:
+    found = find_leg_outside(legs, fence, margin_m)
+    return "" if found is None else f"legs[{found[0]}].waypoints[{found[1]}]: {found[2]}"
+
+
+def _find_point_fault(points: Iterable[Waypoint], at: str) -> str:
+    for number, point in enumerate(points):
+        if not (abs(point.x_m) <= MAX_DISTANCE_M and abs(point.y_m) <= MAX_DISTANCE_M):
+            return f"{at}[{number}]: is not within {MAX_DISTANCE_M / 1000:g} km of the map's origin"
+    return ""
