@@ -26,6 +26,10 @@ WAIT_S = 20.0
 LET_GO_S = 0.5
 MANUAL = "[data-drive=MANUAL]"
 PAD = """(axes) => { navigator.getGamepads = () => (axes ? [{ connected: true, axes }] : [null]); }"""
+PRESS_B = """() => {
+  const buttons = [false, true].map((pressed) => ({ pressed }));
+  navigator.getGamepads = () => [null, { connected: true, axes: [0, 0], buttons }];
+}"""
 HIDE = """(hidden) => {
   Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
   document.dispatchEvent(new Event("visibilitychange"));
@@ -156,4 +160,10 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await orders.until(lambda found: found.stick == (0.0, 0.0))
         assert (WallClock().now_us() - closed_us) * 1e-6 <= LET_GO_S
         await orders.until(lambda found: found.mode is DriveMode.IDLE)
+        assert boat.arming.value is not None
+        assert boat.arming.value.armed
+        await page.evaluate(PRESS_B)
+        async with asyncio.timeout(WAIT_S):
+            while not boat.arming.value.stopped:
+                await boat.arming.next()
         assert watched.errors == []

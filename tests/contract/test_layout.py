@@ -95,10 +95,11 @@ def test_each_library_has_one_importer(word: str, allowed: str) -> None:
 
 
 def test_no_picture_of_the_data_ships() -> None:
-    """Those of the manual apart, every picture is one that the simulator draws."""
+    """Those of the manual and the page's icon apart, every picture is one that the simulator draws."""
     found = {str(p.relative_to(ROOT)) for p in tracked(".jpg", ".jpeg", ".png", ".gif", ".mp4")}
     drawn = {f"examples/pictures/{name}.jpg" for name in VIEWS}
-    assert {name for name in found if not name.startswith("docs/")} == drawn
+    icons = {f"services/paani_services/dashboard/static/icon-{size}.png" for size in (192, 512)}
+    assert {name for name in found if not name.startswith("docs/")} == drawn | icons
 
 
 def test_every_top_level_folder_explains_itself() -> None:

@@ -12,7 +12,10 @@ MEDIA_TYPES = {
     ".js": "text/javascript",
     ".css": "text/css",
     ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".webmanifest": "application/manifest+json",
 }
+WORKER, LIST = "service_worker.js", "files.json"
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
         "default-src 'self'; img-src 'self' blob: data:; base-uri 'none'; form-action 'none';"
@@ -33,10 +36,11 @@ class StaticFile(msgspec.Struct, frozen=True):
 
 
 def load_static_files() -> dict[str, StaticFile]:
-    """Every file of the page by name."""
+    """Every file of the page by name, and `LIST` of their names, for the worker that keeps them in the browser."""
     pages = {}
     for path in sorted(STATIC.iterdir()):
         media_type = MEDIA_TYPES.get(path.suffix)
         if media_type is not None:
             pages[path.name] = StaticFile(media_type, path.read_bytes())
+    pages[LIST] = StaticFile("application/json", msgspec.json.encode([*pages]))
     return pages

@@ -23,7 +23,7 @@ from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.listening import listening
 from paani_services.dashboard.machines import Machines
 from paani_services.dashboard.operator_events import REFUSALS
-from paani_services.dashboard.pages import SECURITY_HEADERS, StaticFile
+from paani_services.dashboard.pages import SECURITY_HEADERS, WORKER, StaticFile
 from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
@@ -124,7 +124,9 @@ class Server:
         page = self._pages.get(name)
         if page is None:
             raise web.HTTPNotFound
-        return web.Response(body=page.body, content_type=page.media_type, charset="utf-8")
+        charset = None if page.media_type.startswith("image/png") else "utf-8"
+        headers = {"Service-Worker-Allowed": "/"} if name == WORKER else None
+        return web.Response(body=page.body, content_type=page.media_type, charset=charset, headers=headers)
 
     async def _stop(self, request: web.Request) -> web.Response:
         """Ask for STOP, whoever asks and whatever the request holds."""

@@ -1,6 +1,7 @@
 // @ts-check
 // Connects the WebSocket to the store and the panels.
 
+import { alertOf, alertOfLink, bindAlerts } from "./alerts.js";
 import { Camera } from "./camera.js";
 import { bindDrive, isDriving, renderDrive } from "./drive.js";
 import { buildExplanation, renderExplanation } from "./explanation.js";
@@ -40,6 +41,7 @@ function onMessage(key, header, body) {
   const value = decodeJson(body);
   if (key === "dashboard/event") {
     addLine(value);
+    alertOf(value.level, header.age_ms);
     return;
   }
   store.put(key, value, header.age_ms, now);
@@ -58,6 +60,7 @@ function onOpen(isOpen) {
 function render() {
   const now = performance.now();
   renderTopbar(store, open, now);
+  alertOfLink(now);
   renderOperatorState(store, open, now);
   renderDrive(store, open, now);
   if (document.hidden) return;
@@ -81,6 +84,8 @@ addEventListener("keydown", (event) => {
 buildExplanation();
 bindLink();
 bindPalette();
+bindAlerts();
+void navigator.serviceWorker?.register("/static/service_worker.js", { scope: "/" }).catch(() => {}); // not every browser takes it
 bindOperatorControls();
 bindDrive();
 connect(onMessage, onOpen);

@@ -1,9 +1,11 @@
 // @ts-check
-// STOP: one press of the button, of Space or of Escape, without login and key, asked until the server answers.
+// STOP: one press of the button, of Space, of Escape or of a gamepad's B, without login and key, asked until the server
+// answers.
 
 import { byId, fixed } from "./text.js";
 
-const RETRY_MS = 400;
+const RETRY_MS = 400, PAD_PERIOD_MS = 40;
+const PAD_BUTTON = 1; // B of the standard layout, the circle of others
 export const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
 let isPending = false, askedAt = 0;
 
@@ -33,6 +35,17 @@ export function bindStop(onAsk, onLatched = () => {}) {
     event.stopPropagation();
     if (!event.repeat) press();
   }, true);
+  bindPad(press);
+}
+
+/** In every mode, whoever holds the wheel. A button that is down when the gamepad appears counts as pressed. @param {() => void} press */
+function bindPad(press) {
+  let wasDown = false;
+  setInterval(() => {
+    const isDown = [...navigator.getGamepads()].some((pad) => pad?.buttons?.[PAD_BUTTON]?.pressed);
+    if (isDown && !wasDown) press();
+    wasDown = isDown;
+  }, PAD_PERIOD_MS);
 }
 
 /** A STOP that the server has not answered yet; null where there is none. @param {number} now */

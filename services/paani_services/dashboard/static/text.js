@@ -104,6 +104,9 @@ export const ACTIVITIES = {
 /** @type {Record<string, string>} */
 export const PALETTES = { auto: "Auto", day: "Day", dusk: "Dusk", night: "Night" };
 
+/** What an alert does besides standing in the log. @type {Record<string, string>} */
+export const ALERTS = { off: "Silent", sound: "Sound", both: "Sound, vibration" };
+
 /** Modes: name, and what the boat does in it. @type {Record<string, [string, string]>} */
 export const MODE_TEXTS = {
   ROUTE: ["Route", "follows its mission or route"],
