@@ -161,6 +161,16 @@ async def open_ros_graph(listen: str, domain_id: int, namespace: str, node: str,
     return RosGraph(session, domain_id, namespace, node, clock)
 
 
+async def join_ros_graph(router: str, domain_id: int, namespace: str, node: str, clock: Clock) -> RosGraph:
+    """Join a graph that another process listens for, as ROS nodes do. Raises UserError where nobody answers there."""
+    settings = {"mode": "client", "connect/endpoints": [router], "scouting/multicast/enabled": False}
+    try:
+        session = await asyncio.to_thread(lambda: zenoh.open(zenoh_config(settings)))
+    except zenoh.ZError as error:
+        raise UserError(f"{router}: {error}") from error
+    return RosGraph(session, domain_id, namespace, node, clock)
+
+
 def ros_router_config(listen: str, domain_id: int) -> zenoh.Config:
     """A router that ROS nodes connect to, and find each other by. It denies by default and connects to nobody."""
     names = [f"{domain_id}/**", f"{domain_id}/**/@adv/**", f"{TOKENS}/{domain_id}/**"]
