@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,8 @@ class HealthReporter:
             inputs=tuple(self._input(topic, inbox, span_s) for topic, inbox in self._inputs),
             drops=tuple(m.DropCount(cause=cause, count=n) for cause, n in sorted(self._drops.items())),
             note=self._note(),
+            open_files=count_open_files(),
+            temperature_c=warmest_zone_c(),
         )
         self._last_us, self._last_cpu_s = now_us, cpu_s
         return report
@@ -70,3 +73,17 @@ class HealthReporter:
 def rss_mib() -> float:
     """Resident memory of this process [MiB]."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * PAGE_KIB / 1024
+
+
+def count_open_files() -> int:
+    """Descriptors that this process holds."""
+    return len(list(Path("/proc/self/fd").iterdir())) - 1  # one of them reads this folder
+
+
+def warmest_zone_c(folder: Path = Path("/sys/class/thermal")) -> float:
+    """The temperature of this machine's warmest thermal zone [degrees C]; 0 where none can be read."""
+    warmest = 0.0
+    for zone in folder.glob("thermal_zone*/temp"):
+        with contextlib.suppress(OSError, ValueError):  # a zone may be switched off
+            warmest = max(warmest, int(zone.read_text(encoding="ascii")) * 1e-3)
+    return warmest

@@ -9,6 +9,8 @@ from pathlib import Path
 from paani.config import BusConfig
 from paani.errors import UserError
 
+LOGS = "logs"  # the folder in it that has one file for each process that `paani up` starts
+
 
 def runtime_path(config: BusConfig) -> Path:
     """Where the folder is to be: `bus.runtime_dir`, else `PAANI_RUNTIME_DIR`, else the user's state folder."""

@@ -9,6 +9,7 @@ import resource
 import socket
 import sys
 from collections.abc import AsyncIterator
+from typing import Any
 
 import aiohttp
 import msgspec
@@ -19,8 +20,10 @@ from paani import keys
 from paani.clock import WallClock
 from paani.config import Config
 from paani.operator_client import OperatorClient
+from paani.runtime import LOGS, runtime_path
 from paani_services.dashboard.answers import ErrorAnswer, ReadyAnswer
 from paani_services.dashboard.gatekeeper import KEY_HEADER, Gatekeeper
+from paani_services.dashboard.history import History
 from paani_services.dashboard.hub import Hub
 from paani_services.dashboard.openapi import LOGIN_OPERATIONS, OPERATIONS
 from paani_services.dashboard.picture_stream import MAX_STREAMS
@@ -43,7 +46,9 @@ async def client(config: Config) -> AsyncIterator[aiohttp.ClientSession]:
 
 async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> None:
     async with spawn("dashboard"):
-        for path, media_type in (("/", "text/html"), ("/static/main.js", "text/javascript")):
+        for path, media_type in (
+            ("/", "text/html"), ("/static/main.js", "text/javascript"), ("/static/uPlot.min.css", "text/css"),
+        ):  # fmt: skip
             async with client.get(path) as answer:
                 assert answer.status == 200
                 assert answer.content_type == media_type
@@ -51,7 +56,13 @@ async def test_page_and_headers(client: aiohttp.ClientSession, spawn: Spawn) -> 
                 policy = answer.headers["Content-Security-Policy"]
                 assert policy.startswith("default-src 'self'; img-src 'self' blob: data:")
                 assert "unsafe" not in policy
-        for path in ("/static/../service.py", "/static/%2e%2e%2fservice.py", "/static/absent.js", "/etc/passwd"):
+        for path in (
+            "/static/../service.py",
+            "/static/%2e%2e%2fservice.py",
+            "/static/absent.js",
+            "/static/README.md",
+            "/etc/passwd",
+        ):
             async with client.get(path) as answer:
                 assert answer.status == 404
         async with client.get("/api/topics") as answer:
@@ -215,7 +226,7 @@ async def test_every_route_is_described_and_nothing_else(open_as: OpenAs, config
         whole = replace(config, dashboard=replace(config.dashboard, host="0.0.0.0" if exposed else "127.0.0.1"))
         tuner = Tuner(bus.publisher(keys.TUNING), clock)
         gatekeeper = Gatekeeper(whole, "key", clock)
-        server = Server(Hub(), OperatorClient(bus, clock), tuner, clock, whole, {}, gatekeeper)
+        server = Server(Hub(), History(()), OperatorClient(bus, clock), tuner, clock, whole, {}, gatekeeper)
         routes = {
             (each.method.lower(), each.resource.canonical) for each in server.app().router.routes() if each.resource
         }
@@ -244,6 +255,43 @@ async def test_streams_send_the_newest_picture_to_a_bounded_number(
                     if answer.status == 200:
                         break
                 await asyncio.sleep(0.1)
+
+
+async def test_the_past_and_the_logs_are_bounded_and_refuse_what_is_not_there(
+    client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
+) -> None:
+    folder = runtime_path(config.bus) / LOGS
+    await asyncio.to_thread(folder.mkdir, exist_ok=True)
+    await asyncio.to_thread((folder / "advisor.log").write_text, "one\ntwo\n", encoding="utf-8")
+    async with spawn("dashboard"):
+
+        async def ask(path: str) -> tuple[int, dict[str, Any]]:
+            async with client.get(path) as answer:
+                return answer.status, await answer.json()
+
+        assert await ask("/api/logs/advisor") == (200, {"lines": ["one", "two"], "cut": False})
+        for path, status, field in (
+            ("/api/logs/navigator", 404, "service"),
+            ("/api/logs/..%2Foperator-key", 404, "service"),
+            ("/api/logs/advisor?lines=9", 400, "lines"),
+            ("/api/history?all=1", 400, "all"),
+            ("/api/history/frames?from_us=5&to_us=4", 400, "to_us"),
+            ("/api/history/frames?from_us=0&to_us=15000001", 400, "to_us"),
+            ("/api/history/frames?from_us=-1&to_us=4", 400, "from_us"),
+        ):
+            found, refusal = await ask(path)
+            assert (found, refusal["field"]) == (status, field), path
+        async with asyncio.timeout(10):
+            while True:
+                _, series = await ask("/api/history")
+                columns = dict(zip(series["samples"]["names"], series["samples"]["values"], strict=True))
+                if "RIGHT" in columns["advice"]:
+                    break
+                await asyncio.sleep(0.1)
+        last_us = columns["at_us"][-1]
+        async with client.get(f"/api/history/frames?from_us={last_us}&to_us={last_us}") as answer:
+            assert answer.content_type == "application/octet-stream"
+            assert b"camera/picture" in await answer.read()
 
 
 async def test_a_client_that_never_reads_delays_nobody(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import hashlib
+import re
 import shutil
 import subprocess
 import sys
@@ -112,8 +114,17 @@ def test_served_files_name_no_other_host() -> None:
     for path in (path for folder in folders for path in folder.rglob("*")):
         if path.suffix in {".js", ".html", ".css"}:
             text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
+            text = re.sub(r"\A/\*!.*?\*/", "", text)  # where a vendored library comes from
             assert "http://" not in text, path
             assert "https://" not in text, path
+
+
+def test_the_vendored_library_is_the_one_that_its_readme_names() -> None:
+    folder = ROOT / "services/paani_services/dashboard/static/uplot"
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    for name in ("uPlot.iife.min.js", "uPlot.min.css"):
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in readme, name
+    assert "MIT" in (folder / "LICENSE").read_text(encoding="utf-8")
 
 
 # Pronouns, participles and metaphors that have a name in the field: trajectories, set-point, observation, inputs, ...

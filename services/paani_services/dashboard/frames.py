@@ -1,20 +1,29 @@
-"""One WebSocket frame: `u8 keylen | u16 headlen | key | header JSON | body`, integers big-endian. Pure."""
+"""One frame of a WebSocket, or of an answer about the past. Pure.
+
+`u8 keylen | u16 headlen | key | header JSON | body`, integers big-endian.
+"""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 
 import msgspec
 
 PREFIX = struct.Struct(">BH")
+LENGTH = struct.Struct(">I")
 MAX_KEY_BYTES, MAX_HEADER_BYTES = 0xFF, 0xFFFF
 
 
 class FrameHeader(msgspec.Struct, frozen=True, omit_defaults=True):
-    """`age_ms`: time from the message's receipt until the frame was made. `picture`: a picture's header."""
+    """`age_ms`: time from the message's receipt until the frame was made. `picture`: a picture's header.
+
+    `at_us`: the moment of the past that the frame belongs to [Unix us]; left out of a live one.
+    """
 
     age_ms: int
     picture: msgspec.Raw = msgspec.Raw()
+    at_us: int = 0
 
 
 def encode_frame(key: str, header: FrameHeader, body: bytes) -> bytes:
@@ -23,6 +32,11 @@ def encode_frame(key: str, header: FrameHeader, body: bytes) -> bytes:
     if len(name) > MAX_KEY_BYTES or len(head) > MAX_HEADER_BYTES:
         raise ValueError(f"{key}: key or header too long for a frame")
     return b"".join((PREFIX.pack(len(name), len(head)), name, head, body))
+
+
+def pack_frames(frames: Iterable[bytes]) -> bytes:
+    """Frames one after the other, each after its length."""
+    return b"".join(part for frame in frames for part in (LENGTH.pack(len(frame)), frame))
 
 
 def decode_frame(frame: bytes) -> tuple[str, FrameHeader, bytes]:

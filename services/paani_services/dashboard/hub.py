@@ -5,17 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import ItemsView, Iterable, Iterator
 
 import msgspec
 
+from paani import keys
 from paani import messages as m
 from paani.bus import Picture
 from paani_services.dashboard.client_queue import ClientQueue
 from paani_services.dashboard.frames import FrameHeader, encode_frame
 
 EVENT_KEY = "dashboard/event"
-MAX_EVENTS = 24  # kept for clients that join late
+MAX_EVENTS = 24  # for clients that join late
+MAX_PAST_EVENTS = 1000
+FRAME_KEYS = frozenset({keys.PICTURE.name, keys.MASK.name, keys.EVIDENCE.name, keys.TRACKS.name})
+RECENT = 8  # values of such a key that are kept, for whoever needs those of one frame
 Value = m.Message | Picture | msgspec.Struct
 
 
@@ -43,14 +47,15 @@ class Hub:
         self.has_clients = asyncio.Event()
         self._values: dict[str, tuple[Value, int]] = {}
         self._watchers: dict[str, set[asyncio.Event]] = {}
-        self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
+        self._recent: dict[str, deque[tuple[Value, int]]] = {key: deque(maxlen=RECENT) for key in FRAME_KEYS}
+        self.events: deque[Event] = deque(maxlen=MAX_PAST_EVENTS)
 
     def add_client(self, now_us: int) -> Client:
         """Add a client; the newest value of every key is already in its queue."""
         client = Client()
         for key, (value, received_us) in self._values.items():
             client.queue.put_state(key, encode_value(key, value, now_us - received_us))
-        for event in self._events:
+        for event in [*self.events][-MAX_EVENTS:]:
             client.queue.put_event(encode_value(EVENT_KEY, event, now_us - event.at_us))
         client.frames_ready.set()
         self.clients.add(client)
@@ -67,6 +72,8 @@ class Hub:
         self._values[key] = (value, received_us)
         for changed in self._watchers.get(key, ()):
             changed.set()
+        if key in self._recent:
+            self._recent[key].append((value, received_us))
         if self.clients:
             frame = encode_value(key, value, now_us - received_us)
             for client in self.clients:
@@ -88,7 +95,7 @@ class Hub:
 
     def publish_event(self, event: Event) -> None:
         """Queue an event for every client."""
-        self._events.append(event)
+        self.events.append(event)
         frame = encode_value(EVENT_KEY, event, 0)
         for client in self.clients:
             client.queue.put_event(frame)
@@ -98,11 +105,22 @@ class Hub:
         """The newest value of a key and when it came [us]."""
         return self._values.get(key)
 
+    def items(self) -> ItemsView[str, tuple[Value, int]]:
+        """The newest value of every key, and when it came [us]."""
+        return self._values.items()
 
-def encode_value(key: str, value: Value, age_us: int) -> bytes:
-    """One frame: a message as JSON, a picture as its bytes with its header in the frame's header."""
+    def recent(self, key: str) -> Iterable[tuple[Value, int]]:
+        """The newest values of a key whose messages belong to frames, and when they came; none of any other key."""
+        return self._recent.get(key, ())
+
+
+def encode_value(key: str, value: Value, age_us: int, at_us: int = 0) -> bytes:
+    """One frame: a message as JSON, a picture as its bytes with its header in the frame's header.
+
+    at_us: the moment of the past it belongs to; 0: none, it is live.
+    """
     age_ms = max(0, age_us // 1000)
     if isinstance(value, Picture):
-        header = FrameHeader(age_ms=age_ms, picture=msgspec.Raw(msgspec.json.encode(value.header)))
+        header = FrameHeader(age_ms=age_ms, picture=msgspec.Raw(msgspec.json.encode(value.header)), at_us=at_us)
         return encode_frame(key, header, value.data)
-    return encode_frame(key, FrameHeader(age_ms=age_ms), msgspec.json.encode(value))
+    return encode_frame(key, FrameHeader(age_ms=age_ms, at_us=at_us), msgspec.json.encode(value))

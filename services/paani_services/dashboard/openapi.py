@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from typing import Any, NamedTuple
 
 import msgspec
@@ -12,12 +13,12 @@ from paani import messages as m
 from paani.board_status import STATUS_PATH, BoardStatus
 from paani.version import version_text
 from paani_services.dashboard import answers as a
-from paani_services.dashboard import driving, requests, tuning
+from paani_services.dashboard import driving, past, process_logs, requests, tuning
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
 from paani_services.dashboard.picture_stream import MEDIA_TYPE
 
 REF = "#/components/schemas/{name}"
-JPEG, TEXT, HTML = "image/jpeg", "text/plain", "text/html"
+JPEG, TEXT, HTML, BYTES = "image/jpeg", "text/plain", "text/html", "application/octet-stream"
 
 
 class Operation(NamedTuple):
@@ -66,6 +67,16 @@ OPERATIONS = (
     Operation("post", "/api/drive/wheel", "Take the wheel.", a.DoneAnswer, driving.HandRequest, errors=ASK),
     Operation("post", "/api/drive/override", "Override the advice.", a.DoneAnswer, driving.HandRequest, errors=ASK),
     Operation("post", "/api/drive/setpoint", "What the hand says.", a.SentAnswer, driving.SetpointRequest, errors=ACT),
+    Operation("get", "/api/history", "Samples and events of the last ten minutes.", past.Series, errors=(401,)),
+    Operation(
+        "get",
+        "/api/history/frames",
+        "What pages were sent then: frames as of the WebSocket, each after its length as u32.",
+        BYTES,
+        query=past.WindowQuery,
+        errors=(401,),
+    ),
+    Operation("get", "/api/logs/{service}", "The last lines of a log.", process_logs.LogLines, errors=(401, 404, 500)),
     Operation("get", "/api/tune", "What is tuned.", m.Shadow, errors=(401, 503)),
     Operation("post", "/api/tune/propose", "Try in the shadow.", m.Shadow, tuning.ProposeRequest, errors=ASK),
     Operation("post", "/api/tune/promote", "Put them in force.", m.Shadow, tuning.ProposalRequest, errors=ASK),
@@ -84,6 +95,7 @@ WORDS = {
     404: "no such file",
     408: "the request did not come to its end",
     409: "refused, and why",
+    500: "it cannot be read or written, and why",
     501: "an extra is not installed",
     503: "nobody answers, or nothing is there",
 }
@@ -148,6 +160,7 @@ def _parameters(each: Operation) -> list[dict[str, Any]]:
         {"name": field.encode_name, "in": "query", "schema": msgspec.json.schema(field.type)}
         for field in msgspec.structs.fields(each.query)
     ]
-    if "{name}" in each.path:
-        found.append({"name": "name", "in": "path", "required": True, "schema": {"type": "string"}})
-    return found
+    return found + [
+        {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
+        for name in re.findall(r"{(\w+)}", each.path)
+    ]

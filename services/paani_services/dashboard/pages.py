@@ -36,9 +36,12 @@ class StaticFile(msgspec.Struct, frozen=True):
 
 
 def load_static_files() -> dict[str, StaticFile]:
-    """Every file of the page by name, and `LIST` of their names, for the worker that keeps them in the browser."""
+    """Every file of the page by name, whichever folder it lies in.
+
+    `LIST` has their names, for the worker that keeps them in the browser.
+    """
     pages = {}
-    for path in sorted(STATIC.iterdir()):
+    for path in sorted(STATIC.rglob("*")):
         media_type = MEDIA_TYPES.get(path.suffix)
         if media_type is not None:
             pages[path.name] = StaticFile(media_type, path.read_bytes())

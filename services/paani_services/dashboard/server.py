@@ -19,11 +19,14 @@ from paani_services.dashboard.answers import ArmedAnswer, HeldAnswer, StopAnswer
 from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.driving import Driving
 from paani_services.dashboard.gatekeeper import Gatekeeper
+from paani_services.dashboard.history import History
 from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.listening import listening
 from paani_services.dashboard.machines import Machines
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, WORKER, StaticFile
+from paani_services.dashboard.past import PastRoutes
+from paani_services.dashboard.process_logs import LogRoutes
 from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
@@ -54,6 +57,7 @@ class Server:
     def __init__(
         self,
         hub: Hub,
+        history: History,
         operator: OperatorClient,
         tuner: Tuner,
         clock: Clock,
@@ -66,6 +70,7 @@ class Server:
         self._pages, self._gatekeeper = pages, gatekeeper
         self._machines = Machines(hub, operator, clock, config, gatekeeper)
         self._driving = Driving(operator, gatekeeper.refuse_act)
+        self._reading = [*PastRoutes(hub, history).routes(), *LogRoutes(config.bus).routes()]
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 
@@ -83,6 +88,7 @@ class Server:
                 web.post("/api/arm/release", self._release),
                 *self._driving.routes(),
                 *self._gatekeeper.routes(),
+                *self._reading,
                 web.get("/api/tune", self._tuning),
                 web.post("/api/tune/propose", self._propose),
                 web.post("/api/tune/promote", self._promote),

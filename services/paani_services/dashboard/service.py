@@ -17,11 +17,13 @@ from paani.operator_client import OperatorClient
 from paani.operator_key import ensure_operator_key
 from paani.page_address import is_page_exposed
 from paani_services.dashboard.gatekeeper import Gatekeeper
+from paani_services.dashboard.history import SAMPLE_KEY, History
 from paani_services.dashboard.hub import Event, Hub
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.page_state import ServiceLiveness, page_settings
 from paani_services.dashboard.pages import load_static_files
 from paani_services.dashboard.server import Server, serving
+from paani_services.dashboard.time_series import SAMPLE_PERIOD_US
 from paani_services.dashboard.tuning import Tuner
 
 STATE_PERIOD_S = 0.1  # people read numbers no faster
@@ -40,10 +42,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
 @contextlib.asynccontextmanager
 async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> AsyncIterator[None]:
     """Run the web server and the tasks that feed it while the context lasts."""
-    hub = Hub()
+    hub, history = Hub(), History(config.services)
     hub.put("dashboard/settings", page_settings(config), clock.now_us(), clock.now_us())
     operator = OperatorClient(bus, clock)
-    async with web_server(hub, operator, tuner, clock, config), asyncio.TaskGroup() as tasks:
+    async with web_server(hub, history, operator, tuner, clock, config), asyncio.TaskGroup() as tasks:
         picture_period_s = 1.0 / config.dashboard.picture_rate_hz
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
@@ -53,6 +55,7 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
         feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
         feeds.append(track_services(hub, bus, clock))
+        feeds.append(keep_history(hub, history, clock))
         running = [tasks.create_task(feed) for feed in feeds]
         try:
             yield
@@ -63,7 +66,7 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
 
 @contextlib.asynccontextmanager
 async def web_server(
-    hub: Hub, operator: OperatorClient, tuner: Tuner, clock: Clock, config: Config
+    hub: Hub, history: History, operator: OperatorClient, tuner: Tuner, clock: Clock, config: Config
 ) -> AsyncIterator[None]:
     """Run the web server while the context lasts."""
     key = await asyncio.to_thread(ensure_operator_key, config.bus)
@@ -71,8 +74,8 @@ async def web_server(
     is_exposed = is_page_exposed(config)
     tls = await asyncio.to_thread(page_server_tls, config.bus) if is_exposed else None
     names = identities_of(config.bus).addresses if is_exposed else ()
-    server = Server(hub, operator, tuner, clock, config, pages, Gatekeeper(config, key, clock, names))
-    async with serving(server, config.dashboard, tls):
+    gatekeeper = Gatekeeper(config, key, clock, names)
+    async with serving(Server(hub, history, operator, tuner, clock, config, pages, gatekeeper), config.dashboard, tls):
         yield
 
 
@@ -135,3 +138,11 @@ async def track_services(hub: Hub, bus: Bus, clock: Clock) -> None:
         if service != bus.user:
             level, text = ("info", "is ready") if alive else ("warn", "has stopped")
             hub.publish_event(Event(now_us, level, f"{service} {text}"))
+
+
+async def keep_history(hub: Hub, history: History, clock: Clock) -> None:
+    """Keep what the hub holds once a second, and send the sample of it to the pages."""
+    while True:
+        await asyncio.sleep(SAMPLE_PERIOD_US * 1e-6)
+        now_us = clock.now_us()
+        hub.put(SAMPLE_KEY, history.take(hub, now_us), now_us, now_us)

@@ -35,7 +35,11 @@ class DropCount(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Health(Message, frozen=True, kw_only=True):
-    """Once a second from every process."""
+    """Once a second from every process.
+
+    open_files: descriptors it holds, of files and connections alike. temperature_c: the warmest thermal zone of its
+    machine; 0 where it has none. Both are 0 in what an earlier version sent.
+    """
 
     service: Text
     ready: bool
@@ -45,3 +49,5 @@ class Health(Message, frozen=True, kw_only=True):
     inputs: tuple[InputHealth, ...] = ()
     drops: tuple[DropCount, ...] = ()
     note: Text = ""
+    open_files: Count = 0
+    temperature_c: NonNegative = 0.0

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import collections
+from pathlib import Path
 
 import pytest
 
 from paani import keys
 from paani.bus.inbox import Latest
 from paani.clock import ManualClock
-from paani.health import HealthReporter
+from paani.health import HealthReporter, count_open_files, warmest_zone_c
 
 
 async def test_rates_ages_and_drops() -> None:
@@ -35,6 +36,7 @@ async def test_rates_ages_and_drops() -> None:
     assert report.uptime_s == pytest.approx(1.0)
     assert report.note == "CENTER_CLEAR"
     assert report.rss_mib > 1.0
+    assert report.open_files >= 3, "the standard streams at least"
 
 
 @pytest.mark.parametrize(("silence_s", "alive", "fresh"), [(0.1, True, True), (1.0, True, False), (20.0, False, False)])
@@ -54,3 +56,22 @@ async def test_newest_wins_in_an_inbox() -> None:
         inbox.offer(value)
     assert await inbox.next() == 3
     assert (inbox.received, inbox.superseded) == (4, 3)
+
+
+def test_descriptors_are_counted(tmp_path: Path) -> None:
+    before = count_open_files()
+    with (tmp_path / "one").open("w"), (tmp_path / "two").open("w"):
+        assert count_open_files() == before + 2
+    assert count_open_files() == before
+
+
+def test_the_warmest_zone_that_can_be_read(tmp_path: Path) -> None:
+    assert warmest_zone_c(tmp_path) == 0.0
+    for number, text in enumerate(("41500\n", "63250\n", "not a number\n", None)):
+        zone = tmp_path / f"thermal_zone{number}"
+        zone.mkdir()
+        if text is None:
+            (zone / "temp").mkdir()  # cannot be read
+        else:
+            (zone / "temp").write_text(text, encoding="ascii")
+    assert warmest_zone_c(tmp_path) == 63.25

@@ -1,25 +1,22 @@
 // @ts-check
 // The camera panel: recent pictures by frame id, and the overlay that belongs to the picture shown.
 
-import { FrameRing, chooseFrame, frameId } from "./frame_matching.js";
-import { drawBoxes, drawCorridors, drawCorridorTop, drawMask, tintMask } from "./overlay.js";
+import { chooseFrame } from "./frame_matching.js";
+import { drawBoxes, drawCorridors, drawCorridorTop, drawMask } from "./overlay.js";
 import { ageText, byId, setText, words } from "./text.js";
 
+/** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
+const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null };
+
 export class Camera {
-  /** @param {import("./store.js").Store} store */
-  constructor(store) {
-    this.store = store;
+  /** @param {import("./view.js").View} view whose frames are shown */
+  constructor(view) {
+    this.view = view;
     this.canvas = /** @type {HTMLCanvasElement} */ (byId("camera"));
     this.ctx = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d", { willReadFrequently: false }));
-    /** @type {FrameRing<{bitmap: ImageBitmap, header: any}>} */
-    this.pictures = new FrameRing((dropped) => dropped.bitmap.close());
-    /** @type {FrameRing<OffscreenCanvas>} */
-    this.masks = new FrameRing();
-    /** @type {Record<string, FrameRing<any>>} */
-    this.messages = { "perception/evidence": new FrameRing(), "advisor/tracks": new FrameRing(), "advisor/advisory": new FrameRing() };
     this.layers = { mask: true, boxes: true, lanes: true, limit: true };
     /** Frame numbers of what the canvas shows now; tests read them. */
-    this.overlay = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null };
+    this.overlay = { ...NOTHING };
     this.isDrawScheduled = false;
     for (const button of document.querySelectorAll("[data-layer]")) {
       button.addEventListener("click", () => this.toggle(/** @type {HTMLElement} */ (button).dataset.layer ?? ""));
@@ -33,25 +30,11 @@ export class Camera {
     this.scheduleDraw();
   }
 
-  /** @param {any} header @param {Uint8Array} body */
-  async addPicture(header, body) {
-    const bitmap = await createImageBitmap(new Blob([/** @type {BlobPart} */ (body)], { type: header.media_type }));
-    this.pictures.put(frameId(header), { bitmap, header });
-    this.scheduleDraw();
-  }
-
-  /** @param {any} header @param {Uint8Array} body */
-  async addMask(header, body) {
-    const blob = new Blob([/** @type {BlobPart} */ (body)], { type: header.media_type });
-    const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-    this.masks.put(frameId(header), tintMask(bitmap));
-    bitmap.close();
-    this.scheduleDraw();
-  }
-
-  /** @param {string} key @param {any} message */
-  addMessage(key, message) {
-    this.messages[key]?.put(frameId(message), message);
+  /** Show the frames of another view. @param {import("./view.js").View} view */
+  show(view) {
+    if (view === this.view) return;
+    this.view = view;
+    this.overlay = { ...NOTHING };
     this.scheduleDraw();
   }
 
@@ -60,28 +43,30 @@ export class Camera {
     this.isDrawScheduled = true;
     requestAnimationFrame(() => {
       this.isDrawScheduled = false;
-      this.draw(performance.now());
+      this.draw(this.view.now());
     });
   }
 
   /** @param {number} now */
   draw(now) {
-    const evidenceOf = this.messages["perception/evidence"];
-    const chosen = chooseFrame(this.pictures.ids(), (id) => evidenceOf.get(id) !== undefined, (id) => this.masks.get(id) !== undefined);
-    if (chosen.id === null) return;
-    const shown = this.pictures.get(chosen.id);
-    if (!shown) return;
+    const { pictures, masks, messages } = this.view.frames, evidenceOf = messages["perception/evidence"];
+    const chosen = chooseFrame(pictures.ids(), (id) => evidenceOf.get(id) !== undefined, (id) => masks.get(id) !== undefined);
+    const shown = chosen.id === null ? undefined : pictures.get(chosen.id);
+    if (chosen.id === null || !shown) {
+      this.drawNothing();
+      return;
+    }
     const { bitmap, header } = shown;
     const evidence = chosen.evidence ? evidenceOf.get(chosen.id) : undefined;
-    const mask = chosen.mask ? this.masks.get(chosen.id) : undefined;
+    const mask = chosen.mask ? masks.get(chosen.id) : undefined;
     const pane = this.resizeCanvas(bitmap);
     pane.ctx.imageSmoothingQuality = "high";
     pane.ctx.drawImage(bitmap, 0, 0, pane.width, pane.height);
-    const corridors = this.store.get("dashboard/settings")?.corridors;
+    const corridors = this.view.store.get("dashboard/settings")?.corridors;
     if (mask && this.layers.mask) drawMask(pane, mask);
     if (evidence && corridors && this.layers.limit) drawCorridorTop(pane, corridors.top);
-    if (evidence && corridors && this.layers.lanes) drawCorridors(pane, corridors, this.messages["advisor/advisory"].get(chosen.id));
-    if (evidence && this.layers.boxes) drawBoxes(pane, evidence, this.messages["advisor/tracks"].get(chosen.id));
+    if (evidence && corridors && this.layers.lanes) drawCorridors(pane, corridors, messages["advisor/advisory"].get(chosen.id));
+    if (evidence && this.layers.boxes) drawBoxes(pane, evidence, messages["advisor/tracks"].get(chosen.id));
     this.overlay = {
       frame_seq: header.frame_seq,
       picture_seq: header.frame_seq,
@@ -91,16 +76,25 @@ export class Camera {
     this.updateCaption(now, header, evidence);
   }
 
+  /** No picture of this view: never another's. */
+  drawNothing() {
+    if (this.overlay.picture_seq === null && byId("camera-id").textContent === "") return;
+    this.ctx.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    this.overlay = { ...NOTHING };
+    setText(byId("camera-id"), "");
+    setText(byId("camera-note"), "No picture of this moment");
+  }
+
   /** @param {number} now @param {any} header @param {any} evidence */
   updateCaption(now, header, evidence) {
-    const ageS = this.store.ageS("camera/picture", now), fresh = this.store.isFresh("camera/picture", now);
-    const newest = this.store.get("camera/picture");
+    const ageS = this.view.store.ageS("camera/picture", now), fresh = this.view.store.isFresh("camera/picture", now);
+    const newest = this.view.store.get("camera/picture");
     const behind = newest ? newest.frame_seq - header.frame_seq : 0;
     this.canvas.classList.toggle("stale", !fresh);
     setText(byId("camera-id"), `frame ${header.frame_seq}${behind > 0 ? ` of ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
     setText(
       byId("camera-note"),
-      !fresh ? (ageS > this.store.limitS("camera/picture") ? `Last picture ${ageText(ageS)} ago` : "Pictures come with gaps")
+      !fresh ? (ageS > this.view.store.limitS("camera/picture") ? `Last picture ${ageText(ageS)} ago` : "Pictures come with gaps")
         : !evidence ? "No evidence for this frame: overlay left out"
         : !evidence.usable ? `Picture unusable: ${words(evidence.cause)}` : "",
     );

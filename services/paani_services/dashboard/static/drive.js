@@ -141,14 +141,15 @@ export function bindDrive() {
   setInterval(() => !document.hidden && void say(), SAY_MS);
 }
 
-/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
-export function renderDrive(store, open, now) {
-  byId("drive").hidden = isReplay(store);
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now @param {boolean} isAway whether the page shows the past or another tab, from where nobody drives */
+export function renderDrive(store, open, now, isAway) {
+  byId("drive").hidden = isReplay(store) || isAway;
   const operator = open && store.isFresh("operator/state", now) ? store.get("operator/state") : undefined;
   const isHolder = operator?.wheel_by === "dashboard" && operator.wheel_hand === hand;
   const isFree = operator?.wheel_by === "", isManual = operator?.mode === "MANUAL";
-  if (canDrive && !(isManual && isHolder)) letGo();
-  canDrive = isManual && isHolder;
+  const mayDrive = isManual && isHolder && !isAway;
+  if (canDrive && !mayDrive) letGo();
+  canDrive = mayDrive;
   if (!canDrive) isPadFree = false;
   else renderStick();
   byId("drive").dataset.driving = String(canDrive);

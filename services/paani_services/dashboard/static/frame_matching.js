@@ -31,6 +31,11 @@ export class FrameRing {
     }
   }
 
+  clear() {
+    for (const dropped of this.byId.values()) this.onDrop(dropped);
+    this.byId.clear();
+  }
+
   /** @param {string} id */
   get(id) {
     return this.byId.get(id);

@@ -1,10 +1,10 @@
 // @ts-check
-// One WebSocket frame: `u8 keylen | u16 headlen | key | header JSON | body`, integers big-endian. Pure.
+// One frame of a WebSocket, or of an answer about the past: `u8 keylen | u16 headlen | key | header JSON | body`, integers big-endian. Pure.
 
 const utf8 = new TextDecoder();
 
 /**
- * @typedef {{age_ms: number, picture?: any}} FrameHeader
+ * @typedef {{age_ms: number, picture?: any, at_us?: number}} FrameHeader
  * @param {ArrayBuffer} buffer
  * @returns {{key: string, header: FrameHeader, body: Uint8Array}}
  */
@@ -18,6 +18,17 @@ export function decodeFrame(buffer) {
     header: JSON.parse(utf8.decode(new Uint8Array(buffer, headAt, bodyAt - headAt))),
     body: new Uint8Array(buffer, bodyAt),
   };
+}
+
+/** Frames one after the other, each after its length in four bytes. @param {ArrayBuffer} packed */
+export function unpackFrames(packed) {
+  const view = new DataView(packed), found = [];
+  for (let at = 0; at < packed.byteLength;) {
+    const end = at + 4 + view.getUint32(at);
+    found.push(decodeFrame(packed.slice(at + 4, end)));
+    at = end;
+  }
+  return found;
 }
 
 /** @param {Uint8Array} body */

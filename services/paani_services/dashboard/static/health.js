@@ -1,6 +1,7 @@
 // @ts-check
-// The health panel: one row per process with its state, rate, age of its report, load and dropped messages.
+// The health tab: one row per process with its state, rate, delays, age of its report, load, and what it dropped and why.
 
+import { bindProcessLog } from "./process_log.js";
 import { ageText, byId, fixed, make, setText } from "./text.js";
 
 /** The main output of each process; its rate is shown. @type {Record<string, string>} */
@@ -10,7 +11,9 @@ const MAIN_TOPIC = {
   localization: "localization/odometry", operator: "operator/arming", dashboard: "operator/tuning", recorder: "recorder/state",
   bridge: "bridge/state", thrusters: "plant/thrust_applied", sensors: "sensors/imu",
 };
-const COLUMNS = 8;
+/** What these send is made of no evidence whose age would tell how long they take. */
+const MADE_OF_NOTHING = { dashboard: true, recorder: true };
+const COLUMNS = 13;
 /** @type {Map<string, HTMLElement[]>} */
 const cells = new Map();
 
@@ -30,34 +33,44 @@ export function renderHealth(store, open, now) {
     const drops = (report?.drops ?? []).reduce((/** @type {number} */ sum, /** @type {any} */ drop) => sum + drop.count, 0);
     ready += alive ? 1 : 0;
     cpu += alive ? report.cpu_cores : 0;
-    const [service, state, rate, age, cores, memory, dropped, starts] = rowCells(name);
+    const [, state, rate, middle, late, age, cores, memory, files, warmth, starts, dropped, says] = rowCells(name);
     const isRecorded = settings.mode === "replay" && name !== "dashboard"; // it need not run
     const [word, kind] = isRecorded ? [fresh ? "recorded" : "not played", "quiet"] : alive ? ["ready", "good"] : life?.alive && open ? ["no report", "bad"] : life?.starts ? ["stopped", "bad"] : ["not started", "warn"];
-    setText(service, name);
+    const delays = name in MADE_OF_NOTHING ? [] : store.delaysMs(MAIN_TOPIC[name]);
     setText(state, word);
     state.className = kind;
     setText(rate, input && (alive || (isRecorded && fresh)) ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–");
-    rate.className = alive && input && !input.rate_ok ? "warn" : "";
+    rate.className = alive && input && !input.rate_ok ? "warn number" : "number";
     setText(age, report ? ageText(store.ageS(`health/${name}`, now)) : "–");
     setText(cores, report ? `${fixed(report.cpu_cores * 100, 0)} %` : "–");
     setText(memory, report ? fixed(report.rss_mib, 0) : "–");
-    setText(dropped, report ? String(drops) : "–");
-    dropped.className = drops ? "warn" : "";
+    setText(middle, delayText(delays, 0.5));
+    setText(late, delayText(delays, 0.95));
+    setText(files, report?.open_files ? String(report.open_files) : "–");
+    setText(warmth, report?.temperature_c ? fixed(report.temperature_c, 0) : "–");
+    setText(dropped, drops ? report.drops.filter((/** @type {any} */ drop) => drop.count).map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? "none" : "–");
+    setText(says, report?.note ?? "");
+    dropped.className = drops ? "warn wide" : "wide";
     setText(starts, life ? String(life.starts) : "–");
-    starts.className = life?.starts > 1 ? "warn" : "";
-    service.title = report?.note ?? "";
-    dropped.title = (report?.drops ?? []).map((/** @type {any} */ drop) => `${drop.cause}: ${drop.count}`).join(", ");
-    for (const cell of [rate, age, cores, memory, dropped]) cell.classList.toggle("stale", !fresh);
+    starts.className = life?.starts > 1 ? "warn number" : "number";
+    for (const cell of [rate, age, cores, memory, files, warmth, dropped]) cell.classList.toggle("stale", !fresh);
   }
-  setText(byId("health-sum"), settings.mode === "replay" ? "of the recorded drive" : `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`);
+  setText(byId("health-sum"), settings.mode === "replay" ? "" : `${ready} of ${settings.services.length}`);
+  byId("health-sum").title = `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`;
 }
+
+/** A quantile of the time from what a message is made of until it was sent. @param {number[]} delaysMs @param {number} part */
+const delayText = (delaysMs, part) => (delaysMs.length < 10 ? "–" : `${fixed([...delaysMs].sort((a, b) => a - b)[Math.floor((delaysMs.length - 1) * part)], 0)} ms`);
 
 /** @param {string} name */
 function rowCells(name) {
   let found = cells.get(name);
   if (!found) {
-    found = Array.from({ length: COLUMNS }, () => make("td"));
-    const line = make("tr");
+    found = Array.from({ length: COLUMNS }, (_, index) => make("td", index > 1 && index < COLUMNS - 2 ? "number" : index === COLUMNS - 1 ? "wide quiet" : ""));
+    const line = make("tr"), button = make("button", "", name);
+    button.setAttribute("type", "button");
+    bindProcessLog(button, name);
+    found[0].append(button);
     line.append(...found);
     byId("health").append(line);
     cells.set(name, found);

@@ -1,7 +1,7 @@
 // @ts-check
 // The log panel, newest line first: events of the dashboard, and each change of advice; repeats are counted.
 
-import { byId, make, reasonText, setText } from "./text.js";
+import { byId, clockText, make, reasonText, setText } from "./text.js";
 
 const MAX_LINES = 60;
 const REPEATED_WITHIN_US = 30e6, LOOK_BACK = 4; // a line that comes again so soon, among so many, is counted, not added
@@ -16,11 +16,26 @@ export function addLine(event) {
     setText(before.lastChild, `${event.text} (× ${before.dataset.count})`);
     return;
   }
-  const line = make("li"), at = make("time", "", new Date(event.at_us / 1000).toTimeString().slice(0, 8));
-  Object.assign(line.dataset, { level: event.level, text: event.text, count: "1", at: String(event.at_us) });
-  line.append(at, make("span", "", event.text));
-  list.prepend(line);
+  list.prepend(lineOf(event));
   while (list.children.length > MAX_LINES) list.lastChild.remove();
+}
+
+/** Show the events of a drive of the past instead; null: the log again. @param {{at_us: number, level: string, text: string}[] | null} events */
+export function showLogOf(events) {
+  const list = byId("log-past"), key = events ? `${events.length} ${events.at(-1)?.at_us}` : "";
+  byId("log").hidden = Boolean(events);
+  list.hidden = !events;
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.replaceChildren(...(events ?? []).slice(-MAX_LINES).reverse().map(lineOf));
+}
+
+/** @param {{at_us: number, level: string, text: string}} event */
+function lineOf(event) {
+  const line = make("li");
+  Object.assign(line.dataset, { level: event.level, text: event.text, count: "1", at: String(event.at_us) });
+  line.append(make("time", "", clockText(event.at_us)), make("span", "", event.text));
+  return line;
 }
 
 /** @param {HTMLElement} line @param {{at_us: number, text: string}} event */

@@ -3,12 +3,13 @@
 
 import { alertOf, alertOfLink, bindAlerts } from "./alerts.js";
 import { Camera } from "./camera.js";
+import { renderDevices } from "./devices.js";
 import { bindDrive, isDriving, renderDrive } from "./drive.js";
 import { buildExplanation, renderExplanation } from "./explanation.js";
 import { decodeJson } from "./frames.js";
 import { renderHealth } from "./health.js";
 import { renderIndicator } from "./indicator.js";
-import { bindLink } from "./link.js";
+import { bindLink, renderLink } from "./link.js";
 import { addLine, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
 import { renderMotion } from "./motion.js";
@@ -18,66 +19,77 @@ import { requireSession } from "./requests.js";
 import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
 import { renderStages } from "./stages.js";
-import { Store } from "./store.js";
+import { bindTabs, isDriveTab, shownTab } from "./tabs.js";
+import { Time, isTyping } from "./time.js";
+import { bindTopics, renderTopics } from "./topics.js";
 import { renderTopbar } from "./topbar.js";
 import { renderTuning } from "./tuning.js";
+import { View } from "./view.js";
 
 const RENDER_PERIOD_MS = 100;
 const LAYERS = ["mask", "boxes", "lanes", "limit"];
-const store = new Store();
-const camera = new Camera(store);
+const live = new View(() => performance.now());
+const camera = new Camera(live);
 const map = new MapPanel();
+const time = new Time(live, () => camera.scheduleDraw());
 let open = false, opened = 0;
 
 /** @param {string} key @param {import("./frames.js").FrameHeader} header @param {Uint8Array} body */
 function onMessage(key, header, body) {
-  const now = performance.now();
-  if (header.picture) {
-    store.put(key, header.picture, header.age_ms, now);
-    if (key === "camera/picture") void camera.addPicture(header.picture, body);
-    if (key === "perception/mask") void camera.addMask(header.picture, body);
-    return;
-  }
-  const value = decodeJson(body);
   if (key === "dashboard/event") {
-    addLine(value);
-    alertOf(value.level, header.age_ms);
+    const event = decodeJson(body);
+    addLine(event);
+    alertOf(event.level, header.age_ms);
+    time.history.series.addEvent(event);
     return;
   }
-  store.put(key, value, header.age_ms, now);
-  if (key in camera.messages) camera.addMessage(key, value);
-  if (key in map.tracks) map.addPose(key, value);
+  const { value, drawn } = live.put(key, header, body, performance.now());
+  if (!time.isPast) void drawn.then(() => camera.scheduleDraw());
   if (key === "advisor/advisory") logAdvice(value);
+  if (key === "dashboard/sample") time.history.series.append(value);
 }
 
 /** @param {boolean} isOpen */
 function onOpen(isOpen) {
   open = isOpen;
   void requireSession();
+  if (isOpen) void time.reload();
   if (isOpen && opened++ > 0) document.querySelector("#log")?.replaceChildren();
 }
 
 function render() {
-  const now = performance.now();
-  renderTopbar(store, open, now);
-  alertOfLink(now);
-  renderOperatorState(store, open, now);
-  renderDrive(store, open, now);
+  const present = performance.now();
+  time.render(present);
+  const { view } = time, { store } = view, now = view.now(), isOpen = open || time.isPast;
+  renderTopbar(store, isOpen, now);
+  renderLink(live.store, open, present);
+  alertOfLink(present);
+  renderOperatorState(live.store, open, present, time.isPast);
+  renderDrive(live.store, open, present, time.isPast || !isDriveTab());
+  camera.show(view);
   if (document.hidden) return;
+  renderHealth(store, isOpen, now);
+  renderDevices(store, now);
+  if (shownTab() === "topics") renderTopics(store, now, present);
+  if (isDriveTab()) renderPanels(view, now);
+}
+
+/** The panels of the tab people drive from. @param {View} view @param {number} now */
+function renderPanels(view, now) {
+  const { store } = view;
   renderTuning(store, now);
   renderExplanation(store, now);
   renderStages(store, now);
   renderMotion(store, now);
   renderIndicator(store, now);
   renderSensors(store, now);
-  renderHealth(store, open, now);
-  map.render(store, now);
-  if (!store.isFresh("camera/picture", now)) camera.scheduleDraw();
+  map.render(view, now);
+  if (time.isPast || !store.isFresh("camera/picture", now)) camera.scheduleDraw();
 }
 
 addEventListener("keydown", (event) => {
   const layer = LAYERS[Number(event.key) - 1];
-  if (event.ctrlKey || event.metaKey || event.altKey || isDriving()) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || isDriving() || isTyping(event.target)) return;
   if (layer) camera.toggle(layer);
   if (event.key === "d" || event.key === "D") nextPalette();
 });
@@ -86,6 +98,8 @@ bindLink();
 bindPalette();
 bindAlerts();
 void navigator.serviceWorker?.register("/static/service_worker.js", { scope: "/" }).catch(() => {}); // not every browser takes it
+bindTabs();
+bindTopics();
 bindOperatorControls();
 bindDrive();
 connect(onMessage, onOpen);
@@ -93,6 +107,7 @@ setInterval(render, RENDER_PERIOD_MS);
 Object.defineProperty(window, "paani", {
   value: Object.freeze({
     get overlay() { return camera.overlay; },
+    get shownUs() { return time.isPast ? time.playback.atUs : null; },
     get link() { return document.body.dataset.link; },
   }),
 });

@@ -4,7 +4,6 @@
 import { drawFence, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
 import { byId, fixed, headingDeg, setText } from "./text.js";
 
-const MAX_TRACK_POINTS = 4000, TRACK_STEP_M = 0.15;
 const ROUND_LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 
 export class MapPanel {
@@ -14,8 +13,6 @@ export class MapPanel {
     this.centre = { x: 0, y: 0 };
     this.pxPerM = 6;
     this.follow = true;
-    /** @type {Record<string, {x: number, y: number}[]>} */
-    this.tracks = { "localization/odometry": [], "@truth/pose": [] };
     this.bindControls();
   }
 
@@ -44,16 +41,8 @@ export class MapPanel {
     this.pxPerM = Math.min(80, Math.max(0.5, this.pxPerM * factor));
   }
 
-  /** @param {string} key @param {any} pose */
-  addPose(key, pose) {
-    const track = this.tracks[key], last = track.at(-1);
-    if (last && Math.hypot(last.x - pose.x_m, last.y - pose.y_m) < TRACK_STEP_M) return;
-    track.push({ x: pose.x_m, y: pose.y_m });
-    if (track.length > MAX_TRACK_POINTS) track.splice(0, MAX_TRACK_POINTS / 4);
-  }
-
-  /** @param {import("./store.js").Store} store @param {number} now */
-  render(store, now) {
+  /** @param {import("./view.js").View} view @param {number} now */
+  render({ store, tracks }, now) {
     const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
     const odometry = store.get("localization/odometry"), truth = store.get("@truth/pose"), route = store.get("navigator/route");
     const ratio = Math.min(devicePixelRatio || 1, 2), width = this.canvas.clientWidth, height = this.canvas.clientHeight;
@@ -78,8 +67,8 @@ export class MapPanel {
     if (mission) drawFence(chart, mission);
     if (mission) drawStations(chart, mission);
     if (route) this.drawRoute(route, store, toScreen, colour("--route"), colour("--quiet"));
-    this.drawTrack(this.tracks["@truth/pose"], toScreen, colour("--text"), 1.5, [2, 4]);
-    this.drawTrack(this.tracks["localization/odometry"], toScreen, colour("--cyan"), 2, []);
+    this.drawTrack(tracks["@truth/pose"], toScreen, colour("--text"), 1.5, [2, 4]);
+    this.drawTrack(tracks["localization/odometry"], toScreen, colour("--cyan"), 2, []);
     if (prediction?.home.length) drawHome(chart, prediction.home[0]);
     if (prediction?.path.length) drawPath(chart, prediction.path);
     if (prediction) drawObstacles(chart, prediction.obstacles, store.ageS(key, now), store.get("advisor/tracks")?.tracks ?? []);

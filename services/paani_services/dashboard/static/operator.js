@@ -57,14 +57,14 @@ export function bindOperatorControls() {
   button.addEventListener("blur", () => release(false));
 }
 
-/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
-export function renderOperatorState(store, open, now) {
+/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now @param {boolean} isPast whether the page shows the past, from which nobody arms */
+export function renderOperatorState(store, open, now, isPast) {
   const operator = store.get("operator/state"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
   const heldMs = heldFrom ? now - heldFrom : 0;
-  if (heldMs > EXPIRES_MS) release(false);
+  if (heldMs > EXPIRES_MS || isPast) release(false);
   const button = byId("arm");
   const isHeard = open && store.isFresh("operator/state", now);
-  button.disabled = !isHeard || !operator || operator.armed || isReplay(store);
+  button.disabled = !isHeard || !operator || operator.armed || isReplay(store) || isPast;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));

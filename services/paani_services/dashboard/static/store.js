@@ -1,9 +1,9 @@
 // @ts-check
 // The newest value of each key and its age: the age on the server plus the time since its receipt here.
 
-const SETTLE_MS = 600;
+const SETTLE_MS = 600, MAX_DELAYS = 200;
 
-/** @typedef {{value: any, at: number, ageMs: number}} Entry */
+/** @typedef {{value: any, at: number, ageMs: number, bytes: number}} Entry */
 
 export class Store {
   constructor() {
@@ -14,12 +14,20 @@ export class Store {
     /** @type {Map<string, number>} */
     this.freshS = new Map();
     this.boatHeardAt = 0;
+    /** @type {Map<string, number[]>} */
+    this.delays = new Map();
   }
 
-  /** @param {string} key @param {any} value @param {number} ageMs @param {number} now */
-  put(key, value, ageMs, now) {
+  /** @param {string} key @param {any} value @param {number} ageMs @param {number} now @param {number} [bytes] its size on the way here */
+  put(key, value, ageMs, now, bytes = 0) {
     if (this.entries.has(key) && this.ageS(key, now) > this.limitS(key)) this.heardAgainAt.set(key, now);
-    this.entries.set(key, { value, at: now, ageMs });
+    this.entries.set(key, { value, at: now, ageMs, bytes });
+    if (value.sent_us && value.source_us) {
+      const delays = this.delays.get(key) ?? [];
+      delays.push(Math.max(0, value.sent_us - value.source_us) / 1000);
+      if (delays.length > MAX_DELAYS) delays.shift();
+      this.delays.set(key, delays);
+    }
     if (key === "dashboard/settings") {
       for (const topic of value.topics) this.freshS.set(topic.name, topic.fresh_s);
     }
@@ -30,6 +38,11 @@ export class Store {
   /** @param {string} key */
   get(key) {
     return this.entries.get(key)?.value;
+  }
+
+  /** From what the newest messages of a key are made of until they were sent [ms], oldest first. @param {string} key */
+  delaysMs(key) {
+    return this.delays.get(key) ?? [];
   }
 
   /** Seconds; infinite before the first. @param {string} key @param {number} now */

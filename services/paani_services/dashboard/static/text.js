@@ -149,6 +149,49 @@ export const STAGES = {
   gate: ["Thrust adapter", "no recent report of thrust"],
 };
 
+/** The time of a moment, on this machine's clock. @param {number} us */
+export const clockText = (us) => new Date(us / 1000).toTimeString().slice(0, 8);
+
+/** A length of time as minutes and seconds. @param {number} us */
+export const spanText = (us) => `${Math.floor(us / 60e6)}:${String(Math.floor((us % 60e6) / 1e6)).padStart(2, "0")}`;
+
+/** The strip of time and its controls. */
+export const TIME_TEXTS = {
+  noServer: "no connection to the dashboard",
+  past: "PAST",
+  recording: "RECORDING",
+  readOnly: "read-only",
+  liveNow: "Live now",
+  stillLive: "STOP still stops the boat",
+  nothing: "nothing recorded yet",
+  play: "Play",
+  pause: "Pause",
+  unknown: "unknown",
+  loading: "loading",
+};
+
+/** The health tab. */
+export const HEALTH_TEXTS = { log: "Log of", empty: "The log is empty.", cut: "Its last lines; those before are in the file." };
+
+/** The topics tab. */
+export const TOPICS_TEXTS = { freeze: "Freeze", thaw: "Frozen: go on", none: "Press a topic for its last value", silent: "nothing received" };
+
+/** The health report that says at which rate each topic comes. */
+export const HEALTH_INPUTS = "health/dashboard";
+
+/** Fields of every message's header, which the tab of devices leaves out. */
+export const DEVICE_FACTS = { header: ["source_us", "seq", "epoch", "domain", "producer", "sent_us", "steady_us", "devices"] };
+
+/** Plots over time: title with its unit, and the curves: column, name, colour. @type {[string, [string, string, string][]][]} */
+export const PLOTS = [
+  ["Speed [m/s]", [["speed_mps", "ahead", "--cyan"]]],
+  ["Cross-track [m]", [["cross_track_m", "to port", "--route"]]],
+  ["Risk", [["risk_left", "left", "--blue-text"], ["risk_center", "centre", "--orange"], ["risk_right", "right", "--green"]]],
+  ["Thrust", [["thrust_left", "port", "--cyan"], ["thrust_right", "starboard", "--orange"]]],
+  ["CPU [cores]", [["cpu_cores", "all processes", "--rose"]]],
+  ["Picture to advice [ms]", [["latency_ms", "latency", "--amber"]]],
+];
+
 /** Set text only when it changes. @param {Element | null} element @param {string} text */
 export function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;

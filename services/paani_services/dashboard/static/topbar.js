@@ -3,7 +3,6 @@
 
 import { describeActivity } from "./activity.js";
 import { announce } from "./announcer.js";
-import { renderLink } from "./link.js";
 import { ACTIVITIES, MODES, ageText, byId, fixed, headingDeg, reasonText, sentence, setText, words } from "./text.js";
 
 const NOT_HEARD = { id: "UNKNOWN", word: ACTIVITIES.UNKNOWN[0], kind: "none", reason: "no connection to the dashboard" };
@@ -28,7 +27,6 @@ export function renderTopbar(store, open, now) {
     document.documentElement.dataset.mode = settings.mode;
     renderRecord(store, settings.services.includes("recorder") && settings.mode !== "replay", now);
   }
-  renderLink(store, open, now);
   const doing = open ? describeActivity(store, now) : NOT_HEARD;
   setText(byId("activity-word"), doing.word);
   setText(byId("activity-reason"), sentence(doing.reason));
