@@ -30,7 +30,7 @@ from paani.messages import (
 from paani.missions import mission_of_route
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
-from paani_services.localization.estimator import Estimator
+from paani_services.localization.choice import create_estimator
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
@@ -48,7 +48,7 @@ class Lockstep:
         self.world, self.config = world, config
         self.plant = Plant(world, config.plant, seed)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
-        self.estimator = Estimator(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
+        self.estimator = create_estimator(msgspec.structs.replace(config.localization, origin_lat_lon_deg=origin_deg))
         self.route = Route(
             source_us=0,
             name=world.name,

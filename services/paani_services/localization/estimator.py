@@ -16,7 +16,8 @@ from paani.config import LocalizationConfig
 from paani.geometry import clip, enu_from_geodetic, geodetic_from_enu
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.gyro_bias import estimate_gyro_bias
-from paani_services.localization.levelling import level_sample, mean_level_motion
+from paani_services.localization.levelling import mean_level_motion
+from paani_services.localization.odometry_message import StoppedFlag, is_fresh, odometry_of, unknown_odometry
 from paani_services.localization.planar_filter import PSI, PX, PY, SIZE, WX, WY, B, C, PlanarFilter, U, V
 from paani_services.localization.rest_detection import MapFix, MotionEvidence, RestDetector
 from paani_services.localization.sensor_checks import MAX_FUTURE_S, check_fix, select_usable_samples
@@ -26,7 +27,6 @@ NOMINAL_GAP_S = 0.01  # between IMU samples at 100 Hz
 UNSEEN_SPEED_MPS, UNSEEN_TURN_RADPS = 0.5, 0.3  # what the boat may have done during a gap of the IMU
 YAW_STD_RAD = 0.02  # compass noise of one step
 YAW_GATE2 = 9.0  # validation gate of the compass, squared sigmas: at 20 Hz a refusal costs little
-MIN_YAW_STD_RAD = 0.02  # published at least: no compass is mounted better
 COMPASS_BIAS_STD_RAD = 0.05  # at start, 3 degrees: an adjusted small compass on a small boat
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long, compass or gyro has changed by about so much
 COMPASS_AGE_S = 3.0  # without a compass for longer, the heading is a guess, even if the course makes it look sure (A12)
@@ -80,7 +80,7 @@ class Estimator:
         self._noise_fixes = FIRST_NOISE_FIXES
         self._position_doubt_m = 0.0  # length of the last jump to the receiver's position; fades
         self._nis = 0.0
-        self._slow_since_us: int | None = None
+        self._stopped = StoppedFlag(self._config)
 
     def step(self, samples: Sequence[ImuSample], fix: GpsFix | None, now_us: int) -> tuple[Odometry, Odometry]:
         """Local and global odometry after these IMU samples, oldest first, and perhaps a new fix.
@@ -100,8 +100,8 @@ class Estimator:
         usable = None if fix is None else check_fix(fix, self._last_fix, now_us, self.drops)
         if usable is not None:
             self._use_fix(usable)
-        self._note_slow_speed(now_us)
-        imu_fresh = self._is_fresh(self._last_imu, self._config.max_imu_age_s, now_us)
+        self._stopped.note_speed(self._global, now_us)
+        imu_fresh = is_fresh(self._last_imu, self._config.max_imu_age_s, now_us)
         return self._local_odometry(now_us, imu_fresh), self._global_odometry(now_us, imu_fresh)
 
     def _predict_motion(self, samples: Sequence[ImuSample]) -> None:
@@ -257,31 +257,21 @@ class Estimator:
         self._agreeing_refusals_m.clear()
         self._accepted_fixes = self._refused_fixes = 0
 
-    def _note_slow_speed(self, now_us: int) -> None:
-        if self._global is None or math.hypot(*self._global.velocity) > self._config.stopped_speed_mps:
-            self._slow_since_us = None
-        elif self._slow_since_us is None:
-            self._slow_since_us = now_us
-
-    def _is_stopped(self, now_us: int) -> bool:
-        since_us = self._slow_since_us
-        return since_us is not None and (now_us - since_us) * 1e-6 >= self._config.stopped_after_s
-
     def _local_odometry(self, now_us: int, imu_fresh: bool) -> Odometry:
         if self._local is None:
-            return self._unknown_odometry(now_us)
+            return unknown_odometry(now_us)
         return self._odometry(self._local, now_us, healthy=imu_fresh)
 
     def _global_odometry(self, now_us: int, imu_fresh: bool) -> Odometry:
         if self._global is None or self._last_fix is None or self._origin_deg is None:
-            return self._unknown_odometry(now_us)
+            return unknown_odometry(now_us)
         odometry = self._odometry(self._global, now_us, healthy=imu_fresh)
         spread_m = max(odometry.position_std_m, self._last_fix.position_std_m)
         position_std_m = math.hypot(spread_m, self._position_doubt_m / math.sqrt(2.0))
         healthy = (
             odometry.healthy
-            and self._is_fresh(self._last_heading, COMPASS_AGE_S, now_us)
-            and self._is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
+            and is_fresh(self._last_heading, COMPASS_AGE_S, now_us)
+            and is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
             and self._accepted_fixes >= CONVERGED_FIXES
             and self._refused_fixes < DOUBTFUL_FIXES
             and position_std_m <= self._config.max_position_std_m
@@ -299,33 +289,7 @@ class Estimator:
         )
 
     def _odometry(self, source: PlanarFilter, now_us: int, *, healthy: bool) -> Odometry:
-        x, std, last = source.x.tolist(), source.std.tolist(), self._last_imu
-        vx_mps, vy_mps = source.velocity
-        sin, cos = math.sin(x[PSI]), math.cos(x[PSI])
-        tilted = last is not None and last.orientation_available
-        return Odometry(
-            source_us=last.source_us if last else now_us,
-            x_m=x[PX],
-            y_m=x[PY],
-            yaw_rad=x[PSI],
-            surge_mps=vx_mps * cos + vy_mps * sin,
-            sway_mps=vy_mps * cos - vx_mps * sin,
-            yaw_rate_radps=level_sample(last).yaw_rate_radps - x[B] if last else 0.0,
-            position_std_m=math.hypot(std[PX], std[PY]) / math.sqrt(2.0),
-            yaw_std_rad=max(std[PSI], MIN_YAW_STD_RAD),
-            healthy=healthy and all(map(math.isfinite, x + std)),
-            stopped=self._is_stopped(now_us),
-            roll_rad=last.roll_rad if last and tilted else 0.0,
-            pitch_rad=last.pitch_rad if last and tilted else 0.0,
-        )
-
-    @staticmethod
-    def _unknown_odometry(now_us: int) -> Odometry:
-        return Odometry(source_us=now_us, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.0)
-
-    @staticmethod
-    def _is_fresh(message: ImuSample | GpsFix | None, limit_s: float, now_us: int) -> bool:
-        return message is not None and (now_us - message.source_us) * 1e-6 <= limit_s
+        return odometry_of(source, self._last_imu, now_us, healthy=healthy, stopped=self._stopped.is_set(now_us))
 
 
 def _initial_yaw_std_rad(sample: ImuSample) -> float:

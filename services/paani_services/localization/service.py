@@ -7,7 +7,7 @@ from paani import keys
 from paani.bus import Bus
 from paani.clock import Clock, MonotonicClock
 from paani.config import Config
-from paani_services.localization.estimator import Estimator
+from paani_services.localization.choice import create_estimator
 
 IMU_DEPTH = 64  # samples kept between two steps: five at 100 Hz and 20 Hz, and room for a process that was held up
 
@@ -17,7 +17,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     monotonic = MonotonicClock()
     imu, gps = bus.queue(keys.IMU, IMU_DEPTH), bus.latest(keys.GPS)
     local, odometry = bus.publisher(keys.LOCAL_ODOMETRY), bus.publisher(keys.ODOMETRY)
-    estimator = Estimator(config.localization)
+    estimator = create_estimator(config.localization)
     period_us = round(1e6 / config.localization.rate_hz)
     last_fix, counted_drops = None, Counter[str]()
     with bus.alive():

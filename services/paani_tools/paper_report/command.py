@@ -16,7 +16,7 @@ from paani.undecodable import UNREADABLE
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue
 from paani_tools.bench.board.table import BoardRun
-from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table
+from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table, world_table
 
 TITLE = "# The paper's results, and what stands here"
 INTRODUCTION = (
@@ -50,11 +50,12 @@ def main(argv: list[str]) -> int:
 
 def report_text(run: BoardRun | None) -> str:
     """The whole report. run: of the board protocol, where there is one."""
-    catalogue = load_catalogue()
+    catalogue, paper = load_catalogue(), load_config(profile="paper")
     tables = (
         detector_table(catalogue["detector"]),
         segmenter_table(catalogue["segmenter"]),
-        stills_table(load_config(profile="paper"), load_config()),
+        stills_table(paper, load_config()),
+        world_table(paper),
         board_tables(run),
     )
     return "\n".join((TITLE, "", INTRODUCTION, "", *(markdown(table) for table in tables)))

@@ -34,6 +34,9 @@ SEGMENTER = {
     "edge_f1": 0.876991,
 }
 INT8 = {"miou": 0.730281, "edge_f1": 0.231788}  # V10
+LAKE = "lake"  # the world that has the extents and the route of the paper's
+LAKE_X_M, LAKE_Y_M = 208.699, 126.0  # K1
+ROUTE_WAYPOINTS, ROUTE_M = 59, 465.443  # K2
 STALE_AGE_S, STALE_PROBES = 9.3, 5  # V16
 
 STILLS = (

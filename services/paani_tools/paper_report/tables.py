@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from statistics import fmean
 
+import numpy as np
 from msgspec.structs import replace
 
 from paani import messages as m
 from paani.config import Config
 from paani.statistics.figure_table import FigureTable
 from paani_models.catalogue import Figure, Model
+from paani_sim.worlds import load_world
+from paani_sim.worlds.load import configured_scenario
 from paani_tools.bench.board.table import BoardRun, board_table
 from paani_tools.paper_report import published
 from paani_tools.paper_report.stills import advice_when_stale, evidence_of, last_advice
@@ -44,6 +47,22 @@ def segmenter_table(segmenter: Model) -> FigureTable:
         why = "what ships is FP32: INT8 has to pass an acceptance test (`paani models quantise`)"
         rows.append(("V10", f"{metric}, INT8", paper, None, 0, why))
     return FigureTable(name="Segmenter", columns=COLUMNS, rows=tuple(rows))
+
+
+def world_table(paper: Config) -> FigureTable:
+    """The water of this profile beside the paper's lake."""
+    world, route_n = configured_scenario(paper.world).world, f"{published.ROUTE_WAYPOINTS} waypoints"
+    east_m, north_m = np.ptp(load_world(published.LAKE).shore_m, axis=0)
+    laid = f"{len(world.route_m)} waypoints, {world.route_length_m:.3f} m"
+    things, lake = f"{len(world.obstacles)} fixed, {len(world.actors)} moving", load_world(published.LAKE)
+    others = f"world `{published.LAKE}` has banks, {len(lake.obstacles)} fixed and {len(lake.actors)} moving things"
+    size = f"{published.LAKE_X_M:.3f} m x {published.LAKE_Y_M:.3f} m"
+    rows = (
+        ("K1", "lake", size, f"{east_m:.3f} m x {north_m:.3f} m", 1, "a far shore closes the view beyond it"),
+        ("K2", "route", f"{route_n}, {published.ROUTE_M:.3f} m", laid, 1, "where the waypoints lie is not printed"),
+        ("K3", "things in it", "0 fixed, 0 moving", things, 1, others),
+    )
+    return FigureTable(name="World, paper profile", columns=COLUMNS, rows=rows)
 
 
 def stills_table(paper: Config, ours: Config) -> FigureTable:

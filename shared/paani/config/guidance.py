@@ -5,7 +5,7 @@ Ids such as `J7` name statements of the paper (`paani claims`).
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -23,6 +23,8 @@ class LocalizationConfig(Section, frozen=True):
     """
 
     rate_hz: Positive = 20.0  # L1, L3: estimates at so many steps a second
+    # `augmented` estimates the slow errors of receiver and compass and the drift too; `plain` is L3.
+    ekf: Literal["augmented", "plain"] = "augmented"
     origin_lat_lon_deg: tuple[Latitude, Longitude] | None = None
     gate_mahalanobis2: Positive = 25.0  # validation gate of a fix: 5 standard deviations
     gps_wander_s: Positive = 60.0  # time constant of the receiver's slow error; as `plant.sensors.gps_bias_time_s`

@@ -6,6 +6,7 @@ from paani.keys import VITAL_SERVICES, Graph, services_in
 
 PAPER: dict[str, object] = {
     "profile": "paper",
+    "world": {"name": "bare_lake"},  # K1, K3
     "camera": {"rate_hz": 0.5},  # A8: newest frame once every 2 s
     "perception": {
         "rate_hz": 0.5,  # J17
@@ -39,6 +40,7 @@ PAPER: dict[str, object] = {
             "look_frames": 0,  # J5: no side, no motion
         },
     },
+    "localization": {"ekf": "plain"},  # L3
     "navigator": {
         "acceptance_m": 1.0,  # M2
         "pass_abeam_m": 0.0,  # M2

@@ -9,7 +9,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
 
@@ -22,7 +22,9 @@ from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import Fault, FaultKind, Pose2, Waves, Wind, World, load_world
 
+Ekf = Literal["augmented", "plain"]
 SEEDS = (1, 2, 3)
+EKFS: tuple[Ekf, ...] = ("augmented", "plain")  # ours, and the paper's
 START_US = 1_000_000_000
 REST_S, UNDER_WAY_S, LEG_S = 60.0, 300.0, 25.0
 CRUISE_FORCE_N, MAX_FORCE_N = 6.0, 15.0
@@ -73,6 +75,7 @@ class EstimationRow(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     condition: str
+    ekf: Ekf
     seed: int
     position_m: float
     healthy_position_m: float
@@ -124,11 +127,11 @@ def simulate_course(condition: Condition, seed: int, config: Config) -> Iterator
         plant.close()
 
 
-def summarise_course(condition: str, seed: int, steps: list[EstimationStep], world: World) -> EstimationRow:
+def summarise_course(condition: str, ekf: Ekf, seed: int, steps: list[EstimationStep], world: World) -> EstimationRow:
     """The figures of one course, from the first healthy estimate on."""
     first = next((number for number, step in enumerate(steps) if step.estimate.healthy), None)
     if first is None:
-        raise ValueError(f"{condition}, seed {seed}: never healthy")
+        raise ValueError(f"{condition}, {ekf}, seed {seed}: never healthy")
     steps = steps[first:]
     step_s = steps[1].at_s - steps[0].at_s
     off2_m2 = [_squared_error_m2(step) for step in steps]
@@ -143,6 +146,7 @@ def summarise_course(condition: str, seed: int, steps: list[EstimationStep], wor
     false = [math.hypot(step.estimate.surge_mps, step.estimate.sway_mps) > FALSE_MOTION_MPS for step in still]
     return EstimationRow(
         condition=condition,
+        ekf=ekf,
         seed=seed,
         position_m=_rms(off2_m2),
         healthy_position_m=_rms(healthy),
@@ -165,20 +169,23 @@ def summarise_course(condition: str, seed: int, steps: list[EstimationStep], wor
 
 
 def estimation_table(
-    seeds: tuple[int, ...] = SEEDS, conditions: tuple[Condition, ...] = CONDITIONS
+    seeds: tuple[int, ...] = SEEDS,
+    conditions: tuple[Condition, ...] = CONDITIONS,
+    ekfs: tuple[Ekf, ...] = ("augmented",),
 ) -> Iterator[EstimationRow]:
-    """Each condition with each seed."""
-    config = load_config(sets=["plant.vessel=otter"])  # wind takes hold of it
+    """Each condition with each seed, by each of these filters: the same boat, weather, faults and sensors."""
     for condition in conditions:
-        for seed in seeds:
-            yield summarise_course(
-                condition.name, seed, list(simulate_course(condition, seed, config)), _build_world(condition)
-            )
+        for ekf in ekfs:
+            # Wind takes hold of this hull.
+            config = load_config(sets=["plant.vessel=otter", f"localization.ekf={ekf}"])
+            for seed in seeds:
+                steps = list(simulate_course(condition, seed, config))
+                yield summarise_course(condition.name, ekf, seed, steps, _build_world(condition))
 
 
 def tabulate_estimation() -> FigureTable:
     """The table for `paani bench water`."""
-    return tabulate_rows(list(estimation_table()))
+    return tabulate_rows(list(estimation_table(ekfs=EKFS)))
 
 
 def tabulate_rows(rows: list[EstimationRow]) -> FigureTable:
@@ -186,12 +193,12 @@ def tabulate_rows(rows: list[EstimationRow]) -> FigureTable:
     return FigureTable(
         name="estimation",
         columns=(
-            "condition", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg", "speed m/s", "NIS",
-            "95 % band", "NEES", "false motion %", "longest s", "unhealthy s", "refused",
+            "condition", "filter", "seed", "position m", "if healthy", "GPS m", "heading deg", "compass deg",
+            "speed m/s", "NIS", "95 % band", "NEES", "false motion %", "longest s", "unhealthy s", "refused",
         ),
         rows=tuple(
             (
-                row.condition, row.seed, round(row.position_m, 2), round(row.healthy_position_m, 2),
+                row.condition, row.ekf, row.seed, round(row.position_m, 2), round(row.healthy_position_m, 2),
                 round(row.gps_m, 2), round(row.heading_deg, 2), round(row.compass_deg, 2), round(row.speed_mps, 3),
                 round(row.nis, 2), f"{row.nis_low:.2f}..{row.nis_high:.2f}", round(row.nees, 2),
                 None if row.false_motion_frac is None else round(100.0 * row.false_motion_frac, 2),
@@ -262,4 +269,4 @@ def _longest_run(flags: list[bool]) -> int:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else len(SEEDS)
-    sys.stdout.write(table_text(tabulate_rows(list(estimation_table(tuple(range(1, count + 1)))))))
+    sys.stdout.write(table_text(tabulate_rows(list(estimation_table(tuple(range(1, count + 1)), ekfs=EKFS)))))

@@ -18,6 +18,12 @@ def open_length_m(points_m: F64) -> float:
     return float(np.linalg.norm(np.diff(points_m, axis=0), axis=1).sum())
 
 
+def circle(centre_m: tuple[float, float], radius_m: float, count: int) -> F64:
+    """Points `(count, 2)` of a circle, counter-clockwise from east."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    return np.column_stack([centre_m[0] + radius_m * np.cos(angle), centre_m[1] + radius_m * np.sin(angle)])
+
+
 def resample_closed(points_m: F64, count: int, start_m: float = 0.0) -> F64:
     """`count` points at equal arc length along the closed polygon, the first `start_m` along."""
     ring = np.vstack([points_m, points_m[:1]])

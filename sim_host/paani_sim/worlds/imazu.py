@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from paani_sim.worlds.curves import circle
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS
 from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.scenario import Scenario, Task
@@ -107,14 +108,13 @@ def count_seen(name: str, hfov_deg: float) -> int:
 
 def build_imazu_scenario(name: str) -> Scenario:
     """The scenario of that name, of `IMAZU_SCENARIOS`. The boat starts at the origin and heads east, in no wind."""
-    angle = np.linspace(0.0, 2.0 * np.pi, SHORE_POINTS, endpoint=False)
     route_m = np.array([[along_m, 0.0] for along_m in np.linspace(0.0, ROUTE_LENGTH_M, 8)])
     world = World(
         name="open_water",
         seed=1,
         origin_lat_deg=47.6512,
         origin_lon_deg=9.4794,
-        shore_m=np.column_stack([RUN_M + BASIN_RADIUS_M * np.cos(angle), BASIN_RADIUS_M * np.sin(angle)]),
+        shore_m=circle((RUN_M, 0.0), BASIN_RADIUS_M, SHORE_POINTS),
         route_m=route_m,
         start=start_pose(route_m),
         obstacles=(),

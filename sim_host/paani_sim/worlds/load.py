@@ -8,11 +8,13 @@ from typing import TypeVar
 
 import numpy as np
 
+from paani.arrays import F64
 from paani.config import WorldConfig
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep, Waypoint
 from paani_sim.vessels import load_vessel
 from paani_sim.worlds import WORLDS, load_world
+from paani_sim.worlds.curves import circle
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS
 from paani_sim.worlds.faults import Fault
 from paani_sim.worlds.generate import draw_random_scenario
@@ -26,6 +28,8 @@ from paani_sim.worlds.world import Light, Obstacle, World
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 SCENARIOS = tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+# Beyond what the planner looks at, so that no land has a say; few enough points for a far shore to be drawn.
+OPEN_WATER_M, OPEN_WATER_POINTS = 80.0, 96
 T = TypeVar("T")
 _RANDOM = re.compile(r"random:([a-z]+):(\d{1,9})")
 
@@ -109,6 +113,7 @@ def _build_world(file: ScenarioFile) -> World:
         origin_lon_deg=_given_or(part.origin_lon_deg, own.origin_lon_deg),
         water_rgb=_given_or(part.water_rgb, own.water_rgb),
         season_frac=_given_or(part.season_frac, own.season_frac),
+        shore_m=own.shore_m if part.banks else _open_water(own),
         obstacles=own.obstacles if part.obstacles else tuple(o for o in own.obstacles if o.look == "bridge"),
         actors=own.actors if part.actors else (),
         light=_build_light(file, own.light),
@@ -126,6 +131,14 @@ def _build_world(file: ScenarioFile) -> World:
             toward_rad=_radians_or(weather.current_toward_deg, own.current.toward_rad),
         ),
     )
+
+
+def _open_water(own: World) -> F64:
+    """A round shore that lies `OPEN_WATER_M` outside the corners of the world's own water."""
+    low_m, high_m = own.shore_m.min(axis=0), own.shore_m.max(axis=0)
+    middle_m = 0.5 * (low_m + high_m)
+    radius_m = 0.5 * float(np.hypot(*(high_m - low_m))) + OPEN_WATER_M
+    return circle((float(middle_m[0]), float(middle_m[1])), radius_m, OPEN_WATER_POINTS)
 
 
 def _build_light(file: ScenarioFile, own: Light) -> Light:

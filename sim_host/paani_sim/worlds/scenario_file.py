@@ -35,7 +35,10 @@ Areas = Annotated[tuple[Area, ...], msgspec.Meta(max_length=MAX_ACTORS)]
 
 
 class WorldPart(Section, frozen=True):
-    """Which world; what is left out is the world's own. `obstacles` and `actors`: whether its own ones are kept."""
+    """Which world; what is left out is the world's own.
+
+    `banks`, `obstacles` and `actors`: whether its own ones are kept. Without banks there is open water all round.
+    """
 
     kind: str
     seed: Seed | None = None
@@ -43,6 +46,7 @@ class WorldPart(Section, frozen=True):
     origin_lon_deg: Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)] | None = None
     water_rgb: tuple[Fraction, Fraction, Fraction] | None = None
     season_frac: Fraction | None = None
+    banks: bool = True
     obstacles: bool = True
     actors: bool = True
 

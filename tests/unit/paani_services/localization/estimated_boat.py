@@ -9,7 +9,7 @@ import numpy as np
 from paani.config import LocalizationConfig
 from paani.geometry import geodetic_from_enu
 from paani.messages import GpsFix, ImuSample, Odometry
-from paani_services.localization.estimator import Estimator
+from paani_services.localization.choice import create_estimator
 
 ORIGIN_DEG = (50.0, 8.0)
 CONFIG = LocalizationConfig(origin_lat_lon_deg=ORIGIN_DEG)
@@ -36,7 +36,7 @@ class EstimatedBoat:
         fix_std_m: float = 0.8,
         steps_per_fix: int = 4,
     ) -> None:
-        self.estimator = Estimator(config)
+        self.estimator = create_estimator(config)
         self.rng = np.random.default_rng(seed)
         self.now_us = START_US
         self.x_m, self.y_m, self.yaw_rad, self.surge_mps = 20.0, -10.0, 0.5, 0.0

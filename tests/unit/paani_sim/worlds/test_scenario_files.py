@@ -10,12 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from paani.config import WorldConfig
+from paani.config import WorldConfig, load_config
 from paani.errors import UserError
 from paani.messages import Keep
 from paani_services.navigator.files.route_file import load_route
 from paani_sim.worlds import WORLDS, Behaviour, FaultKind, Kind, Scenario, actor_pose_at, load_world
-from paani_sim.worlds.curves import open_length_m
+from paani_sim.worlds.curves import clearance_m, open_length_m
 from paani_sim.worlds.encounter_paths import is_path_clear
 from paani_sim.worlds.export_route import main as export_route
 from paani_sim.worlds.load import SCENARIOS, configured_scenario, load_scenario
@@ -106,6 +106,18 @@ def test_shipped_scenarios_cover_faults_and_encounters() -> None:
     assert {scenario.world.name for scenario in scenarios} == set(WORLDS)
     kinds = {fault.kind for scenario in scenarios for fault in scenario.faults}
     assert {FaultKind.CAMERA_BLACK, FaultKind.GPS_OUTAGE, FaultKind.COMPASS_BIAS, FaultKind.LINK_LOSS} <= kinds
+
+
+def test_k1_k2_k3_the_papers_lake_has_its_size_and_route_and_nothing_in_it() -> None:
+    """K1, K2, K3: no bank, nothing that stands or moves, no wind, flat water; profile `paper` sails there."""
+    lake, bare = load_world("lake"), configured_scenario(load_config(profile="paper").world)
+    assert bare.name == "bare_lake"
+    assert np.array_equal(bare.world.route_m, lake.route_m)
+    assert (bare.world.obstacles, bare.world.actors, bare.faults, bare.fence) == ((), (), (), ())
+    assert (bare.world.wind.speed_mps, bare.world.waves.fetch_m, bare.world.current.speed_mps) == (0.0, 0.0, 0.0)
+    assert clearance_m(lake.shore_m, lake.shore_m).max() < 1.0
+    assert clearance_m(bare.world.shore_m, lake.shore_m).min() > 75.0
+    assert clearance_m(bare.world.shore_m, np.zeros((1, 2)))[0] < 250.0  # near enough to be drawn
 
 
 def test_a_world_s_name_is_its_plain_scenario() -> None:

@@ -14,7 +14,7 @@ from paani_models.catalogue import load_catalogue
 from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report import published
 from paani_tools.paper_report.command import markdown, report_text
-from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table
+from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table, world_table
 from tests.unit.paani_tools.bench.board.test_board_figures import polls, run_of
 
 SAYS = {statement.id: statement.says for statement in read_statements()}
@@ -49,6 +49,16 @@ def test_pictures_are_decided_anew_and_the_papers_advice_comes_out() -> None:
     assert column(stills_table(careful, OURS), "here")[0] != column(table, "paper")[0]
 
 
+def test_the_paper_profile_sails_the_papers_lake() -> None:
+    table = world_table(PAPER)
+    assert column(table, "here") == column(table, "paper")
+    for name, figure in zip(column(table, "statement"), ("208.699 m", "465.443 m", ""), strict=True):
+        assert figure in SAYS[name]
+    assert "208.699 m by 126.000 m" in SAYS["K1"]
+    assert "59 waypoints" in SAYS["K2"]
+    assert column(world_table(OURS), "here")[1:] != column(table, "paper")[1:]
+
+
 def test_figures_of_networks_are_the_manifests() -> None:
     catalogue = load_catalogue()
     detector, segmenter = catalogue["detector"], catalogue["segmenter"]
@@ -70,7 +80,8 @@ def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text == report_text(None)
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
-        "## Detector", "## Segmenter", "## Single pictures, paper profile", "## Board protocol",
+        "## Detector", "## Segmenter", "## Single pictures, paper profile",
+        "## World, paper profile", "## Board protocol",
     ]  # fmt: skip
     assert "| V10 | miou, INT8 | 0.7303 | - |" in text
     assert markdown(board_tables(None)).count("| - | 0 |") == 7
