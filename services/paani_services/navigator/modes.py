@@ -11,7 +11,7 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
-from paani.fence_geometry import Fence, is_allowed
+from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
 from paani.messages import (
     DriveMode,
@@ -222,8 +222,6 @@ def _bound_speed(
     surge: float, inputs: NavigatorInputs, odometry: Odometry, fence: Fence, config: NavigatorConfig
 ) -> float | None:
     """The speed ahead or astern that the hand gets [m/s]; None where the fence gives it none."""
-    if not is_allowed(fence, (odometry.x_m, odometry.y_m)) and not config.fence_return:
-        return None
     course_rad = odometry.yaw_rad if surge >= 0.0 else wrap_rad(odometry.yaw_rad + math.pi)
     wanted_mps = abs(surge) * config.cruise_mps
     if surge > 0.0:

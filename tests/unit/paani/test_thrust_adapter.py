@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani.config import AdapterConfig
 from paani.messages import Arming, Thrust, ZeroCause
-from paani.thrust_adapter import ThrustAdapter
+from paani.thrust_adapter import ThrustAdapter, applied_message
 
 NOW_US = 50_000_000
 CONFIG = AdapterConfig()
@@ -228,3 +228,31 @@ def test_force_is_always_within_limits() -> None:
 
     offer()
     assert with_force >= MIN_WITH_FORCE
+
+
+def test_what_is_applied_is_told_with_the_command_behind_it() -> None:
+    adapter = ready()
+    none = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    assert (none.source_us, none.since_us, none.zero_cause) == (5, 3, ZeroCause.NO_COMMAND)
+    assert (none.command_seq, none.command_sent_us, none.command_source_us, none.rejected) == (0, 0, 0, 0)
+    adapter.offer(thrust(producer="advisor"), NOW_US)
+    adapter.offer(thrust(sent_us=11, source_us=12), NOW_US)
+    message = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    assert (message.left, message.right, message.left_n, message.right_n) == pytest.approx((0.02, 0.04, 1.5, 3.0))
+    assert (message.command_seq, message.command_sent_us, message.command_source_us, message.rejected) == (7, 11, 12, 1)
+    assert (message.zero_cause, message.lost_pulse) == (ZeroCause.NONE, "")
+
+
+def test_a_message_of_a_lost_pulse_names_the_process() -> None:
+    adapter = ThrustAdapter(CONFIG, domain=43)
+    adapter.receive_arming(ARMED, NOW_US)
+    message = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    assert (message.zero_cause, message.lost_pulse) == (ZeroCause.PULSE_LOST, CONFIG.require_pulses[0])
+
+
+@pytest.mark.parametrize(("armed", "stopped"), [(True, False), (True, True), (False, False), (False, True)])
+def test_armed_is_the_operators_newest_word(armed: bool, stopped: bool) -> None:
+    adapter = ThrustAdapter(CONFIG, domain=43)
+    assert (adapter.has_heard_operator, adapter.is_armed) == (False, False)
+    adapter.receive_arming(Arming(source_us=1, armed=armed, stopped=stopped), NOW_US)
+    assert (adapter.has_heard_operator, adapter.is_armed) == (True, armed and not stopped)

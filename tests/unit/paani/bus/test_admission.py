@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani import keys
 from paani import messages as m
-from paani.bus.admission import MAX_MESSAGE_BYTES, Admission
+from paani.bus.admission import MAX_MESSAGE_BYTES, Admission, same_clock, since_sent
 from paani.bus.publish import Numbering
 from paani.clock import ManualClock
 
@@ -131,3 +131,65 @@ def test_what_nobody_may_write_in_a_graph_is_not_let_in() -> None:
             yaw_rate_radps=0, domain=43, producer=producer,
         )  # fmt: skip
         assert Admission(row, 43, 1.0).judge(msgspec.json.encode(pose), 10) == (None, "wrong_producer")
+
+
+@pytest.mark.parametrize("field", ["source_us", "sent_us"])
+@pytest.mark.parametrize(("ahead_us", "cause"), [(1_000_000, ""), (1_000_001, "future")])
+def test_a_stamp_may_be_ahead_by_no_more_than_clocks_may_differ(field: str, ahead_us: int, cause: str) -> None:
+    assert admission().judge(raw(thrust(**{field: NOW_US + ahead_us})), NOW_US)[1] == cause
+
+
+@pytest.mark.parametrize(("longer", "cause"), [(0, ""), (1, "oversized")])
+def test_a_message_may_be_as_long_as_the_limit(longer: int, cause: str) -> None:
+    data = raw(thrust())
+    padded = data + b" " * (MAX_MESSAGE_BYTES + longer - len(data))
+    assert admission().judge(padded, NOW_US)[1] == cause
+
+
+def test_the_first_message_of_a_start_is_let_in() -> None:
+    """Epoch and number 0 are the lowest there are; after them the same is a repetition."""
+    gate = admission()
+    assert gate.judge(raw(thrust(epoch=0, seq=0)), NOW_US)[1] == ""
+    assert gate.judge(raw(thrust(epoch=0, seq=0)), NOW_US)[1] == "duplicate"
+
+
+def test_an_epoch_at_the_edge_of_the_future_still_counts_and_one_beyond_is_forgotten() -> None:
+    """After a clock was set back: the old epoch outranks for as long as it may be one of this clock's."""
+    epoch = NOW_US // 1000 + 1000
+    for back_us, cause in ((0, "old_epoch"), (1, "")):
+        gate = admission()
+        assert gate.judge(raw(thrust(epoch=epoch, source_us=0, sent_us=0)), NOW_US)[1] == ""
+        assert gate.judge(raw(thrust(epoch=0, seq=0, source_us=0, sent_us=0)), NOW_US - back_us)[1] == cause
+
+
+@pytest.mark.parametrize("shift_us", [5_000_000, -5_000_000])
+def test_another_machines_stamps_are_judged_by_its_clock_and_come_out_by_this_ones(shift_us: int) -> None:
+    asked: list[tuple[m.Message, int]] = []
+
+    def shift(message: m.Message, now_us: int) -> int:
+        asked.append((message, now_us))
+        return shift_us
+
+    there_us = NOW_US - shift_us
+    first = thrust(source_us=there_us, sent_us=there_us, epoch=0)
+    for as_sent, source_us in ((False, NOW_US), (True, there_us)):
+        gate = Admission(keys.THRUST, 43, 1.0, shift, as_sent=as_sent)
+        message, cause = gate.judge(raw(first), NOW_US)
+        assert (message, cause) == (msgspec.structs.replace(first, source_us=source_us), "")
+        late = raw(thrust(source_us=there_us + 1_000_001, sent_us=there_us, epoch=0, seq=6))
+        assert gate.judge(late, NOW_US)[1] == "future"
+    assert asked[0] == (first, NOW_US)
+
+
+def test_a_stamp_before_this_clocks_beginning_is_its_beginning() -> None:
+    gate = Admission(keys.THRUST, 43, 1.0, lambda message, now_us: -500)
+    message, _ = gate.judge(raw(thrust(source_us=400, sent_us=NOW_US, epoch=0)), NOW_US)
+    assert message is not None
+    assert message.source_us == 0
+
+
+def test_stamps_of_one_clock_come_out_as_they_were_and_what_is_echoed_may_be_taken_as_sent_now() -> None:
+    message, _ = admission().judge(raw(thrust(source_us=123)), NOW_US)
+    assert message == thrust(source_us=123)
+    assert same_clock(thrust(), NOW_US) == 0
+    assert since_sent(thrust(sent_us=NOW_US - 70), NOW_US) == 70

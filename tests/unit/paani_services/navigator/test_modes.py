@@ -13,9 +13,12 @@ from paani import messages as m
 from paani.config import NavigatorConfig
 from paani.messages import Direction, DriveMode, FenceArea, Inhibit, Keep, Mission, NavCommand, OperatorOrder, Waypoint
 from paani.missions import mission_of_route
+from paani.motion_planning import HeadingSpeed, PlanningInputs
+from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import NavigatorState, navigate
+from tests.synthetic_water import CAMERA
 from tests.unit.paani_services.navigator.test_navigate import (
     HERE,
     NOW_US,
@@ -326,3 +329,67 @@ def test_in_no_mode_an_order_moves_the_boat_that_says_why_it_may_not(
     assert not (command.enable and mode is DriveMode.IDLE)
     assert not (command.enable and mode is DriveMode.MANUAL and age_s > PAANI.stick_max_age_s)
     assert not (command.speed_mps and direction in {Direction.STOP, Direction.NO_DATA} and not override)
+
+
+@pytest.mark.parametrize("mode", [DriveMode.IDLE, DriveMode.MANUAL])
+def test_an_order_without_advice_has_the_time_of_its_step(mode: DriveMode) -> None:
+    """And the integral is held over it, so that the time in this mode is not integrated later."""
+    state, command = step(ordered(mode), advisory=None)
+    assert (command.enable, command.source_us) == (False, NOW_US)
+    assert state.ilos.updated_us == NOW_US
+
+
+def test_an_errand_leaves_count_and_integral_of_the_mission_alone_and_has_its_own() -> None:
+    under_way = msgspec.structs.replace(
+        RUNNING,
+        progress=MissionProgress(target=2, leg_start=HERE, waypoints_reached=5),
+        ilos=IlosState(east_m=0.5, north_m=-0.2, updated_us=NOW_US - 100_000),
+    )
+    order = ordered(DriveMode.RETURN, target=(Waypoint(x_m=60.0, y_m=0.0),))
+    state, command = step(order, under_way, odometry=pose(3.0, 2.0))
+    assert (command.waypoint_index, command.waypoints_reached, command.leg_index) == (2, 5, 0)
+    assert (state.ilos.east_m, state.ilos.north_m, state.ilos.updated_us) == (0.5, -0.2, NOW_US)
+    assert state.progress.home == Waypoint(x_m=3.0, y_m=2.0)
+    held = msgspec.structs.replace(state, progress=msgspec.structs.replace(state.progress, home=HERE))
+    assert step(order, held, odometry=pose(30.0, 2.0))[0].progress.home == HERE
+    adrift = msgspec.structs.replace(state, errand_ilos=IlosState(east_m=1.0, north_m=2.0, updated_us=NOW_US))
+    assert step(order, adrift, odometry=pose(3.0, 2.0))[0].errand_ilos.north_m == pytest.approx(2.0, abs=0.1)
+    anew = msgspec.structs.replace(order, since_us=2)
+    assert step(anew, adrift, odometry=pose(3.0, 2.0))[0].errand_ilos.north_m == pytest.approx(0.0, abs=0.1)
+    fresh = msgspec.structs.replace(RUNNING, progress=MissionProgress())
+    assert step(order, fresh)[1].waypoint_index == 0
+
+
+@pytest.mark.parametrize("order", [None, ordered(DriveMode.RETURN, target=(Waypoint(x_m=50.0, y_m=0.0),))])
+def test_another_planner_is_asked_on_the_mission_and_on_an_errand(order: OperatorOrder | None) -> None:
+    def aside(given: PlanningInputs) -> HeadingSpeed:
+        return HeadingSpeed(given.course_rad + 0.3, 0.2)
+
+    given_inputs = inputs(advisory=advice(Direction.STRAIGHT), order=order, order_us=NOW_US)
+    mission = mission_of_route(SQUARE)
+    _, command = follow_order(RUNNING, given_inputs, mission, NOW_US, 43, PAANI, CAMERA, aside)
+    assert command.heading_rad == pytest.approx(0.3)
+    assert command.speed_mps == 0.2
+
+
+@pytest.mark.parametrize("surge", [0.3, 0.5, 1.0])
+def test_the_fence_holds_a_hand_at_any_surge_ahead(surge: float) -> None:
+    at_edge = msgspec.structs.replace(pose(4.5, 0.0), surge_mps=0.0)
+    _, command = step(manual(surge), odometry=at_edge, mission=fenced_pool())
+    assert (command.enable, command.inhibits) == (False, (Inhibit.OUTSIDE_FENCE,))
+
+
+def test_a_hand_in_neutral_outside_the_fence_is_in_neutral_and_no_more() -> None:
+    _, command = step(manual(), odometry=pose(9.0, 0.0), mission=fenced_pool())
+    assert command.inhibits == (Inhibit.NEUTRAL,)
+
+
+def test_a_hand_that_is_vetoed_still_names_what_else_forbids_motion() -> None:
+    _, command = step(manual(1.0), advisory=BLOCKED, arming=None)
+    assert set(command.inhibits) == {Inhibit.NOT_ARMED, Inhibit.BLOCKED_AHEAD}
+
+
+def test_an_advised_limit_of_nothing_gives_a_hand_no_speed() -> None:
+    halted = msgspec.structs.replace(advice(Direction.STRAIGHT), speed_limit_mps=0.0)
+    assert step(manual(1.0), advisory=halted)[1].speed_mps == 0.0
+    assert step(manual(-1.0), advisory=halted)[1].astern_mps == PAANI.cruise_mps

@@ -186,3 +186,57 @@ def is_unbroken(heard: list[tuple[str, str, int, int]], client: str, press: int,
             if now_us - at_us >= op.HOLD_MIN_S * 1e6:
                 return True
     return False
+
+
+def test_a_press_that_is_refused_ends_no_other_hold() -> None:
+    holding = held(op.Operator(stopped=False), 1.0)
+    other = op.refuse(holding, STATION, 8, m.ArmRefusal.BROKEN)
+    assert other.hold == holding.hold
+    assert (other.ended.press, other.ended.refusal) == (8, m.ArmRefusal.BROKEN)
+    own = op.refuse(holding, STATION, 7, m.ArmRefusal.TOO_SHORT)
+    assert (own.hold, own.ended.press) == (None, 7)
+    assert op.refuse(op.Operator(), STATION, 7, m.ArmRefusal.BROKEN).hold is None
+
+
+@pytest.mark.parametrize("since_us", [-5, 0, 1, 2, 500])
+def test_a_stop_is_confirmed_after_it_was_asked_for_whatever_the_clock_says(since_us: int) -> None:
+    stopped = op.latch_stop(op.Operator(armed=True, stopped=False), "stop", BEGUN_US)
+    confirmed = op.confirm_stop(stopped, applied(m.ZeroCause.NOT_ARMED), BEGUN_US + since_us)
+    assert confirmed.confirmed_us == BEGUN_US + max(1, since_us)
+
+
+def test_a_page_that_is_silent_for_as_long_as_it_may_keeps_the_boat_armed() -> None:
+    armed = op.arm(op.Operator(), STATION, 1, station_epoch=9)
+    assert op.follow_station(armed, 9, op.STATION_SILENT_S).armed
+    assert not op.follow_station(armed, 9, op.STATION_SILENT_S + 0.001).armed
+    assert not op.follow_station(armed, 10, 0.0).armed
+
+
+def test_the_latch_has_a_word_for_each_state() -> None:
+    assert op.latch_text(op.Operator(armed=True, stopped=False)) == op.ARMED
+    assert op.latch_text(op.Operator(armed=False, stopped=False)) == op.CLEAR
+    assert op.latch_text(op.Operator(armed=True, stopped=True)) == op.STOPPED
+
+
+def test_arming_keeps_the_count_of_stops() -> None:
+    stopped = op.latch_stop(op.latch_stop(op.Operator(), "stop", 1_000), "stop", 2_000)
+    assert op.arm(stopped, STATION, 4, 9) == op.Operator(
+        armed=True, stopped=False, by=STATION, station_epoch=9, stops=2, ended=op.Ended(STATION, 4)
+    )
+
+
+def test_everybody_is_told_the_whole_state() -> None:
+    armed = op.hold(op.arm(op.Operator(), STATION, 4, 9), STATION, 5, BEGUN_US)
+    message = op.state_message(armed, BEGUN_US + 300_000, latch_kept=True)
+    assert (message.source_us, message.armed, message.stopped, message.by) == (BEGUN_US + 300_000, True, False, STATION)
+    assert (message.latch_kept, message.stops, message.asked_us, message.confirmed_us) == (True, 0, 0, 0)
+    assert (message.hold_by, message.held_ms) == (STATION, 300.0)
+    assert (message.press_by, message.press, message.refusal) == (STATION, 4, m.ArmRefusal.NONE)
+    silent = op.state_message(armed, BEGUN_US + round(1e6 * op.REFRESH_MAX_S) + 1, latch_kept=False)
+    assert (silent.hold_by, silent.held_ms, silent.latch_kept) == ("", 0.0, False)
+    assert op.state_message(armed, BEGUN_US - 50, latch_kept=True).held_ms == 0.0
+    stopped = op.confirm_stop(op.latch_stop(armed, "stop", 1_000), applied(m.ZeroCause.NOT_ARMED), 2_000)
+    message = op.state_message(stopped, 3_000, latch_kept=True)
+    assert (message.armed, message.stopped, message.by, message.stops) == (False, True, "stop", 1)
+    assert (message.asked_us, message.confirmed_us, message.refusal) == (1_000, 2_000, m.ArmRefusal.STOPPED)
+    assert (message.hold_by, message.held_ms, message.press_by, message.press) == ("", 0.0, STATION, 5)

@@ -226,3 +226,10 @@ def test_no_sequence_of_requests_gives_an_old_set_point_or_one_of_another_hand(
         if (order.surge, order.turn) != (0.0, 0.0):
             age_us = now_us - received_us[order.by, order.hand, order.surge, order.turn]
             assert age_us <= now_us - order.source_us <= w.DEFLECTED_MAX_S * 1e6
+
+
+def test_a_wheel_that_is_taken_over_in_manual_rests_from_then_on() -> None:
+    bridge = at_the_wheel()
+    bridge.now_us += 50_000
+    assert bridge.ask(RequestAct.WHEEL, hand=2) is ModeRefusal.NONE
+    assert (bridge.wheel.mode, bridge.wheel.since_us) == (DriveMode.IDLE, bridge.now_us)
