@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
+import json
 import os
 import resource
 import socket
@@ -19,6 +21,7 @@ from msgspec.structs import replace
 from paani import keys
 from paani.clock import WallClock
 from paani.config import Config
+from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani.runtime import LOGS, runtime_path
 from paani_services.dashboard.answers import ErrorAnswer, ReadyAnswer
@@ -126,6 +129,13 @@ async def test_driving_needs_the_own_page_the_operators_key_and_a_valid_request(
             status, text = await ask("setpoint", ours, **{field: wrong})
             assert (status, f'"field":"{field}"' in text) == (400, True)
         assert (await ask("mode", mode="FAST"))[0] == 400
+        for length, status, why in ((1, 409, "takes 2 to 10000"), (100_000, 413, "error")):
+            leg = {"kind": "follow_route", "waypoints": [{"x_m": 0.5, "y_m": -0.25}] * length}
+            body = json.dumps({"hand": 1, "legs": [leg]}).encode()
+            for headers, expected in ((ours, status), ({"Origin": page}, 403)):
+                async with client.post("/api/mission", data=io.BytesIO(body), headers=headers) as answer:
+                    assert answer.status == expected
+                    assert (why if expected != 403 else "key") in await answer.text()
         assert await ask("mode") == (200, '{"done":true}')
         status, text = await ask("mode", mode="MANUAL")
         assert (status, "the boat is not armed" in text) == (409, True)
@@ -226,7 +236,8 @@ async def test_every_route_is_described_and_nothing_else(open_as: OpenAs, config
         whole = replace(config, dashboard=replace(config.dashboard, host="0.0.0.0" if exposed else "127.0.0.1"))
         tuner = Tuner(bus.publisher(keys.TUNING), clock)
         gatekeeper = Gatekeeper(whole, "key", clock)
-        server = Server(Hub(), History(()), OperatorClient(bus, clock), tuner, clock, whole, {}, gatekeeper)
+        operator, missions = OperatorClient(bus, clock), MissionClient(bus, clock)
+        server = Server(Hub(), History(()), operator, missions, tuner, clock, whole, {}, gatekeeper)
         routes = {
             (each.method.lower(), each.resource.canonical) for each in server.app().router.routes() if each.resource
         }

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import ssl
 from typing import Annotated
 
 import msgspec
 from aiohttp import web
 
+from paani.certificates import identities_of, page_server_tls
 from paani.clock import Clock
 from paani.config import Config
+from paani.operator_key import ensure_operator_key
 from paani.page_address import LOGIN_PATH, is_page_exposed
 from paani_services.dashboard.answers import DoneAnswer, SessionAnswer
 from paani_services.dashboard.requests import decode_body, is_own_host, is_same_origin
@@ -32,6 +35,15 @@ class LoginRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`key`: the operator's."""
 
     key: Annotated[str, msgspec.Meta(max_length=256)]
+
+
+def open_gate(config: Config, clock: Clock) -> tuple[Gatekeeper, ssl.SSLContext | None]:
+    """Who judges requests, and what encrypts them; None where nothing has to. Raises UserError. It reads files."""
+    key = ensure_operator_key(config.bus)
+    if not is_page_exposed(config):
+        return Gatekeeper(config, key, clock), None
+    tls = page_server_tls(config.bus)
+    return Gatekeeper(config, key, clock, identities_of(config.bus).addresses), tls
 
 
 class Gatekeeper:

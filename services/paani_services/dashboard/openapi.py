@@ -15,6 +15,7 @@ from paani.version import version_text
 from paani_services.dashboard import answers as a
 from paani_services.dashboard import driving, past, process_logs, requests, tuning
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
+from paani_services.dashboard.missions import MissionBody
 from paani_services.dashboard.picture_stream import MEDIA_TYPE
 
 REF = "#/components/schemas/{name}"
@@ -77,6 +78,7 @@ OPERATIONS = (
         errors=(401,),
     ),
     Operation("get", "/api/logs/{service}", "The last lines of a log.", process_logs.LogLines, errors=(401, 404, 500)),
+    Operation("post", "/api/mission", "Another mission and fence.", a.DoneAnswer, MissionBody, errors=(408, *ASK)),
     Operation("get", "/api/tune", "What is tuned.", m.Shadow, errors=(401, 503)),
     Operation("post", "/api/tune/propose", "Try in the shadow.", m.Shadow, tuning.ProposeRequest, errors=ASK),
     Operation("post", "/api/tune/promote", "Put them in force.", m.Shadow, tuning.ProposalRequest, errors=ASK),

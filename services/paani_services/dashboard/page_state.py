@@ -21,7 +21,8 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Settings that the page shows or draws with; constant while the process runs.
 
     mode: what the thrust moves, `sim`, `hil` or `hull`; `replay`: a recording is played, and nothing moves. pictures:
-    where they come from, `sim`, `camera` or `file`. planner: whether it chooses heading and speed.
+    where they come from, `sim`, `camera` or `file`. turn_radius_m: of the hull
+    under way, 0 where it turns on the spot. planner: whether it chooses heading and speed.
     """
 
     vessel: str
@@ -34,6 +35,8 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     corridors: CorridorConfig
     weights: RiskConfig
     acceptance_m: float
+    fence_margin_m: float
+    turn_radius_m: float
     topics: tuple[TopicFreshness, ...]
     services: tuple[str, ...]
 
@@ -63,6 +66,8 @@ def page_settings(config: Config) -> PageSettings:
         corridors=config.perception.corridors,
         weights=config.advisor.risk,
         acceptance_m=config.navigator.acceptance_m,
+        fence_margin_m=config.navigator.fence_margin_m,
+        turn_radius_m=config.navigator.planner.turn_radius_m,
         topics=tuple(
             TopicFreshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.topics_in(config.bus.graph)
         ),

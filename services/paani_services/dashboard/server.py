@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import Clock
 from paani.config import Config, DashboardConfig
+from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani.page_address import LOGIN_PATH
 from paani_services.dashboard.answers import ArmedAnswer, HeldAnswer, StopAnswer
@@ -23,6 +24,7 @@ from paani_services.dashboard.history import History
 from paani_services.dashboard.hub import Client, Hub
 from paani_services.dashboard.listening import listening
 from paani_services.dashboard.machines import Machines
+from paani_services.dashboard.missions import Missions
 from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, WORKER, StaticFile
 from paani_services.dashboard.past import PastRoutes
@@ -59,6 +61,7 @@ class Server:
         hub: Hub,
         history: History,
         operator: OperatorClient,
+        missions: MissionClient,
         tuner: Tuner,
         clock: Clock,
         config: Config,
@@ -68,6 +71,7 @@ class Server:
         self._hub, self._operator, self._tuner = hub, operator, tuner
         self._clock, self._config = clock, config
         self._pages, self._gatekeeper = pages, gatekeeper
+        self._missions = Missions(missions, gatekeeper.refuse_act)
         self._machines = Machines(hub, operator, clock, config, gatekeeper)
         self._driving = Driving(operator, gatekeeper.refuse_act)
         self._reading = [*PastRoutes(hub, history).routes(), *LogRoutes(config.bus).routes()]
@@ -87,6 +91,7 @@ class Server:
                 web.post("/api/arm/hold", self._hold),
                 web.post("/api/arm/release", self._release),
                 *self._driving.routes(),
+                *self._missions.routes(),
                 *self._gatekeeper.routes(),
                 *self._reading,
                 web.get("/api/tune", self._tuning),

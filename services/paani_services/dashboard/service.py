@@ -10,13 +10,11 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Latest
-from paani.certificates import identities_of, page_server_tls
 from paani.clock import Clock
 from paani.config import Config
+from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
-from paani.operator_key import ensure_operator_key
-from paani.page_address import is_page_exposed
-from paani_services.dashboard.gatekeeper import Gatekeeper
+from paani_services.dashboard.gatekeeper import open_gate
 from paani_services.dashboard.history import SAMPLE_KEY, History
 from paani_services.dashboard.hub import Event, Hub
 from paani_services.dashboard.operator_events import describe_operator_change
@@ -45,7 +43,8 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
     hub, history = Hub(), History(config.services)
     hub.put("dashboard/settings", page_settings(config), clock.now_us(), clock.now_us())
     operator = OperatorClient(bus, clock)
-    async with web_server(hub, history, operator, tuner, clock, config), asyncio.TaskGroup() as tasks:
+    missions = MissionClient(bus, clock)
+    async with web_server(hub, history, operator, missions, tuner, clock, config), asyncio.TaskGroup() as tasks:
         picture_period_s = 1.0 / config.dashboard.picture_rate_hz
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
@@ -66,16 +65,19 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
 
 @contextlib.asynccontextmanager
 async def web_server(
-    hub: Hub, history: History, operator: OperatorClient, tuner: Tuner, clock: Clock, config: Config
+    hub: Hub,
+    history: History,
+    operator: OperatorClient,
+    missions: MissionClient,
+    tuner: Tuner,
+    clock: Clock,
+    config: Config,
 ) -> AsyncIterator[None]:
     """Run the web server while the context lasts."""
-    key = await asyncio.to_thread(ensure_operator_key, config.bus)
     pages = await asyncio.to_thread(load_static_files)
-    is_exposed = is_page_exposed(config)
-    tls = await asyncio.to_thread(page_server_tls, config.bus) if is_exposed else None
-    names = identities_of(config.bus).addresses if is_exposed else ()
-    gatekeeper = Gatekeeper(config, key, clock, names)
-    async with serving(Server(hub, history, operator, tuner, clock, config, pages, gatekeeper), config.dashboard, tls):
+    gatekeeper, tls = await asyncio.to_thread(open_gate, config, clock)
+    server = Server(hub, history, operator, missions, tuner, clock, config, pages, gatekeeper)
+    async with serving(server, config.dashboard, tls):
         yield
 
 

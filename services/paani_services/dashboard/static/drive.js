@@ -4,7 +4,7 @@
 // by a page that is hidden or has lost its link: the operator's process then lets the stick go by itself.
 
 import { isReplay } from "./inhibits.js";
-import { hasKey, post } from "./requests.js";
+import { hand, hasKey, post } from "./requests.js";
 import { MODE_BARS, MODE_TEXTS, byId, fixed, make, operatorText, setText } from "./text.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
@@ -15,7 +15,6 @@ const KEYS = {
   KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
   KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
 };
-const hand = 1 + Math.floor(Math.random() * 2 ** 50);
 let number = Date.now(), underWay = 0, refusal = "", canDrive = false;
 /** Keys that are held. @type {Set<string>} */
 const held = new Set();

@@ -108,6 +108,8 @@ Object.defineProperty(window, "paani", {
   value: Object.freeze({
     get overlay() { return camera.overlay; },
     get shownUs() { return time.isPast ? time.playback.atUs : null; },
+    get plan() { return structuredClone(map.editor.made.plan); },
+    get marks() { return structuredClone(map.editor.marks); },
     get link() { return document.body.dataset.link; },
   }),
 });

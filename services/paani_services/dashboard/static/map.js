@@ -1,7 +1,8 @@
 // @ts-check
 // The map panel in local metres, north up: fence, mission, route, way ahead, moving obstacles, estimated and true track.
 
-import { drawFence, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
+import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
+import { RouteEditor } from "./route_editor.js";
 import { byId, fixed, headingDeg, setText } from "./text.js";
 
 const ROUND_LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
@@ -14,6 +15,7 @@ export class MapPanel {
     this.pxPerM = 6;
     this.follow = true;
     this.bindControls();
+    this.editor = new RouteEditor(this);
   }
 
   bindControls() {
@@ -23,7 +25,7 @@ export class MapPanel {
     byId("map-fit").addEventListener("click", () => { this.fitRoute = true; this.setFollow(false); });
     this.canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15); }, { passive: false });
     this.canvas.addEventListener("pointermove", (event) => {
-      if (!event.buttons) return;
+      if (!event.buttons || this.editor.isDragging) return;
       this.setFollow(false);
       this.centre = { x: this.centre.x - event.movementX / this.pxPerM, y: this.centre.y + event.movementY / this.pxPerM };
     });
@@ -39,6 +41,12 @@ export class MapPanel {
   /** @param {number} factor */
   zoom(factor) {
     this.pxPerM = Math.min(80, Math.max(0.5, this.pxPerM * factor));
+  }
+
+  /** The place in metres under a pixel of the canvas. @param {number} x @param {number} y */
+  toMap(x, y) {
+    const { centre, pxPerM, canvas } = this;
+    return { x_m: centre.x + (x - canvas.clientWidth / 2) / pxPerM, y_m: centre.y + (canvas.clientHeight / 2 - y) / pxPerM };
   }
 
   /** @param {import("./view.js").View} view @param {number} now */
@@ -74,6 +82,8 @@ export class MapPanel {
     if (prediction) drawObstacles(chart, prediction.obstacles, store.ageS(key, now), store.get("advisor/tracks")?.tracks ?? []);
     if (truth) this.drawBoat(truth, toScreen, colour("--text"), false, store.isFresh("@truth/pose", now));
     if (odometry) this.drawBoat(odometry, toScreen, colour("--cyan"), true, store.isFresh("localization/odometry", now));
+    if (odometry && !store.isFresh("localization/odometry", now)) drawGhost(chart, odometry, store.ageS("localization/odometry", now));
+    this.editor.render(chart, store, now);
     this.drawScaleAndNorth(width, height, colour("--text"), colour("--quiet"));
     setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");
     const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;

@@ -1,9 +1,10 @@
 // @ts-check
 // Draws on the map what the boat is told and what it sees coming: fence, stations, home, the way ahead, moving obstacles.
 
-import { trackNames } from "./text.js";
+import { ageText, trackNames } from "./text.js";
 
 const ARROW_S = 5; // a velocity is drawn as the way of this long
+const GHOST_S = 30; // no boat that nobody hears is said to go straight on for longer
 const FONT = "12px system-ui, sans-serif";
 
 /** @typedef {{ctx: CanvasRenderingContext2D, toScreen: import("./map.js").ToScreen, pxPerM: number, colour: (name: string) => string}} Chart */
@@ -66,6 +67,28 @@ export function drawHome({ ctx, toScreen, colour }, home) {
   ctx.beginPath();
   ctx.moveTo(x - 8, y); ctx.lineTo(x, y - 8); ctx.lineTo(x + 8, y); ctx.moveTo(x - 5, y - 2); ctx.lineTo(x - 5, y + 7); ctx.lineTo(x + 5, y + 7); ctx.lineTo(x + 5, y - 2);
   ctx.stroke();
+}
+
+/**
+ * Where the boat may be by now that was heard of last as `pose`: straight on at its speed, in a circle that grows with it.
+ * @param {Chart} chart @param {any} pose @param {number} ageS
+ */
+export function drawGhost({ ctx, toScreen, pxPerM, colour }, pose, ageS) {
+  const goneS = Math.min(ageS, GHOST_S), wayM = pose.surge_mps * goneS;
+  const [x, y] = toScreen(pose.x_m + wayM * Math.cos(pose.yaw_rad), pose.y_m + wayM * Math.sin(pose.yaw_rad));
+  ctx.strokeStyle = ctx.fillStyle = colour("--red");
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([4, 4]);
+  ctx.beginPath();
+  ctx.moveTo(...toScreen(pose.x_m, pose.y_m));
+  ctx.lineTo(x, y);
+  ctx.stroke();
+  ctx.beginPath();
+  ctx.arc(x, y, Math.max(10, (Math.abs(wayM) + (pose.position_std_m ?? 0)) * pxPerM), 0, 7);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.font = FONT;
+  ctx.fillText(`not heard for ${ageText(ageS)}`, x + 13, y - 13);
 }
 
 /** The way ahead by the order in force. @param {Chart} chart @param {{x_m: number, y_m: number}[]} path */

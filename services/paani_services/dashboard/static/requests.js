@@ -3,6 +3,8 @@
 
 import { byId } from "./text.js";
 
+/** Each page is a hand of its own at the wheel, until it is loaded again. */
+export const hand = 1 + Math.floor(Math.random() * 2 ** 50);
 let hasSession = false;
 let key = sessionStorage.getItem("paani-key") ?? "";
 

@@ -107,6 +107,18 @@ export const PALETTES = { auto: "Auto", day: "Day", dusk: "Dusk", night: "Night"
 /** What an alert does besides standing in the log. @type {Record<string, string>} */
 export const ALERTS = { off: "Silent", sound: "Sound", both: "Sound, vibration" };
 
+/** Words of the editor on the map. @type {{kinds: Record<string, string>, acts: Record<string, string>} & Record<string, any>} */
+export const EDITOR = {
+  kinds: { follow_route: "Route", hold_station: "Hold", return_home: "Return", stop: "Stop", in: "Keep in", out: "Keep out" },
+  acts: { undo: "Undo", point: "Delete point", item: "Delete leg", load: "In force", open: "Open file" },
+  hint: "Press on the map to draw a route, add a leg or an area, or drop a file here.",
+  fine: "Nothing is wrong with it as far as this page knows.",
+  nothing: "No mission and no route is in force.",
+  noOrigin: "where the map lies on Earth is not known yet",
+  sent: "Sent; it is being checked.",
+  accepted: "Accepted. It is in force; order Route to follow it.",
+};
+
 /** Modes: name, and what the boat does in it. @type {Record<string, [string, string]>} */
 export const MODE_TEXTS = {
   ROUTE: ["Route", "follows its mission or route"],

@@ -1,0 +1,116 @@
+// @ts-check
+// What is wrong with a mission while it is drawn, each at its place on the map. The operator's process checks it again,
+// exactly and whole, before it is in force; these marks say beforehand where it would refuse, and what it does not know:
+// a turn too tight for the hull, and cells in which the boat has seen something. Pure.
+
+import { between, clearance, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
+
+const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
+const SAME_M = 0.01, MIN_AREA_M2 = 1, MAX_WAYPOINTS = 10000, MAX_CORNERS = 1000, MAX_LEGS = 100;
+const OCCUPIED = 2; // as `Occupancy` in messages/occupancy.py
+
+/**
+ * @typedef {import("./plane_geometry.js").Point} Point
+ * @typedef {{kind: string, waypoints: Point[], repeat: boolean, laps: number, radius_m: number, duration_s: number, speed_mps: number}} Leg
+ * @typedef {{legs: Leg[], fence: import("./plane_geometry.js").Area[]}} Plan
+ * @typedef {{marginM: number, turnRadiusM: number}} Limits
+ * @typedef {{at: Point | null, text: string}} Mark
+ */
+
+/** @param {Plan} plan @param {Limits} limits @param {any} [grid] the navigator's `OccupancyGrid` @returns {Mark[]} */
+export function findMarks(plan, limits, grid) {
+  const cells = grid ? unpack(grid) : null;
+  return [
+    ...countMarks(plan),
+    ...plan.fence.flatMap((area, index) => areaMarks(area, `${area.keep === "in" ? "keep-in" : "keep-out"} area ${index + 1}`)),
+    ...plan.legs.flatMap((leg, index) => legMarks(leg, `leg ${index + 1}`, plan, limits, cells)),
+  ];
+}
+
+/** @param {Plan} plan @returns {Mark[]} */
+function countMarks({ legs, fence }) {
+  const waypoints = legs.reduce((all, leg) => all + leg.waypoints.length, 0), corners = fence.reduce((all, area) => all + area.corners.length, 0);
+  const endless = legs.findIndex((leg) => leg.kind === "follow_route" && leg.laps === 0), found = [];
+  if (waypoints > MAX_WAYPOINTS) found.push(`more than ${MAX_WAYPOINTS} waypoints`);
+  if (corners > MAX_CORNERS) found.push(`more than ${MAX_CORNERS} corners`);
+  if (legs.length > MAX_LEGS) found.push(`more than ${MAX_LEGS} legs`);
+  if (endless >= 0 && endless < legs.length - 1) found.push(`leg ${endless + 1} has no end, so no leg may come after it`);
+  return found.map((text) => ({ at: null, text }));
+}
+
+/** @param {import("./plane_geometry.js").Area} area @param {string} name @returns {Mark[]} */
+function areaMarks({ corners }, name) {
+  if (corners.length < 3) return [{ at: corners[0] ?? null, text: `${name}: needs 3 corners` }];
+  const edges = segments(corners, true);
+  for (let one = 0; one < edges.length; one++) {
+    if (distance(...edges[one]) < SAME_M) return [{ at: corners[one], text: `${name}: two corners are the same` }];
+    for (let other = one + 2; other < edges.length; other++) {
+      const at = one === 0 && other === edges.length - 1 ? null : crossing(edges[one], edges[other]);
+      if (at) return [{ at, text: `${name}: its edges cross` }];
+    }
+  }
+  const area = Math.abs(edges.reduce((all, [a, b]) => all + a.x_m * b.y_m - b.x_m * a.y_m, 0)) / 2;
+  return area < MIN_AREA_M2 ? [{ at: corners[0], text: `${name}: hardly any area` }] : [];
+}
+
+/** @param {Leg} leg @param {string} name @param {Plan} plan @param {Limits} limits @param {ReturnType<typeof unpack> | null} cells @returns {Mark[]} */
+function legMarks(leg, name, plan, limits, cells) {
+  const { waypoints } = leg;
+  if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: a route needs 2 waypoints` }];
+  /** @type {Mark[]} */
+  const found = [];
+  const ways = waypoints.length === 1 ? /** @type {[Point, Point][]} */ ([[waypoints[0], waypoints[0]]]) : segments(waypoints, leg.repeat);
+  ways.forEach(([a, b], index) => {
+    const where = `${name}, waypoint ${index + 1}`;
+    if (waypoints.length > 1 && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: the next is the same` });
+    const outside = firstAlong(a, b, (at) => !isAllowed(plan.fence, at));
+    if (outside) found.push({ at: outside, text: `${where}: leaves the fence` });
+    const near = outside ? null : firstAlong(a, b, (at) => clearance(plan.fence, at) < limits.marginM);
+    if (near) found.push({ at: near, text: `${where}: nearer than ${limits.marginM} m to the fence` });
+    const seen = cells && firstAlong(a, b, (at) => isOccupied(cells, at));
+    if (seen) found.push({ at: seen, text: `${where}: the boat has seen something there` });
+  });
+  return leg.kind === "follow_route" ? [...found, ...turnMarks(leg, name, limits.turnRadiusM)] : found;
+}
+
+/**
+ * A turn by an angle on a circle takes radius * tan(angle / 2) of the way before and after it; half of each way is there.
+ * @param {Leg} leg @param {string} name @param {number} radiusM @returns {Mark[]}
+ */
+function turnMarks({ waypoints, repeat }, name, radiusM) {
+  const count = waypoints.length;
+  if (!radiusM || count < 3) return [];
+  return waypoints.flatMap((at, index) => {
+    if (!repeat && (index === 0 || index === count - 1)) return [];
+    const before = waypoints[(index + count - 1) % count], after = waypoints[(index + 1) % count];
+    const turn = Math.abs(angle(Math.atan2(after.y_m - at.y_m, after.x_m - at.x_m) - Math.atan2(at.y_m - before.y_m, at.x_m - before.x_m)));
+    const room = 0.5 * Math.min(distance(before, at), distance(at, after));
+    return radiusM * Math.tan(turn / 2) > room ? [{ at, text: `${name}, waypoint ${index + 1}: a turn too tight for the hull, ${radiusM} m` }] : [];
+  });
+}
+
+/** @param {number} rad */
+const angle = (rad) => Math.atan2(Math.sin(rad), Math.cos(rad));
+
+/** @param {Point} a @param {Point} b @param {(at: Point) => boolean} isWrong */
+function firstAlong(a, b, isWrong) {
+  const steps = Math.max(1, Math.min(MAX_STEPS, Math.ceil(distance(a, b) / STEP_M)));
+  for (let step = 0; step <= steps; step++) {
+    const at = between(a, b, step / steps);
+    if (isWrong(at)) return at;
+  }
+  return null;
+}
+
+/** Two bits a cell, the first in the lowest of the first byte. @param {any} grid */
+function unpack(grid) {
+  return { ...grid, bytes: Uint8Array.from(atob(grid.cells), (char) => char.charCodeAt(0)) };
+}
+
+/** @param {ReturnType<typeof unpack>} grid @param {Point} at */
+function isOccupied(grid, at) {
+  const column = Math.floor((at.x_m - grid.west_m) / grid.cell_m), row = Math.floor((at.y_m - grid.south_m) / grid.cell_m);
+  if (column < 0 || row < 0 || column >= grid.columns || row >= grid.rows) return false;
+  const index = row * grid.columns + column;
+  return ((grid.bytes[index >> 2] >> (2 * (index & 3))) & 3) === OCCUPIED;
+}

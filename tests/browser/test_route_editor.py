@@ -1,0 +1,178 @@
+"""Missions drawn on the map: points, undo, faults at their places, files in and out, one request that is answered."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from paani import keys
+from paani import messages as m
+from paani.clock import WallClock
+from paani.config import Config
+from paani.fence_geometry import is_allowed
+from paani.map_origin import map_origin_deg
+from paani_services.navigator.files.geojson import read_geojson_line
+from paani_services.navigator.files.gpx import read_gpx
+from paani_services.navigator.files.map_frame import MapFrame
+from tests.browser.guidance import guiding
+from tests.browser.test_map_objects import MISSION
+from tests.browser.test_page import MAP_PX_PER_M, until, watch
+from tests.conftest import OpenAs, Spawn
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+HERE = {"x_m": 0.0, "y_m": 0.0, "latitude_deg": 47.65, "longitude_deg": 9.2}
+JUDGE = """async ([fence, points]) => {
+  const { isAllowed } = await import("/static/plane_geometry.js");
+  return points.map(([x_m, y_m]) => isAllowed(fence, { x_m, y_m }));
+}"""
+MARKS = """async ([legs, fence, turnRadiusM]) => {
+  const { findMarks } = await import("/static/mission_checks.js");
+  return findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM }).map((mark) => mark.text);
+}"""
+
+
+class Editor:
+    """The editor in the page, by pressing and dragging at places of the map [m]."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+
+    async def pixel(self, east_m: float, north_m: float) -> tuple[float, float]:
+        box = await self.page.locator("#map").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        return x + MAP_PX_PER_M * east_m, y - MAP_PX_PER_M * north_m
+
+    async def press(self, *places: tuple[float, float]) -> None:
+        for place in places:
+            await self.page.mouse.click(*await self.pixel(*place))
+
+    async def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        await self.page.mouse.move(*await self.pixel(*start))
+        await self.page.mouse.down()
+        await self.page.mouse.move(*await self.pixel(*end), steps=3)
+        await self.page.mouse.up()
+
+    async def choose(self, text: str) -> None:
+        await self.page.click(f"#editor button:text-is('{text}')")
+
+    async def points(self) -> list[tuple[float, float]]:
+        plan = await self.page.evaluate("paani.plan")
+        return [(round(point["x_m"], 1), round(point["y_m"], 1)) for point in plan["legs"][0]["waypoints"]]
+
+    async def until_note(self, text: str) -> None:
+        try:
+            await until(self.page, f"document.querySelector('#editor-note').textContent.includes({json.dumps(text)})")
+        except TimeoutError:
+            pytest.fail(f"not {text!r} but {await self.page.inner_text('#editor-note')!r}")
+
+
+async def test_a_mission_is_drawn_checked_and_sent_as_one(
+    browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    accepted = (await open_as("observer")).latest(keys.ORDERED_MISSION)
+    async with spawn("operator"), spawn("dashboard"), guiding(open_as) as guidance:
+        guidance.route = None
+        assert guidance.odometry is not None
+        pose = guidance.odometry = replace(guidance.odometry, **HERE)
+        missions = guidance.navigator.publisher(keys.MISSION)
+
+        async def publish_forever() -> None:
+            while True:
+                missions.put(replace(MISSION, source_us=WallClock().now_us()))
+                await asyncio.sleep(0.5)
+
+        publishing = asyncio.create_task(publish_forever())
+        watched = await watch(browser, config)
+        page, editor = watched.page, Editor(watched.page)
+        await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E, 0.0 m N')")
+
+        await page.click("#map-edit")
+        await page.screenshot(path=tmp_path / "begin.png")
+        await editor.press((-10, 0), (0, 9), (8, 0))
+        assert await editor.points() == [(-10, 0), (0, 9), (8, 0)]
+        await editor.until_note("Nothing is wrong")
+        await editor.drag((8, 0), (8, -8))
+        await editor.drag((-5, 4.5), (-9, 9))
+        assert await editor.points() == [(-10, 0), (-9, 9), (0, 9), (8, -8)], "a line that is dragged gets a point"
+        await editor.choose("Delete point")
+        assert await editor.points() == [(-10, 0), (0, 9), (8, -8)]
+        for _ in range(3):
+            await editor.choose("Undo")
+        assert await editor.points() == [(-10, 0), (0, 9), (8, 0)]
+
+        await editor.choose("In force")
+        assert len((await page.evaluate("paani.plan"))["fence"]) == 2
+        await editor.choose("Delete leg")
+        await editor.choose("+ Route")
+        await editor.press((-10, -8), (0, 9), (18, 9))
+        await editor.until_note("waypoint 2: leaves the fence")
+        marks = await page.evaluate("paani.marks")
+        assert 9.5 <= marks[0]["at"]["x_m"] <= 10.6, "at the place"
+        await page.wait_for_timeout(300)
+        await page.screenshot(path=tmp_path / "faults.png")
+        await page.click("#editor-send")
+        await editor.until_note("not accepted: legs[0].waypoints[1]: the leg to the next leaves the fence")
+        await editor.drag((18, 9), (6, -8))
+        await editor.until_note("Nothing is wrong")
+        await editor.choose("+ Hold")
+        await editor.press((0, -14))
+        await page.click("#editor-send")
+        await editor.until_note("Accepted")
+        async with asyncio.timeout(5.0):
+            while accepted.value is None or not accepted.value.legs:
+                await accepted.next()
+        assert [leg.kind for leg in accepted.value.legs] == [m.LegKind.FOLLOW_ROUTE, m.LegKind.HOLD_STATION]
+        drawn = [(point.x_m, point.y_m) for point in accepted.value.legs[0].waypoints]
+        assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
+        assert len(accepted.value.fence) == 2
+        await page.wait_for_timeout(300)
+        await page.screenshot(path=tmp_path / "accepted.png")
+
+        frame = MapFrame("", None, map_origin_deg(pose))
+        for kind, read in (("GPX", read_gpx), ("GeoJSON", read_geojson_line)):
+            async with page.expect_download() as found:
+                await editor.choose(f"{kind} ↓")
+            path = tmp_path / f"mission.{kind.lower()}"
+            await (await found.value).save_as(path)
+            line = await asyncio.to_thread(read, path, str(path))
+            for point, (x_m, y_m) in zip(line.points, drawn, strict=True):
+                waypoint = frame.waypoint_of(point, "point")
+                assert (waypoint.x_m, waypoint.y_m) == pytest.approx((x_m, y_m), abs=0.01)
+            await page.set_input_files("#editor-file", str(path))
+            assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
+        assert [line for line in watched.errors if "409" not in line] == []
+        for name, text, why in (
+            ("a.gpx", "<gpx", "is no GPX file"),
+            ("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "DOCTYPE"),
+            ("a.gpx", '<gpx><wpt lat="91" lon="0"/></gpx>', "no place on Earth"),
+            ("a.geojson", "{}", "no route and no area"),
+        ):
+            await asyncio.to_thread((tmp_path / name).write_text, text)
+            await page.set_input_files("#editor-file", str(tmp_path / name))
+            await editor.until_note(why)
+
+        fence = [{"keep": a.keep, "corners": [{"x_m": c.x_m, "y_m": c.y_m} for c in a.corners]} for a in MISSION.fence]
+        source = random.Random(7)
+        points = [(source.uniform(-25, 25), source.uniform(-25, 25)) for _ in range(300)]
+        assert await page.evaluate(JUDGE, [fence, points]) == [is_allowed(MISSION.fence, point) for point in points]
+        zigzag = {"kind": "follow_route", "repeat": False, "laps": 1, "waypoints": [
+            {"x_m": 0, "y_m": 0}, {"x_m": 3, "y_m": 0}, {"x_m": 0, "y_m": 1}]}  # fmt: skip
+        assert await page.evaluate(MARKS, [[zigzag], [], 2.2]) == [
+            "leg 1, waypoint 2: a turn too tight for the hull, 2.2 m"
+        ]
+        assert await page.evaluate(MARKS, [[zigzag], [], 0]) == []
+        bow = [{"x_m": x, "y_m": y} for x, y in ((0, 0), (9, 9), (9, 0), (0, 9))]
+        assert await page.evaluate(MARKS, [[], [{"keep": "in", "corners": bow}], 0]) == [
+            "keep-in area 1: its edges cross"
+        ]
+        guidance.odometry = None
+        await page.wait_for_timeout(1500)
+        await page.screenshot(path=tmp_path / "ghost.png")
+        publishing.cancel()
