@@ -83,11 +83,31 @@ def _fault_of_mutant(mutant: Mutant, root: Path) -> str:
         return f"`from` occurs {found} times in {mutant.file}, not once: {mutant.before!r}"
     if path.suffix != ".py":
         return "" if mutant.before != mutant.after else f"changes nothing: {mutant}"
+    statement = _statement_around(source, mutant.before)
     try:
-        after = _code(source.replace(mutant.before, mutant.after))
+        after = _code(statement.replace(mutant.before, mutant.after))
     except SyntaxError as error:
         return f"is no Python any more: {mutant} ({error.msg})"
-    return "" if _code_of_file(source) != after else f"changes no code: {mutant}"
+    return "" if _code(statement) != after else f"changes no code: {mutant}"
+
+
+def _statement_around(source: str, text: str) -> str:
+    """The statement of the module that the text lies in; the whole module where it lies in none or in several."""
+    first = source.count("\n", 0, source.index(text)) + 1
+    last = first + text.count("\n")
+    for begin, end in _statement_lines(source):
+        if begin <= first and last <= end:
+            return "\n".join(source.split("\n")[begin - 1 : end])
+    return source
+
+
+@functools.cache
+def _statement_lines(source: str) -> tuple[tuple[int, int], ...]:
+    """First and last line of each statement of the module, decorators included."""
+    return tuple(
+        (min([node.lineno, *(each.lineno for each in getattr(node, "decorator_list", ()))]), node.end_lineno or 0)
+        for node in ast.parse(source).body
+    )
 
 
 def _code(source: str) -> str:
@@ -99,9 +119,3 @@ def _code(source: str) -> str:
                 each for each in node.body if not (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
             ]
     return ast.dump(tree)
-
-
-@functools.cache
-def _code_of_file(source: str) -> str:
-    """The code of a file as it stands, which all its mutants are compared with."""
-    return _code(source)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani.config import AdapterConfig
 from paani.messages import Arming, Thrust, ZeroCause
-from paani.thrust_adapter import ThrustAdapter, applied_message
+from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
 
 NOW_US = 50_000_000
 CONFIG = AdapterConfig()
@@ -256,3 +256,51 @@ def test_armed_is_the_operators_newest_word(armed: bool, stopped: bool) -> None:
     assert (adapter.has_heard_operator, adapter.is_armed) == (False, False)
     adapter.receive_arming(Arming(source_us=1, armed=armed, stopped=stopped), NOW_US)
     assert (adapter.has_heard_operator, adapter.is_armed) == (True, armed and not stopped)
+
+
+def at_age(gate: str, age_us: int) -> ThrustAdapter:
+    """A ready adapter with a command, of which one thing alone is as old as this."""
+    adapter, then_us = ThrustAdapter(CONFIG, domain=43), NOW_US - age_us
+    adapter.receive_arming(ARMED, then_us if gate == "arming" else NOW_US)
+    for service in CONFIG.require_pulses:
+        adapter.receive_pulse(service, then_us if gate == service else NOW_US)
+    received_us = then_us if gate == "command" else NOW_US
+    adapter.offer(thrust(echo_us=then_us if gate == "echo" else received_us - 100_000), received_us)
+    return adapter
+
+
+@pytest.mark.parametrize(
+    ("gate", "limit_s", "cause", "lost_pulse"),
+    [
+        ("arming", CONFIG.arming_timeout_s, ZeroCause.ARMING_LOST, ""),
+        ("command", CONFIG.timeout_s, ZeroCause.TIMEOUT, ""),
+        ("echo", CONFIG.max_echo_age_s, ZeroCause.STALE_ECHO, ""),
+        *((service, CONFIG.pulse_timeout_s, ZeroCause.PULSE_LOST, service) for service in CONFIG.require_pulses),
+    ],
+)
+def test_each_gate_holds_to_the_microsecond(gate: str, limit_s: float, cause: ZeroCause, lost_pulse: str) -> None:
+    """What is as old as its limit still counts; a microsecond older is zero of both fans, named by its cause."""
+    limit_us = round(limit_s * 1e6)
+    assert at_age(gate, limit_us).decide(NOW_US) == AppliedThrust(0.02, 0.04, 1.5, 3.0, ZeroCause.NONE)
+    assert at_age(gate, limit_us + 1).decide(NOW_US) == AppliedThrust(0.0, 0.0, 0.0, 0.0, cause, lost_pulse)
+
+
+def test_each_zero_is_of_both_fans_and_has_its_cause_alone() -> None:
+    assert ThrustAdapter(CONFIG, 43).decide(NOW_US) == AppliedThrust(0.0, 0.0, 0.0, 0.0, ZeroCause.NOT_ARMED)
+    assert ready().decide(NOW_US) == AppliedThrust(0.0, 0.0, 0.0, 0.0, ZeroCause.NO_COMMAND)
+    disabled = ready()
+    disabled.offer(thrust(enabled=False), NOW_US)
+    assert disabled.decide(NOW_US) == AppliedThrust(0.0, 0.0, 0.0, 0.0, ZeroCause.NOT_ENABLED)
+
+
+@pytest.mark.parametrize(("left", "right"), [(1.0, -CONFIG.astern), (-CONFIG.astern, 1.0), (0.0, 0.0)])
+def test_the_limits_themselves_are_allowed(left: float, right: float) -> None:
+    assert ready().offer(thrust(left=left, right=right), NOW_US) is ZeroCause.NONE
+
+
+def test_the_first_command_of_a_start_counts_and_each_refusal_is_counted() -> None:
+    adapter = ready()
+    assert adapter.offer(thrust(epoch=0, seq=0), NOW_US) is ZeroCause.NONE
+    for refused in (1, 2, 3):
+        assert adapter.offer(thrust(epoch=0, seq=0), NOW_US) is ZeroCause.REPLAYED
+        assert adapter.rejected == refused

@@ -81,6 +81,8 @@ def test_an_unhealthy_estimate_moves_nothing_in_the_state() -> None:
     state, order = navigate(RUNNING, inputs(odometry=doubtful, advisory=beside), MISSION, NOW_US, 43, PAANI)
     assert order.inhibits == (Inhibit.UNHEALTHY_ODOMETRY,)
     assert (order.leg, order.cross_track_m) == ("", 0.0)
+    blind, order = navigate(RUNNING, inputs(odometry=doubtful, advisory=None), MISSION, NOW_US, 43, PAANI)
+    assert (order.source_us, blind.passed_obstacles) == (NOW_US, RUNNING.passed_obstacles)
     assert (state.passed_obstacles, state.progress) == (RUNNING.passed_obstacles, RUNNING.progress)
     healthy, _ = navigate(RUNNING, inputs(odometry=pose(9.9, 0.0), advisory=beside), MISSION, NOW_US, 43, PAANI)
     assert healthy.passed_obstacles != RUNNING.passed_obstacles
@@ -91,7 +93,7 @@ def test_outside_the_fence_no_turn_begins_and_no_integral_runs(direction: Direct
     state, order = navigate(RUNNING, inputs(odometry=OUTSIDE, advisory=advice(direction)), FENCED, NOW_US, 43, PAANI)
     assert (order.enable, order.inhibits) == (False, (Inhibit.OUTSIDE_FENCE,))
     assert state.turn is None
-    assert order.leg == "follow route, lap 1"
+    assert (order.leg, order.cross_track_m) == ("follow route, lap 1", 0.0)
     returning = msgspec.structs.replace(PAANI, fence_return=True)
     back = pose(31.0, 0.0, yaw_rad=math.pi)
     _, order = navigate(RUNNING, inputs(odometry=back), FENCED, NOW_US, 43, returning)
@@ -143,6 +145,7 @@ def test_a_plan_is_sailed_at_its_own_heading_and_speed() -> None:
     _, order = planned(aside)
     assert order.heading_rad == pytest.approx(0.3)
     assert order.speed_mps == pytest.approx(min(PAANI.cruise_mps, PAANI.planner.speed_mps))
+    assert order.obstacle_track_ids == ()
     _, order = planned(aside, advisory=advice(Direction.LEFT))
     assert order.speed_mps == pytest.approx(0.5 * PAANI.cruise_mps)
     assert order.heading_rad == pytest.approx(0.3)  # the map decides where, not the angle of a visual turn
@@ -261,6 +264,9 @@ def test_a_clock_that_is_set_back_forgets_all_but_the_count() -> None:
     after = note_clock_advance(turning, back, NOW_US)
     assert after == NavigatorState(progress=MissionProgress(waypoints_reached=7), sim_us=RUNNING.sim_us - 1)
     assert note_clock_advance(turning, NavigatorInputs(), NOW_US) is turning
+    at_start = NavigatorState(sim_us=0)
+    first = inputs(clock=SimTime(source_us=NOW_US, sim_us=50, stamp_us=1))
+    assert note_clock_advance(at_start, first, NOW_US).clock_advanced_us == NOW_US
 
 
 @pytest.mark.parametrize(

@@ -154,13 +154,14 @@ def test_a_drive_with_holes_or_without_heading_is_refused(rich: Messages) -> Non
 
 
 def test_a_fix_far_off_is_left_out(rich: Messages) -> None:
-    """One fix in forty claims 5 m/s to the north."""
+    """One fix in thirty claims 5 m/s to the north, in the first half of the drive."""
+    half = len(rich.applied) // 2
     spoilt = [
-        msgspec.structs.replace(fix, sog_mps=5.0, cog_rad=1.57) if number % 40 == 20 else fix
+        msgspec.structs.replace(fix, sog_mps=5.0, cog_rad=1.57) if number % 30 == 15 else fix
         for number, fix in enumerate(rich.fixes)
     ]
     found = identify(
-        drive_of(rich.applied, rich.odometry, spoilt, rich.samples), load_vessel("paper"), FORCE_PER_UNIT_N
+        drive_of(rich.applied[:half], rich.odometry, spoilt, rich.samples), load_vessel("paper"), FORCE_PER_UNIT_N
     )
     assert found.outliers >= 15
     assert found.estimates["surge_quadratic"].value == pytest.approx(20.0, rel=0.2)
