@@ -82,8 +82,11 @@ def _preload(manager: ZenohSession) -> None:
 
 
 def _filled(manager: Any, value: Any) -> Any:
-    """A field: three axes are a vector."""
-    return manager.store.types["geometry_msgs/msg/Vector3"](**value) if isinstance(value, dict) else value
+    """A field: an object of the type that it names, and without one a vector."""
+    if not isinstance(value, dict):
+        return value
+    fields = {name: _filled(manager, field) for name, field in value.items() if name != "type"}
+    return manager.store.types[value.get("type", "geometry_msgs/msg/Vector3")](**fields)
 
 
 def _tell(topic: str, message: Any) -> None:

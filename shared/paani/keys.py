@@ -218,7 +218,7 @@ MISSION_REQUESTS = {
         name=f"operator/mission_request/{client}", type=m.MissionRequest, producer=client, rate_hz=1.0, fresh_s=2.0,
         stance=Stance.EVENT, summary=f"a mission, a fence, or both, that {client} asks the operator's process for",
     )
-    for client in (STATION, "mavlink", "mission")
+    for client in (STATION, *ASKING_PORTS, "mission")
 }
 ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values())  # nobody owes one of these
 

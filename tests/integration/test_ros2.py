@@ -173,6 +173,23 @@ TWIST = type_hash("geometry_msgs/Twist")
 STRING = f"RIHS01_{HASHES['std_msgs/String']}"
 
 
+POSE = type_hash("geometry_msgs/PoseStamped")
+ROUTE = m.Route(
+    source_us=CLOCK.now_us(), name="a", waypoints=(m.Waypoint(x_m=0.0, y_m=0.0), m.Waypoint(x_m=9.0, y_m=0.0))
+)
+
+
+def goal(frame: str) -> dict[str, Any]:
+    """Fields of a PoseStamped 12 m east and 3 m south of the origin of a frame, without a stamp."""
+    stamp = {"type": "builtin_interfaces/msg/Time", "sec": 0, "nanosec": 0}
+    position = {"type": "geometry_msgs/msg/Point", "x": 12.0, "y": -3.0, "z": 0.0}
+    orientation = {"type": "geometry_msgs/msg/Quaternion", "x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    return {
+        "header": {"type": "std_msgs/msg/Header", "stamp": stamp, "frame_id": frame},
+        "pose": {"type": "geometry_msgs/msg/Pose", "position": position, "orientation": orientation},
+    }
+
+
 def vector(x: float = 0.0, z: float = 0.0) -> dict[str, float]:
     return {"x": x, "y": 0.0, "z": z}
 
@@ -182,6 +199,8 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
     listen = find_free_port()
     observer, station = await open_as("observer"), await open_as("dashboard")
     orders, health = observer.latest(keys.OPERATOR_ORDER), observer.latest(keys.health("ros2"))
+    missions = observer.latest(keys.ORDERED_MISSION)
+    routes = (await open_as("navigator")).publisher(keys.ROUTE)
 
     def order() -> m.OperatorOrder:
         assert orders.value is not None
@@ -214,7 +233,20 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
                 before = drops().get(cause, 0)
                 await node.until(lambda: drops().get(cause, 0) > before, why, act)
 
+            def go(frame: str) -> None:
+                node.ask(
+                    publish="/otter/goal_pose", type="geometry_msgs/msg/PoseStamped", hash=POSE, fields=goal(frame)
+                )
+                routes.put(ROUTE)
+
             await counted("not_manual", steer, "a stick without MANUAL is passed over")
+            await node.until(
+                lambda: missions.value is not None and bool(missions.value.legs), "a goal", lambda: go("map")
+            )
+            assert missions.value is not None
+            (leg,) = missions.value.legs
+            assert (leg.kind, leg.waypoints) == (m.LegKind.HOLD_STATION, (m.Waypoint(x_m=12.0, y_m=-3.0),))
+            await counted("refused", lambda: go("odom"), "a goal of another frame")
             await counted("refused", lambda: say("MANUAL"), "a boat that is not armed takes no MANUAL")
             assert order().mode is m.DriveMode.ROUTE
             assert await hand.hold_to_arm(5.0) is m.ArmRefusal.NONE
@@ -234,6 +266,11 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
             await counted("out_of_range", lambda: say("FULL AHEAD"), "a word that is no mode")
             assert await hand.take_wheel(5.0) is m.ModeRefusal.NONE
             await counted("refused", lambda: say("HOLD"), "another hand holds the wheel")
+            accepted = missions.value
+            await counted("refused", lambda: go("map"), "and the mission")
+            assert accepted is not None
+            assert missions.value is not None
+            assert missions.value.accepted_us == accepted.accepted_us
             await node.until(lambda: order().by == "ros2", "which that word alone takes", lambda: say("WHEEL"))
 
 

@@ -1,7 +1,8 @@
-"""What ROS nodes may ask of the operator's process: STOP at any time; modes and the stick where `accept_commands`.
+"""What ROS nodes may ask of the operator's process: STOP at any time; modes, stick and goals where `accept_commands`.
 
 Nothing here drives by itself: MANUAL begins with a word on the topic `mode`, as on the page, and `cmd_vel` moves the
 boat only while that holds. A stream of `cmd_vel` that goes on after a STOP, a lost link or another hand moves nothing.
+A goal becomes the mission, by the checks of every mission, and is gone to once ROUTE is ordered after it.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from paani.bus.ros_graph import RosGraph
 from paani.clock import Clock
 from paani.config import Config
 from paani.geometry import clip
+from paani.mission_client import MISSION_REFUSALS, MissionClient
 from paani.operator_client import OperatorClient
 from paani_services.ros2 import topics
+from paani_services.ros2.frames import Frames
+from paani_services.ros2.goals import leg_of_goal
 from paani_services.ros2.schemas import decode
 from paani_services.ros2.topics import RosTopic
 
@@ -27,6 +31,7 @@ LOG = logging.getLogger(__name__)
 DEPTH = 16
 ANSWER_S = 2.0
 BATCH_PERIOD_S = 0.05  # of several set-points within this time the newest counts
+GOAL_MISSION = "goal"  # the name of a mission that a goal became
 TAKE_WHEEL = "WHEEL"  # the word that takes the wheel from another hand
 
 
@@ -60,7 +65,9 @@ class Commands:
 
     def __init__(self, bus: Bus, clock: Clock, config: Config, graph: RosGraph) -> None:
         vessel, settings = config.bus.vessel, config.ros2
-        self._bus, self._operator = bus, OperatorClient(bus, clock)
+        self._bus, self._clock = bus, clock
+        self._operator, self._missions = OperatorClient(bus, clock), MissionClient(bus, clock)
+        self._map_frame, self._station_m = Frames(settings.frame_prefix).map, config.navigator.hold_radius_m
         self._full_speed_mps, self._full_turn_radps = config.navigator.cruise_mps, settings.full_turn_radps
         heard = topics.COMMANDS if settings.accept_commands else (topics.STOP,)
         self._inboxes = {topic.name: graph.subscribe(topic.endpoint(vessel), DEPTH) for topic in heard}
@@ -68,7 +75,7 @@ class Commands:
     def serve(self, group: asyncio.TaskGroup) -> None:
         """Take what is asked, each topic by a task of its own."""
         takers = {topics.STOP.name: self._take_stops, topics.MODE.name: self._take_modes}
-        takers[topics.CMD_VEL.name] = self._take_twists
+        takers |= {topics.CMD_VEL.name: self._take_twists, topics.GOAL.name: self._take_goals}
         for name, inbox in self._inboxes.items():
             group.create_task(takers[name](inbox), name=name)
 
@@ -105,6 +112,34 @@ class Commands:
         """The newest alone, once: a set-point that no node says again is let go by the operator's process."""
         async for batch in batches(inbox):
             self._steer(batch[-1])
+
+    async def _take_goals(self, inbox: Queue[bytes]) -> None:
+        """The newest alone: who sends a second goal before the first was answered has changed their mind."""
+        async for batch in batches(inbox):
+            message = self._read(batch[-1], topics.GOAL)
+            if message is not None:
+                await self._go(message)
+
+    async def _go(self, goal: Any) -> None:
+        """Ask for a goal as the mission, and tell in this process's health what became of it."""
+        try:
+            leg = leg_of_goal(goal, self._map_frame, self._clock.now_us(), self._station_m)
+        except ValueError as error:
+            self._refuse_goal(str(error))
+            return
+        answer = await self._missions.send_legs(GOAL_MISSION, (leg,), hand=self._operator.hand)
+        if answer is None:
+            self._refuse_goal("no answer")
+        elif answer.refusal is not m.MissionRefusal.NONE:
+            self._refuse_goal(answer.fault or MISSION_REFUSALS[answer.refusal])
+        else:
+            self._bus.note("goal from ROS 2: it is the mission; ROUTE goes there")
+            LOG.info("goal from ROS 2: the mission is to keep station at %s", leg.waypoints[0])
+
+    def _refuse_goal(self, reason: str) -> None:
+        self._bus.count_drop("refused")
+        self._bus.note(f"goal from ROS 2: {reason}")
+        LOG.warning("goal from ROS 2 refused: %s", reason)
 
     def _steer(self, data: bytes) -> None:
         message, state = self._read(data, topics.CMD_VEL), self._operator.state

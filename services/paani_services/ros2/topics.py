@@ -54,9 +54,10 @@ TRANSFORM = RosTopic(
 STOP = RosTopic("stop", "std_msgs/Bool", RELIABLE, "", keys.REQUESTS["ros2"].name, 0.0)
 MODE = RosTopic("mode", "std_msgs/String", RELIABLE, "", keys.REQUESTS["ros2"].name, 0.0)
 CMD_VEL = RosTopic("cmd_vel", "geometry_msgs/Twist", RELIABLE, "base_link", keys.REQUESTS["ros2"].name, 0.0)
+GOAL = RosTopic("goal_pose", "geometry_msgs/PoseStamped", RELIABLE, "map", keys.MISSION_REQUESTS["ros2"].name, 0.0)
 
 SENT = (
     GPS_FIX, IMU, GLOBAL_ODOMETRY, LOCAL_ODOMETRY, IMAGE, DETECTIONS, TRACKS, ADVISORY, OCCUPANCY, DIAGNOSTICS,
     TRANSFORM,
 )  # fmt: skip
-COMMANDS = (STOP, MODE, CMD_VEL)  # the last two only where `ros2.accept_commands`
+COMMANDS = (STOP, MODE, CMD_VEL, GOAL)  # the last three only where `ros2.accept_commands`

@@ -16,9 +16,9 @@ class Ros2Config(Section, frozen=True):
     """`listen`: where ROS nodes connect (rmw_zenoh), tcp/HOST:PORT. Whoever reaches it may listen, and stop the boat.
 
     `domain_id`: their ROS_DOMAIN_ID. `frame_prefix`: before the name of every frame, for several boats in one graph.
-    `accept_commands`: whether they may also ask for modes and steer in MANUAL; of this machine alone, since ROS knows
-    nobody by name. `full_turn_radps`: `angular.z` of `cmd_vel` at which the helm is hard over; `linear.x` is full at
-    `navigator.cruise_mps`.
+    `accept_commands`: whether they may also ask for modes, steer in MANUAL and send goals; of this machine alone, since
+    ROS knows nobody by name. `full_turn_radps`: `angular.z` of `cmd_vel` at which the helm is hard over; `linear.x` is
+    full at `navigator.cruise_mps`.
     """
 
     listen: str = "tcp/127.0.0.1:7449"  # beside `bus.router`, which has the port that rmw_zenoh looks at by itself
