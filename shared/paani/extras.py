@@ -24,6 +24,7 @@ EXTRA_OF = {
     "rosbags": "ros2",
     "foxglove": "foxglove",
     "rerun": "rerun",
+    "playwright": "dev",
 }  # module -> extra
 
 

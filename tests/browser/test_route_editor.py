@@ -21,6 +21,7 @@ from paani_services.navigator.files.geojson import read_geojson_line
 from paani_services.navigator.files.gpx import read_gpx
 from paani_services.navigator.files.map_frame import MapFrame
 from tests.browser.guidance import guiding
+from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_map_objects import MISSION
 from tests.browser.test_page import MAP_PX_PER_M, until, watch
 from tests.conftest import OpenAs, Spawn
@@ -134,6 +135,18 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         assert len(accepted.value.fence) == 2
         await page.wait_for_timeout(300)
         await page.screenshot(path=tmp_path / "accepted.png")
+        axe = await asyncio.to_thread(AXE.read_text, encoding="utf-8")
+        await page.evaluate(axe)
+        assert await page.evaluate(SERIOUS) == []
+        assert await page.evaluate(SMALL_TEXT) == []
+        assert await page.evaluate(SMALL_TARGETS, 24) == []
+        await page.set_viewport_size({"width": 390, "height": 844})
+        await page.wait_for_timeout(300)
+        await page.evaluate("document.querySelector('.panel.map').scrollIntoView()")
+        await page.screenshot(path=tmp_path / "phone.png")
+        assert await page.evaluate("document.documentElement.scrollWidth") == 390
+        assert await page.evaluate(SMALL_TARGETS, 44) == []
+        await page.set_viewport_size({"width": 1440, "height": 900})
 
         frame = MapFrame("", None, map_origin_deg(pose))
         for kind, read in (("GPX", read_gpx), ("GeoJSON", read_geojson_line)):

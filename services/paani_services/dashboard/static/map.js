@@ -82,7 +82,8 @@ export class MapPanel {
     if (prediction) drawObstacles(chart, prediction.obstacles, store.ageS(key, now), store.get("advisor/tracks")?.tracks ?? []);
     if (truth) this.drawBoat(truth, toScreen, colour("--text"), false, store.isFresh("@truth/pose", now));
     if (odometry) this.drawBoat(odometry, toScreen, colour("--cyan"), true, store.isFresh("localization/odometry", now));
-    if (odometry && !store.isFresh("localization/odometry", now)) drawGhost(chart, odometry, store.ageS("localization/odometry", now));
+    const poseAgeS = store.ageS("localization/odometry", now);
+    if (odometry && poseAgeS > store.limitS("localization/odometry")) drawGhost(chart, odometry, poseAgeS);
     this.editor.render(chart, store, now);
     this.drawScaleAndNorth(width, height, colour("--text"), colour("--quiet"));
     setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");

@@ -1,0 +1,145 @@
+"""The page in headless Chromium: loads, moments at which a picture is drawn, presses, and its heap."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+from collections.abc import AsyncIterator
+from typing import Any
+
+import msgspec
+from playwright.async_api import async_playwright
+
+from paani.config import Config
+from paani.errors import UserError
+from paani.operator_key import ensure_operator_key
+from paani.page_address import page_origin
+from paani_tools.bench.deck.loads import PageLoad
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+LIVE_TIMEOUT_S, POLL_S = 30.0, 0.01
+LIVE = "document.body.dataset.link === 'live'"
+LOADED = """() => {
+  const files = performance.getEntriesByType('resource'), page = performance.getEntriesByType('navigation')[0];
+  return { load_ms: performance.now(), files: 1 + files.length,
+    bytes: page.transferSize + files.reduce((all, file) => all + file.transferSize, 0) };
+}"""
+WATCH_DRAWN = """() => {
+  window.drawn = [];
+  let last = null;
+  const look = () => {
+    const seq = paani.overlay.picture_seq;
+    if (seq !== last) drawn.push([seq, 1e3 * (performance.timeOrigin + performance.now())]);
+    last = seq;
+    requestAnimationFrame(look);
+  };
+  look();
+}"""
+PRESS_STOP = """() => {
+  const at = 1e3 * (performance.timeOrigin + performance.now());
+  document.querySelector('#stop').dispatchEvent(new PointerEvent('pointerdown'));
+  return at;
+}"""
+TAKE_WHEEL = """() => {
+  const buttons = ['#drive-take:not([hidden])', '[data-drive=MANUAL]:enabled'];
+  for (const name of buttons) document.querySelector(name)?.click();
+}"""
+KEY = """([type, code]) => {
+  const at = 1e3 * (performance.timeOrigin + performance.now());
+  dispatchEvent(new KeyboardEvent(type, { code }));
+  return at;
+}"""
+
+
+class Deck:
+    """One page, kept open. Moments are Unix time [us], by the clock of this machine, which the boat has too."""
+
+    def __init__(self, page: Any) -> None:
+        self._page = page
+        self._devtools: Any = None
+
+    async def close(self) -> None:
+        await self._page.context.close()
+
+    async def watch_drawn(self) -> None:
+        """Note from now on when each picture is drawn first."""
+        await self._page.evaluate(WATCH_DRAWN)
+
+    async def take_drawn(self) -> list[tuple[int, float]]:
+        """Number of each picture and when it was drawn, since the last time."""
+        return [(int(seq), at_us) for seq, at_us in await self._page.evaluate("drawn.splice(0)") if seq is not None]
+
+    async def press_stop(self) -> float:
+        """When it was pressed."""
+        return float(await self._page.evaluate(PRESS_STOP))
+
+    async def press_key(self, code: str) -> float:
+        """Hold a key until it is let go; when it went down."""
+        return float(await self._page.evaluate(KEY, ["keydown", code]))
+
+    async def let_key_go(self, code: str) -> None:
+        await self._page.evaluate(KEY, ["keyup", code])
+
+    async def take_wheel(self) -> None:
+        """Drive by hand. Raises TimeoutError where the page may not."""
+        async with asyncio.timeout(LIVE_TIMEOUT_S):
+            while await self._page.evaluate("document.querySelector('#drive').dataset.driving") != "true":
+                await self._page.evaluate(TAKE_WHEEL)
+                await asyncio.sleep(0.3)
+
+    async def slow_down(self, latency_ms: float) -> None:
+        """From now on every answer takes so much longer, as over a link."""
+        conditions = {"offline": False, "latency": latency_ms, "downloadThroughput": -1, "uploadThroughput": -1}
+        tools = await self._tools()
+        await tools.send("Network.enable")
+        await tools.send("Network.emulateNetworkConditions", conditions)
+
+    async def heap_mib(self) -> float:
+        """Of JavaScript, after a collection."""
+        tools = await self._tools()
+        await tools.send("HeapProfiler.collectGarbage")
+        return float((await tools.send("Runtime.getHeapUsage"))["usedSize"]) / 2**20
+
+    async def _tools(self) -> Any:
+        if self._devtools is None:
+            self._devtools = await self._page.context.new_cdp_session(self._page)
+        return self._devtools
+
+
+class Browser:
+    """Headless Chromium."""
+
+    def __init__(self, browser: Any, config: Config, key: str) -> None:
+        self._browser, self._address = browser, f"{page_origin(config)}/#key={key}"
+
+    async def open_page(self) -> tuple[Deck, PageLoad]:
+        """A page of a visitor who comes for the first time: nothing is kept from before."""
+        context = await self._browser.new_context(viewport={"width": 1440, "height": 900}, service_workers="block")
+        page = await context.new_page()
+        await page.goto(self._address)
+        async with asyncio.timeout(LIVE_TIMEOUT_S):
+            while not await page.evaluate(LIVE):  # noqa: ASYNC110  # a browser wakes nobody, and the page forbids eval
+                await asyncio.sleep(POLL_S)
+        return Deck(page), msgspec.convert(await page.evaluate(LOADED), PageLoad)
+
+    async def load_page(self) -> PageLoad:
+        """What a load takes; the page is closed then."""
+        deck, load = await self.open_page()
+        await deck.close()
+        return load
+
+
+@contextlib.asynccontextmanager
+async def chromium(config: Config) -> AsyncIterator[Browser]:
+    """Raises UserError where there is none on this machine."""
+    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    if path is None:
+        raise UserError(f"bench deck: no Chromium on this machine (looked for {', '.join(CHROMIUM)})")
+    key = await asyncio.to_thread(ensure_operator_key, config.bus)
+    async with async_playwright() as driver:
+        browser = await driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        try:
+            yield Browser(browser, config, key)
+        finally:
+            await browser.close()

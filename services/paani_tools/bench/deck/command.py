@@ -1,0 +1,94 @@
+"""`paani bench deck`."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import sys
+
+from paani.cli import add_config_arguments, config_from
+from paani.config import Config
+from paani.extras import require_modules
+from paani.option_numbers import whole_number
+from paani.option_paths import output_file
+from paani.whole_file import write_json
+from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars
+from paani_tools.inspect.listen import observer
+from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.lifecycle import run_plan
+from paani_tools.up.plan import make_plan
+from paani_tools.up.run_summary import percentiles
+from paani_tools.up.terminal import Display
+
+LINK_MS = 50.0
+HERE, CROWDED, LINK = "on this machine", "with 10 clients", f"over a link of {LINK_MS:g} ms"
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 every bar was kept, 1 one was not, 2 user's mistake."""
+    parser = argparse.ArgumentParser(
+        prog="paani bench deck", description="The page in headless Chromium beside a simulated boat under way."
+    )
+    parser.add_argument("--world", help="a world or a scenario (default: lake)", default="lake")
+    parser.add_argument("--loads", type=whole_number(), default=5, metavar="N", help="of the page; default: 5")
+    parser.add_argument("--stops", type=whole_number(), default=20, metavar="N", help="each way; default: 20")
+    parser.add_argument("--sticks", type=whole_number(), default=40, metavar="N", help="default: 40")
+    parser.add_argument("--for", dest="seconds", type=seconds, default=20.0, metavar="S", help="each; default: 20")
+    parser.add_argument("--rounds", type=whole_number(), default=2, metavar="N", help="of 1 and 10 clients; default: 2")
+    parser.add_argument("--heap", type=seconds, metavar="S", help="leave a page open for so long, and watch its heap")
+    parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
+    add_config_arguments(parser)
+    options = parser.parse_args(argv)
+    require_modules("bench deck", "playwright")
+    config = config_from(options, up_sets(world=options.world, camera=None, headless=False))
+    report = asyncio.run(_measure(config, options))
+    sys.stdout.write("\n" + deck_text(report))
+    if options.json:
+        write_json(options.json, report, "--json")
+    return 0 if keeps_bars(report) else 1
+
+
+async def _measure(config: Config, options: argparse.Namespace) -> DeckReport:
+    from paani_tools.bench.deck import browser, measuring  # noqa: PLC0415  # need the extra
+
+    plan = await make_plan(config)
+    load_before, reports = os.getloadavg()[0], list[DeckReport]()
+
+    async def measure() -> None:
+        async with observer(plan.config.bus) as bus, browser.chromium(plan.config) as chromium:
+            boat = measuring.Boat(bus, plan.config)
+            deck, _ = await chromium.open_page()
+            await boat.until_applied(measuring.is_under_way, 0.0, measuring.UNDER_WAY_S)
+            received_ms, drawn_ms = await measuring.time_pictures(plan.config, deck, options.seconds)
+            loads = [await chromium.load_page() for _ in range(options.loads)]
+            crowds: list[Crowd] = []
+            for _ in range(options.rounds):
+                for clients in (1, measuring.MANY):
+                    crowds.append(await measuring.measure_crowd(plan.config, boat, clients, options.seconds))
+            stops = dict[str, list[float]]()
+            stops[HERE], missed_here = await measuring.time_stops(boat, deck, options.stops)
+            async with measuring.crowd(plan.config, measuring.MANY):
+                stops[CROWDED], missed_crowded = await measuring.time_stops(boat, deck, options.stops)
+            await deck.slow_down(LINK_MS)
+            stops[LINK], missed_link = await measuring.time_stops(boat, deck, options.stops)
+            await deck.slow_down(0.0)
+            sticks_ms, missed_sticks = await measuring.time_sticks(boat, deck, options.sticks)
+            heap = await measuring.watch_heap(chromium, options.heap or 0.0)
+            reports.append(
+                DeckReport(
+                    loads=tuple(loads),
+                    received_ms=percentiles(received_ms),
+                    drawn_ms=percentiles(drawn_ms),
+                    crowds=tuple(crowds),
+                    stop_ms={name: percentiles(found) for name, found in stops.items()},
+                    stick_ms=percentiles(sticks_ms),
+                    unanswered=missed_here + missed_crowded + missed_sticks + missed_link,
+                    heap_s=options.heap or 0.0,
+                    heap_slope_mib_h=heap_slope(heap),
+                    load_average=(load_before, os.getloadavg()[0]),
+                )
+            )
+
+    await run_plan(plan, None, Display(sys.stdout), measure)
+    return reports[0]

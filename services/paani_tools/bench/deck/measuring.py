@@ -1,0 +1,217 @@
+"""Measures the page of a boat that is under way: loads, pictures, clients, STOP, stick, heap."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import aiohttp
+import msgspec
+
+from paani import keys
+from paani import messages as m
+from paani.bus import Bus, Queue
+from paani.clock import WallClock
+from paani.config import Config
+from paani.operator_key import ensure_operator_key
+from paani.page_address import page_origin
+from paani_services.dashboard.frames import decode_frame
+from paani_tools.bench.deck.browser import Browser, Deck
+from paani_tools.bench.deck.report import Crowd
+
+CLOCK = WallClock()
+ANSWER_S = 3.0  # of a STOP or a stick that nothing follows
+UNDER_WAY_S = 30.0
+HOLD_S, REFRESH_S = 1.3, 0.15
+PHASE_S, PHASES = 0.037, 7  # so that presses fall on no clock's beat
+TURNING = 0.05  # difference of the fans' thrust that is a turn and no trim
+HEAP_PERIOD_S = 10.0
+WARM_UP = 0.2  # of the time: what a page keeps fills meanwhile
+MANY = 10
+
+
+class Boat:
+    """The running boat, as heard on the bus, and the operator's hand that arms it."""
+
+    def __init__(self, bus: Bus, config: Config) -> None:
+        self._config, self._origin = config, page_origin(config)
+        self.applied: Queue[m.ThrustApplied] = bus.queue(keys.THRUST_APPLIED)
+        self._advice: Queue[m.Advisory] = bus.queue(keys.ADVISORY)
+
+    async def arm(self) -> None:
+        """Hold the button, which also releases a STOP. Raises TimeoutError where the boat does not come under way."""
+        key = await asyncio.to_thread(ensure_operator_key, self._config.bus)
+        headers, body = {"Origin": self._origin, "X-Paani-Key": key}, {"press": CLOCK.now_us()}
+        async with aiohttp.ClientSession(headers=headers) as client:
+            for _ in range(round(HOLD_S / REFRESH_S)):
+                async with client.post(f"{self._origin}/api/arm/hold", json=body):
+                    await asyncio.sleep(REFRESH_S)
+            async with client.post(f"{self._origin}/api/arm/release", json=body):
+                pass
+
+    async def until_applied(self, is_it: Callable[[m.ThrustApplied], bool], since_us: float, wait_s: float) -> float:
+        """When the thrust adapter first says so after `since_us` [us]. Raises TimeoutError."""
+        async with asyncio.timeout(wait_s):
+            while True:
+                report = await self.applied.get()
+                if report.source_us >= since_us and is_it(report):
+                    return float(report.source_us)
+
+    async def decisions_hz(self, seconds: float) -> float:
+        """Decisions a second, heard for so long."""
+        self._advice.drain()
+        await asyncio.sleep(seconds)
+        return len(self._advice.drain()) / seconds
+
+
+def is_under_way(report: m.ThrustApplied) -> bool:
+    """Whether any thrust is applied."""
+    return report.zero_cause is m.ZeroCause.NONE and (report.left != 0.0 or report.right != 0.0)
+
+
+def is_zero(report: m.ThrustApplied) -> bool:
+    """Whether none is, and none may be."""
+    return report.zero_cause is not m.ZeroCause.NONE and report.left == report.right == 0.0
+
+
+def turns(side: float) -> Callable[[m.ThrustApplied], bool]:
+    """Whether the fans turn the boat to that side: 1 to port, -1 to starboard."""
+    return lambda report: side * (report.right - report.left) > TURNING
+
+
+async def time_stops(boat: Boat, deck: Deck, count: int) -> tuple[list[float], int]:
+    """From each press on the page to the report of zero [ms], and how many nothing followed.
+
+    A boat that stands, as its advice may have it, is not pressed: there would be nothing to stop.
+    """
+    found_ms, unanswered = list[float](), 0
+    for number in range(count):
+        await boat.arm()
+        try:
+            await boat.until_applied(is_under_way, CLOCK.now_us(), UNDER_WAY_S)
+        except TimeoutError:
+            continue
+        await asyncio.sleep(PHASE_S * (number % PHASES))
+        pressed_us = await deck.press_stop()
+        try:
+            found_ms.append((await boat.until_applied(is_zero, pressed_us, ANSWER_S) - pressed_us) * 1e-3)
+        except TimeoutError:
+            unanswered += 1
+    return found_ms, unanswered
+
+
+async def time_sticks(boat: Boat, deck: Deck, count: int) -> tuple[list[float], int]:
+    """From each key on the page to the report of the turn it asks for [ms], and how many nothing followed."""
+    await boat.arm()
+    await deck.take_wheel()
+    found_ms, unanswered = list[float](), 0
+    for number in range(count):
+        await asyncio.sleep(0.5 + PHASE_S * (number % PHASES))
+        code, side = (("KeyA", 1.0), ("KeyD", -1.0))[number % 2]
+        pressed_us = await deck.press_key(code)
+        try:
+            at_us = await boat.until_applied(turns(side), pressed_us, ANSWER_S)
+            found_ms.append((at_us - pressed_us) * 1e-3)
+        except TimeoutError:
+            unanswered += 1
+        await deck.let_key_go(code)
+    return found_ms, unanswered
+
+
+async def time_pictures(config: Config, deck: Deck, seconds: float) -> tuple[list[float], list[float]]:
+    """Age of each picture [ms] when a client that only reads has it, and when the page draws it with its evidence."""
+    await deck.watch_drawn()
+    await deck.take_drawn()
+    stamps_us, received_ms = dict[int, int](), list[float]()
+    async with watching(config) as socket_:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while True:
+                    key, header, _ = decode_frame(await socket_.receive_bytes())
+                    if key == keys.PICTURE.name:
+                        picture = msgspec.json.decode(header.picture, type=m.PictureHeader)
+                        stamps_us[picture.frame_seq] = picture.source_us
+                        received_ms.append((CLOCK.now_us() - picture.source_us) * 1e-3)
+    drawn = await deck.take_drawn()
+    return received_ms, [(at_us - stamps_us[seq]) * 1e-3 for seq, at_us in drawn if seq in stamps_us]
+
+
+async def measure_crowd(config: Config, boat: Boat, clients: int, seconds: float) -> Crowd:
+    """The dashboard's processor time, and the boat's decisions, with so many clients besides the pages."""
+    async with crowd(config, clients):
+        await asyncio.sleep(1.0)
+        before_s = await asyncio.to_thread(dashboard_cpu_s)
+        decisions_hz = await boat.decisions_hz(seconds)
+        used_s = await asyncio.to_thread(dashboard_cpu_s) - before_s
+    return Crowd(clients=clients, cpu_cores=used_s / seconds, decisions_hz=decisions_hz)
+
+
+@contextlib.asynccontextmanager
+async def crowd(config: Config, clients: int) -> AsyncIterator[None]:
+    """So many clients besides the page; of several, one never reads."""
+    async with contextlib.AsyncExitStack() as stack:
+        if clients > 1:
+            stack.enter_context(await asyncio.to_thread(_deaf_client, config))
+        readers = [await stack.enter_async_context(watching(config)) for _ in range(max(1, clients - 1))]
+        reading = [asyncio.create_task(_read_forever(each)) for each in readers]
+        try:
+            yield
+        finally:
+            for task in reading:
+                task.cancel()
+
+
+async def watch_heap(browser: Browser, seconds: float) -> list[tuple[float, float]]:
+    """Time [s] and heap [MiB] of a page that is left open, after the warm-up."""
+    if seconds <= 0:
+        return []
+    deck, _ = await browser.open_page()
+    begun_us, found = CLOCK.now_us(), list[tuple[float, float]]()
+    while (at_s := (CLOCK.now_us() - begun_us) * 1e-6) < seconds:
+        if at_s >= WARM_UP * seconds:
+            found.append((at_s, await deck.heap_mib()))
+        await asyncio.sleep(min(HEAP_PERIOD_S, seconds / 20))
+    return found
+
+
+@contextlib.asynccontextmanager
+async def watching(config: Config) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
+    """One more client of the page's socket."""
+    origin = page_origin(config)
+    async with aiohttp.ClientSession() as client, client.ws_connect(f"{origin}/ws", origin=origin) as found:
+        yield found
+
+
+async def _read_forever(found: aiohttp.ClientWebSocketResponse) -> None:
+    async for _ in found:
+        pass
+
+
+def _deaf_client(config: Config) -> socket.socket:
+    """Opens the page's socket and never reads."""
+    origin = page_origin(config)
+    host, port = origin.partition("//")[2].rsplit(":", 1)
+    found = socket.create_connection((host.strip("[]"), int(port)), timeout=5.0)
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    found.sendall(
+        f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    return found
+
+
+def dashboard_cpu_s() -> float:
+    """Processor time of the dashboard that this process has started [s]."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_text(encoding="utf-8").rstrip("\0").split("\0")
+            if words[-1] == "dashboard" and str(os.getpid()) in words:
+                fields = (folder / "stat").read_text(encoding="ascii").rpartition(")")[2].split()
+                return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        except OSError:  # it has just ended
+            continue
+    raise RuntimeError("no dashboard runs here")

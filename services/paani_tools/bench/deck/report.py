@@ -1,0 +1,93 @@
+"""The figures of `paani bench deck`, and whether they keep the bars. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import linear_regression
+
+import msgspec
+
+from paani_tools.bench.deck.loads import PageLoad
+from paani_tools.up.run_summary import Percentiles
+
+MAX_STOP_P99_MS, MAX_LINK_STOP_P99_MS = 150.0, 300.0  # on this machine; over a link of 50 ms
+MAX_LOSS = 0.05  # of the decision rate, with ten clients
+
+
+class Crowd(msgspec.Struct, frozen=True, kw_only=True):
+    """A stretch with so many clients, of which one never reads where there are several."""
+
+    clients: int
+    cpu_cores: float
+    decisions_hz: float
+
+
+class DeckReport(msgspec.Struct, frozen=True, kw_only=True):
+    """All times in ms. `drawn_ms`: from the picture's stamp aboard until it is on the screen, with its evidence;
+    `received_ms`: until a client that only reads has it. `stop_ms`: from the press until the thrust adapter says zero,
+    by what stands between; `unanswered`: presses and sticks that nothing followed.
+    """
+
+    loads: tuple[PageLoad, ...]
+    received_ms: Percentiles
+    drawn_ms: Percentiles
+    crowds: tuple[Crowd, ...]
+    stop_ms: dict[str, Percentiles]
+    stick_ms: Percentiles
+    unanswered: int
+    heap_s: float
+    heap_slope_mib_h: float | None
+    load_average: tuple[float, float]
+
+
+def heap_slope(samples: Sequence[tuple[float, float]]) -> float | None:
+    """MiB an hour through points of time [s] and heap [MiB], by least squares; None for too few."""
+    if len(samples) < 3:
+        return None
+    times_s, heaps_mib = zip(*samples, strict=True)
+    return linear_regression(times_s, heaps_mib).slope * 3600.0
+
+
+def decision_ratio(crowds: Sequence[Crowd]) -> float | None:
+    """Decisions a second with many clients over those with one; None where one of them is missing."""
+    few = [each.decisions_hz for each in crowds if each.clients == 1]
+    many = [each.decisions_hz for each in crowds if each.clients > 1]
+    return (sum(many) / len(many)) / (sum(few) / len(few)) if few and many and sum(few) > 0 else None
+
+
+def keeps_bars(report: DeckReport) -> bool:
+    """STOP is in time here and over a link, nothing was without answer, and many clients slow no decision by 5 %."""
+    ratio = decision_ratio(report.crowds)
+    in_time = all(
+        figures.p99 is not None and figures.p99 <= (MAX_LINK_STOP_P99_MS if "link" in name else MAX_STOP_P99_MS)
+        for name, figures in report.stop_ms.items()
+    )
+    return in_time and report.unanswered == 0 and ratio is not None and ratio >= 1.0 - MAX_LOSS
+
+
+def deck_text(report: DeckReport) -> str:
+    """The table."""
+    loads = sorted(each.load_ms for each in report.loads)
+    rows = [
+        ("page load until live", f"{loads[0]:.0f} to {loads[-1]:.0f} ms (n = {len(loads)})"),
+        ("page load, files and bytes", f"{report.loads[0].files}, {report.loads[0].bytes / 1024:.0f} KiB"),
+        ("picture to a client", _spread(report.received_ms)),
+        ("picture to the screen", _spread(report.drawn_ms)),
+        *((f"STOP to zero thrust, {name}", _spread(figures)) for name, figures in report.stop_ms.items()),
+        ("stick to thrust", _spread(report.stick_ms)),
+    ]
+    for each in report.crowds:
+        rows.append((f"dashboard with {each.clients} client{'s' * (each.clients > 1)}",
+                     f"{100 * each.cpu_cores:.1f} % of a core, {each.decisions_hz:.2f} decisions/s"))  # fmt: skip
+    slope = report.heap_slope_mib_h
+    heap = "not measured" if slope is None else f"{slope:+.1f} MiB/h over {report.heap_s:g} s"
+    rows.append(("heap of the page", heap))
+    lines = ["| what | figure |", "|---|---|", *(f"| {name} | {figure} |" for name, figure in rows)]
+    before, after = report.load_average
+    return "\n".join(lines) + f"\n\nwithout answer: {report.unanswered}; load {before:.2f} before, {after:.2f} after\n"
+
+
+def _spread(figures: Percentiles) -> str:
+    if figures.p50 is None:
+        return "-"
+    return f"p50 {figures.p50:.0f}, p95 {figures.p95:.0f}, p99 {figures.p99:.0f} ms (n = {figures.samples})"

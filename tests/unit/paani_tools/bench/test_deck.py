@@ -1,0 +1,70 @@
+"""The figures of `paani bench deck`: what keeps the bars, and what is told."""
+
+from __future__ import annotations
+
+import pytest
+from msgspec.structs import replace
+
+from paani_tools.bench.deck.command import main
+from paani_tools.bench.deck.loads import PageLoad
+from paani_tools.bench.deck.report import Crowd, DeckReport, decision_ratio, deck_text, heap_slope, keeps_bars
+from paani_tools.up.run_summary import Percentiles, percentiles
+
+FEW, MANY = (Crowd(clients=count, cpu_cores=0.03 * count, decisions_hz=5.0) for count in (1, 10))
+KEPT = DeckReport(
+    loads=(PageLoad(load_ms=410.0, files=40, bytes=204_800), PageLoad(load_ms=390.0, files=40, bytes=204_800)),
+    received_ms=percentiles([20.0, 30.0]),
+    drawn_ms=percentiles([120.0, 130.0]),
+    crowds=(FEW, MANY),
+    stop_ms={"on this machine": percentiles([40.0, 150.0]), "over a link of 50 ms": percentiles([150.0, 299.0])},
+    stick_ms=percentiles([60.0]),
+    unanswered=0,
+    heap_s=1800.0,
+    heap_slope_mib_h=1.25,
+    load_average=(0.5, 2.0),
+)
+
+
+def test_what_keeps_the_bars_keeps_them() -> None:
+    assert keeps_bars(KEPT)
+
+
+@pytest.mark.parametrize(
+    "missed",
+    [
+        replace(KEPT, stop_ms={**KEPT.stop_ms, "on this machine": percentiles([151.0])}),
+        replace(KEPT, stop_ms={**KEPT.stop_ms, "over a link of 50 ms": percentiles([301.0])}),
+        replace(KEPT, stop_ms={**KEPT.stop_ms, "with 10 clients": Percentiles()}),
+        replace(KEPT, unanswered=1),
+        replace(KEPT, crowds=(FEW, replace(MANY, decisions_hz=4.74))),
+        replace(KEPT, crowds=(FEW,)),
+    ],
+)
+def test_each_bar_can_be_missed(missed: DeckReport) -> None:
+    assert not keeps_bars(missed)
+
+
+def test_many_clients_are_compared_with_one_over_all_rounds() -> None:
+    assert decision_ratio((FEW, replace(MANY, decisions_hz=4.0), replace(FEW, decisions_hz=3.0), MANY)) == 4.5 / 4.0
+    assert decision_ratio((MANY,)) is None
+
+
+def test_a_slope_is_that_of_the_line_through_the_samples() -> None:
+    assert heap_slope([(0.0, 10.0), (1800.0, 11.0), (3600.0, 12.0)]) == pytest.approx(2.0)
+    assert heap_slope([(0.0, 10.0), (1.0, 11.0)]) is None
+
+
+def test_every_figure_is_told_with_its_count() -> None:
+    text = deck_text(KEPT)
+    for words in ("390 to 410 ms (n = 2)", "40, 200 KiB", "p99 150 ms (n = 2)", "with 10 clients | 30.0 % of a core",
+                  "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after"):  # fmt: skip
+        assert words in text, words
+    assert "not measured" in deck_text(replace(KEPT, heap_slope_mib_h=None))
+
+
+def test_options_that_are_none_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--stops", "0"], ["--for", "-1"], ["--heap", "nan"], ["--heap", "0"]):
+        with pytest.raises(SystemExit) as ended:
+            main(words)
+        assert ended.value.code == 2
+        assert words[0] in capsys.readouterr().err
