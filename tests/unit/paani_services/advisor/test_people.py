@@ -9,6 +9,9 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config
+from paani.messages import BoxXyxy
+from paani_services.advisor.people import counts, is_close, nearest_ahead_m, people_in_lane, speed_limit_mps
+from paani_services.advisor.risk import Obstacle
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, box, lane, play, seeing
 
 STILL = (m.Direction.STOP, m.Direction.NO_DATA)
@@ -202,3 +205,97 @@ def test_the_paper_weighs_a_person_as_anything_else(config: Config) -> None:
     closed = msgspec.structs.replace(lane(0.2), open_width=0.0)
     frame = msgspec.structs.replace(CLEAR, left=closed, center=closed, right=closed)
     assert play([frame], config)[1][-1].direction is m.Direction.STRAIGHT
+
+
+PEOPLE = PAANI.advisor.people
+AHEAD, BESIDE, LEFT, RIGHT = (0.45, 0.4, 0.55, 0.6), (0.27, 0.4, 0.30, 0.6), (0.1, 0.4, 0.2, 0.6), (0.8, 0.4, 0.9, 0.6)
+
+
+def person(box: BoxXyxy = AHEAD, **changes: object) -> Obstacle:
+    seen = Obstacle(1, False, box, 0.5, 0.0, 1.0, is_danger=False, is_person=True)
+    return msgspec.structs.replace(seen, **changes)
+
+
+def blocked(obstacle: Obstacle) -> set[str]:
+    return {lane for lane in ("left", "center", "right") if people_in_lane(lane, (obstacle,), PAANI)}
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "lanes"),
+    [
+        (person(), {"center"}),
+        (person(LEFT), {"left"}),
+        (person(RIGHT), {"right"}),
+        (person(BESIDE), {"left", "center"}),  # about to drift into the way
+        (person(BESIDE, candidate=1), {"left"}),  # what may be a person is not taken to drift
+        (person((0.2, 0.4, 0.26, 0.6)), {"left"}),
+        (person((0.70, 0.4, 0.73, 0.6)), {"center", "right"}),
+        (person((0.74, 0.4, 0.80, 0.6)), {"right"}),
+        (person((0.45, 0.2, 0.55, 0.8)), {"left", "center", "right"}),  # so close that nothing is passed
+        (person((0.45, 0.2, 0.55, 0.79)), {"center"}),
+        (person(distance_m=PEOPLE.ahead_m), {"center"}),
+        (person(distance_m=PEOPLE.ahead_m + 0.01), set()),
+        (person(LEFT, distance_m=PEOPLE.slow_m), {"left"}),
+        (person(LEFT, distance_m=PEOPLE.slow_m + 0.01), set()),
+        (person(RIGHT, distance_m=PEOPLE.slow_m + 0.01), set()),
+        (person(distance_m=PEOPLE.stop_m), {"left", "center", "right"}),
+        (person(is_ashore=True), set()),
+        (person(is_person=False), set()),
+        (person(is_person=False, candidate=2), {"center"}),
+        (person(is_confirmed=False, presence=0.5), {"center"}),
+        (person(is_confirmed=False, presence=0.49), set()),
+        (person(is_confirmed=True, presence=0.01), {"center"}),
+    ],
+)
+def test_a_person_blocks_these_corridors(obstacle: Obstacle, lanes: set[str]) -> None:
+    assert blocked(obstacle) == lanes
+    assert counts(obstacle) is bool(lanes or obstacle.distance_m)
+
+
+def test_only_those_in_the_lane_are_named_and_the_paper_names_nobody() -> None:
+    both = (person(LEFT), person(), person(RIGHT), person())
+    assert people_in_lane("center", both, PAANI) == (1, 3)
+    assert people_in_lane("center", both, PAPER) == ()
+    assert speed_limit_mps(both, PAPER) is None
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "stops"),
+    [
+        (person(distance_m=PEOPLE.stop_m), True),
+        (person(distance_m=PEOPLE.stop_m + 0.01), False),
+        (person((0.45, 0.0, 0.55, 1.0), distance_m=5.0), False),  # where the distance is known it decides
+        (person((0.45, 0.25, 0.55, 0.85)), True),
+        (person((0.45, 0.25, 0.55, 0.84)), False),
+        (person(LEFT, distance_m=0.5), False),  # beside the way
+        (person((0.45, 0.0, 0.55, 1.0), candidate=1), False),
+        (person(distance_m=0.5, candidate=1), False),
+    ],
+)
+def test_the_boat_stops_for_somebody_in_the_way_who_is_near(obstacle: Obstacle, stops: bool) -> None:
+    assert is_close(obstacle, PAANI) is stops
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "is_limited"),
+    [
+        (person(), True),
+        (person(LEFT), True),  # anywhere in the picture
+        (person(distance_m=PEOPLE.slow_m), True),
+        (person(distance_m=PEOPLE.slow_m + 0.01), False),
+        (person(is_ashore=True), False),
+        (person(candidate=1), True),
+        (person(LEFT, candidate=1), False),  # what may be a person counts in the way alone
+    ],
+)
+def test_people_near_limit_the_speed(obstacle: Obstacle, is_limited: bool) -> None:
+    limit = PEOPLE.slow_mps if is_limited else None
+    assert speed_limit_mps((obstacle,), PAANI) == limit
+    assert speed_limit_mps((person(is_ashore=True), obstacle), PAANI) == limit
+
+
+def test_the_nearest_is_the_least_known_distance() -> None:
+    crowd = (person(distance_m=9.0), person(), person(distance_m=4.0), person(distance_m=2.0))
+    assert nearest_ahead_m(crowd, (0, 1, 2)) == 4.0
+    assert nearest_ahead_m(crowd, (1,)) is None
+    assert nearest_ahead_m(crowd, ()) is None

@@ -16,6 +16,7 @@ from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION, RES
 from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.guidance.visual_turns import VisualTurn
+from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import (
     NavigatorInputs,
     NavigatorState,
@@ -286,3 +287,24 @@ def test_a_visual_turn_ends_with_straight_advice_or_disarming_alone(changes: dic
     assert first.turn is not None
     after, _ = navigate(first, inputs(**changes), MISSION, NOW_US, 43, PAANI)
     assert (after.turn is None) is ends
+
+
+def test_other_legs_begin_without_the_integral_of_those_before_and_with_their_home() -> None:
+    before = msgspec.structs.replace(
+        RUNNING,
+        progress=MissionProgress(target=2, waypoints_reached=4, home=Waypoint(x_m=1.0, y_m=2.0)),
+        ilos=IlosState(east_m=1.5, updated_us=NOW_US),
+    )
+    route = m.OperatorOrder(source_us=NOW_US, mode=m.DriveMode.ROUTE, mission_us=7)
+    other = msgspec.structs.replace(MISSION, legs_us=7)
+    given_inputs = inputs(order=route, order_us=NOW_US, advisory=advice(Direction.STOP))
+    state, _ = follow_order(before, given_inputs, other, NOW_US, 43, PAANI)
+    assert (state.ilos.east_m, state.progress.home, state.legs_us) == (0.0, Waypoint(x_m=1.0, y_m=2.0), 7)
+
+
+@pytest.mark.parametrize(("mode", "leg"), [(m.DriveMode.IDLE, "idle"), (m.DriveMode.HOLD, "")])
+def test_a_stale_order_is_no_leg_but_that_of_idle(mode: m.DriveMode, leg: str) -> None:
+    order = m.OperatorOrder(source_us=NOW_US, mode=mode)
+    old_us = NOW_US - round(PAANI.order_max_age_s * 1e6) - 1
+    _, command = follow_order(RUNNING, inputs(order=order, order_us=old_us), MISSION, NOW_US, 43, PAANI)
+    assert (command.enable, command.inhibits, command.leg) == (False, (Inhibit.STALE_ORDER,), leg)

@@ -233,3 +233,43 @@ def test_a_wheel_that_is_taken_over_in_manual_rests_from_then_on() -> None:
     bridge.now_us += 50_000
     assert bridge.ask(RequestAct.WHEEL, hand=2) is ModeRefusal.NONE
     assert (bridge.wheel.mode, bridge.wheel.since_us) == (DriveMode.IDLE, bridge.now_us)
+
+
+@pytest.mark.parametrize(("left_us", "is_in_force"), [(0, False), (1, True), (10_000_000, True), (10_000_001, False)])
+def test_an_override_lasts_to_the_microsecond_and_never_longer_than_asked(left_us: int, is_in_force: bool) -> None:
+    """What lies further ahead than an override lasts is of a clock that was set back."""
+    wheel = w.Wheel(mode=DriveMode.MANUAL, override_until_us=BEGUN_US + left_us)
+    assert w.is_overridden(wheel, BEGUN_US) is is_in_force
+
+
+def test_a_hands_order_is_dated_by_its_word_and_any_other_by_now() -> None:
+    """So that the navigator may judge how old the word of a hand is."""
+    bridge = at_the_wheel()
+    said_us = bridge.now_us
+    bridge.now_us += 200_000
+    assert bridge.order.source_us == said_us
+    assert bridge.mode(DriveMode.HOLD) is ModeRefusal.NONE
+    assert bridge.order.source_us == bridge.now_us
+    assert (bridge.order.by, bridge.order.hand, bridge.order.since_us) == (STATION, 1, bridge.now_us)
+
+
+def test_everybody_hears_who_holds_the_wheel_and_what_was_answered() -> None:
+    bridge = at_the_wheel()
+    assert bridge.ask(RequestAct.OVERRIDE) is ModeRefusal.NONE
+    assert bridge.ask(RequestAct.OVERRIDE, hand=2) is ModeRefusal.NOT_HOLDER
+    bridge.now_us += 100_000
+    state = w.with_wheel(
+        m.OperatorState(source_us=5, armed=True, stopped=False), bridge.wheel, w.Facts(), bridge.now_us
+    )
+    assert (state.source_us, state.armed, state.mode, state.mode_since_us) == (5, True, DriveMode.MANUAL, BEGUN_US)
+    assert (state.wheel_by, state.wheel_hand) == (STATION, 1)
+    assert state.override_ms == pytest.approx(1e3 * w.OVERRIDE_S - 100.0)
+    answered = (state.answered_by, state.answered, state.mode_refusal)
+    assert answered == (STATION, bridge.wheel.answer.press, ModeRefusal.NOT_HOLDER)
+    assert {(each.mode, each.refusal) for each in state.barred} == {
+        (DriveMode.ROUTE, ModeRefusal.NO_MISSION),
+        (DriveMode.HOLD, ModeRefusal.NO_POSITION),
+        (DriveMode.RETURN, ModeRefusal.NO_POSITION),
+    }
+    plain = w.with_wheel(m.OperatorState(source_us=5, armed=False, stopped=True), w.Wheel(), ALL, bridge.now_us)
+    assert (plain.override_ms, [each.mode for each in plain.barred]) == (0.0, [DriveMode.MANUAL])
