@@ -273,6 +273,11 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
             assert missions.value.accepted_us == accepted.accepted_us
             await node.until(lambda: order().by == "ros2", "which that word alone takes", lambda: say("WHEEL"))
 
+            def is_newer() -> bool:
+                return missions.value is not None and missions.value.accepted_us > accepted.accepted_us
+
+            await node.until(is_newer, "whose hand may send a goal", lambda: go("map"))
+
 
 async def test_a_node_stops_the_boat_and_can_say_nothing_else(spawn: Spawn, open_as: OpenAs) -> None:
     listen = find_free_port()
