@@ -88,13 +88,6 @@ class Deck:
                 await self._page.evaluate(TAKE_WHEEL)
                 await asyncio.sleep(0.3)
 
-    async def slow_down(self, latency_ms: float) -> None:
-        """From now on every answer takes so much longer, as over a link."""
-        conditions = {"offline": False, "latency": latency_ms, "downloadThroughput": -1, "uploadThroughput": -1}
-        tools = await self._tools()
-        await tools.send("Network.enable")
-        await tools.send("Network.emulateNetworkConditions", conditions)
-
     async def heap_mib(self) -> float:
         """Of JavaScript, after a collection."""
         tools = await self._tools()
@@ -111,13 +104,13 @@ class Browser:
     """Headless Chromium."""
 
     def __init__(self, browser: Any, config: Config, key: str) -> None:
-        self._browser, self._address = browser, f"{page_origin(config)}/#key={key}"
+        self._browser, self._origin, self._key = browser, page_origin(config), key
 
-    async def open_page(self) -> tuple[Deck, PageLoad]:
-        """A page of a visitor who comes for the first time: nothing is kept from before."""
+    async def open_page(self, origin: str = "") -> tuple[Deck, PageLoad]:
+        """A page of a visitor who comes for the first time: nothing is kept. origin: where, if not at the server."""
         context = await self._browser.new_context(viewport={"width": 1440, "height": 900}, service_workers="block")
         page = await context.new_page()
-        await page.goto(self._address)
+        await page.goto(f"{origin or self._origin}/#key={self._key}")
         async with asyncio.timeout(LIVE_TIMEOUT_S):
             while not await page.evaluate(LIVE):  # noqa: ASYNC110  # a browser wakes nobody, and the page forbids eval
                 await asyncio.sleep(POLL_S)

@@ -9,11 +9,14 @@ import sys
 
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config
+from paani.errors import UserError
 from paani.extras import require_modules
 from paani.option_numbers import whole_number
 from paani.option_paths import output_file
+from paani.page_address import is_page_exposed, page_host
 from paani.whole_file import write_json
 from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars
+from paani_tools.bench.deck.slow_link import slow_link
 from paani_tools.inspect.listen import observer
 from paani_tools.up.command import seconds, up_sets
 from paani_tools.up.lifecycle import run_plan
@@ -21,8 +24,8 @@ from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import percentiles
 from paani_tools.up.terminal import Display
 
-LINK_MS = 50.0
-HERE, CROWDED, LINK = "on this machine", "with 10 clients", f"over a link of {LINK_MS:g} ms"
+LINK_MS = 50.0  # each way
+HERE, CROWDED, LINK = "on this machine", "with 10 clients", f"over a link of {LINK_MS:g} ms each way"
 
 
 def main(argv: list[str]) -> int:
@@ -42,6 +45,8 @@ def main(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     require_modules("bench deck", "playwright")
     config = config_from(options, up_sets(world=options.world, camera=None, headless=False))
+    if is_page_exposed(config):
+        raise UserError(f"dashboard.host {config.dashboard.host}: this bench measures a page on the loopback interface")
     report = asyncio.run(_measure(config, options))
     sys.stdout.write("\n" + deck_text(report))
     if options.json:
@@ -70,9 +75,11 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport:
             stops[HERE], missed_here = await measuring.time_stops(boat, deck, options.stops)
             async with measuring.crowd(plan.config, measuring.MANY):
                 stops[CROWDED], missed_crowded = await measuring.time_stops(boat, deck, options.stops)
-            await deck.slow_down(LINK_MS)
-            stops[LINK], missed_link = await measuring.time_stops(boat, deck, options.stops)
-            await deck.slow_down(0.0)
+            page = plan.config.dashboard
+            async with slow_link(page_host(plan.config), page.port, LINK_MS * 1e-3) as port:
+                far, _ = await chromium.open_page(f"http://127.0.0.1:{port}")
+                stops[LINK], missed_link = await measuring.time_stops(boat, far, options.stops)
+                await far.close()
             sticks_ms, missed_sticks = await measuring.time_sticks(boat, deck, options.sticks)
             heap = await measuring.watch_heap(chromium, options.heap or 0.0)
             reports.append(

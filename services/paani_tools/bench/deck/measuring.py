@@ -105,7 +105,10 @@ async def time_stops(boat: Boat, deck: Deck, count: int) -> tuple[list[float], i
 
 
 async def time_sticks(boat: Boat, deck: Deck, count: int) -> tuple[list[float], int]:
-    """From each key on the page to the report of the turn it asks for [ms], and how many nothing followed."""
+    """From each key on the page to the report of the turn it asks for [ms], and how many nothing followed.
+
+    MANUAL ends where the page was silent for too long, as on a busy machine; then the wheel is taken again.
+    """
     await boat.arm()
     await deck.take_wheel()
     found_ms, unanswered = list[float](), 0
@@ -118,6 +121,7 @@ async def time_sticks(boat: Boat, deck: Deck, count: int) -> tuple[list[float], 
             found_ms.append((at_us - pressed_us) * 1e-3)
         except TimeoutError:
             unanswered += 1
+            await deck.take_wheel()
         await deck.let_key_go(code)
     return found_ms, unanswered
 

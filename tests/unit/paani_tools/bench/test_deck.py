@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
+from paani.errors import UserError
 from paani_tools.bench.deck.command import main
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.bench.deck.report import Crowd, DeckReport, decision_ratio, deck_text, heap_slope, keeps_bars
@@ -68,3 +69,8 @@ def test_options_that_are_none_end_with_2(capsys: pytest.CaptureFixture[str]) ->
             main(words)
         assert ended.value.code == 2
         assert words[0] in capsys.readouterr().err
+
+
+def test_a_page_that_others_reach_is_refused_before_anything_starts() -> None:
+    with pytest.raises(UserError, match=r"dashboard\.host 0\.0\.0\.0"):
+        main(["--set", "dashboard.host=0.0.0.0"])
