@@ -206,9 +206,12 @@ async def test_machines_ask_for_life_readiness_and_metrics(
                     break
                 await asyncio.sleep(0.1)
         assert set(unready) == {name for name in config.services if name != "dashboard"}
-        async with client.get("/metrics") as answer:
-            assert (answer.status, answer.content_type) == (200, "text/plain")
-            lines = (await answer.text()).splitlines()
+        async with asyncio.timeout(10):
+            lines: list[str] = []
+            while not any(line.startswith("paani_advice{") for line in lines):
+                async with client.get("/metrics") as answer:
+                    assert (answer.status, answer.content_type) == (200, "text/plain")
+                    lines = (await answer.text()).splitlines()
         assert 'paani_service_ready{service="dashboard"} 1.0' in lines
         assert 'paani_service_ready{service="navigator"} 0.0' in lines
         assert 'paani_advice{direction="RIGHT"} 1.0' in lines

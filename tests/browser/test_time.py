@@ -57,6 +57,9 @@ async def test_a_press_shows_that_moment_everywhere(
         assert len({overlay[name] for name in ("frame_seq", "picture_seq", "mask_seq", "evidence_seq")}) == 1
         assert overlay["frame_seq"] <= before, "the picture of that moment"
         assert await page.evaluate("document.querySelector('#arm').disabled && document.querySelector('#drive').hidden")
+        await page.click("#map-edit")
+        assert await page.evaluate("document.querySelector('#editor-send').offsetParent") is None, "nothing is sent"
+        await page.click("#map-edit")
         frame = "getComputedStyle(document.body, '::after').borderTopWidth"
         assert await page.evaluate(frame) == "5px", "unmistakable"
         await page.screenshot(path=tmp_path / "past.png")

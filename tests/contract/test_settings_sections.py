@@ -27,6 +27,7 @@ KNOWN = {  # section that another process owns, and why it is read
     ("ros2", "navigator"): "the speed that a hand gets at full stick, by which `cmd_vel` is scaled",
     ("foxglove", "perception"): "the corridors that are drawn over the picture and on the water",
     ("foxglove", "localization"): "the origin of the map, at which route and fence are placed on the earth",
+    ("dashboard", "recorder"): "the folder whose recordings the page lists and plays",
     ("dashboard", "camera"): "what the page shows of the source of pictures",
     ("dashboard", "world"): "what the page shows of the simulated world",
     ("dashboard", "perception"): "the corridors that the page draws",

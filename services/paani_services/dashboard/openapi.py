@@ -13,7 +13,7 @@ from paani import messages as m
 from paani.board_status import STATUS_PATH, BoardStatus
 from paani.version import version_text
 from paani_services.dashboard import answers as a
-from paani_services.dashboard import driving, past, process_logs, requests, tuning
+from paani_services.dashboard import driving, past, process_logs, recording_routes, recordings, requests, tuning
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
 from paani_services.dashboard.missions import MissionBody
 from paani_services.dashboard.picture_stream import MEDIA_TYPE
@@ -41,6 +41,8 @@ class Operation(NamedTuple):
 
 ACT = (401, 403)
 ASK = (*ACT, 409, 503)
+READ = (401, 404, 409, 503)
+KEEP = (*ACT, 404, 409, 500)
 OPERATIONS = (
     Operation("get", "/", "The page.", HTML, errors=(303,)),
     Operation("get", "/static/{name}", "A file of the page.", HTML, errors=(404,), is_open=True),
@@ -76,6 +78,33 @@ OPERATIONS = (
         BYTES,
         query=past.WindowQuery,
         errors=(401,),
+    ),
+    Operation("get", "/api/recordings", "Which there are.", recordings.RecordingList, errors=(401, 404)),
+    Operation("get", "/api/recordings/{name}/file", "One, as it is.", BYTES, errors=(401, 404)),
+    Operation("get", "/api/recordings/{name}/series", "Its samples and events.", past.Series, errors=READ),
+    Operation(
+        "get",
+        "/api/recordings/{name}/frames",
+        "What a page is given of it, as of the history.",
+        BYTES,
+        query=past.WindowQuery,
+        errors=READ,
+    ),
+    Operation(
+        "post",
+        "/api/recordings/protect",
+        "Keep one whatever the budget, or no longer.",
+        a.DoneAnswer,
+        recording_routes.ProtectRequest,
+        errors=KEEP,
+    ),
+    Operation(
+        "post",
+        "/api/recordings/delete",
+        "Delete one that is neither protected nor being written.",
+        a.DoneAnswer,
+        recording_routes.RecordingRequest,
+        errors=KEEP,
     ),
     Operation("get", "/api/logs/{service}", "The last lines of a log.", process_logs.LogLines, errors=(401, 404, 500)),
     Operation("post", "/api/mission", "Another mission and fence.", a.DoneAnswer, MissionBody, errors=(408, *ASK)),

@@ -29,6 +29,7 @@ from paani_services.dashboard.operator_events import REFUSALS
 from paani_services.dashboard.pages import SECURITY_HEADERS, WORKER, StaticFile
 from paani_services.dashboard.past import PastRoutes
 from paani_services.dashboard.process_logs import LogRoutes
+from paani_services.dashboard.recording_routes import RecordingRoutes
 from paani_services.dashboard.requests import (
     BadRequestError,
     NoQuery,
@@ -74,7 +75,11 @@ class Server:
         self._missions = Missions(missions, gatekeeper.refuse_act)
         self._machines = Machines(hub, operator, clock, config, gatekeeper)
         self._driving = Driving(operator, gatekeeper.refuse_act)
-        self._reading = [*PastRoutes(hub, history).routes(), *LogRoutes(config.bus).routes()]
+        self._reading = [
+            *PastRoutes(hub, history).routes(),
+            *LogRoutes(config.bus).routes(),
+            *RecordingRoutes(config.recorder.folder, gatekeeper.refuse_act).routes(),
+        ]
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered
 

@@ -42,16 +42,17 @@ export function renderExplanation(store, now) {
   const fresh = store.isFresh("advisor/advisory", now), panel = /** @type {HTMLElement} */ (document.querySelector(".why"));
   for (const part of panel.children) if (part.tagName !== "HEADER" && part.id !== "stages") part.classList.toggle("stale", !fresh);
   setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice received");
+  panel.dataset.empty = String(!advisory);
+  const tracks = store.get("advisor/tracks");
+  byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));
+  setText(byId("tracks-sum"), tracks?.tracks.length ? `${tracks.tracks.length} tracked${advisory ? `, ${advisory.contributing_track_ids.length} in the risk` : ""}` : "");
+  renderTracks(tracks, new Set(advisory?.contributing_track_ids));
   if (!advisory || !settings) return;
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
   renderPath(advisory);
   const weights = weightsInForce(settings.weights, store.get("advisor/shadow"));
   for (const [name] of CORRIDORS) renderCorridor(rows[name], advisory[name], advisory[name].limit || (name === "center" ? advisory.center_block_risk : advisory.side_block_risk), weights);
   renderInput(store.get("perception/evidence"), advisory, store.ageS("perception/evidence", now));
-  const tracks = store.get("advisor/tracks");
-  byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));
-  setText(byId("tracks-sum"), tracks?.tracks.length ? `${tracks.tracks.length} tracked, ${advisory.contributing_track_ids.length} in the risk` : "");
-  renderTracks(tracks, new Set(advisory.contributing_track_ids));
 }
 
 /** @param {any} advisory */

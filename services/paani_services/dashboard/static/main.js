@@ -16,6 +16,7 @@ import { renderMotion } from "./motion.js";
 import { bindOperatorControls, renderOperatorState } from "./operator.js";
 import { bindPalette, nextPalette } from "./palette.js";
 import { requireSession } from "./requests.js";
+import { bindRecordings } from "./recordings.js";
 import { renderSensors } from "./sensors.js";
 import { connect } from "./socket.js";
 import { renderStages } from "./stages.js";
@@ -100,6 +101,7 @@ bindAlerts();
 void navigator.serviceWorker?.register("/static/service_worker.js", { scope: "/" }).catch(() => {}); // not every browser takes it
 bindTabs();
 bindTopics();
+bindRecordings(time);
 bindOperatorControls();
 bindDrive();
 connect(onMessage, onOpen);

@@ -31,3 +31,10 @@ export function historySource() {
 export async function loadHistory(series) {
   series.load(await (await ask("/api/history")).json());
 }
+
+/** A recording, with its samples and events; throws an error with the server's reason. @param {string} name @returns {Promise<import("./playback.js").Source>} */
+export async function recordingSource(name) {
+  const path = `/api/recordings/${encodeURIComponent(name)}`, series = new Series();
+  series.load(await (await ask(`${path}/series`)).json());
+  return { name, series, isKeyframed: false, fetch: (fromUs, toUs) => fetchFrames(`${path}/frames`, fromUs, toUs) };
+}

@@ -194,6 +194,12 @@ export const HEALTH_INPUTS = "health/dashboard";
 /** Fields of every message's header, which the tab of devices leaves out. */
 export const DEVICE_FACTS = { header: ["source_us", "seq", "epoch", "domain", "producer", "sent_us", "steady_us", "devices"] };
 
+/** The recordings tab. */
+export const RECORDING_TEXTS = {
+  reading: "reading", in: "in", none: "nothing is recorded there yet", leftOut: "older ones are not listed", running: "being written", protected: "protected",
+  play: "Replay here", download: "Download", protect: "Protect", unprotect: "Unprotect", delete: "Delete", sure: "Press again to delete",
+};
+
 /** Plots over time: title with its unit, and the curves: column, name, colour. @type {[string, [string, string, string][]][]} */
 export const PLOTS = [
   ["Speed [m/s]", [["speed_mps", "ahead", "--cyan"]]],

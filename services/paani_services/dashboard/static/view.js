@@ -26,7 +26,7 @@ export class View {
     const value = header.picture ?? decodeJson(body);
     this.store.put(key, value, header.age_ms, now, body.byteLength);
     if (key in this.tracks) this.addPose(key, value);
-    return { value, drawn: this.frames.put(key, value, body) };
+    return { value, drawn: this.frames.put(key, value, body).catch(() => undefined) }; // a damaged picture is not shown
   }
 
   /** @param {string} key @param {any} pose */
