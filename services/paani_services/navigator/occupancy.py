@@ -8,9 +8,9 @@ from paani import messages as m
 from paani.config import NavigatorConfig
 from paani.occupancy_cells import pack_cells
 from paani_services.navigator.avoidance.replanning import PlannerState
-from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
+from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, build_occupancy_grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS
 
 
 def occupancy_around(
@@ -25,9 +25,7 @@ def occupancy_around(
         return None
     if odometry is None or not odometry.healthy:
         return None
-    moving = find_dynamic_obstacles(observations, now_us, camera, config.planner) if config.planner.predict else ()
-    boxes: BoxIds = frozenset().union(*(each.vacated_boxes for each in moving))
-    grid = build_occupancy_grid(observations, (here.x_m, here.y_m), now_us, camera, config.planner, boxes)
+    grid, _ = map_water(observations, (here.x_m, here.y_m), now_us, camera, config.planner)
     cells = np.full(grid.occupied.shape, m.Occupancy.UNKNOWN, np.uint8)
     cells[grid.free] = m.Occupancy.FREE
     cells[grid.blind_zone] = m.Occupancy.BLIND_ZONE

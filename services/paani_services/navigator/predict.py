@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from paani.clock import has_passed
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
 from paani.messages import (
@@ -23,6 +24,7 @@ from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obst
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import NavigatorState
 
+PLAN_MAX_AGE_US = 1_000_000  # of a plan whose reasons are told; the boat is not steered by an older one
 EVERY = 3  # steps of the rollout between two points that are drawn
 
 
@@ -53,7 +55,15 @@ def predict(
         nearest = min(encounters, key=lambda each: (each.kind is EncounterClass.NONE, each.approach.tcpa_s))
         courtesy = describe_encounter(nearest, boat, order)
     obstacles = tuple(_on_map(each, boat, odometry) for each in encounters if boat is not None)
-    return Prediction(source_us=odometry.source_us, path=path, obstacles=obstacles, home=home, courtesy=courtesy)
+    is_planned = not has_passed(state.planner_state.planned_us, PLAN_MAX_AGE_US, now_us)
+    return Prediction(
+        source_us=odometry.source_us,
+        path=path,
+        obstacles=obstacles,
+        home=home,
+        courtesy=courtesy,
+        headings=state.planner_state.verdicts if is_planned else (),
+    )
 
 
 def _home(state: NavigatorState, mission: Mission | None) -> tuple[Waypoint, ...]:

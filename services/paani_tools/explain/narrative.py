@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import itertools
 import math
 
 import msgspec
@@ -12,6 +13,7 @@ from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
     Direction,
+    HeadingVerdict,
     Inhibit,
     Lane,
     LaneRisk,
@@ -151,6 +153,7 @@ def _navigator(moment: Moment) -> list[str]:
         return ["no order on this advice in the log"]
     planned_for = [f"planned for {obstacles}"] if (obstacles := _planned_for(moment, order.obstacle_track_ids)) else []
     planned_for += _encounters(moment)
+    planned_for += _headings(moment.prediction.headings) if moment.prediction is not None else []
     if not order.enable:
         return [f"holds the boat: {inhibits(order.inhibits)}", *planned_for]
     course = f"steer {_heading_deg(order.heading_rad):03.0f} deg at {order.speed_mps:.2f} m/s"
@@ -177,6 +180,34 @@ def _encounters(moment: Moment) -> list[str]:
         when = f"in {tcpa_s:.1f} s" if tcpa_s > 0.0 else "now"
         lines.append(f"{_planned_for(moment, (each.track_id,))} nearest {when}: {cpa_m:.1f} m, +- {std_m:.1f} m")
     return lines
+
+
+def _headings(verdicts: tuple[HeadingVerdict, ...]) -> list[str]:
+    """Why headings were not taken, from port to starboard, neighbours alike together; and what the cheapest costs."""
+    if not verdicts:
+        return []
+    course_rad = verdicts[0].heading_rad
+    ordered = sorted(verdicts, key=lambda each: -wrap_rad(each.heading_rad - course_rad))
+    lines = []
+    for text, group in itertools.groupby(ordered, key=_verdict):
+        alike = [f"{_heading_deg(each.heading_rad):03.0f}" for each in group]
+        lines.append(f"{alike[0] if len(alike) == 1 else f'{alike[0]} to {alike[-1]}'} deg {text}")
+    free = [
+        (msgspec.structs.asdict(each.costs), each.heading_rad) for each in verdicts if each.costs is not msgspec.UNSET
+    ]
+    if free:
+        costs, heading_rad = min(free, key=lambda pair: sum(pair[0].values()))
+        parts = [f"{name.replace('_', ' ')} {cost:.2f}" for name, cost in costs.items() if cost]
+        lines.append(f"cheapest {_heading_deg(heading_rad):03.0f} deg, cost {sum(costs.values()):.2f}")
+        lines[-1] += f": {', '.join(parts)}" if parts else ""
+    return lines
+
+
+def _verdict(verdict: HeadingVerdict) -> str:
+    """`free at 0.30 m/s`, or every reason for which the heading is refused, at the highest speed first."""
+    if verdict.costs is not msgspec.UNSET:
+        return f"free at {verdict.speed_mps:.2f} m/s"
+    return f"refused: {', '.join(each.replace('_', ' ') for each in dict.fromkeys(verdict.refused_by))}"
 
 
 def _controller(moment: Moment) -> list[str]:

@@ -55,7 +55,14 @@ from paani.messages.perception import (
     UnusableCause,
 )
 from paani.messages.plant import GpsFix, ImuSample, SimTime, ThrustApplied, TruePose, ZeroCause
-from paani.messages.prediction import EncounterClass, MovingObstacle, Prediction
+from paani.messages.prediction import (
+    Constraint,
+    EncounterClass,
+    HeadingCosts,
+    HeadingVerdict,
+    MovingObstacle,
+    Prediction,
+)
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
@@ -74,6 +81,7 @@ __all__ = [
     "CandidateKind",
     "Change",
     "ChangedBy",
+    "Constraint",
     "Count",
     "Counterfactual",
     "Detection",
@@ -87,6 +95,8 @@ __all__ = [
     "Finite",
     "GpsFix",
     "Hazard",
+    "HeadingCosts",
+    "HeadingVerdict",
     "Health",
     "ImuSample",
     "InferenceTiming",

@@ -48,14 +48,68 @@ class MovingObstacle(msgspec.Struct, frozen=True, kw_only=True):
     encounter: EncounterClass = EncounterClass.NONE
 
 
+class Constraint(StrEnum):
+    """Why the local planner refuses a heading at a speed; the first that does is told. NONE: nothing refuses it.
+
+    PERSON, STATIC_OBSTACLE, DYNAMIC_OBSTACLE: too near to one. UNKNOWN_WATER: no room to stop before it. WAIT: the boat
+    waits until something has passed. LOOK: it looks where it turns before it moves. NO_ESCAPE: it does not lead out of
+    a place where no margin is left. TOO_FAST: beside an obstacle. TURN: too small a pivot, too far round, or not the
+    one asked for.
+    """
+
+    NONE = "none"
+    PERSON = "person"
+    STATIC_OBSTACLE = "static_obstacle"
+    DYNAMIC_OBSTACLE = "dynamic_obstacle"
+    UNKNOWN_WATER = "unknown_water"
+    WAIT = "wait"
+    LOOK = "look"
+    NO_ESCAPE = "no_escape"
+    TOO_FAST = "too_fast"
+    TURN = "turn"
+
+
+class HeadingCosts(msgspec.Struct, frozen=True):
+    """What a heading costs; the unit is a quarter turn off the course.
+
+    course: off the desired one. progress: made good along it. heading_change: off the plan before. advice: not to the
+    advised side. unknown_water: on the path. proximity: to obstacles, and ahead of dynamic ones. path_obstacle: further
+    along the path. margin: how far it is intruded into.
+    """
+
+    course: Finite
+    progress: Finite
+    heading_change: Finite
+    advice: Finite
+    unknown_water: Finite
+    proximity: Finite
+    path_obstacle: Finite
+    margin: Finite
+
+
+class HeadingVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """Why the plan in force took or refused a heading.
+
+    refused_by: at each speed that was tried, the fastest first. speed_mps, costs: of the cheapest speed that nothing
+    refuses; 0 and unset where everything is refused.
+    """
+
+    heading_rad: Finite
+    refused_by: tuple[Constraint, ...]
+    speed_mps: NonNegative = 0.0
+    costs: HeadingCosts | msgspec.UnsetType = msgspec.UNSET
+
+
 class Prediction(Message, frozen=True, kw_only=True):
     """`path`: where the boat will be by the order in force, from now on; empty while it may not move.
 
     `home`: where it would return to; empty before that is known, else one point. Nothing is decided by this message.
     `courtesy`: the nearest encounter in words, and what the order does about it; empty without one.
+    `headings`: why each was taken or refused, the desired course first; empty without a plan of the last second.
     """
 
     path: tuple[Waypoint, ...] = ()
     obstacles: tuple[MovingObstacle, ...] = ()
     home: tuple[Waypoint, ...] = ()
     courtesy: Text = ""
+    headings: tuple[HeadingVerdict, ...] = ()

@@ -9,15 +9,15 @@ from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
-from paani.messages import Evidence, Odometry, Tracks
+from paani.messages import Evidence, HeadingVerdict, Odometry, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
-from paani_services.navigator.avoidance.planner import Plan, plan_motion
-from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles, is_refuted
+from paani_services.navigator.avoidance.planner import plan_motion
+from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import BoxIds, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
 
@@ -32,6 +32,7 @@ class PlannerState(
     course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
     waiting_since_us: since when no plan has led the boat onward.
     obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
+    verdicts: why the plan took or refused each heading; empty where another planner made it.
     """
 
     memory: ObservationMemory = ObservationMemory()
@@ -42,6 +43,7 @@ class PlannerState(
     waiting_since_us: int | None = None
     frame_id: tuple[int, int] = (-1, -1)
     obstacle_track_ids: tuple[int, ...] = ()
+    verdicts: tuple[HeadingVerdict, ...] = ()
 
 
 def observe(
@@ -71,25 +73,20 @@ def replan(
     A new plan is made for a new frame, another course or advised side, or after `replan_s`. Without an odometry pose
     the boat stops.
     """
-    plan, here = state.plan, state.memory.odom_pose
+    here = state.memory.odom_pose
     if here is None:
         return state, Plan(odometry.yaw_rad, 0.0)
-    is_other_side = setpoint.advised_side != state.advised_side
-    is_other_course = abs(wrap_rad(setpoint.course_rad - state.course_rad)) > COURSE_TOLERANCE_RAD
-    is_new = is_other_side or is_other_course or state.memory.frame_id != state.frame_id
-    if plan is None or is_new or has_passed(state.planned_us, config.replan_s * 1e6, now_us):
-        observations = state.memory.observations
-        obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
-        boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
-        grid = build_occupancy_grid(observations, (here.x_m, here.y_m), now_us, camera, config, boxes)
-        obstacles = tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
+    plan = state.plan
+    if plan is None or _is_plan_due(state, setpoint, now_us, config):
+        grid, obstacles = map_water(state.memory.observations, (here.x_m, here.y_m), now_us, camera, config)
         grid = apply_fence(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         start = BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
         since_us = now_us if state.waiting_since_us is None else min(state.waiting_since_us, now_us)
         may_wait = (now_us - since_us) * 1e-6 < config.patience_s
+        verdicts: tuple[HeadingVerdict, ...] = ()
         if planner is None:
-            plan = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
+            plan, verdicts = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
         else:
             plan = Plan(*planner(_planning_inputs(grid, start, setpoint, plan, config, obstacles)))
         state = PlannerState(
@@ -101,8 +98,16 @@ def replan(
             since_us if plan.is_waiting or plan.speed_mps == 0.0 else None,
             state.memory.frame_id,
             tuple(sorted({obstacle.track_id for obstacle in obstacles} - {0})),
+            verdicts,
         )
     return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
+
+
+def _is_plan_due(state: PlannerState, setpoint: GuidanceSetpoint, now_us: int, config: PlannerConfig) -> bool:
+    """Whether the frame, the course or the advised side is another, or the plan is `replan_s` old."""
+    is_other_course = abs(wrap_rad(setpoint.course_rad - state.course_rad)) > COURSE_TOLERANCE_RAD
+    is_other = setpoint.advised_side != state.advised_side or state.memory.frame_id != state.frame_id
+    return is_other or is_other_course or has_passed(state.planned_us, config.replan_s * 1e6, now_us)
 
 
 def _planning_inputs(

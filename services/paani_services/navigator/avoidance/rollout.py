@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from paani import portable
@@ -47,6 +48,17 @@ class GuidanceSetpoint(NamedTuple):
     speed_mps: float
     advised_side: float = 0.0
     is_pivot_only: bool = False
+
+
+class Plan(msgspec.Struct, frozen=True, rename={"is_waiting": "waits"}):
+    """The heading and speed to order; speed 0 where no candidate is feasible. Recorded under the names of `rename`.
+
+    `is_waiting`: the boat waits until a dynamic obstacle has passed; it may pivot meanwhile.
+    """
+
+    heading_rad: float
+    speed_mps: float
+    is_waiting: bool = False
 
 
 def sample_candidates(start: BoatState, setpoint: GuidanceSetpoint, config: PlannerConfig) -> tuple[F64, F64]:

@@ -15,7 +15,12 @@ from paani.config import PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.mapping.observation import BOX_STEPS, OUTLINE_POINTS, Observation, ObstacleBox
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, own_hull_top
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, OccupancyGrid
+from paani_services.navigator.mapping.occupancy_grid import (
+    GRID_CELLS,
+    BoxIds,
+    OccupancyGrid,
+    build_occupancy_grid,
+)
 from paani_services.navigator.mapping.projection import (
     PinholeCamera,
     pinhole_at,
@@ -67,6 +72,20 @@ class DynamicObstacle(NamedTuple):
     def is_moving(self) -> bool:
         """Whether it moves for certain; a person who may swim has a standard deviation alone."""
         return any(self.velocity[:2])
+
+
+def map_water(
+    observations: tuple[Observation, ...],
+    position_m: tuple[float, float],
+    now_us: int,
+    camera: Camera,
+    config: PlannerConfig,
+) -> tuple[OccupancyGrid, tuple[DynamicObstacle, ...]]:
+    """The grid around a position, and the dynamic obstacles, which are not on it."""
+    obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
+    boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
+    grid = build_occupancy_grid(observations, position_m, now_us, camera, config, boxes)
+    return grid, tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
 
 
 def find_dynamic_obstacles(

@@ -64,6 +64,18 @@ def test_encounters_are_told_with_their_closest_point_and_keep_their_class() -> 
         assert kept.courtesy == f"Give way: person #{number} crossing from {side}, waiting until it is past"
 
 
+def test_the_reasons_of_the_plan_are_told_while_the_boat_is_steered_by_it() -> None:
+    planner, _, now_us = watch(4, with_tracks=True)
+    here = odometry(now_us, AT_REST)
+    planner, plan = replan(planner, here, GuidanceSetpoint(0.3, 0.6), now_us, CAMERA, PLANNER)
+    state = NavigatorState(planner_state=planner)
+    headings = predict(state, AHEAD, here, None, now_us, CAMERA, NAVIGATOR).headings
+    assert headings == planner.verdicts
+    assert headings[0].heading_rad == pytest.approx(0.3)
+    assert plan.heading_rad in [each.heading_rad for each in headings]
+    assert predict(state, AHEAD, here, None, now_us + 1_100_000, CAMERA, NAVIGATOR).headings == ()
+
+
 def test_the_way_ahead_leads_to_the_ordered_heading_and_is_none_where_the_boat_may_not_move() -> None:
     here = replace(odometry(1_000_000, AT_REST), x_m=100.0, y_m=50.0, surge_mps=0.5)
     path = predict(NavigatorState(), AHEAD, here, None, 1_000_000, CAMERA, NAVIGATOR).path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import math
 from pathlib import Path
 
 import cv2
@@ -98,6 +99,32 @@ def test_the_order_tells_the_encounter_that_it_is_for(log: Path) -> None:
     assert f"{words}\n{' ' * 12}track #99 nearest in 6.0 s: 1.2 m, +- 0.5 m\n" in printed
     assert printed.count("nearest in") == 1
     assert "nearest in" not in narrative_of(msgspec.structs.replace(moment, prediction=None), CONFIG)
+
+
+def test_headings_that_were_not_taken_are_told_with_why(log: Path) -> None:
+    """From port to starboard, neighbours alike together; the costs of the cheapest by name."""
+    wall, free = m.Constraint.STATIC_OBSTACLE, m.Constraint.NONE
+    cheap = m.HeadingCosts(0.25, 0.0, 0.125, 0.0, 0.0, 0.0, 0.0, 0.0)
+    dear = msgspec.structs.replace(cheap, margin=2.0)
+    headings = tuple(
+        m.HeadingVerdict(heading_rad=math.radians(yaw_deg), refused_by=refused_by, speed_mps=speed_mps, costs=costs)
+        for yaw_deg, refused_by, speed_mps, costs in (
+            (90.0, (wall, wall, m.Constraint.TURN), 0.0, msgspec.UNSET),
+            (100.0, (wall, wall, m.Constraint.TURN), 0.0, msgspec.UNSET),
+            (80.0, (wall, free, wall), 0.3, dear),
+            (70.0, (free, free, free), 0.6, cheap),
+        )
+    )
+    moment = moment_at(open_log(log), T0_US + 8_000_000)
+    ahead = m.Prediction(source_us=1, headings=headings)
+    printed = narrative_of(msgspec.structs.replace(moment, prediction=ahead), CONFIG)
+    lines = [line.strip() for line in printed.splitlines()]
+    at = lines.index("350 to 000 deg refused: static obstacle, turn")
+    assert lines[at + 1 : at + 4] == [
+        "010 deg free at 0.30 m/s",
+        "020 deg free at 0.60 m/s",
+        "cheapest 020 deg, cost 0.38: course 0.25, heading change 0.12",
+    ]
 
 
 def test_the_newest_prediction_by_then_is_told_unless_it_is_old(tmp_path: Path) -> None:

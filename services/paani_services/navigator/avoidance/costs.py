@@ -1,0 +1,84 @@
+"""The named costs of a candidate of the local planner. Pure.
+
+The unit is the cost of a quarter turn off the desired course.
+"""
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from paani import portable
+from paani.arrays import F64
+from paani.config import PlannerConfig
+from paani.geometry import wrap_rad
+from paani_services.navigator.avoidance.clearance import advanced_in_time, least_separation_margin_m
+from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
+
+QUARTER_TURN_RAD = 0.5 * math.pi
+PATH_OBSTACLE_WEIGHT = 3.0  # an obstacle on the path at the boat; it falls linearly to none at `look_m`
+PROXIMITY_WEIGHT = 0.6  # required clearance just kept; it falls with the square to none at PROXIMITY_RANGE_M beyond it
+PROXIMITY_RANGE_M = 2.0
+MARGIN_INTRUSION_WEIGHT = 10.0  # a metre of intrusion into the safety margin, held over the whole horizon
+UNKNOWN_WATER_WEIGHT = 0.3  # a path all over unknown water: the boat turns to what it sees, and sees further from there
+LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
+HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn off the heading of the plan before
+ADVICE_WEIGHT = 0.15  # nothing turned to the advised side (M5); it falls linearly to none at ADVISED_TURN_RAD
+ADVISED_TURN_RAD = math.radians(25.0)
+
+
+class CandidateCosts(NamedTuple):
+    """Each cost by name [candidates], as `paani.messages.HeadingCosts` tells them."""
+
+    course: F64
+    progress: F64
+    heading_change: F64
+    advice: F64
+    unknown_water: F64
+    proximity: F64
+    path_obstacle: F64
+    margin: F64
+
+    @property
+    def total(self) -> F64:
+        """Their sum."""
+        return np.asarray(functools.reduce(np.add, self))
+
+
+def weigh_candidates(
+    evaluation: CandidateEvaluation,
+    margin_m: F64,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    previous: Plan | None,
+    config: PlannerConfig,
+) -> CandidateCosts:
+    """The costs of each candidate. margin_m: clearance beyond the required one [times, candidates]."""
+    speeds_mps, deviation_rad = evaluation.speeds_mps, evaluation.deviation_rad
+    travelled_m, is_in_horizon = evaluation.trajectories.travelled_m, evaluation.is_in_horizon
+    made_good = speeds_mps / speeds_mps[0] * np.array([portable.cos(each) for each in deviation_rad.tolist()])
+    change_rad = np.zeros_like(deviation_rad)
+    if previous is not None and previous.speed_mps > 0.0:
+        change_rad = angles_between_rad(evaluation.offsets_rad, wrap_rad(previous.heading_rad - start.yaw_rad))
+    disregard = np.clip(1.0 - setpoint.advised_side * evaluation.offsets_rad / ADVISED_TURN_RAD, 0.0, 1.0)
+    is_looked_at = travelled_m <= config.look_m
+    leading = [advanced_in_time(obstacle, config.lead_s) for obstacle in evaluation.obstacles]
+    ahead_m = least_separation_margin_m(leading, evaluation.trajectories, start, config)
+    nearest_m = np.where(is_in_horizon, np.minimum(margin_m, ahead_m), np.inf).min(axis=0)
+    nearness = np.clip(1.0 - nearest_m / PROXIMITY_RANGE_M, 0.0, 1.0)
+    first_m = np.where((margin_m < 0.0) & is_looked_at, travelled_m, np.inf).min(axis=0)
+    path_obstacle = np.clip(1.0 - first_m / config.look_m, 0.0, 1.0) if config.look_m > 0.0 else np.zeros_like(first_m)
+    intrusion_m = np.maximum(config.hull_radius_m + config.margin_m - evaluation.clearance_m, 0.0)
+    mean_intrusion_m = np.add.accumulate(np.where(is_in_horizon, intrusion_m, 0.0))[-1] / float(is_in_horizon.sum())
+    return CandidateCosts(
+        course=deviation_rad / QUARTER_TURN_RAD,
+        progress=LOST_PROGRESS_WEIGHT * (1.0 - made_good),
+        heading_change=HEADING_CHANGE_WEIGHT * change_rad / QUARTER_TURN_RAD,
+        advice=ADVICE_WEIGHT * abs(setpoint.advised_side) * disregard,
+        unknown_water=UNKNOWN_WATER_WEIGHT * (evaluation.is_unknown & is_looked_at).sum(axis=0) / len(is_looked_at),
+        proximity=PROXIMITY_WEIGHT * nearness * nearness,
+        path_obstacle=PATH_OBSTACLE_WEIGHT * path_obstacle,
+        margin=MARGIN_INTRUSION_WEIGHT * mean_intrusion_m,
+    )

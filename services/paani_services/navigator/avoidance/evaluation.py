@@ -1,0 +1,117 @@
+"""What each candidate of the local planner meets: clearances, people, unknown water. Pure."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from paani.arrays import F64, Bools
+from paani.config import PlannerConfig
+from paani_services.navigator.avoidance.clearance import (
+    clearance_field_m,
+    interpolate_field,
+    is_give_way_needed,
+    least_clearance_m,
+)
+from paani_services.navigator.avoidance.rollout import (
+    PIVOT_SPEED_FRACTION,
+    BoatState,
+    GuidanceSetpoint,
+    Trajectories,
+    roll_out,
+    roll_out_coasting,
+    sample_candidates,
+)
+from paani_services.navigator.mapping.distance_field import distance_field_m
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
+
+# Deviation from the desired course up to which a candidate leads onward [rad]; beyond it less than a quarter of the
+# distance sailed is made good.
+ONWARD_SECTOR_RAD = math.radians(75.0)
+
+
+class CandidateEvaluation(NamedTuple):
+    """What each candidate meets: [candidates], or [times, candidates] of `trajectories`.
+
+    deviation_rad: off the desired course; is_onward: within `ONWARD_SECTOR_RAD` of it.
+    is_pivot_to_course: whether it is the pivot to the desired course.
+    is_in_horizon: times within `horizon_s` [times, 1]; is_in_checked_range: those, or within `room_m` of path.
+    static_clearance_m: to static obstacles; clearance_m: to dynamic ones as well; person_distance_m: to seen people.
+    tight_clearance_m: hull and `tight_margin_m`.
+    is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
+    coasting: the trajectory with the thrusters off; coasting_clearance_m: its least clearance within the horizon.
+    """
+
+    obstacles: Sequence[DynamicObstacle]
+    offsets_rad: F64
+    speeds_mps: F64
+    deviation_rad: F64
+    is_onward: Bools
+    is_full_speed: Bools
+    is_pivot: Bools
+    is_pivot_to_course: Bools
+    trajectories: Trajectories
+    is_in_horizon: Bools
+    is_in_checked_range: Bools
+    static_clearance_m: F64
+    clearance_m: F64
+    person_distance_m: F64
+    is_unknown: Bools
+    tight_clearance_m: float
+    is_give_way_needed: bool
+    coasting: Trajectories
+    coasting_clearance_m: float
+
+    @property
+    def is_safe_at_rest(self) -> bool:
+        """Whether nothing comes near a boat that coasts to rest."""
+        return not self.is_give_way_needed and self.coasting_clearance_m >= self.tight_clearance_m
+
+
+def evaluate_candidates(
+    grid: OccupancyGrid,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    obstacles: Sequence[DynamicObstacle],
+    config: PlannerConfig,
+) -> CandidateEvaluation:
+    """Sample the candidates around the setpoint, roll each out, and look up what it meets."""
+    offsets_rad, speeds_mps = sample_candidates(start, setpoint, config)
+    trajectories, field_m = roll_out(start, offsets_rad, speeds_mps, config), clearance_field_m(grid, config)
+    static_m = interpolate_field(grid, field_m, trajectories)
+    tight_m = config.hull_radius_m + config.tight_margin_m
+    is_in_horizon = (trajectories.time_s <= config.horizon_s + 1e-9)[:, None]
+    coasting, last = roll_out_coasting(start, trajectories.time_s, config), int(is_in_horizon.sum()) - 1
+    at_rest = BoatState(float(coasting.x_m[last, 0]), float(coasting.y_m[last, 0]), start.yaw_rad)
+    coasting_m = least_clearance_m(interpolate_field(grid, field_m, coasting), obstacles, coasting)
+    deviation_rad = angles_between_rad(offsets_rad, float(offsets_rad[0]))
+    is_pivot = speeds_mps == PIVOT_SPEED_FRACTION * speeds_mps[0]
+    return CandidateEvaluation(
+        obstacles,
+        offsets_rad,
+        speeds_mps,
+        deviation_rad=deviation_rad,
+        is_onward=deviation_rad <= ONWARD_SECTOR_RAD,
+        is_full_speed=speeds_mps == speeds_mps[0],
+        is_pivot=is_pivot,
+        is_pivot_to_course=np.asarray(is_pivot & (offsets_rad == offsets_rad[0])),
+        trajectories=trajectories,
+        is_in_horizon=is_in_horizon,
+        is_in_checked_range=is_in_horizon | (trajectories.travelled_m <= config.room_m),
+        static_clearance_m=static_m,
+        clearance_m=least_clearance_m(static_m, obstacles, trajectories),
+        person_distance_m=interpolate_field(grid, distance_field_m(grid.people), trajectories),
+        is_unknown=interpolate_field(grid, distance_field_m(grid.unknown), trajectories) < config.hull_radius_m,
+        tight_clearance_m=tight_m,
+        is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
+        coasting=coasting,
+        coasting_clearance_m=float(np.where(is_in_horizon, coasting_m, np.inf).min()),
+    )
+
+
+def angles_between_rad(angles_rad: F64, other_rad: float) -> F64:
+    """The angle between each and the other, both wrapped: [0, pi]."""
+    off = np.abs(angles_rad - other_rad)
+    return np.asarray(np.minimum(off, 2.0 * math.pi - off))
