@@ -11,6 +11,7 @@ from paani import messages as m
 from paani.config import AdvisorConfig
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.gateway import Gateway, Request
+from paani_services.mavlink.mission_exchange import MissionOrder
 from paani_services.mavlink.parameters import parameters_of
 from paani_services.mavlink.signing import Signer
 from paani_services.mavlink.snapshot import Snapshot
@@ -112,6 +113,7 @@ class Port:
     def __init__(self, snapshot: Snapshot, *, is_signed: bool = False) -> None:
 
         self.asked: list[Request] = []
+        self.sent: list[MissionOrder] = []
         self.counted: list[str] = []
 
         def parameters(now: Snapshot) -> Any:
@@ -122,7 +124,9 @@ class Port:
         def drive(surge: float, turn: float, hand: int) -> None:
             self.driven.append((surge, turn, hand))
 
-        self.gateway = Gateway(self.asked.append, drive, parameters, self.counted.append, is_signed=is_signed)
+        self.gateway = Gateway(
+            self.asked.append, self.sent.append, drive, parameters, self.counted.append, is_signed=is_signed
+        )
         self.gateway.tick(snapshot)
 
 

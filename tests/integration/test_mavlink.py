@@ -33,6 +33,7 @@ from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.component_type import ComponentType
+from mavsdk.plugins.mission_raw import MissionItem
 from pymavlink.dialects.v20 import common
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(200)]
@@ -120,8 +121,14 @@ async def refusal_of(attempt: Awaitable[Any]) -> str:
     return "taken"
 
 
+def moved(item: MissionItem, **changes: Any) -> MissionItem:
+    """The same item with other fields."""
+    return MissionItem(**{**vars(item), **changes})
+
+
 async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(river: River, observer: Bus) -> None:
     states, speeds = observer.latest(keys.OPERATOR_STATE), observer.latest(keys.ODOMETRY)
+    missions = observer.latest(keys.MISSION)
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"udpin://127.0.0.1:{river.udp}")
         system = await mavsdk.first_autopilot(timeout_s=10.0)
@@ -149,11 +156,32 @@ async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(r
         # What it is refused.
         assert "TIMEOUT" in await refusal_of(station.parameters.set_param_float("CRUISE_SPEED", 3.0))
         assert await station.parameters.get_param_float("CRUISE_SPEED") == pytest.approx(0.6)
-        assert "UNSUPPORTED" in await refusal_of(station.mission.upload_mission(items))
+        assert "UNSUPPORTED" in await refusal_of(
+            station.mission.upload_mission([*items, moved(items[1], seq=len(items), command=22, current=0)])
+        )
         assert "DENIED" in await refusal_of(action.return_to_launch())
         assert "mode: no home" in station.texts
         assert "DENIED" in await refusal_of(action.set_home(False, 0.0, *RIVER_DEG))
         assert await telemetry.armed() is False
+
+        # A mission and a fence of its own, which the boat then has, and a mission that leaves that fence.
+        route = [moved(item, seq=seq, current=seq == 0) for seq, item in enumerate(items[1:-1])]
+        await until_taken(functools.partial(station.mission.upload_mission, route))
+        taken = await until(missions.next, lambda mission: mission.accepted_us > 0)
+        assert [len(leg.waypoints) for leg in taken.legs] == [len(route)]
+        fence = [
+            moved(route[0], command=5001, param1=4.0, x=route[0].x + north, y=route[0].y + east)
+            for north, east in ((-500_000, -500_000), (500_000, -500_000), (500_000, 500_000), (-500_000, 500_000))
+        ]
+        fence = [moved(corner, seq=seq, mission_type=1, current=0) for seq, corner in enumerate(fence)]
+        await until_taken(functools.partial(station.mission.upload_geofence, fence))
+        assert len((await until(missions.next, lambda mission: bool(mission.fence))).fence[0].corners) == 4
+        outside = [route[0], moved(route[1], x=route[1].x + 1_000_000)]
+        assert "INVALID_ARGUMENT" in await refusal_of(station.mission.upload_mission(outside))
+        assert "legs[0].waypoints[1]: is outside the fence" in station.texts
+        found = await station.mission.download_mission()
+        assert [(item.x, item.y) for item in found] == [(item.x, item.y) for item in route]
+        await until_taken(functools.partial(station.mission.upload_mission, items))
 
         # What it does. MAVSDK asks for HOLD before it arms; armed by a hold of the operator's process,
         # the boat makes way along its route when its mission is started.

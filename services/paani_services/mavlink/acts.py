@@ -7,14 +7,26 @@ from collections.abc import Awaitable, Callable
 
 from paani import messages as m
 from paani.clock import Clock
+from paani.mission_client import MissionAnswer, MissionClient
 from paani.operator_client import OperatorClient
-from paani_services.mavlink.commands import IN_PROGRESS, LATER, Act, arm_result, mode_result, stop_result
+from paani_services.mavlink.commands import (
+    IN_PROGRESS,
+    LATER,
+    Act,
+    arm_result,
+    mission_result,
+    mode_result,
+    stop_result,
+)
 from paani_services.mavlink.gateway import Request
+from paani_services.mavlink.mission_exchange import MissionOrder
 from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.station import Station
+from paani_services.mavlink.uploads import acknowledge
 
 PROGRESS_S = 0.4  # stations ask again after half a second without an answer
 STOP_TIMEOUT_S = 1.0
+MISSION_NAME = "uploaded"  # the protocol has no names
 
 
 class Acts:
@@ -26,11 +38,13 @@ class Acts:
     def __init__(
         self,
         client: OperatorClient,
+        missions: MissionClient,
         clock: Clock,
         count: Callable[[str], None],
         hands: Callable[[], frozenset[int]],
     ) -> None:
-        self._client, self._clock, self._count, self._hands = client, clock, count, hands
+        self._client, self._missions, self._clock = client, missions, clock
+        self._count, self._hands = count, hands
         self._changing = set[Station]()
         self._tasks = set[asyncio.Task[None]]()
         self._arming: Request | None = None
@@ -52,6 +66,10 @@ class Acts:
         else:
             is_repeated = request.station is self._arming.station
             self._acknowledge(request, IN_PROGRESS if is_repeated else LATER, "")
+
+    def send(self, order: MissionOrder) -> None:
+        """Begin to put a mission, a fence or both in force; the station is told how it ended."""
+        self._start(self._send_mission(order))
 
     async def stop(self) -> m.OperatorState | None:
         """The state in which STOP is latched, None where nobody answers. Whoever asks meanwhile has the same answer."""
@@ -78,6 +96,30 @@ class Acts:
             holding.cancel()
             self._arming = None
 
+    async def _send_mission(self, order: MissionOrder) -> None:
+        answer, hand = await self._put_in_force(order), order.station.hand
+        is_barred = answer is not None and answer.refusal is m.MissionRefusal.NOT_HOLDER
+        if is_barred and self._is_wheel_left() and await self._client.take_wheel(hand=hand) is m.ModeRefusal.NONE:
+            answer = await self._put_in_force(order)
+        result, text = mission_result(answer)
+        if text:
+            self._count("mavlink_refused")
+        acknowledge(order.station, order.target, result, order.kind, self._clock.now_us(), text)
+
+    async def _put_in_force(self, order: MissionOrder) -> MissionAnswer | None:
+        hand, fence = order.station.hand, order.fence
+        if order.legs is None:
+            return await self._missions.send_fence(fence or (), hand=hand)
+        if fence is None:
+            return await self._missions.send_legs(MISSION_NAME, order.legs, hand=hand)
+        both = m.Mission(source_us=0, name=MISSION_NAME, legs=order.legs, fence=fence)
+        return await self._missions.send(both, hand=hand)
+
+    def _is_wheel_left(self) -> bool:
+        """Whether the wheel is in the hand of a station that is gone."""
+        state = self._client.state
+        return state is not None and state.wheel_by == self._client.name and state.wheel_hand not in self._hands()
+
     async def _turn_wheel(self, request: Request) -> None:
         try:
             if request.act is Act.WHEEL:
@@ -93,10 +135,7 @@ class Acts:
         """A wheel that was left by a station that is gone is taken; from anybody else it is not."""
         hand = request.station.hand
         refusal = await self._client.set_mode(request.mode, hand=hand)
-        state = self._client.state
-        if refusal is not m.ModeRefusal.NOT_HOLDER or state is None:
-            return refusal
-        if state.wheel_by != self._client.name or state.wheel_hand in self._hands():
+        if refusal is not m.ModeRefusal.NOT_HOLDER or not self._is_wheel_left():
             return refusal
         refusal = await self._client.take_wheel(hand=hand)
         return await self._client.set_mode(request.mode, hand=hand) if refusal is m.ModeRefusal.NONE else refusal

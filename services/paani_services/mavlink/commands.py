@@ -11,6 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from paani import messages as m
+from paani.mission_client import MISSION_REFUSALS, MissionAnswer
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.health_bits import prearm_faults
@@ -150,3 +151,14 @@ def _judge_arming(first: int | None, second: int | None, snapshot: Snapshot) -> 
 
 def _trusted(verdict: Verdict, is_trusted: bool) -> Verdict:
     return verdict if is_trusted else Verdict(DENIED, NOT_TRUSTED)
+
+
+def mission_result(answer: MissionAnswer | None) -> tuple[int, str]:
+    """The result of a mission for MISSION_ACK, and why where it is not in force."""
+    if answer is None:
+        return dialect.MAV_MISSION_ERROR, "mission: the operator's process is silent"
+    if answer.refusal is m.MissionRefusal.NONE:
+        return dialect.MAV_MISSION_ACCEPTED, ""
+    is_invalid = answer.refusal is m.MissionRefusal.INVALID
+    result = dialect.MAV_MISSION_INVALID if is_invalid else dialect.MAV_MISSION_DENIED
+    return result, answer.fault or MISSION_REFUSALS[answer.refusal]

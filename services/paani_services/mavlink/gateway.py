@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from paani import messages as m
-from paani_services.mavlink import commands, missions
+from paani_services.mavlink import commands
 from paani_services.mavlink.announcements import Announcer, summary
 from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect, text_of
 from paani_services.mavlink.commands import Act, Verdict, judge_command, judge_mode
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.file_transfer import refuse_file
-from paani_services.mavlink.missions import EMPTY, FENCE, MISSION, RALLY, plan_of
+from paani_services.mavlink.mission_exchange import MissionExchange, MissionOrder
 from paani_services.mavlink.parameters import Parameter, find, param_value
 from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.station import HAND_SILENT_S, PARAMETERS_PER_TICK, REQUEST_CONTROL, Station
@@ -20,10 +20,8 @@ from paani_services.mavlink.streams import MISSION_CURRENT, STREAMED
 from paani_services.mavlink.telemetry import BUILDERS
 
 AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
-MISSION_UNSUPPORTED = dialect.MAV_MISSION_UNSUPPORTED
-MISSION_INVALID = dialect.MAV_MISSION_INVALID_SEQUENCE
 FULL_DEFLECTION = 1000  # of a stick; a field that is not used has 0x7fff
-NO_UPLOAD = "mission: set by a file on the boat, not from here"
+NO_JUMP = "mission: the boat goes on with its own leg"
 NO_WRITE = "parameter is read-only here; tune on the page"
 SEND_ONE = {  # commands that ask for one message that they name
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION,
@@ -42,8 +40,8 @@ class Request(NamedTuple):
 
 
 class Gateway:
-    """ask: does what is asked of the operator's process. drive: says surge and turn of a hand to it. is_signed: whether
-    there is a key.
+    """ask, send: what is asked of the operator's process, and missions for it. drive: says surge and turn of a hand.
+    is_signed: whether there is a key.
 
     parameters: what they are, given what is known. count: something refused, by its cause.
     """
@@ -51,6 +49,7 @@ class Gateway:
     def __init__(
         self,
         ask: Callable[[Request], None],
+        send: Callable[[MissionOrder], None],
         drive: Callable[[float, float, int], None],
         parameters: Callable[[Snapshot], tuple[Parameter, ...]],
         count: Callable[[str], None],
@@ -62,10 +61,9 @@ class Gateway:
         self.stations: list[Station] = []
         self.commander_us: int | None = None  # when a station that may command was heard last
         self._snapshot = Snapshot(now_us=0)
-        self._plan, self._plan_key = EMPTY, (object(), object(), 0)
+        self._missions = MissionExchange(send, count, self._is_trusted)
         self._announcer = Announcer()
         self._welcomed = set[Station]()
-        self._current = self._reached = 0
         self._handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
             "COMMAND_LONG": self._command_long,
             "COMMAND_INT": self._command_int,
@@ -75,12 +73,7 @@ class Gateway:
             "PARAM_REQUEST_LIST": self._param_request_list,
             "PARAM_REQUEST_READ": self._param_request_read,
             "PARAM_SET": self._param_set,
-            "MISSION_REQUEST_LIST": self._mission_request_list,
-            "MISSION_REQUEST_INT": self._mission_request,
-            "MISSION_REQUEST": self._mission_request,
-            "MISSION_COUNT": self._refuse_mission,
-            "MISSION_CLEAR_ALL": self._refuse_mission,
-            "MISSION_WRITE_PARTIAL_LIST": self._refuse_mission,
+            **self._missions.handlers,
             "MISSION_SET_CURRENT": self._refuse_current,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
             "LOG_REQUEST_LIST": self._log_request_list,
@@ -91,9 +84,8 @@ class Gateway:
     def tick(self, snapshot: Snapshot) -> None:
         """Send what is due. To be called 50 times a second."""
         now_us, self._snapshot = snapshot.now_us, snapshot
-        self._follow_plan(snapshot)
         texts = self._announcer.observe(snapshot)
-        news = self._mission_news(snapshot)
+        news = self._missions.follow(snapshot)
         for station in tuple(self.stations):
             if station.stick is not None:
                 self._drive(*station.stick, station.hand)
@@ -137,6 +129,7 @@ class Gateway:
     def remove(self, station: Station) -> None:
         """Forget a station whose link has ended."""
         self._welcomed.discard(station)
+        self._missions.forget(station)
         if station in self.stations:
             self.stations.remove(station)
 
@@ -233,37 +226,12 @@ class Gateway:
         ended = begun + PARAMETERS_PER_TICK
         station.next_parameter = ended if ended < len(parameters) else None
 
-    # Mission, fence, files
-
-    def _mission_request_list(self, station: Station, message: Any, source: tuple[int, int]) -> None:
-        if message.mission_type in {MISSION, FENCE, RALLY}:
-            station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
-        else:
-            self._mission_ack(station, MISSION_UNSUPPORTED, message, source)
-
-    def _mission_request(self, station: Station, message: Any, source: tuple[int, int]) -> None:
-        kind = message.mission_type
-        item = None
-        if kind in {MISSION, FENCE, RALLY}:
-            item = missions.mission_item(self._plan, kind, message.seq, self._current, source)
-        if item is None:
-            self._mission_ack(station, MISSION_INVALID, message, source)
-        else:
-            station.send(item, self._snapshot.now_us)
-
-    def _refuse_mission(self, station: Station, message: Any, source: tuple[int, int]) -> None:
-        self._count("mavlink_refused")
-        station.refuse(NO_UPLOAD, self._snapshot.now_us)
-        self._mission_ack(station, MISSION_UNSUPPORTED, message, source)
+    # Files
 
     def _refuse_current(self, station: Station, _: Any, __: tuple[int, int]) -> None:
         self._count("mavlink_refused")
-        station.refuse(NO_UPLOAD, self._snapshot.now_us)
+        station.refuse(NO_JUMP, self._snapshot.now_us)
         self._send_message(station, MISSION_CURRENT)
-
-    def _mission_ack(self, station: Station, result: int, message: Any, source: tuple[int, int]) -> None:
-        ack = dialect.MAVLink_mission_ack_message(*source, result, message.mission_type)
-        station.send(ack, self._snapshot.now_us)
 
     def _refuse_file(self, station: Station, message: Any, _: tuple[int, int]) -> None:
         answer = refuse_file(message)
@@ -305,36 +273,8 @@ class Gateway:
         """Send one message of this kind: whether there was one; None for a kind that is never sent."""
         if message_id not in STREAMED:
             return None
-        if message_id == MISSION_CURRENT:
-            message = missions.mission_current(self._snapshot, self._plan)
-        else:
-            message = BUILDERS[message_id](self._snapshot)
+        message = self._missions.current if message_id == MISSION_CURRENT else BUILDERS[message_id](self._snapshot)
         if message is None:
             return False
         station.send(message, self._snapshot.now_us)
         return True
-
-    def _follow_plan(self, snapshot: Snapshot) -> None:
-        """Make the plan anew where the mission, home or the map has changed, and only then: downloads take a while."""
-        legs, prediction = snapshot.legs, snapshot.prediction
-        if legs is None:
-            self._plan, self._plan_key = EMPTY, (object(), object(), 0)
-        elif snapshot.pose is not None:
-            home = prediction.home if prediction is not None else self._plan_key[1]
-            key = ((legs, snapshot.fence), home, snapshot.pose.epoch)
-            if key != self._plan_key:
-                self._plan, self._plan_key = plan_of(snapshot), key
-
-    def _mission_news(self, snapshot: Snapshot) -> list[Any]:
-        """MISSION_CURRENT where another item is steered for, and MISSION_ITEM_REACHED for the last."""
-        if snapshot.command is None:
-            return []
-        news: list[Any] = []
-        current = missions.current_seq(snapshot, self._plan)
-        if snapshot.command.waypoints_reached > self._reached:
-            news.append(dialect.MAVLink_mission_item_reached_message(self._current))
-        if current != self._current:
-            self._current = current
-            news.append(missions.mission_current(snapshot, self._plan))
-        self._reached = snapshot.command.waypoints_reached
-        return news

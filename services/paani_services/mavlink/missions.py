@@ -1,7 +1,6 @@
 """The mission and the fence as ground stations download them. Pure.
 
-As ArduPilot has it, item 0 of a mission is home. There is no way onto the bus for a mission from outside, so that an
-upload is refused and the boat keeps what it has.
+As ArduPilot has it, item 0 of a mission is home.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from paani.geometry import geodetic_from_enu
 from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import degrees_e7
+from paani_services.mavlink.mission_items import Item, Legs
 from paani_services.mavlink.rover_modes import Mode, mode_of
 from paani_services.mavlink.snapshot import Snapshot
 
@@ -28,15 +28,6 @@ NAN = math.nan
 Place = Callable[[m.Waypoint], tuple[int, int]]
 
 
-class Item(NamedTuple):
-    """One item without its number: command, parameters, and the place in 1e-7 degrees (0, 0: none)."""
-
-    command: int
-    parameters: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    place_e7: tuple[int, int] = (0, 0)
-    frame: int = RELATIVE
-
-
 class Plan(NamedTuple):
     """What can be downloaded. `seq_of` gives the item that is steered for, by leg and waypoint."""
 
@@ -47,8 +38,18 @@ class Plan(NamedTuple):
 EMPTY = Plan({MISSION: (), FENCE: (), RALLY: ()}, {})
 
 
-def plan_of(snapshot: Snapshot) -> Plan:
-    """The mission and the fence in degrees; empty while either the mission or the boat's own place is not known."""
+class Uploaded(NamedTuple):
+    """What a station has uploaded: its items, and the legs that they are."""
+
+    items: tuple[Item, ...]
+    legs: Legs
+
+
+def plan_of(snapshot: Snapshot, uploaded: Uploaded | None = None) -> Plan:
+    """The mission and the fence in degrees; empty while either the mission or the boat's own place is not known.
+
+    A mission that was uploaded, and is in force, has the items that were uploaded.
+    """
     pose, legs = snapshot.pose, snapshot.legs
     if pose is None or legs is None:
         return EMPTY
@@ -59,6 +60,9 @@ def plan_of(snapshot: Snapshot) -> Plan:
         return degrees_e7(latitude_deg), degrees_e7(longitude_deg)
 
     home = snapshot.prediction.home if snapshot.prediction is not None else ()
+    if uploaded is not None and uploaded.legs.legs == legs:
+        fence_items = _fence_items(snapshot.fence, place)[:MAX_ITEMS]
+        return Plan({MISSION: uploaded.items, FENCE: fence_items, RALLY: ()}, uploaded.legs.seq_of)
     items = [Item(WAYPOINT, place_e7=place(home[0]) if home else (0, 0), frame=GLOBAL)]
     seq_of: dict[tuple[int, int], int] = {}
     for number, leg in enumerate(legs):

@@ -12,6 +12,7 @@ from paani import keys
 from paani.bus import Bus
 from paani.clock import Clock, MonotonicClock
 from paani.config import Config
+from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani_services.mavlink.acts import Acts, is_link_lost
 from paani_services.mavlink.endpoints import Endpoints
@@ -52,9 +53,9 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         signer = Signer(await asyncio.to_thread(read_signing_key, settings.signing_key_file), clock.now_us())
     inputs = Inputs(bus, clock)
     client = OperatorClient(bus, clock)
-    acts = Acts(client, clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
+    acts = Acts(client, MissionClient(bus, clock), clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
     parameters = functools.partial(parameters_of, cruise_mps=config.navigator.cruise_mps, advisor=config.advisor)
-    gateway = Gateway(acts.ask, client.drive, parameters, bus.count_drop, is_signed=signer is not None)
+    gateway = Gateway(acts.ask, acts.send, client.drive, parameters, bus.count_drop, is_signed=signer is not None)
     gateway.tick(inputs.snapshot())
     endpoints = Endpoints(gateway, settings, signer, clock)
     with contextlib.closing(endpoints), contextlib.closing(acts):

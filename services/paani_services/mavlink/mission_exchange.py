@@ -1,0 +1,202 @@
+"""Mission, fence and rally points, to and from ground stations. No input or output of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from paani import messages as m
+from paani.geometry import enu_from_geodetic
+from paani.map_origin import map_origin_deg
+from paani_services.mavlink import commands, missions
+from paani_services.mavlink.codec import dialect
+from paani_services.mavlink.mission_items import Item, ItemError, Legs, areas_of_items, legs_of_items
+from paani_services.mavlink.missions import ALL, EMPTY, FENCE, MISSION, RALLY, Uploaded, plan_of
+from paani_services.mavlink.snapshot import Snapshot
+from paani_services.mavlink.station import Station
+from paani_services.mavlink.uploads import MAX_ITEMS, NO_SPACE, Uploads, acknowledge
+
+ACCEPTED, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_UNSUPPORTED
+INVALID_SEQUENCE, DENIED = dialect.MAV_MISSION_INVALID_SEQUENCE, dialect.MAV_MISSION_DENIED
+NO_RALLY = "rally: there are no rally points; RTL goes home"
+NO_PARTS = "mission: whole or not at all"
+NO_PLACE = "mission: the boat does not know its place yet"
+NO_LEGS = Legs((), {})
+
+
+class MissionOrder(NamedTuple):
+    """What a station asks the operator's process to put in force; None: as it is. It is acknowledged by this type."""
+
+    station: Station
+    target: tuple[int, int]
+    kind: int
+    legs: tuple[m.MissionLeg, ...] | None = None
+    fence: tuple[m.FenceArea, ...] | None = None
+
+
+class MissionExchange:
+    """send: asks the operator's process. count: something refused, by its cause. is_trusted: whether it may command."""
+
+    def __init__(
+        self,
+        send: Callable[[MissionOrder], None],
+        count: Callable[[str], None],
+        is_trusted: Callable[[Station, Any], bool],
+    ) -> None:
+        self._send, self._count, self._is_trusted = send, count, is_trusted
+        self._snapshot = Snapshot(now_us=0)
+        self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
+        self._uploaded: Uploaded | None = None  # whose legs were in force
+        self._newest: Uploaded | None = None  # which may be refused
+        self._uploads, self._upload_count = Uploads(), 0
+        self._current = self._reached = self._leg_index = 0
+        self.handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+            "MISSION_REQUEST_LIST": self._request_list,
+            "MISSION_REQUEST_INT": self._request,
+            "MISSION_REQUEST": self._request,
+            "MISSION_COUNT": self._begin,
+            "MISSION_ITEM_INT": self._take,
+            "MISSION_ITEM": self._take,
+            "MISSION_CLEAR_ALL": self._clear,
+            "MISSION_ACK": self._end,
+            "MISSION_WRITE_PARTIAL_LIST": self._refuse_part,
+        }
+
+    @property
+    def current(self) -> Any:
+        """MISSION_CURRENT."""
+        return missions.mission_current(self._snapshot, self._plan)
+
+    def follow(self, snapshot: Snapshot) -> list[Any]:
+        """Take what is known now: MISSION_CURRENT where another item is steered for, MISSION_ITEM_REACHED for the last.
+
+        The plan is made anew where the mission, home or the map has changed, and only then: downloads take a while.
+        """
+        self._snapshot = snapshot
+        self._uploads.tick(snapshot.now_us)
+        legs, prediction = snapshot.legs, snapshot.prediction
+        if legs is None:
+            self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
+        elif snapshot.pose is not None:
+            home = prediction.home if prediction is not None else self._plan_key[1]
+            key = ((legs, snapshot.fence), home, snapshot.pose.epoch, self._upload_count)
+            if key != self._plan_key:
+                if self._newest is not None and self._newest.legs.legs == legs:
+                    self._uploaded = self._newest
+                self._plan, self._plan_key = plan_of(snapshot, self._uploaded), key
+        return self._news(snapshot)
+
+    def forget(self, station: Station) -> None:
+        """A station whose link has ended."""
+        self._uploads.forget(station)
+
+    def _news(self, snapshot: Snapshot) -> list[Any]:
+        command = snapshot.command
+        if command is None:
+            return []
+        news: list[Any] = []
+        current = missions.current_seq(snapshot, self._plan)
+        if command.waypoints_reached > self._reached or command.leg_index > self._leg_index:
+            news.append(dialect.MAVLink_mission_item_reached_message(self._current))
+        if current != self._current:
+            self._current = current
+            news.append(self.current)
+        self._reached, self._leg_index = command.waypoints_reached, command.leg_index
+        return news
+
+    # Downloads
+
+    def _request_list(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        if message.mission_type in {MISSION, FENCE, RALLY}:
+            station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
+        else:
+            self._acknowledge(station, UNSUPPORTED, message, source)
+
+    def _request(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        kind = message.mission_type
+        item = None
+        if kind in {MISSION, FENCE, RALLY}:
+            item = missions.mission_item(self._plan, kind, message.seq, self._current, source)
+        if item is None:
+            self._acknowledge(station, INVALID_SEQUENCE, message, source)
+        else:
+            station.send(item, self._snapshot.now_us)
+
+    # Uploads
+
+    def _begin(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        kind = message.mission_type
+        if not self._is_trusted(station, message):
+            self._refuse(station, DENIED, message, source, commands.NOT_TRUSTED)
+        elif kind == RALLY and message.count > 0:
+            self._refuse(station, UNSUPPORTED, message, source, NO_RALLY)
+        elif kind not in {MISSION, FENCE, RALLY}:
+            self._refuse(station, UNSUPPORTED, message, source, "")
+        elif message.count > MAX_ITEMS:
+            self._refuse(station, NO_SPACE, message, source, f"mission: more than {MAX_ITEMS} items")
+        elif message.count == 0:
+            self._empty(station, message, source)
+        else:
+            self._uploads.begin(station, message, source, self._snapshot.now_us)
+
+    def _take(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        whole = self._uploads.take(station, message, source, self._snapshot.now_us)
+        if whole is None:
+            return
+        pose = self._snapshot.pose
+        if pose is None:
+            self._refuse(station, DENIED, message, source, NO_PLACE)
+            return
+        origin_deg = map_origin_deg(pose)
+
+        def waypoint_of(place_e7: tuple[int, int]) -> m.Waypoint:
+            x_m, y_m = enu_from_geodetic(place_e7[0] * 1e-7, place_e7[1] * 1e-7, *origin_deg)
+            return m.Waypoint(x_m=x_m, y_m=y_m)
+
+        try:
+            if whole.kind == FENCE:
+                fence = areas_of_items(whole.items, waypoint_of)
+                self._send(MissionOrder(station, whole.target, FENCE, fence=fence))
+            else:
+                legs = legs_of_items(whole.items, waypoint_of)
+                self._keep(whole.items, legs)
+                self._send(MissionOrder(station, whole.target, MISSION, legs=legs.legs))
+        except ItemError as error:
+            self._refuse(station, error.result, message, source, str(error))
+
+    def _keep(self, items: tuple[Item, ...], legs: Legs) -> None:
+        self._newest, self._upload_count = Uploaded(items, legs), self._upload_count + 1
+
+    def _clear(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        if not self._is_trusted(station, message):
+            self._refuse(station, DENIED, message, source, commands.NOT_TRUSTED)
+        elif message.mission_type not in {MISSION, FENCE, RALLY, ALL}:
+            self._refuse(station, UNSUPPORTED, message, source, "")
+        else:
+            self._empty(station, message, source)
+
+    def _empty(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        kind = message.mission_type
+        self._uploads.forget(station)
+        if kind == RALLY:
+            self._acknowledge(station, ACCEPTED, message, source)
+            return
+        if kind in {MISSION, ALL}:
+            self._keep((), NO_LEGS)
+        legs = None if kind == FENCE else ()
+        self._send(MissionOrder(station, source, kind, legs, None if kind == MISSION else ()))
+
+    def _end(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+        """A station that will not go on with its upload; after a download it is thanks."""
+        if message.type != ACCEPTED:
+            self._uploads.forget(station)
+
+    def _refuse_part(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+        self._refuse(station, UNSUPPORTED, message, source, NO_PARTS)
+
+    def _refuse(self, station: Station, result: int, message: Any, source: tuple[int, int], text: str) -> None:
+        self._count("mavlink_refused")
+        acknowledge(station, source, result, message.mission_type, self._snapshot.now_us, text)
+
+    def _acknowledge(self, station: Station, result: int, message: Any, source: tuple[int, int]) -> None:
+        acknowledge(station, source, result, message.mission_type, self._snapshot.now_us)

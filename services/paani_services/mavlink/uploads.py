@@ -1,0 +1,99 @@
+"""Uploads of missions and fences by ground stations, item by item. No input or output of its own."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from paani_services.mavlink.codec import dialect
+from paani_services.mavlink.mission_items import Item
+from paani_services.mavlink.station import Station
+
+MAX_ITEMS = 10_200  # the waypoints that a mission may have, and what stands between them
+REPEAT_S, ATTEMPTS = 1.0, 5  # an item that does not come is asked for again, and then no more
+CANCELLED, NO_SPACE = dialect.MAV_MISSION_OPERATION_CANCELLED, dialect.MAV_MISSION_NO_SPACE
+SEQUENCE = dialect.MAV_MISSION_INVALID_SEQUENCE
+
+
+class Completed(NamedTuple):
+    """All items of a type, from this station, to be acknowledged to this target."""
+
+    station: Station
+    target: tuple[int, int]
+    kind: int
+    items: tuple[Item, ...]
+
+
+class Uploads:
+    """One upload at a time for each station; stations do not disturb each other."""
+
+    def __init__(self) -> None:
+        self._under_way: dict[Station, _Upload] = {}
+
+    def begin(self, station: Station, message: Any, target: tuple[int, int], now_us: int) -> None:
+        """A count: ask for the first item. Another upload of this station ends."""
+        upload = _Upload(station, target, message.mission_type, message.count)
+        self._under_way[station] = upload
+        upload.ask(now_us)
+
+    def take(self, station: Station, message: Any, source: tuple[int, int], now_us: int) -> Completed | None:
+        """One item; what is complete with it. One that was not asked for is refused, but for one that is repeated."""
+        upload = self._under_way.get(station)
+        if upload is None or message.mission_type != upload.kind:
+            acknowledge(station, source, SEQUENCE, message.mission_type, now_us)
+            return None
+        wanted = len(upload.items)
+        if message.seq != wanted:
+            if message.seq > wanted:
+                acknowledge(station, source, SEQUENCE, upload.kind, now_us)
+                del self._under_way[station]
+            return None
+        upload.items.append(_item_of(message))
+        if len(upload.items) < upload.count:
+            upload.attempts = 0
+            upload.ask(now_us)
+            return None
+        del self._under_way[station]
+        return Completed(station, upload.target, upload.kind, tuple(upload.items))
+
+    def tick(self, now_us: int) -> None:
+        """Ask again for what has not come; give up after some attempts."""
+        for station, upload in tuple(self._under_way.items()):
+            if not 0 <= now_us - upload.asked_us < REPEAT_S * 1e6:
+                if upload.attempts >= ATTEMPTS:
+                    acknowledge(station, upload.target, CANCELLED, upload.kind, now_us)
+                    del self._under_way[station]
+                else:
+                    upload.ask(now_us)
+
+    def forget(self, station: Station) -> None:
+        """The station is gone, or has cancelled."""
+        self._under_way.pop(station, None)
+
+
+class _Upload:
+    def __init__(self, station: Station, target: tuple[int, int], kind: int, count: int) -> None:
+        self.station, self.target, self.kind, self.count = station, target, kind, count
+        self.items: list[Item] = []
+        self.attempts = self.asked_us = 0
+
+    def ask(self, now_us: int) -> None:
+        self.attempts, self.asked_us = self.attempts + 1, now_us
+        request = dialect.MAVLink_mission_request_int_message(*self.target, len(self.items), self.kind)
+        self.station.send(request, now_us)
+
+
+def acknowledge(station: Station, target: tuple[int, int], result: int, kind: int, now_us: int, text: str = "") -> None:
+    """The text first, then the result."""
+    station.refuse(text, now_us)
+    station.send(dialect.MAVLink_mission_ack_message(*target, result, kind), now_us)
+
+
+def _item_of(message: Any) -> Item:
+    """Both kinds of item; a place that is no number is none."""
+    parameters = message.param1, message.param2, message.param3, message.param4
+    place = message.x, message.y
+    if message.get_type() == "MISSION_ITEM":
+        degrees = [value if math.isfinite(value) and abs(value) <= 200.0 else 0.0 for value in place]
+        place = round(degrees[0] * 1e7), round(degrees[1] * 1e7)
+    return Item(message.command, parameters, place, message.frame)
