@@ -11,9 +11,9 @@ from msgspec import inspect as types
 
 from docs.reference.markdown import prose, table, with_statement_links
 from docs.reference.statements import what_statements_say
-from docs.reference.value_types import kind_of, range_of, text_of, unit_of
 from paani import keys
 from paani import messages as m
+from paani.config.value_types import kind_of, range_of, text_of, unit_of
 
 INTRODUCTION = """# Messages
 

@@ -15,9 +15,9 @@ import msgspec
 
 from docs.reference.markdown import STATEMENT, prose, table, with_statement_links
 from docs.reference.statements import what_statements_say
-from docs.reference.value_types import kind_of, range_of, text_of, unit_of
 from paani.config import PROFILES, Config
 from paani.config.tuning import TUNABLE
+from paani.config.value_types import kind_of, range_of, text_of, unit_of
 
 INTRODUCTION = """# Settings
 

@@ -61,9 +61,26 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")
         await page.screenshot(path=tmp_path / "tuning.png")
 
+        await page.click("[data-tab-of='settings']")
+        trial = "document.querySelector('#settings-trial').textContent"
+        await until(page, f"{trial}.startsWith('7f3a tried beside') && {trial}.includes('3 of 120 frames differ')")
+        await until(page, "document.querySelectorAll('#settings tr').length > 200")
+        assert not await page.evaluate("document.querySelector('#settings-promote').disabled")
+        visible = "[...document.querySelectorAll('#settings tr')].filter((row) => row.offsetParent)"
+        await page.fill("#settings-search", "center_block_risk")
+        await until(page, f"{visible}.length === 1")
+        texts = f"[...{visible}[0].children].map((cell) => cell.textContent)"
+        assert (await page.evaluate(texts))[:6] == [
+            "advisor.policy.center_block_risk", "0.48", "–", "0.48", "0 to 1", "default",
+        ]  # fmt: skip
+        assert await page.locator("#settings input:visible").count() == 1, "it can be tried"
+        await page.screenshot(path=tmp_path / "settings.png")
+
         weights = "[...document.querySelectorAll('.lane .parts span')].map((part) => part.title.split(' ')[0])"
         assert (await page.evaluate(weights))[:4] == ["0.55", "0.65", "0.2", "0.15"]
         report = m.Shadow(source_us=0, active="7f3a", active_changes=(LOWER, WEIGHT), previous=True)
+        await until(page, f"({texts})[1] === '0.46' && ({texts})[5] === 'tuned'")
+        await page.click("[data-tab-of='drive']")
         await until(page, "document.querySelector('#tuning-force').dataset.promoted === 'true'")
         assert "7f3a in force: policy.center_block_risk = 0.46, risk.non_water = 0.5" in await page.inner_text(
             "#tuning"

@@ -13,7 +13,16 @@ from paani import messages as m
 from paani.board_status import STATUS_PATH, BoardStatus
 from paani.version import version_text
 from paani_services.dashboard import answers as a
-from paani_services.dashboard import driving, past, process_logs, recording_routes, recordings, requests, tuning
+from paani_services.dashboard import (
+    driving,
+    past,
+    process_logs,
+    recording_routes,
+    recordings,
+    requests,
+    settings_rows,
+    tuning,
+)
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
 from paani_services.dashboard.missions import MissionBody
 from paani_services.dashboard.picture_stream import MEDIA_TYPE
@@ -79,6 +88,7 @@ OPERATIONS = (
         query=past.WindowQuery,
         errors=(401,),
     ),
+    Operation("get", "/api/settings", "What it runs with.", list[settings_rows.SettingRow], errors=(401,)),
     Operation("get", "/api/recordings", "Which there are.", recordings.RecordingList, errors=(401, 404)),
     Operation("get", "/api/recordings/{name}/file", "One, as it is.", BYTES, errors=(401, 404)),
     Operation("get", "/api/recordings/{name}/series", "Its samples and events.", past.Series, errors=READ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 
@@ -39,6 +40,7 @@ from paani_services.dashboard.requests import (
     is_same_origin,
 )
 from paani_services.dashboard.responses import error_response, json_response
+from paani_services.dashboard.settings_rows import SettingRoutes
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
 MAX_CLIENTS = 16  # pages at once: one more takes the place of the page that has been connected longest
@@ -78,6 +80,7 @@ class Server:
         self._reading = [
             *PastRoutes(hub, history).routes(),
             *LogRoutes(config.bus).routes(),
+            *SettingRoutes(config, os.environ).routes(),
             *RecordingRoutes(config.recorder.folder, gatekeeper.refuse_act).routes(),
         ]
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came

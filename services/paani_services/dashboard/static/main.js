@@ -18,6 +18,7 @@ import { bindPalette, nextPalette } from "./palette.js";
 import { requireSession } from "./requests.js";
 import { bindRecordings } from "./recordings.js";
 import { renderSensors } from "./sensors.js";
+import { bindSettings, renderSettings } from "./settings.js";
 import { connect } from "./socket.js";
 import { renderStages } from "./stages.js";
 import { bindTabs, isDriveTab, shownTab } from "./tabs.js";
@@ -71,6 +72,7 @@ function render() {
   if (document.hidden) return;
   renderHealth(store, isOpen, now);
   renderDevices(store, now);
+  if (shownTab() === "settings") renderSettings(live.store, present);
   if (shownTab() === "topics") renderTopics(store, now, present);
   if (isDriveTab()) renderPanels(view, now);
 }
@@ -102,6 +104,7 @@ void navigator.serviceWorker?.register("/static/service_worker.js", { scope: "/"
 bindTabs();
 bindTopics();
 bindRecordings(time);
+bindSettings();
 bindOperatorControls();
 bindDrive();
 connect(onMessage, onOpen);

@@ -26,13 +26,13 @@ export function weightsInForce(configured, shadow) {
 }
 
 /** @param {any} shadow */
-function countsText(shadow) {
+export function countsText(shadow) {
   const differing = `${shadow.differing} of ${shadow.frames} frames differ (${fixed(100 * shadow.differing_frac, 1)} %)`;
   return `${differing}, would move on ${shadow.moves_more} where it stops, stop on ${shadow.stops_more} where it moves`;
 }
 
 /** @param {{path: string, value: string}[]} list */
-const changesText = (list) => list.map((change) => `${change.path.replace(/^advisor\./, "")} = ${change.value}`).join(", ");
+export const changesText = (list) => list.map((change) => `${change.path.replace(/^advisor\./, "")} = ${change.value}`).join(", ");
 
 /** @param {any} disagreement @param {"active" | "shadow"} which */
 const adviceText = (disagreement, which) =>
