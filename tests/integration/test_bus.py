@@ -16,7 +16,7 @@ from paani.bus import Latest, Publisher, open_bus
 from paani.bus.admission import MAX_MESSAGE_BYTES
 from paani.bus.routing import open_router
 from paani.bus.session import MAX_BYTES
-from paani.clock import WallClock
+from paani.clock import ManualClock, WallClock
 from paani.config import Config, load_config
 from tests.conftest import OpenAs, Spawn, put_raw
 
@@ -136,6 +136,22 @@ async def test_pictures_are_pulled_one_at_a_time(open_as: OpenAs) -> None:
     pictures.new_epoch()
     pictures.put_picture(header, b"again")
     assert (await asyncio.wait_for(pulled.next(), 5)).data == b"again"
+
+
+async def test_pictures_are_pulled_on_after_the_clock_was_set_back(config: Config) -> None:
+    """To before the publisher began: its new epoch is lower than that of the picture that was pulled last."""
+    clock = ManualClock(CLOCK.now_us())
+    router = await open_router(config.bus)
+    camera, dashboard = await open_bus(config.bus, "camera", clock), await open_bus(config.bus, "dashboard", clock)
+    pictures, pulled = camera.picture_publisher(keys.PICTURE, push=False), dashboard.pull_picture(keys.PICTURE)
+    for number in range(3):
+        header = m.PictureHeader(source_us=clock.now_us(), frame_seq=number, frame_epoch=1, width_px=4, height_px=3)
+        pictures.put_picture(header, b"jpeg %d" % number)
+        assert (await asyncio.wait_for(pulled.next(), 5)).data == b"jpeg %d" % number
+        clock.advance(0.2 if number == 0 else -3600.0)
+    for bus in (camera, dashboard):
+        await bus.close()
+    await asyncio.to_thread(router.close)
 
 
 async def test_services_find_each_other_again_after_the_router_dies(config: Config) -> None:

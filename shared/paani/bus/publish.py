@@ -162,7 +162,11 @@ class PicturePublisher(Publisher[m.PictureHeader]):
                 query.reply(self._key, data, attachment=attachment, encoding=zenoh.Encoding(header.media_type))
 
     def _is_newer(self, after: tuple[int, int]) -> bool:
-        return self._newest is not None and (self._newest[0].epoch, self._newest[0].seq) > after
+        """Whether the newest is another than what was asked to come after: of a lower epoch too, after a set clock."""
+        if self._newest is None:
+            return False
+        header, (epoch, seq) = self._newest[0], after
+        return header.epoch != epoch or header.seq > seq
 
 
 def after_of(parameters: str) -> tuple[int, int]:

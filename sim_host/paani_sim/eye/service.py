@@ -68,7 +68,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     settings.jpeg_quality,
                     truth.actors_along_m,
                 )
-                due_us = max(due_us + period_us, clock.now_us())
+                now_us = clock.now_us()
+                due_us = min(max(due_us + period_us, now_us), now_us + period_us)
                 if data is None:
                     continue
                 header = m.PictureHeader(
