@@ -89,7 +89,7 @@ OPERATIONS = (
         errors=(401,),
     ),
     Operation("get", "/api/settings", "What it runs with.", list[settings_rows.SettingRow], errors=(401,)),
-    Operation("get", "/api/recordings", "Which there are.", recordings.RecordingList, errors=(401, 404)),
+    Operation("get", "/api/recordings", "Which there are.", recordings.RecordingList, errors=(401,)),
     Operation("get", "/api/recordings/{name}/file", "One, as it is.", BYTES, errors=(401, 404)),
     Operation("get", "/api/recordings/{name}/series", "Its samples and events.", past.Series, errors=READ),
     Operation(

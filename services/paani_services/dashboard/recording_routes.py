@@ -57,10 +57,7 @@ class RecordingRoutes:
 
     async def _list(self, request: web.Request) -> web.Response:
         decode_query(dict(request.query), NoQuery)
-        try:
-            return json_response(await asyncio.to_thread(self._folder.list))
-        except RecordingRefusedError as error:
-            return error_response(error.status, str(error), "recorder.folder")
+        return json_response(await asyncio.to_thread(self._folder.list))
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         decode_query(dict(request.query), NoQuery)

@@ -58,7 +58,9 @@ class RecordingFolder:
         self._durations_s: dict[tuple[str, int], float | None] = {}  # by name and size, so a grown file is read anew
 
     def list(self) -> RecordingList:
-        """Raises RecordingRefusedError where nothing is recorded."""
+        """Empty, and without a folder, where nothing is recorded."""
+        if not self._folder:
+            return RecordingList(folder="", recordings=(), left_out=0)
         folder = self._require_folder()
         found = recordings(folder)
         rows = tuple(

@@ -22,9 +22,9 @@ async function list(time, note = "") {
   say(note || RECORDING_TEXTS.reading, false);
   try {
     const { folder, recordings, left_out: leftOut } = await (await ask("/api/recordings")).json();
-    setText(byId("recordings-sum"), `${recordings.length + leftOut} ${RECORDING_TEXTS.in} ${folder}`);
+    setText(byId("recordings-sum"), !folder ? "" : `${recordings.length + leftOut} ${RECORDING_TEXTS.in} ${folder}`);
     byId("recordings").replaceChildren(...recordings.map((/** @type {Recording} */ each) => rowOf(time, each)));
-    say(note || (leftOut ? `${leftOut} ${RECORDING_TEXTS.leftOut}` : recordings.length ? "" : RECORDING_TEXTS.none), Boolean(note));
+    say(note || (leftOut ? `${leftOut} ${RECORDING_TEXTS.leftOut}` : recordings.length ? "" : folder ? RECORDING_TEXTS.none : RECORDING_TEXTS.off), Boolean(note));
   } catch (error) {
     byId("recordings").replaceChildren();
     setText(byId("recordings-sum"), "");

@@ -199,6 +199,7 @@ export const SETTING_TEXTS = { tuned: "tuned", try: "Try", sent: "tried beside w
 
 /** The recordings tab. */
 export const RECORDING_TEXTS = {
+  off: "Nothing is recorded here: recorder.folder is not set (paani up --record DIR).",
   reading: "reading", in: "in", none: "nothing is recorded there yet", leftOut: "older ones are not listed", running: "being written", protected: "protected",
   play: "Replay here", download: "Download", protect: "Protect", unprotect: "Unprotect", delete: "Delete", sure: "Press again to delete",
 };

@@ -74,8 +74,10 @@ def test_nothing_else_is_a_recording(tmp_path: Path, name: str) -> None:
 
 
 def test_without_a_recorder_there_is_no_folder() -> None:
-    with pytest.raises(RecordingRefusedError, match=r"recorder\.folder"):
-        RecordingFolder("").list()
+    folder = RecordingFolder("")
+    assert (folder.list().folder, folder.list().recordings) == ("", ())
+    status, text = refusal(folder, NAME)
+    assert (status, "recorder.folder" in text) == (404, True)
 
 
 def test_the_series_of_a_recording(tmp_path: Path) -> None:
