@@ -20,7 +20,7 @@ from paani_services.localization.levelling import mean_level_motion
 from paani_services.localization.odometry_message import StoppedFlag, is_fresh, odometry_of, unknown_odometry
 from paani_services.localization.planar_filter import PSI, PX, PY, SIZE, WX, WY, B, C, PlanarFilter, U, V
 from paani_services.localization.rest_detection import MapFix, MotionEvidence, RestDetector
-from paani_services.localization.sensor_checks import MAX_FUTURE_S, check_fix, select_usable_samples
+from paani_services.localization.sensor_checks import check_fix, take_samples
 
 MAX_SAMPLE_GAP_S = 0.1  # mean gap between IMU samples beyond which the boat is not predicted across it
 NOMINAL_GAP_S = 0.01  # between IMU samples at 100 Hz
@@ -90,12 +90,10 @@ class Estimator:
         Messages that are not finite, late, repeated or from the future are dropped and counted in `drops`.
         A new epoch of the IMU, or a clock that is set back, starts everything anew.
         """
-        if self._last_imu is not None and self._last_imu.source_us > now_us + MAX_FUTURE_S * 1e6:
+        samples, begins_anew = take_samples(samples, self._last_imu, now_us, self.drops)
+        if begins_anew:
             self._reset()
-        samples = select_usable_samples(samples, self._last_imu, now_us, self.drops)
         if samples:
-            if self._last_imu is not None and samples[-1].epoch != self._last_imu.epoch:
-                self._reset()
             self._predict_motion(samples)
         usable = None if fix is None else check_fix(fix, self._last_fix, now_us, self.drops)
         if usable is not None:

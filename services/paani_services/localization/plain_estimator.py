@@ -18,7 +18,7 @@ from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.levelling import mean_level_motion
 from paani_services.localization.odometry_message import StoppedFlag, is_fresh, odometry_of, unknown_odometry
 from paani_services.localization.planar_filter import PSI, PX, PY, SIZE, PlanarFilter, U, V
-from paani_services.localization.sensor_checks import MAX_FUTURE_S, check_fix, select_usable_samples
+from paani_services.localization.sensor_checks import check_fix, take_samples
 
 YAW_STD_RAD = 0.02  # of the compass
 ACCEL_STD_MPS2 = 0.1  # change of the velocity that is taken as constant, per root second: a small boat under way
@@ -55,12 +55,10 @@ class PlainEstimator:
         Healthy while IMU, heading and GPS are fresh and no standard deviation is too large. What is dropped and what
         starts everything anew is as in `Estimator.step`.
         """
-        if self._last_imu is not None and self._last_imu.source_us > now_us + MAX_FUTURE_S * 1e6:
+        samples, begins_anew = take_samples(samples, self._last_imu, now_us, self.drops)
+        if begins_anew:
             self._reset()
-        samples = select_usable_samples(samples, self._last_imu, now_us, self.drops)
         if samples:
-            if self._last_imu is not None and samples[-1].epoch != self._last_imu.epoch:
-                self._reset()
             self._predict_motion(samples)
         usable = None if fix is None else check_fix(fix, self._last_fix, now_us, self.drops)
         if usable is not None and self._last_imu is not None:

@@ -15,7 +15,17 @@ MAX_ACCEL_MPS2, MAX_RATE_RADPS = 160.0, 35.0  # the widest ranges of small IMUs:
 MAX_ANGLE_RAD = 1e4  # far more than a full circle, because some sensors count their turns
 
 
-def select_usable_samples(
+def take_samples(
+    samples: Sequence[ImuSample], last: ImuSample | None, now_us: int, drops: Counter[str]
+) -> tuple[list[ImuSample], bool]:
+    """The usable samples, and whether estimates begin anew: the IMU has a new epoch, or the clock was set back."""
+    is_set_back = last is not None and last.source_us > now_us + MAX_FUTURE_S * 1e6
+    usable = _select_usable(samples, None if is_set_back else last, now_us, drops)
+    is_restarted = last is not None and bool(usable) and usable[-1].epoch != last.epoch
+    return usable, is_set_back or is_restarted
+
+
+def _select_usable(
     samples: Sequence[ImuSample], last: ImuSample | None, now_us: int, drops: Counter[str]
 ) -> list[ImuSample]:
     """The samples within an IMU's ranges, of the newest epoch, in order, later than `last` and not ahead of now."""
