@@ -10,8 +10,9 @@ import pytest
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Queue, Stepper
-from paani.clock import WallClock
+from paani.bus import Queue, Stepper, open_bus
+from paani.bus.routing import open_router
+from paani.clock import ManualClock, WallClock
 from paani.config import Config
 from paani.decider import Input, decider_of
 from tests.conftest import OpenAs
@@ -20,6 +21,33 @@ pytestmark = pytest.mark.integration
 CLOCK = WallClock()
 STEPS = 40
 CONTROLLER = decider_of("controller")
+
+
+async def test_a_step_has_the_state_again_after_the_clock_was_set_back(config: Config) -> None:
+    """Otherwise nothing recorded could be decided again until the clock is where it was."""
+    clock = ManualClock(CLOCK.now_us())
+    router = await open_router(config.bus)
+    controller = await open_bus(config.bus, "controller", clock)
+    observer = await open_bus(config.bus, "observer", clock)
+    stepper, steps = Stepper(controller, clock, config, CONTROLLER), observer.queue(keys.STEPS["controller"], 100)
+
+    def take_step() -> None:
+        _, outputs = stepper.decide()
+        stepper.conclude(outputs)
+
+    while not steps.received:  # until the observer hears it
+        take_step()
+        await asyncio.sleep(0.05)
+    steps.drain()
+    has_state = []
+    for seconds in (0.1, -3600.0, 0.1):
+        clock.advance(seconds)
+        take_step()
+        has_state.append(bool((await asyncio.wait_for(steps.get(), 5)).state))
+    for bus in (controller, observer):
+        await bus.close()
+    await asyncio.to_thread(router.close)
+    assert has_state == [False, True, False]
 
 
 async def test_a_ledger_of_steps_gives_the_same_thrust_again(open_as: OpenAs, config: Config) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from paani import messages as m
+from paani.clock import has_passed
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.snapshot import Snapshot
 
@@ -94,7 +95,7 @@ class Announcer:
 
     def _may_say(self, name: str, now_us: int) -> bool:
         said_us = self._said_us.get(name)
-        return said_us is None or not 0 <= now_us - said_us < QUIET_S * 1e6
+        return said_us is None or has_passed(said_us, QUIET_S * 1e6, now_us)
 
 
 def summary(snapshot: Snapshot) -> list[Any]:

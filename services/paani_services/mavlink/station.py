@@ -6,6 +6,7 @@ import secrets
 from collections.abc import Callable
 from typing import Any
 
+from paani.clock import has_passed
 from paani_services.mavlink.announcements import WARNING, statustext
 from paani_services.mavlink.codec import Codec, dialect
 from paani_services.mavlink.streams import Schedule
@@ -60,7 +61,7 @@ class Station:
     def refuse(self, text: str, now_us: int) -> None:
         """Say why something is refused, the same thing no more than once in a while."""
         said_us = self._texts_us.get(text)
-        if text and (said_us is None or not 0 <= now_us - said_us < REPEAT_TEXT_S * 1e6):
+        if text and (said_us is None or has_passed(said_us, REPEAT_TEXT_S * 1e6, now_us)):
             self._texts_us[text] = now_us
             self.send(statustext(WARNING, text), now_us)
 

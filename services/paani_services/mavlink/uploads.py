@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from paani.clock import has_passed
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.mission_items import Item
 from paani_services.mavlink.station import Station
@@ -59,7 +60,7 @@ class Uploads:
     def tick(self, now_us: int) -> None:
         """Ask again for what has not come; give up after some attempts."""
         for station, upload in tuple(self._under_way.items()):
-            if not 0 <= now_us - upload.asked_us < REPEAT_S * 1e6:
+            if has_passed(upload.asked_us, REPEAT_S * 1e6, now_us):
                 if upload.attempts >= ATTEMPTS:
                     acknowledge(station, upload.target, CANCELLED, upload.kind, now_us)
                     del self._under_way[station]

@@ -8,7 +8,7 @@ from pathlib import Path
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock, ClockStep, MonotonicClock
+from paani.clock import Clock, ClockStep, MonotonicClock, has_passed
 from paani.config import Config
 from paani.config.sensors import recording_of
 from paani.serial_port import PortError, open_port
@@ -81,7 +81,7 @@ async def _read_port(address: str, clock: Clock) -> AsyncIterator[bytes | None]:
         while True:
             data = await port.read()
             now_us = clock.now_us()
-            if not 0 <= now_us - began_us < 1e6:
+            if has_passed(began_us, 1e6, now_us):
                 began_us, n = now_us, 0
             n += len(data)
             if n > MAX_BYTES_PER_S:

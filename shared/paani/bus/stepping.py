@@ -8,7 +8,7 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
-from paani.clock import Clock
+from paani.clock import Clock, has_passed
 from paani.config import Config
 from paani.decider import Decider, Input, Outputs
 
@@ -78,7 +78,7 @@ class Stepper(Generic[S, I]):
         """Publish what is to be published of the last step, and the step itself; returns messages as sent."""
         sent = {name: self._publishers[name].put(message) for name, message in outputs.items()}
         state = ""
-        if not self._state_us or self._now_us - self._state_us >= STATE_EVERY_US:
+        if has_passed(self._state_us, STATE_EVERY_US, self._now_us):
             state, self._state_us = msgspec.json.encode(self._before).decode(), self._now_us
         self._steps.put(
             m.Step(
