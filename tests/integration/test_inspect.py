@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-import sys
-
 import msgspec
 import pytest
 
 from paani import messages as m
 from paani.config import Config
 from tests.conftest import Spawn
+from tests.paani_command import paani
 
 pytestmark = pytest.mark.integration
-
-
-async def paani(sets: tuple[str, ...], *words: str) -> tuple[int | None, str, str]:
-    settings = [word for setting in sets for word in ("--set", setting)]
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "paani", *words, *settings, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
-    )
-    out, errors = await process.communicate()
-    return process.returncode, out.decode(), errors.decode()
 
 
 async def test_look_at_a_running_bus(spawn: Spawn, private_sets: tuple[str, ...]) -> None:

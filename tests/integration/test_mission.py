@@ -14,6 +14,7 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.clock import WallClock
 from tests.conftest import OpenAs, Spawn
+from tests.paani_command import paani
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
@@ -110,19 +111,6 @@ async def test_a_route_that_leaves_the_fence_stops_the_process_before_it_starts(
     assert "mission.toml: legs[1].waypoints[1]: is outside the fence" in done.stderr
 
 
-async def mission_command(private_sets: tuple[str, ...], *words: str) -> tuple[int | None, str]:
-    """`paani mission`: exit code and what it said."""
-    sets = [word for setting in private_sets for word in ("--set", setting)]
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "paani", "mission", *words, *sets),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-    )
-    async with asyncio.timeout(30):
-        output, _ = await process.communicate()
-    return process.returncode, output.decode()
-
-
 async def test_a_mission_that_is_sent_is_followed_a_bad_one_is_not_and_a_restart_forgets_neither(
     spawn: Spawn, open_as: OpenAs, tmp_path: Path, private_sets: tuple[str, ...]
 ) -> None:
@@ -141,11 +129,11 @@ async def test_a_mission_that_is_sent_is_followed_a_bad_one_is_not_and_a_restart
     async with spawn("operator"):
         async with spawn("navigator", *sets):
             fence = (await followed("there")).fence
-            assert await mission_command(private_sets, "send", str(sent)) == (0, "sent: 1 legs, in force\n")
+            assert await paani(private_sets, "mission", "send", str(sent)) == (0, "sent: 1 legs, in force\n", "")
             taken = await followed("sent")
             assert taken.fence == fence, "the fence of the files stays"
-            code, printed = await mission_command(private_sets, "send", str(far))
-            assert (code, printed) == (2, "paani: refused: legs[0].waypoints[0]: is outside the fence\n")
+            refused = await paani(private_sets, "mission", "send", str(far))
+            assert refused == (2, "", "paani: refused: legs[0].waypoints[0]: is outside the fence\n")
             assert (await missions.next()).accepted_us == taken.accepted_us > 0
         async with spawn("navigator", *sets):
             assert (await followed("sent")).accepted_us == taken.accepted_us

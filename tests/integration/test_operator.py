@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import sys
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from paani.operator_client import OperatorClient
 from paani.runtime import runtime_dir
 from paani_services.operator.latch import LATCH_FILE
 from tests.conftest import OpenAs, Spawn
+from tests.paani_command import paani
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
 CLOCK = WallClock()
@@ -84,19 +84,6 @@ async def station(config: Config) -> AsyncIterator[OperatorClient]:
         await bus.close()
 
 
-async def stop_command(private_sets: tuple[str, ...]) -> tuple[int | None, str]:
-    """`paani stop`: exit code and what it printed."""
-    words = [word for setting in private_sets for word in ("--set", setting)]
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "paani", "stop", *words),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-    )
-    async with asyncio.timeout(30):
-        output, _ = await process.communicate()
-    return process.returncode, output.decode()
-
-
 async def test_a_page_that_begins_again_finds_the_boat_disarmed(spawn: Spawn, boat: Boat, config: Config) -> None:
     async with spawn("operator"):
         async with station(config) as hand:
@@ -156,15 +143,18 @@ async def test_paani_stop_needs_no_page(
     async with station(config) as hand, spawn("operator"):
         assert await hand.hold_to_arm() is m.ArmRefusal.NONE
         await boat.until(lambda: boat.is_armed, "armed")
-        code, output = await stop_command(private_sets)
+        code, out, errors = await paani(private_sets, "stop")
+        output = out + errors
         assert (code, output.startswith("stopped: zero thrust after ")) == (0, True), output
         assert boat.state.value is not None
         assert (boat.state.value.stopped, boat.state.value.by) == (True, "stop")
-    code, output = await stop_command(private_sets)
+    code, out, errors = await paani(private_sets, "stop")
+    output = out + errors
     assert (code, output.startswith("NOT LATCHED: ")) == (1, True), output
 
 
 async def test_paani_stop_without_a_router_is_one_line(private_sets: tuple[str, ...]) -> None:
-    code, output = await stop_command(private_sets)
+    code, out, errors = await paani(private_sets, "stop")
+    output = out + errors
     assert (code, output.count("\n")) == (2, 1)
     assert "bus.r" in output or "credentials" in output

@@ -7,7 +7,6 @@ import contextlib
 import math
 import os
 import random
-import sys
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.messages import SensorRole, SensorStatus
 from tests.conftest import OpenAs, Spawn
+from tests.paani_command import paani
 from tests.places import DATA
 from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
 
@@ -283,15 +283,6 @@ async def test_a_sailing_log_plays_through_the_same_adapter_as_fast_as_it_can(sp
         found = await device(bus, SensorRole.GPS, lambda each: "played to the end" in each.note, 60.0)
         assert (found.checksum_failures, found.damaged, found.withheld) == (0, 0, 0)
         assert found.frames == 3625 * 14 + 3624 + 3625
-
-
-async def paani(sets: tuple[str, ...], *words: str) -> tuple[int | None, str, str]:
-    settings = [word for setting in sets for word in ("--set", setting)]
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "paani", *words, *settings, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
-    )
-    out, errors = await process.communicate()
-    return process.returncode, out.decode(), errors.decode()
 
 
 async def test_paani_sensors_shows_what_each_says_and_what_is_missing(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import sys
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -21,6 +20,7 @@ from paani.config import Config, load_config
 from paani.decider import Input, decider_of
 from tests.arming import arm_on_page, headers_of, hold_on_page
 from tests.conftest import OpenAs, Spawn, put_raw
+from tests.paani_command import paani
 from tests.unit.paani_services.advisor.advisor_evidence import water
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
@@ -48,19 +48,6 @@ async def perception(open_as: OpenAs) -> AsyncIterator[Bus]:
         await speaking
 
 
-async def tune(sets: tuple[str, ...], *words: str) -> tuple[int, str, str]:
-    """Run the command; exit code, output, errors."""
-    settings = [word for setting in sets for word in ("--set", setting)]
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "paani", "tune", *words, *settings,
-        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
-    async with asyncio.timeout(30):
-        out, errors = await process.communicate()
-    assert process.returncode is not None
-    return process.returncode, out.decode(), errors.decode()
-
-
 async def until(inbox: Any, wanted: Any) -> Any:
     async with asyncio.timeout(15):
         while True:
@@ -78,19 +65,19 @@ async def test_two_steps_forth_and_one_back(
     async with spawn("operator"), spawn("dashboard"), spawn("advisor", FEW):
         await arm_on_page(page, config.bus)
         await until(advisory, lambda a: a.direction is m.Direction.STRAIGHT)
-        code, out, _ = await tune(private_sets, "propose", "advisor.policy.center_block_risk=0.46", "--json")
+        code, out, _ = await paani(private_sets, "tune", "propose", "advisor.policy.center_block_risk=0.46", "--json")
         name = msgspec.json.decode(out, type=m.Shadow).proposal
         assert code == 0
         latest = await until(shadow, lambda s: s.frames >= 5)
         assert (latest.proposal, latest.differing) == (name, latest.frames)
         assert latest.recent[-1].shadow_direction is m.Direction.LEFT
         assert (await advisory.next()).direction is m.Direction.STRAIGHT
-        code, out, _ = await tune(private_sets, "status")
+        code, out, _ = await paani(private_sets, "tune", "status")
         assert code == 0
         assert "center_block_risk 0.48 -> 0.46" in out
         assert "(100.0%)" in out
 
-        code, _, errors = await tune(private_sets, "promote", name)
+        code, _, errors = await paani(private_sets, "tune", "promote", name)
         assert (code, errors.count("\n")) == (2, 1)
         assert "armed; press STOP first" in errors
         async with aiohttp.ClientSession() as client:
@@ -98,15 +85,15 @@ async def test_two_steps_forth_and_one_back(
                 async with client.post(f"{page}/api/tune/{deed}", json=body) as answer:
                     assert (answer.status, (await answer.json())["field"]) == (403, "Origin")
             await client.post(f"{page}/api/stop")
-        code, _, errors = await tune(private_sets, "promote", "0000")
+        code, _, errors = await paani(private_sets, "tune", "promote", "0000")
         assert (code, "not the proposal" in errors) == (2, True)
-        assert (await tune(private_sets, "promote", name))[0] == 0
+        assert (await paani(private_sets, "tune", "promote", name))[0] == 0
         moved = await until(advisory, lambda a: a.direction is m.Direction.LEFT)
         assert moved.center_block_risk == 0.46
 
-        assert (await tune(private_sets, "rollback", name))[0] == 0
+        assert (await paani(private_sets, "tune", "rollback", name))[0] == 0
         await until(advisory, lambda a: a.center_block_risk == 0.48)
-        code, _, errors = await tune(private_sets, "rollback", name)
+        code, _, errors = await paani(private_sets, "tune", "rollback", name)
         assert (code, errors.count("\n")) == (2, 1)
 
 
@@ -118,16 +105,16 @@ async def test_a_restarted_advisor_is_back_at_its_configuration(
     shadow, advisory = observer.latest(keys.SHADOW), observer.latest(keys.ADVISORY)
     async with spawn("operator"), spawn("dashboard"):
         async with spawn("advisor", FEW):
-            _, out, _ = await tune(private_sets, "propose", "advisor.policy.center_block_risk=0.46", "--json")
+            _, out, _ = await paani(private_sets, "tune", "propose", "advisor.policy.center_block_risk=0.46", "--json")
             await until(shadow, lambda s: s.frames >= 5)
             name = msgspec.json.decode(out, type=m.Shadow).proposal
-            assert (await tune(private_sets, "promote", name))[0] == 0
+            assert (await paani(private_sets, "tune", "promote", name))[0] == 0
             await until(advisory, lambda a: a.direction is m.Direction.LEFT)
         async with spawn("advisor", FEW):
             after = await until(shadow, lambda s: s.refused > 0)
             assert (after.active, after.refusal) == ("", m.TuningRefusal.NOT_CURRENT)
             assert (await until(advisory, lambda a: a.frame_seq > 0)).direction is m.Direction.STRAIGHT
-            _, out, _ = await tune(private_sets, "status")
+            _, out, _ = await paani(private_sets, "tune", "status")
             assert "in force  the configuration" in out
 
 
