@@ -26,6 +26,7 @@ from tests.unit.mcu.core import (
 RUNS, FRAMES = 100, 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_30_000_random_frames_across_the_wrap_and_no_motion_past_its_lease(part: int) -> None:
     """A model of the rule, beside the core: an advice that moves, and live thrust, are younger than their lease."""

@@ -57,6 +57,7 @@ class Listening:
         return self.other
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     here=machines(),

@@ -58,6 +58,7 @@ async def test_a_call_without_payload_sends_none() -> None:
     assert peer.calls == [Request(1, "paani_status", ())]
 
 
+@pytest.mark.slow
 async def test_a_silent_microcontroller_costs_a_quarter_of_a_second_and_is_named() -> None:
     peer = McuPeer()
     peer.answers = lambda request: b""
@@ -74,6 +75,7 @@ async def test_a_silent_microcontroller_costs_a_quarter_of_a_second_and_is_named
         assert caller.problem == ""
 
 
+@pytest.mark.slow
 async def test_what_speaks_another_protocol_is_named() -> None:
     peer = McuPeer()
     peer.answers = lambda request: b"$GPGGA,092750.000,5321.6802,N\r\n"
@@ -221,6 +223,7 @@ async def test_a_line_that_is_not_to_be_had_is_tried_again_without_haste() -> No
     assert process_cpu_s() - before_s < 0.2
 
 
+@pytest.mark.slow
 async def test_a_babbling_line_costs_bounded_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
     """As fast as the socket takes it, which is thousands of times what a serial line carries."""
     monkeypatch.setattr(caller_module, "BABBLE_PAUSE_S", 0.1)

@@ -56,6 +56,7 @@ def is_within(count: int, n: int, frac: float) -> bool:
     return abs(count - n * frac) < 4.0 * math.sqrt(n * frac * (1.0 - frac))
 
 
+@pytest.mark.slow
 def test_glare_has_a_blob_in_seven_and_glitter_in_six_of_ten_s8() -> None:
     """On black only light shows: a blob above the lower half, or wide and soft; strokes of glitter are in the lower."""
     black, n = np.zeros((256, 320, 3), np.uint8), 600
@@ -65,6 +66,7 @@ def test_glare_has_a_blob_in_seven_and_glitter_in_six_of_ten_s8() -> None:
     assert is_within(sum(not out.any() for out in lit), n, 0.3 * 0.4)
 
 
+@pytest.mark.slow
 def test_the_papers_augmentation_has_its_shares_s8() -> None:
     """Mirrored in half, other colours in half, glare in 0.35: told apart on a picture of two even greys."""
     picture, mask = np.full((256, 320, 3), 90, np.uint8), np.zeros((256, 320), np.uint8)
