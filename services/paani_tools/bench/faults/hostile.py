@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import random
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -219,8 +220,8 @@ def _value(info: inspect.Type, rng: random.Random) -> Any:
             low, high = low or 0, high if high is not None else 2**53
             return rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randrange(10))))
         case inspect.FloatType(ge=low, gt=above, le=high, lt=below):
-            first = low if low is not None else above if above is not None else -1e9
-            last = high if high is not None else below if below is not None else 1e9
+            first = low if low is not None else math.nextafter(above, math.inf) if above is not None else -1e9
+            last = high if high is not None else math.nextafter(below, -math.inf) if below is not None else 1e9
             return rng.choice((first, last, rng.uniform(first, last), max(first, min(last, rng.uniform(-1.0, 1.0)))))
         case inspect.BoolType():
             return rng.random() < 0.5
