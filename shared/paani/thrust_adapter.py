@@ -3,6 +3,9 @@
 It stands before whatever turns thrust into force: the simulated plant, or the microcontroller of a hull. Time is the
 monotonic clock of the process that it runs in, which hands it out as the plant's stamp. A command is as old as the
 stamp that it echoes, so no other clock matters and a burst of delayed commands is refused whole.
+
+The order of epochs and sequence numbers is kept for as long as a command that was sent before the newest one could pass
+by its echo. After that a lower epoch is a controller that began after its wall clock was set back.
 """
 
 import math
@@ -38,6 +41,7 @@ class ThrustAdapter:
         self._domain = domain
         self._epoch = -1
         self._seq = -1
+        self._ordered_us = 0  # when epoch and sequence number were taken
         self._accepted_us: int | None = None
         self._refused = ZeroCause.NO_COMMAND
         self._arming: Arming | None = None
@@ -53,7 +57,7 @@ class ThrustAdapter:
         """
         cause = self._find_refusal(thrust, now_us)
         if cause is ZeroCause.NONE:
-            self._epoch, self._seq = thrust.epoch, thrust.seq
+            self._epoch, self._seq, self._ordered_us = thrust.epoch, thrust.seq, now_us
             self.command, self._accepted_us = thrust, now_us
             self._refused = ZeroCause.TIMEOUT
             return cause
@@ -113,13 +117,15 @@ class ThrustAdapter:
             return ZeroCause.WRONG_PRODUCER
         if thrust.domain != self._domain:
             return ZeroCause.WRONG_DOMAIN
-        if thrust.epoch < self._epoch:
-            return ZeroCause.OLD_EPOCH
-        if thrust.epoch == self._epoch and thrust.seq <= self._seq:
-            return ZeroCause.REPLAYED
+        max_echo_age_us = self._config.max_echo_age_s * 1e6
+        if now_us - self._ordered_us <= max_echo_age_us:
+            if thrust.epoch < self._epoch:
+                return ZeroCause.OLD_EPOCH
+            if thrust.epoch == self._epoch and thrust.seq <= self._seq:
+                return ZeroCause.REPLAYED
         if thrust.echo_us > now_us:
             return ZeroCause.FUTURE
-        if now_us - thrust.echo_us > self._config.max_echo_age_s * 1e6:
+        if now_us - thrust.echo_us > max_echo_age_us:
             return ZeroCause.STALE_ECHO
         fans = (thrust.left, thrust.right)
         if not all(math.isfinite(fan) and -self._config.astern <= fan <= 1.0 for fan in fans):

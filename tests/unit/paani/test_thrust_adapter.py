@@ -125,6 +125,37 @@ def test_a_restarted_controller_begins_again() -> None:
     assert adapter.offer(thrust(epoch=101, seq=0), NOW_US) is ZeroCause.NONE
 
 
+def test_a_controller_that_began_after_its_clock_was_set_back_is_heard_once_every_command_before_is_stale() -> None:
+    """Until then the order of epochs refuses what came before; from then on the echo does."""
+    adapter = ready()
+    adapter.offer(thrust(echo_us=NOW_US), NOW_US)
+    for after_us, cause in ((500_000, ZeroCause.OLD_EPOCH), (500_001, ZeroCause.NONE)):
+        now_us = NOW_US + after_us
+        assert adapter.offer(thrust(epoch=5, seq=0, echo_us=now_us), now_us) is cause
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 700_000), st.integers(0, 500_000), st.integers(0, 3), st.booleans()), max_size=12
+    ),
+    st.data(),
+)
+def test_no_command_from_before_the_newest_is_ever_taken_again(
+    steps: list[tuple[int, int, int, bool]], data: st.DataObject
+) -> None:
+    """Whatever order epochs came in, with whatever pauses: a copy of an earlier command moves nothing."""
+    adapter, now_us, sent = ready(), NOW_US, [thrust(echo_us=NOW_US)]
+    adapter.offer(sent[0], NOW_US)
+    for seq, (pause_us, echo_age_us, epoch, is_replay) in enumerate(steps):
+        now_us += pause_us
+        if is_replay:
+            assert adapter.offer(data.draw(st.sampled_from(sent)), now_us) is not ZeroCause.NONE
+            continue
+        command = thrust(epoch=98 + epoch, seq=8 + seq, echo_us=max(sent[-1].echo_us, now_us - echo_age_us))
+        if adapter.offer(command, now_us) is ZeroCause.NONE:
+            sent.append(command)
+
+
 def test_disabled_command_is_accepted_and_gives_zero() -> None:
     adapter = ready()
     assert adapter.offer(thrust(enabled=False), NOW_US) is ZeroCause.NONE
