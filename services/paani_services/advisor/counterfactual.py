@@ -211,6 +211,7 @@ def _input_indices(found: Evaluation) -> NDArray[np.int64]:
         + found.left_incursion * np.int64(16)
         + found.right_incursion * np.int64(32)
         + found.may_search * np.int64(64)
+        + found.is_person_ahead * np.int64(128)
     )
     return indices
 
@@ -223,8 +224,9 @@ POLICY_INPUTS = tuple(
         preferred_side="right" if index & 8 else "left",
         incursion_side="left" if index & 16 else "right" if index & 32 else None,
         may_search=bool(index & 64),
+        is_person_ahead=bool(index & 128),
     )
-    for index in range(128)
+    for index in range(256)
 )
 DIRECTIONS = tuple(map(select_direction, POLICY_INPUTS))
 IS_NOT = {direction: np.array([found is not direction for found in DIRECTIONS]) for direction in Direction}

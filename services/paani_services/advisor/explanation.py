@@ -168,6 +168,8 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"the way ahead is occupied{by}; {sides}"
         case Reason.CENTER_VESSEL:
             return f"the way ahead is taken{by}; {sides}"
+        case Reason.CENTER_EDGE_INCURSION if someone:
+            return f"{centre}, and an obstacle reaches into it from one side; {sides}"
         case Reason.CENTER_EDGE_INCURSION:
             return f"an obstacle reaches into the way ahead from one side, {centre}"
         case Reason.TIE_KEPT_SIDE:

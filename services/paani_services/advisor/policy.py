@@ -25,6 +25,7 @@ RECORDED_NAMES = {  # of the fields of `PolicyInput` in a recorded state
     "preferred_side": "better",
     "retained_turn": "kept",
     "may_search": "looks",
+    "is_person_ahead": "person",
 }
 
 
@@ -33,7 +34,8 @@ class PolicyInput(msgspec.Struct, frozen=True, rename=RECORDED_NAMES):
 
     incursion_side: the side from which obstacles reach into the centre but not into its core. preferred_side: the side
     to take where both are free. retained_turn: a turn whose end has not been clear for long enough. may_search: no way
-    has been free for so long that the boat may turn on the spot to find one.
+    has been free for so long that the boat may turn on the spot to find one. is_person_ahead: somebody blocks the
+    centre, and nobody is passed by a slight turn.
     """
 
     left_blocked: bool = True
@@ -43,6 +45,7 @@ class PolicyInput(msgspec.Struct, frozen=True, rename=RECORDED_NAMES):
     preferred_side: str = "right"
     retained_turn: Direction | None = None
     may_search: bool = False
+    is_person_ahead: bool = False
 
 
 class Evaluation(NamedTuple):
@@ -56,6 +59,7 @@ class Evaluation(NamedTuple):
     right_incursion: Truth
     prefers_right: Truth
     may_search: Truth
+    is_person_ahead: Truth
 
 
 class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"}):
@@ -85,7 +89,8 @@ def evaluate(
     """Apply thresholds and overrides to the evidence that counts (J5-J7, J9).
 
     components: of the same evidence. An incursion from one edge of the centre is one whose obstacles reach neither its
-    core nor its other edge, where the water alone does not block the centre.
+    core nor its other edge, where the water alone does not block the centre. People who block the centre neither make
+    an incursion nor end one: its side stays closed when somebody comes in front of it.
     """
     without_water, occupied, blocked = {}, {}, {}
     for lane, found in facts.lanes.items():
@@ -97,9 +102,11 @@ def evaluate(
     blocked["center"] = blocked["center"] | vessel_ahead
     center, weights = components["center"], config.advisor.risk
     water_risk = weights.non_water * center.non_water + weights.uncertainty * center.uncertainty
-    core, left, right = (evidence.has_any(facts.reaching[part]) for part in ("core", "left", "right"))
+    people = facts.lanes["center"].people
+    core, left, right = (
+        evidence.has_any([i for i in facts.reaching[part] if i not in people]) for part in ("core", "left", "right")
+    )
     is_inner = core | (water_risk >= config.advisor.policy.center_block_risk)
-    is_inner = is_inner | evidence.has_any(facts.lanes["center"].people)  # nobody is passed by a slight turn
     gain = components[facts.held_side].risk - components[OPPOSITE_SIDE[facts.held_side]].risk
     shows_water = True ^ (without_water["left"] & without_water["center"] & without_water["right"])
     return Evaluation(
@@ -111,6 +118,7 @@ def evaluate(
         right_incursion=right & (True ^ (left | is_inner)),
         prefers_right=_is_clear_gain(gain, facts.needed_gain) ^ (facts.held_side == "right"),
         may_search=facts.may_search & shows_water,
+        is_person_ahead=evidence.has_any(people),
     )
 
 
@@ -133,6 +141,7 @@ def decide(
         incursion_side="left" if found.left_incursion else "right" if found.right_incursion else None,
         preferred_side="right" if found.prefers_right else "left",
         may_search=bool(found.may_search),
+        is_person_ahead=bool(found.is_person_ahead),
         retained_turn=state.turn if clear_frames < policy.clear_frames else None,
     )
     direction = select_direction(policy_input)
@@ -168,8 +177,8 @@ def select_direction(policy_input: PolicyInput) -> Direction:
     """The direction that follows from the input (J5, J8-J10).
 
     A clear centre goes straight, unless a turn is retained. A blocked centre turns to the free side, or to the
-    preferred one where both are free; away from an incursion from one edge, slightly where that side is free; and
-    stops where no side is free, unless the boat may search.
+    preferred one where both are free; away from an incursion from one edge, slightly where that side is free and nobody
+    is ahead; and stops where no side is free, unless the boat may search.
     """
     blocked = {"left": policy_input.left_blocked, "right": policy_input.right_blocked}
     if not policy_input.center_blocked:
@@ -179,7 +188,7 @@ def select_direction(policy_input: PolicyInput) -> Direction:
         return Direction.STOP
     if policy_input.incursion_side is not None:
         away = OPPOSITE_SIDE[policy_input.incursion_side]  # the other side would turn towards the obstacle
-        return FULL_TURNS[away] if blocked[away] else SLIGHT_TURNS[away]
+        return FULL_TURNS[away] if blocked[away] or policy_input.is_person_ahead else SLIGHT_TURNS[away]
     free = [side for side in ("left", "right") if not blocked[side]]
     return FULL_TURNS[free[0] if len(free) == 1 else policy_input.preferred_side]
 

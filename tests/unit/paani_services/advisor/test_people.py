@@ -61,6 +61,24 @@ def test_another_person_makes_no_advice_bolder_and_no_boat_faster(
     assert after.speed_limit_mps in (PAANI.advisor.people.slow_mps, msgspec.UNSET)
 
 
+def test_a_person_before_an_obstacle_that_reaches_into_the_way_does_not_open_its_side() -> None:
+    """Nobody is passed by a slight turn, and the side that the obstacle comes from stays closed."""
+    buoy = box(m.Label.BUOY, (0.28, 0.4, 0.37, 0.6), 0.95)
+    swimmer = box(m.Label.PERSON, (0.50, 0.4, 0.56, 0.6))
+    bank = lane(0.66)
+    for right, alone, with_somebody in (
+        (CLEAR.right, m.Direction.SLIGHT_RIGHT, m.Direction.RIGHT),
+        (bank, m.Direction.STOP, m.Direction.STOP),
+    ):
+        frame = msgspec.structs.replace(seeing(buoy), center=lane(0.35), right=right)
+        advisory = play([frame] * 3)[1][-1]
+        assert (advisory.direction, advisory.left.blocked) == (alone, False)
+        frame = msgspec.structs.replace(frame, detections=(*frame.detections, swimmer))
+        advisory = play([frame] * 3)[1][-1]
+        assert advisory.direction is with_somebody
+    assert m.Removal(direction=m.Direction.RIGHT, water=(m.Lane.RIGHT,)) in advisory.counterfactual.removals
+
+
 @given(FRAMES)
 def test_a_lane_without_connected_water_is_never_advised(frame: m.Evidence) -> None:
     advisory = play([frame] * 3)[1][-1]
