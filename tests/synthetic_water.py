@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.navigator.avoidance.planner import plan_motion
-from paani_services.navigator.avoidance.rollout import Plan, Trajectories
+from paani_services.navigator.avoidance.rollout import Trajectories
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
@@ -127,11 +124,6 @@ def move_to(memory: ObservationMemory, at_us: int, boat: BoatPose) -> Observatio
             memory, odometry(here.stamp_us + step_us, boat, float(surge), sway_mps=float(sway)), None, PLANNER
         )
     return memory if memory.odom_pose is not None else update_memory(memory, odometry(at_us, boat), None, PLANNER)
-
-
-def make_plan(*inputs: Any, **options: Any) -> Plan:
-    """What `plan_motion` orders, without its verdicts."""
-    return plan_motion(*inputs, **options)[0]
 
 
 def static_distances_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.ndarray:

@@ -9,6 +9,7 @@ from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
 from paani.messages import (
     EncounterClass,
+    HeadingVerdict,
     LegKind,
     Mission,
     MovingObstacle,
@@ -18,7 +19,7 @@ from paani.messages import (
     Waypoint,
 )
 from paani_services.navigator.avoidance.courtesy import Encounter, assess_encounter, describe_encounter
-from paani_services.navigator.avoidance.replanning import PlannerState
+from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan
 from paani_services.navigator.avoidance.rollout import BoatState, roll_out
 from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
 from paani_services.navigator.mapping.observed_cells import Camera
@@ -55,14 +56,17 @@ def predict(
         nearest = min(encounters, key=lambda each: (each.kind is EncounterClass.NONE, each.approach.tcpa_s))
         courtesy = describe_encounter(nearest, boat, order)
     obstacles = tuple(_on_map(each, boat, odometry) for each in encounters if boat is not None)
-    is_planned = not has_passed(state.planner_state.planned_us, PLAN_MAX_AGE_US, now_us)
+    headings: tuple[HeadingVerdict, ...] = ()
+    if not has_passed(state.planner_state.planned_us, PLAN_MAX_AGE_US, now_us):
+        fence = mission.fence if mission is not None else ()
+        headings = explain_plan(state.planner_state, camera, config.planner, fence)
     return Prediction(
         source_us=odometry.source_us,
         path=path,
         obstacles=obstacles,
         home=home,
         courtesy=courtesy,
-        headings=state.planner_state.verdicts if is_planned else (),
+        headings=headings,
     )
 
 

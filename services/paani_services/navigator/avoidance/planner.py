@@ -6,13 +6,13 @@ Constraints and costs keep their names.
 """
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani.messages import Constraint, HeadingCosts, HeadingVerdict
+from paani.messages import Constraint
 from paani_services.navigator.avoidance.constraints import (
     MarginCheck,
     Refusals,
@@ -31,7 +31,23 @@ from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoi
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 
-COST_DIGITS = 3  # of a cost that is told: a thousandth of a quarter turn
+
+class JudgedCandidates(NamedTuple):
+    """The candidates with what refuses each in the situation that decides, and what each costs."""
+
+    evaluation: CandidateEvaluation
+    refusals: Refusals
+    costs: CandidateCosts
+    is_waiting: bool
+
+    def cheapest_plan(self, start: BoatState) -> Plan:
+        """The plan of the cheapest feasible candidate; a stop if there is none."""
+        is_refused = any_refusal(self.refusals)
+        if is_refused.all():
+            return Plan(start.yaw_rad, 0.0)
+        best = int(np.where(is_refused, np.inf, self.costs.total).argmin())
+        heading_rad = wrap_rad(start.yaw_rad + float(self.evaluation.offsets_rad[best]))
+        return Plan(heading_rad, float(self.evaluation.speeds_mps[best]), self.is_waiting)
 
 
 def plan_motion(
@@ -43,8 +59,8 @@ def plan_motion(
     tracked: Sequence[DynamicObstacle] = (),
     *,
     may_wait: bool = True,
-) -> tuple[Plan, tuple[HeadingVerdict, ...]]:
-    """Choose the cheapest feasible candidate; with it, why each heading was taken or refused, the desired course first.
+) -> Plan:
+    """Choose the cheapest feasible candidate.
 
     Candidates are headings around the desired course at three speeds, each rolled out through the boat's turn-rate and
     acceleration limits. A candidate is feasible if no constraint refuses it: `hard_constraints`, and those of the first
@@ -60,9 +76,23 @@ def plan_motion(
     If there is none, the plan is a stop. Once the boat may wait no longer, people who may swim but were not seen to are
     static obstacles.
     """
-    stop = Plan(start.yaw_rad, 0.0)
+    judged = judge_candidates(grid, start, setpoint, previous, config, tracked, may_wait=may_wait)
+    return Plan(start.yaw_rad, 0.0) if judged is None else judged.cheapest_plan(start)
+
+
+def judge_candidates(
+    grid: OccupancyGrid,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    previous: Plan | None,
+    config: PlannerConfig,
+    tracked: Sequence[DynamicObstacle] = (),
+    *,
+    may_wait: bool = True,
+) -> JudgedCandidates | None:
+    """Check and weigh the candidates that `plan_motion` chooses from; None where none is considered."""
     if setpoint.speed_mps <= 0.0 or not grid.free.any():
-        return stop, ()
+        return None
     obstacles = [each for each in tracked if each.age_s <= config.unseen_s and (may_wait or each.is_moving)]
     evaluation = evaluate_candidates(grid, start, setpoint, obstacles, config)
     hard = hard_constraints(evaluation, start, setpoint, config)
@@ -74,12 +104,7 @@ def plan_motion(
     else:
         situations = _situations(evaluation, hard, check, start, previous, config)
         refusals = next((each for each in situations if not any_refusal(each).all()), check.refusals)
-    verdicts = _tell_headings(evaluation, refusals, costs, start)
-    if any_refusal(refusals).all():
-        return stop, verdicts
-    best = int(np.where(any_refusal(refusals), np.inf, costs.total).argmin())
-    heading_rad = wrap_rad(start.yaw_rad + float(evaluation.offsets_rad[best]))
-    return Plan(heading_rad, float(evaluation.speeds_mps[best]), is_waiting), verdicts
+    return JudgedCandidates(evaluation, refusals, costs, is_waiting)
 
 
 def _is_held_up(evaluation: CandidateEvaluation, check: MarginCheck) -> bool:
@@ -103,29 +128,3 @@ def _situations(
     yield check.refusals
     yield unless_escaping(evaluation, hard, start, config)
     yield unless_clearer_than_coasting(evaluation, hard)
-
-
-def _tell_headings(
-    evaluation: CandidateEvaluation, refusals: Refusals, costs: CandidateCosts, start: BoatState
-) -> tuple[HeadingVerdict, ...]:
-    """Of each heading, what refuses it at each speed, and the costs of the cheapest speed that nothing refuses."""
-    names = [each for each in Constraint if each in refusals]
-    masks = np.stack([refusals[each] for each in names])
-    is_refused, first = any_refusal(refusals), masks.argmax(axis=0)
-    total = np.where(is_refused, np.inf, costs.total)
-    count = int((evaluation.offsets_rad == evaluation.offsets_rad[0]).sum())
-    verdicts = []
-    for at in range(0, total.size, count):
-        speeds = range(at, at + count)
-        cheapest = min(speeds, key=lambda each: float(total[each]))
-        is_free = bool(total[cheapest] < np.inf)
-        parts = (round(float(each[cheapest]), COST_DIGITS) for each in costs)
-        verdicts.append(
-            HeadingVerdict(
-                heading_rad=wrap_rad(start.yaw_rad + float(evaluation.offsets_rad[at])),
-                refused_by=tuple(names[first[each]] if is_refused[each] else Constraint.NONE for each in speeds),
-                speed_mps=float(evaluation.speeds_mps[cheapest]) if is_free else 0.0,
-                costs=HeadingCosts(*parts) if is_free else msgspec.UNSET,
-            )
-        )
-    return tuple(verdicts)

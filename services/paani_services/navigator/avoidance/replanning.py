@@ -14,12 +14,27 @@ from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
+from paani_services.navigator.avoidance.verdicts import explain_motion
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
+
+
+class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """What the planner was asked beside the course and the water, so that it can be asked again.
+
+    map_offset_m: east and north of the boat in the map, less those by dead reckoning.
+    """
+
+    start: BoatState
+    speed_mps: float
+    is_pivot_only: bool
+    previous: Plan | None
+    may_wait: bool
+    map_offset_m: tuple[float, float]
 
 
 class PlannerState(
@@ -32,7 +47,7 @@ class PlannerState(
     course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
     waiting_since_us: since when no plan has led the boat onward.
     obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
-    verdicts: why the plan took or refused each heading; empty where another planner made it.
+    request: what the plan was made from; None where another planner made it.
     """
 
     memory: ObservationMemory = ObservationMemory()
@@ -43,7 +58,7 @@ class PlannerState(
     waiting_since_us: int | None = None
     frame_id: tuple[int, int] = (-1, -1)
     obstacle_track_ids: tuple[int, ...] = ()
-    verdicts: tuple[HeadingVerdict, ...] = ()
+    request: PlanRequest | None = None
 
 
 def observe(
@@ -78,17 +93,21 @@ def replan(
         return state, Plan(odometry.yaw_rad, 0.0)
     plan = state.plan
     if plan is None or _is_plan_due(state, setpoint, now_us, config):
-        grid, obstacles = map_water(state.memory.observations, (here.x_m, here.y_m), now_us, camera, config)
-        grid = apply_fence(grid, fence, (odometry.x_m - here.x_m, odometry.y_m - here.y_m))
         velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
-        start = BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity)
         since_us = now_us if state.waiting_since_us is None else min(state.waiting_since_us, now_us)
-        may_wait = (now_us - since_us) * 1e-6 < config.patience_s
-        verdicts: tuple[HeadingVerdict, ...] = ()
+        request = PlanRequest(
+            start=BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity),
+            speed_mps=setpoint.speed_mps,
+            is_pivot_only=setpoint.is_pivot_only,
+            previous=plan,
+            may_wait=(now_us - since_us) * 1e-6 < config.patience_s,
+            map_offset_m=(odometry.x_m - here.x_m, odometry.y_m - here.y_m),
+        )
+        grid, obstacles = _map_fenced_water(state.memory, request, now_us, camera, config, fence)
         if planner is None:
-            plan, verdicts = plan_motion(grid, start, setpoint, plan, config, obstacles, may_wait=may_wait)
+            plan = plan_motion(grid, request.start, setpoint, plan, config, obstacles, may_wait=request.may_wait)
         else:
-            plan = Plan(*planner(_planning_inputs(grid, start, setpoint, plan, config, obstacles)))
+            plan = Plan(*planner(_planning_inputs(grid, request.start, setpoint, plan, config, obstacles)))
         state = PlannerState(
             state.memory,
             plan,
@@ -98,9 +117,35 @@ def replan(
             since_us if plan.is_waiting or plan.speed_mps == 0.0 else None,
             state.memory.frame_id,
             tuple(sorted({obstacle.track_id for obstacle in obstacles} - {0})),
-            verdicts,
+            request if planner is None else None,
         )
     return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
+
+
+def explain_plan(
+    state: PlannerState, camera: Camera, config: PlannerConfig, fence: Fence = ()
+) -> tuple[HeadingVerdict, ...]:
+    """Why the plan in force took or refused each heading: the planner is asked again what it was asked then.
+
+    Empty where another planner made the plan, and where the memory does not lead to it any more.
+    """
+    request = state.request
+    if request is None or state.frame_id != state.memory.frame_id:
+        return ()
+    grid, obstacles = _map_fenced_water(state.memory, request, state.planned_us, camera, config, fence)
+    setpoint = GuidanceSetpoint(state.course_rad, request.speed_mps, state.advised_side, request.is_pivot_only)
+    plan, verdicts = explain_motion(
+        grid, request.start, setpoint, request.previous, config, obstacles, may_wait=request.may_wait
+    )
+    return verdicts if plan == state.plan else ()
+
+
+def _map_fenced_water(
+    memory: ObservationMemory, request: PlanRequest, now_us: int, camera: Camera, config: PlannerConfig, fence: Fence
+) -> tuple[OccupancyGrid, tuple[DynamicObstacle, ...]]:
+    """The grid around the boat, which ends at the fence, and the dynamic obstacles."""
+    grid, obstacles = map_water(memory.observations, request.start[:2], now_us, camera, config)
+    return apply_fence(grid, fence, request.map_offset_m), obstacles
 
 
 def _is_plan_due(state: PlannerState, setpoint: GuidanceSetpoint, now_us: int, config: PlannerConfig) -> bool:

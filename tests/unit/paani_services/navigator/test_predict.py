@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from paani import messages as m
-from paani_services.navigator.avoidance.replanning import replan
-from paani_services.navigator.avoidance.rollout import GuidanceSetpoint
+from paani.motion_planning import HeadingSpeed
+from paani_services.navigator.avoidance.fence_cells import apply_fence
+from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan, observe, replan
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
+from paani_services.navigator.avoidance.verdicts import explain_motion
 from paani_services.navigator.guidance.mission_progress import MissionProgress
+from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.navigate import NavigatorState
 from paani_services.navigator.predict import predict
-from tests.synthetic_water import AT_REST, CAMERA, CONFIG, PLANNER, odometry
+from paani_sim.eye.camera import BoatPose
+from tests.synthetic_water import AT_REST, CAMERA, CONFIG, PLANNER, evidence, odometry
 from tests.unit.paani_services.navigator.mapping.test_track_identity import person_of, watch
 
 NAVIGATOR = replace(CONFIG.navigator, planner=PLANNER)
 AHEAD = m.NavCommand(source_us=0, enable=True, heading_rad=math.pi / 2, speed_mps=0.5)
 STILL = m.NavCommand(source_us=0, enable=False, heading_rad=0.0, speed_mps=0.0, inhibits=(m.Inhibit.NOT_ARMED,))
 HOME = m.Waypoint(x_m=-3.0, y_m=4.0)
+CORNERS = tuple(m.Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in ((90.0, 40.0), (110.0, 40.0), (110.0, 52.5), (90.0, 52.5)))
+FENCE = (m.FenceArea(keep=m.Keep.IN, corners=CORNERS),)
 
 
 def test_moving_obstacles_stand_in_the_map_with_number_and_velocity() -> None:
@@ -64,16 +72,53 @@ def test_encounters_are_told_with_their_closest_point_and_keep_their_class() -> 
         assert kept.courtesy == f"Give way: person #{number} crossing from {side}, waiting until it is past"
 
 
-def test_the_reasons_of_the_plan_are_told_while_the_boat_is_steered_by_it() -> None:
+@pytest.mark.parametrize(
+    ("frames", "setpoint", "waited_us"),
+    [
+        (16, GuidanceSetpoint(0.3, 0.6, 1.0), 0),
+        (4, GuidanceSetpoint(0.3, 0.6, 1.0), 60_000_000),  # whether the person swims is unknown, and it waits no longer
+        (16, GuidanceSetpoint(0.0, 0.6, 1.0, is_pivot_only=True), 0),
+    ],
+)
+def test_the_reasons_told_are_those_of_the_plan_in_force_until_it_is_old(
+    frames: int, setpoint: GuidanceSetpoint, waited_us: int
+) -> None:
+    """They are told by asking the planner again, also of a recorded state, after the boat has gone on."""
+    planner, _, now_us = watch(frames, with_tracks=True)
+    planner = replace(planner, waiting_since_us=now_us - waited_us, plan=Plan(0.1, 0.6))
+    away = replace(odometry(now_us, AT_REST), x_m=100.0, y_m=50.0, surge_mps=0.3, sway_mps=0.05, yaw_rate_radps=0.1)
+    after, plan = replan(planner, away, setpoint, now_us, CAMERA, PLANNER, FENCE)
+    grid, obstacles = map_water(planner.memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
+    grid, start = apply_fence(grid, FENCE, (100.0, 50.0)), BoatState(0.0, 0.0, 0.0, 0.3, 0.1, 0.05)
+    planned, verdicts = explain_motion(grid, start, setpoint, planner.plan, PLANNER, obstacles, may_wait=waited_us == 0)
+    assert planned == plan
+    assert len({each.refused_by for each in verdicts}) > 1
+    gone_on = observe(after, odometry(now_us + 200_000, BoatPose(0.7, 0.0, 0.05), 3.5), None, PLANNER)
+    recorded = msgspec.json.decode(msgspec.json.encode(gone_on), type=PlannerState)
+    mission = m.Mission(source_us=0, name="fenced", legs=(), fence=FENCE)
+
+    def headings_told(state: PlannerState, after_us: int = 200_000) -> tuple[m.HeadingVerdict, ...]:
+        later = NavigatorState(planner_state=state)
+        return predict(later, AHEAD, away, mission, now_us + after_us, CAMERA, NAVIGATOR).headings
+
+    assert headings_told(after) == headings_told(recorded) == verdicts
+    assert headings_told(after, 1_100_000) == ()
+
+
+def test_no_reasons_are_told_of_a_plan_that_is_no_more_what_the_planner_would_do() -> None:
+    """Another planner made it, a newer picture or another fence came since, or the memory began anew."""
     planner, _, now_us = watch(4, with_tracks=True)
-    here = odometry(now_us, AT_REST)
-    planner, plan = replan(planner, here, GuidanceSetpoint(0.3, 0.6), now_us, CAMERA, PLANNER)
-    state = NavigatorState(planner_state=planner)
-    headings = predict(state, AHEAD, here, None, now_us, CAMERA, NAVIGATOR).headings
-    assert headings == planner.verdicts
-    assert headings[0].heading_rad == pytest.approx(0.3)
-    assert plan.heading_rad in [each.heading_rad for each in headings]
-    assert predict(state, AHEAD, here, None, now_us + 1_100_000, CAMERA, NAVIGATOR).headings == ()
+    here, ahead = odometry(now_us, AT_REST), GuidanceSetpoint(0.3, 0.6)
+    planned, plan = replan(planner, here, ahead, now_us, CAMERA, PLANNER)
+    same = HeadingSpeed(plan.heading_rad, plan.speed_mps)
+    other, _ = replan(planner, here, ahead, now_us, CAMERA, PLANNER, planner=lambda _: same)
+    newer = observe(planned, None, evidence(now_us + 10_000, ()), PLANNER)
+    anew = observe(planned, odometry(now_us + 10_000, AT_REST, epoch=7), None, PLANNER)
+    for state, is_told in ((planned, True), (other, False), (newer, False), (anew, False)):
+        assert bool(explain_plan(state, CAMERA, PLANNER)) is is_told
+    corners = tuple(m.Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in ((-3.0, -3.0), (2.0, -3.0), (2.0, 3.0), (-3.0, 3.0)))
+    fence = (m.FenceArea(keep=m.Keep.IN, corners=corners),)
+    assert explain_plan(planned, CAMERA, PLANNER, fence) == ()
 
 
 def test_the_way_ahead_leads_to_the_ordered_heading_and_is_none_where_the_boat_may_not_move() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from paani.messages import Detection, Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m
+from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
@@ -19,7 +20,6 @@ from tests.synthetic_water import (
     PLANNER,
     Bar,
     detection_of,
-    make_plan,
     observe_from,
     observe_then_look_astern,
     water_edge_of,
@@ -72,7 +72,7 @@ def test_the_boat_goes_slower_where_a_person_may_be(x_m: float, y_m: float) -> N
     grid = grid._replace(free=~grid.occupied)  # everything else is known to be free
     start, setpoint = BoatState(x_m, y_m, 0.0, 0.6), GuidanceSetpoint(0.0, 0.6)
     found, at_once = (
-        make_plan(given, start, setpoint, None, PLANNER)
+        plan_motion(given, start, setpoint, None, PLANNER)
         for given in (grid, grid._replace(reachable_unseen=grid.people))
     )
     assert found.speed_mps < at_once.speed_mps

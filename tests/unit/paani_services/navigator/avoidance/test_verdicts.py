@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingVerdict
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
+from paani_services.navigator.avoidance.verdicts import explain_motion
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
 from paani_services.navigator.mapping.velocity_fit import Velocity
@@ -70,7 +70,7 @@ def test_the_plan_is_the_cheapest_heading_that_nothing_refuses(
 ) -> None:
     grid = pool(*((x, y, x + deep, y + wide) for x, y, deep, wide in bars))
     start, crossing = BoatState(0.0, 0.0, 0.0, surge), swimmer(*place, 0.3)
-    plan, verdicts = plan_motion(grid, start, GuidanceSetpoint(course, 0.6, side), None, PLANNER, (crossing,))
+    plan, verdicts = explain_motion(grid, start, GuidanceSetpoint(course, 0.6, side), None, PLANNER, (crossing,))
     headings = [each.heading_rad for each in verdicts]
     assert headings[0] == pytest.approx(wrap_rad(course))
     assert len(set(headings)) == len(headings) > 20
@@ -85,7 +85,7 @@ def test_the_plan_is_the_cheapest_heading_that_nothing_refuses(
 
 
 def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
-    _, verdicts = plan_motion(pool(), CRUISING, GuidanceSetpoint(0.0, 0.6, 1.0), Plan(0.0, 0.6), PLANNER)
+    _, verdicts = explain_motion(pool(), CRUISING, GuidanceSetpoint(0.0, 0.6, 1.0), Plan(0.0, 0.6), PLANNER)
     straight, port, starboard = verdicts[:3]
     assert straight.costs is not msgspec.UNSET
     assert port.costs is not msgspec.UNSET
@@ -102,7 +102,7 @@ def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
 
 
 def test_obstacles_cost_what_is_near_and_what_is_further_along_the_path() -> None:
-    _, verdicts = plan_motion(pool((3.6, -0.4, 4.2, 0.4)), RESTING, AHEAD, None, PLANNER)
+    _, verdicts = explain_motion(pool((3.6, -0.4, 4.2, 0.4)), RESTING, AHEAD, None, PLANNER)
     by_heading = {round(math.degrees(each.heading_rad)): each.costs for each in verdicts}
     near, clear = by_heading[20], by_heading[60]
     assert near is not msgspec.UNSET
@@ -113,43 +113,43 @@ def test_obstacles_cost_what_is_near_and_what_is_further_along_the_path() -> Non
 
 def test_water_that_is_not_known_refuses_a_boat_that_could_not_stop() -> None:
     """No picture shows what lies abeam; a boat that may pivot there does not go there at speed."""
-    _, verdicts = plan_motion(pool()._replace(blind_zone=wall(range(0), range(0))), CRUISING, AHEAD, None, PLANNER)
+    _, verdicts = explain_motion(pool()._replace(blind_zone=wall(range(0), range(0))), CRUISING, AHEAD, None, PLANNER)
     assert {each.refused_by for each in verdicts} == {(Constraint.UNKNOWN_WATER,) * 3}
 
 
 def test_a_wall_refuses_what_leads_to_it_and_a_boat_beside_it_goes_slowly() -> None:
-    _, verdicts = plan_motion(basin(wall(columns=range(58, 62))), CRUISING, AHEAD, None, PLANNER)
+    _, verdicts = explain_motion(basin(wall(columns=range(58, 62))), CRUISING, AHEAD, None, PLANNER)
     assert verdicts[0].refused_by[0] is Constraint.STATIC_OBSTACLE
-    _, verdicts = plan_motion(basin(wall(rows=range(52, 60))), RESTING, AHEAD, None, PLANNER)
+    _, verdicts = explain_motion(basin(wall(rows=range(52, 60))), RESTING, AHEAD, None, PLANNER)
     assert verdicts[0].refused_by[:2] == (Constraint.TOO_FAST, Constraint.NONE)
 
 
 def test_people_keep_their_distance_whatever_else_is_there() -> None:
     person = wall(range(48, 52), range(56, 60))
-    _, verdicts = plan_motion(basin(person, person), CRUISING, AHEAD, None, PLANNER)
+    _, verdicts = explain_motion(basin(person, person), CRUISING, AHEAD, None, PLANNER)
     assert verdicts[0].refused_by[0] is Constraint.PERSON
 
 
 def test_what_crosses_refuses_the_way_across_its_own_and_a_boat_that_waits_says_so() -> None:
     crossing = swimmer(3.0, -2.0, 0.35)
-    plan, verdicts = plan_motion(basin(wall(range(0), range(0))), CRUISING, AHEAD, None, PLANNER, (crossing,))
+    plan, verdicts = explain_motion(basin(wall(range(0), range(0))), CRUISING, AHEAD, None, PLANNER, (crossing,))
     assert not plan.is_waiting
     assert Constraint.DYNAMIC_OBSTACLE in verdicts[0].refused_by
-    plan, verdicts = plan_motion(pool(), CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, -1.0, 0.35),))
+    plan, verdicts = explain_motion(pool(), CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, -1.0, 0.35),))
     assert plan.speed_mps == 0.0
     assert {each.refused_by[0] for each in verdicts} <= {Constraint.WAIT, Constraint.UNKNOWN_WATER}
     assert verdicts[0].refused_by[0] is Constraint.WAIT
 
 
 def test_a_boat_that_faces_away_looks_first() -> None:
-    _, verdicts = plan_motion(basin(wall(range(0), range(0))), RESTING, GuidanceSetpoint(2.0, 0.6), None, PLANNER)
+    _, verdicts = explain_motion(basin(wall(range(0), range(0))), RESTING, GuidanceSetpoint(2.0, 0.6), None, PLANNER)
     assert verdicts[0].refused_by == (Constraint.LOOK, Constraint.LOOK, Constraint.NONE)
 
 
 def test_a_turn_that_is_not_asked_for_is_refused_as_such() -> None:
     """A pivot to port is asked for, and no way ahead."""
     look = GuidanceSetpoint(0.0, 0.6, 1.0, is_pivot_only=True)
-    plan, verdicts = plan_motion(pool(), RESTING, look, None, PLANNER)
+    plan, verdicts = explain_motion(pool(), RESTING, look, None, PLANNER)
     assert verdicts[0].refused_by == (Constraint.TURN,) * 3
     assert plan.heading_rad > 0.3
 
@@ -158,7 +158,7 @@ def test_out_of_a_corner_without_a_way_nothing_escapes() -> None:
     """The boat lies in a corner that no candidate leads out of, and stops; every heading says why."""
     cells = wall()
     cells[49:51, 49:51] = False
-    plan, verdicts = plan_motion(basin(cells), RESTING, GuidanceSetpoint(1.9, 0.3), Plan(0.0, 0.0), PLANNER)
+    plan, verdicts = explain_motion(basin(cells), RESTING, GuidanceSetpoint(1.9, 0.3), Plan(0.0, 0.0), PLANNER)
     assert plan.speed_mps == 0.0
     assert {each.speed_mps for each in verdicts} == {0.0}
     assert all(Constraint.NONE not in each.refused_by for each in verdicts)
