@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import importlib.util
 import os
 import subprocess
@@ -174,6 +175,38 @@ async def test_a_boat_armed_from_here_is_stopped_without_stations(
         async with asyncio.timeout(5.0):
             assert (await requests.get()).act is m.RequestAct.STOP
     publishing.cancel()
+
+
+async def test_mavsdk_downloads_what_is_recorded_and_sees_nothing_else(spawn: Spawn, tmp_path: Path) -> None:
+    """A recording of two requests of MAVSDK's, 46,080 bytes each, and a bit; the one being written is not there."""
+    pytest.importorskip("mavsdk", reason="needs mavsdk")
+    from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
+    from mavsdk.asyncio.plugins.log_files import LogFilesAsync
+    from mavsdk.component_type import ComponentType
+
+    tcp, folder, copy = find_free_port(), tmp_path / "recordings", tmp_path / "copy"
+    folder.mkdir()
+    recording = folder / "20231114T221320Z-1.mcap"
+    recording.write_bytes(os.urandom(2 * 46_080 + 17))
+    links = (f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""', f"recorder.folder={folder}")
+    with (folder / "20231114T231320Z-1.mcap").open("wb") as written:
+        written.write(b"begun")
+        written.flush()
+        fcntl.flock(written, fcntl.LOCK_EX)
+        async with (
+            spawn("mavlink", *links),
+            Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk,
+        ):
+            await mavsdk.add_any_connection(f"tcpout://127.0.0.1:{tcp}")
+            system = await mavsdk.first_autopilot(timeout_s=10.0)
+            assert system is not None
+            logs = LogFilesAsync(system)
+            (entry,) = await logs.get_entries()
+            assert (entry.size_bytes, entry.date[:19]) == (recording.stat().st_size, "2023-11-14T22:13:20")
+            async with asyncio.timeout(30.0):
+                async for _ in logs.download_log_file(entry, str(copy)):
+                    pass
+    assert copy.read_bytes() == recording.read_bytes()
 
 
 async def test_mavproxy_signs_and_is_obeyed_and_before_is_not(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:

@@ -6,14 +6,12 @@ none. Whoever writes one holds a lock on it while it is being written.
 
 from __future__ import annotations
 
-import datetime
-import fcntl
 from pathlib import Path
 
 import msgspec
 
 from paani.errors import UserError
-from paani.logs.folder import KEEP, NAME, recordings
+from paani.logs.folder import KEEP, NAME, is_being_written, recordings, start_us
 from paani.logs.locate import layout_of
 
 MAX_ROWS = 1000
@@ -67,8 +65,8 @@ class RecordingFolder:
             RecordingRow(
                 name=each.path.name,
                 size_bytes=each.size_bytes,
-                start_us=_start_us(each.path.name),
-                duration_s=None if (running := is_running(each.path)) else self._duration_s(each.path, each.size_bytes),
+                start_us=start_us(each.path.name),
+                duration_s=None if (running := is_being_written(each.path)) else self._duration_s(each.path, each.size_bytes),
                 protected=each.kept,
                 running=running,
             )
@@ -100,7 +98,7 @@ class RecordingFolder:
         path = self.find(name)
         if path.with_name(path.name + KEEP).exists():
             raise RecordingRefusedError(409, f"{name} is protected: take its protection off first")
-        if is_running(path):
+        if is_being_written(path):
             raise RecordingRefusedError(409, f"{name} is being written")
         try:
             path.unlink(missing_ok=True)
@@ -121,18 +119,6 @@ class RecordingFolder:
         return self._durations_s[key]
 
 
-def is_running(path: Path) -> bool:
-    """Whether a recorder, or a repair, is writing this file."""
-    try:
-        with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False
-
-
 def _read_duration_s(path: Path) -> float | None:
     """From the first message to the last; None where that cannot be told."""
     try:
@@ -140,8 +126,3 @@ def _read_duration_s(path: Path) -> float | None:
     except UserError:
         return None
     return (max(span.end_us for span in spans) - min(span.start_us for span in spans)) * 1e-6 if spans else None
-
-
-def _start_us(name: str) -> int:
-    moment = datetime.datetime.strptime(name.partition("-")[0], "%Y%m%dT%H%M%SZ").replace(tzinfo=datetime.UTC)
-    return round(moment.timestamp() * 1e6)

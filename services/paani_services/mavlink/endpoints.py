@@ -45,8 +45,11 @@ class UdpLink(asyncio.DatagramProtocol):
 
     def write(self, data: bytes) -> None:
         """One frame, which is lost where the socket's buffer is full."""
-        if self._transport is not None and self._transport.get_write_buffer_size() <= MAX_UNREAD_BYTES:
+        if self._transport is not None and self.unsent_bytes() <= MAX_UNREAD_BYTES:
             self._transport.sendto(data)
+
+    def unsent_bytes(self) -> int:
+        return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
     def close(self) -> None:
         if self._transport is not None:
@@ -71,7 +74,7 @@ class Endpoints:
                 _, link = await loop.create_datagram_endpoint(UdpLink, remote_addr=(host, port))
             except OSError as error:
                 raise UserError(f"mavlink.udp {host}:{port}: {error.strerror}") from error
-            station = self._add(f"udp {host}:{port}", link.write, host)
+            station = self._add(f"udp {host}:{port}", link.write, link.unsent_bytes, host)
             link.receive = functools.partial(self._receive, station)
             self._udp.append(link)
         if self._settings.tcp:
@@ -97,7 +100,10 @@ class Endpoints:
                 return
             self._writers.add(writer)
             address = writer.get_extra_info("peername")
-            station = self._add(f"tcp {address[0]}:{address[1]}", lambda data: _write(writer, data), address[0])
+            unsent_bytes = writer.transport.get_write_buffer_size
+            station = self._add(
+                f"tcp {address[0]}:{address[1]}", lambda data: _write(writer, data), unsent_bytes, address[0]
+            )
             try:
                 while data := await reader.read(CHUNK_BYTES):
                     if not self._gateway.receive(station, data, self._clock.now_us()):
@@ -109,8 +115,11 @@ class Endpoints:
     def _receive(self, station: Station, data: bytes) -> None:
         self._gateway.receive(station, data, self._clock.now_us())
 
-    def _add(self, name: str, write: Callable[[bytes], None], host: str) -> Station:
-        station = Station(name, Codec(next(self._link_ids), self._signer), write, is_local=is_loopback(host))
+    def _add(
+        self, name: str, write: Callable[[bytes], None], unsent_bytes: Callable[[], int], host: str
+    ) -> Station:
+        codec = Codec(next(self._link_ids), self._signer)
+        station = Station(name, codec, write, unsent_bytes, is_local=is_loopback(host))
         self._gateway.stations.append(station)
         return station
 

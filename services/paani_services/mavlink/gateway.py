@@ -12,6 +12,7 @@ from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect, text_of
 from paani_services.mavlink.commands import Act, Verdict, judge_command, judge_mode
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.file_transfer import refuse_file
+from paani_services.mavlink.log_transfers import LogTransfers
 from paani_services.mavlink.mission_exchange import MissionExchange, MissionOrder
 from paani_services.mavlink.parameters import Parameter, find, param_value
 from paani_services.mavlink.snapshot import Snapshot
@@ -62,6 +63,7 @@ class Gateway:
         self.commander_us: int | None = None  # when a station that may command was heard last
         self._snapshot = Snapshot(now_us=0)
         self._missions = MissionExchange(send, count, self._is_trusted)
+        self.logs = LogTransfers(count, self._is_trusted)
         self._announcer = Announcer()
         self._welcomed = set[Station]()
         self._handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
@@ -76,7 +78,7 @@ class Gateway:
             **self._missions.handlers,
             "MISSION_SET_CURRENT": self._refuse_current,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
-            "LOG_REQUEST_LIST": self._log_request_list,
+            **self.logs.handlers,
             "MANUAL_CONTROL": self._manual_control,
             "CHANGE_OPERATOR_CONTROL": self._change_operator_control,
         }
@@ -86,6 +88,7 @@ class Gateway:
         now_us, self._snapshot = snapshot.now_us, snapshot
         texts = self._announcer.observe(snapshot)
         news = self._missions.follow(snapshot)
+        self.logs.follow(snapshot)
         for station in tuple(self.stations):
             if station.stick is not None:
                 self._drive(*station.stick, station.hand)
@@ -130,6 +133,7 @@ class Gateway:
         """Forget a station whose link has ended."""
         self._welcomed.discard(station)
         self._missions.forget(station)
+        self.logs.forget(station)
         if station in self.stations:
             self.stations.remove(station)
 
@@ -237,10 +241,6 @@ class Gateway:
         answer = refuse_file(message)
         if answer is not None:
             station.send(answer, self._snapshot.now_us)
-
-    def _log_request_list(self, station: Station, _: Any, __: tuple[int, int]) -> None:
-        """There are none by this way: without an answer stations ask on and on."""
-        station.send(dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0), self._snapshot.now_us)
 
     # The wheel
 

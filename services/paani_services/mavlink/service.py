@@ -17,6 +17,7 @@ from paani.operator_client import OperatorClient
 from paani_services.mavlink.acts import Acts, is_link_lost
 from paani_services.mavlink.endpoints import Endpoints
 from paani_services.mavlink.gateway import Gateway
+from paani_services.mavlink.log_files import serve_logs
 from paani_services.mavlink.parameters import parameters_of
 from paani_services.mavlink.signing import Signer, read_signing_key
 from paani_services.mavlink.snapshot import TOPICS, Snapshot
@@ -60,20 +61,22 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     endpoints = Endpoints(gateway, settings, signer, clock)
     with contextlib.closing(endpoints), contextlib.closing(acts):
         await endpoints.open()
-        with bus.alive():
-            LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")
-            begun_us = clock.now_us()
-            try:
-                while True:
-                    snapshot = inputs.snapshot()
-                    gateway.tick(snapshot)
-                    heard_us = gateway.commander_us or begun_us
-                    if is_link_lost(snapshot, bus.user, heard_us, settings.link_loss_s):
-                        LOG.warning("no ground station for %.1f s: STOP", settings.link_loss_s)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(serve_logs(gateway.logs, config.recorder.folder, clock))
+            with bus.alive():
+                LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")
+                begun_us = clock.now_us()
+                try:
+                    while True:
+                        snapshot = inputs.snapshot()
+                        gateway.tick(snapshot)
+                        heard_us = gateway.commander_us or begun_us
+                        if is_link_lost(snapshot, bus.user, heard_us, settings.link_loss_s):
+                            LOG.warning("no ground station for %.1f s: STOP", settings.link_loss_s)
+                            await acts.stop()
+                        present = sum(station.is_present(snapshot.now_us) for station in gateway.stations)
+                        bus.note(f"{present} ground station{'' if present == 1 else 's'}")
+                        await asyncio.sleep(PERIOD_S)
+                finally:  # nobody is left who could be asked
+                    if is_link_lost(inputs.snapshot(), bus.user, 0, settings.link_loss_s):
                         await acts.stop()
-                    present = sum(station.is_present(snapshot.now_us) for station in gateway.stations)
-                    bus.note(f"{present} ground station{'' if present == 1 else 's'}")
-                    await asyncio.sleep(PERIOD_S)
-            finally:  # nobody is left who could be asked
-                if is_link_lost(inputs.snapshot(), bus.user, 0, settings.link_loss_s):
-                    await acts.stop()

@@ -20,10 +20,22 @@ PARAMETERS_PER_TICK = 5  # 250 a second
 
 
 class Station:
-    """`write` takes the bytes of a frame. is_local: at the loopback interface of this machine."""
+    """`write` takes the bytes of a frame. is_local: at the loopback interface of this machine.
 
-    def __init__(self, name: str, codec: Codec, write: Callable[[bytes], None], *, is_local: bool) -> None:
+    unsent_bytes: how many of those bytes have not left this machine.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        codec: Codec,
+        write: Callable[[bytes], None],
+        unsent_bytes: Callable[[], int] = lambda: 0,
+        *,
+        is_local: bool,
+    ) -> None:
         self.name, self.is_local, self._codec, self._write = name, is_local, codec, write
+        self.unsent_bytes = unsent_bytes
         self.schedule = Schedule()
         self.next_parameter: int | None = None  # to be sent of the list that it asked for
         self.heard_us: int | None = None

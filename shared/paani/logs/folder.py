@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import fcntl
 import re
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -34,8 +36,14 @@ def recordings(folder: Path) -> list[Recording]:
     """Every recording of the folder by name, which is by age."""
     found = []
     for path in sorted(folder.glob("*.mcap*"), key=_age):
-        if NAME.fullmatch(path.name) and path.is_file():
-            found.append(Recording(path, path.stat().st_size, path.with_name(path.name + KEEP).exists()))
+        if not NAME.fullmatch(path.name):
+            continue
+        try:
+            status = path.stat()
+        except FileNotFoundError:  # deleted since the folder was read
+            continue
+        if stat.S_ISREG(status.st_mode):
+            found.append(Recording(path, status.st_size, path.with_name(path.name + KEEP).exists()))
     return found
 
 
@@ -62,6 +70,27 @@ def require_folder(folder: Path) -> None:
         probe.unlink()
     except OSError as error:
         raise UserError(f"recorder.folder {folder}: {error.strerror}") from error
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a recorder, or a repair, is writing this file."""
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def start_us(name: str) -> int:
+    """When a recording began, to the second of its name [Unix us]; 0 where its digits are no time."""
+    try:
+        moment = datetime.datetime.strptime(name.partition("-")[0], "%Y%m%dT%H%M%SZ").replace(tzinfo=datetime.UTC)
+    except ValueError:
+        return 0
+    return round(moment.timestamp() * 1e6)
 
 
 def _age(path: Path) -> tuple[str, int]:
