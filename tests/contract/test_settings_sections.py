@@ -24,6 +24,7 @@ KNOWN = {  # section that another process owns, and why it is read
     ("thrusters", "plant"): "the thrust adapter, which the plant has in a simulation and the thrusters on a hull",
     ("mavlink", "advisor"): "the parameters of the policy that ground stations read",
     ("mavlink", "navigator"): "the cruise speed that ground stations read",
+    ("mavlink", "recorder"): "the folder whose recordings ground stations download",
     ("ros2", "navigator"): "the speed that a hand gets at full stick, by which `cmd_vel` is scaled",
     ("foxglove", "perception"): "the corridors that are drawn over the picture and on the water",
     ("foxglove", "localization"): "the origin of the map, at which route and fence are placed on the earth",
