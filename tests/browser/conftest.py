@@ -17,6 +17,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.clock import WallClock
+from paani_services.dashboard.pages import StaticFile, load_static_files
 from tests.conftest import OpenAs
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
@@ -103,6 +104,21 @@ async def boat(open_as: OpenAs) -> AsyncIterator[Boat]:
     publishing.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await publishing
+
+
+@pytest.fixture
+async def scripts_page(browser: Any) -> Any:
+    """An empty page that may import the scripts of the dashboard's page; nothing is served beside them."""
+    files, origin = await asyncio.to_thread(load_static_files), "http://page.test"
+
+    async def answer(route: Any) -> None:
+        file = files.get(route.request.url.removeprefix(f"{origin}/static/"), StaticFile("text/html", b""))
+        await route.fulfill(body=file.body, content_type=file.media_type)
+
+    page = await browser.new_page()
+    await page.route(f"{origin}/**", answer)
+    await page.goto(origin)
+    return page
 
 
 @pytest.fixture

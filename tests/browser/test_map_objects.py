@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from tests.browser.guidance import guiding
-from tests.browser.test_page import has_colour_on_map, until, watch
+from tests.browser.test_page import MAP_PX_PER_M, TRACK_RGB, has_colour_on_map, until, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
@@ -41,12 +41,39 @@ AHEAD = m.Prediction(
 )  # fmt: skip
 
 
+async def check_bow_up(page: Any, folder: Path) -> None:
+    """The boat heads east: what lies north of it is on its left, until a mission is drawn, and after a reload too."""
+    await page.click("#map-up")
+    up = "document.querySelector('#map-up-name').textContent"
+    await until(page, f"{up} === 'Bow'")
+    below_m = 0.22 * await page.evaluate("document.querySelector('#map').clientHeight") / MAP_PX_PER_M
+    drawn = (
+        ("the swimmer", ORANGE, -7.8, -8.0), ("home", ROUTE, 8.67, -10.0), ("the way ahead", AMBER, 0.0, 3.0),
+        ("the bow", TRACK_RGB, 0.0, 1.0),
+    )  # fmt: skip
+    for what, colour, right_m, ahead_m in drawn:
+        assert await has_colour_on_map(page, colour, right_m, ahead_m - below_m), what
+    await page.screenshot(path=folder / "bow-up.png")
+    await page.click("#map-edit")
+    await until(page, f"{up} === 'North' && document.querySelector('#map-up').disabled")
+    await page.wait_for_timeout(300)
+    assert await has_colour_on_map(page, ORANGE, -8.0 - below_m, 7.8), "north is up"
+    await page.click("#map-edit")
+    await page.click("#map-follow")
+    await page.reload()
+    await until(page, f"{up} === 'Bow' && document.querySelector('#map-follow').ariaPressed === 'true'")
+    await page.click("#map-up")
+    await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E')")
+    await page.wait_for_timeout(1000)
+    assert await has_colour_on_map(page, ORANGE, -8.0, 7.8)
+
+
 async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
     async with spawn("dashboard"), guiding(open_as) as guidance:
         guidance.route = None
-        guidance.odometry = replace(guidance.odometry, x_m=0.0, y_m=0.0) if guidance.odometry else None
+        guidance.odometry = replace(guidance.odometry, x_m=0.0, y_m=0.0, yaw_rad=0.0) if guidance.odometry else None
         navigator = guidance.navigator
         missions, predictions = navigator.publisher(keys.MISSION), navigator.publisher(keys.PREDICTION)
         watched = await watch(browser, config)
@@ -73,6 +100,7 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
         for what, colour, east_m, north_m in drawn:
             assert await has_colour_on_map(page, colour, east_m, north_m), what
         assert not await has_colour_on_map(page, RED, 8.0, 8.0)
+        await check_bow_up(page, tmp_path)
         prediction = None
         await page.wait_for_timeout(3600)
         assert not await has_colour_on_map(page, AMBER, 3.0, 0.0), "a way that is no longer said is no longer drawn"

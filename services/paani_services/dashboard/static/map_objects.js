@@ -7,7 +7,8 @@ const ARROW_S = 5; // a velocity is drawn as the way of this long
 const GHOST_S = 30; // no boat that nobody hears is said to go straight on for longer
 const FONT = "12px system-ui, sans-serif";
 
-/** @typedef {{ctx: CanvasRenderingContext2D, toScreen: import("./map.js").ToScreen, pxPerM: number, colour: (name: string) => string}} Chart */
+/** Metres east and north to pixels. @typedef {(x: number, y: number) => [number, number]} ToScreen */
+/** turnRad: by which every direction is turned, counter-clockwise. @typedef {{ctx: CanvasRenderingContext2D, toScreen: ToScreen, turnRad: number, pxPerM: number, colour: (name: string) => string}} Chart */
 
 /** Areas to keep in are outlined, areas to keep out are hatched too. @param {Chart} chart @param {any} mission */
 export function drawFence({ ctx, toScreen, colour }, mission) {

@@ -88,7 +88,7 @@ export class RouteEditor {
     byId("editor").hidden = !isOpen;
     document.body.dataset.editing = String(isOpen);
     byId("map-edit").setAttribute("aria-pressed", String(isOpen));
-    if (isOpen) this.map.setFollow(false);
+    if (isOpen) this.map.controls.setFollow(false);
   }
 
   /** @param {MouseEvent} event */
@@ -139,7 +139,7 @@ export class RouteEditor {
       const found = readFile(file.name, await file.text(), this.origin()), { plan } = this.made;
       this.made.replace({ legs: found.legs.length ? found.legs : plan.legs, fence: found.fence.length ? found.fence : plan.fence });
       this.note = "";
-      this.map.fitTo(this.made.items.flatMap((_, index) => this.made.points(index) ?? []), this.map.canvas.clientWidth, this.map.canvas.clientHeight);
+      this.map.fitTo(this.made.items.flatMap((_, index) => this.made.points(index) ?? []));
     } catch (error) {
       this.note = `${file.name}: ${/** @type {Error} */ (error).message}`;
     }

@@ -119,6 +119,13 @@ export const EDITOR = {
   accepted: "Accepted. It is in force; order Route to follow it.",
 };
 
+/** The map: what points up on it, and what a press on that does. */
+export const MAP_TEXTS = {
+  up: { north: "North", boat: "Bow" },
+  turn: "North or the bow is up",
+  drawing: "North is up while a mission is drawn",
+};
+
 /** Modes: name, and what the boat does in it. @type {Record<string, [string, string]>} */
 export const MODE_TEXTS = {
   ROUTE: ["Route", "follows its mission or route"],

@@ -1,0 +1,75 @@
+// @ts-check
+// Draws on the map where the boat is, where it was, and the route it follows.
+
+const FONT = "12px system-ui, sans-serif";
+
+/** @typedef {import("./map_objects.js").Chart} Chart */
+
+/** @param {Chart} chart @param {any} route @param {number} next index of the waypoint ahead; -1: unknown @param {number} acceptanceM */
+export function drawRoute({ ctx, toScreen, pxPerM, colour }, route, next, acceptanceM) {
+  const acceptancePx = acceptanceM * pxPerM;
+  ctx.strokeStyle = colour("--route");
+  ctx.lineWidth = 1.5;
+  ctx.beginPath();
+  for (const point of route.waypoints) ctx.lineTo(...toScreen(point.x_m, point.y_m));
+  if (route.repeat) ctx.closePath();
+  ctx.stroke();
+  route.waypoints.forEach((/** @type {any} */ point, /** @type {number} */ index) => {
+    const [x, y] = toScreen(point.x_m, point.y_m), isNext = index === next;
+    ctx.fillStyle = ctx.strokeStyle = colour("--route");
+    ctx.beginPath();
+    ctx.arc(x, y, isNext ? 4 : 2.5, 0, 7);
+    ctx.fill();
+    ctx.globalAlpha = isNext ? 1 : 0.35;
+    ctx.beginPath();
+    ctx.arc(x, y, Math.max(acceptancePx, 4), 0, 7);
+    ctx.stroke();
+    ctx.globalAlpha = 1;
+    if (isNext) {
+      ctx.fillStyle = colour("--quiet");
+      ctx.font = FONT;
+      ctx.fillText(`next ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
+    }
+  });
+}
+
+/** @param {Chart} chart @param {{x: number, y: number}[]} points @param {string} colourName @param {number} thick @param {number[]} dash */
+export function drawTrack({ ctx, toScreen, colour }, points, colourName, thick, dash) {
+  ctx.strokeStyle = colour(colourName);
+  ctx.lineWidth = thick;
+  ctx.setLineDash(dash);
+  ctx.globalAlpha = 0.85;
+  ctx.beginPath();
+  for (const point of points) ctx.lineTo(...toScreen(point.x, point.y));
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+}
+
+/** @param {Chart} chart @param {any} pose @param {string} colourName @param {boolean} isEstimate filled, with its deviation @param {boolean} isFresh */
+export function drawBoat({ ctx, toScreen, turnRad, pxPerM, colour }, pose, colourName, isEstimate, isFresh) {
+  const [x, y] = toScreen(pose.x_m, pose.y_m), size = Math.max(9, 0.9 * pxPerM);
+  ctx.save();
+  ctx.globalAlpha = isFresh ? 1 : 0.35;
+  ctx.fillStyle = ctx.strokeStyle = colour(colourName);
+  ctx.translate(x, y);
+  if (isEstimate && pose.position_std_m) {
+    ctx.globalAlpha *= 0.5;
+    ctx.lineWidth = 1;
+    ctx.beginPath();
+    ctx.arc(0, 0, pose.position_std_m * pxPerM, 0, 7);
+    ctx.stroke();
+    ctx.globalAlpha = isFresh ? 1 : 0.35;
+  }
+  ctx.rotate(-(pose.yaw_rad + turnRad));
+  ctx.beginPath();
+  ctx.moveTo(size, 0);
+  ctx.lineTo(-size * 0.7, size * 0.55);
+  ctx.lineTo(-size * 0.4, 0);
+  ctx.lineTo(-size * 0.7, -size * 0.55);
+  ctx.closePath();
+  ctx.lineWidth = 1.5;
+  if (isEstimate) ctx.fill();
+  else ctx.stroke();
+  ctx.restore();
+}
