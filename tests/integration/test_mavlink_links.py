@@ -179,11 +179,10 @@ async def test_a_boat_armed_from_here_is_stopped_without_stations(
 
 async def test_mavsdk_downloads_what_is_recorded_and_sees_nothing_else(spawn: Spawn, tmp_path: Path) -> None:
     """A recording of two requests of MAVSDK's, 46,080 bytes each, and a bit; the one being written is not there."""
-    pytest.importorskip("mavsdk", reason="needs mavsdk")
-    from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
-    from mavsdk.asyncio.plugins.log_files import LogFilesAsync
-    from mavsdk.component_type import ComponentType
-
+    sdk: Any = pytest.importorskip("mavsdk.asyncio.mavsdk", reason="needs mavsdk")
+    log_files: Any = pytest.importorskip("mavsdk.asyncio.plugins.log_files")
+    kinds: Any = pytest.importorskip("mavsdk.component_type")
+    configuration = sdk.Configuration.create_with_component_type(kinds.ComponentType.GROUND_STATION)
     tcp, folder, copy = find_free_port(), tmp_path / "recordings", tmp_path / "copy"
     folder.mkdir()
     recording = folder / "20231114T221320Z-1.mcap"
@@ -193,14 +192,11 @@ async def test_mavsdk_downloads_what_is_recorded_and_sees_nothing_else(spawn: Sp
         written.write(b"begun")
         written.flush()
         fcntl.flock(written, fcntl.LOCK_EX)
-        async with (
-            spawn("mavlink", *links),
-            Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk,
-        ):
+        async with spawn("mavlink", *links), sdk.Mavsdk(configuration) as mavsdk:
             await mavsdk.add_any_connection(f"tcpout://127.0.0.1:{tcp}")
             system = await mavsdk.first_autopilot(timeout_s=10.0)
             assert system is not None
-            logs = LogFilesAsync(system)
+            logs = log_files.LogFilesAsync(system)
             (entry,) = await logs.get_entries()
             assert (entry.size_bytes, entry.date[:19]) == (recording.stat().st_size, "2023-11-14T22:13:20")
             async with asyncio.timeout(30.0):

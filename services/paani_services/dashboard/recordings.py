@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from paani.errors import UserError
-from paani.logs.folder import KEEP, NAME, is_being_written, recordings, start_us
+from paani.logs.folder import KEEP, NAME, Recording, is_being_written, recordings, start_us
 from paani.logs.locate import layout_of
 
 MAX_ROWS = 1000
@@ -61,18 +61,20 @@ class RecordingFolder:
             return RecordingList(folder="", recordings=(), left_out=0)
         folder = self._require_folder()
         found = recordings(folder)
-        rows = tuple(
-            RecordingRow(
-                name=each.path.name,
-                size_bytes=each.size_bytes,
-                start_us=start_us(each.path.name),
-                duration_s=None if (running := is_being_written(each.path)) else self._duration_s(each.path, each.size_bytes),
-                protected=each.kept,
-                running=running,
-            )
-            for each in reversed(found[-MAX_ROWS:])
-        )
+        rows = tuple(self._row(each) for each in reversed(found[-MAX_ROWS:]))
         return RecordingList(folder=str(folder), recordings=rows, left_out=len(found) - len(rows))
+
+    def _row(self, recording: Recording) -> RecordingRow:
+        path, size_bytes = recording.path, recording.size_bytes
+        is_running = is_being_written(path)
+        return RecordingRow(
+            name=path.name,
+            size_bytes=size_bytes,
+            start_us=start_us(path.name),
+            duration_s=None if is_running else self._duration_s(path, size_bytes),
+            protected=recording.kept,
+            running=is_running,
+        )
 
     def find(self, name: str) -> Path:
         """The file of a recording. Raises RecordingRefusedError for what is none."""

@@ -115,9 +115,7 @@ class Endpoints:
     def _receive(self, station: Station, data: bytes) -> None:
         self._gateway.receive(station, data, self._clock.now_us())
 
-    def _add(
-        self, name: str, write: Callable[[bytes], None], unsent_bytes: Callable[[], int], host: str
-    ) -> Station:
+    def _add(self, name: str, write: Callable[[bytes], None], unsent_bytes: Callable[[], int], host: str) -> Station:
         codec = Codec(next(self._link_ids), self._signer)
         station = Station(name, codec, write, unsent_bytes, is_local=is_loopback(host))
         self._gateway.stations.append(station)

@@ -54,7 +54,7 @@ async def serve_logs(transfers: LogTransfers, folder: str, clock: Clock) -> None
             continue
         station, request = turn
         if not isinstance(request, ListRequest):
-            data = await asyncio.to_thread(read_log, request.file.path, request.offset, request.count)
+            data = await asyncio.to_thread(read_log, request.file.path, request.offset, request.turn_bytes)
             transfers.send_data(station, request, data)
         elif request.is_known:
             transfers.send_entries(station, request, None)

@@ -51,8 +51,8 @@ class DataRequest(NamedTuple):
     end: int
 
     @property
-    def count(self) -> int:
-        """Bytes of one turn."""
+    def turn_bytes(self) -> int:
+        """How much of it is one turn."""
         return min(self.end - self.offset, CHUNKS_PER_TURN * CHUNK_BYTES)
 
 
@@ -111,14 +111,14 @@ class LogTransfers:
         self._go_on(station, rest)
 
     def send_data(self, station: Station, request: DataRequest, data: bytes) -> None:
-        """Send bytes that were read from `offset`; fewer than `count` of the request end at the end of the file.
+        """Send bytes that were read from `offset`; fewer than its `turn_bytes` end at the end of the file.
 
         A chunk that is not full ends a download, as that of ArduPilot does: after a full one, at the end of the file,
         there is an empty one.
         """
         if self._requests.get(station) is not request:
             return
-        is_at_end = len(data) < request.count
+        is_at_end = len(data) < request.turn_bytes
         if not data and request.offset < request.file.size_bytes:
             self._refuse(station, GONE)
         for at in range(0, len(data) + is_at_end, CHUNK_BYTES):

@@ -50,7 +50,7 @@ class Disk:
             logs.send_entries(station, request, None if request.is_known else tuple(files))
         else:
             content = self.contents.get(request.file.path, b"")
-            logs.send_data(station, request, content[request.offset : request.offset + request.count])
+            logs.send_data(station, request, content[request.offset : request.offset + request.turn_bytes])
         return True
 
     def serve(self, peer: Peer, *answers: Any) -> list[Any]:
@@ -59,7 +59,7 @@ class Disk:
             pass
         return [*answers, *peer.received()]
 
-    def list(self, first: int = 0, last: int = 0xFFFF) -> list[Any]:
+    def entries(self, first: int = 0, last: int = 0xFFFF) -> list[Any]:
         request = common.MAVLink_log_request_list_message(1, 1, first, last)
         return self.serve(self.peer, *self.peer.send(request))
 
@@ -81,7 +81,7 @@ def content_of(chunks: list[Any]) -> bytes:
 
 
 def test_the_list_numbers_recordings_from_one_and_tells_size_and_time() -> None:
-    entries = Disk(b"a" * 100, b"b" * 7).list()
+    entries = Disk(b"a" * 100, b"b" * 7).entries()
     assert [(each.id, each.num_logs, each.last_log_num, each.size, each.time_utc) for each in entries] == [
         (1, 2, 2, 100, 1_700_000_000),
         (2, 2, 2, 7, 1_700_000_000),
@@ -89,12 +89,12 @@ def test_the_list_numbers_recordings_from_one_and_tells_size_and_time() -> None:
 
 
 def test_an_empty_folder_has_one_entry_that_says_so() -> None:
-    (entry,) = Disk().list()
+    (entry,) = Disk().entries()
     assert (entry.id, entry.num_logs) == (0, 0)
 
 
 def test_a_long_list_is_whole_and_of_the_newest() -> None:
-    entries = Disk(*[b"x"] * (MAX_LOGS + 5)).list()
+    entries = Disk(*[b"x"] * (MAX_LOGS + 5)).entries()
     assert [each.id for each in entries] == list(range(1, MAX_LOGS + 1))
 
 
@@ -104,7 +104,7 @@ def test_a_long_list_is_whole_and_of_the_newest() -> None:
 def test_a_recording_comes_whole_and_ends_with_a_chunk_that_is_not_full(size: int) -> None:
     content = bytes(number % 251 for number in range(size))
     disk = Disk(content)
-    disk.list()
+    disk.entries()
     chunks = disk.download(1)
     assert content_of(chunks) == content
     assert [chunk.count == CHUNK_BYTES for chunk in chunks] == [True] * (len(chunks) - 1) + [False]
@@ -113,7 +113,7 @@ def test_a_recording_comes_whole_and_ends_with_a_chunk_that_is_not_full(size: in
 def test_a_part_of_a_recording_is_that_part() -> None:
     content = bytes(range(250)) * 100
     disk = Disk(content)
-    disk.list()
+    disk.entries()
     chunks = disk.download(1, 90, 900)
     assert content_of(chunks) == content[90:990]
     assert [chunk.count for chunk in chunks] == [CHUNK_BYTES] * 10  # it does not say that the file ends here
@@ -125,18 +125,18 @@ def test_a_part_of_a_recording_is_that_part() -> None:
 def test_numbers_stay_with_their_files_until_a_new_list() -> None:
     """A recording is deleted, and one is added; the part of a list that a station lost is of the list that it has."""
     disk = Disk(b"a", b"b", b"c")
-    disk.list()
+    disk.entries()
     del disk.contents[Path("0.mcap")]
     disk.contents[Path("9.mcap")] = b"longer"
     assert content_of(disk.download(2)) == b"b"
-    assert [(each.id, each.size) for each in disk.list(2, 3)] == [(2, 1), (3, 1)]
-    assert [each.size for each in disk.list()] == [1, 1, 6]
+    assert [(each.id, each.size) for each in disk.entries(2, 3)] == [(2, 1), (3, 1)]
+    assert [each.size for each in disk.entries()] == [1, 1, 6]
     assert content_of(disk.download(2)) == b"c"
 
 
 def test_of_what_is_gone_nothing_is_sent_but_why() -> None:
     disk = Disk(b"a" * 500)
-    disk.list()
+    disk.entries()
     disk.contents.clear()
     text, chunk = disk.download(1)
     assert (text.text, chunk.count) == (GONE, 0)
@@ -145,7 +145,7 @@ def test_of_what_is_gone_nothing_is_sent_but_why() -> None:
 @pytest.mark.parametrize("number", [0, 3, 0xFFFF])
 def test_a_number_that_is_not_in_the_list_is_no_log(number: int) -> None:
     disk = Disk(b"a", b"b")
-    disk.list()
+    disk.entries()
     text, chunk = disk.download(number)
     assert (text.text, chunk.id, chunk.count) == (NO_SUCH_LOG, number, 0)
     assert disk.port.counted == ["mavlink_refused"]
@@ -155,7 +155,7 @@ def test_stations_elsewhere_get_no_recordings_without_a_signature() -> None:
     disk = Disk(b"a", local=False)
     text, chunk = disk.download(1)
     assert (text.text, chunk.count) == (commands.NOT_TRUSTED, 0)
-    (entry,) = disk.list()
+    (entry,) = disk.entries()
     assert entry.num_logs == 0
     assert not disk.turn()
 
@@ -163,13 +163,13 @@ def test_stations_elsewhere_get_no_recordings_without_a_signature() -> None:
 def test_recordings_are_not_erased() -> None:
     disk = Disk(b"a")
     assert only(disk.peer.send(common.MAVLink_log_erase_message(1, 1)), "STATUSTEXT").text == NO_ERASING
-    assert len(disk.list()) == 1
+    assert len(disk.entries()) == 1
 
 
 def test_stations_take_turns_of_bounded_size() -> None:
     disk = Disk(b"a" * 20 * TURN_BYTES)
     other = disk.station()
-    disk.list()
+    disk.entries()
     other.send(common.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     disk.serve(other)
     for peer in (disk.peer, other):
@@ -182,7 +182,7 @@ def test_stations_take_turns_of_bounded_size() -> None:
 
 def test_a_request_takes_the_place_of_the_one_before_and_an_end_ends_it() -> None:
     disk = Disk(b"a" * 20 * TURN_BYTES)
-    disk.list()
+    disk.entries()
     disk.peer.send(data_request(1))
     disk.turn()
     disk.peer.send(data_request(1, 900, CHUNK_BYTES))
@@ -195,7 +195,7 @@ def test_a_request_takes_the_place_of_the_one_before_and_an_end_ends_it() -> Non
 
 def test_what_was_read_for_an_earlier_request_is_not_sent() -> None:
     disk = Disk(b"a" * 20 * TURN_BYTES)
-    disk.list()
+    disk.entries()
     logs = disk.port.gateway.logs
     disk.peer.send(data_request(1))
     turn = logs.next_request()
@@ -209,7 +209,7 @@ def test_what_was_read_for_an_earlier_request_is_not_sent() -> None:
 
 def test_a_link_that_is_behind_waits_and_a_silent_station_gets_no_more() -> None:
     disk = Disk(b"a" * 20 * TURN_BYTES)
-    disk.list()
+    disk.entries()
     disk.peer.send(data_request(1))
     disk.peer.station.unsent_bytes = lambda: MAX_UNSENT_BYTES + 1
     assert not disk.turn()
@@ -221,7 +221,7 @@ def test_a_link_that_is_behind_waits_and_a_silent_station_gets_no_more() -> None
 
 def test_a_station_that_is_gone_leaves_nothing_behind() -> None:
     disk = Disk(b"a" * 20 * TURN_BYTES)
-    disk.list()
+    disk.entries()
     disk.peer.send(data_request(1))
     disk.port.gateway.remove(disk.peer.station)
     assert not disk.turn()
