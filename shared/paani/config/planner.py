@@ -9,12 +9,10 @@ from typing import Annotated
 
 import msgspec
 
-from paani.config.section import Fraction, NonNegative, Positive, Section
+from paani.config.section import Fraction, NonNegative, Offset, Positive, Section, Tilt
 from paani.config.simulator import EyeConfig
 
 FieldOfView = Annotated[float, msgspec.Meta(ge=0.0, le=170.0)]
-Tilt = Annotated[float, msgspec.Meta(ge=-60.0, le=60.0)]
-Offset = Annotated[float, msgspec.Meta(ge=-50.0, le=50.0)]
 Reach = Annotated[float, msgspec.Meta(ge=0.0, le=3.8)]  # the planner knows distances to 4 m
 Height = Annotated[float, msgspec.Meta(ge=0.0, le=30.0)]
 Angle = Annotated[float, msgspec.Meta(gt=0.0, le=180.0)]
@@ -90,7 +88,7 @@ class PlannerConfig(Section, frozen=True):
     horizon_slack_deg: NonNegative = 4.0
     free_s: Positive = 0.8  # Q3
     occupied_s: Positive = 2.0  # Q3
-    outvoted_by: Annotated[int, msgspec.Meta(ge=0)] = 2
+    outvoted_by: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 2
     hidden_s: NonNegative = 20.0
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat

@@ -9,8 +9,10 @@ from typing import Annotated
 
 import msgspec
 
-from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+from paani.config.section import Fraction, NonNegative, Offset, Positive, Section, Size, Tilt
 from paani.keys import VITAL_SERVICES
+
+LensTerm = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
 
 
 class WorldConfig(Section, frozen=True):
@@ -69,12 +71,12 @@ class EyeConfig(Section, frozen=True):
     height_px: Size = 240  # as `camera.height_px`
     jpeg_quality: Size = 85  # as `camera.jpeg_quality`
     camera_height_m: Positive = 0.9  # above the water, boat at rest
-    camera_forward_m: float = 0.55  # ahead of the boat's middle
-    pitch_down_deg: float = 6.0  # shows the water before the bow, and the horizon at 0.4 of the picture's height
+    camera_forward_m: Offset = 0.55  # ahead of the boat's middle
+    pitch_down_deg: Tilt = 6.0  # shows the water before the bow, and the horizon at 0.4 of the picture's height
     hfov_deg: Positive = 70.0  # a common webcam; `wide` has 102
     exposure_frac: Fraction = 1.0  # of the exposure that suits the light; less is darker
-    lens_k1: float = 0.0
-    lens_k2: float = 0.0
+    lens_k1: LensTerm = 0.0
+    lens_k2: LensTerm = 0.0
     shutter_s: NonNegative = 0.0
     blue_gain: Positive = 1.0
     red_gain: Positive = 1.0

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from msgspec import inspect as types
 
 from paani.config import Config, EyeConfig, decode_config, encode_config, load_config, with_settings
 from paani.errors import UserError
@@ -29,6 +31,7 @@ def test_later_layers_win(tmp_path: Path) -> None:
         ("boat.name=x", "Object contains unknown field `boat` (have: profile, bus, camera, "),
         ("camera.rate_hz=0", "camera.rate_hz: Expected `float` > 0.0"),
         ("camera.rate_hz=nan", "camera.rate_hz: Expected `float` > 0.0"),
+        ("eye.camera_forward_m=inf", "eye.camera_forward_m: Expected `float` <= 50.0"),
         ("camera.rate_hz=fast", "camera.rate_hz: Expected `float`, got `str`"),
         ("bus.vessel=Otter/x", "bus.vessel: Expected `str` matching regex"),
         ("navigator.cruise_mps=2.0", "navigator.cruise_mps 2.0 exceeds controller.max_speed_mps 0.9"),
@@ -156,6 +159,28 @@ def test_a_configuration_survives_being_handed_to_a_child() -> None:
     assert decode_config(encode_config(config)) == config
     with pytest.raises(UserError):
         decode_config(b'{"camera": {"rate": 1}}')
+
+
+def numbers_of(info: types.Type, path: str = "") -> Iterator[tuple[str, types.IntType | types.FloatType]]:
+    match info:
+        case types.IntType() | types.FloatType():
+            yield path, info
+        case types.StructType():
+            for field in info.fields:
+                yield from numbers_of(field.type, f"{path}.{field.encode_name}".lstrip("."))
+        case types.TupleType(item_types=parts) | types.UnionType(types=parts):
+            for part in parts:
+                yield from numbers_of(part, path)
+        case types.VarTupleType():
+            yield from numbers_of(info.item_type, path)
+
+
+def test_every_number_has_both_bounds() -> None:
+    """Infinity and what is no number have no JSON, so that a child could not be handed them."""
+    numbers = dict(numbers_of(types.type_info(Config)))
+    assert len(numbers) > 200
+    open_ended = [path for path, of in numbers.items() if of.le is None or (of.ge is None and of.gt is None)]
+    assert open_ended == []
 
 
 def test_defaults_are_valid() -> None:
