@@ -245,6 +245,7 @@ def blocked(obstacle: Obstacle) -> set[str]:
         (person(LEFT), {"left"}),
         (person(RIGHT), {"right"}),
         (person(BESIDE), {"left", "center"}),  # about to drift into the way
+        (person((0.41, 0.4, 0.45, 0.6)), {"center"}),  # nobody drifts into a side
         (person(BESIDE, candidate=1), {"left"}),  # what may be a person is not taken to drift
         (person((0.2, 0.4, 0.26, 0.6)), {"left"}),
         (person((0.70, 0.4, 0.73, 0.6)), {"center", "right"}),

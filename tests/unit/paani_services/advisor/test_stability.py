@@ -18,8 +18,6 @@ from paani_services.advisor.risk import ALL_EVIDENCE, LANES, severity
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, PAANI, PAPER, murky, play, water
 from tests.unit.paani_services.advisor.advisor_scenes import Scene, scene, scenes
 
-pytestmark = pytest.mark.slow
-
 D, R = m.Direction, m.Reason
 CONFIGS = st.sampled_from((PAANI, PAPER, CALIBRATED))
 ABRUPT = load_config(sets=("advisor.policy.side_change_margin=0", "advisor.policy.release_margin=0"))
@@ -69,6 +67,7 @@ def noisy(config: Config, risks: tuple[float, float, float]) -> Dithering:
     return dithering(play(frames, config)[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("risks", [(0.30, 0.60, 0.30), (0.30, 0.45, 0.40), (0.55, 0.60, 0.55)])
 def test_noise_around_a_limit_changes_the_advice_less(risks: tuple[float, float, float]) -> None:
     """Between like sides, at the centre's limit, at the sides' limit (where it stops more often instead)."""
@@ -78,6 +77,7 @@ def test_noise_around_a_limit_changes_the_advice_less(risks: tuple[float, float,
     assert steady.side_flips <= 0.6 * abrupt.side_flips
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(scenes(6))
 def test_steadiness_never_moves_a_boat_that_would_stop(given_scene: Scene) -> None:
@@ -91,6 +91,7 @@ def test_steadiness_never_moves_a_boat_that_would_stop(given_scene: Scene) -> No
         assert abrupt.direction in {D.STRAIGHT, given_scene.state.turn}
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(scenes(6), st.integers(0, 2**32), CONFIGS)
 def test_one_more_obstacle_is_never_good_news(given_scene: Scene, seed: int, config: Config) -> None:
@@ -144,6 +145,7 @@ def mirrored(given_scene: Scene) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(scenes(6), CONFIGS)
 @example(scene(2465981, 2), CALIBRATED)  # no side was free for long, and both are alike
@@ -177,6 +179,7 @@ def test_the_side_taken_is_never_much_the_worse(
     assert risks[side] - risks[OPPOSITE_SIDE[side]] <= max(policy.tie, policy.side_change_margin)
 
 
+@pytest.mark.slow
 def test_the_scenes_cover_every_direction() -> None:
     """The scenes of these tests are scenes: some of each direction, with risks between none and all."""
     decided = [scene(seed, seed % 7).decided(PAANI) for seed in range(400)]
