@@ -12,7 +12,7 @@ from paani.config import AdvisorConfig
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.gateway import Gateway, Request
 from paani_services.mavlink.mission_exchange import MissionOrder
-from paani_services.mavlink.parameters import parameters_of
+from paani_services.mavlink.parameter_exchange import ParameterWrite
 from paani_services.mavlink.signing import Signer
 from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.station import Station
@@ -111,22 +111,19 @@ class Port:
     """A gateway without links, what it has asked of the operator's process, and what it has counted."""
 
     def __init__(self, snapshot: Snapshot, *, is_signed: bool = False) -> None:
-
         self.asked: list[Request] = []
         self.sent: list[MissionOrder] = []
         self.counted: list[str] = []
-
-        def parameters(now: Snapshot) -> Any:
-            return parameters_of(now, 0.6, AdvisorConfig())
-
+        self.written: list[ParameterWrite] = []
         self.driven: list[tuple[float, float, int]] = []
 
         def drive(surge: float, turn: float, hand: int) -> None:
             self.driven.append((surge, turn, hand))
 
         self.gateway = Gateway(
-            self.asked.append, self.sent.append, drive, parameters, self.counted.append, is_signed=is_signed
-        )
+            self.asked.append, self.sent.append, drive, self.written.append, self.counted.append,
+            advisor=AdvisorConfig(), cruise_mps=0.6, is_signed=is_signed,
+        )  # fmt: skip
         self.gateway.tick(snapshot)
 
 

@@ -220,7 +220,16 @@ MISSION_REQUESTS = {
     )
     for client in (STATION, *ASKING_PORTS, "mission")
 }
-ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values())  # nobody owes one of these
+# Who may ask the page's process to have parameters tried; to promote them it takes a hand on the page.
+TUNING_PROPOSALS = {
+    client: Topic(
+        name=f"operator/tuning_proposal/{client}", type=m.TuningProposal, producer=client, rate_hz=1.0, fresh_s=2.0,
+        stance=Stance.EVENT, summary=f"parameters of the policy that {client} asks the page's process to have tried",
+    )
+    for client in ("mavlink",)
+}
+# Nobody owes one of these.
+ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values(), *TUNING_PROPOSALS.values())
 
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,

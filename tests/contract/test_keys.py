@@ -125,7 +125,8 @@ def test_each_client_of_the_operator_writes_its_own_requests_and_only_a_simulate
 ) -> None:
     asked = {topic.name for topic in keys.ASKED}
     for user in (*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS):
-        rows = [each[user] for each in (keys.REQUESTS, keys.MISSION_REQUESTS) if user in each]
+        tables = (keys.REQUESTS, keys.MISSION_REQUESTS, keys.TUNING_PROPOSALS)
+        rows = [each[user] for each in tables if user in each]
         own = {row.name for row in rows if user not in keys.ABSENT[graph]}
         assert asked & set(authority.written_by(user, graph)) == own
     for command in keys.COMMAND_LINE_CLIENTS:

@@ -154,8 +154,12 @@ async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(r
         assert await station.parameters.get_param_float("CRUISE_SPEED") == pytest.approx(0.6)
 
         # What it is refused.
-        assert "TIMEOUT" in await refusal_of(station.parameters.set_param_float("CRUISE_SPEED", 3.0))
+        assert "READ_ONLY" in await refusal_of(station.parameters.set_param_float("CRUISE_SPEED", 3.0))
         assert await station.parameters.get_param_float("CRUISE_SPEED") == pytest.approx(0.6)
+        assert "DOES_NOT_EXIST" in await refusal_of(station.parameters.get_param_float("NO_SUCH"))
+        assert "PERMISSION_DENIED" in await refusal_of(station.parameters.set_param_float("POL_CEN_BLO_RIS", 0.46))
+        assert await station.parameters.get_param_float("POL_CEN_BLO_RIS") == pytest.approx(0.48)
+        assert any(text.startswith("on trial as mavlink") for text in station.texts)
         assert "UNSUPPORTED" in await refusal_of(
             station.mission.upload_mission([*items, moved(items[1], seq=len(items), command=22, current=0)])
         )
@@ -303,7 +307,7 @@ async def test_mavproxy_reads_parameters_and_mission_and_is_refused(river: River
         await expect("COMPONENT_ARM_DISARM: DENIED", "arm throttle")
         assert "AP: arm: a STOP holds" in printed
         await expect("Mode RTL", "mode RTL")
-        await expect("read-only", "param set CRUISE_SPEED 3")
+        await expect("CRUISE_SPEED: is not tunable", "param set CRUISE_SPEED 3")
         await expect("COMPONENT_ARM_DISARM: ACCEPTED", "disarm")
     finally:
         process.kill()

@@ -19,7 +19,7 @@ from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
 from tests.arming import arm_on_page, headers_of, hold_on_page
-from tests.conftest import OpenAs, Spawn, put_raw
+from tests.conftest import OpenAs, Spawn, find_free_port, put_raw
 from tests.paani_command import paani
 from tests.unit.paani_services.advisor.advisor_evidence import water
 
@@ -130,6 +130,70 @@ async def test_nobody_arms_while_a_request_waits_for_the_advisor(spawn: Spawn, c
         async with await asking as answer:
             assert (answer.status, (await answer.json())["field"]) == (503, keys.SHADOW.name)
         await arm_on_page(page, config.bus, press=2)
+
+
+async def test_what_a_ground_station_writes_is_on_trial_until_the_page_promotes_it(
+    open_as: OpenAs, spawn: Spawn, perception: Bus, private_sets: tuple[str, ...]
+) -> None:
+    """A trial is no change: the advice stays what it was. Another's trial does not make room for it."""
+    common: Any = pytest.importorskip("pymavlink.dialects.v20.common", reason="needs pymavlink")
+    observer = await open_as("observer")
+    shadow, advisory = observer.latest(keys.SHADOW), observer.latest(keys.ADVISORY)
+    tcp, name = find_free_port(), "advisor.policy.center_block_risk"
+    async with spawn("operator"), spawn("dashboard"), spawn("advisor", FEW):
+        client = await open_as("mavlink")
+        proposals = client.publisher(keys.TUNING_PROPOSALS["mavlink"])
+        await shadow.next()
+        for proposal in ("7f3a", "mavlink1"):  # a name that is not the client's own, and one that is
+            change = m.Change(path="advisor.policy.tie", value="0.1")
+            proposals.put(m.TuningProposal(source_us=CLOCK.now_us(), proposal=proposal, changes=(change,)))
+        assert (await until(shadow, lambda s: s.answered)).proposal == "mavlink1"
+        code, out, _ = await paani(private_sets, "tune", "propose", f"{name}=0.47", "--json")
+        theirs = msgspec.json.decode(out, type=m.Shadow).proposal
+        proposals.put(m.TuningProposal(source_us=CLOCK.now_us(), proposal="mavlink2", changes=(change,)))
+        await until(shadow, lambda s: s.frames >= 5)
+        assert ((await shadow.next()).proposal, code) == (theirs, 0)
+        await client.close()
+        async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'), asyncio.timeout(30.0):
+            reader, writer = await asyncio.open_connection("127.0.0.1", tcp)
+            codec, received, texts = common.MAVLink(None, 255, 190), [], []
+
+            async def answer(kind: str, **fields: Any) -> Any:
+                """The next message of this kind with these fields."""
+                nonlocal texts
+                while True:
+                    while received:
+                        message = received.pop(0)
+                        texts += [message.text] if message.get_type() == "STATUSTEXT" else []
+                        if message.get_type() == kind and fields.items() <= message.to_dict().items():
+                            return message
+                    received.extend(codec.parse_buffer(await reader.readexactly(1)) or ())
+
+            def write(parameter: bytes, value: float) -> None:
+                writer.write(common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(codec))
+                writer.write(common.MAVLink_param_set_message(1, 1, parameter, value, 9).pack(codec))
+
+            while f"parameter: the page tries {theirs} now" not in texts:
+                write(b"POL_CEN_BLO_RIS", 0.46)
+                await answer("PARAM_ERROR")
+            assert (await paani(private_sets, "tune", "rollback", theirs))[0] == 0
+            await until(shadow, lambda s: not s.proposal)
+            write(b"POL_TIE", 5.0)  # no such margin
+            write(b"POL_CEN_BLO_RIS", 0.46)
+            error = await answer("PARAM_ERROR", param_id="POL_TIE")
+            assert error.error == common.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+            trial = await until(shadow, lambda s: s.frames >= 5)
+            assert (trial.changes, trial.active) == ((m.Change(path=name, value="0.46"),), "")
+            assert trial.recent[-1].shadow_direction is m.Direction.LEFT
+            assert (await advisory.next()).direction is m.Direction.STRAIGHT
+            await answer("STATUSTEXT", text=f"on trial as {trial.proposal}: promote it on the page")
+            assert (await answer("PARAM_VALUE", param_id="POL_CEN_BLO_RIS")).param_value == pytest.approx(0.48)
+            write(b"POL_CEN_BLO_RIS", 0.46)  # on trial already, and still
+            assert (await answer("PARAM_VALUE", param_id="POL_CEN_BLO_RIS")).param_value == pytest.approx(0.48)
+            assert (await shadow.next()).frames >= trial.frames
+            assert (await paani(private_sets, "tune", "promote", trial.proposal))[0] == 0
+            assert (await answer("PARAM_VALUE", param_id="POL_CEN_BLO_RIS")).param_value == pytest.approx(0.46)
+            writer.close()
 
 
 async def test_only_the_dashboard_may_tune_and_nonsense_is_counted(

@@ -49,10 +49,10 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
         feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
         feeds.append(forward_while_clients(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
-        applied = bus.latest(keys.THRUST_APPLIED)
-        feeds.append(forward(hub, keys.THRUST_APPLIED, applied, clock, APPLIED_PERIOD_S))
+        feeds.append(forward(hub, keys.THRUST_APPLIED, bus.latest(keys.THRUST_APPLIED), clock, APPLIED_PERIOD_S))
         feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
+        feeds += [tuner.relay_forever(client, bus.queue(row)) for client, row in keys.TUNING_PROPOSALS.items()]
         feeds.append(track_services(hub, bus, clock))
         feeds.append(keep_history(hub, history, clock))
         running = [tasks.create_task(feed) for feed in feeds]

@@ -10,7 +10,7 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Publisher
+from paani.bus import Publisher, Queue
 from paani.clock import Clock
 from paani_services.dashboard.hub import Event
 
@@ -35,7 +35,7 @@ class Tuner:
     def __init__(self, publisher: Publisher[m.Tuning], clock: Clock) -> None:
         self._publisher, self._clock = publisher, clock
         self._request = m.Tuning(source_us=clock.now_us())
-        self._request_lock = asyncio.Lock()
+        self._request_lock, self._changing_n = asyncio.Lock(), 0
         self._report_received = asyncio.Event()
         self.shadow: m.Shadow | None = None
 
@@ -47,8 +47,8 @@ class Tuner:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a request waits for the advisor, so that the parameters in force may be about to change."""
-        return self._request_lock.locked()
+        """Whether a request waits for the advisor by which the parameters in force may be about to change."""
+        return self._changing_n > 0
 
     async def propose(self, changes: tuple[m.Change, ...]) -> m.Shadow | None:
         """Propose changes under a new name; returns the advisor's answer, None when it gives none."""
@@ -56,7 +56,26 @@ class Tuner:
 
     async def send_act(self, act: m.TuningAct, proposal: str) -> m.Shadow | None:
         """Promote or roll back a proposal; returns the advisor's answer, None when it gives none."""
-        return await self._send_request(act, proposal, ())
+        self._changing_n += 1
+        try:
+            return await self._send_request(act, proposal, ())
+        finally:
+            self._changing_n -= 1
+
+    async def relay_forever(self, client: str, inbox: Queue[m.TuningProposal]) -> None:
+        """Have tried what a client asks to be tried, one after the other."""
+        while True:
+            await self.relay(client, await inbox.get())
+
+    async def relay(self, client: str, asked: m.TuningProposal) -> None:
+        """Propose what a client of the page asks to be tried, once however often it says so.
+
+        Its own trials have its name, and no other trial has to make room for them.
+        """
+        trial = self.shadow.proposal if self.shadow is not None else ""
+        is_known = asked.proposal == self._request.proposal
+        if not is_known and asked.proposal.startswith(client) and (not trial or trial.startswith(client)):
+            await self._send_request(m.TuningAct.PROPOSE, asked.proposal, asked.changes)
 
     def update(self, shadow: m.Shadow) -> Event | None:
         """Take the advisor's report; returns an event when the parameters in force or on trial have changed."""

@@ -6,24 +6,24 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from paani import messages as m
+from paani.config import AdvisorConfig
 from paani_services.mavlink import commands
 from paani_services.mavlink.announcements import Announcer, summary
-from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect, text_of
+from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect
 from paani_services.mavlink.commands import Act, Verdict, judge_command, judge_mode
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.file_transfer import refuse_file
 from paani_services.mavlink.log_transfers import LogTransfers
 from paani_services.mavlink.mission_exchange import MissionExchange, MissionOrder
-from paani_services.mavlink.parameters import Parameter, find, param_value
+from paani_services.mavlink.parameter_exchange import ParameterExchange, ParameterWrite
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import HAND_SILENT_S, PARAMETERS_PER_TICK, REQUEST_CONTROL, Station
+from paani_services.mavlink.station import HAND_SILENT_S, REQUEST_CONTROL, Station
 from paani_services.mavlink.streams import MISSION_CURRENT, STREAMED
 from paani_services.mavlink.telemetry import BUILDERS
 
 AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 FULL_DEFLECTION = 1000  # of a stick; a field that is not used has 0x7fff
 NO_JUMP = "mission: the boat goes on with its own leg"
-NO_WRITE = "parameter is read-only here; tune on the page"
 SEND_ONE = {  # commands that ask for one message that they name
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION,
     dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
@@ -42,9 +42,9 @@ class Request(NamedTuple):
 
 class Gateway:
     """ask, send: what is asked of the operator's process, and missions for it. drive: says surge and turn of a hand.
-    is_signed: whether there is a key.
+    try_parameter: has a parameter tried that a station writes. is_signed: whether there is a key.
 
-    parameters: what they are, given what is known. count: something refused, by its cause.
+    count: something refused, by its cause. advisor, cruise_mps: the settings that stations read as parameters.
     """
 
     def __init__(
@@ -52,17 +52,20 @@ class Gateway:
         ask: Callable[[Request], None],
         send: Callable[[MissionOrder], None],
         drive: Callable[[float, float, int], None],
-        parameters: Callable[[Snapshot], tuple[Parameter, ...]],
+        try_parameter: Callable[[ParameterWrite], None],
         count: Callable[[str], None],
         *,
+        advisor: AdvisorConfig,
+        cruise_mps: float,
         is_signed: bool,
     ) -> None:
-        self._ask, self._drive, self._parameters, self._count = ask, drive, parameters, count
+        self._ask, self._drive, self._count = ask, drive, count
         self._is_signed = is_signed
         self.stations: list[Station] = []
         self.commander_us: int | None = None  # when a station that may command was heard last
         self._snapshot = Snapshot(now_us=0)
         self._missions = MissionExchange(send, count, self._is_trusted)
+        self.parameters = ParameterExchange(try_parameter, count, self._is_trusted, advisor, cruise_mps)
         self.logs = LogTransfers(count, self._is_trusted)
         self._announcer = Announcer()
         self._welcomed = set[Station]()
@@ -72,9 +75,7 @@ class Gateway:
             "SET_MODE": self._set_mode,
             "PING": self._ping,
             "TIMESYNC": self._timesync,
-            "PARAM_REQUEST_LIST": self._param_request_list,
-            "PARAM_REQUEST_READ": self._param_request_read,
-            "PARAM_SET": self._param_set,
+            **self.parameters.handlers,
             **self._missions.handlers,
             "MISSION_SET_CURRENT": self._refuse_current,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
@@ -87,7 +88,7 @@ class Gateway:
         """Send what is due. To be called 50 times a second."""
         now_us, self._snapshot = snapshot.now_us, snapshot
         texts = self._announcer.observe(snapshot)
-        news = self._missions.follow(snapshot)
+        news = [*self._missions.follow(snapshot), *self.parameters.follow(snapshot)]
         self.logs.follow(snapshot)
         for station in tuple(self.stations):
             if station.stick is not None:
@@ -104,7 +105,7 @@ class Gateway:
                 station.send(message, now_us)
             for message_id in station.schedule.due(now_us):
                 self._send_message(station, message_id)
-            self._send_parameters(station)
+            self.parameters.send_due(station)
 
     def receive(self, station: Station, data: bytes, now_us: int) -> bool:
         """Answer what a station has sent. Damaged bytes are counted and otherwise without effect.
@@ -200,35 +201,6 @@ class Gateway:
         if message.tc1 == 0:
             now_us = self._snapshot.now_us
             station.send(dialect.MAVLink_timesync_message(now_us * 1000, message.ts1), now_us)
-
-    # Parameters
-
-    def _param_request_list(self, station: Station, _: Any, __: tuple[int, int]) -> None:
-        station.next_parameter = 0
-
-    def _param_request_read(self, station: Station, message: Any, _: tuple[int, int]) -> None:
-        parameters, index = self._parameters(self._snapshot), message.param_index
-        by_name = index < 0
-        found = find(parameters, text_of(message.param_id)) if by_name else index
-        if found is not None and found < len(parameters):
-            station.send(param_value(parameters, found, by_name=by_name), self._snapshot.now_us)
-
-    def _param_set(self, station: Station, message: Any, _: tuple[int, int]) -> None:
-        parameters = self._parameters(self._snapshot)
-        found = find(parameters, text_of(message.param_id))
-        if found is not None:
-            self._count("mavlink_refused")
-            station.refuse(NO_WRITE, self._snapshot.now_us)
-            station.send(param_value(parameters, found, by_name=True), self._snapshot.now_us)
-
-    def _send_parameters(self, station: Station) -> None:
-        if station.next_parameter is None:
-            return
-        parameters, begun = self._parameters(self._snapshot), station.next_parameter
-        for index in range(begun, min(begun + PARAMETERS_PER_TICK, len(parameters))):
-            station.send(param_value(parameters, index), self._snapshot.now_us)
-        ended = begun + PARAMETERS_PER_TICK
-        station.next_parameter = ended if ended < len(parameters) else None
 
     # Files
 

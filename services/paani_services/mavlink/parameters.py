@@ -1,8 +1,9 @@
-"""Parameters as ground stations read them. Pure. None is written: the page tries and promotes them."""
+"""Parameters as ground stations read and write them. Pure."""
 
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any, NamedTuple
 
 from paani.config import AdvisorConfig
@@ -43,10 +44,32 @@ def parameters_of(snapshot: Snapshot, cruise_mps: float, advisor: AdvisorConfig)
         Parameter("FENCE_ENABLE", bool(snapshot.fence), INTEGER),
     ]
     for path in TUNABLE:
-        value = number_of(in_force.get(path, setting_text(advisor, path)))
-        if value is not None:
-            found.append(Parameter(tunable_name(path), *value))
+        configured = setting_text(advisor, path)
+        present, value = number_of(configured), number_of(in_force.get(path, configured))
+        if present is not None and value is not None:
+            found.append(Parameter(tunable_name(path), value[0], present[1]))
     return tuple(sorted(found))
+
+
+def path_of(name: str) -> str | None:
+    """The tunable setting that has this name; None for what is not tunable."""
+    return next((path for path in TUNABLE if tunable_name(path) == name), None)
+
+
+def written_text(value: float, path: str, advisor: AdvisorConfig) -> str | None:
+    """What a station writes to a tunable setting, as text of the kind that it has; None where it cannot be one.
+
+    A value comes as the float32 that is nearest to what was typed: the shortest number with that float32 is meant.
+    """
+    configured = setting_text(advisor, path)
+    if not math.isfinite(value):
+        return None
+    if configured in {"true", "false"}:
+        return {0.0: "false", 1.0: "true"}.get(value)
+    if (number := number_of(configured)) is not None and number[1] == INTEGER:
+        return str(round(value)) if value == round(value) and abs(value) <= MAX_INTEGER else None
+    shortest = (float(f"{value:.{digits}g}") for digits in range(6, 10))
+    return repr(next((each for each in shortest if _is_same_float32(each, value)), value))
 
 
 def number_of(text: str) -> tuple[float, int] | None:
@@ -71,6 +94,24 @@ def param_value(parameters: tuple[Parameter, ...], index: int, *, by_name: bool 
     )
 
 
+def is_in_force(parameters: tuple[Parameter, ...], index: int, value: float) -> bool:
+    """Whether a station that writes this value would change nothing."""
+    return _is_same_float32(parameters[index].value, value)
+
+
+def param_error(name: str, target: tuple[int, int], error: int) -> Any:
+    """Why a parameter was not read or written; stations that do not know this message go by the value."""
+    return dialect.MAVLink_param_error_message(*target, name.encode("ascii", "replace")[:NAME_BYTES], -1, error)
+
+
 def find(parameters: tuple[Parameter, ...], name: str) -> int | None:
     """The index of a name."""
     return next((index for index, each in enumerate(parameters) if each.name == name), None)
+
+
+def _is_same_float32(one: float, other: float) -> bool:
+    """Whether both are the same number to a station, which has 32 bits for it."""
+    try:
+        return struct.pack("<f", one) == struct.pack("<f", other)
+    except OverflowError:
+        return False

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 import logging
 from typing import Any
 
@@ -18,9 +17,9 @@ from paani_services.mavlink.acts import Acts, is_link_lost
 from paani_services.mavlink.endpoints import Endpoints
 from paani_services.mavlink.gateway import Gateway
 from paani_services.mavlink.log_files import serve_logs
-from paani_services.mavlink.parameters import parameters_of
 from paani_services.mavlink.signing import Signer, read_signing_key
 from paani_services.mavlink.snapshot import TOPICS, Snapshot
+from paani_services.mavlink.trials import Trials
 
 LOG = logging.getLogger(__name__)
 PERIOD_S = 0.02
@@ -55,11 +54,14 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     inputs = Inputs(bus, clock)
     client = OperatorClient(bus, clock)
     acts = Acts(client, MissionClient(bus, clock), clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
-    parameters = functools.partial(parameters_of, cruise_mps=config.navigator.cruise_mps, advisor=config.advisor)
-    gateway = Gateway(acts.ask, acts.send, client.drive, parameters, bus.count_drop, is_signed=signer is not None)
+    trials = Trials(bus, clock, lambda: inputs.snapshot().shadow, lambda *ended: gateway.parameters.answer(*ended))
+    gateway = Gateway(
+        acts.ask, acts.send, client.drive, trials.ask, bus.count_drop, advisor=config.advisor,
+        cruise_mps=config.navigator.cruise_mps, is_signed=signer is not None,
+    )  # fmt: skip
     gateway.tick(inputs.snapshot())
     endpoints = Endpoints(gateway, settings, signer, clock)
-    with contextlib.closing(endpoints), contextlib.closing(acts):
+    with contextlib.closing(endpoints), contextlib.closing(acts), contextlib.closing(trials):
         await endpoints.open()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(serve_logs(gateway.logs, config.recorder.folder, clock))

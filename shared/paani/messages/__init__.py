@@ -66,7 +66,7 @@ from paani.messages.prediction import (
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
-from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningRefusal
+from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAct, TuningProposal, TuningRefusal
 
 __all__ = [
     "INPUT_FAULTS",
@@ -164,6 +164,7 @@ __all__ = [
     "TruePose",
     "Tuning",
     "TuningAct",
+    "TuningProposal",
     "TuningRefusal",
     "Unit",
     "UnusableCause",

@@ -44,6 +44,16 @@ class Tuning(Message, frozen=True, kw_only=True):
     changes: Changes = ()
 
 
+class TuningProposal(Message, frozen=True, kw_only=True):
+    """Changes that a client of the page asks to be tried beside those in force, and nothing else can be asked by it.
+
+    proposal: the client's name, and what tells it from the client's others.
+    """
+
+    proposal: Annotated[str, msgspec.Meta(pattern=r"^[a-z0-9]{1,32}$")]
+    changes: Annotated[tuple[Change, ...], msgspec.Meta(min_length=1, max_length=32)]
+
+
 class TuningRefusal(StrEnum):
     """Why a request was refused; NONE when it was obeyed."""
 
