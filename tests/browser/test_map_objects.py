@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,20 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from tests.browser.guidance import guiding
+from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_page import MAP_PX_PER_M, TRACK_RGB, has_colour_on_map, until, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
-GREEN, RED, AMBER, ORANGE, ROUTE = (77, 184, 133), (255, 113, 118), (227, 179, 65), (240, 152, 63), (185, 164, 240)
+GREEN, BLUE, RED, AMBER, ORANGE, ROUTE = (
+    (77, 184, 133),
+    (143, 169, 242),
+    (255, 113, 118),
+    (227, 179, 65),
+    (240, 152, 63),
+    (185, 164, 240),
+)
 
 
 def points(*places: tuple[float, float]) -> tuple[m.Waypoint, ...]:
@@ -36,8 +45,22 @@ MISSION = m.Mission(
     ),
 )
 SWIMMER = m.MovingObstacle(track_id=4, x_m=-8.0, y_m=8.0, radius_m=1.0, east_mps=0.0, north_mps=-1.0)
+FREE = (m.Constraint.NONE,) * 3
+BLOCKED = (m.Constraint.PERSON, m.Constraint.PERSON, m.Constraint.UNKNOWN_WATER)
+
+
+def verdict(off_deg: int) -> m.HeadingVerdict:
+    """A boat that heads east: what lies to port is refused, and to starboard it is dearer than straight on."""
+    heading_rad, off = math.radians(off_deg), abs(off_deg) / 90.0
+    if off_deg > 0:
+        return m.HeadingVerdict(heading_rad=heading_rad, refused_by=BLOCKED)
+    costs = m.HeadingCosts(off, off, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return m.HeadingVerdict(heading_rad=heading_rad, refused_by=FREE, speed_mps=0.6, costs=costs)
+
+
 AHEAD = m.Prediction(
-    source_us=0, path=points((0, 0), (3, 0), (6, 2)), obstacles=(SWIMMER,), home=points((-10, -10))
+    source_us=0, path=points((0, 0), (3, 0), (6, 2)), obstacles=(SWIMMER,), home=points((-10, -10)),
+    headings=tuple(verdict(off) for off in (0, *(side * step for step in range(20, 180, 20) for side in (1, -1)))),
 )  # fmt: skip
 
 
@@ -66,6 +89,53 @@ async def check_bow_up(page: Any, folder: Path) -> None:
     await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E')")
     await page.wait_for_timeout(1000)
     assert await has_colour_on_map(page, ORANGE, -8.0, 7.8)
+
+
+async def check_headings(page: Any, folder: Path) -> None:
+    """Rays around the boat and the words of one of them: the one taken, by the pointer, by a tap, by keys."""
+    words = "document.querySelector('#heading-words').textContent"
+    assert not await page.is_visible("#headings")
+    await page.click("#map-headings")
+    await until(page, f"{words}.startsWith('090° taken, costs 0.00')")
+    await page.wait_for_timeout(300)
+    ray_m = 47 / MAP_PX_PER_M  # the middle of the cell of the second speed
+    for colour, east_m, north_m in ((RED, 0.0, ray_m), (GREEN, 0.0, -ray_m), (GREEN, ray_m, 0.0)):
+        # at 80, 100 and 0 degrees to port
+        turn_rad = 0.0 if east_m else math.radians(-10)
+        place = math.cos(turn_rad) * east_m - math.sin(turn_rad) * north_m, math.cos(turn_rad) * north_m
+        assert await has_colour_on_map(page, colour, *place), (colour, place)
+    lowest_m = 33 / MAP_PX_PER_M
+    place = -math.sin(math.radians(-10)) * lowest_m, math.cos(math.radians(-10)) * lowest_m
+    assert await has_colour_on_map(page, BLUE, *place), "the lowest speed is innermost"
+    box = await page.locator("#map").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    await page.mouse.move(x + 5, y - 40)
+    await until(page, f"{words}.startsWith('010° refused: at the highest speed: too near to a person')")
+    await page.mouse.click(x + 40, y + 15)
+    await page.mouse.move(x + 150, y)
+    await until(page, f"{words}.startsWith('110° free, dearer by 0.44: off the course +0.22')")
+    await page.focus("#heading-range")
+    await page.keyboard.press("ArrowRight")
+    await until(page, f"{words}.startsWith('130° free')")
+    assert await page.get_attribute("#heading-range", "aria-valuetext") == "130° free"
+    await page.screenshot(path=folder / "headings.png")
+    await page.evaluate(AXE.read_text(encoding="utf-8"))
+    for palette in ("day", "night"):
+        while await page.evaluate("document.documentElement.dataset.palette") != palette:
+            await page.keyboard.press("d")
+        await page.set_viewport_size({"width": 360, "height": 740})
+        await page.locator("#heading-words").scroll_into_view_if_needed()
+        await page.wait_for_timeout(300)
+        await page.screenshot(path=folder / f"headings-{palette}.png", full_page=True)
+        assert await page.evaluate(SERIOUS) == [], palette
+        assert await page.evaluate(SMALL_TEXT) == []
+        assert await page.evaluate(SMALL_TARGETS, 44) == []
+        assert await page.evaluate("document.documentElement.scrollWidth") == 360
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await page.keyboard.press("d")
+    await page.click("#heading-taken")
+    await until(page, f"{words}.startsWith('090° taken')")
+    await page.click("#map-headings")
 
 
 async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
@@ -100,6 +170,7 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
         for what, colour, east_m, north_m in drawn:
             assert await has_colour_on_map(page, colour, east_m, north_m), what
         assert not await has_colour_on_map(page, RED, 8.0, 8.0)
+        await check_headings(page, tmp_path)
         await check_bow_up(page, tmp_path)
         prediction = None
         await page.wait_for_timeout(3600)

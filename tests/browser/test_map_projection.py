@@ -48,4 +48,6 @@ async def test_what_is_dragged_stays_under_the_pointer(scripts_page: Any) -> Non
         assert dragged == pytest.approx([123, 28])
         assert has_corner
         assert is_tight
-        assert await scripts_page.evaluate(AHEAD, [up_rad, 30]) == pytest.approx([200, 210]), "the boat, below the middle"
+        assert await scripts_page.evaluate(AHEAD, [up_rad, 30]) == pytest.approx([200, 210]), (
+            "the boat, below the middle"
+        )

@@ -4,6 +4,7 @@
 import { drawBoat, drawRoute, drawTrack } from "./map_boat.js";
 import { MapControls } from "./map_controls.js";
 import { drawGrid, drawScale } from "./map_ground.js";
+import { MapHeadings } from "./map_headings.js";
 import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { RouteEditor } from "./route_editor.js";
@@ -21,6 +22,7 @@ export class MapPanel {
     this.centre = null;
     this.fitRoute = false;
     this.controls = new MapControls((factor) => this.zoom(factor), () => { this.fitRoute = true; this.controls.setFollow(false); });
+    this.headings = new MapHeadings(this.canvas);
     this.bindPointer();
     this.editor = new RouteEditor(this);
   }
@@ -76,11 +78,13 @@ export class MapPanel {
     this.drawGiven(chart, store, mission, route);
     drawTrack(chart, tracks["@truth/pose"], "--text", 1.5, [2, 4]);
     drawTrack(chart, tracks["localization/odometry"], "--cyan", 2, []);
-    this.drawPrediction(chart, store, now);
+    const prediction = store.isFresh("navigator/prediction", now) ? store.get("navigator/prediction") : undefined;
+    if (prediction) this.drawPrediction(chart, store, prediction, now);
     if (truth) drawBoat(chart, truth, "--text", false, store.isFresh("@truth/pose", now));
     if (odometry) drawBoat(chart, odometry, "--cyan", true, store.isFresh("localization/odometry", now));
     const poseAgeS = store.ageS("localization/odometry", now);
     if (odometry && poseAgeS > store.limitS("localization/odometry")) drawGhost(chart, odometry, poseAgeS);
+    this.headings.render(chart, prediction?.headings ?? [], odometry, store.get("dashboard/settings")?.planner ?? true, this.editor.isOpen);
     this.editor.render(chart, store, now);
     drawScale(ctx, projection, colour("--quiet"));
     controls.render(turnRad, this.editor.isOpen);
@@ -96,13 +100,11 @@ export class MapPanel {
     if (route) drawRoute(chart, route, store.get("navigator/command")?.waypoint_index ?? -1, store.get("dashboard/settings")?.acceptance_m ?? 1);
   }
 
-  /** What the boat is about to do. @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {number} now */
-  drawPrediction(chart, store, now) {
-    const key = "navigator/prediction", prediction = store.isFresh(key, now) ? store.get(key) : undefined;
-    if (!prediction) return;
+  /** What the boat is about to do. @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {any} prediction @param {number} now */
+  drawPrediction(chart, store, prediction, now) {
     if (prediction.home.length) drawHome(chart, prediction.home[0]);
     if (prediction.path.length) drawPath(chart, prediction.path);
-    drawObstacles(chart, prediction.obstacles, store.ageS(key, now), store.get("advisor/tracks")?.tracks ?? []);
+    drawObstacles(chart, prediction.obstacles, store.ageS("navigator/prediction", now), store.get("advisor/tracks")?.tracks ?? []);
   }
 
   /** @param {{x_m: number, y_m: number}[]} points */

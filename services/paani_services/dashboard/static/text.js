@@ -126,6 +126,40 @@ export const MAP_TEXTS = {
   drawing: "North is up while a mission is drawn",
 };
 
+/** What refuses a heading: its name, and a clause. `none`: nothing. @type {Record<string, [string, string]>} */
+export const CONSTRAINTS = {
+  none: ["free", ""],
+  person: ["person", "too near to a person"],
+  static_obstacle: ["standing obstacle", "too near to what stands there"],
+  dynamic_obstacle: ["moving obstacle", "too near to what moves there"],
+  unknown_water: ["unseen water", "no room to stop before water not seen yet"],
+  wait: ["waits", "the boat waits until something has passed"],
+  look: ["looks", "the boat looks where it turns before it moves"],
+  no_escape: ["no way out", "does not lead out of a place without margin"],
+  too_fast: ["too fast", "too fast beside an obstacle"],
+  turn: ["turn", "no turn that may be made now"],
+};
+
+/** What a heading costs. @type {Record<string, string>} */
+export const COSTS = {
+  course: "off the course",
+  progress: "little made good",
+  heading_change: "off the plan before",
+  advice: "not to the advised side",
+  unknown_water: "unseen water on the way",
+  proximity: "near obstacles",
+  path_obstacle: "obstacle further along",
+  margin: "into the margin",
+};
+
+/** The headings on the map. */
+export const HEADING_TEXTS = {
+  taken: "taken", free: "free", refused: "refused", costs: "costs", dearer: "dearer by",
+  speeds: { fastest: "at the highest speed", between: "at the next", slowest: "at the lowest" },
+  none: "No heading is weighed: there is no plan of the last second.",
+  off: "No heading is weighed: the planner is off, and the boat turns as advised.",
+};
+
 /** Modes: name, and what the boat does in it. @type {Record<string, [string, string]>} */
 export const MODE_TEXTS = {
   ROUTE: ["Route", "follows its mission or route"],

@@ -98,5 +98,5 @@ export class Time {
 }
 
 /** Whether a key goes into a field. @param {EventTarget | null} target */
-export const isTyping = (target) => target instanceof HTMLElement && target.matches("input, select, textarea");
+export const isTyping = (target) => target instanceof HTMLElement && target.matches("input:not([type=range]), select, textarea");
 
