@@ -140,12 +140,12 @@ async def test_what_a_ground_station_writes_is_on_trial_until_the_page_promotes_
     observer = await open_as("observer")
     shadow, advisory = observer.latest(keys.SHADOW), observer.latest(keys.ADVISORY)
     tcp, name = find_free_port(), "advisor.policy.center_block_risk"
+    change = m.Change(path="advisor.policy.tie", value="0.1")
     async with spawn("operator"), spawn("dashboard"), spawn("advisor", FEW):
         client = await open_as("mavlink")
         proposals = client.publisher(keys.TUNING_PROPOSALS["mavlink"])
         await shadow.next()
         for proposal in ("7f3a", "mavlink1"):  # a name that is not the client's own, and one that is
-            change = m.Change(path="advisor.policy.tie", value="0.1")
             proposals.put(m.TuningProposal(source_us=CLOCK.now_us(), proposal=proposal, changes=(change,)))
         assert (await until(shadow, lambda s: s.answered)).proposal == "mavlink1"
         code, out, _ = await paani(private_sets, "tune", "propose", f"{name}=0.47", "--json")
@@ -156,15 +156,16 @@ async def test_what_a_ground_station_writes_is_on_trial_until_the_page_promotes_
         await client.close()
         async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'), asyncio.timeout(30.0):
             reader, writer = await asyncio.open_connection("127.0.0.1", tcp)
-            codec, received, texts = common.MAVLink(None, 255, 190), [], []
+            codec = common.MAVLink(None, 255, 190)
+            received: list[Any] = []
+            texts: list[str] = []
 
             async def answer(kind: str, **fields: Any) -> Any:
                 """The next message of this kind with these fields."""
-                nonlocal texts
                 while True:
                     while received:
                         message = received.pop(0)
-                        texts += [message.text] if message.get_type() == "STATUSTEXT" else []
+                        texts.extend([message.text] if message.get_type() == "STATUSTEXT" else [])
                         if message.get_type() == kind and fields.items() <= message.to_dict().items():
                             return message
                     received.extend(codec.parse_buffer(await reader.readexactly(1)) or ())
