@@ -90,8 +90,8 @@ def test_writing_what_holds_changes_nothing_but_takes_it_off_a_trial() -> None:
 
 
 def test_every_station_is_told_what_is_in_force_when_that_changes() -> None:
-    port, peer = made()
-    other = Peer(port.gateway, 1)
+    port = Port(in_order())
+    peer, other = Peer(port.gateway), Peer(port.gateway, 1)
     for station in (peer, other):
         station.send(HEARTBEAT)
 
@@ -100,6 +100,7 @@ def test_every_station_is_told_what_is_in_force_when_that_changes() -> None:
         sent = [station.received() for station in (peer, other)]
         return [[(v.param_id, v.param_value) for v in each if v.get_type() == "PARAM_VALUE"] for each in sent]
 
+    assert values(m.Shadow(source_us=NOW_US)) == [[], []]  # heard for the first time
     assert values(TRIED) == [[], []]
     changed = [(NAME.decode(), pytest.approx(0.46))]
     assert values(PROMOTED) == [changed, changed]
