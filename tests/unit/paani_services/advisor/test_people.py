@@ -65,7 +65,7 @@ def test_a_person_before_an_obstacle_that_reaches_into_the_way_does_not_open_its
     """Nobody is passed by a slight turn, and the side that the obstacle comes from stays closed."""
     buoy = box(m.Label.BUOY, (0.28, 0.4, 0.37, 0.6), 0.95)
     swimmer = box(m.Label.PERSON, (0.50, 0.4, 0.56, 0.6))
-    bank = lane(0.66)
+    bank, removals = lane(0.66), tuple[m.Removal, ...]()
     for right, alone, with_somebody in (
         (CLEAR.right, m.Direction.SLIGHT_RIGHT, m.Direction.RIGHT),
         (bank, m.Direction.STOP, m.Direction.STOP),
@@ -76,7 +76,8 @@ def test_a_person_before_an_obstacle_that_reaches_into_the_way_does_not_open_its
         frame = msgspec.structs.replace(frame, detections=(*frame.detections, swimmer))
         advisory = play([frame] * 3)[1][-1]
         assert advisory.direction is with_somebody
-    assert m.Removal(direction=m.Direction.RIGHT, water=(m.Lane.RIGHT,)) in advisory.counterfactual.removals
+        removals = advisory.counterfactual.removals
+    assert m.Removal(direction=m.Direction.RIGHT, water=(m.Lane.RIGHT,)) in removals
 
 
 @given(FRAMES)

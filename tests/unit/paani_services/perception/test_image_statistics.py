@@ -97,6 +97,8 @@ def test_pictures_that_differ_by_the_limit_are_not_the_same(change: int) -> None
     (ON.sure_fitness, 1.0, C.NONE, 1),
     (math.nextafter(ON.sure_fitness, 0.0), 1.0, C.UNFIT, 2),
     (ON.min_fitness, math.nextafter(ON.sure_fitness, 0.0), C.NONE, 2),
+    (0.96, 0.998, C.UNFIT, 2),  # on its head a twentieth of the doubt
+    (0.96, math.nextafter(0.998, 0.0), C.NONE, 2),
 ])  # fmt: skip
 def test_a_fitness_that_equals_its_limit_reaches_it(
     answer: float, upside_down: float, cause: UnusableCause, looks: int
@@ -115,7 +117,7 @@ def test_a_larger_picture_is_averaged(size_wh: tuple[int, int]) -> None:
     assert np.abs(reduced - means[:, :, None]).max() <= 1.0
     assert np.array_equal(luma, reduced[:, :, 0])
     assert np.abs(thumbnail - luma.reshape(60, 4, 80, 4).mean(axis=(1, 3))).max() <= 1.0
-    assert (reduced.dtype, luma.dtype, thumbnail.dtype) == (np.uint8, np.uint8, np.float32)
+    assert [str(of.dtype) for of in (reduced, luma, thumbnail)] == ["uint8", "uint8", "float32"]
 
 
 @pytest.mark.parametrize("width", [160, 240])
