@@ -13,22 +13,18 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections import Counter
 from pathlib import Path
 
-from paani_sim.trials.intervals import wilson_interval
+from tests.mutation.verdicts import NOTICED, UNTRIED, judge_file, load_equivalents, summary
 from tests.places import ROOT
 
-BAR_FRAC = 0.9
 STAGE = ROOT / "runs" / "mutation"
 # mutmut names a module by its path, so the packages lie side by side there.
 PACKAGES = {"paani": "shared/paani", "paani_services": "services/paani_services"}
-NOTICED = {1, 3, 24, 36, 152, 255, -9, -24}  # exit codes of pytest and of what ends a run without end
-UNKNOWN = None
 
 
 def main(argv: list[str]) -> int:
-    """0: the tests notice as many changes as they have to; 1: fewer, or mutmut failed."""
+    """0: the tests notice as many changes of each file as they have to; 1: fewer, or mutmut failed."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__.partition("\n")[0])
     parser.add_argument("--only", nargs="+", metavar="MUTANT", help="try these again, such as 'paani.thrust_adapter.*'")
     parser.add_argument("--survivors", action="store_true", help="keep what was noticed, try again what was not")
@@ -39,7 +35,8 @@ def main(argv: list[str]) -> int:
     words = [str(Path(sys.executable).with_name("mutmut")), "run", "--max-children", "1", *(options.only or ())]
     if subprocess.run(words, cwd=STAGE, check=False).returncode != 0:
         return 1
-    text, is_enough = summary()
+    equivalents = load_equivalents()
+    text, is_enough = summary([judge_file(STAGE / "mutants", file, equivalents) for file in _changed_files()])
     print(text)
     return 0 if is_enough else 1
 
@@ -59,37 +56,19 @@ def stage_copy(*, keep: bool) -> None:
 
 def forget_survivors() -> None:
     """mutmut tries again what has no verdict."""
-    for path in _records():
+    for file in _changed_files():
+        path = STAGE / "mutants" / f"{file}.meta"
         record = json.loads(path.read_text())
         codes = record["exit_code_by_key"]
-        record["exit_code_by_key"] = {key: code if code in NOTICED else UNKNOWN for key, code in codes.items()}
+        record["exit_code_by_key"] = {key: code if code in NOTICED else UNTRIED for key, code in codes.items()}
         path.write_text(json.dumps(record))
 
 
-def summary() -> tuple[str, bool]:
-    """A line for each file and one for all, and whether that is enough. Survivors are named first."""
-    lines, survivors, total = [], [], Counter[str]()
-    for path in _records():
-        codes = json.loads(path.read_text())["exit_code_by_key"]
-        noticed = sum(code in NOTICED for code in codes.values())
-        survivors += [key for key, code in codes.items() if code not in NOTICED]
-        lines.append(
-            f"{path.relative_to(STAGE / 'mutants').as_posix().removesuffix('.meta')}: {noticed} of {len(codes)}"
-        )
-        total.update(noticed=noticed, all=len(codes))
-    low, high = wilson_interval(total["noticed"], total["all"])
-    frac = total["noticed"] / max(1, total["all"])
-    lines.append(
-        f"noticed: {total['noticed']} of {total['all']}, {frac:.1%} [{low:.1%}, {high:.1%}], bar {BAR_FRAC:.0%}"
-    )
-    return "\n".join([*(f"not noticed: {key}" for key in survivors), *lines]), frac >= BAR_FRAC
-
-
-def _records() -> list[Path]:
-    """mutmut's records of the files that it changed, each with a verdict for every mutant."""
+def _changed_files() -> list[str]:
+    """The files that mutmut changed and has a verdict about for every mutant, by their paths in the stage."""
     with (STAGE / "pyproject.toml").open("rb") as file:
         changed = tomllib.load(file)["tool"]["mutmut"]["only_mutate"]
-    return [path for name in changed if (path := STAGE / "mutants" / f"{name}.meta").is_file()]
+    return [name for name in changed if (STAGE / "mutants" / f"{name}.meta").is_file()]
 
 
 def _digest() -> str:
