@@ -52,6 +52,16 @@ KEY = """([type, code]) => {
 }"""
 
 
+@contextlib.asynccontextmanager
+async def answering(otherwise: str) -> AsyncIterator[None]:
+    """Wait for a page for so long. Raises TimeoutError that says what it did not do."""
+    try:
+        async with asyncio.timeout(LIVE_TIMEOUT_S):
+            yield
+    except TimeoutError:
+        raise TimeoutError(f"{otherwise} within {LIVE_TIMEOUT_S:g} s") from None
+
+
 class Deck:
     """One page, kept open. Moments are Unix time [us], by the clock of this machine, which the boat has too."""
 
@@ -83,7 +93,7 @@ class Deck:
 
     async def take_wheel(self) -> None:
         """Drive by hand. Raises TimeoutError where the page may not."""
-        async with asyncio.timeout(LIVE_TIMEOUT_S):
+        async with answering("the page did not get the wheel"):
             while await self._page.evaluate("document.querySelector('#drive').dataset.driving") != "true":
                 await self._page.evaluate(TAKE_WHEEL)
                 await asyncio.sleep(0.3)
@@ -111,7 +121,7 @@ class Browser:
         context = await self._browser.new_context(viewport={"width": 1440, "height": 900}, service_workers="block")
         page = await context.new_page()
         await page.goto(f"{origin or self._origin}/#key={self._key}")
-        async with asyncio.timeout(LIVE_TIMEOUT_S):
+        async with answering("the page heard nothing of the boat"):
             while not await page.evaluate(LIVE):  # noqa: ASYNC110  # a browser wakes nobody, and the page forbids eval
                 await asyncio.sleep(POLL_S)
         return Deck(page), msgspec.convert(await page.evaluate(LOADED), PageLoad)

@@ -29,7 +29,7 @@ HERE, CROWDED, LINK = "on this machine", "with 10 clients", f"over a link of {LI
 
 
 def main(argv: list[str]) -> int:
-    """Exit codes: 0 every bar was kept, 1 one was not, 2 user's mistake."""
+    """Exit codes: 0 every bar was kept, 1 one was not or could not be measured, 2 user's mistake."""
     parser = argparse.ArgumentParser(
         prog="paani bench deck", description="The page in headless Chromium beside a simulated boat under way."
     )
@@ -48,17 +48,21 @@ def main(argv: list[str]) -> int:
     if is_page_exposed(config):
         raise UserError(f"dashboard.host {config.dashboard.host}: this bench measures a page on the loopback interface")
     report = asyncio.run(_measure(config, options))
+    if isinstance(report, str):
+        sys.stderr.write(f"paani: bench deck: {report}\n")
+        return 1
     sys.stdout.write("\n" + deck_text(report))
     if options.json:
         write_json(options.json, report, "--json")
     return 0 if keeps_bars(report) else 1
 
 
-async def _measure(config: Config, options: argparse.Namespace) -> DeckReport:
+async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | str:
+    """The figures, or why there are none."""
     from paani_tools.bench.deck import browser, measuring  # noqa: PLC0415  # need the extra
 
     plan = await make_plan(config)
-    load_before, reports = os.getloadavg()[0], list[DeckReport]()
+    load_before, reports, failures = os.getloadavg()[0], list[DeckReport](), list[str]()
 
     async def measure() -> None:
         async with observer(plan.config.bus) as bus, browser.chromium(plan.config) as chromium:
@@ -97,5 +101,16 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport:
                 )
             )
 
-    await run_plan(plan, None, Display(sys.stdout), measure)
-    return reports[0]
+    async def measure_if_answered() -> None:
+        try:
+            await measure()
+        except measuring.NO_ANSWER as error:
+            failures.append(silence_text(error))
+
+    outcome = await run_plan(plan, None, Display(sys.stdout), measure_if_answered)
+    return reports[0] if reports else outcome.failure or next(iter(failures), "interrupted")
+
+
+def silence_text(error: BaseException) -> str:
+    """What did not answer, by the first line of what was raised."""
+    return f"the page or the boat did not answer: {(str(error).splitlines() or ['in time'])[0]}"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import aiohttp
 import msgspec
+from playwright.async_api import Error as BrowserError
 
 from paani import keys
 from paani import messages as m
@@ -24,6 +25,7 @@ from paani_tools.bench.deck.browser import Browser, Deck
 from paani_tools.bench.deck.report import Crowd
 
 CLOCK = WallClock()
+NO_ANSWER = (TimeoutError, OSError, aiohttp.ClientError, BrowserError)  # of the boat, the server, the page
 ANSWER_S = 3.0  # of a STOP or a stick that nothing follows
 UNDER_WAY_S = 30.0
 HOLD_S, REFRESH_S = 1.3, 0.15
@@ -55,11 +57,14 @@ class Boat:
 
     async def until_applied(self, is_it: Callable[[m.ThrustApplied], bool], since_us: float, wait_s: float) -> float:
         """When the thrust adapter first says so after `since_us` [us]. Raises TimeoutError."""
-        async with asyncio.timeout(wait_s):
-            while True:
-                report = await self.applied.get()
-                if report.source_us >= since_us and is_it(report):
-                    return float(report.source_us)
+        try:
+            async with asyncio.timeout(wait_s):
+                while True:
+                    report = await self.applied.get()
+                    if report.source_us >= since_us and is_it(report):
+                        return float(report.source_us)
+        except TimeoutError:
+            raise TimeoutError(f"the thrust that was waited for was not applied within {wait_s:g} s") from None
 
     async def decisions_hz(self, seconds: float) -> float:
         """Decisions a second, heard for so long."""
@@ -218,4 +223,4 @@ def dashboard_cpu_s() -> float:
                 return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
         except OSError:  # it has just ended
             continue
-    raise RuntimeError("no dashboard runs here")
+    raise ProcessLookupError("no dashboard runs here")

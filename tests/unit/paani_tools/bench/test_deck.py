@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from paani.errors import UserError
-from paani_tools.bench.deck.command import main
+from paani_tools.bench.deck.command import main, silence_text
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.bench.deck.report import Crowd, DeckReport, decision_ratio, deck_text, heap_slope, keeps_bars
 from paani_tools.up.run_summary import Percentiles, percentiles
@@ -61,6 +61,21 @@ def test_every_figure_is_told_with_its_count() -> None:
                   "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after"):  # fmt: skip
         assert words in text, words
     assert "not measured" in deck_text(replace(KEPT, heap_slope_mib_h=None))
+
+
+@pytest.mark.parametrize(
+    ("error", "end"),
+    [
+        (TimeoutError(), ": in time"),
+        (TimeoutError("the page heard nothing of the boat within 30 s"), "nothing of the boat within 30 s"),
+        (OSError("Page.goto: Timeout 30000ms exceeded.\nCall log:\n  - navigating"), "Timeout 30000ms exceeded."),
+    ],
+)
+def test_what_did_not_answer_is_told_in_one_line(error: Exception, end: str) -> None:
+    text = silence_text(error)
+    assert text.startswith("the page or the boat did not answer: ")
+    assert text.endswith(end)
+    assert "\n" not in text
 
 
 def test_options_that_are_none_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
