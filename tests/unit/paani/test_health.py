@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import collections
+import sys
 from pathlib import Path
 
 import pytest
@@ -66,7 +67,7 @@ def test_descriptors_are_counted(tmp_path: Path) -> None:
 
 
 def test_the_warmest_zone_that_can_be_read(tmp_path: Path) -> None:
-    assert warmest_zone_c(tmp_path) == 0.0
+    assert warmest_zone_c(str(tmp_path)) == 0.0
     for number, text in enumerate(("41500\n", "63250\n", "not a number\n", None)):
         zone = tmp_path / f"thermal_zone{number}"
         zone.mkdir()
@@ -74,4 +75,28 @@ def test_the_warmest_zone_that_can_be_read(tmp_path: Path) -> None:
             (zone / "temp").mkdir()  # cannot be read
         else:
             (zone / "temp").write_text(text, encoding="ascii")
-    assert warmest_zone_c(tmp_path) == 63.25
+    assert warmest_zone_c(str(tmp_path)) == 63.25
+
+
+def test_a_machine_without_zones_has_no_temperature(tmp_path: Path) -> None:
+    assert warmest_zone_c(str(tmp_path / "none")) == 0.0
+
+
+def test_a_report_adds_no_string_to_the_table_of_the_interpreter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "thermal_zone0").mkdir()
+    (tmp_path / "thermal_zone0" / "temp").write_text("41500\n", encoding="ascii")
+    reporter = HealthReporter("advisor", [], collections.Counter(), lambda: "")
+    added: list[str] = []
+
+    def intern(text: str) -> str:
+        added.append(text)
+        return text
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "intern", intern)
+        reporter.report(1_000_000)
+        warmest_c = warmest_zone_c(str(tmp_path))
+    assert warmest_c == 41.5
+    assert added == []
