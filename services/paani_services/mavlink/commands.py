@@ -25,6 +25,7 @@ FAILED, IN_PROGRESS = dialect.MAV_RESULT_FAILED, dialect.MAV_RESULT_IN_PROGRESS
 ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 SET_MODE = dialect.MAV_CMD_DO_SET_MODE
+JUMP = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
 # Commands that would change where the boat goes otherwise than by its mode: the bus has no request for any of them.
 GUIDING = frozenset(
     {
@@ -32,7 +33,7 @@ GUIDING = frozenset(
         dialect.MAV_CMD_DO_CHANGE_SPEED,
         dialect.MAV_CMD_DO_SET_HOME,
         dialect.MAV_CMD_DO_SET_REVERSE,
-        dialect.MAV_CMD_DO_SET_MISSION_CURRENT,
+        JUMP,
         dialect.MAV_CMD_DO_FENCE_ENABLE,
         dialect.MAV_CMD_NAV_WAYPOINT,
     }
@@ -44,6 +45,7 @@ MODE_COMMANDS = {
     dialect.MAV_CMD_MISSION_START: Mode.AUTO,
 }
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
+NO_JUMP = "mission: no jumping; the boat goes on with its leg"
 NOT_TRUSTED = "refused: unsigned commands only on this machine"
 
 
@@ -82,7 +84,8 @@ def judge_command(command: int, parameters: Sequence[float], snapshot: Snapshot,
     if command == PAUSE and first in {0, 1}:
         return _trusted(judge_mode(Mode.AUTO if first else Mode.LOITER), is_trusted)
     if command in GUIDING:
-        return _trusted(Verdict(DENIED, "refused: the boat follows its own mission"), is_trusted)
+        text = NO_JUMP if command == JUMP else "refused: the boat follows its own mission"
+        return _trusted(Verdict(DENIED, text), is_trusted)
     return Verdict(UNSUPPORTED)
 
 

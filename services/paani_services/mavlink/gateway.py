@@ -23,7 +23,6 @@ from paani_services.mavlink.telemetry import BUILDERS
 
 AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 FULL_DEFLECTION = 1000  # of a stick; a field that is not used has 0x7fff
-NO_JUMP = "mission: the boat goes on with its own leg"
 SEND_ONE = {  # commands that ask for one message that they name
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION,
     dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
@@ -205,9 +204,10 @@ class Gateway:
     # Files
 
     def _refuse_current(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+        """Nothing jumps. The item is told no more often than why: MAVSDK asks again whenever it hears of another."""
         self._count("mavlink_refused")
-        station.refuse(NO_JUMP, self._snapshot.now_us)
-        self._send_message(station, MISSION_CURRENT)
+        if station.refuse(commands.NO_JUMP, self._snapshot.now_us):
+            self._send_message(station, MISSION_CURRENT)
 
     def _refuse_file(self, station: Station, message: Any, _: tuple[int, int]) -> None:
         answer = refuse_file(message)

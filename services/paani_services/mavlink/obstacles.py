@@ -1,4 +1,4 @@
-"""Moving obstacles around the boat as OBSTACLE_DISTANCE. Pure.
+"""Moving obstacles around the boat as OBSTACLE_DISTANCE, and the one that comes nearest as COLLISION. Pure.
 
 Sectors of five degrees, clockwise from the bow. A sector in which no moving obstacle is tracked is not known to be
 free: it has the protocol's value for what is not known.
@@ -9,15 +9,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import msgspec
+
 from paani import messages as m
 from paani.geometry import wrap_rad
 from paani_services.mavlink.codec import dialect
-from paani_services.mavlink.fields import U16_MAX, to_int
+from paani_services.mavlink.fields import U16_MAX, U32_MAX, to_int
 from paani_services.mavlink.snapshot import Snapshot
 
 SECTORS = 72
 SECTOR_RAD = 2.0 * math.pi / SECTORS
 MAX_DISTANCE_M = 100.0
+FIRST_ID = 256  # of COLLISION, which has those of MAVLink systems below
 
 
 def obstacle_distance(snapshot: Snapshot) -> Any | None:
@@ -40,6 +43,36 @@ def obstacle_distance(snapshot: Snapshot) -> Any | None:
         round(MAX_DISTANCE_M * 100.0),
         frame=dialect.MAV_FRAME_BODY_FRD,
     )
+
+
+def collision(snapshot: Snapshot) -> Any | None:
+    """Of the obstacles that come nearer by the present velocities of both, the one that will come nearest.
+
+    None where nothing does, or the prediction is not known. The threat is high from when the navigator finds the
+    closest point too near until the two are past it.
+    """
+    found = [] if snapshot.prediction is None else [_approach_of(each) for each in snapshot.prediction.obstacles]
+    approaches = [each for each in found if each is not None]
+    if not approaches:
+        return None
+    cpa_m, tcpa_s, track_id, is_encounter = min(approaches)
+    return dialect.MAVLink_collision_message(
+        dialect.MAV_COLLISION_SRC_MAVLINK_GPS_GLOBAL_INT,
+        (FIRST_ID + track_id) & U32_MAX,
+        dialect.MAV_COLLISION_ACTION_REPORT,
+        dialect.MAV_COLLISION_THREAT_LEVEL_HIGH if is_encounter else dialect.MAV_COLLISION_THREAT_LEVEL_LOW,
+        tcpa_s,
+        0.0,
+        cpa_m,
+    )
+
+
+def _approach_of(obstacle: m.MovingObstacle) -> tuple[float, float, int, bool] | None:
+    """Distance and time of the closest point, track, whether that is too near; None where it is past, or unknown."""
+    cpa_m, tcpa_s = obstacle.cpa_m, obstacle.tcpa_s
+    if cpa_m is msgspec.UNSET or tcpa_s is msgspec.UNSET or tcpa_s <= 0.0:
+        return None
+    return cpa_m, tcpa_s, obstacle.track_id, obstacle.encounter is not m.EncounterClass.NONE
 
 
 def sectors_of(obstacle: m.MovingObstacle, pose: m.Odometry) -> tuple[float, list[int]]:

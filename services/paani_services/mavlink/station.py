@@ -70,12 +70,14 @@ class Station:
         """One message."""
         self._write(self._codec.encode(message, now_us))
 
-    def refuse(self, text: str, now_us: int) -> None:
-        """Say why something is refused, the same thing no more than once in a while."""
+    def refuse(self, text: str, now_us: int) -> bool:
+        """Say why something is refused, the same thing no more than once in a while; whether it was said."""
         said_us = self._texts_us.get(text)
         if text and (said_us is None or has_passed(said_us, REPEAT_TEXT_S * 1e6, now_us)):
             self._texts_us[text] = now_us
             self.send(statustext(WARNING, text), now_us)
+            return True
+        return False
 
     def acknowledge(self, command: int, result: int, target: tuple[int, int], now_us: int, text: str = "") -> None:
         """The text first, as stations show the last they had with the result."""

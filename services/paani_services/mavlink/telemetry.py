@@ -28,7 +28,7 @@ from paani_services.mavlink.fields import (
     to_int,
 )
 from paani_services.mavlink.health_bits import sys_status
-from paani_services.mavlink.obstacles import obstacle_distance
+from paani_services.mavlink.obstacles import collision, obstacle_distance
 from paani_services.mavlink.rover_modes import mode_of
 from paani_services.mavlink.snapshot import Snapshot, attitude_rad, velocity_mps
 
@@ -244,5 +244,6 @@ BUILDERS: Mapping[int, Callable[[Snapshot], Any | None]] = {
     dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: gps_global_origin,
     dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: nav_controller_output,
     dialect.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: obstacle_distance,
+    dialect.MAVLINK_MSG_ID_COLLISION: collision,
     dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
 }

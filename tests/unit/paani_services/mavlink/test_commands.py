@@ -128,7 +128,7 @@ def test_commands_that_stand_for_a_mode(command: int, first: float, mode: m.Driv
     assert (verdict.act, verdict.mode) == (Act.MODE, mode)
 
 
-@pytest.mark.parametrize("command", [16, 178, 179, 192, 194, 207, 224])
+@pytest.mark.parametrize("command", [16, 178, 179, 192, 194, 207])
 def test_the_boat_is_not_guided_from_here(command: int) -> None:
     assert judge(command, 1.0)[:2] == (commands.DENIED, "refused: the boat follows its own mission")
 

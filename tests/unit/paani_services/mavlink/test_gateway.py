@@ -242,6 +242,18 @@ def test_a_part_of_a_mission_is_not_taken() -> None:
     assert (port.asked, port.sent) == ([], [])
 
 
+def test_nothing_jumps_to_an_item_and_a_station_that_asks_on_gets_no_answer_to_each() -> None:
+    """MAVSDK asks again whenever it hears of another item than it has asked for."""
+    port, peer = made(armed(route=ROUTE))
+    answers = [message for _ in range(50) for message in peer.send(common.MAVLink_mission_set_current_message(1, 1, 2))]
+    assert kinds(answers) == ["STATUSTEXT", "MISSION_CURRENT"]
+    assert (answers[0].text, answers[1].seq) == (commands.NO_JUMP, 1)
+    elsewhere = Peer(port.gateway, 1)
+    text, ack = elsewhere.command(common.MAV_CMD_DO_SET_MISSION_CURRENT, 2.0)
+    assert (text.text, ack.result) == (commands.NO_JUMP, commands.DENIED)
+    assert (port.asked, port.sent) == ([], [])
+
+
 def test_progress_is_told_when_it_is_made() -> None:
     port, peer = made(armed(route=ROUTE))
     peer.send(HEARTBEAT)

@@ -1,4 +1,4 @@
-"""OBSTACLE_DISTANCE: where moving obstacles are, and that the rest is not called free."""
+"""OBSTACLE_DISTANCE: where moving obstacles are, and that the rest is not called free. COLLISION: the one to mind."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import common
 
 from paani import messages as m
 from paani_services.mavlink.codec import Codec
-from paani_services.mavlink.obstacles import MAX_DISTANCE_M, SECTORS, obstacle_distance, sectors_of
+from paani_services.mavlink.obstacles import FIRST_ID, MAX_DISTANCE_M, SECTORS, collision, obstacle_distance, sectors_of
 from tests.mavlink_peer import NOW_US, in_order, odometry
 
 UNKNOWN = 0xFFFF
@@ -67,6 +68,36 @@ def test_a_boat_inside_an_obstacle_has_it_everywhere() -> None:
 @pytest.mark.parametrize("unknown", [{"odometry": None}, {"odometry": odometry(healthy=False)}, {"prediction": None}])
 def test_what_is_not_known_is_not_sent(unknown: dict[str, Any]) -> None:
     assert obstacle_distance(in_order(**{"prediction": m.Prediction(source_us=NOW_US), **unknown})) is None
+
+
+def approaching(track_id: int, **fields: Any) -> m.MovingObstacle:
+    return replace(obstacle(0.0, 0.0), track_id=track_id, **fields)
+
+
+def sent_collision(*obstacles: m.MovingObstacle) -> Any:
+    """COLLISION as a station reads it; None where there is none."""
+    message = collision(in_order(prediction=m.Prediction(source_us=NOW_US, obstacles=obstacles)))
+    return None if message is None else common.MAVLink(None).parse_buffer(Codec(0, None).encode(message, NOW_US))[0]
+
+
+def test_of_those_that_come_nearer_the_one_that_comes_nearest_is_told() -> None:
+    past, near = approaching(1, cpa_m=0.5, tcpa_s=0.0), approaching(2, cpa_m=4.0, tcpa_s=9.0)
+    far = approaching(3, cpa_m=20.0, tcpa_s=1.0)
+    message = sent_collision(past, far, near, approaching(4))
+    assert (message.id, message.horizontal_minimum_delta, message.time_to_minimum_delta) == (FIRST_ID + 2, 4.0, 9.0)
+    assert message.action == common.MAV_COLLISION_ACTION_REPORT
+    assert message.threat_level == common.MAV_COLLISION_THREAT_LEVEL_LOW
+
+
+def test_the_threat_is_high_while_the_navigator_finds_it_too_near() -> None:
+    message = sent_collision(approaching(2, cpa_m=1.0, tcpa_s=5.0, encounter=m.EncounterClass.HEAD_ON))
+    assert message.threat_level == common.MAV_COLLISION_THREAT_LEVEL_HIGH
+
+
+def test_without_anything_that_comes_nearer_nothing_is_told() -> None:
+    assert sent_collision() is None
+    assert sent_collision(approaching(1, cpa_m=0.5, tcpa_s=0.0), approaching(2)) is None
+    assert collision(in_order(prediction=None)) is None
 
 
 @given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(0.0, 8.0), st.floats(-7.0, 7.0))
