@@ -13,7 +13,9 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from tests.browser.test_page import until, watch
+from tests.browser.test_time import press_strip
 from tests.conftest import OpenAs, Spawn
+from tests.unit.paani.logs.small_logs import NAME, START_US, finished
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
@@ -56,4 +58,38 @@ async def test_a_replay_raises_no_alarm(
         }})()""")
             == []
         )
+        assert watched.errors == []
+
+
+async def test_the_replayed_file_is_played_by_the_same_controls(
+    browser: Any, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    """Ten seconds at 2 m/s: at once, from where the command says; paused, stepped, sought, faster, once more."""
+    path = await asyncio.to_thread(finished, tmp_path, 200, 20)
+    pose, play = "document.querySelector('#map-pose').textContent", "document.querySelector('#time-play').ariaLabel"
+    async with spawn("dashboard", f"dashboard.replayed={path}"):
+        watched = await watch(browser, config)
+        page = watched.page
+        await page.goto(f"http://127.0.0.1:{config.dashboard.port}/#at=4")
+        await page.reload()
+        await until(page, f"{play} === 'Pause' && {pose}.startsWith('8.')")
+        assert NAME in await page.inner_text("#past-what")
+        assert await page.inner_text("#past-live") == "No boat is steered from this page"
+        assert await page.inner_text("#mode") == "REPLAY"
+        assert not await page.is_visible("#past-live-button")
+        await page.keyboard.press("k")
+        await until(page, f"{play} === 'Play'")
+        paused_us = await page.evaluate("paani.shownUs")
+        assert paused_us >= START_US + 4_000_000
+        await page.keyboard.press("l")
+        await page.click("#time-next")
+        assert 0 < await page.evaluate("paani.shownUs") - paused_us < 1.5e6
+        await press_strip(page, 0.8)
+        await until(page, f"{pose}.startsWith('15.') || {pose}.startsWith('16.')")
+        await page.screenshot(path=tmp_path / "replayed.png")
+        await page.select_option("#time-speed", "5")
+        await page.click("#time-play")
+        await until(page, f"{play} === 'Play' && {pose}.startsWith('19.')")
+        await page.click("#time-play")
+        await until(page, f"{pose}.startsWith('1.') || {pose}.startsWith('2.')")
         assert watched.errors == []

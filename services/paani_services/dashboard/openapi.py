@@ -100,6 +100,8 @@ OPERATIONS = (
         query=past.WindowQuery,
         errors=READ,
     ),
+    Operation("get", "/api/replayed/series", "Samples and events of what is replayed.", past.Series, errors=READ),
+    Operation("get", "/api/replayed/frames", "Its frames.", BYTES, query=past.WindowQuery, errors=READ),
     Operation(
         "post",
         "/api/recordings/protect",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import msgspec
 
 from paani import keys
@@ -22,7 +24,8 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     mode: what the thrust moves, `sim`, `hil` or `hull`; `replay`: a recording is played, and nothing moves. pictures:
     where they come from, `sim`, `camera` or `file`. turn_radius_m: of the hull
-    under way, 0 where it turns on the spot. planner: whether it chooses heading and speed.
+    under way, 0 where it turns on the spot. planner: whether it chooses heading and speed. replayed: name of the
+    recording that the page plays instead of the present; empty: none.
     """
 
     vessel: str
@@ -39,6 +42,7 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     turn_radius_m: float
     topics: tuple[TopicFreshness, ...]
     services: tuple[str, ...]
+    replayed: str
 
 
 class ServiceLife(msgspec.Struct, frozen=True):
@@ -72,6 +76,7 @@ def page_settings(config: Config) -> PageSettings:
             TopicFreshness(t.name, t.producer, t.rate_hz, t.fresh_s) for t in keys.topics_in(config.bus.graph)
         ),
         services=config.services,
+        replayed=Path(config.dashboard.replayed).name,
     )
 
 

@@ -39,10 +39,13 @@ class ProtectRequest(RecordingRequest, frozen=True, forbid_unknown_fields=True):
 
 
 class RecordingRoutes:
-    """`refuse`: the error response to an act that is not from the operator's own page, else None."""
+    """folder: of the recorder. replayed: what the page plays instead of the present; empty: nothing.
 
-    def __init__(self, folder: str, refuse: Refuse) -> None:
-        self._folder, self._refuse = RecordingFolder(folder), refuse
+    refuse: the error response to an act that is not from the operator's own page, else None.
+    """
+
+    def __init__(self, folder: str, replayed: str, refuse: Refuse) -> None:
+        self._folder, self._replayed, self._refuse = RecordingFolder(folder), replayed, refuse
         self._reading, self._waiting = asyncio.Lock(), 0
 
     def routes(self) -> list[web.RouteDef]:
@@ -51,6 +54,8 @@ class RecordingRoutes:
             web.get("/api/recordings/{name}/file", self._file),
             web.get("/api/recordings/{name}/series", self._series),
             web.get("/api/recordings/{name}/frames", self._frames),
+            web.get("/api/replayed/series", self._series),
+            web.get("/api/replayed/frames", self._frames),
             web.post("/api/recordings/protect", self._protect),
             web.post("/api/recordings/delete", self._delete),
         ]
@@ -100,10 +105,18 @@ class RecordingRoutes:
             return error_response(error.status, str(error), "name")
         return json_response(DoneAnswer(True))
 
+    def _find(self, name: str | None) -> Path:
+        """A recording of the folder; None: the one that is replayed. Raises RecordingRefusedError."""
+        if name is not None:
+            return self._folder.find(name)
+        if not self._replayed:
+            raise RecordingRefusedError(404, "dashboard.replayed: not set, so no recording is replayed")
+        return Path(self._replayed)
+
     async def _read(self, request: web.Request, *words: str) -> bytes | web.Response:
         """What the reader writes of a recording, or the error response; one reader at a time."""
         try:
-            path = await asyncio.to_thread(self._folder.find, request.match_info["name"])
+            path = await asyncio.to_thread(self._find, request.match_info.get("name"))
         except RecordingRefusedError as error:
             return error_response(error.status, str(error), "name")
         if self._waiting >= MAX_WAITING:

@@ -81,7 +81,7 @@ class Server:
             *PastRoutes(hub, history).routes(),
             *LogRoutes(config.bus).routes(),
             *SettingRoutes(config, os.environ).routes(),
-            *RecordingRoutes(config.recorder.folder, gatekeeper.refuse_act).routes(),
+            *RecordingRoutes(config.recorder.folder, config.dashboard.replayed, gatekeeper.refuse_act).routes(),
         ]
         self._sockets: dict[Client, web.WebSocketResponse] = {}  # in the order they came
         self.busy: set[object] = set()  # protocols of the connections whose request is being answered

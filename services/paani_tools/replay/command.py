@@ -20,7 +20,7 @@ from paani.whole_file import write_json
 from paani_tools.progress import Progress
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.report_text import change_text, check_text
-from paani_tools.replay.republish import RepublishOptions, replay_config, republish, topics_of
+from paani_tools.replay.republish import RepublishOptions, RepublishResult, replay_config, republish, topics_of
 from paani_tools.replay.verify import ChangeReport, CheckReport, change_log, check_log
 
 ROUTER = "bus.router=tcp/127.0.0.1:7448"  # beside the live bus
@@ -72,29 +72,31 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
             f" --set bus.vessel={bus.vessel}{profile}\n"
         )
         if what.dashboard:
-            sys.stdout.write(f"  {page_origin(config)}\n")
+            begin = f"#at={what.from_s:g}" if what.from_s else ""
+            sys.stdout.write(f"  {page_origin(config)}/{begin}\nplay, pause, step and seek there; Ctrl-C ends it\n")
         sys.stdout.flush()
         for problem in log.problems:
             sys.stderr.write(f"damaged: {problem}\n")
-        result = asyncio.run(_until_told(log, config, what, progress))
-    if result:
-        sys.stdout.write(result)
+        asyncio.run(_until_told(log, config, what, progress))
     return 0
 
 
-async def _until_told(log: Log, config: Config, what: RepublishOptions, progress: Progress) -> str:
+async def _until_told(log: Log, config: Config, what: RepublishOptions, progress: Progress) -> None:
     """Republish; a signal ends it in order."""
-    work = asyncio.create_task(republish(log, config, what, progress.at))
+    work = asyncio.create_task(republish(log, config, what, progress.at, _tell_end))
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, work.cancel)
     with contextlib.suppress(asyncio.CancelledError):
-        done = await work
-        return (
-            f"{done.messages} messages republished; late by {done.late_ms[0]:.1f} ms (median), "
-            f"{done.late_ms[1]:.1f} ms (95th percentile)\n"
-        )
-    return ""
+        await work
+
+
+def _tell_end(done: RepublishResult) -> None:
+    sys.stdout.write(
+        f"{done.messages} messages republished; late by {done.late_ms[0]:.1f} ms (median), "
+        f"{done.late_ms[1]:.1f} ms (95th percentile)\n"
+    )
+    sys.stdout.flush()
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -117,7 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument("--loop", action="store_true", help="again and again")
     play.add_argument("--only", nargs="+", metavar="TOPIC", help="only these topics")
     play.add_argument("--commands", action="store_true", help="commands, arming and heartbeats too")
-    play.add_argument("--dashboard", action="store_true", help="show it on the dashboard")
+    play.add_argument("--dashboard", action="store_true", help="play it on the dashboard, until Ctrl-C")
     parser.add_argument(
         "--set", action="append", default=[], dest="sets", metavar="SECTION.FIELD=VALUE",
         help="with --check: decide with this setting; else: a bus or dashboard setting; may be repeated",

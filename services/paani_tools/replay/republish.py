@@ -60,6 +60,9 @@ class RepublishResult(msgspec.Struct, frozen=True, kw_only=True):
     late_ms: tuple[float, float]
 
 
+OnEnd = Callable[[RepublishResult], None]
+
+
 def topics_of(log: Log, what: RepublishOptions, graph: keys.Graph) -> list[keys.Topic[Any]]:
     """The topics of the log that will be republished, in its graph. Raises UserError for one that is not there."""
     known: dict[str, keys.Topic[Any]] = {topic.name: topic for topic in keys.topics_in(graph)}
@@ -87,12 +90,12 @@ def replay_config(config: Config, log: Log) -> Config:
         config,
         bus=bus,
         camera=msgspec.structs.replace(config.camera, source=str(log.path)),
-        dashboard=msgspec.structs.replace(config.dashboard, serve=True),
+        dashboard=msgspec.structs.replace(config.dashboard, serve=True, replayed=str(log.path.resolve())),
     )
 
 
-async def republish(log: Log, config: Config, what: RepublishOptions, on_progress: OnProgress) -> RepublishResult:
-    """Run the router and republish until the end, or until cancelled.
+async def republish(log: Log, config: Config, what: RepublishOptions, on_progress: OnProgress, on_end: OnEnd) -> None:
+    """Run the router and republish until the end, or until cancelled; with a dashboard, which goes on, until cancelled.
 
     Raises UserError when the router's address is taken, or a service that could move a boat joins the bus.
     """
@@ -105,7 +108,9 @@ async def republish(log: Log, config: Config, what: RepublishOptions, on_progres
             if what.dashboard:
                 await stack.enter_async_context(_dashboard(config, observer))
             player = Player(log, topics, buses, what, on_progress)
-            return await _unless_moving(observer, player.play())
+            on_end(await _unless_moving(observer, player.play()))
+            if what.dashboard:
+                await asyncio.Event().wait()
     finally:
         await asyncio.to_thread(router.close)
 

@@ -21,7 +21,8 @@ export function renderLink(store, open, now) {
   document.body.dataset.link = lost ? "lost" : never ? "waiting" : silent ? "ended" : "live";
   document.body.dataset.loss = unseen ? "unseen" : "";
   byId("link-seen").hidden = !unseen;
-  setText(byId("link-word"), lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : silent ? "not playing" : `live ${fixed(silenceS, 1)} s`);
-  setText(byId("link-age"), unseen ? `was lost ${ageText(longestLossS)}, ${lostAt}` : !open ? "no connection" : silent ? "no data" : never ? "for data" : "age of data");
+  const isFile = open && Boolean(store.get("dashboard/settings")?.replayed);
+  setText(byId("link-word"), isFile ? "replay" : lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : silent ? "not playing" : `live ${fixed(silenceS, 1)} s`);
+  setText(byId("link-age"), unseen ? `was lost ${ageText(longestLossS)}, ${lostAt}` : !open ? "no connection" : isFile ? "of a file" : silent ? "no data" : never ? "for data" : "age of data");
   document.title = lost ? "LOST · PAANI" : "PAANI";
 }

@@ -34,7 +34,8 @@ const live = new View(() => performance.now());
 const camera = new Camera(live);
 const map = new MapPanel();
 const time = new Time(live, () => camera.scheduleDraw());
-let open = false, opened = 0;
+const fromS = Number(new URLSearchParams(location.hash.slice(1)).get("at")) || 0; // seconds since a recording's start
+let open = false, opened = 0, isReplayed = false;
 
 /** @param {string} key @param {import("./frames.js").FrameHeader} header @param {Uint8Array} body */
 function onMessage(key, header, body) {
@@ -48,7 +49,15 @@ function onMessage(key, header, body) {
   const { value, drawn } = live.put(key, header, body, performance.now());
   if (!time.isPast) void drawn.then(() => camera.scheduleDraw());
   if (key === "advisor/advisory") logAdvice(value);
+  if (key === "dashboard/settings" && value.replayed) replay(value.replayed);
   if (key === "dashboard/sample") time.history.series.append(value);
+}
+
+/** Once: the settings come again with each connection. @param {string} name of the recording that this page is of */
+function replay(name) {
+  if (isReplayed) return;
+  isReplayed = true;
+  time.replay(name, fromS).catch((error) => addLine({ at_us: Date.now() * 1000, level: "warn", text: `${name}: ${error.message}` }));
 }
 
 /** @param {boolean} isOpen */

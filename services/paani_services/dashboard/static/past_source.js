@@ -32,9 +32,15 @@ export async function loadHistory(series) {
   series.load(await (await ask("/api/history")).json());
 }
 
-/** A recording, with its samples and events; throws an error with the server's reason. @param {string} name @returns {Promise<import("./playback.js").Source>} */
-export async function recordingSource(name) {
-  const path = `/api/recordings/${encodeURIComponent(name)}`, series = new Series();
+/** A recording of the recorder's folder; throws an error with the server's reason. @param {string} name */
+export const recordingSource = (name) => sourceAt(`/api/recordings/${encodeURIComponent(name)}`, name);
+
+/** The recording that the page plays instead of the present; throws an error with the server's reason. @param {string} name */
+export const replayedSource = (name) => sourceAt("/api/replayed", name);
+
+/** A recording, with its samples and events. @param {string} path @param {string} name @returns {Promise<import("./playback.js").Source>} */
+async function sourceAt(path, name) {
+  const series = new Series();
   series.load(await (await ask(`${path}/series`)).json());
   return { name, series, isKeyframed: false, fetch: (fromUs, toUs) => fetchFrames(`${path}/frames`, fromUs, toUs) };
 }

@@ -72,6 +72,13 @@ export class Playback {
     this.feed();
   }
 
+  /** Play or pause; at the end, from the beginning. */
+  toggle() {
+    if (!this.source) return;
+    if (!this.playing && this.atUs >= this.source.series.endUs) this.seek(this.source.series.startUs);
+    this.playing = !this.playing;
+  }
+
   /** To the next moment that was decided, or to the one before. @param {1 | -1} direction */
   step(direction) {
     if (!this.source) return;

@@ -219,6 +219,9 @@ export const TIME_TEXTS = {
   nothing: "nothing recorded yet",
   play: "Play",
   pause: "Pause",
+  toLive: "Back to live",
+  toReplayed: "Back to the replay",
+  noBoat: "No boat is steered from this page",
   unknown: "unknown",
   loading: "loading",
 };

@@ -3,7 +3,7 @@
 
 import { describeActivity } from "./activity.js";
 import { showLogOf } from "./log.js";
-import { historySource, loadHistory } from "./past_source.js";
+import { historySource, loadHistory, replayedSource } from "./past_source.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
 import { TIME_TEXTS, ageText, byId, clockText, setText, spanText } from "./text.js";
@@ -17,14 +17,19 @@ export class Time {
     this.playback = new Playback(onPicture);
     this.strip = new TimeStrip((atUs) => this.seek(atUs));
     this.plots = new Plots((atUs) => this.seek(atUs));
+    /** What is played instead of the present. @type {import("./playback.js").Source | null} */
+    this.replayed = null;
     this.renderedAt = performance.now();
     byId("past-live-button").addEventListener("click", () => this.goLive());
     byId("time-back").addEventListener("click", () => this.step(-1));
     byId("time-next").addEventListener("click", () => this.step(1));
-    byId("time-play").addEventListener("click", () => { this.playback.playing = !this.playback.playing; });
+    byId("time-play").addEventListener("click", () => this.playback.toggle());
     byId("time-speed").addEventListener("change", () => { this.playback.speed = Number(byId("time-speed").value); });
     addEventListener("keydown", (event) => {
-      if (event.key === "l" && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)) this.goLive();
+      if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      if (event.key === "l") this.goLive();
+      if (event.key === "k") this.playback.toggle();
+      if (this.isPast && (event.key === "," || event.key === ".")) this.step(event.key === "," ? -1 : 1);
     });
   }
 
@@ -60,8 +65,17 @@ export class Time {
     else this.playback.step(direction);
   }
 
+  /** To the present; a page that replays a recording has none, and returns to that. */
   goLive() {
-    this.playback.close();
+    if (!this.replayed) this.playback.close();
+    else if (this.playback.source !== this.replayed) this.open(this.replayed, this.replayed.series.startUs);
+  }
+
+  /** Play a recording instead of the present. @param {string} name @param {number} fromS since its start */
+  async replay(name, fromS) {
+    const source = this.replayed = await replayedSource(name);
+    this.open(source, source.series.startUs + fromS * 1e6);
+    this.playback.playing = true;
   }
 
   /** @param {number} now */
@@ -93,7 +107,10 @@ export class Time {
     const place = source.name ? `${source.name}, ${spanText(atUs - series.startUs)} of ${spanText(series.endUs - series.startUs)}` : `${ageText((this.history.series.endUs - atUs) / 1e6)} ago`;
     const state = problem || (buffer.length ? TIME_TEXTS.readOnly : TIME_TEXTS.loading);
     setText(byId("past-what"), `${clockText(atUs)}, ${place}: ${state}`);
-    setText(byId("past-live"), `${TIME_TEXTS.liveNow}: ${describeActivity(this.live.store, now).word}. ${TIME_TEXTS.stillLive}`);
+    const button = byId("past-live-button");
+    button.hidden = source === this.replayed;
+    setText(button, this.replayed ? TIME_TEXTS.toReplayed : TIME_TEXTS.toLive);
+    setText(byId("past-live"), this.replayed ? TIME_TEXTS.noBoat : `${TIME_TEXTS.liveNow}: ${describeActivity(this.live.store, now).word}. ${TIME_TEXTS.stillLive}`);
   }
 }
 
