@@ -58,11 +58,9 @@ def allowed_distance_m(fence: Fence, from_m: Point, to_m: Point) -> float:
     length_m = math.dist(from_m, to_m)
     if not is_allowed(fence, from_m):
         return 0.0
-    cuts = sorted(cut for area in fence for edge in edges(area) for cut in _crossings(from_m, to_m, *edge))
-    for cut, beyond in pairwise((*cuts, 1.0)):
-        middle = 0.5 * (cut + beyond)
-        if not is_allowed(fence, _interpolate(from_m, to_m, middle)):
-            return cut * length_m
+    exit_part = _exit_part(fence, from_m, to_m)
+    if exit_part is not None:
+        return exit_part * length_m
     return math.inf if is_allowed(fence, to_m) else length_m
 
 
@@ -92,10 +90,19 @@ def find_route_violation(
         if not _is_clear(fence, point, point, margin_m):
             return number, f"is nearer than {margin_m} m to the fence"
     for number, (start, end) in enumerate(pairwise((*points, *points[:1]) if repeat else points)):
-        if allowed_distance_m(fence, start, end) < math.inf:
+        if _exit_part(fence, start, end) is not None:  # both ends are allowed
             return number, "the leg to the next leaves the fence"
         if not _is_clear(fence, start, end, margin_m):
             return number, f"the leg to the next comes nearer than {margin_m} m to the fence"
+    return None
+
+
+def _exit_part(fence: Fence, from_m: Point, to_m: Point) -> float | None:
+    """The part of the way after which something between its ends is not allowed; None where there is nothing."""
+    cuts = sorted(cut for area in fence for edge in edges(area) for cut in _crossings(from_m, to_m, *edge))
+    for cut, beyond in pairwise((*cuts, 1.0)):
+        if not is_allowed(fence, _interpolate(from_m, to_m, 0.5 * (cut + beyond))):
+            return cut
     return None
 
 

@@ -17,6 +17,7 @@ MAX_WAYPOINTS = 10_000  # of a route or mission: the nearest leg is sought among
 MIN_LEG_M = 0.01  # waypoints nearer to each other than this are the same: a leg this short has no direction
 MIN_RADIUS_M, MAX_RADIUS_M = 1.0, 1e3  # of a station; a boat would never rest within a radius below its own length
 MAX_CORNERS = 1000  # of all areas together: every edge is tested at each step of the navigator, ten times a second
+MAX_PAIRS = 1_000_000  # of a waypoint and a corner: each leg is tested against each edge, before a mission is accepted
 MIN_AREA_M2 = 1.0  # of one area: less is a slip of the pen, not water or land
 MAX_DISTANCE_M = 1e6  # of a point from the map's origin; a plane is no map long before that
 
@@ -40,7 +41,8 @@ def find_mission_fault(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: flo
 
     margin_m: the least distance of a waypoint or leg from an edge. Numbers that are none count as out of bounds.
     """
-    return _find_fence_fault(fence) or _find_legs_fault(legs) or _find_violation(legs, fence, margin_m)
+    fault = _find_fence_fault(fence) or _find_legs_fault(legs) or _find_size_fault(legs, fence)
+    return fault or _find_violation(legs, fence, margin_m)
 
 
 def find_leg_outside(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> tuple[int, int, str] | None:
@@ -76,6 +78,13 @@ def find_repeated_waypoint(waypoints: tuple[Waypoint, ...], *, repeat: bool) -> 
         if math.dist((start.x_m, start.y_m), (end.x_m, end.y_m)) < MIN_LEG_M:
             return number
     return None
+
+
+def _find_size_fault(legs: tuple[MissionLeg, ...], fence: Fence) -> str:
+    waypoints_n, corners_n = sum(len(leg.waypoints) for leg in legs), sum(len(area.corners) for area in fence)
+    if waypoints_n * corners_n > MAX_PAIRS:
+        return f"legs: {waypoints_n} waypoints times {corners_n} corners of the fence is more than {MAX_PAIRS}"
+    return ""
 
 
 def _find_fence_fault(fence: Fence) -> str:

@@ -89,6 +89,19 @@ def test_a_fault_of_a_fence_is_named(fence: tuple[FenceArea, ...], fault: str) -
     assert find_mission_fault(LEGS, fence, MARGIN_M).startswith(fault)
 
 
+@pytest.mark.parametrize(
+    ("corners", "fault"),
+    [
+        (100, "legs[0].waypoints[0]: is outside the fence"),
+        (101, "legs: 10000 waypoints times 101 corners of the fence is more than 1000000"),
+    ],
+)
+def test_what_would_take_long_to_check_is_refused_at_once(corners: int, fault: str) -> None:
+    angles = (math.tau * number / corners for number in range(corners))
+    lake = FenceArea(keep=Keep.IN, corners=points(*((math.cos(a) - 50.0, math.sin(a)) for a in angles)))
+    assert find_mission_fault((changed(ROUTE, waypoints=line(MAX_WAYPOINTS)),), (lake,), MARGIN_M) == fault
+
+
 def test_a_route_alone_is_followed_once_or_without_end() -> None:
     for repeat, laps in ((True, 0), (False, 1)):
         (leg,) = mission_of_route(Route(source_us=3, name="r", waypoints=ROUTE.waypoints, repeat=repeat)).legs
