@@ -45,6 +45,12 @@ def test_equivalent_and_untried_mutants_are_counted_apart(tmp_path: Path) -> Non
     assert not judged(tmp_path, (None, None))[1]
 
 
+def test_a_mutant_without_end_is_noticed_and_counted_apart(tmp_path: Path) -> None:
+    text, is_enough = judged(tmp_path, (36, 0), ALIKE)
+    assert f"{FILE}: 1 of 1, 100.0%, 1 equivalent, 1 noticed by running out of time\n" in text
+    assert is_enough
+
+
 def test_a_survivor_is_shown_with_its_change_and_counts(tmp_path: Path) -> None:
     text, is_enough = judged(tmp_path, (0, 0), ALIKE)
     assert "boat.x_limit__mutmut_1\n    - return min(speed, 1.0)\n    + return min(speed, 2.0)\n" in text

@@ -17,6 +17,7 @@ from paani_sim.trials.intervals import wilson_interval
 BAR_FRAC = 0.9  # of each file's mutants that were tried and change something
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 NOTICED = {1, 3, 24, 36, 152, 255, -9, -24}  # exit codes of pytest and of what ends a run without end
+OUT_OF_TIME = {24, 36, 152, -24}  # of these; a busy machine makes some that are none
 UNTRIED = None
 
 
@@ -46,6 +47,7 @@ class Verdict(NamedTuple):
     total: int
     untried: int
     noticed: int
+    out_of_time: int
     survivors: tuple[Change, ...]
     equivalent: tuple[Change, ...]
     stale: tuple[Equivalent, ...]  # rows that name no survivor, though all mutants were tried
@@ -74,6 +76,7 @@ def judge_file(mutants: Path, file: str, equivalents: tuple[Equivalent, ...]) ->
         total=len(codes),
         untried=untried,
         noticed=len(codes) - len(left) - untried,
+        out_of_time=sum(code in OUT_OF_TIME for code in codes.values()),
         survivors=tuple(change for change, row in changes.items() if row is None),
         equivalent=tuple(change for change, row in changes.items() if row is not None),
         stale=() if untried else tuple(row for row in rows if used[id(row)] != set(row.to)),
@@ -88,6 +91,7 @@ def summary(verdicts: list[Verdict]) -> tuple[str, bool]:
     lines += [f"{EQUIVALENT.name}: no such survivor: {row.function}: {row.line}" for v in verdicts for row in v.stale]
     for verdict in verdicts:
         apart = [f"{len(verdict.equivalent)} equivalent"] * bool(verdict.equivalent)
+        apart += [f"{verdict.out_of_time} noticed by running out of time"] * bool(verdict.out_of_time)
         apart += [f"{verdict.untried} not tried"] * bool(verdict.untried)
         lines.append(f"{verdict.file}: {_share(verdict.noticed, verdict.counted)}" + "".join(f", {x}" for x in apart))
     noticed, counted = sum(v.noticed for v in verdicts), sum(v.counted for v in verdicts)

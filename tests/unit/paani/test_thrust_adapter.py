@@ -65,6 +65,22 @@ def test_o2_zero_half_a_second_after_the_last_command() -> None:
     assert adapter.decide(later_us).zero_cause is ZeroCause.NONE
 
 
+@pytest.mark.parametrize("timeout", ["timeout_s", "arming_timeout_s", "pulse_timeout_s", "max_echo_age_s"])
+def test_a_timeout_ends_within_a_microsecond(timeout: str) -> None:
+    long = dict.fromkeys(("timeout_s", "arming_timeout_s", "pulse_timeout_s", "max_echo_age_s"), 60.0)
+    for after_us, passes in ((2_000_000, True), (2_000_001, False)):
+        adapter = ready(msgspec.structs.replace(CONFIG, **(long | {timeout: 2.0})))
+        adapter.offer(thrust(echo_us=NOW_US), NOW_US + after_us if timeout == "max_echo_age_s" else NOW_US)
+        assert (adapter.decide(NOW_US + after_us).zero_cause is ZeroCause.NONE) is passes
+
+
+def test_the_first_command_may_be_of_any_epoch() -> None:
+    """At once after the start of the plant, and of its clock."""
+    adapter = ThrustAdapter(CONFIG, domain=43)
+    assert adapter.command is None
+    assert adapter.offer(thrust(epoch=0, seq=0, echo_us=0), 1000) is ZeroCause.NONE
+
+
 @pytest.mark.parametrize(
     ("changes", "cause"),
     [

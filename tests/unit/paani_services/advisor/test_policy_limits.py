@@ -38,6 +38,14 @@ def test_an_incursion_is_one_where_the_water_alone_does_not_block(center: m.Lane
     assert advice[1].direction is turn
 
 
+def test_obstacles_at_both_edges_are_no_incursion() -> None:
+    """J9: whichever side it turned to, a slight turn would lead towards one of them."""
+    other = box(PIER, (0.60, 0.35, 0.70, 0.50), 0.9)
+    frame = msgspec.structs.replace(seeing(EDGE, other), center=lane(0.40), left=lane(0.2))
+    assert play([frame] * 2, PAPER)[1][1].direction is D.RIGHT
+    assert play([msgspec.structs.replace(frame, left=CLEAR.left, right=lane(0.2))] * 2, PAPER)[1][1].direction is D.LEFT
+
+
 @pytest.mark.parametrize(
     "dry",
     [

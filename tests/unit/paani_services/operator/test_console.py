@@ -155,6 +155,7 @@ def test_the_latch_file_is_private_and_whole(tmp_path: Path) -> None:
 def test_an_unreadable_latch_is_a_stop(tmp_path: Path) -> None:
     path = tmp_path / LATCH_FILE
     path.write_bytes(b"\xff\xfe")
+    assert read_latch(path) == ""
     assert op.initial_state(read_latch(path)).stopped
     path.unlink()
     path.mkdir()
