@@ -4,6 +4,7 @@ Static clearance is read from a signed distance field of the grid. A dynamic obs
 velocity and grows with the uncertainty of that velocity.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import msgspec
 import numpy as np
 
 from paani import portable
-from paani.arrays import F64
+from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
 from paani_services.navigator.avoidance.rollout import BoatState, Trajectories
 from paani_services.navigator.mapping.distance_field import signed_distance_field_m
@@ -25,6 +26,18 @@ UNSEEN_GROWTH_MPS = 0.1
 # How far ahead an approach is predicted [s]: a boat needs 20 s to turn away from an obstacle that comes at 0.13 m/s.
 APPROACH_S = 30.0
 ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
+
+
+class DynamicClearance(NamedTuple):
+    """Clearance to the predicted outline of one dynamic obstacle.
+
+    candidates_m: along each candidate [times, candidates]. coasting_m: of the boat with its thrusters off [times].
+    resting_m: the smallest so far, within the horizon, of a boat that stays where it is [times].
+    """
+
+    candidates_m: F64
+    coasting_m: F64
+    resting_m: F64
 
 
 class Approach(NamedTuple):
@@ -48,16 +61,20 @@ def clearance_field_m(grid: OccupancyGrid, config: PlannerConfig) -> F64:
     return np.minimum(field_m, signed_distance_field_m(grid.reachable_unseen))
 
 
-def interpolate_field(grid: OccupancyGrid, field: F64, trajectories: Trajectories) -> F64:
-    """Interpolate the field bilinearly at each position; positions off the grid get the value at its border."""
+def interpolate_fields(grid: OccupancyGrid, fields: Sequence[F64], trajectories: Trajectories) -> list[F64]:
+    """Interpolate each field bilinearly at each position; positions off the grid get the value at its border."""
     column = np.clip((trajectories.x_m - grid.west_m) / CELL_M - 0.5, 0.0, GRID_CELLS - 1.001)
     row = np.clip((trajectories.y_m - grid.south_m) / CELL_M - 0.5, 0.0, GRID_CELLS - 1.001)
-    left, low = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
+    left, low = np.floor(column), np.floor(row)
     right_part, high_part = column - left, row - low
-    flat, at = field.ravel(), low * GRID_CELLS + left
-    lower = flat[at] * (1.0 - right_part) + flat[at + 1] * right_part
-    upper = flat[at + GRID_CELLS] * (1.0 - right_part) + flat[at + GRID_CELLS + 1] * right_part
-    return np.asarray(lower * (1.0 - high_part) + upper * high_part)
+    left_part, low_part = 1.0 - right_part, 1.0 - high_part
+    at = low.astype(np.int64) * GRID_CELLS + left.astype(np.int64)
+    found = []
+    for flat in (field.ravel() for field in fields):
+        lower = flat[at] * left_part + flat[at + 1] * right_part
+        upper = flat[at + GRID_CELLS] * left_part + flat[at + GRID_CELLS + 1] * right_part
+        found.append(np.asarray(lower * low_part + upper * high_part))
+    return found
 
 
 def predicted_clearance_m(obstacle: DynamicObstacle, x_m: F64, y_m: F64, time_s: F64) -> F64:
@@ -68,23 +85,34 @@ def predicted_clearance_m(obstacle: DynamicObstacle, x_m: F64, y_m: F64, time_s:
     """
     velocity = obstacle.velocity
     east_m, north_m = x_m - time_s * velocity.east_mps, y_m - time_s * velocity.north_mps
-    square = np.full(east_m.shape, np.inf)
+    square, east, north = np.full(east_m.shape, np.inf), np.empty_like(east_m), np.empty_like(north_m)
     for x, y in zip(obstacle.east_m.tolist(), obstacle.north_m.tolist(), strict=True):
-        east, north = east_m - x, north_m - y
-        square = np.minimum(square, east * east + north * north)
+        np.square(np.subtract(east_m, x, out=east), out=east)
+        np.square(np.subtract(north_m, y, out=north), out=north)
+        np.minimum(square, np.add(east, north, out=east), out=square)
     return np.asarray(np.sqrt(square) - obstacle.standoff_m - position_deviation_m(obstacle, time_s))
+
+
+def predict_clearance(
+    obstacle: DynamicObstacle, candidates: Trajectories, coasting: Trajectories, start: BoatState, config: PlannerConfig
+) -> DynamicClearance:
+    """The clearance of all candidates, of the coasting boat and of the resting one to an obstacle, in one go."""
+    rests = np.ones((candidates.time_s.size, 1))
+    x_m = np.hstack([candidates.x_m, coasting.x_m, start.x_m * rests])
+    y_m = np.hstack([candidates.y_m, coasting.y_m, start.y_m * rests])
+    clearance_m = predicted_clearance_m(obstacle, x_m, y_m, candidates.time_s[:, None])
+    resting_m = np.where(is_within_horizon(candidates, config), clearance_m[:, -1], np.inf)
+    return DynamicClearance(clearance_m[:, :-2], clearance_m[:, -2], np.minimum.accumulate(resting_m))
+
+
+def is_within_horizon(trajectories: Trajectories, config: PlannerConfig) -> Bools:
+    """Which times lie within `horizon_s` [times]."""
+    return np.asarray(trajectories.time_s <= config.horizon_s + 1e-9)
 
 
 def position_deviation_m(obstacle: DynamicObstacle, time_s: F64 | float) -> F64 | float:
     """Standard deviation of the obstacle's predicted position at these times from now."""
     return obstacle.velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
-
-
-def least_clearance_m(static_m: F64, obstacles: Sequence[DynamicObstacle], trajectories: Trajectories) -> F64:
-    """Clearance to the nearest of all static and dynamic obstacles [times, candidates]."""
-    time_s = trajectories.time_s[:, None]
-    dynamic_m = (predicted_clearance_m(each, trajectories.x_m, trajectories.y_m, time_s) for each in obstacles)
-    return np.asarray(np.minimum.reduce([static_m, *dynamic_m]))
 
 
 def required_clearance_m(time_s: F64, resting_m: float | F64, config: PlannerConfig) -> F64:
@@ -109,32 +137,21 @@ def margins(config: PlannerConfig) -> list[PlannerConfig]:
     return [config, *(msgspec.structs.replace(config, margin_m=m, drift_mps=d) for m, d in tighter)]
 
 
-def separation_margin_m(
-    obstacle: DynamicObstacle, trajectories: Trajectories, start: BoatState, config: PlannerConfig
-) -> F64:
+def separation_margin_m(clearance: DynamicClearance, time_s: F64, config: PlannerConfig) -> F64:
     """Clearance to a dynamic obstacle beyond the required one [times, candidates]; negative where it is too near.
 
     An obstacle that comes near a boat at rest may come as near on the trajectory, but no nearer, and no trajectory may
     enter the room kept around it.
     """
-    time_s = trajectories.time_s[:, None]
-    resting_m = predicted_clearance_m(
-        obstacle, np.full_like(time_s, start.x_m), np.full_like(time_s, start.y_m), time_s
-    )[:, 0]
-    is_in_horizon = trajectories.time_s <= config.horizon_s + 1e-9
-    resting_m = np.minimum.accumulate(np.where(is_in_horizon, resting_m, np.inf))
-    required_m = np.maximum(required_clearance_m(trajectories.time_s, resting_m, config), 0.0)
-    clearance_m = predicted_clearance_m(obstacle, trajectories.x_m, trajectories.y_m, time_s)
-    return np.asarray(clearance_m - required_m[:, None])
+    required_m = np.maximum(required_clearance_m(time_s, clearance.resting_m, config), 0.0)
+    return np.asarray(clearance.candidates_m - required_m[:, None])
 
 
-def least_separation_margin_m(
-    obstacles: Sequence[DynamicObstacle], trajectories: Trajectories, start: BoatState, config: PlannerConfig
-) -> F64:
-    """The smallest `separation_margin_m` of all obstacles; infinite without any."""
-    infinite_m = np.full(trajectories.x_m.shape, np.inf)
-    margins_m = (separation_margin_m(each, trajectories, start, config) for each in obstacles)
-    return np.asarray(np.minimum.reduce([infinite_m, *margins_m]))
+def least_separation_margin_m(clearances: Sequence[DynamicClearance], time_s: F64, config: PlannerConfig) -> F64:
+    """The smallest `separation_margin_m` of all obstacles [times, candidates]; infinite without any [times, 1]."""
+    infinite_m = np.full((time_s.size, 1), np.inf)
+    margins_m = (separation_margin_m(each, time_s, config) for each in clearances)
+    return functools.reduce(lambda one, other: np.asarray(np.minimum(one, other)), margins_m, infinite_m)
 
 
 def advanced_in_time(obstacle: DynamicObstacle, lead_s: float) -> DynamicObstacle:

@@ -18,7 +18,6 @@ from paani_services.navigator.avoidance.clearance import (
     ESCAPE_GAIN_M,
     least_separation_margin_m,
     margins,
-    predicted_clearance_m,
     required_clearance_m,
     separation_margin_m,
 )
@@ -113,7 +112,7 @@ def _check_margin(
 ) -> MarginCheck:
     """Check the candidates with the margin and drift of one of the `margins` of the settings."""
     dynamic_step = step if evaluation.is_give_way_needed else config
-    dynamic_m = least_separation_margin_m(evaluation.obstacles, evaluation.trajectories, start, dynamic_step)
+    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
     static_m = evaluation.static_clearance_m
     beyond_m = static_m - required_clearance_m(evaluation.trajectories.time_s, static_m[0, 0], step)[:, None]
     static, dynamic = (
@@ -142,7 +141,7 @@ def before_looking(
     """LOOK: of a boat that faces away, all but the pivot to its course with room for hull and half a cell."""
     step = margins(config)[-1]
     dynamic_step = step if evaluation.is_give_way_needed else config
-    dynamic_m = least_separation_margin_m(evaluation.obstacles, evaluation.trajectories, start, dynamic_step)
+    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
     margin_m = np.minimum(evaluation.static_clearance_m - (step.hull_radius_m + step.margin_m), dynamic_m)
     is_unsafe = ((margin_m < 0.0) & evaluation.is_in_horizon).any(axis=0)
     return {**hard, Constraint.LOOK: ~evaluation.is_pivot_to_course | is_unsafe}
@@ -201,13 +200,10 @@ def _escapes_dynamic(evaluation: CandidateEvaluation, start: BoatState, config: 
     escapes = np.ones(evaluation.offsets_rad.size, np.bool_)
     within = evaluation.is_in_horizon[:, 0]
     step = margins(config)[-1] if evaluation.is_give_way_needed else config
-    for obstacle in evaluation.obstacles:
-        margin_m = separation_margin_m(obstacle, evaluation.trajectories, start, step)
+    for clearance in evaluation.dynamic:
+        margin_m = separation_margin_m(clearance, evaluation.trajectories.time_s, step)
         is_clear = ((margin_m >= 0.0) | ~evaluation.is_in_checked_range).all(axis=0)
-        sailing_m, coasting_m = (
-            predicted_clearance_m(obstacle, each.x_m, each.y_m, each.time_s[:, None])[within]
-            for each in (evaluation.trajectories, evaluation.coasting)
-        )
+        sailing_m, coasting_m = clearance.candidates_m[within], clearance.coasting_m[within, None]
         is_left = (sailing_m >= coasting_m - ESCAPE_TOLERANCE_M).all(axis=0)
         escapes &= is_clear | (is_left & (sailing_m[-1] >= coasting_m[-1] + ESCAPE_GAIN_M))
     return escapes

@@ -13,7 +13,7 @@ from paani import portable
 from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani_services.navigator.avoidance.clearance import advanced_in_time, least_separation_margin_m
+from paani_services.navigator.avoidance.clearance import advanced_in_time, least_separation_margin_m, predict_clearance
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 
@@ -64,8 +64,13 @@ def weigh_candidates(
         change_rad = angles_between_rad(evaluation.offsets_rad, wrap_rad(previous.heading_rad - start.yaw_rad))
     disregard = np.clip(1.0 - setpoint.advised_side * evaluation.offsets_rad / ADVISED_TURN_RAD, 0.0, 1.0)
     is_looked_at = travelled_m <= config.look_m
-    leading = [advanced_in_time(obstacle, config.lead_s) for obstacle in evaluation.obstacles]
-    ahead_m = least_separation_margin_m(leading, evaluation.trajectories, start, config)
+    leading = [
+        predict_clearance(
+            advanced_in_time(each, config.lead_s), evaluation.trajectories, evaluation.coasting, start, config
+        )
+        for each in evaluation.obstacles
+    ]
+    ahead_m = least_separation_margin_m(leading, evaluation.trajectories.time_s, config)
     nearest_m = np.where(is_in_horizon, np.minimum(margin_m, ahead_m), np.inf).min(axis=0)
     nearness = np.clip(1.0 - nearest_m / PROXIMITY_RANGE_M, 0.0, 1.0)
     first_m = np.where((margin_m < 0.0) & is_looked_at, travelled_m, np.inf).min(axis=0)

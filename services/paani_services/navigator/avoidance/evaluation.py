@@ -9,10 +9,12 @@ import numpy as np
 from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
 from paani_services.navigator.avoidance.clearance import (
+    DynamicClearance,
     clearance_field_m,
-    interpolate_field,
+    interpolate_fields,
     is_give_way_needed,
-    least_clearance_m,
+    is_within_horizon,
+    predict_clearance,
 )
 from paani_services.navigator.avoidance.rollout import (
     PIVOT_SPEED_FRACTION,
@@ -41,7 +43,8 @@ class CandidateEvaluation(NamedTuple):
     static_clearance_m: to static obstacles; clearance_m: to dynamic ones as well; person_distance_m: to seen people.
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
-    coasting: the trajectory with the thrusters off; coasting_clearance_m: its least clearance within the horizon.
+    dynamic: the clearances to each of the obstacles.
+    coasting_clearance_m: the least within the horizon with the thrusters off.
     """
 
     obstacles: Sequence[DynamicObstacle]
@@ -61,6 +64,7 @@ class CandidateEvaluation(NamedTuple):
     is_unknown: Bools
     tight_clearance_m: float
     is_give_way_needed: bool
+    dynamic: Sequence[DynamicClearance]
     coasting: Trajectories
     coasting_clearance_m: float
 
@@ -80,12 +84,16 @@ def evaluate_candidates(
     """Sample the candidates around the setpoint, roll each out, and look up what it meets."""
     offsets_rad, speeds_mps = sample_candidates(start, setpoint, config)
     trajectories, field_m = roll_out(start, offsets_rad, speeds_mps, config), clearance_field_m(grid, config)
-    static_m = interpolate_field(grid, field_m, trajectories)
+    fields = (field_m, distance_field_m(grid.people), distance_field_m(grid.unknown))
+    static_m, person_m, unknown_m = interpolate_fields(grid, fields, trajectories)
     tight_m = config.hull_radius_m + config.tight_margin_m
-    is_in_horizon = (trajectories.time_s <= config.horizon_s + 1e-9)[:, None]
+    is_in_horizon = is_within_horizon(trajectories, config)[:, None]
     coasting, last = roll_out_coasting(start, trajectories.time_s, config), int(is_in_horizon.sum()) - 1
     at_rest = BoatState(float(coasting.x_m[last, 0]), float(coasting.y_m[last, 0]), start.yaw_rad)
-    coasting_m = least_clearance_m(interpolate_field(grid, field_m, coasting), obstacles, coasting)
+    dynamic = [predict_clearance(each, trajectories, coasting, start, config) for each in obstacles]
+    coasting_m = np.minimum.reduce(
+        [interpolate_fields(grid, (field_m,), coasting)[0][:, 0], *(each.coasting_m for each in dynamic)]
+    )
     deviation_rad = angles_between_rad(offsets_rad, float(offsets_rad[0]))
     is_pivot = speeds_mps == PIVOT_SPEED_FRACTION * speeds_mps[0]
     return CandidateEvaluation(
@@ -101,13 +109,14 @@ def evaluate_candidates(
         is_in_horizon=is_in_horizon,
         is_in_checked_range=is_in_horizon | (trajectories.travelled_m <= config.room_m),
         static_clearance_m=static_m,
-        clearance_m=least_clearance_m(static_m, obstacles, trajectories),
-        person_distance_m=interpolate_field(grid, distance_field_m(grid.people), trajectories),
-        is_unknown=interpolate_field(grid, distance_field_m(grid.unknown), trajectories) < config.hull_radius_m,
+        clearance_m=np.minimum.reduce([static_m, *(each.candidates_m for each in dynamic)]),
+        person_distance_m=person_m,
+        is_unknown=unknown_m < config.hull_radius_m,
         tight_clearance_m=tight_m,
         is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
+        dynamic=dynamic,
         coasting=coasting,
-        coasting_clearance_m=float(np.where(is_in_horizon, coasting_m, np.inf).min()),
+        coasting_clearance_m=float(coasting_m[: last + 1].min()),
     )
 
 

@@ -4,8 +4,9 @@ A constant velocity is fitted to the positions of each track by weighted least s
 not differ significantly from rest is static.
 """
 
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.mapping.observation import BOX_STEPS, OUTLINE_POINTS, Observation, ObstacleBox
+from paani_services.navigator.mapping.observation import BOX_STEPS, MAX_OBSERVATIONS, OUTLINE_POINTS, Observation
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, own_hull_top
 from paani_services.navigator.mapping.occupancy_grid import (
     GRID_CELLS,
@@ -26,9 +27,9 @@ from paani_services.navigator.mapping.projection import (
     pinhole_at,
     pixel_rays,
     ranges_to_water_m,
-    stack_cameras,
 )
 from paani_services.navigator.mapping.velocity_fit import (
+    PlaneVector,
     PositionMeasurement,
     Velocity,
     VelocityEstimate,
@@ -72,6 +73,13 @@ class DynamicObstacle(NamedTuple):
     def is_moving(self) -> bool:
         """Whether it moves for certain; a person who may swim has a standard deviation alone."""
         return any(self.velocity[:2])
+
+
+class MeasuredPicture(NamedTuple):
+    """The measurements of one picture, and by label the number, position and range deviation of each."""
+
+    measurements: Sequence[PositionMeasurement]
+    of_label: Mapping[Label, Sequence[tuple[int, PlaneVector, float]]]
 
 
 def map_water(
@@ -200,83 +208,70 @@ def _associate_measurements(
     Applications to Tracking and Navigation", 2001), among obstacles of one label.
     """
     tracks: list[list[PositionMeasurement]] = []
-    for measurements in _measure_positions(observations, now_us, camera, config):
-        pairs = sorted(
-            (math.dist(track[-1].position_m, measurement.position_m), t, f)
-            for t, track in enumerate(tracks)
-            for f, measurement in enumerate(measurements)
-            if track[-1].label is measurement.label and measurement.time_s - track[-1].time_s <= config.fit_s
-        )
-        taken: set[int] = set()
-        extended: set[int] = set()
-        for distance_m, t, f in pairs:
-            last, measurement = tracks[t][-1], measurements[f]
-            gate_m = (
-                GATE_M
-                + GATE_MPS * (measurement.time_s - last.time_s)
-                + last.range_deviation_m
-                + measurement.range_deviation_m
-            )
-            if t not in extended and f not in taken and distance_m <= gate_m:
-                tracks[t].append(measurement)
-                extended.add(t)
-                taken.add(f)
-        tracks += [[measurement] for f, measurement in enumerate(measurements) if f not in taken]
+    recent: list[int] = []
+    for observation in observations:
+        if not observation.boxes or observation.stamp_us > now_us:
+            continue
+        time_s = (observation.stamp_us - now_us) * 1e-6
+        measured, of_label = _measure_positions(observation, camera, config.mover_range_m)
+        measurements = [PositionMeasurement(time_s, *each[1:]) for each in measured]
+        recent = [t for t in recent if time_s - tracks[t][-1].time_s <= config.fit_s]
+        pairs = []
+        for t in recent:
+            last = tracks[t][-1]
+            last_m, gate_m = last.position_m, GATE_M + GATE_MPS * (time_s - last.time_s) + last.range_deviation_m
+            for f, position_m, deviation_m in of_label.get(last.label, ()):
+                distance_m = math.dist(last_m, position_m)
+                if distance_m <= gate_m + deviation_m:
+                    pairs.append((distance_m, t, f))
+        extended: dict[int, int] = {}  # by measurement
+        for _, t, f in sorted(pairs):
+            if f not in extended and t not in extended.values():
+                extended[f] = t
+        for f, each in enumerate(measurements):
+            if f in extended:
+                tracks[extended[f]].append(each)
+            else:
+                recent.append(len(tracks))
+                tracks.append([each])
     return tracks
 
 
-def _measure_positions(
-    observations: tuple[Observation, ...], now_us: int, camera: Camera, config: PlannerConfig
-) -> Iterator[list[PositionMeasurement]]:
-    """For each picture with boxes, the positions of obstacles whose whole outline is within range."""
-    with_boxes = [observation for observation in observations if observation.boxes and observation.stamp_us <= now_us]
-    if not with_boxes:
-        return
-    camera_models = [
-        pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio) for observation in with_boxes
-    ]
-    camera_model = stack_cameras(
-        [model for observation, model in zip(with_boxes, camera_models, strict=True) for _ in observation.boxes]
-    )
-    boxes = [box for observation in with_boxes for box in observation.boxes]
-    left, right = (np.array(sides)[:, None] for sides in ([box.left for box in boxes], [box.right for box in boxes]))
+@functools.lru_cache(maxsize=MAX_OBSERVATIONS)
+def _measure_positions(observation: Observation, camera: Camera, max_range_m: float) -> MeasuredPicture:
+    """The positions of the obstacles in one picture whose whole outline is within range, as if it were taken now.
+
+    An observation never changes, so each is measured once and cached.
+    """
+    camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
+    left, right = np.array([(box.left, box.right) for box in observation.boxes]).T[:, :, None]
     u = (left + (right - left) * ((np.arange(OUTLINE_POINTS) + 0.5) / OUTLINE_POINTS)) / BOX_STEPS
-    v = np.array([box.waterline for box in boxes]) / BOX_STEPS
+    v = np.array([box.waterline for box in observation.boxes]) / BOX_STEPS
     rays = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
-    range_m = ranges_to_water_m(camera_model, rays, config.mover_range_m)
+    range_m = ranges_to_water_m(camera_model, rays, max_range_m)
     east_m: F64 = camera_model.position_m[0] + range_m * rays.east
     north_m: F64 = camera_model.position_m[1] + range_m * rays.north
-    in_range = set(np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist())
-    row = 0
-    for observation, model in zip(with_boxes, camera_models, strict=True):
-        time_s = (observation.stamp_us - now_us) * 1e-6
-        measured = []
-        for number, box in enumerate(observation.boxes, row):
-            if number in in_range:
-                box_id, outline = (observation.stamp_us, number - row), (east_m[number], north_m[number])
-                measurement = _measure_position(box_id, box, time_s, model, camera.calibration.height_m, outline)
-                ids = observation.box_track_ids
-                measured.append(measurement._replace(track_id=ids[number - row]) if ids else measurement)
-        row += len(observation.boxes)
-        yield measured
+    in_range = np.flatnonzero(np.isfinite(range_m).all(axis=1)).tolist()
+    measured = [
+        _measure_position(observation, k, camera_model, camera.calibration.height_m, (east_m[k], north_m[k]))
+        for k in in_range
+    ]
+    of_label: dict[Label, list[tuple[int, PlaneVector, float]]] = {}
+    for f, each in enumerate(measured):
+        of_label.setdefault(each.label, []).append((f, each.position_m, each.range_deviation_m))
+    return MeasuredPicture(measured, of_label)
 
 
 def _measure_position(
-    box_id: tuple[int, int],
-    box: ObstacleBox,
-    time_s: float,
-    camera_model: PinholeCamera,
-    height_m: float,
-    outline: tuple[F64, F64],
+    observation: Observation, number: int, camera_model: PinholeCamera, height_m: float, outline: tuple[F64, F64]
 ) -> PositionMeasurement:
-    """The position and its covariance, along and across the ray from the camera.
+    """The position of one box and its covariance, along and across the ray from the camera.
 
     One row of the picture is range^2 / height times its angle along the ray; across, much less.
     """
-    camera_m, row_rad = (
-        (float(camera_model.position_m[0]), float(camera_model.position_m[1])),
-        BOX_EDGE_DEVIATION / float(camera_model.focal[1]),
-    )
+    box, box_id = observation.boxes[number], (observation.stamp_us, number)
+    track_id = observation.box_track_ids[number] if observation.box_track_ids else 0
+    camera_m, row_rad = camera_model.position_m[:2], BOX_EDGE_DEVIATION / camera_model.focal[1]
     easts, norths = (axis.tolist() for axis in outline)
     position_m = (sum(easts) / OUTLINE_POINTS, sum(norths) / OUTLINE_POINTS)
     distance_m = max(math.dist(position_m, camera_m), POSITION_DEVIATION_M)
@@ -297,5 +292,5 @@ def _measure_position(
     foot = box.bottom < BOX_STEPS - BORDER_STEPS
     shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)
     return PositionMeasurement(
-        box_id, box.label, time_s, position_m, information_matrix, range_deviation_m, outline, shows_ends
+        0.0, box_id, box.label, position_m, information_matrix, range_deviation_m, outline, shows_ends, track_id
     )

@@ -75,6 +75,7 @@ class ObstacleBox(msgspec.Struct, frozen=True, array_like=True):
 class Observation(
     msgspec.Struct,
     frozen=True,
+    cache_hash=True,
     rename={"stamp_us": "at_us", "aspect_ratio": "aspect", "water_edge": "edge"},
 ):
     """What one picture shows of the water, and the pose it was taken from. Recorded under the names of `rename`.

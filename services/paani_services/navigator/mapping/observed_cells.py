@@ -63,6 +63,28 @@ class ObservedCells(NamedTuple):
     vessels: CellIndices
 
 
+class WaterEdge(NamedTuple):
+    """The water edge of one picture, by columns: where it ends in the picture, the rays there, and how far those are.
+
+    free: the cells of the water before it.
+    """
+
+    camera_model: PinholeCamera
+    u: F64
+    v: F64
+    rays: Rays
+    range_m: F64
+    free: CellIndices
+
+
+class FootPoints(NamedTuple):
+    """Points on the water that one obstacle covers, and those that a person does without the room kept around them."""
+
+    foot: FootLine
+    points: tuple[F64, F64]
+    person_points: tuple[F64, F64] | None
+
+
 @functools.lru_cache(maxsize=CACHED_OBSERVATIONS)
 def project_to_cells(
     observation: Observation,
@@ -78,38 +100,53 @@ def project_to_cells(
     obstacle is taken to be. `moving_boxes` are those of dynamic obstacles, which occupy nothing. Only every
     `column_step`th column frees cells.
     """
-    camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
-    edge = np.frombuffer(observation.water_edge, np.uint8).astype(np.float64) / EDGE_STEPS
-    u = (np.arange(edge.size) + 0.5) / edge.size
-    top = own_hull_top(camera.ego_polygon, u)
-    near_m = ranges_to_water_m(camera_model, pixel_rays(camera_model, u, top), config.max_range_m)
-    ends = pixel_rays(camera_model, u, np.minimum(edge, top))
-    far_m = ranges_to_water_m(camera_model, ends, config.max_range_m)
-    is_water = ends.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # no water is seen higher up
-    open_m = np.where(is_water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
-    open_m[np.arange(edge.size) % column_step > 0] = 0.0
+    edge = _project_water_edge(observation, camera, config, column_step)
+    u, far_m = edge.u, edge.range_m.copy()
     is_moving = np.zeros(u.shape, np.bool_)
     for box in moving_boxes:
-        is_moving |= _is_water_ended_by(box, u, edge)
+        is_moving |= _is_water_ended_by(box, u, edge.v)
     depth_m, is_hull = np.full(u.shape, config.thickness_m), np.zeros(u.shape, np.bool_)
     for box in observation.boxes:
         if box.label is Label.VESSEL and box not in moving_boxes:
-            is_hull[_complete_hull(box, camera_model, u, ends, far_m, depth_m, config)] = True
+            is_hull[_complete_hull(box, edge.camera_model, u, edge.rays, far_m, depth_m, config)] = True
     is_static = np.isfinite(far_m) & ~is_moving
     depth = np.where(is_static, np.ceil(depth_m / CELL_M) + 1.0, 0.0)
-    points = [_points_along_rays(camera_model, ends, far_m, depth)]
-    points += [
-        _foot_points(camera_model, foot, camera, config) for foot in observation.feet if _is_static(foot, moving_boxes)
-    ]
-    free = _points_along_rays(camera_model, ends, near_m, np.ceil(open_m / CELL_M))
-    without_margin = msgspec.structs.replace(config, person_room_m=0.0)
-    people = [
-        _foot_points(camera_model, foot, camera, without_margin)
+    feet = [each for each in _project_feet(observation, camera, config) if _is_static(each.foot, moving_boxes)]
+    points = [_points_along_rays(edge.camera_model, edge.rays, far_m, depth), *(each.points for each in feet)]
+    people = [each.person_points for each in feet if each.person_points is not None]
+    hulls = _points_along_rays(edge.camera_model, edge.rays, far_m, np.where(is_hull, depth, 0.0))
+    return ObservedCells(edge.free, _cells_of_all(points), _cells_of_all(people), _cells_at(*hulls))
+
+
+@functools.lru_cache(maxsize=CACHED_OBSERVATIONS)
+def _project_water_edge(observation: Observation, camera: Camera, config: PlannerConfig, column_step: int) -> WaterEdge:
+    """Project what does not depend on which obstacles move, which changes from picture to picture."""
+    camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
+    v = np.frombuffer(observation.water_edge, np.uint8).astype(np.float64) / EDGE_STEPS
+    u = (np.arange(v.size) + 0.5) / v.size
+    top = own_hull_top(camera.ego_polygon, u)
+    near_m = ranges_to_water_m(camera_model, pixel_rays(camera_model, u, top), config.max_range_m)
+    rays = pixel_rays(camera_model, u, np.minimum(v, top))
+    far_m = ranges_to_water_m(camera_model, rays, config.max_range_m)
+    is_water = rays.descent > -portable.tan(math.radians(config.horizon_slack_deg))  # no water is seen higher up
+    open_m = np.where(is_water, np.minimum(far_m, config.max_range_m), 0.0) - near_m
+    open_m[np.arange(v.size) % column_step > 0] = 0.0
+    free = _points_along_rays(camera_model, rays, near_m, np.ceil(open_m / CELL_M))
+    return WaterEdge(camera_model, u, v, rays, far_m, _cells_at(*free))
+
+
+@functools.lru_cache(maxsize=CACHED_OBSERVATIONS)
+def _project_feet(observation: Observation, camera: Camera, config: PlannerConfig) -> tuple[FootPoints, ...]:
+    camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
+    without_room = msgspec.structs.replace(config, person_room_m=0.0)
+    return tuple(
+        FootPoints(
+            foot,
+            _foot_points(camera_model, foot, camera, config),
+            _foot_points(camera_model, foot, camera, without_room) if foot.is_person else None,
+        )
         for foot in observation.feet
-        if foot.is_person and _is_static(foot, moving_boxes)
-    ]
-    hulls = _points_along_rays(camera_model, ends, far_m, np.where(is_hull, depth, 0.0))
-    return ObservedCells(_cells_at(*free), _cells_of_all(points), _cells_of_all(people), _cells_at(*hulls))
+    )
 
 
 def _complete_hull(

@@ -7,7 +7,6 @@ computes the same bits: there is no reduction whose order could differ.
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,7 @@ from paani import portable
 from paani.arrays import F64
 from paani.config import CalibrationConfig
 
-Number = float | F64
-Vector = tuple[Number, Number, Number]
+Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]  # by rows
 MIN_DESCENT = 1e-6  # tangent below the horizontal; a flatter ray does not meet the water
 
@@ -36,12 +34,12 @@ class PinholeCamera(NamedTuple):
     """A pinhole camera in the map: map-from-camera rotation, position [m], focal lengths and principal point.
 
     Camera axes are outward, right and down. Focal lengths and principal point are fractions of the picture's width and
-    height. For several pictures at once each number is a column (`stack_cameras`).
+    height.
     """
 
     rotation: Matrix
     position_m: Vector
-    focal: tuple[Number, Number]
+    focal: tuple[float, float]
     centre: tuple[float, float]
 
 
@@ -66,25 +64,6 @@ def pinhole_at(pose: Pose, calibration: CalibrationConfig, aspect: float) -> Pin
     return PinholeCamera(rotation, position_m, (focal, focal * aspect), calibration.centre_frac)
 
 
-def stack_cameras(cameras: Sequence[PinholeCamera]) -> PinholeCamera:
-    """The cameras of several pictures as one, with numbers [pictures, 1]; they share one principal point."""
-
-    def column(numbers: Iterable[Number]) -> F64:
-        return np.array(list(numbers))[:, None]
-
-    first, second, third = (
-        (
-            column(camera.rotation[row][0] for camera in cameras),
-            column(camera.rotation[row][1] for camera in cameras),
-            column(camera.rotation[row][2] for camera in cameras),
-        )
-        for row in range(3)
-    )
-    east, north, up = (column(camera.position_m[axis] for camera in cameras) for axis in range(3))
-    focal_x, focal_y = (column(camera.focal[axis] for camera in cameras) for axis in range(2))
-    return PinholeCamera((first, second, third), (east, north, up), (focal_x, focal_y), cameras[0].centre)
-
-
 def rotation_matrix(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
     """The rotation matrix of yaw about z, then pitch about y, then roll about x, by rows."""
     cr, sr = portable.cos(roll_rad), portable.sin(roll_rad)
@@ -100,7 +79,7 @@ def rotation_matrix(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix
 def pixel_rays(camera: PinholeCamera, u: F64, v: F64) -> Rays:
     """The rays r = R K^-1 [u, v, 1] of points of the picture (Q1).
 
-    u, v: fractions of the picture's width and height, [n] or [pictures, n].
+    u, v: fractions of the picture's width and height.
     """
     right = (u - camera.centre[0]) / camera.focal[0]
     down = (v - camera.centre[1]) / camera.focal[1]

@@ -20,14 +20,14 @@ PlaneVector = tuple[float, float]
 class PositionMeasurement(NamedTuple):
     """The position of an obstacle in one picture, east and north [m], with the inverse of its covariance.
 
-    box_id: as in `BoxIds`. time_s: from now, negative. range_deviation_m: standard deviation of its range.
+    time_s: from now, negative. box_id: as in `BoxIds`. range_deviation_m: standard deviation of its range.
     outline: points where it meets the water, from left to right.
     shows_ends: whether the picture shows its left and its right end. track_id: the advisor's track of it; 0: unknown.
     """
 
+    time_s: float
     box_id: tuple[int, int]
     label: Label
-    time_s: float
     position_m: PlaneVector
     information_matrix: SymmetricMatrix
     range_deviation_m: float
