@@ -72,6 +72,8 @@ async def test_the_replayed_file_is_played_by_the_same_controls(
         page = watched.page
         await page.goto(f"http://127.0.0.1:{config.dashboard.port}/#at=4")
         await page.reload()
+        await until(page, "paani.shownUs !== null")
+        assert START_US + 4e6 <= await page.evaluate("paani.shownUs") < START_US + 7e6
         await until(page, f"{play} === 'Pause' && {pose}.startsWith('8.')")
         assert NAME in await page.inner_text("#past-what")
         assert await page.inner_text("#past-live") == "No boat is steered from this page"

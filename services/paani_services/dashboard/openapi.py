@@ -21,6 +21,7 @@ from paani_services.dashboard import (
     recordings,
     requests,
     settings_rows,
+    tiles,
     tuning,
 )
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
@@ -118,6 +119,8 @@ OPERATIONS = (
         recording_routes.RecordingRequest,
         errors=KEEP,
     ),
+    Operation("get", "/api/tiles", "Zoom levels of the chart.", tiles.TileSet, errors=(401, 409)),
+    Operation("get", "/tiles/{zoom}/{column}/{row}", "A tile; 204: none.", BYTES, errors=(401, 404, 409, 500)),
     Operation("get", "/api/logs/{service}", "The last lines of a log.", process_logs.LogLines, errors=(401, 404, 500)),
     Operation("post", "/api/mission", "Another mission and fence.", a.DoneAnswer, MissionBody, errors=(408, *ASK)),
     Operation("get", "/api/tune", "What is tuned.", m.Shadow, errors=(401, 503)),

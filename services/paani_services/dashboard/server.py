@@ -41,6 +41,7 @@ from paani_services.dashboard.requests import (
 )
 from paani_services.dashboard.responses import error_response, json_response
 from paani_services.dashboard.settings_rows import SettingRoutes
+from paani_services.dashboard.tiles import TileRoutes, find_tiles
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, Tuner
 
 MAX_CLIENTS = 16  # pages at once: one more takes the place of the page that has been connected longest
@@ -80,6 +81,7 @@ class Server:
         self._reading = [
             *PastRoutes(hub, history).routes(),
             *LogRoutes(config.bus).routes(),
+            *TileRoutes(config.dashboard.tiles).routes(),
             *SettingRoutes(config, os.environ).routes(),
             *RecordingRoutes(config.recorder.folder, config.dashboard.replayed, gatekeeper.refuse_act).routes(),
         ]
@@ -247,6 +249,9 @@ async def send_all(socket: web.WebSocketResponse, client: Client, may_watch: Cal
 @contextlib.asynccontextmanager
 async def serving(server: Server, config: DashboardConfig, tls: ssl.SSLContext | None) -> AsyncIterator[None]:
     """Listen on the configured host only; tls: None: not encrypted. Raises UserError."""
+    await asyncio.to_thread(
+        find_tiles, config.tiles
+    )  # a mistake in the folder's name is told before anything is served
     runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     assert runner.server is not None

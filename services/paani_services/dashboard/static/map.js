@@ -6,6 +6,7 @@ import { MapControls } from "./map_controls.js";
 import { drawGrid, drawScale } from "./map_ground.js";
 import { MapHeadings } from "./map_headings.js";
 import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
+import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { RouteEditor } from "./route_editor.js";
 import { byId, fixed, headingDeg, setText } from "./text.js";
@@ -23,6 +24,7 @@ export class MapPanel {
     this.fitRoute = false;
     this.controls = new MapControls((factor) => this.zoom(factor), () => { this.fitRoute = true; this.controls.setFollow(false); });
     this.headings = new MapHeadings(this.canvas);
+    this.tiles = new MapTiles();
     this.bindPointer();
     this.editor = new RouteEditor(this);
   }
@@ -74,6 +76,7 @@ export class MapPanel {
     const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
     const toScreen = (/** @type {number} */ x, /** @type {number} */ y) => projection.toScreen(x, y);
     const chart = { ctx, toScreen, turnRad, pxPerM, colour };
+    this.tiles.render(ctx, projection, odometry, colour("--panel"), Number(colour("--tiles")));
     drawGrid(ctx, projection, colour("--line"));
     this.drawGiven(chart, store, mission, route);
     drawTrack(chart, tracks["@truth/pose"], "--text", 1.5, [2, 4]);

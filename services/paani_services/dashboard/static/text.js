@@ -123,6 +123,9 @@ export const EDITOR = {
 export const MAP_TEXTS = {
   up: { north: "North", boat: "Bow" },
   turn: "North or the bow is up",
+  tooFar: "Zoom in to see the chart",
+  noTiles: "No tiles of the chart lie here",
+  damagedTile: "the picture is damaged",
   drawing: "North is up while a mission is drawn",
 };
 
