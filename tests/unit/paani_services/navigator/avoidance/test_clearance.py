@@ -1,0 +1,62 @@
+"""The clearance to a dynamic obstacle, predicted for all candidates, the coasting and the resting boat in one go."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani_services.navigator.avoidance.clearance import (
+    UNSEEN_GROWTH_MPS,
+    predict_clearance,
+    predicted_clearance_m,
+)
+from paani_services.navigator.avoidance.rollout import (
+    BoatState,
+    GuidanceSetpoint,
+    roll_out,
+    roll_out_coasting,
+    sample_candidates,
+)
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.velocity_fit import Velocity
+from tests.synthetic_water import PLANNER
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    place=st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)),
+    velocity=st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(0.0, 0.3)),
+    age_s=st.floats(0.0, 20.0),
+    boat=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-3.1, 3.1), st.floats(0.0, 0.6)),
+)
+def test_one_prediction_holds_for_candidates_and_for_a_boat_that_coasts_or_rests(
+    place: tuple[float, float],
+    velocity: tuple[float, float, float],
+    age_s: float,
+    boat: tuple[float, float, float, float],
+) -> None:
+    """Each is the distance to the nearest outline point where it is then, less its room and its uncertainty."""
+    outline = np.array([[0.0, 0.4, 0.8], [0.0, -0.3, 0.1]]) + np.array(place)[:, None]
+    obstacle = DynamicObstacle(*outline, 0.2, Velocity(*velocity), age_s, frozenset())
+    start = BoatState(*boat)
+    candidates = roll_out(start, *sample_candidates(start, GuidanceSetpoint(0.3, 0.6), PLANNER), PLANNER)
+    coasting = roll_out_coasting(start, candidates.time_s, PLANNER)
+    predicted, time_s = predict_clearance(obstacle, candidates, coasting, start, PLANNER), candidates.time_s[:, None]
+    there_m = outline[:, None, :] + np.array(velocity[:2])[:, None, None] * time_s
+    unsure_m = velocity[2] * (time_s[:, 0] + age_s) + UNSEEN_GROWTH_MPS * age_s
+
+    def clearance_m(x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        gaps_m = np.hypot(x_m[:, None] - there_m[0], y_m[:, None] - there_m[1])
+        return np.asarray(gaps_m.min(axis=1) - 0.2 - unsure_m)
+
+    for number in (0, 7, -1):
+        x_m, y_m = candidates.x_m[:, number], candidates.y_m[:, number]
+        np.testing.assert_allclose(predicted.candidates_m[:, number], clearance_m(x_m, y_m), atol=1e-9)
+    np.testing.assert_allclose(predicted.coasting_m, clearance_m(coasting.x_m[:, 0], coasting.y_m[:, 0]), atol=1e-9)
+    count = int((candidates.time_s <= PLANNER.horizon_s + 1e-9).sum())
+    rests_m = clearance_m(np.full(time_s.size, boat[0]), np.full(time_s.size, boat[1]))[:count]
+    np.testing.assert_allclose(predicted.resting_m[:count], np.minimum.accumulate(rests_m), atol=1e-9)
+    assert (predicted.resting_m[count:] == predicted.resting_m[count - 1]).all()
+    alone_m = predicted_clearance_m(obstacle, candidates.x_m, candidates.y_m, time_s)
+    assert np.array_equal(predicted.candidates_m, alone_m)
