@@ -66,9 +66,11 @@ def weigh_candidates(
     is_looked_at = travelled_m <= config.look_m
     leading = [
         predict_clearance(
-            advanced_in_time(each, config.lead_s), evaluation.trajectories, evaluation.coasting, start, config
+            advanced_in_time(obstacle, config.lead_s), evaluation.trajectories, evaluation.coasting, start, config
         )
-        for each in evaluation.obstacles
+        if obstacle.is_moving
+        else now
+        for obstacle, now in zip(evaluation.obstacles, evaluation.dynamic, strict=True)
     ]
     ahead_m = least_separation_margin_m(leading, evaluation.trajectories.time_s, config)
     nearest_m = np.where(is_in_horizon, np.minimum(margin_m, ahead_m), np.inf).min(axis=0)

@@ -51,6 +51,9 @@ class CellIndices(NamedTuple):
     row: I64
 
 
+NO_CELLS = CellIndices(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
 class ObservedCells(NamedTuple):
     """The cells that one picture shows; a cell may be free and occupied at once.
 
@@ -265,6 +268,8 @@ def _cells_of_all(points: list[tuple[F64, F64]]) -> CellIndices:
 
 def _cells_at(east_m: F64, north_m: F64) -> CellIndices:
     """The cells of points, each once."""
+    if east_m.size == 0:
+        return NO_CELLS
     column, row = (np.floor(axis / CELL_M).astype(np.int64) for axis in (east_m, north_m))
     each_once = np.unique(row * MAP_COLUMNS + column)
     row = (each_once + MAP_COLUMNS // 2) // MAP_COLUMNS
