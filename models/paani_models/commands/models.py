@@ -16,6 +16,7 @@ from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
 from paani_models.commands import prepare as prepare_command
 from paani_models.commands import report as report_command
+from paani_models.commands import temperature as temperature_command
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import list_pictures_without_water
 from paani_models.engines.contract_check import infer_role, inspect_model
@@ -54,6 +55,8 @@ def main(argv: list[str]) -> int:
             if arguments.lars or arguments.mods:
                 return evaluate_command.run_benchmark(arguments)
             return evaluate_command.run(arguments, _select_pictures(arguments))
+        if arguments.command == "temperature":
+            return temperature_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "report":
             return report_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "quantise":
@@ -128,7 +131,11 @@ def _parser() -> argparse.ArgumentParser:
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
     report_command.add_arguments(report)
-    for command in (export, evaluate, report):
+    temperature = commands.add_parser(
+        "temperature", help="how far the mask's confidence is to be trusted, and a better temperature"
+    )
+    temperature_command.add_arguments(temperature)
+    for command in (export, evaluate, report, temperature):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
     variant = commands.add_parser("variant", help="the same nets, taking pictures as bytes: a little faster")
     variant.add_argument("--out", type=Path, required=True, help="folder for nets and manifest")
@@ -145,7 +152,8 @@ def _parser() -> argparse.ArgumentParser:
     quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
     quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
     quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
-    for command in (check, held_out, check_data, pack, train, export, evaluate, report, quantise, convert, bench):
+    measuring = (evaluate, report, temperature, quantise, convert, bench)
+    for command in (check, held_out, check_data, pack, train, export, *measuring):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")

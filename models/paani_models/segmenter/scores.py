@@ -58,7 +58,13 @@ def score_mask_batch(batch: Batch) -> list[ScoredMask]:
 
 
 def open_segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], U8]:
-    """Open a segmenter as a function from an RGB picture and a shape (H, W, ...) to classes uint8 [H,W].
+    """Open a segmenter as a function from an RGB picture and a shape (H, W, ...) to classes uint8 [H,W]."""
+    logits_of = open_logits(net)
+    return lambda picture, shape: label_from_logits(logits_of(picture), shape)
+
+
+def open_logits(net: Path) -> Callable[[NDArray[np.uint8]], F32]:
+    """Open a segmenter as a function from an RGB picture to logits [1,3,h,w] in the order of SEGMENTER_CLASSES.
 
     Size, preprocessing and order of classes are those of the network's contract.
     """
@@ -67,11 +73,11 @@ def open_segmenter(net: Path) -> Callable[[NDArray[np.uint8], tuple[int, ...]], 
     mean, std = (np.array(v, np.float32) for v in (contract.preprocessing.mean, contract.preprocessing.std))
     rows = [contract.classes.index(name) for name in SEGMENTER_CLASSES]
 
-    def segment(picture: NDArray[np.uint8], shape: tuple[int, ...]) -> U8:
+    def logits_of(picture: NDArray[np.uint8]) -> F32:
         scaled = (cv2.resize(picture, size_wh).astype(np.float32) / 255.0 - mean) / std
-        return label_from_logits(run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows], shape)
+        return run(np.ascontiguousarray(scaled.transpose(2, 0, 1)[None]))[:, rows]
 
-    return segment
+    return logits_of
 
 
 def label_from_logits(logits: F32, shape: tuple[int, ...]) -> U8:
