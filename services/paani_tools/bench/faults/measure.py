@@ -14,6 +14,7 @@ from paani_tools.bench.faults.running import MONOTONIC, Loop, Report, until
 SILENCE_S = 0.15  # three of the adapter's reports
 BACK_S = 15.0
 STAYS_S = 1.5
+ANSWER_S = 0.5  # from the end of a hold to a report that the boat is armed
 HISTORY = 20  # reports of the second before
 
 
@@ -21,7 +22,8 @@ class FaultRun(msgspec.Struct, frozen=True, kw_only=True):
     """`zero_s`, `back_s`: seconds to no thrust from the fault's beginning, and to thrust from its end; None: never.
 
     `moved`: there was thrust again while the fault lasted. `rearmed`: there was thrust before a hand armed that had
-    to. `hands`: a hand had to arm. `blind_s`: the longest time without a decision. `problem`: why it says nothing.
+    to. `hands`: a hand had to arm; `back_s` is from the end of its first hold. `blind_s`: the longest time without a
+    decision. `problem`: why it says nothing.
     """
 
     fault: str
@@ -65,8 +67,7 @@ async def measure(fault: Fault, loop: Loop) -> FaultRun:
             unarmed_us = MONOTONIC.now_us()
             await asyncio.sleep(STAYS_S)
             rearmed = _moves_after(loop, unarmed_us)
-            await loop.arm()
-            ended_us = MONOTONIC.now_us()
+            ended_us = await _arm_until_taken(loop)
         await _until(lambda: _moves_after(loop, ended_us), BACK_S)
     reports = watch.reports[first:]
     zero_s = zero_after_s(reports, loop.hit_us, loop.hit_wall_us, adapter_away=fault.hurts_adapter)
@@ -82,6 +83,15 @@ async def measure(fault: Fault, loop: Loop) -> FaultRun:
         hands=hands,
         blind_s=longest_gap_s([loop.hit_us, *decided]),
     )
+
+
+async def _arm_until_taken(loop: Loop) -> int:
+    """When the first hold ended [us, monotonic]; a hand that is refused holds again, for `BACK_S` in all."""
+    await loop.arm()
+    ended_us = MONOTONIC.now_us()
+    while not await _until(lambda: not loop.is_unarmed(), ANSWER_S) and MONOTONIC.now_us() - ended_us < BACK_S * 1e6:
+        await loop.arm()
+    return ended_us
 
 
 def zero_after_s(

@@ -161,3 +161,34 @@ async def test_a_drive_that_is_slow_to_come_back_has_not_armed_itself(monkeypatc
     assert (run.rearmed, run.hands, loop.armings) == (False, False, 0)
     assert run.back_s is not None
     assert run.back_s >= 0.4
+
+
+class RefusingLoop(SlowLoop):
+    """A drive that refuses the first hold and takes the second."""
+
+    async def arm(self) -> None:
+        await super().arm()
+        if self.armings > 1:
+            now_us = MONOTONIC.now_us()
+            self.watch.reports.append(Report(now_us, True, m.ZeroCause.NONE, now_us, now_us))
+
+
+async def test_a_hand_that_is_refused_holds_again_and_the_time_counts_from_its_first_hold(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(measuring, "STAYS_S", 0.0)
+    monkeypatch.setattr(measuring, "ANSWER_S", 0.1)
+    loop = RefusingLoop()
+
+    async def begin(loop: Loop) -> None:
+        loop.mark()
+        now_us = MONOTONIC.now_us()
+        loop.watch.reports.append(Report(now_us, False, m.ZeroCause.NOT_ARMED, now_us, now_us))
+
+    async def end(loop: Loop) -> None:
+        """At once."""
+
+    run = await measure(Fault(name="refused", expected=Expected.HAND, begin=begin, end=end), loop)
+    assert (run.rearmed, run.hands, loop.armings) == (False, True, 2)
+    assert run.back_s is not None
+    assert run.back_s >= 0.1
