@@ -65,10 +65,10 @@ async def test_the_chart_lies_below_the_map(
     column, row = tile_at(LATITUDE_DEG, LONGITUDE_DEG, ZOOM)
     folder = tmp_path / "tiles"
     picture = await asyncio.to_thread(lambda: cv2.imencode(".png", np.full((256, 256, 3), TILE_BGR, np.uint8))[1])
-    for x in range(column - 3, column + 4):
-        path = folder / str(ZOOM) / str(x) / f"{row}.png"
-        await asyncio.to_thread(path.parent.mkdir, parents=True)
-        await asyncio.to_thread(path.write_bytes, picture.tobytes())
+    for tile_column in range(column - 3, column + 4):
+        file = folder / str(ZOOM) / str(tile_column) / f"{row}.png"
+        await asyncio.to_thread(file.parent.mkdir, parents=True)
+        await asyncio.to_thread(file.write_bytes, picture.tobytes())
     await asyncio.to_thread((folder / "attribution.txt").write_text, "chart of nowhere", encoding="utf-8")
     note = "document.querySelector('#map-tiles').textContent"
     origin = f"http://127.0.0.1:{config.dashboard.port}"
