@@ -38,7 +38,7 @@ def test_one_prediction_holds_for_candidates_and_for_a_boat_that_coasts_or_rests
 ) -> None:
     """Each is the distance to the nearest outline point where it is then, less its room and its uncertainty."""
     outline = np.array([[0.0, 0.4, 0.8], [0.0, -0.3, 0.1]]) + np.array(place)[:, None]
-    obstacle = DynamicObstacle(*outline, 0.2, Velocity(*velocity), age_s, frozenset())
+    obstacle = DynamicObstacle(outline[0], outline[1], 0.2, Velocity(*velocity), age_s, frozenset())
     start = BoatState(*boat)
     candidates = roll_out(start, *sample_candidates(start, GuidanceSetpoint(0.3, 0.6), PLANNER), PLANNER)
     coasting = roll_out_coasting(start, candidates.time_s, PLANNER)
