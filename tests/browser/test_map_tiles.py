@@ -47,7 +47,8 @@ async def test_the_tiles_below_a_part_of_the_map(scripts_page: Any) -> None:
     assert corner == pytest.approx([5, 9])
     column, row = tile_at(LATITUDE_DEG, LONGITUDE_DEG, ZOOM)
     by_place = {(x, y): corners for x, y, corners in tiles}
-    (west_m, north_m), (east_m, _), (_, south_m) = by_place[column, row]
+    (west_m, north_m), (east_m, _), (lower_west_m, south_m) = by_place[column, row]
+    assert lower_west_m == pytest.approx(west_m)
     assert west_m <= 0 <= east_m
     assert south_m <= 0 <= north_m
     side_m = 2 * math.pi * 6378137 * math.cos(math.radians(LATITUDE_DEG)) / 2**ZOOM

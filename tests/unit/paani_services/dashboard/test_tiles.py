@@ -32,7 +32,7 @@ def test_a_tile_of_each_kind_is_served(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("suffix", PICTURES)
 def test_what_is_no_picture_is_refused_by_its_name(tmp_path: Path, suffix: str) -> None:
-    for body in (b"", b"<html>not found</html>", PICTURES["jpg" if suffix != "jpg" else "png"]):
+    for body in (b"", b"<html>not found</html>", b"RIFF\x10\0\0\0WAVE", PICTURES["jpg" if suffix != "jpg" else "png"]):
         put(tmp_path, f"3/1/2.{suffix}", body)
         with pytest.raises(TileRefusedError, match=rf"3/1/2\.{suffix} is no {suffix} picture") as refused:
             read_tile(str(tmp_path), 3, 1, 2)
