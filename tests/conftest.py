@@ -26,12 +26,14 @@ from tests.claims_check.table import read_table
 from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
-RESULTS_ALONE = """
-    authority_matrix claims_check cluster docs examples inspect package replay stuck_detection trials
-"""  # what these files wait for: they do not watch the clock
-BESIDE = {f"tests/integration/test_{name}.py" for name in RESULTS_ALONE.split()} | {
-    "tests/browser/test_models_report.py"
-}
+RESULTS_ALONE = {
+    "browser": "exposed_page heading_verdicts legibility map_projection models_report recordings_tab",
+    "integration": """
+        authority_matrix certificates claims_check cluster docs doctor examples inspect package replay stuck_detection
+        trials
+    """,
+}  # by folder, the files that wait for results and do not watch the clock
+BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
