@@ -233,8 +233,9 @@ def _value(info: inspect.Type, rng: random.Random) -> Any:
             return rng.choice([member.value for member in kind])
         case inspect.TupleType(item_types=types):
             return [_value(item, rng) for item in types]
-        case inspect.VarTupleType(item_type=item, max_length=most):
-            return [_value(item, rng) for _ in range(rng.randrange(min(MAX_ITEMS, most or MAX_ITEMS) + 1))]
+        case inspect.VarTupleType(item_type=item, min_length=least, max_length=most):
+            count = rng.randint(least or 0, max(least or 0, min(MAX_ITEMS, most or MAX_ITEMS)))
+            return [_value(item, rng) for _ in range(count)]
     raise TypeError(f"no value of {info}")
 
 
