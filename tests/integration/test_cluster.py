@@ -13,10 +13,16 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 import paani
+from paani.cluster import open_workers
 from paani.errors import UserError
+from paani_models.catalogue import WEIGHTS
+from paani_models.commands.evaluate import score_pair
+from paani_models.datasets import batches
+from paani_models.datasets.selection import PictureSelection
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.run_suite import (
@@ -29,6 +35,7 @@ from paani_sim.trials.run_suite import (
 )
 from paani_sim.trials.trial_cases import TrialCase
 from tests.conftest import find_free_port
+from tests.unit.paani_models.datasets.public_sets import own_data
 
 security = pytest.importorskip("distributed.security")
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
@@ -184,6 +191,18 @@ def test_what_was_ready_is_kept_when_nobody_takes_more(tmp_path: Path) -> None:
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.stdout == "[0, 1, 2] ['0', '1', '2']\n", done.stderr
+
+
+def test_networks_are_scored_on_a_cluster_as_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The evaluation of both networks is that of one process to the last bit, though batches come back in any order."""
+    pictures = PictureSelection(own_data(tmp_path, 6), ["tbiseg_dasha", "mcoe_boats"], None)
+    monkeypatch.setattr(batches, "BATCH_PICTURES", 2)
+    with open_workers("local", 2) as workers:
+        far, near = (score_pair(WEIGHTS, pictures, who) for who in (workers, None))
+    assert far.evaluation.estimates
+    assert msgspec.json.encode(far.evaluation) == msgspec.json.encode(near.evaluation)
+    for one, other in ((far.masks, near.masks), (far.boxes, near.boxes)):
+        assert [each.sample.picture for each in one] == [each.sample.picture for each in other]
 
 
 def test_a_cluster_that_cannot_work_is_told_in_a_line(tmp_path: Path, scheduler: Scheduler) -> None:
