@@ -163,11 +163,3 @@ def test_out_of_a_corner_without_a_way_nothing_escapes() -> None:
     assert {each.speed_mps for each in verdicts} == {0.0}
     assert all(Constraint.NONE not in each.refused_by for each in verdicts)
     assert Constraint.STATIC_OBSTACLE in verdicts[0].refused_by
-
-
-def test_a_boat_before_a_wall_does_not_pivot_away_from_its_course_unasked() -> None:
-    """Only pivots beyond the onward sector are left: it stops, and does not turn its camera away from its way."""
-    before = basin(wall(columns=range(56, 60)))
-    plan, verdicts = explain_motion(before, RESTING, AHEAD, Plan(0.0, 0.6), PLANNER)
-    assert plan.speed_mps == 0.0
-    assert {each.refused_by[-1] for each in verdicts} == {Constraint.STATIC_OBSTACLE, Constraint.TURN}
