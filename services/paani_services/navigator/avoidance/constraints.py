@@ -16,6 +16,7 @@ from paani.geometry import wrap_rad
 from paani.messages import Constraint
 from paani_services.navigator.avoidance.clearance import (
     ESCAPE_GAIN_M,
+    least_separation_margin_m,
     margins,
     required_clearance_m,
     separation_margin_m,
@@ -80,31 +81,52 @@ def hard_constraints(
 
 
 def check_margins(
-    evaluation: CandidateEvaluation, hard: Refusals, setpoint: GuidanceSetpoint, config: PlannerConfig
+    evaluation: CandidateEvaluation,
+    hard: Refusals,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    config: PlannerConfig,
 ) -> MarginCheck:
     """Check the candidates with the largest margin that leaves a feasible one, or else with the smallest.
 
-    The whole margin is always kept to dynamic obstacles. With less than that to static ones no candidate is feasible at
-    full speed. Pivots out of the onward sector are feasible where nothing but a pivot is asked for.
+    The whole margin is kept to dynamic obstacles, unless one would come to a boat at rest: only then is being at rest
+    no better than passing it closely. With less than the whole margin no candidate is feasible at full speed, and
+    pivots out of the onward sector are feasible with the smallest margin alone.
     """
-    static_m, is_checked = evaluation.static_clearance_m, evaluation.is_in_checked_range
-    is_pivot_away = evaluation.is_pivot & ~evaluation.is_onward & (not setpoint.is_pivot_only)
-    dynamic = np.asarray(((evaluation.separation_m < 0.0) & is_checked).any(axis=0))
-
-    def check_margin(step: PlannerConfig) -> MarginCheck:
-        beyond_m = static_m - required_clearance_m(evaluation.trajectories.time_s, static_m[0, 0], step)[:, None]
-        refusals = {
-            **hard,
-            Constraint.STATIC_OBSTACLE: np.asarray(((beyond_m < 0.0) & is_checked).any(axis=0)),
-            Constraint.DYNAMIC_OBSTACLE: dynamic,
-            Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | (evaluation.is_full_speed & (step is not config)),
-            Constraint.TURN: hard[Constraint.TURN] | is_pivot_away,
-        }
-        return MarginCheck(refusals, np.minimum(beyond_m, evaluation.separation_m))
-
     *larger, least = margins(config)
-    checks = (check_margin(step) for step in larger)
-    return next((each for each in checks if not any_refusal(each.refusals).all()), None) or check_margin(least)
+    for step in larger:
+        check = _check_margin(evaluation, hard, start, config, step, may_pivot_away=setpoint.is_pivot_only)
+        if not any_refusal(check.refusals).all():
+            return check
+    return _check_margin(evaluation, hard, start, config, least, may_pivot_away=True)
+
+
+def _check_margin(
+    evaluation: CandidateEvaluation,
+    hard: Refusals,
+    start: BoatState,
+    config: PlannerConfig,
+    step: PlannerConfig,
+    *,
+    may_pivot_away: bool,
+) -> MarginCheck:
+    """Check the candidates with the margin and drift of one of the `margins` of the settings."""
+    dynamic_step = step if evaluation.is_give_way_needed else config
+    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
+    static_m = evaluation.static_clearance_m
+    beyond_m = static_m - required_clearance_m(evaluation.trajectories.time_s, static_m[0, 0], step)[:, None]
+    static, dynamic = (
+        np.asarray(((each_m < 0.0) & evaluation.is_in_checked_range).any(axis=0)) for each_m in (beyond_m, dynamic_m)
+    )
+    is_pivot_away = evaluation.is_pivot & ~evaluation.is_onward
+    refusals = {
+        **hard,
+        Constraint.STATIC_OBSTACLE: static,
+        Constraint.DYNAMIC_OBSTACLE: dynamic,
+        Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | (evaluation.is_full_speed & (step is not config)),
+        Constraint.TURN: hard[Constraint.TURN] | (is_pivot_away & (not may_pivot_away)),
+    }
+    return MarginCheck(refusals, np.minimum(beyond_m, dynamic_m))
 
 
 def while_waiting(evaluation: CandidateEvaluation, hard: Refusals, check: MarginCheck) -> Refusals:
@@ -113,11 +135,14 @@ def while_waiting(evaluation: CandidateEvaluation, hard: Refusals, check: Margin
     return {**hard, Constraint.WAIT: ~evaluation.is_pivot_to_course | is_met}
 
 
-def before_looking(evaluation: CandidateEvaluation, hard: Refusals, config: PlannerConfig) -> Refusals:
+def before_looking(
+    evaluation: CandidateEvaluation, hard: Refusals, start: BoatState, config: PlannerConfig
+) -> Refusals:
     """LOOK: of a boat that faces away, all but the pivot to its course with room for hull and half a cell."""
     step = margins(config)[-1]
-    static_m = evaluation.static_clearance_m - (step.hull_radius_m + step.margin_m)
-    margin_m = np.minimum(static_m, evaluation.separation_m)
+    dynamic_step = step if evaluation.is_give_way_needed else config
+    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
+    margin_m = np.minimum(evaluation.static_clearance_m - (step.hull_radius_m + step.margin_m), dynamic_m)
     is_unsafe = ((margin_m < 0.0) & evaluation.is_in_horizon).any(axis=0)
     return {**hard, Constraint.LOOK: ~evaluation.is_pivot_to_course | is_unsafe}
 
@@ -134,9 +159,11 @@ def has_stopped_facing_away(evaluation: CandidateEvaluation, start: BoatState, p
     return is_pivoting and abs(off_rad) < 0.5 * MIN_PIVOT_RAD
 
 
-def unless_escaping(evaluation: CandidateEvaluation, hard: Refusals, config: PlannerConfig) -> Refusals:
+def unless_escaping(
+    evaluation: CandidateEvaluation, hard: Refusals, start: BoatState, config: PlannerConfig
+) -> Refusals:
     """NO_ESCAPE: of a boat with no margin left, all that leads not away from static and dynamic obstacles."""
-    escapes = _escapes_static(evaluation) & _escapes_dynamic(evaluation, config)
+    escapes = _escapes_static(evaluation) & _escapes_dynamic(evaluation, start, config)
     return {**hard, Constraint.NO_ESCAPE: ~escapes}
 
 
@@ -164,7 +191,7 @@ def _escapes_static(evaluation: CandidateEvaluation) -> Bools:
     return np.asarray((least_m >= now_m - ESCAPE_TOLERANCE_M) & (last_m >= now_m + ESCAPE_GAIN_M))
 
 
-def _escapes_dynamic(evaluation: CandidateEvaluation, config: PlannerConfig) -> Bools:
+def _escapes_dynamic(evaluation: CandidateEvaluation, start: BoatState, config: PlannerConfig) -> Bools:
     """Candidates that, of each dynamic obstacle, keep clear or come hardly nearer and end further away [candidates].
 
     Nearer and further are measured against a coasting boat: an obstacle not seen for long may be anywhere around it,
@@ -172,8 +199,9 @@ def _escapes_dynamic(evaluation: CandidateEvaluation, config: PlannerConfig) -> 
     """
     escapes = np.ones(evaluation.offsets_rad.size, np.bool_)
     within = evaluation.is_in_horizon[:, 0]
+    step = margins(config)[-1] if evaluation.is_give_way_needed else config
     for clearance in evaluation.dynamic:
-        margin_m = separation_margin_m(clearance, evaluation.trajectories.time_s, config)
+        margin_m = separation_margin_m(clearance, evaluation.trajectories.time_s, step)
         is_clear = ((margin_m >= 0.0) | ~evaluation.is_in_checked_range).all(axis=0)
         sailing_m, coasting_m = clearance.candidates_m[within], clearance.coasting_m[within, None]
         is_left = (sailing_m >= coasting_m - ESCAPE_TOLERANCE_M).all(axis=0)

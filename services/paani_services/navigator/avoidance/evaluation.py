@@ -14,7 +14,6 @@ from paani_services.navigator.avoidance.clearance import (
     interpolate_fields,
     is_give_way_needed,
     is_within_horizon,
-    least_separation_margin_m,
     predict_clearance,
 )
 from paani_services.navigator.avoidance.rollout import (
@@ -44,7 +43,7 @@ class CandidateEvaluation(NamedTuple):
     static_clearance_m: to static obstacles; clearance_m: to dynamic ones as well; person_distance_m: to seen people.
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
-    dynamic: the clearances to each of the obstacles; separation_m: to the nearest, beyond the required one.
+    dynamic: the clearances to each of the obstacles.
     coasting_clearance_m: the least within the horizon with the thrusters off.
     """
 
@@ -66,7 +65,6 @@ class CandidateEvaluation(NamedTuple):
     tight_clearance_m: float
     is_give_way_needed: bool
     dynamic: Sequence[DynamicClearance]
-    separation_m: F64
     coasting: Trajectories
     coasting_clearance_m: float
 
@@ -117,7 +115,6 @@ def evaluate_candidates(
         tight_clearance_m=tight_m,
         is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
         dynamic=dynamic,
-        separation_m=least_separation_margin_m(dynamic, trajectories.time_s, config),
         coasting=coasting,
         coasting_clearance_m=float(coasting_m[: last + 1].min()),
     )

@@ -96,7 +96,7 @@ def judge_candidates(
     obstacles = [each for each in tracked if each.age_s <= config.unseen_s and (may_wait or each.is_moving)]
     evaluation = evaluate_candidates(grid, start, setpoint, obstacles, config)
     hard = hard_constraints(evaluation, start, setpoint, config)
-    check = check_margins(evaluation, hard, setpoint, config)
+    check = check_margins(evaluation, hard, start, setpoint, config)
     costs = weigh_candidates(evaluation, check.margin_m, start, setpoint, previous, config)
     is_waiting = may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
     if is_waiting:
@@ -124,7 +124,7 @@ def _situations(
 ) -> Iterator[Refusals]:
     """What is refused in each situation of a boat that does not wait, the first that applies first."""
     if has_stopped_facing_away(evaluation, start, previous):
-        yield before_looking(evaluation, hard, config)
+        yield before_looking(evaluation, hard, start, config)
     yield check.refusals
-    yield unless_escaping(evaluation, hard, config)
+    yield unless_escaping(evaluation, hard, start, config)
     yield unless_clearer_than_coasting(evaluation, hard)
