@@ -26,6 +26,7 @@ from tests.synthetic_water import (
     EYE,
     PLANNER,
     START_US,
+    detection_of,
     observe_from,
     water_edge_of,
 )
@@ -248,3 +249,12 @@ def test_velocities_are_reproduced_bit_by_bit() -> None:
     first, second = (moving(each, at_us) for each in (memory, again))
     assert first[0].velocity == second[0].velocity
     assert (first[0].east_m == second[0].east_m).all()
+
+
+def test_two_that_were_seen_as_one_are_two_obstacles() -> None:
+    """A track takes one measurement of each picture; the other begins a track of its own."""
+    one, other = (detection_of((4.9, y_m, 5.1, y_m + 0.3), 0.4) for y_m in (-0.4, 0.2))
+    memory = observe_from(at_us=START_US, detections=(one,))
+    for number in (1, 2, 3):
+        memory = observe_from(at_us=START_US + 200_000 * number, memory=memory, detections=(one, other))
+    assert len(find_dynamic_obstacles(memory.observations, START_US + 600_000, CAMERA, PLANNER)) == 2
