@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.navigator.avoidance.rollout import Trajectories
+from paani_services.navigator.avoidance.planner import judge_candidates
+from paani_services.navigator.avoidance.rollout import BoatState, Plan, Trajectories
+from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
@@ -132,3 +136,12 @@ def static_distances_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.nd
     x_m, y_m = grid.west_m + CELL_M * (columns + 0.5), grid.south_m + CELL_M * (rows + 0.5)
     gaps_m: np.ndarray = np.hypot(trajectories.x_m - x_m, trajectories.y_m - y_m).min(axis=1, initial=np.inf)
     return gaps_m
+
+
+def explain_motion(
+    grid: OccupancyGrid, start: BoatState, *inputs: Any, **options: Any
+) -> tuple[Plan, tuple[m.HeadingVerdict, ...]]:
+    """The plan that `plan_motion` makes of the same, and its verdict on each heading, the desired course first."""
+    judged = judge_candidates(grid, start, *inputs, **options)
+    assert judged is not None
+    return judged.cheapest_plan(start), tell_headings(judged, start)

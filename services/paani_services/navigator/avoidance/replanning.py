@@ -12,9 +12,9 @@ from paani.geometry import wrap_rad
 from paani.messages import Evidence, HeadingVerdict, Odometry, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
-from paani_services.navigator.avoidance.planner import plan_motion
+from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.avoidance.verdicts import explain_motion
+from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
@@ -134,10 +134,12 @@ def explain_plan(
         return ()
     grid, obstacles = _map_fenced_water(state.memory, request, state.planned_us, camera, config, fence)
     setpoint = GuidanceSetpoint(state.course_rad, request.speed_mps, state.advised_side, request.is_pivot_only)
-    plan, verdicts = explain_motion(
+    judged = judge_candidates(
         grid, request.start, setpoint, request.previous, config, obstacles, may_wait=request.may_wait
     )
-    return verdicts if plan == state.plan else ()
+    if judged is None or judged.cheapest_plan(request.start) != state.plan:
+        return ()
+    return tell_headings(judged, request.start)
 
 
 def _map_fenced_water(

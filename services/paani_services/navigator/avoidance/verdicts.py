@@ -1,41 +1,22 @@
 """Why the local planner took or refused each heading, for people. Pure; it decides nothing."""
 
-from collections.abc import Sequence
-
 import msgspec
 import numpy as np
 
-from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingCosts, HeadingVerdict
 from paani_services.navigator.avoidance.constraints import any_refusal
-from paani_services.navigator.avoidance.planner import JudgedCandidates, judge_candidates
-from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
+from paani_services.navigator.avoidance.planner import JudgedCandidates
+from paani_services.navigator.avoidance.rollout import BoatState
 
 COST_DIGITS = 3  # of a cost that is told: a thousandth of a quarter turn
 
 
-def explain_motion(
-    grid: OccupancyGrid,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    previous: Plan | None,
-    config: PlannerConfig,
-    tracked: Sequence[DynamicObstacle] = (),
-    *,
-    may_wait: bool = True,
-) -> tuple[Plan, tuple[HeadingVerdict, ...]]:
-    """The plan that `plan_motion` makes of the same, and its verdict on each heading, the desired course first."""
-    judged = judge_candidates(grid, start, setpoint, previous, config, tracked, may_wait=may_wait)
-    if judged is None:
-        return Plan(start.yaw_rad, 0.0), ()
-    return judged.cheapest_plan(start), _tell_headings(judged, start)
+def tell_headings(judged: JudgedCandidates, start: BoatState) -> tuple[HeadingVerdict, ...]:
+    """Of each heading, what refuses it at each speed, and the costs of the cheapest speed that nothing refuses.
 
-
-def _tell_headings(judged: JudgedCandidates, start: BoatState) -> tuple[HeadingVerdict, ...]:
-    """Of each heading, what refuses it at each speed, and the costs of the cheapest speed that nothing refuses."""
+    The desired course comes first. start: of the candidates.
+    """
     evaluation, refusals, costs, _ = judged
     names = [each for each in Constraint if each in refusals]
     masks = np.stack([refusals[each] for each in names])

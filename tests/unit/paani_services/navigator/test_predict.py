@@ -13,13 +13,12 @@ from paani.motion_planning import HeadingSpeed
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan, observe, replan
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.avoidance.verdicts import explain_motion
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.navigate import NavigatorState
 from paani_services.navigator.predict import predict
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, CONFIG, PLANNER, evidence, odometry
+from tests.synthetic_water import AT_REST, CAMERA, CONFIG, PLANNER, evidence, explain_motion, odometry
 from tests.unit.paani_services.navigator.mapping.test_track_identity import person_of, watch
 
 NAVIGATOR = replace(CONFIG.navigator, planner=PLANNER)

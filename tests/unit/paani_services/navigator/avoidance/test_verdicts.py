@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingVerdict
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.avoidance.verdicts import explain_motion
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
 from paani_services.navigator.mapping.velocity_fit import Velocity
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, observe_from, water_edge_of
+from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, explain_motion, observe_from, water_edge_of
 
 CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
 AHEAD = GuidanceSetpoint(0.0, 0.6)
