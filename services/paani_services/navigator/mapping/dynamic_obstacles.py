@@ -6,9 +6,10 @@ not differ significantly from rest is static.
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from paani.arrays import F64
@@ -29,11 +30,11 @@ from paani_services.navigator.mapping.projection import (
     ranges_to_water_m,
 )
 from paani_services.navigator.mapping.velocity_fit import (
-    PlaneVector,
     PositionMeasurement,
     Velocity,
     VelocityEstimate,
     estimate_velocity,
+    first_since,
     fit_velocity,
     velocity_if_significant,
 )
@@ -50,6 +51,7 @@ MAX_DRIFT_MPS = 0.3  # vessels adrift are slower than this
 MIN_DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
 MIN_UNSEEN_S = 1.0  # five pictures
 GATE_M, GATE_MPS = 0.5, 1.2  # validation gate between two measurements: an obstacle's size, and its highest speed
+CACHED_PAIRS = 4 * MAX_OBSERVATIONS  # of pictures: a track goes on in the next picture, or a few later
 BORDER_STEPS = 4  # a box that comes this near to the picture's sides [1/512] may go on beyond
 
 
@@ -75,11 +77,11 @@ class DynamicObstacle(NamedTuple):
         return any(self.velocity[:2])
 
 
-class MeasuredPicture(NamedTuple):
-    """The measurements of one picture, and by label the number, position and range deviation of each."""
+class MeasuredPicture(msgspec.Struct, frozen=True, eq=False):
+    """The measurements of one picture. Each is made once, so it is equal to itself alone."""
 
+    stamp_us: int
     measurements: Sequence[PositionMeasurement]
-    of_label: Mapping[Label, Sequence[tuple[int, PlaneVector, float]]]
 
 
 def map_water(
@@ -111,17 +113,19 @@ def find_dynamic_obstacles(
         if velocity is None and track[-1].label is Label.VESSEL:
             velocity, last = _estimate_drift(track, complete), track[-1]
         if velocity is None:
-            if track[-1].label is Label.PERSON and len(track) > 1 and -track[-1].time_s <= config.occupied_s:
-                found.append(_possible_swimmer(track, config))
+            age_s = (now_us - track[-1].stamp_us) * 1e-6
+            if track[-1].label is Label.PERSON and len(track) > 1 and age_s <= config.occupied_s:
+                found.append(_possible_swimmer(track, age_s, config))
             continue
+        age_s, left = (now_us - last.stamp_us) * 1e-6, track[: first_since(track, round(config.free_s * 1e6))]
         found.append(
             DynamicObstacle(
-                last.outline[0] - last.time_s * velocity.east_mps,
-                last.outline[1] - last.time_s * velocity.north_mps,
+                last.outline[0] + age_s * velocity.east_mps,
+                last.outline[1] + age_s * velocity.north_mps,
                 config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
                 velocity,
-                -last.time_s,
-                frozenset(each.box_id for each in track if each.time_s < track[-1].time_s - config.free_s),
+                age_s,
+                frozenset(each.box_id for each in left),
                 _latest_track_id(track),
                 last.label,
             )
@@ -134,9 +138,9 @@ def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMea
 
     It is that of its middle, or of the more certain end where too few pictures show the vessel whole.
     """
-    estimate = _fit_recent(complete, track[-1].time_s)
+    estimate = _fit_recent(complete, track[-1].stamp_us)
     if estimate is None:
-        ends = [_fit_recent(_measurements_of_end(track, end), track[-1].time_s) for end in (0, 1)]
+        ends = [_fit_recent(_measurements_of_end(track, end), track[-1].stamp_us) for end in (0, 1)]
         estimate = max((end for end in ends if end is not None), key=lambda end: end.squared_significance, default=None)
     velocity = velocity_if_significant(estimate)
     if velocity is None or math.hypot(*velocity[:2]) > MAX_DRIFT_MPS:
@@ -144,9 +148,9 @@ def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMea
     return velocity._replace(deviation_mps=max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS))
 
 
-def _fit_recent(measurements: list[PositionMeasurement], last_s: float) -> VelocityEstimate | None:
+def _fit_recent(measurements: list[PositionMeasurement], last_us: int) -> VelocityEstimate | None:
     """The velocity over `DRIFT_FIT_S`, if the newest measurement is that recent."""
-    if not measurements or last_s - measurements[-1].time_s > DRIFT_FIT_S:
+    if not measurements or (last_us - measurements[-1].stamp_us) * 1e-6 > DRIFT_FIT_S:
         return None
     return fit_velocity(measurements, DRIFT_FIT_S)
 
@@ -160,7 +164,7 @@ def _measurements_of_end(track: list[PositionMeasurement], end: int) -> list[Pos
     ]
 
 
-def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -> DynamicObstacle:
+def _possible_swimmer(track: list[PositionMeasurement], age_s: float, config: PlannerConfig) -> DynamicObstacle:
     """A person seen more than once, who may stand, or swim in any direction.
 
     The speed is as high as the measurements do not rule out, those cut by the picture's sides included. The cells where
@@ -174,7 +178,7 @@ def _possible_swimmer(track: list[PositionMeasurement], config: PlannerConfig) -
         *last.outline,
         config.person_near_m,
         Velocity(0.0, 0.0, fastest_mps),
-        -last.time_s,
+        age_s,
         frozenset(),
         _latest_track_id(track),
         Label.PERSON,
@@ -208,38 +212,49 @@ def _associate_measurements(
     Applications to Tracking and Navigation", 2001), among obstacles of one label.
     """
     tracks: list[list[PositionMeasurement]] = []
-    recent: list[int] = []
+    recent: dict[int, tuple[MeasuredPicture, int]] = {}  # by track: where its newest measurement is
     for observation in observations:
         if not observation.boxes or observation.stamp_us > now_us:
             continue
-        time_s = (observation.stamp_us - now_us) * 1e-6
-        measured, of_label = _measure_positions(observation, camera, config.mover_range_m)
-        measurements = [PositionMeasurement(time_s, *each[1:]) for each in measured]
-        recent = [t for t in recent if time_s - tracks[t][-1].time_s <= config.fit_s]
-        pairs = []
-        for t in recent:
-            last = tracks[t][-1]
-            last_m, gate_m = last.position_m, GATE_M + GATE_MPS * (time_s - last.time_s) + last.range_deviation_m
-            for f, position_m, deviation_m in of_label.get(last.label, ()):
-                distance_m = math.dist(last_m, position_m)
-                if distance_m <= gate_m + deviation_m:
-                    pairs.append((distance_m, t, f))
+        picture = _measure_positions(observation, camera, config.mover_range_m)
+        recent = {t: last for t, last in recent.items() if (picture.stamp_us - last[0].stamp_us) * 1e-6 <= config.fit_s}
+        pairs = [
+            (distance_m, t, f)
+            for t, (last, number) in recent.items()
+            for distance_m, f in _find_matches(last, picture)[number]
+        ]
         extended: dict[int, int] = {}  # by measurement
         for _, t, f in sorted(pairs):
             if f not in extended and t not in extended.values():
                 extended[f] = t
-        for f, each in enumerate(measurements):
-            if f in extended:
-                tracks[extended[f]].append(each)
-            else:
-                recent.append(len(tracks))
-                tracks.append([each])
+        for f, each in enumerate(picture.measurements):
+            t = extended.get(f, len(tracks))
+            if t == len(tracks):
+                tracks.append([])
+            tracks[t].append(each)
+            recent[t] = (picture, f)
     return tracks
+
+
+@functools.lru_cache(maxsize=CACHED_PAIRS)
+def _find_matches(before: MeasuredPicture, after: MeasuredPicture) -> Sequence[Sequence[tuple[float, int]]]:
+    """For each measurement of one picture, the distance and number of those of a later one within its gate."""
+    within_m = GATE_M + GATE_MPS * ((after.stamp_us - before.stamp_us) * 1e-6)
+    return [
+        [
+            (distance_m, f)
+            for f, each in enumerate(after.measurements)
+            if each.label is last.label
+            and (distance_m := math.dist(last.position_m, each.position_m))
+            <= within_m + last.range_deviation_m + each.range_deviation_m
+        ]
+        for last in before.measurements
+    ]
 
 
 @functools.lru_cache(maxsize=MAX_OBSERVATIONS)
 def _measure_positions(observation: Observation, camera: Camera, max_range_m: float) -> MeasuredPicture:
-    """The positions of the obstacles in one picture whose whole outline is within range, as if it were taken now.
+    """The positions of the obstacles in one picture whose whole outline is within range.
 
     An observation never changes, so each is measured once and cached.
     """
@@ -256,10 +271,7 @@ def _measure_positions(observation: Observation, camera: Camera, max_range_m: fl
         _measure_position(observation, k, camera_model, camera.calibration.height_m, (east_m[k], north_m[k]))
         for k in in_range
     ]
-    of_label: dict[Label, list[tuple[int, PlaneVector, float]]] = {}
-    for f, each in enumerate(measured):
-        of_label.setdefault(each.label, []).append((f, each.position_m, each.range_deviation_m))
-    return MeasuredPicture(measured, of_label)
+    return MeasuredPicture(observation.stamp_us, measured)
 
 
 def _measure_position(
@@ -292,5 +304,5 @@ def _measure_position(
     foot = box.bottom < BOX_STEPS - BORDER_STEPS
     shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)
     return PositionMeasurement(
-        0.0, box_id, box.label, position_m, information_matrix, range_deviation_m, outline, shows_ends, track_id
+        box_id, box.label, position_m, information_matrix, range_deviation_m, outline, shows_ends, track_id
     )

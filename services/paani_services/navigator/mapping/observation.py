@@ -347,6 +347,7 @@ def _prune_observations(observations: tuple[Observation, ...], config: PlannerCo
             kept.append(observation)
             old_us = last_us = observation.stamp_us
         elif age_s <= config.fit_s + config.unseen_s and observation.boxes and is_apart:
-            kept.append(msgspec.structs.replace(observation, water_edge=b"", feet=()))
+            is_bare = not observation.water_edge and not observation.feet  # the same object stays: its hash is kept
+            kept.append(observation if is_bare else msgspec.structs.replace(observation, water_edge=b"", feet=()))
             last_us = observation.stamp_us
     return tuple(kept[-MAX_OBSERVATIONS:])

@@ -1,5 +1,6 @@
 """Weighted least-squares fit of a constant velocity to the measured positions of one obstacle. Pure."""
 
+import bisect
 import math
 from typing import NamedTuple
 
@@ -20,12 +21,11 @@ PlaneVector = tuple[float, float]
 class PositionMeasurement(NamedTuple):
     """The position of an obstacle in one picture, east and north [m], with the inverse of its covariance.
 
-    time_s: from now, negative. box_id: as in `BoxIds`. range_deviation_m: standard deviation of its range.
+    box_id: as in `BoxIds`. range_deviation_m: standard deviation of its range.
     outline: points where it meets the water, from left to right.
     shows_ends: whether the picture shows its left and its right end. track_id: the advisor's track of it; 0: unknown.
     """
 
-    time_s: float
     box_id: tuple[int, int]
     label: Label
     position_m: PlaneVector
@@ -36,9 +36,14 @@ class PositionMeasurement(NamedTuple):
     track_id: int = 0
 
     @property
+    def stamp_us(self) -> int:
+        """When the picture was taken."""
+        return self.box_id[0]
+
+    @property
     def is_whole(self) -> bool:
         """Whether the picture's sides do not cut it."""
-        return all(self.shows_ends)
+        return self.shows_ends == (True, True)
 
 
 class Velocity(NamedTuple):
@@ -88,15 +93,15 @@ def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Veloc
     and (S - T W^-1 T) v = b - T W^-1 a. A prior of zero mean draws the velocity towards rest. Information is scaled
     down for pictures that follow fast, whose errors are the same, and by the reduced chi-squared of the residuals.
     """
-    measurements = [each for each in measurements if measurements[-1].time_s - each.time_s <= fit_s]
-    span_s = measurements[-1].time_s - measurements[0].time_s if measurements else 0.0
+    measurements = measurements[first_since(measurements, round(fit_s * 1e6)) :]
+    span_s = (measurements[-1].stamp_us - measurements[0].stamp_us) * 1e-6 if measurements else 0.0
     if len(measurements) < MIN_MEASUREMENTS or span_s < MIN_SPAN_S:
         return None
     weight_sum = time_sum = square_sum = (0.0, 0.0, 0.0)
     position_sum = moment_sum = (0.0, 0.0)
     first = measurements[0]
     for each in measurements:
-        t_s = each.time_s - first.time_s
+        t_s = (each.stamp_us - first.stamp_us) * 1e-6
         offset_m = (each.position_m[0] - first.position_m[0], each.position_m[1] - first.position_m[1])
         weighted = _multiply(each.information_matrix, offset_m)
         weight_sum = _add_scaled(weight_sum, 1.0, each.information_matrix)
@@ -120,6 +125,13 @@ def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Veloc
     )
 
 
+def first_since(measurements: list[PositionMeasurement], span_us: int) -> int:
+    """The number of the first measurement that is no more than this older than the last; 0 without any."""
+    if not measurements:
+        return 0
+    return bisect.bisect_left(measurements, measurements[-1].stamp_us - span_us, key=lambda each: each.stamp_us)
+
+
 def _reduced_chi_squared(
     measurements: list[PositionMeasurement],
     velocity: PlaneVector,
@@ -135,7 +147,7 @@ def _reduced_chi_squared(
     start = _multiply(inverse, (position_sum[0] - moved[0], position_sum[1] - moved[1]))
     total, first = 0.0, measurements[0]
     for each in measurements:
-        t_s = each.time_s - first.time_s
+        t_s = (each.stamp_us - first.stamp_us) * 1e-6
         residual_m = (
             each.position_m[0] - first.position_m[0] - start[0] - t_s * velocity[0],
             each.position_m[1] - first.position_m[1] - start[1] - t_s * velocity[1],
