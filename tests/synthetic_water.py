@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from paani import messages as m
-from paani.config import calibration_of, load_config
-from paani_services.navigator.avoidance.planner import judge_candidates
-from paani_services.navigator.avoidance.rollout import BoatState, Plan, Trajectories
+from paani.config import PlannerConfig, calibration_of, load_config
+from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
+from paani_services.navigator.avoidance.request import PlanRequest
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan, Trajectories
 from paani_services.navigator.avoidance.verdicts import tell_headings
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
@@ -138,10 +141,35 @@ def static_distances_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.nd
     return gaps_m
 
 
-def explain_motion(
-    grid: OccupancyGrid, start: BoatState, *inputs: Any, **options: Any
-) -> tuple[Plan, tuple[m.HeadingVerdict, ...]]:
-    """The plan that `plan_motion` makes of the same, and its verdict on each heading, the desired course first."""
-    judged = judge_candidates(grid, start, *inputs, **options)
+def request_on(
+    grid: OccupancyGrid,
+    start: BoatState,
+    setpoint: GuidanceSetpoint,
+    previous: Plan | None = None,
+    config: PlannerConfig = PLANNER,
+    obstacles: Sequence[DynamicObstacle] = (),
+    *,
+    may_wait: bool = True,
+) -> PlanRequest:
+    """What the planner is asked on this water."""
+    return PlanRequest(
+        grid=grid,
+        start=start,
+        setpoint=setpoint,
+        config=config,
+        obstacles=obstacles,
+        previous=previous,
+        may_wait=may_wait,
+    )
+
+
+def plan_on(*water: Any, **options: Any) -> Plan:
+    """The plan for what `request_on` makes of the same."""
+    return plan_motion(request_on(*water, **options))
+
+
+def explain_motion(*water: Any, **options: Any) -> tuple[Plan, tuple[m.HeadingVerdict, ...]]:
+    """The plan that `plan_on` makes of the same, and its verdict on each heading, the desired course first."""
+    judged = judge_candidates(request_on(*water, **options))
     assert judged is not None
-    return judged.cheapest_plan(start), tell_headings(judged, start)
+    return judged.cheapest_plan(), tell_headings(judged)

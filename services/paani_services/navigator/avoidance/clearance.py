@@ -4,7 +4,6 @@ Static clearance is read from a signed distance field of the grid. A dynamic obs
 velocity and grows with the uncertainty of that velocity.
 """
 
-import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -29,10 +28,11 @@ ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 
 class DynamicClearance(NamedTuple):
-    """Clearance to the predicted outline of one dynamic obstacle.
+    """Clearance to the predicted outline of each dynamic obstacle.
 
-    candidates_m: along each candidate [times, candidates]. coasting_m: of the boat with its thrusters off [times].
-    resting_m: the smallest so far, within the horizon, of a boat that stays where it is [times].
+    candidates_m: along each candidate [obstacles, times, candidates]. coasting_m: of the boat with its thrusters off
+    [obstacles, times]. resting_m: the smallest so far, within the horizon, of a boat that stays where it is [obstacles,
+    times].
     """
 
     candidates_m: F64
@@ -93,16 +93,15 @@ def predicted_clearance_m(obstacle: DynamicObstacle, x_m: F64, y_m: F64, time_s:
     return np.asarray(np.sqrt(square) - obstacle.standoff_m - position_deviation_m(obstacle, time_s))
 
 
-def predict_clearance(
-    obstacle: DynamicObstacle, candidates: Trajectories, coasting: Trajectories, start: BoatState, config: PlannerConfig
+def predict_clearances(
+    obstacles: Sequence[DynamicObstacle], paths: Trajectories, config: PlannerConfig
 ) -> DynamicClearance:
-    """The clearance of all candidates, of the coasting boat and of the resting one to an obstacle, in one go."""
-    rests = np.ones((candidates.time_s.size, 1))
-    x_m = np.hstack([candidates.x_m, coasting.x_m, start.x_m * rests])
-    y_m = np.hstack([candidates.y_m, coasting.y_m, start.y_m * rests])
-    clearance_m = predicted_clearance_m(obstacle, x_m, y_m, candidates.time_s[:, None])
-    resting_m = np.where(is_within_horizon(candidates, config), clearance_m[:, -1], np.inf)
-    return DynamicClearance(clearance_m[:, :-2], clearance_m[:, -2], np.minimum.accumulate(resting_m))
+    """The clearances to the obstacles along paths of which the last two are a boat's that coasts, and that rests."""
+    clearance_m = np.empty((len(obstacles), *paths.x_m.shape))
+    for row_m, obstacle in zip(clearance_m, obstacles, strict=True):
+        row_m[:] = predicted_clearance_m(obstacle, paths.x_m, paths.y_m, paths.time_s[:, None])
+    resting_m = np.where(is_within_horizon(paths, config), clearance_m[:, :, -1], np.inf)
+    return DynamicClearance(clearance_m[:, :, :-2], clearance_m[:, :, -2], np.minimum.accumulate(resting_m, axis=1))
 
 
 def is_within_horizon(trajectories: Trajectories, config: PlannerConfig) -> Bools:
@@ -138,20 +137,18 @@ def margins(config: PlannerConfig) -> list[PlannerConfig]:
 
 
 def separation_margin_m(clearance: DynamicClearance, time_s: F64, config: PlannerConfig) -> F64:
-    """Clearance to a dynamic obstacle beyond the required one [times, candidates]; negative where it is too near.
+    """Clearance to each dynamic obstacle beyond the required one, negative where it is too near, as `candidates_m`.
 
     An obstacle that comes near a boat at rest may come as near on the trajectory, but no nearer, and no trajectory may
     enter the room kept around it.
     """
     required_m = np.maximum(required_clearance_m(time_s, clearance.resting_m, config), 0.0)
-    return np.asarray(clearance.candidates_m - required_m[:, None])
+    return np.asarray(clearance.candidates_m - required_m[:, :, None])
 
 
-def least_separation_margin_m(clearances: Sequence[DynamicClearance], time_s: F64, config: PlannerConfig) -> F64:
-    """The smallest `separation_margin_m` of all obstacles [times, candidates]; infinite without any [times, 1]."""
-    infinite_m = np.full((time_s.size, 1), np.inf)
-    margins_m = (separation_margin_m(each, time_s, config) for each in clearances)
-    return functools.reduce(lambda one, other: np.asarray(np.minimum(one, other)), margins_m, infinite_m)
+def least_of_obstacles_m(each_m: F64) -> F64:
+    """The smallest of all obstacles [obstacles, ...]; infinite without any."""
+    return np.asarray(each_m.min(axis=0, initial=np.inf))
 
 
 def advanced_in_time(obstacle: DynamicObstacle, lead_s: float) -> DynamicObstacle:

@@ -16,18 +16,14 @@ from paani.geometry import wrap_rad
 from paani.messages import Constraint
 from paani_services.navigator.avoidance.clearance import (
     ESCAPE_GAIN_M,
-    least_separation_margin_m,
+    least_of_obstacles_m,
     margins,
     required_clearance_m,
-    separation_margin_m,
 )
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
 from paani_services.navigator.avoidance.rollout import (
     PIVOT_SPEED_FRACTION,
     RESIDUAL_DRIFT_MPS,
-    BoatState,
-    GuidanceSetpoint,
-    Plan,
 )
 
 ESCAPE_TOLERANCE_M = 0.2  # clearance that a way out may lose before it gains [m]: the advance of a boat while it turns
@@ -50,9 +46,7 @@ def any_refusal(refusals: Refusals) -> Bools:
     return np.asarray(np.logical_or.reduce(list(refusals.values())))
 
 
-def hard_constraints(
-    evaluation: CandidateEvaluation, start: BoatState, setpoint: GuidanceSetpoint, config: PlannerConfig
-) -> Refusals:
+def hard_constraints(evaluation: CandidateEvaluation) -> Refusals:
     """Refusals that no smaller margin lifts.
 
     UNKNOWN_WATER: the boat could not stop before water that it does not know. PERSON: nearer to a person than hull and
@@ -60,8 +54,9 @@ def hard_constraints(
     TURN: a pivot too small to be made, or not the one asked for; or, for a boat with its whole margin, beyond
     `span_deg`: it waits before a dead end and does not circle through the far side.
     """
+    setpoint, config = evaluation.request.setpoint, evaluation.request.config
     offsets_rad, travelled_m = evaluation.offsets_rad, evaluation.trajectories.travelled_m
-    stopping_m = config.stop_s * np.maximum(evaluation.speeds_mps, start.surge_mps)
+    stopping_m = config.stop_s * np.maximum(evaluation.speeds_mps, evaluation.request.start.surge_mps)
     person_m = (
         min(evaluation.tight_clearance_m, float(evaluation.person_distance_m[0, 0])) - PERSON_DISTANCE_TOLERANCE_M
     )
@@ -80,51 +75,37 @@ def hard_constraints(
     }
 
 
-def check_margins(
-    evaluation: CandidateEvaluation,
-    hard: Refusals,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    config: PlannerConfig,
-) -> MarginCheck:
+def check_margins(evaluation: CandidateEvaluation, hard: Refusals) -> MarginCheck:
     """Check the candidates with the largest margin that leaves a feasible one, or else with the smallest.
 
-    The whole margin is kept to dynamic obstacles, unless one would come to a boat at rest: only then is being at rest
-    no better than passing it closely. With less than the whole margin no candidate is feasible at full speed, and
-    pivots out of the onward sector are feasible with the smallest margin alone.
+    With less than the whole margin no candidate is feasible at full speed, and pivots out of the onward sector are
+    feasible with the smallest margin alone.
     """
-    *larger, least = margins(config)
+    *larger, least = margins(evaluation.request.config)
     for step in larger:
-        check = _check_margin(evaluation, hard, start, config, step, may_pivot_away=setpoint.is_pivot_only)
+        check = _check_margin(evaluation, hard, step, may_pivot_away=evaluation.request.setpoint.is_pivot_only)
         if not any_refusal(check.refusals).all():
             return check
-    return _check_margin(evaluation, hard, start, config, least, may_pivot_away=True)
+    return _check_margin(evaluation, hard, least, may_pivot_away=True)
 
 
 def _check_margin(
-    evaluation: CandidateEvaluation,
-    hard: Refusals,
-    start: BoatState,
-    config: PlannerConfig,
-    step: PlannerConfig,
-    *,
-    may_pivot_away: bool,
+    evaluation: CandidateEvaluation, hard: Refusals, step: PlannerConfig, *, may_pivot_away: bool
 ) -> MarginCheck:
     """Check the candidates with the margin and drift of one of the `margins` of the settings."""
-    dynamic_step = step if evaluation.is_give_way_needed else config
-    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
-    static_m = evaluation.static_clearance_m
+    dynamic_m, static_m = least_of_obstacles_m(evaluation.separation_m(step)), evaluation.static_clearance_m
     beyond_m = static_m - required_clearance_m(evaluation.trajectories.time_s, static_m[0, 0], step)[:, None]
     static, dynamic = (
         np.asarray(((each_m < 0.0) & evaluation.is_in_checked_range).any(axis=0)) for each_m in (beyond_m, dynamic_m)
     )
-    is_pivot_away = evaluation.is_pivot & ~evaluation.is_onward
+    is_too_fast = evaluation.is_full_speed & (step is not evaluation.request.config)
+    is_pivot_away = evaluation.is_pivot & ~evaluation.is_onward & (not may_pivot_away)
     refusals = {
         **hard,
         Constraint.STATIC_OBSTACLE: static,
         Constraint.DYNAMIC_OBSTACLE: dynamic,
-        Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | (evaluation.is_full_speed & (step is not config)),
-        Constraint.TURN: hard[Constraint.TURN] | (is_pivot_away & (not may_pivot_away)),
+        Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | is_too_fast,
+        Constraint.TURN: hard[Constraint.TURN] | is_pivot_away,
     }
     return MarginCheck(refusals, np.minimum(beyond_m, dynamic_m))
 
@@ -135,20 +116,18 @@ def while_waiting(evaluation: CandidateEvaluation, hard: Refusals, check: Margin
     return {**hard, Constraint.WAIT: ~evaluation.is_pivot_to_course | is_met}
 
 
-def before_looking(
-    evaluation: CandidateEvaluation, hard: Refusals, start: BoatState, config: PlannerConfig
-) -> Refusals:
+def before_looking(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals:
     """LOOK: of a boat that faces away, all but the pivot to its course with room for hull and half a cell."""
-    step = margins(config)[-1]
-    dynamic_step = step if evaluation.is_give_way_needed else config
-    dynamic_m = least_separation_margin_m(evaluation.dynamic, evaluation.trajectories.time_s, dynamic_step)
-    margin_m = np.minimum(evaluation.static_clearance_m - (step.hull_radius_m + step.margin_m), dynamic_m)
+    step = margins(evaluation.request.config)[-1]
+    static_m = evaluation.static_clearance_m - (step.hull_radius_m + step.margin_m)
+    margin_m = np.minimum(static_m, least_of_obstacles_m(evaluation.separation_m(step)))
     is_unsafe = ((margin_m < 0.0) & evaluation.is_in_horizon).any(axis=0)
     return {**hard, Constraint.LOOK: ~evaluation.is_pivot_to_course | is_unsafe}
 
 
-def has_stopped_facing_away(evaluation: CandidateEvaluation, start: BoatState, previous: Plan | None) -> bool:
+def has_stopped_facing_away(evaluation: CandidateEvaluation) -> bool:
     """Whether the boat was stopped, or is pivoting to its course since, and does not see in that direction yet."""
+    start, previous = evaluation.request.start, evaluation.request.previous
     course_rad = float(evaluation.offsets_rad[0])
     if start.surge_mps > RESIDUAL_DRIFT_MPS or abs(course_rad) <= HALF_FIELD_OF_VIEW_RAD:
         return False
@@ -159,11 +138,9 @@ def has_stopped_facing_away(evaluation: CandidateEvaluation, start: BoatState, p
     return is_pivoting and abs(off_rad) < 0.5 * MIN_PIVOT_RAD
 
 
-def unless_escaping(
-    evaluation: CandidateEvaluation, hard: Refusals, start: BoatState, config: PlannerConfig
-) -> Refusals:
+def unless_escaping(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals:
     """NO_ESCAPE: of a boat with no margin left, all that leads not away from static and dynamic obstacles."""
-    escapes = _escapes_static(evaluation) & _escapes_dynamic(evaluation, start, config)
+    escapes = _escapes_static(evaluation) & _escapes_dynamic(evaluation)
     return {**hard, Constraint.NO_ESCAPE: ~escapes}
 
 
@@ -191,19 +168,16 @@ def _escapes_static(evaluation: CandidateEvaluation) -> Bools:
     return np.asarray((least_m >= now_m - ESCAPE_TOLERANCE_M) & (last_m >= now_m + ESCAPE_GAIN_M))
 
 
-def _escapes_dynamic(evaluation: CandidateEvaluation, start: BoatState, config: PlannerConfig) -> Bools:
+def _escapes_dynamic(evaluation: CandidateEvaluation) -> Bools:
     """Candidates that, of each dynamic obstacle, keep clear or come hardly nearer and end further away [candidates].
 
     Nearer and further are measured against a coasting boat: an obstacle not seen for long may be anywhere around it,
     and the space it may be in grows with time.
     """
-    escapes = np.ones(evaluation.offsets_rad.size, np.bool_)
+    separation_m = evaluation.separation_m(margins(evaluation.request.config)[-1])
+    is_clear = ((separation_m >= 0.0) | ~evaluation.is_in_checked_range).all(axis=1)
     within = evaluation.is_in_horizon[:, 0]
-    step = margins(config)[-1] if evaluation.is_give_way_needed else config
-    for clearance in evaluation.dynamic:
-        margin_m = separation_margin_m(clearance, evaluation.trajectories.time_s, step)
-        is_clear = ((margin_m >= 0.0) | ~evaluation.is_in_checked_range).all(axis=0)
-        sailing_m, coasting_m = clearance.candidates_m[within], clearance.coasting_m[within, None]
-        is_left = (sailing_m >= coasting_m - ESCAPE_TOLERANCE_M).all(axis=0)
-        escapes &= is_clear | (is_left & (sailing_m[-1] >= coasting_m[-1] + ESCAPE_GAIN_M))
-    return escapes
+    sailing_m, coasting_m = evaluation.dynamic.candidates_m[:, within], evaluation.dynamic.coasting_m[:, within, None]
+    is_left = (sailing_m >= coasting_m - ESCAPE_TOLERANCE_M).all(axis=1)
+    is_left &= sailing_m[:, -1] >= coasting_m[:, -1] + ESCAPE_GAIN_M
+    return np.asarray((is_clear | is_left).all(axis=0))

@@ -11,11 +11,15 @@ import numpy as np
 
 from paani import portable
 from paani.arrays import F64
-from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
-from paani_services.navigator.avoidance.clearance import advanced_in_time, least_separation_margin_m, predict_clearance
+from paani_services.navigator.avoidance.clearance import (
+    DynamicClearance,
+    advanced_in_time,
+    least_of_obstacles_m,
+    predict_clearances,
+    separation_margin_m,
+)
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
-from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 
 QUARTER_TURN_RAD = 0.5 * math.pi
 PATH_OBSTACLE_WEIGHT = 3.0  # an obstacle on the path at the boat; it falls linearly to none at `look_m`
@@ -47,32 +51,18 @@ class CandidateCosts(NamedTuple):
         return np.asarray(functools.reduce(np.add, self))
 
 
-def weigh_candidates(
-    evaluation: CandidateEvaluation,
-    margin_m: F64,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    previous: Plan | None,
-    config: PlannerConfig,
-) -> CandidateCosts:
+def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> CandidateCosts:
     """The costs of each candidate. margin_m: clearance beyond the required one [times, candidates]."""
+    request, config, previous = evaluation.request, evaluation.request.config, evaluation.request.previous
     speeds_mps, deviation_rad = evaluation.speeds_mps, evaluation.deviation_rad
     travelled_m, is_in_horizon = evaluation.trajectories.travelled_m, evaluation.is_in_horizon
     made_good = speeds_mps / speeds_mps[0] * np.array([portable.cos(each) for each in deviation_rad.tolist()])
     change_rad = np.zeros_like(deviation_rad)
     if previous is not None and previous.speed_mps > 0.0:
-        change_rad = angles_between_rad(evaluation.offsets_rad, wrap_rad(previous.heading_rad - start.yaw_rad))
-    disregard = np.clip(1.0 - setpoint.advised_side * evaluation.offsets_rad / ADVISED_TURN_RAD, 0.0, 1.0)
+        change_rad = angles_between_rad(evaluation.offsets_rad, wrap_rad(previous.heading_rad - request.start.yaw_rad))
+    disregard = np.clip(1.0 - request.setpoint.advised_side * evaluation.offsets_rad / ADVISED_TURN_RAD, 0.0, 1.0)
     is_looked_at = travelled_m <= config.look_m
-    leading = [
-        predict_clearance(
-            advanced_in_time(obstacle, config.lead_s), evaluation.trajectories, evaluation.coasting, start, config
-        )
-        if obstacle.is_moving
-        else now
-        for obstacle, now in zip(evaluation.obstacles, evaluation.dynamic, strict=True)
-    ]
-    ahead_m = least_separation_margin_m(leading, evaluation.trajectories.time_s, config)
+    ahead_m = least_of_obstacles_m(separation_margin_m(_predict_leading(evaluation), evaluation.paths.time_s, config))
     nearest_m = np.where(is_in_horizon, np.minimum(margin_m, ahead_m), np.inf).min(axis=0)
     nearness = np.clip(1.0 - nearest_m / PROXIMITY_RANGE_M, 0.0, 1.0)
     first_m = np.where((margin_m < 0.0) & is_looked_at, travelled_m, np.inf).min(axis=0)
@@ -83,9 +73,18 @@ def weigh_candidates(
         course=deviation_rad / QUARTER_TURN_RAD,
         progress=LOST_PROGRESS_WEIGHT * (1.0 - made_good),
         heading_change=HEADING_CHANGE_WEIGHT * change_rad / QUARTER_TURN_RAD,
-        advice=ADVICE_WEIGHT * abs(setpoint.advised_side) * disregard,
+        advice=ADVICE_WEIGHT * abs(request.setpoint.advised_side) * disregard,
         unknown_water=UNKNOWN_WATER_WEIGHT * (evaluation.is_unknown & is_looked_at).sum(axis=0) / len(is_looked_at),
         proximity=PROXIMITY_WEIGHT * nearness * nearness,
         path_obstacle=PATH_OBSTACLE_WEIGHT * path_obstacle,
         margin=MARGIN_INTRUSION_WEIGHT * mean_intrusion_m,
     )
+
+
+def _predict_leading(evaluation: CandidateEvaluation) -> DynamicClearance:
+    """The clearances where each obstacle will be `lead_s` later; those that do not move are predicted already."""
+    request = evaluation.request
+    leading = [advanced_in_time(each, request.config.lead_s) for each in request.predicted_obstacles if each.is_moving]
+    is_still = [not each.is_moving for each in request.predicted_obstacles]
+    later, still = predict_clearances(leading, evaluation.paths, request.config), evaluation.dynamic
+    return DynamicClearance(*(np.concatenate([each, now[is_still]]) for each, now in zip(later, still, strict=True)))

@@ -1,7 +1,6 @@
 """What each candidate of the local planner meets: clearances, people, unknown water. Pure."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,20 +13,20 @@ from paani_services.navigator.avoidance.clearance import (
     interpolate_fields,
     is_give_way_needed,
     is_within_horizon,
-    predict_clearance,
+    least_of_obstacles_m,
+    predict_clearances,
+    separation_margin_m,
 )
+from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import (
     PIVOT_SPEED_FRACTION,
     BoatState,
-    GuidanceSetpoint,
     Trajectories,
     roll_out,
-    roll_out_coasting,
     sample_candidates,
+    with_coasting_and_resting,
 )
 from paani_services.navigator.mapping.distance_field import distance_field_m
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 
 # Deviation from the desired course up to which a candidate leads onward [rad]; beyond it less than a quarter of the
 # distance sailed is made good.
@@ -37,17 +36,18 @@ ONWARD_SECTOR_RAD = math.radians(75.0)
 class CandidateEvaluation(NamedTuple):
     """What each candidate meets: [candidates], or [times, candidates] of `trajectories`.
 
+    paths: the trajectories, and those of the boat that coasts and that rests.
     deviation_rad: off the desired course; is_onward: within `ONWARD_SECTOR_RAD` of it.
     is_pivot_to_course: whether it is the pivot to the desired course.
     is_in_horizon: times within `horizon_s` [times, 1]; is_in_checked_range: those, or within `room_m` of path.
     static_clearance_m: to static obstacles; clearance_m: to dynamic ones as well; person_distance_m: to seen people.
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
-    dynamic: the clearances to each of the obstacles.
+    dynamic: the clearances to each of the request's `predicted_obstacles`.
     coasting_clearance_m: the least within the horizon with the thrusters off.
     """
 
-    obstacles: Sequence[DynamicObstacle]
+    request: PlanRequest
     offsets_rad: F64
     speeds_mps: F64
     deviation_rad: F64
@@ -56,6 +56,7 @@ class CandidateEvaluation(NamedTuple):
     is_pivot: Bools
     is_pivot_to_course: Bools
     trajectories: Trajectories
+    paths: Trajectories
     is_in_horizon: Bools
     is_in_checked_range: Bools
     static_clearance_m: F64
@@ -64,9 +65,17 @@ class CandidateEvaluation(NamedTuple):
     is_unknown: Bools
     tight_clearance_m: float
     is_give_way_needed: bool
-    dynamic: Sequence[DynamicClearance]
-    coasting: Trajectories
+    dynamic: DynamicClearance
     coasting_clearance_m: float
+
+    def separation_m(self, step: PlannerConfig) -> F64:
+        """Clearance to each dynamic obstacle beyond the required one [obstacles, times, candidates].
+
+        The whole margin is required, or that of `step` where one would come to a boat at rest: only then is being at
+        rest no better than passing it closely.
+        """
+        config = step if self.is_give_way_needed else self.request.config
+        return separation_margin_m(self.dynamic, self.trajectories.time_s, config)
 
     @property
     def is_safe_at_rest(self) -> bool:
@@ -74,30 +83,24 @@ class CandidateEvaluation(NamedTuple):
         return not self.is_give_way_needed and self.coasting_clearance_m >= self.tight_clearance_m
 
 
-def evaluate_candidates(
-    grid: OccupancyGrid,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    obstacles: Sequence[DynamicObstacle],
-    config: PlannerConfig,
-) -> CandidateEvaluation:
+def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     """Sample the candidates around the setpoint, roll each out, and look up what it meets."""
-    offsets_rad, speeds_mps = sample_candidates(start, setpoint, config)
-    trajectories, field_m = roll_out(start, offsets_rad, speeds_mps, config), clearance_field_m(grid, config)
-    fields = (field_m, distance_field_m(grid.people), distance_field_m(grid.unknown))
-    static_m, person_m, unknown_m = interpolate_fields(grid, fields, trajectories)
+    grid, start, config, obstacles = request.grid, request.start, request.config, request.predicted_obstacles
+    offsets_rad, speeds_mps = sample_candidates(start, request.setpoint, config)
+    trajectories = roll_out(start, offsets_rad, speeds_mps, config)
+    paths = with_coasting_and_resting(trajectories, start, config)
+    fields = (clearance_field_m(grid, config), distance_field_m(grid.people), distance_field_m(grid.unknown))
+    static_m, person_m, unknown_m = interpolate_fields(grid, fields, paths)
     tight_m = config.hull_radius_m + config.tight_margin_m
     is_in_horizon = is_within_horizon(trajectories, config)[:, None]
-    coasting, last = roll_out_coasting(start, trajectories.time_s, config), int(is_in_horizon.sum()) - 1
-    at_rest = BoatState(float(coasting.x_m[last, 0]), float(coasting.y_m[last, 0]), start.yaw_rad)
-    dynamic = [predict_clearance(each, trajectories, coasting, start, config) for each in obstacles]
-    coasting_m = np.minimum.reduce(
-        [interpolate_fields(grid, (field_m,), coasting)[0][:, 0], *(each.coasting_m for each in dynamic)]
-    )
+    last = int(is_in_horizon.sum()) - 1
+    at_rest = BoatState(float(paths.x_m[last, -2]), float(paths.y_m[last, -2]), start.yaw_rad)
+    dynamic = predict_clearances(obstacles, paths, config)
+    coasting_m = np.minimum(static_m[:, -2], least_of_obstacles_m(dynamic.coasting_m))
     deviation_rad = angles_between_rad(offsets_rad, float(offsets_rad[0]))
     is_pivot = speeds_mps == PIVOT_SPEED_FRACTION * speeds_mps[0]
     return CandidateEvaluation(
-        obstacles,
+        request,
         offsets_rad,
         speeds_mps,
         deviation_rad=deviation_rad,
@@ -106,16 +109,16 @@ def evaluate_candidates(
         is_pivot=is_pivot,
         is_pivot_to_course=np.asarray(is_pivot & (offsets_rad == offsets_rad[0])),
         trajectories=trajectories,
+        paths=paths,
         is_in_horizon=is_in_horizon,
         is_in_checked_range=is_in_horizon | (trajectories.travelled_m <= config.room_m),
-        static_clearance_m=static_m,
-        clearance_m=np.minimum.reduce([static_m, *(each.candidates_m for each in dynamic)]),
-        person_distance_m=person_m,
-        is_unknown=unknown_m < config.hull_radius_m,
+        static_clearance_m=static_m[:, :-2],
+        clearance_m=np.minimum(static_m[:, :-2], least_of_obstacles_m(dynamic.candidates_m)),
+        person_distance_m=person_m[:, :-2],
+        is_unknown=unknown_m[:, :-2] < config.hull_radius_m,
         tight_clearance_m=tight_m,
         is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
         dynamic=dynamic,
-        coasting=coasting,
         coasting_clearance_m=float(coasting_m[: last + 1].min()),
     )
 

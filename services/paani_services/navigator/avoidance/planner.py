@@ -5,12 +5,11 @@ IEEE Robotics & Automation Magazine, 1997): candidates are rolled out, checked a
 Constraints and costs keep their names.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from paani.config import PlannerConfig
 from paani.geometry import wrap_rad
 from paani.messages import Constraint
 from paani_services.navigator.avoidance.constraints import (
@@ -27,9 +26,8 @@ from paani_services.navigator.avoidance.constraints import (
 )
 from paani_services.navigator.avoidance.costs import CandidateCosts, weigh_candidates
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
-from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
+from paani_services.navigator.avoidance.request import PlanRequest
+from paani_services.navigator.avoidance.rollout import Plan
 
 
 class JudgedCandidates(NamedTuple):
@@ -40,26 +38,17 @@ class JudgedCandidates(NamedTuple):
     costs: CandidateCosts
     is_waiting: bool
 
-    def cheapest_plan(self, start: BoatState) -> Plan:
+    def cheapest_plan(self) -> Plan:
         """The plan of the cheapest feasible candidate; a stop if there is none."""
-        is_refused = any_refusal(self.refusals)
+        yaw_rad, is_refused = self.evaluation.request.start.yaw_rad, any_refusal(self.refusals)
         if is_refused.all():
-            return Plan(start.yaw_rad, 0.0)
+            return Plan(yaw_rad, 0.0)
         best = int(np.where(is_refused, np.inf, self.costs.total).argmin())
-        heading_rad = wrap_rad(start.yaw_rad + float(self.evaluation.offsets_rad[best]))
+        heading_rad = wrap_rad(yaw_rad + float(self.evaluation.offsets_rad[best]))
         return Plan(heading_rad, float(self.evaluation.speeds_mps[best]), self.is_waiting)
 
 
-def plan_motion(
-    grid: OccupancyGrid,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    previous: Plan | None,
-    config: PlannerConfig,
-    tracked: Sequence[DynamicObstacle] = (),
-    *,
-    may_wait: bool = True,
-) -> Plan:
+def plan_motion(request: PlanRequest) -> Plan:
     """Choose the cheapest feasible candidate.
 
     Candidates are headings around the desired course at three speeds, each rolled out through the boat's turn-rate and
@@ -73,36 +62,25 @@ def plan_motion(
         leaves a candidate, and the whole one to the predicted positions of dynamic ones.
       * It escapes from the nearest obstacle.
       * It keeps further off than coasting would.
-    If there is none, the plan is a stop. Once the boat may wait no longer, people who may swim but were not seen to are
-    static obstacles.
+    If there is none, the plan is a stop.
     """
-    judged = judge_candidates(grid, start, setpoint, previous, config, tracked, may_wait=may_wait)
-    return Plan(start.yaw_rad, 0.0) if judged is None else judged.cheapest_plan(start)
+    judged = judge_candidates(request)
+    return Plan(request.start.yaw_rad, 0.0) if judged is None else judged.cheapest_plan()
 
 
-def judge_candidates(
-    grid: OccupancyGrid,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    previous: Plan | None,
-    config: PlannerConfig,
-    tracked: Sequence[DynamicObstacle] = (),
-    *,
-    may_wait: bool = True,
-) -> JudgedCandidates | None:
+def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     """Check and weigh the candidates that `plan_motion` chooses from; None where none is considered."""
-    if setpoint.speed_mps <= 0.0 or not grid.free.any():
+    if request.setpoint.speed_mps <= 0.0 or not request.grid.free.any():
         return None
-    obstacles = [each for each in tracked if each.age_s <= config.unseen_s and (may_wait or each.is_moving)]
-    evaluation = evaluate_candidates(grid, start, setpoint, obstacles, config)
-    hard = hard_constraints(evaluation, start, setpoint, config)
-    check = check_margins(evaluation, hard, start, setpoint, config)
-    costs = weigh_candidates(evaluation, check.margin_m, start, setpoint, previous, config)
-    is_waiting = may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
+    evaluation = evaluate_candidates(request)
+    hard = hard_constraints(evaluation)
+    check = check_margins(evaluation, hard)
+    costs = weigh_candidates(evaluation, check.margin_m)
+    is_waiting = request.may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
     if is_waiting:
         refusals = while_waiting(evaluation, hard, check)
     else:
-        situations = _situations(evaluation, hard, check, start, previous, config)
+        situations = _situations(evaluation, hard, check)
         refusals = next((each for each in situations if not any_refusal(each).all()), check.refusals)
     return JudgedCandidates(evaluation, refusals, costs, is_waiting)
 
@@ -114,17 +92,10 @@ def _is_held_up(evaluation: CandidateEvaluation, check: MarginCheck) -> bool:
     return bool(is_refused and check.refusals[Constraint.DYNAMIC_OBSTACLE][onward].any())
 
 
-def _situations(
-    evaluation: CandidateEvaluation,
-    hard: Refusals,
-    check: MarginCheck,
-    start: BoatState,
-    previous: Plan | None,
-    config: PlannerConfig,
-) -> Iterator[Refusals]:
+def _situations(evaluation: CandidateEvaluation, hard: Refusals, check: MarginCheck) -> Iterator[Refusals]:
     """What is refused in each situation of a boat that does not wait, the first that applies first."""
-    if has_stopped_facing_away(evaluation, start, previous):
-        yield before_looking(evaluation, hard, start, config)
+    if has_stopped_facing_away(evaluation):
+        yield before_looking(evaluation, hard)
     yield check.refusals
-    yield unless_escaping(evaluation, hard, start, config)
+    yield unless_escaping(evaluation, hard)
     yield unless_clearer_than_coasting(evaluation, hard)

@@ -1,7 +1,6 @@
 """When the local planner makes a new plan, and from which observations. Pure."""
 
 import math
-from collections.abc import Sequence
 
 import msgspec
 
@@ -13,18 +12,18 @@ from paani.messages import Evidence, HeadingVerdict, Odometry, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
+from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.avoidance.verdicts import tell_headings
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, map_water
+from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
 
 
-class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
-    """What the planner was asked beside the course and the water, so that it can be asked again.
+class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
+    """What a plan was requested with beside the course and the water, so that the request can be made again.
 
     map_offset_m: east and north of the boat in the map, less those by dead reckoning.
     """
@@ -40,14 +39,14 @@ class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
 class PlannerState(
     msgspec.Struct,
     frozen=True,
-    rename={"advised_side": "side", "waiting_since_us": "waits_us", "frame_id": "frame"},
+    rename={"advised_side": "side", "waiting_since_us": "waits_us", "frame_id": "frame", "basis": "request"},
 ):
     """The remembered observations, and the plan in force. It is recorded under the field names given by `rename`.
 
     course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
     waiting_since_us: since when no plan has led the boat onward.
     obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
-    request: what the plan was made from; None where another planner made it.
+    basis: what the plan was made from; None where another planner made it.
     """
 
     memory: ObservationMemory = ObservationMemory()
@@ -58,7 +57,7 @@ class PlannerState(
     waiting_since_us: int | None = None
     frame_id: tuple[int, int] = (-1, -1)
     obstacle_track_ids: tuple[int, ...] = ()
-    request: PlanRequest | None = None
+    basis: PlanBasis | None = None
 
 
 def observe(
@@ -95,7 +94,7 @@ def replan(
     if plan is None or _is_plan_due(state, setpoint, now_us, config):
         velocity = (odometry.surge_mps, odometry.yaw_rate_radps, odometry.sway_mps)
         since_us = now_us if state.waiting_since_us is None else min(state.waiting_since_us, now_us)
-        request = PlanRequest(
+        basis = PlanBasis(
             start=BoatState(here.x_m, here.y_m, odometry.yaw_rad, *velocity),
             speed_mps=setpoint.speed_mps,
             is_pivot_only=setpoint.is_pivot_only,
@@ -103,11 +102,8 @@ def replan(
             may_wait=(now_us - since_us) * 1e-6 < config.patience_s,
             map_offset_m=(odometry.x_m - here.x_m, odometry.y_m - here.y_m),
         )
-        grid, obstacles = _map_fenced_water(state.memory, request, now_us, camera, config, fence)
-        if planner is None:
-            plan = plan_motion(grid, request.start, setpoint, plan, config, obstacles, may_wait=request.may_wait)
-        else:
-            plan = Plan(*planner(_planning_inputs(grid, request.start, setpoint, plan, config, obstacles)))
+        request = _request_plan(state.memory, basis, setpoint, now_us, camera, config, fence)
+        plan = plan_motion(request) if planner is None else Plan(*planner(_planning_inputs(request)))
         state = PlannerState(
             state.memory,
             plan,
@@ -116,8 +112,8 @@ def replan(
             now_us,
             since_us if plan.is_waiting or plan.speed_mps == 0.0 else None,
             state.memory.frame_id,
-            tuple(sorted({obstacle.track_id for obstacle in obstacles} - {0})),
-            request if planner is None else None,
+            tuple(sorted({obstacle.track_id for obstacle in request.obstacles} - {0})),
+            basis if planner is None else None,
         )
     return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
 
@@ -129,25 +125,34 @@ def explain_plan(
 
     Empty where another planner made the plan, and where the memory does not lead to it any more.
     """
-    request = state.request
-    if request is None or state.frame_id != state.memory.frame_id:
+    basis = state.basis
+    if basis is None or state.frame_id != state.memory.frame_id:
         return ()
-    grid, obstacles = _map_fenced_water(state.memory, request, state.planned_us, camera, config, fence)
-    setpoint = GuidanceSetpoint(state.course_rad, request.speed_mps, state.advised_side, request.is_pivot_only)
-    judged = judge_candidates(
-        grid, request.start, setpoint, request.previous, config, obstacles, may_wait=request.may_wait
+    setpoint = GuidanceSetpoint(state.course_rad, basis.speed_mps, state.advised_side, basis.is_pivot_only)
+    judged = judge_candidates(_request_plan(state.memory, basis, setpoint, state.planned_us, camera, config, fence))
+    return tell_headings(judged) if judged is not None and judged.cheapest_plan() == state.plan else ()
+
+
+def _request_plan(
+    memory: ObservationMemory,
+    basis: PlanBasis,
+    setpoint: GuidanceSetpoint,
+    now_us: int,
+    camera: Camera,
+    config: PlannerConfig,
+    fence: Fence,
+) -> PlanRequest:
+    """The request on the water as it is remembered: the grid ends at the fence."""
+    grid, obstacles = map_water(memory.observations, basis.start[:2], now_us, camera, config)
+    return PlanRequest(
+        grid=apply_fence(grid, fence, basis.map_offset_m),
+        start=basis.start,
+        setpoint=setpoint,
+        config=config,
+        obstacles=obstacles,
+        previous=basis.previous,
+        may_wait=basis.may_wait,
     )
-    if judged is None or judged.cheapest_plan(request.start) != state.plan:
-        return ()
-    return tell_headings(judged, request.start)
-
-
-def _map_fenced_water(
-    memory: ObservationMemory, request: PlanRequest, now_us: int, camera: Camera, config: PlannerConfig, fence: Fence
-) -> tuple[OccupancyGrid, tuple[DynamicObstacle, ...]]:
-    """The grid around the boat, which ends at the fence, and the dynamic obstacles."""
-    grid, obstacles = map_water(memory.observations, request.start[:2], now_us, camera, config)
-    return apply_fence(grid, fence, request.map_offset_m), obstacles
 
 
 def _is_plan_due(state: PlannerState, setpoint: GuidanceSetpoint, now_us: int, config: PlannerConfig) -> bool:
@@ -157,22 +162,16 @@ def _is_plan_due(state: PlannerState, setpoint: GuidanceSetpoint, now_us: int, c
     return is_other or is_other_course or has_passed(state.planned_us, config.replan_s * 1e6, now_us)
 
 
-def _planning_inputs(
-    grid: OccupancyGrid,
-    start: BoatState,
-    setpoint: GuidanceSetpoint,
-    previous: Plan | None,
-    config: PlannerConfig,
-    obstacles: Sequence[DynamicObstacle],
-) -> PlanningInputs:
+def _planning_inputs(request: PlanRequest) -> PlanningInputs:
+    grid, start, config, previous = request.grid, request.start, request.config, request.previous
     return PlanningInputs(
         start.x_m,
         start.y_m,
         start.yaw_rad,
         start.surge_mps,
         start.yaw_rate_radps,
-        setpoint.course_rad,
-        min(setpoint.speed_mps, config.speed_mps),
+        request.setpoint.course_rad,
+        min(request.setpoint.speed_mps, config.speed_mps),
         None if previous is None else previous.heading_rad,
         grid.occupied,
         grid.west_m,
@@ -180,7 +179,7 @@ def _planning_inputs(
         CELL_M,
         tuple(
             MovingObstacle(each.east_m, each.north_m, each.velocity.east_mps, each.velocity.north_mps)
-            for each in obstacles
+            for each in request.obstacles
             if each.age_s <= config.unseen_s
         ),
     )

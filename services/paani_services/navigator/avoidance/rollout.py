@@ -140,5 +140,14 @@ def roll_out_coasting(start: BoatState, time_s: F64, config: PlannerConfig) -> T
     return Trajectories(x_m, y_m, travelled_m, time_s)
 
 
+def with_coasting_and_resting(candidates: Trajectories, start: BoatState, config: PlannerConfig) -> Trajectories:
+    """The candidates, and after them the boat that coasts from there, and the one that stays there."""
+    coasting = roll_out_coasting(start, candidates.time_s, config)
+    rests = np.ones((candidates.time_s.size, 1))
+    resting = (start.x_m * rests, start.y_m * rests, 0.0 * rests)
+    x_m, y_m, travelled_m = map(np.hstack, zip(candidates[:3], coasting[:3], resting, strict=True))
+    return Trajectories(x_m, y_m, travelled_m, candidates.time_s)
+
+
 def _clip(values: F64, limit: float) -> F64:
     return np.asarray(np.minimum(np.maximum(values, -limit), limit))

@@ -7,15 +7,14 @@ from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingCosts, HeadingVerdict
 from paani_services.navigator.avoidance.constraints import any_refusal
 from paani_services.navigator.avoidance.planner import JudgedCandidates
-from paani_services.navigator.avoidance.rollout import BoatState
 
 COST_DIGITS = 3  # of a cost that is told: a thousandth of a quarter turn
 
 
-def tell_headings(judged: JudgedCandidates, start: BoatState) -> tuple[HeadingVerdict, ...]:
+def tell_headings(judged: JudgedCandidates) -> tuple[HeadingVerdict, ...]:
     """Of each heading, what refuses it at each speed, and the costs of the cheapest speed that nothing refuses.
 
-    The desired course comes first. start: of the candidates.
+    The desired course comes first.
     """
     evaluation, refusals, costs, _ = judged
     names = [each for each in Constraint if each in refusals]
@@ -31,7 +30,7 @@ def tell_headings(judged: JudgedCandidates, start: BoatState) -> tuple[HeadingVe
         parts = (round(float(each[cheapest]), COST_DIGITS) for each in costs)
         verdicts.append(
             HeadingVerdict(
-                heading_rad=wrap_rad(start.yaw_rad + float(evaluation.offsets_rad[at])),
+                heading_rad=wrap_rad(evaluation.request.start.yaw_rad + float(evaluation.offsets_rad[at])),
                 refused_by=tuple(names[first[each]] if is_refused[each] else Constraint.NONE for each in speeds),
                 speed_mps=float(evaluation.speeds_mps[cheapest]) if is_free else 0.0,
                 costs=HeadingCosts(*parts) if is_free else msgspec.UNSET,

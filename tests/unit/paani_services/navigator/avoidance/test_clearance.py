@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from paani_services.navigator.avoidance.clearance import (
     UNSEEN_GROWTH_MPS,
-    predict_clearance,
+    DynamicClearance,
+    predict_clearances,
     predicted_clearance_m,
 )
 from paani_services.navigator.avoidance.rollout import (
@@ -17,6 +18,7 @@ from paani_services.navigator.avoidance.rollout import (
     roll_out,
     roll_out_coasting,
     sample_candidates,
+    with_coasting_and_resting,
 )
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.velocity_fit import Velocity
@@ -42,7 +44,9 @@ def test_one_prediction_holds_for_candidates_and_for_a_boat_that_coasts_or_rests
     start = BoatState(*boat)
     candidates = roll_out(start, *sample_candidates(start, GuidanceSetpoint(0.3, 0.6), PLANNER), PLANNER)
     coasting = roll_out_coasting(start, candidates.time_s, PLANNER)
-    predicted, time_s = predict_clearance(obstacle, candidates, coasting, start, PLANNER), candidates.time_s[:, None]
+    elsewhere, time_s = obstacle._replace(east_m=outline[0] + 9.0), candidates.time_s[:, None]
+    paths = with_coasting_and_resting(candidates, start, PLANNER)
+    predicted = DynamicClearance(*(each[1] for each in predict_clearances([elsewhere, obstacle], paths, PLANNER)))
     there_m = outline[:, None, :] + np.array(velocity[:2])[:, None, None] * time_s
     unsure_m = velocity[2] * (time_s[:, 0] + age_s) + UNSEEN_GROWTH_MPS * age_s
 

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from paani.fence_geometry import is_allowed
 from paani.messages import FenceArea, Keep, Waypoint
 from paani_services.navigator.avoidance.fence_cells import apply_fence
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.replanning import PlannerState, replan
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.observation import ObservationMemory
@@ -26,6 +25,7 @@ from tests.synthetic_water import (
     Bar,
     observe_from,
     odometry,
+    plan_on,
     water_edge_of,
 )
 
@@ -92,7 +92,7 @@ def test_the_fence_is_shifted_from_the_map_to_the_frame_of_dead_reckoning() -> N
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) -> None:
     fence = (box(Keep.OUT, -2.0, side * 0.9, 12.0, side * 9.0),)
-    found = plan_motion(apply_fence(pool(ATHWART), fence), RESTING, AHEAD, None, PLANNER)
+    found = plan_on(apply_fence(pool(ATHWART), fence), RESTING, AHEAD, None, PLANNER)
     assert found.speed_mps > 0.0
     assert math.copysign(1.0, found.heading_rad) == -side
 

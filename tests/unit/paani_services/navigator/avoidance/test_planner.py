@@ -14,7 +14,6 @@ from paani.config import load_config
 from paani.messages import Detection, Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m, required_clearance_m
 from paani_services.navigator.avoidance.constraints import ESCAPE_TOLERANCE_M, MIN_PIVOT_RAD
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import (
     PIVOT_SPEED_FRACTION,
     BoatState,
@@ -37,6 +36,7 @@ from tests.synthetic_water import (
     START_US,
     Bar,
     observe_from,
+    plan_on,
     static_distances_m,
     water_edge_of,
 )
@@ -141,7 +141,7 @@ def test_no_plan_enters_an_occupied_cell(
     least = msgspec.structs.replace(PLANNER, margin_m=0.5 * CELL_M, drift_mps=0.0)
     grid = pool(*((x, y, x + deep, y + wide) for x, y, deep, wide in bars), bank_m=bank_m)
     start = BoatState(0.0, 0.0, 0.0, surge)
-    found = plan_motion(grid, start, GuidanceSetpoint(course, 0.6, side), None, PLANNER)
+    found = plan_on(grid, start, GuidanceSetpoint(course, 0.6, side), None, PLANNER)
     if found.speed_mps == 0.0:
         return
     time_s, gap_m = swept_gap_m(grid, start, found)
@@ -154,22 +154,22 @@ def test_no_plan_enters_an_occupied_cell(
 def test_the_advised_side_is_taken_where_both_are_free(side: float) -> None:
     """The advice decides where there is as much room on either side of the bar."""
     bar = (4.0, -0.4, 4.6, 0.4)
-    assert plan_motion(pool(bar), CRUISING, GuidanceSetpoint(0.0, 0.3, side), None, PLANNER).heading_rad * side > 0.0
+    assert plan_on(pool(bar), CRUISING, GuidanceSetpoint(0.0, 0.3, side), None, PLANNER).heading_rad * side > 0.0
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_other_side_is_taken_where_only_that_is_free(side: float) -> None:
     """The map decides where a wall stands on the advised side."""
     wall = (2.5, min(-0.5, side * 30.0), 3.5, max(0.5, side * 30.0))
-    found = plan_motion(pool(wall), BoatState(-1.5, 0.0, 0.0, 0.3), GuidanceSetpoint(0.0, 0.3, side), None, PLANNER)
+    found = plan_on(pool(wall), BoatState(-1.5, 0.0, 0.0, 0.3), GuidanceSetpoint(0.0, 0.3, side), None, PLANNER)
     assert found.speed_mps == 0.0 or found.heading_rad * side < 0.0
 
 
 def test_open_water_is_crossed_on_the_desired_course_at_full_speed() -> None:
     """The boat starts at once, because the blind zone beside it counts as water."""
     for start in (RESTING, CRUISING):
-        assert plan_motion(pool(), start, AHEAD, None, PLANNER) == Plan(0.0, 0.6)
-        found = plan_motion(pool(), start, GuidanceSetpoint(0.4, 0.6), None, PLANNER)
+        assert plan_on(pool(), start, AHEAD, None, PLANNER) == Plan(0.0, 0.6)
+        found = plan_on(pool(), start, GuidanceSetpoint(0.4, 0.6), None, PLANNER)
         assert found.heading_rad == pytest.approx(0.4)
 
 
@@ -181,7 +181,7 @@ def test_a_boat_turns_the_other_way_round_past_an_obstacle_abeam() -> None:
     for off_m, leaves in ((0.9, True), (1.6, False)):
         quay = (-6.0, off_m, 9.0, off_m + 0.7)
         for course in (1.9, 2.6):
-            found = plan_motion(
+            found = plan_on(
                 pool(quay), BoatState(3.0, 0.0, 0.0), GuidanceSetpoint(course, 0.6), Plan(0.0, 0.3), PLANNER
             )
             assert (found.speed_mps > 0.0 and found.heading_rad < -1.0) is leaves
@@ -192,7 +192,7 @@ def test_the_margin_is_relaxed_where_the_whole_one_leaves_no_candidate(half_m: f
     """The boat goes on slowly; with less than half the margin it pivots and looks for another way."""
     ahead = BoatState(0.0, 0.0, 0.0, 0.5)
     gap = pool((1.8, half_m, 6.0, 4.0), (1.8, -4.0, 6.0, -half_m))
-    assert plan_motion(gap, ahead, AHEAD, None, PLANNER).speed_mps == speed_mps
+    assert plan_on(gap, ahead, AHEAD, None, PLANNER).speed_mps == speed_mps
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -201,7 +201,7 @@ def test_a_boat_beside_a_hull_moves_away_before_it_turns_to_its_course(side: flo
     hull = (-6.0, min(side * 0.75, side * 2.5), 6.0, max(side * 0.75, side * 2.5))
     quay = pool((2.5, min(side * 0.75, side * 2.5), 6.0, max(side * 0.75, side * 2.5)), hull)
     start = BoatState(2.0, 0.0, 0.0, 0.4)
-    found = plan_motion(quay, start, GuidanceSetpoint(side * 1.2, 0.6), None, PLANNER)
+    found = plan_on(quay, start, GuidanceSetpoint(side * 1.2, 0.6), None, PLANNER)
     assert found.speed_mps > 0.0
     assert found.heading_rad * side <= 0.0
 
@@ -222,7 +222,7 @@ def test_no_plan_leads_over_a_person(ahead_m: float, left_m: float, gone_m: floa
     grid = build_occupancy_grid(observe_from(detections=(swimmer,)).observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
     assert grid.people.any()
     start = BoatState(min(gone_m, ahead_m - 0.3), 0.0, 0.0, surge)
-    found = plan_motion(grid, start, GuidanceSetpoint(course, 0.6), None, PLANNER)
+    found = plan_on(grid, start, GuidanceSetpoint(course, 0.6), None, PLANNER)
     if found.speed_mps > 0.0:
         time_s, gap_m = swept_gap_m(grid._replace(occupied=grid.people), start, found)
         near = time_s <= PLANNER.horizon_s
@@ -234,23 +234,23 @@ def test_without_a_recent_observation_the_boat_stops() -> None:
     memory = observe_from()
     for observations, age_us in ((ObservationMemory().observations, 0), (memory.observations, 810_000)):
         grid = build_occupancy_grid(observations, (0.0, 0.0), START_US + age_us, CAMERA, PLANNER)
-        assert plan_motion(grid, RESTING, AHEAD, None, PLANNER).speed_mps == 0.0
+        assert plan_on(grid, RESTING, AHEAD, None, PLANNER).speed_mps == 0.0
 
 
 def test_a_boat_before_a_wall_pivots() -> None:
     """Thrusters that only push stay off: they would drive the boat on while it turns."""
     fans = load_config(profile="fans").navigator.planner
     for start in (RESTING, CRUISING):
-        found = plan_motion(pool(bank_m=1.6), start, AHEAD, None, PLANNER)
+        found = plan_on(pool(bank_m=1.6), start, AHEAD, None, PLANNER)
         assert found.speed_mps == pytest.approx(PIVOT_SPEED_FRACTION * 0.6)
         assert abs(found.heading_rad) > 1.0
-        assert plan_motion(pool(bank_m=1.6), start, AHEAD, None, fans).speed_mps == 0.0
+        assert plan_on(pool(bank_m=1.6), start, AHEAD, None, fans).speed_mps == 0.0
 
 
 def test_a_pivot_is_no_smaller_than_the_smallest_one_allowed() -> None:
     """A boat that may wait does not creep along in small pivots."""
     for bank_m in np.arange(1.0, 4.0, 0.1).tolist():
-        found = plan_motion(pool(bank_m=bank_m), RESTING, AHEAD, None, PLANNER)
+        found = plan_on(pool(bank_m=bank_m), RESTING, AHEAD, None, PLANNER)
         assert found.speed_mps in (0.0, 0.3, 0.6) or abs(found.heading_rad) >= MIN_PIVOT_RAD
 
 
@@ -259,7 +259,7 @@ def test_a_boat_that_would_coast_onto_an_obstacle_steers_past_it(side: float) ->
     """No candidate keeps clear of it any more, but coasting straight on would come nearer."""
     low, high = sorted((0.1 * side, 0.4 * side))
     grid, start = pool((1.7, low, 2.0, high)), BoatState(0.9, 0.0, 0.0, 0.6)
-    found = plan_motion(grid, start, AHEAD, None, PLANNER)
+    found = plan_on(grid, start, AHEAD, None, PLANNER)
     assert found.speed_mps > 0.0
     assert found.heading_rad * side < -0.3
     time_s, gap_m = swept_gap_m(grid, start, found)
@@ -271,7 +271,7 @@ def test_a_boat_that_would_coast_onto_an_obstacle_steers_past_it(side: float) ->
 def test_an_obstacle_is_passed_on_the_side_with_more_room() -> None:
     for side in (-1.0, 1.0):
         bar = (4.0, min(-0.3, side * 0.9), 4.6, max(0.3, side * 0.9))
-        found = plan_motion(pool(bar), CRUISING, AHEAD, None, PLANNER)
+        found = plan_on(pool(bar), CRUISING, AHEAD, None, PLANNER)
         assert found.speed_mps > 0.0
         assert found.heading_rad * side < -0.1
 
@@ -280,7 +280,7 @@ def test_the_side_of_the_previous_plan_is_kept() -> None:
     """The previous plan decides where there is as much room on either side."""
     bar = (4.0, -0.4, 4.6, 0.4)
     for before in (0.35, -0.35):
-        found = plan_motion(pool(bar), CRUISING, AHEAD, Plan(before, 0.6), PLANNER)
+        found = plan_on(pool(bar), CRUISING, AHEAD, Plan(before, 0.6), PLANNER)
         assert found.heading_rad * before > 0.0
 
 
@@ -290,13 +290,13 @@ def test_no_cell_within_the_stopping_distance_may_be_unknown() -> None:
     memory = observe_from()
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), START_US, CAMERA, near)
     speeds = [
-        plan_motion(grid, RESTING, AHEAD, None, msgspec.structs.replace(near, stop_s=stop_s)).speed_mps
+        plan_on(grid, RESTING, AHEAD, None, msgspec.structs.replace(near, stop_s=stop_s)).speed_mps
         for stop_s in (2.5, 6.0, 20.0, 40.0)
     ]
     assert speeds == [0.6, 0.3, 0.06, 0.0]
     blind = msgspec.structs.replace(PLANNER, blind_m=0.0)
     grid = build_occupancy_grid(memory.observations, (0.0, 0.0), START_US, CAMERA, blind)
-    assert plan_motion(grid, RESTING, AHEAD, None, blind).speed_mps == 0.0
+    assert plan_on(grid, RESTING, AHEAD, None, blind).speed_mps == 0.0
 
 
 def test_an_obstacle_that_left_the_picture_below_is_remembered() -> None:
@@ -311,7 +311,7 @@ def test_an_obstacle_that_left_the_picture_below_is_remembered() -> None:
         at_us += 300_000
         memory = observe_from(boat, at_us=at_us, memory=memory)
     grid = build_occupancy_grid(memory.observations, (boat.x_m, 0.0), at_us, CAMERA, PLANNER)
-    found = plan_motion(grid, BoatState(boat.x_m, 0.0, 0.0), AHEAD, None, PLANNER)
+    found = plan_on(grid, BoatState(boat.x_m, 0.0, 0.0), AHEAD, None, PLANNER)
     time_s, gap_m = swept_gap_m(grid, BoatState(boat.x_m, 0.0, 0.0), found)
     assert found.speed_mps == 0.0 or gap_m[time_s <= 3.0].min() > 0.5
     forgetful = build_occupancy_grid(memory.observations, (boat.x_m, 0.0), at_us, CAMERA, PAPER)
@@ -324,7 +324,7 @@ def test_a_boat_inside_an_obstacle_goes_no_deeper(course: float) -> None:
     cells = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     cells[40:60, 49:62] = True  # the boat is 0.2 m inside the western side
     grid = round_about(cells)
-    found = plan_motion(grid, RESTING, GuidanceSetpoint(course, 0.6), None, PLANNER)
+    found = plan_on(grid, RESTING, GuidanceSetpoint(course, 0.6), None, PLANNER)
     if found.speed_mps > 0.0:
         assert clearance_along_m(grid, RESTING, found).min() >= -0.1 - 0.5 * CELL_M - ESCAPE_TOLERANCE_M
         assert abs(found.heading_rad) > 1.5
@@ -338,11 +338,11 @@ def test_a_boat_with_its_bow_aslant_to_an_obstacle_pivots_away(gap_m: float) -> 
     cells = (behind >= 0) & (behind < 10)
     start = BoatState(-gap_m, 0.0, 0.0)
     stopped = Plan(0.0, 0.0)
-    found = plan_motion(round_about(cells), start, GuidanceSetpoint(1.9, 0.3), stopped, PLANNER)
+    found = plan_on(round_about(cells), start, GuidanceSetpoint(1.9, 0.3), stopped, PLANNER)
     assert found.speed_mps == pytest.approx(PIVOT_SPEED_FRACTION * 0.3)
     assert clearance_along_m(round_about(cells), start, found).min() >= gap_m - ESCAPE_TOLERANCE_M - 0.5 * CELL_M
     cells[:, :48] = cells[:48] = cells[52:] = True  # in a corner no pivot leads out, and it stops
-    assert plan_motion(round_about(cells), start, GuidanceSetpoint(1.9, 0.3), stopped, PLANNER).speed_mps == 0.0
+    assert plan_on(round_about(cells), start, GuidanceSetpoint(1.9, 0.3), stopped, PLANNER).speed_mps == 0.0
 
 
 @pytest.mark.parametrize("course", [1.2, 2.0, 2.8])
@@ -353,13 +353,13 @@ def test_a_stopped_boat_facing_away_pivots_to_its_course_before_it_moves(course:
     setpoint = GuidanceSetpoint(course, 0.6)
     pivot = Plan(float(sample_candidates(RESTING, setpoint, PLANNER)[0][0]), PIVOT_SPEED_FRACTION * 0.6)
     for before in (None, Plan(0.0, 0.0), Plan(course, PIVOT_SPEED_FRACTION * 0.6)):
-        assert plan_motion(round_about(cells), RESTING, setpoint, before, PLANNER) == pivot
+        assert plan_on(round_about(cells), RESTING, setpoint, before, PLANNER) == pivot
     assert (
-        plan_motion(round_about(cells), RESTING, setpoint, Plan(-2.0, PIVOT_SPEED_FRACTION * 0.6), PLANNER) != pivot
+        plan_on(round_about(cells), RESTING, setpoint, Plan(-2.0, PIVOT_SPEED_FRACTION * 0.6), PLANNER) != pivot
     )  # it has already turned that way
-    assert plan_motion(round_about(cells), CRUISING, setpoint, Plan(0.0, 0.6), PLANNER) != pivot
+    assert plan_on(round_about(cells), CRUISING, setpoint, Plan(0.0, 0.6), PLANNER) != pivot
     near = np.hypot(column - 49.5, row - 54.5) < 1.6
-    assert plan_motion(round_about(near), RESTING, setpoint, None, PLANNER) != pivot  # the hull has no room to pivot
+    assert plan_on(round_about(near), RESTING, setpoint, None, PLANNER) != pivot  # the hull has no room to pivot
 
 
 @pytest.mark.parametrize("surge", [0.0, 0.6])
@@ -369,13 +369,13 @@ def test_near_an_obstacle_no_candidate_is_feasible_at_full_speed(surge: float) -
     for wall_m in (0.4, 2.0):
         cells = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
         cells[50 + round(wall_m / CELL_M) : 60, :] = True
-        speeds.append(plan_motion(round_about(cells), BoatState(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
+        speeds.append(plan_on(round_about(cells), BoatState(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
     assert speeds == [0.3, 0.6]
 
 
 def test_plans_are_reproduced_bit_by_bit() -> None:
     """The same observations give the same plan to the last bit, whatever was computed in between."""
     bar = (4.0, -0.4, 4.6, 0.4)
-    first = msgspec.json.encode(plan_motion(pool(bar), CRUISING, GuidanceSetpoint(0.123, 0.6), None, PLANNER))
-    plan_motion(pool(), RESTING, GuidanceSetpoint(-1.0, 0.3, 1.0), None, PLANNER)
-    assert msgspec.json.encode(plan_motion(pool(bar), CRUISING, GuidanceSetpoint(0.123, 0.6), None, PLANNER)) == first
+    first = msgspec.json.encode(plan_on(pool(bar), CRUISING, GuidanceSetpoint(0.123, 0.6), None, PLANNER))
+    plan_on(pool(), RESTING, GuidanceSetpoint(-1.0, 0.3, 1.0), None, PLANNER)
+    assert msgspec.json.encode(plan_on(pool(bar), CRUISING, GuidanceSetpoint(0.123, 0.6), None, PLANNER)) == first

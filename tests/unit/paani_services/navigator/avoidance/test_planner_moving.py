@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani_services.navigator.avoidance.clearance import UNSEEN_GROWTH_MPS, predicted_clearance_m
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.replanning import PlannerState, replan
 from paani_services.navigator.avoidance.rollout import (
     BoatState,
@@ -31,6 +30,7 @@ from tests.synthetic_water import (
     detection_of,
     observe_from,
     odometry,
+    plan_on,
     static_distances_m,
     water_edge_of,
 )
@@ -48,7 +48,7 @@ def test_a_boat_waits_for_a_crossing_swimmer_and_passes_behind(side: float) -> N
     """Under way on open water it waits, or brakes and looks round, and lets the swimmer pass."""
     grid = open_water()
     found = [
-        plan_motion(grid, CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, side * y_m, 0.0, side * 0.35),))
+        plan_on(grid, CRUISING, AHEAD, None, PLANNER, (swimmer(3.0, side * y_m, 0.0, side * 0.35),))
         for y_m in (-2.0, -1.0, 0.0, 0.5, 1.5)
     ]
     assert [each.speed_mps for each in found] == [0.06, 0.0, 0.06, 0.3, 0.3]
@@ -59,10 +59,10 @@ def test_a_person_who_may_swim_but_does_not_is_passed_in_the_end() -> None:
     """A person who treads water, or is a false detection, is a static obstacle once the boat may wait no longer."""
     grid = open_water()
     person = DynamicObstacle(np.array([2.8]), np.array([0.5]), 0.5, Velocity(0.0, 0.0, 0.2), 0.1, frozenset())
-    found = [plan_motion(grid, RESTING, AHEAD, None, PLANNER, (person,), may_wait=patient) for patient in (True, False)]
+    found = [plan_on(grid, RESTING, AHEAD, None, PLANNER, (person,), may_wait=patient) for patient in (True, False)]
     assert [each.speed_mps > 0.0 for each in found] == [False, True]
     crossing = swimmer(3.0, -1.0, 0.0, 0.35)
-    assert plan_motion(grid, CRUISING, AHEAD, None, PLANNER, (crossing,), may_wait=False).speed_mps <= 0.3
+    assert plan_on(grid, CRUISING, AHEAD, None, PLANNER, (crossing,), may_wait=False).speed_mps <= 0.3
 
 
 def test_a_boat_waits_for_patience_s_at_most() -> None:
@@ -94,7 +94,7 @@ def test_a_boat_at_rest_gives_way_to_a_vessel_that_drifts_onto_it(side: float) -
     grid = open_water()
     outline = (np.full(9, 3.8), side * 0.3 + np.linspace(-1.0, 1.0, 9))
     kayak = DynamicObstacle(*outline, 0.2, Velocity(-0.13, 0.0, 0.03), 0.1, frozenset())
-    found = plan_motion(grid, RESTING, AHEAD, None, PLANNER, (kayak,))
+    found = plan_on(grid, RESTING, AHEAD, None, PLANNER, (kayak,))
     assert found.speed_mps > 0.0
     assert found.heading_rad * side < -0.8
 
@@ -132,23 +132,23 @@ def least_gap_m(found: Plan, start: BoatState, obstacle: DynamicObstacle) -> flo
 def test_a_crossing_swimmer_is_passed_astern(side: float) -> None:
     """A static swimmer would be passed on the other side; one who crosses the bow from `side` is passed behind."""
     crossing = swimmer(4.5, side * 1.5, 0.0, -side * 0.35)
-    found = plan_motion(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,))
+    found = plan_on(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,))
     assert found.speed_mps > 0.0
     assert found.heading_rad * side > 0.05
     standing = swimmer(4.5, side * 0.3, 0.0, 0.0)
-    assert plan_motion(open_water(), CRUISING, AHEAD, None, PLANNER, (standing,)).heading_rad * side < 0.0
+    assert plan_on(open_water(), CRUISING, AHEAD, None, PLANNER, (standing,)).heading_rad * side < 0.0
 
 
 def test_an_obstacle_that_has_passed_by_then_changes_nothing() -> None:
     """It crosses the course, but is past before the boat comes."""
     gone = swimmer(5.5, 0.6, 0.0, 0.6)
-    assert plan_motion(open_water(), CRUISING, AHEAD, None, PLANNER, (gone,)) == Plan(0.0, 0.6)
+    assert plan_on(open_water(), CRUISING, AHEAD, None, PLANNER, (gone,)) == Plan(0.0, 0.6)
 
 
 def test_head_on_the_boat_turns_or_stops() -> None:
     for ahead_m in (3.0, 4.0, 5.0):
         oncoming = swimmer(ahead_m, 0.0, -0.4, 0.0)
-        found = plan_motion(open_water(), CRUISING, AHEAD, None, PLANNER, (oncoming,))
+        found = plan_on(open_water(), CRUISING, AHEAD, None, PLANNER, (oncoming,))
         assert found.speed_mps == 0.0 or abs(found.heading_rad) > 0.1
         straight = least_gap_m(Plan(0.0, 0.6), CRUISING, oncoming)
         assert least_gap_m(found, CRUISING, oncoming) > straight + 0.3
@@ -157,14 +157,14 @@ def test_head_on_the_boat_turns_or_stops() -> None:
 def test_a_boat_at_rest_gives_way_to_a_swimmer_from_the_side() -> None:
     """The boat moves to where the swimmer comes no nearer than to a waiting boat."""
     coming = swimmer(0.3, 2.2, 0.0, -0.4)
-    found = plan_motion(open_water(), RESTING, AHEAD, None, PLANNER, (coming,))
+    found = plan_on(open_water(), RESTING, AHEAD, None, PLANNER, (coming,))
     assert found.speed_mps > 0.0
     assert least_gap_m(found, RESTING, coming) > least_gap_m(Plan(0.0, 0.0), RESTING, coming) + 0.3
 
 
 def test_an_obstacle_out_of_sight_for_unseen_s_counts_no_more() -> None:
     crossing = swimmer(3.0, 0.3, 0.0, -0.1, PLANNER.unseen_s + 0.1)
-    assert plan_motion(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,)) == Plan(0.0, 0.6)
+    assert plan_on(open_water(), CRUISING, AHEAD, None, PLANNER, (crossing,)) == Plan(0.0, 0.6)
 
 
 @pytest.mark.slow
@@ -194,7 +194,7 @@ def test_a_dynamic_obstacle_makes_no_candidate_feasible_but_one_wider_than_coast
         BoatState(0.0, 0.0, 0.0, surge),
     )
     obstacle = swimmer(*place, *velocity)
-    found = plan_motion(grid, start, AHEAD, None, PLANNER, (obstacle,))
+    found = plan_on(grid, start, AHEAD, None, PLANNER, (obstacle,))
     if found.speed_mps == 0.0:
         return
     trajectories = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
@@ -205,7 +205,7 @@ def test_a_dynamic_obstacle_makes_no_candidate_feasible_but_one_wider_than_coast
         predicted_clearance_m(obstacle, np.zeros_like(time_s), np.zeros_like(time_s), time_s)[:, 0]
     )
     keeps = (gap_m >= np.minimum(1.0, np.maximum(rest_m - 0.1, 0.0)) - 1e-9).all()
-    if not keeps or plan_motion(grid, start, AHEAD, None, PLANNER).speed_mps == 0.0:
+    if not keeps or plan_on(grid, start, AHEAD, None, PLANNER).speed_mps == 0.0:
         assert least_m(grid, obstacle, trajectories) > least_m(
             grid, obstacle, roll_out_coasting(start, trajectories.time_s, PLANNER)
         )

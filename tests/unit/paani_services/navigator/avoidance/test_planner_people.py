@@ -8,7 +8,6 @@ import pytest
 
 from paani.messages import Detection, Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
@@ -22,6 +21,7 @@ from tests.synthetic_water import (
     detection_of,
     observe_from,
     observe_then_look_astern,
+    plan_on,
     water_edge_of,
 )
 
@@ -72,8 +72,7 @@ def test_the_boat_goes_slower_where_a_person_may_be(x_m: float, y_m: float) -> N
     grid = grid._replace(free=~grid.occupied)  # everything else is known to be free
     start, setpoint = BoatState(x_m, y_m, 0.0, 0.6), GuidanceSetpoint(0.0, 0.6)
     found, at_once = (
-        plan_motion(given, start, setpoint, None, PLANNER)
-        for given in (grid, grid._replace(reachable_unseen=grid.people))
+        plan_on(given, start, setpoint, None, PLANNER) for given in (grid, grid._replace(reachable_unseen=grid.people))
     )
     assert found.speed_mps < at_once.speed_mps
 

@@ -9,7 +9,6 @@ import pytest
 from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m, predicted_clearance_m
 from paani_services.navigator.avoidance.constraints import ESCAPE_TOLERANCE_M
-from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, roll_out
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
 from paani_services.navigator.mapping.observation import ObservationMemory
@@ -26,6 +25,7 @@ from tests.synthetic_water import (
     detection_of,
     observe_from,
     observe_then_look_astern,
+    plan_on,
     water_edge_of,
 )
 
@@ -113,16 +113,16 @@ def test_a_waiting_boat_pivots_to_its_course(side: float) -> None:
     drifting = DynamicObstacle(
         np.array([0.3]), np.array([2.6 * side]), 0.2, Velocity(0.08, 0.0, 0.03), 3.0, frozenset()
     )
-    found = plan_motion(grid, resting, setpoint, None, PLANNER, (drifting,))
+    found = plan_on(grid, resting, setpoint, None, PLANNER, (drifting,))
     assert found.speed_mps == pytest.approx(0.06)
     assert found.heading_rad == pytest.approx(1.8 * side)
     on = roll_out(resting, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
     near = on.time_s <= PLANNER.horizon_s
     assert np.hypot(on.x_m, on.y_m)[near].max() < 0.2
     turned = BoatState(0.0, 0.0, 1.8 * side)
-    assert plan_motion(grid, turned, setpoint, None, PLANNER, (drifting,)).speed_mps == 0.0
+    assert plan_on(grid, turned, setpoint, None, PLANNER, (drifting,)).speed_mps == 0.0
     pushes_only = msgspec.structs.replace(PLANNER, turn_radius_m=0.5)
-    assert plan_motion(grid, resting, setpoint, None, pushes_only, (drifting,)).speed_mps == 0.0
+    assert plan_on(grid, resting, setpoint, None, pushes_only, (drifting,)).speed_mps == 0.0
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 60.0, 170.0])
@@ -138,7 +138,7 @@ def test_a_boat_leaves_where_an_unseen_obstacle_may_have_got_to(course_deg: floa
     assert clearance_field_m(grid, PLANNER)[GRID_CELLS // 2, GRID_CELLS // 2] < -0.3
     coming = DynamicObstacle(np.array([-1.6]), np.array([1.2]), 0.2, Velocity(0.1, -0.08, 0.05), 14.0, frozenset())
     assert predicted_clearance_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here
-    found = plan_motion(grid, start, GuidanceSetpoint(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
+    found = plan_on(grid, start, GuidanceSetpoint(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
     assert 0.0 < found.speed_mps < 0.6
     on = roll_out(start, np.array([found.heading_rad]), np.array([found.speed_mps]), PLANNER)
     gaps_m = predicted_clearance_m(coming, on.x_m, on.y_m, on.time_s[:, None])[on.time_s <= PLANNER.horizon_s]
