@@ -1,4 +1,4 @@
-"""`paani bench chain`, `paani bench judgement`, `paani bench recorder`, and those of other packages."""
+"""`paani bench chain`, `judgement`, `planner`, `recorder`, and those of other packages."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from paani.statistics.measured import Machine, Report, measure_tables
 from paani.whole_file import write_whole
 from paani_tools.bench.chain import chain_bench, chain_text
 from paani_tools.bench.judgement import contract, step
+from paani_tools.bench.planner import plan_among_obstacles, plan_recorded
 from paani_tools.bench.recording_cost import recorder
 from paani_tools.bench.steadiness import steadiness
 from paani_tools.replay.speed import measure_replay
@@ -35,9 +36,7 @@ def main(argv: list[str]) -> int:
     if argv and argv[0] in others:
         return int(others[argv[0]].load()(argv[1:]))
     parser = argparse.ArgumentParser(prog="paani bench", description="Measure, and print the figures side by side.")
-    benches = parser.add_subparsers(
-        dest="what", required=True, metavar=" | ".join(["chain", "judgement", "recorder", *others])
-    )
+    benches = parser.add_subparsers(dest="what", required=True, metavar=" | ".join([*BENCHES, *others]))
     chain = benches.add_parser("chain", help="the whole loop, from the picture to the thrust")
     chain.add_argument("--world", help="river or lake (default: river)")
     chain.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")
@@ -58,12 +57,19 @@ def main(argv: list[str]) -> int:
     )
     judgement.add_argument("--only", action="append", default=[], metavar="PART", help="these parts alone")
     add_config_arguments(judgement)
+    planning = benches.add_parser("planner", help="the navigator's map and plan among 12 moving obstacles")
+    planning.add_argument("--steps", type=whole_number(), default=300, metavar="N", help="to plan; default: 300")
+    planning.add_argument(
+        "--drive", type=Path, action="append", default=[], metavar="LOG", help="plan these recordings again as well"
+    )
+    planning.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
+    add_config_arguments(planning)
     recording = benches.add_parser("recorder", help="what recording a drive costs")
     recording.add_argument("--for", dest="seconds", type=seconds, default=30.0, metavar="S", help="default: 30")
     recording.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(recording)
     options = parser.parse_args(argv)
-    return {"chain": _chain, "judgement": _judgement, "recorder": _recorder}[options.what](options)
+    return BENCHES[options.what](options)
 
 
 def _chain(options: argparse.Namespace) -> int:
@@ -105,6 +111,18 @@ def _judgement(options: argparse.Namespace) -> int:
     return 0
 
 
+def _planner(options: argparse.Namespace) -> int:
+    """Print each part as it is done. Raises UserError for a log that cannot be read or a file not written."""
+    config = config_from(options)
+    parts = [lambda: plan_among_obstacles(config, options.steps)]
+    if options.drive:
+        parts.append(lambda: plan_recorded(options.drive))
+    report = measure_tables(parts)
+    if options.json:
+        write_whole(options.json, msgspec.json.encode(report) + b"\n", "--json")
+    return 0
+
+
 def _recorder(options: argparse.Namespace) -> int:
     """Drive, record, print. Exit codes as `paani up`."""
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
@@ -120,3 +138,8 @@ def _recorder(options: argparse.Namespace) -> int:
     if options.json:
         write_whole(options.json, msgspec.json.encode(Report(machine=machine, parts=(part,))) + b"\n", "--json")
     return 0
+
+
+BENCHES: dict[str, Callable[[argparse.Namespace], int]] = {
+    "chain": _chain, "judgement": _judgement, "planner": _planner, "recorder": _recorder,
+}  # fmt: skip

@@ -115,6 +115,11 @@ class Recomputation:
                 missing = missing if excuse is None else 0
             yield self._recompute(given)._replace(missing_before=missing)
 
+    @property
+    def state(self) -> Any:
+        """After the step before; None where it is not known."""
+        return self._state
+
     def is_lost(self, topic: str, count: int = 1) -> bool:
         """Whether the recorder has counted as many more messages of a topic as lost."""
         if self._lost.get(topic, 0) < count:
