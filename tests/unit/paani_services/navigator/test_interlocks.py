@@ -12,6 +12,7 @@ from paani.config import NavigatorConfig
 from paani.messages import Direction, FenceArea, Inhibit, Keep, NavCommand, Purpose, SimTime, Waypoint
 from paani.missions import mission_of_route
 from paani.motion_planning import HeadingSpeed, MotionPlanner, PlanningInputs
+from paani_services.navigator.avoidance.replanning import observe
 from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION, RESIDUAL_DRIFT_MPS
 from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
@@ -20,6 +21,7 @@ from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import (
     NavigatorInputs,
     NavigatorState,
+    begin_step,
     build_command,
     is_out_of_date,
     navigate,
@@ -45,6 +47,10 @@ POOL = FenceArea(
 )
 FENCED = msgspec.structs.replace(MISSION, fence=(POOL,))
 OUTSIDE = pose(31.0, 0.0)
+TRACK_OF_FIRST_BOX = m.Track(
+    id=4, label=m.Label.PERSON, hazard=m.Hazard.SWIMMER, confidence=0.9, box_xyxy=(0.4, 0.5, 0.6, 0.7), hits=2,
+    confirmed=True, immediate_danger=False, accepted=True, held=False, age_s=0.4, urgency=0.0, detection_number=1,
+)  # fmt: skip
 
 
 def test_a_disabled_order_has_neither_heading_nor_speed() -> None:
@@ -72,7 +78,7 @@ def test_an_order_carries_the_progress_of_the_mission() -> None:
     )
     assert (order.waypoint_index, order.waypoints_reached, order.leg_index) == (2, 5, 3)
     assert (order.cross_track_m, order.leg) == (0.5, "transit")
-    assert (order.vetoes, order.obstacle_track_ids) == (vetoes, (4,))
+    assert (order.vetoes, order.obstacle_track_ids, order.direction) == (vetoes, (4,), Direction.STRAIGHT)
 
 
 def test_an_unhealthy_estimate_moves_nothing_in_the_state() -> None:
@@ -85,8 +91,38 @@ def test_an_unhealthy_estimate_moves_nothing_in_the_state() -> None:
     blind, order = navigate(RUNNING, inputs(odometry=doubtful, advisory=None), MISSION, NOW_US, 43, PAANI)
     assert (order.source_us, blind.passed_obstacles) == (NOW_US, RUNNING.passed_obstacles)
     assert (state.passed_obstacles, state.progress) == (RUNNING.passed_obstacles, RUNNING.progress)
-    healthy, _ = navigate(RUNNING, inputs(odometry=pose(9.9, 0.0), advisory=beside), MISSION, NOW_US, 43, PAANI)
+    near = msgspec.structs.replace(PAANI, clear_m=0.5)
+    healthy, _ = navigate(RUNNING, inputs(odometry=pose(9.9, 0.0), advisory=beside), MISSION, NOW_US, 43, near)
     assert healthy.passed_obstacles != RUNNING.passed_obstacles
+
+
+@pytest.mark.parametrize("direction", [Direction.STOP, Direction.LEFT, None])
+def test_what_does_not_follow_its_path_holds_the_integral_over_this_step(direction: Direction | None) -> None:
+    """So that this time is not integrated later; the order still says how far off the path the boat is."""
+    advisory = None if direction is None else advice(direction)
+    state, order = navigate(RUNNING, inputs(odometry=pose(3.0, -2.0), advisory=advisory), MISSION, NOW_US, 43, PAANI)
+    assert (state.ilos, order.source_us) == (IlosState(0.0, 0.0, NOW_US), NOW_US)
+    assert order.cross_track_m == pytest.approx(-2.0)
+
+
+def test_the_integral_runs_with_any_look_ahead() -> None:
+    near = msgspec.structs.replace(PAANI, lookahead_m=0.5)
+    before = msgspec.structs.replace(RUNNING, ilos=IlosState(updated_us=NOW_US - 100_000))
+    state, _ = navigate(before, inputs(odometry=pose(3.0, -0.2)), MISSION, NOW_US, 43, near)
+    assert state.ilos.north_m < 0.0
+
+
+def test_the_next_leg_begins_without_the_integral_of_the_one_before() -> None:
+    first = msgspec.structs.replace(MISSION.legs[0], waypoints=SQUARE.waypoints[:2], repeat=False)
+    before = msgspec.structs.replace(RUNNING, ilos=IlosState(east_m=0.5, north_m=0.5, updated_us=NOW_US))
+    mission = msgspec.structs.replace(MISSION, legs=(first, *MISSION.legs))
+    state, order = navigate(before, inputs(odometry=pose(9.9, 0.0)), mission, NOW_US, 43, PAANI)
+    assert (order.leg_index, state.ilos) == (1, IlosState(0.0, 0.0, NOW_US))
+
+
+def test_the_mission_notes_which_run_of_the_operators_process_armed_the_boat() -> None:
+    armed = m.Arming(source_us=NOW_US, armed=True, epoch=9)
+    assert navigate(RUNNING, inputs(arming=armed), MISSION, NOW_US, 43, PAANI)[0].progress.armed_epoch == 9
 
 
 @pytest.mark.parametrize("direction", [Direction.STRAIGHT, Direction.LEFT])
@@ -143,25 +179,66 @@ def test_a_boat_with_way_on_is_still_ordered_to_brake() -> None:
 
 
 def test_a_plan_is_sailed_at_its_own_heading_and_speed() -> None:
-    _, order = planned(aside)
+    state, order = planned(aside)
     assert order.heading_rad == pytest.approx(0.3)
     assert order.speed_mps == pytest.approx(min(PAANI.cruise_mps, PAANI.planner.speed_mps))
-    assert order.obstacle_track_ids == ()
-    _, order = planned(aside, advisory=advice(Direction.LEFT))
-    assert order.speed_mps == pytest.approx(0.5 * PAANI.cruise_mps)
+    assert (order.obstacle_track_ids, state.planner_state.advised_side) == ((), 0.0)
+    assert state.ilos.updated_us == NOW_US, "held beside the course"
+    state, order = planned(aside, advisory=advice(Direction.LEFT))
+    assert (state.planner_state.advised_side, order.speed_mps) == (1.0, pytest.approx(0.5 * PAANI.cruise_mps))
     assert order.heading_rad == pytest.approx(0.3)  # the map decides where, not the angle of a visual turn
 
 
-@pytest.mark.parametrize("direction", [Direction.STOP, Direction.NO_DATA])
-def test_no_plan_is_made_where_the_advice_forbids_motion(direction: Direction) -> None:
+HALTED = msgspec.structs.replace(advice(Direction.STRAIGHT), speed_limit_mps=0.0)
+
+
+@pytest.mark.parametrize(
+    ("advisory", "inhibits"),
+    [
+        (advice(Direction.STOP), (Inhibit.ADVISED_STOP,)),
+        (advice(Direction.NO_DATA), (Inhibit.ADVISED_NO_DATA,)),
+        (HALTED, ()),
+    ],
+)
+def test_no_plan_is_made_where_the_advice_forbids_motion(advisory: m.Advisory, inhibits: tuple[Inhibit, ...]) -> None:
     asked: list[PlanningInputs] = []
 
     def count(given: PlanningInputs) -> HeadingSpeed:
         asked.append(given)
         return aside(given)
 
-    _, order = planned(count, advisory=advice(direction))
-    assert (order.enable, asked) == (False, [])
+    _, order = planned(count, advisory=advisory)
+    assert (order.inhibits, order.speed_mps, asked) == (inhibits, 0.0, [])
+
+
+@pytest.mark.parametrize(("mission", "is_shut_in"), [(MISSION, False), (FENCED, True)])
+def test_the_planner_is_shown_the_fence(mission: m.Mission, is_shut_in: bool) -> None:
+    def look(given: PlanningInputs) -> HeadingSpeed:
+        assert given.occupied.any() == is_shut_in
+        return aside(given)
+
+    assert navigate(RUNNING, inputs(), mission, NOW_US, 43, PAANI, CAMERA, look)[1].enable
+
+
+def test_an_order_names_the_tracks_that_its_plan_was_made_for() -> None:
+    state, _ = planned(aside)
+    tracked = msgspec.structs.replace(
+        state, planner_state=msgspec.structs.replace(state.planner_state, obstacle_track_ids=(4,))
+    )
+    assert planned(aside, tracked)[1].obstacle_track_ids == (4,)
+    assert navigate(tracked, inputs(), MISSION, NOW_US, 43, PAANI)[1].obstacle_track_ids == (), "without a plan"
+
+
+def test_the_map_is_told_the_tracks_of_its_boxes() -> None:
+    person = m.Detection(label=m.Label.PERSON, confidence=0.9, box_xyxy=(0.4, 0.5, 0.6, 0.7))
+    seen = evidence(NOW_US, (0.5,) * COLUMNS, detections=(person,))
+    tracks = m.Tracks(
+        source_us=NOW_US, frame_seq=seen.frame_seq, frame_epoch=seen.frame_epoch, tracks=(TRACK_OF_FIRST_BOX,)
+    )
+    given_inputs = inputs(evidence=seen, tracks=tracks)
+    state, _ = begin_step(RUNNING, given_inputs, NOW_US, 43, PAANI, CAMERA)
+    assert state.planner_state == observe(RUNNING.planner_state, given_inputs.odometry, seen, PAANI.planner, tracks)
+    assert state.planner_state.memory.observations[-1].box_track_ids == (TRACK_OF_FIRST_BOX.id,)
 
 
 def test_with_a_map_a_turn_may_reach_a_waypoint() -> None:
@@ -221,6 +298,8 @@ def test_a_stamp_is_out_of_date_beyond_its_limit_and_in_the_future(profile: Navi
     future_us = round(profile.max_future_s * 1e6)
     for age_us, is_old in ((0, False), (500_000, False), (500_001, True), (-future_us, False), (-future_us - 1, True)):
         assert is_out_of_date(NOW_US - age_us, 0.5, NOW_US, profile) is is_old
+    exact = msgspec.structs.replace(profile, max_future_s=0.5)
+    assert not is_out_of_date(NOW_US + 500_000, 0.5, NOW_US, exact)
 
 
 @pytest.mark.parametrize("kind", ["advisory", "odometry", "clock", "arming", "evidence"])

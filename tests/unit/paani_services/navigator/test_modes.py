@@ -126,6 +126,7 @@ def test_other_legs_begin_with_the_first_and_another_fence_begins_none_anew() ->
     assert (after.progress.target, command.waypoints_reached, after.legs_us) == (3, 9, 0)
     after, command = step(ordered(DriveMode.ROUTE, mission_us=7), state, mission=OTHER)
     assert (after.progress.target, command.waypoints_reached, after.progress.home) == (1, 9, HERE)
+    assert after.progress.waypoints_reached_before == 9
     assert after.legs_us == 7
     assert command.heading_rad == pytest.approx(-math.pi / 2)
     again, _ = step(ordered(DriveMode.ROUTE, mission_us=7), after, mission=OTHER)
@@ -136,6 +137,11 @@ def test_a_mission_without_legs_moves_nothing() -> None:
     cleared = msgspec.structs.replace(OTHER, legs=())
     _, command = step(ordered(DriveMode.ROUTE, mission_us=7), mission=cleared)
     assert (command.enable, command.inhibits) == (False, (Inhibit.MISSION_DONE,))
+
+
+def test_a_boat_without_a_mission_keeps_the_place_it_has_in_the_one_before() -> None:
+    state, _ = follow_order(RUNNING, inputs(order=ordered(DriveMode.IDLE), order_us=NOW_US), None, NOW_US, 43, PAANI)
+    assert (state.progress, state.legs_us) == (RUNNING.progress, 0)
 
 
 def test_idle_is_no_thrust() -> None:
@@ -342,13 +348,14 @@ def test_an_order_without_advice_has_the_time_of_its_step(mode: DriveMode) -> No
 def test_an_errand_leaves_count_and_integral_of_the_mission_alone_and_has_its_own() -> None:
     under_way = msgspec.structs.replace(
         RUNNING,
-        progress=MissionProgress(target=2, leg_start=HERE, waypoints_reached=5),
+        progress=MissionProgress(leg_index=1, target=2, leg_start=HERE, waypoints_reached=5),
         ilos=IlosState(east_m=0.5, north_m=-0.2, updated_us=NOW_US - 100_000),
     )
     order = ordered(DriveMode.RETURN, target=(Waypoint(x_m=60.0, y_m=0.0),))
     state, command = step(order, under_way, odometry=pose(3.0, 2.0))
-    assert (command.waypoint_index, command.waypoints_reached, command.leg_index) == (2, 5, 0)
+    assert (command.waypoint_index, command.waypoints_reached, command.leg_index) == (2, 5, 1)
     assert (state.ilos.east_m, state.ilos.north_m, state.ilos.updated_us) == (0.5, -0.2, NOW_US)
+    assert state.errand_ilos.updated_us == NOW_US
     assert state.progress.home == Waypoint(x_m=3.0, y_m=2.0)
     held = msgspec.structs.replace(state, progress=msgspec.structs.replace(state.progress, home=HERE))
     assert step(order, held, odometry=pose(30.0, 2.0))[0].progress.home == HERE
@@ -372,10 +379,12 @@ def test_another_planner_is_asked_on_the_mission_and_on_an_errand(order: Operato
     assert command.speed_mps == 0.2
 
 
-@pytest.mark.parametrize("surge", [0.3, 0.5, 1.0])
-def test_the_fence_holds_a_hand_at_any_surge_ahead(surge: float) -> None:
+@pytest.mark.parametrize(("surge", "turn"), [(0.3, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 1.0)])
+def test_the_fence_holds_a_hand_at_any_surge_ahead_and_in_a_turn_which_pushes_ahead_too(
+    surge: float, turn: float
+) -> None:
     at_edge = msgspec.structs.replace(pose(4.5, 0.0), surge_mps=0.0)
-    _, command = step(manual(surge), odometry=at_edge, mission=fenced_pool())
+    _, command = step(manual(surge, turn), odometry=at_edge, mission=fenced_pool())
     assert (command.enable, command.inhibits) == (False, (Inhibit.OUTSIDE_FENCE,))
 
 

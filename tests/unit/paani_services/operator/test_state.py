@@ -39,15 +39,17 @@ def test_the_state_after_a_start_follows_the_latch_and_is_never_armed(latch: str
     state = op.initial_state(latch)
     assert (state.armed, state.stopped) == (False, stopped)
     word = op.arming_message(state, 5)
-    assert (word.armed, word.stopped) == (False, stopped)
+    assert (word.source_us, word.armed, word.stopped) == (5, False, stopped)
+    assert not op.awaits_zero(state), "nobody has asked this process"
 
 
 @pytest.mark.parametrize(
     ("held_s", "refusal"),
     [
         (0.9, m.ArmRefusal.TOO_SHORT),
-        (1.1, m.ArmRefusal.NONE),
+        (op.HOLD_MIN_S, m.ArmRefusal.NONE),
         (4.9, m.ArmRefusal.NONE),
+        (op.HOLD_MAX_S, m.ArmRefusal.NONE),
         (5.2, m.ArmRefusal.TOO_LONG),
     ],
 )
@@ -57,6 +59,7 @@ def test_a_press_arms_by_how_long_it_was_held(held_s: float, refusal: m.ArmRefus
 
 
 def test_a_client_that_was_silent_has_let_go() -> None:
+    assert not op.is_silent(op.Hold(STATION, 7, 0, BEGUN_US), BEGUN_US + round(op.REFRESH_MAX_S * 1e6))
     late_us = BEGUN_US + round((op.REFRESH_MAX_S + 1.2) * 1e6)
     state = held(op.initial_state(op.CLEAR), 1.2)
     assert op.judge_release(state, STATION, 7, late_us) is m.ArmRefusal.BROKEN
@@ -198,11 +201,12 @@ def test_a_press_that_is_refused_ends_no_other_hold() -> None:
     assert op.refuse(op.Operator(), STATION, 7, m.ArmRefusal.BROKEN).hold is None
 
 
+@pytest.mark.parametrize("asked_us", [1, BEGUN_US])
 @pytest.mark.parametrize("since_us", [-5, 0, 1, 2, 500])
-def test_a_stop_is_confirmed_after_it_was_asked_for_whatever_the_clock_says(since_us: int) -> None:
-    stopped = op.latch_stop(op.Operator(armed=True, stopped=False), "stop", BEGUN_US)
-    confirmed = op.confirm_stop(stopped, applied(m.ZeroCause.NOT_ARMED), BEGUN_US + since_us)
-    assert confirmed.confirmed_us == BEGUN_US + max(1, since_us)
+def test_a_stop_is_confirmed_after_it_was_asked_for_whatever_the_clock_says(asked_us: int, since_us: int) -> None:
+    stopped = op.latch_stop(op.Operator(armed=True, stopped=False), "stop", asked_us)
+    confirmed = op.confirm_stop(stopped, applied(m.ZeroCause.NOT_ARMED), asked_us + since_us)
+    assert confirmed.confirmed_us == asked_us + max(1, since_us)
 
 
 def test_a_page_that_is_silent_for_as_long_as_it_may_keeps_the_boat_armed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -141,8 +142,8 @@ def test_a_silent_hand_has_let_go_and_its_return_drives_nothing(surge: float, li
     bridge = at_the_wheel(surge)
     bridge.wait(limit_s)
     assert (bridge.order.mode, bridge.order.surge) == (DriveMode.MANUAL, surge)
-    late = bridge.now_us + 1
-    assert w.order_message(bridge.wheel, late, armed=True).mode is DriveMode.IDLE, "before anybody has noticed"
+    late = w.order_message(bridge.wheel, bridge.now_us + 1, armed=True)
+    assert (late.mode, late.target, late.override) == (DriveMode.IDLE, (), False), "before anybody has noticed"
     bridge.wait(1e-6)
     bridge.drive(surge)
     assert (bridge.order.mode, bridge.order.surge, bridge.order.since_us) == (DriveMode.IDLE, 0.0, bridge.now_us)
@@ -166,8 +167,17 @@ def test_a_set_point_that_was_overtaken_is_passed_over_also_after_manual_began_a
     bridge.mode(DriveMode.MANUAL)
     bridge.drive(0.5, number=1000)
     assert bridge.order.surge == 0.0
-    bridge.drive(0.5, number=1001)
-    assert bridge.order.surge == 0.5
+    bridge.drive(0.5, 0.25, number=1001)
+    assert (bridge.order.surge, bridge.order.turn) == (0.5, 0.25)
+
+
+def test_a_hand_that_takes_the_wheel_numbers_its_set_points_from_the_first() -> None:
+    bridge = at_the_wheel()
+    bridge.drive(0.5, number=1000)
+    bridge.ask(RequestAct.WHEEL, hand=2)
+    bridge.mode(DriveMode.MANUAL, hand=2)
+    bridge.drive(0.25, hand=2, number=1)
+    assert bridge.order.surge == 0.25
 
 
 def test_an_override_is_of_manual_alone_and_ends_by_itself() -> None:
@@ -240,6 +250,8 @@ def test_an_override_lasts_to_the_microsecond_and_never_longer_than_asked(left_u
     """What lies further ahead than an override lasts is of a clock that was set back."""
     wheel = w.Wheel(mode=DriveMode.MANUAL, override_until_us=BEGUN_US + left_us)
     assert w.is_overridden(wheel, BEGUN_US) is is_in_force
+    begun = msgspec.structs.replace(wheel, override_until_us=left_us)
+    assert w.order_message(begun, 0, armed=True).override is is_in_force
 
 
 def test_a_hands_order_is_dated_by_its_word_and_any_other_by_now() -> None:
@@ -249,8 +261,9 @@ def test_a_hands_order_is_dated_by_its_word_and_any_other_by_now() -> None:
     bridge.now_us += 200_000
     assert bridge.order.source_us == said_us
     assert bridge.mode(DriveMode.HOLD) is ModeRefusal.NONE
-    assert bridge.order.source_us == bridge.now_us
     assert (bridge.order.by, bridge.order.hand, bridge.order.since_us) == (STATION, 1, bridge.now_us)
+    bridge.now_us += 200_000
+    assert bridge.order.source_us == bridge.now_us
 
 
 def test_everybody_hears_who_holds_the_wheel_and_what_was_answered() -> None:
