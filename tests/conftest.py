@@ -27,7 +27,11 @@ from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "browser": "exposed_page heading_verdicts legibility map_projection models_report recordings_tab",
+    "bench": "board bridge chain eyes fleet judgement recorder",
+    "browser": """
+        exposed_page heading_verdicts indicator_strip installed legibility map_projection map_tiles models_report
+        recording_chip recordings_tab replay_page route_editor sensor_strip tuning_strip
+    """,
     "integration": """
         authority_matrix certificates claims_check cluster docs doctor examples inspect package replay stuck_detection
         trials
@@ -64,11 +68,11 @@ def is_whole_run(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """In a whole run what watches the clock gets a second try, which the summary tells; what stops the boat not."""
+    """In a whole run what starts processes gets a second try, which the summary tells; what stops the boat not."""
     items.sort(key=lambda item: not is_alone(item.nodeid))
     if is_whole_run(config):
         for item in items:
-            if is_alone(item.nodeid) and item.nodeid.split("/")[1] not in STOPS_THE_BOAT:
+            if item.nodeid.split("/")[1] in ALONE - STOPS_THE_BOAT:
                 item.add_marker(pytest.mark.flaky(reruns=1))
 
 

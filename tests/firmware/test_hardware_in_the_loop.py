@@ -21,7 +21,7 @@ from tests.mcu_peer import served
 
 pytestmark = [pytest.mark.firmware, pytest.mark.timeout(400)]
 READY_S = 120.0
-DRIVE_S = float(os.environ.get("HIL_DRIVE_S", "30"))
+DRIVE_S = float(os.environ.get("HIL_DRIVE_S", "20"))
 
 
 @contextlib.asynccontextmanager
