@@ -16,6 +16,7 @@ from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
 from paani_models.commands import prepare as prepare_command
 from paani_models.commands import report as report_command
+from paani_models.commands import small_obstacles as small_obstacles_command
 from paani_models.commands import temperature as temperature_command
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import list_pictures_without_water
@@ -57,6 +58,8 @@ def main(argv: list[str]) -> int:
             return evaluate_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "temperature":
             return temperature_command.run(arguments, _select_pictures(arguments))
+        if arguments.command == "small-obstacles":
+            return small_obstacles_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "report":
             return report_command.run(arguments, _select_pictures(arguments))
         if arguments.command == "quantise":
@@ -135,7 +138,11 @@ def _parser() -> argparse.ArgumentParser:
         "temperature", help="how far the mask's confidence is to be trusted, and a better temperature"
     )
     temperature_command.add_arguments(temperature)
-    for command in (export, evaluate, report, temperature):
+    small_obstacles = commands.add_parser(
+        "small-obstacles", help="how many of the small obstacles near the boat are seen"
+    )
+    small_obstacles_command.add_arguments(small_obstacles)
+    for command in (export, evaluate, report, temperature, small_obstacles):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
     variant = commands.add_parser("variant", help="the same nets, taking pictures as bytes: a little faster")
     variant.add_argument("--out", type=Path, required=True, help="folder for nets and manifest")
@@ -152,7 +159,7 @@ def _parser() -> argparse.ArgumentParser:
     quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
     quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
     quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
-    measuring = (evaluate, report, temperature, quantise, convert, bench)
+    measuring = (evaluate, report, temperature, small_obstacles, quantise, convert, bench)
     for command in (check, held_out, check_data, pack, train, export, *measuring):
         command.add_argument("--data", type=Path, default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated; all if not given")
