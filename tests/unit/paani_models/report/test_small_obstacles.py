@@ -12,7 +12,6 @@ from paani.errors import UserError
 from paani_models.datasets.sources import SOURCES, Sample
 from paani_models.detector.metrics import Detections
 from paani_models.report.small_obstacles import (
-    SMALL_FRAC,
     above_thresholds,
     format_small_obstacles,
     is_small_and_near,
@@ -32,7 +31,7 @@ def boxes(*rows: list[float]) -> np.ndarray:
 
 
 def test_a_box_is_small_by_its_area_and_near_by_its_foot() -> None:
-    limit = SMALL_FRAC * HEIGHT
+    limit = HEIGHT / 15
     given = boxes(
         box(10, 0.65 * HEIGHT), box(10, 0.65 * HEIGHT - 1), box(10, 290, limit), box(10, 290, limit - 0.1),
         [0, 200, 4 * limit, 200 + limit / 5],
@@ -74,6 +73,7 @@ def test_each_class_has_its_share_and_an_interval_over_sequences(tmp_path: Path)
         tmp_path,
         ("a", [(0, 20, 250), (0, 200, 250), (1, 20, 280), (1, 20, 100)]),
         ("b", [(0, 20, 250)]),
+        ("b", [(0, 20, 250)]),
         ("b", [(3, 20, 20)]),
     )
 
@@ -87,12 +87,13 @@ def test_each_class_has_its_share_and_an_interval_over_sequences(tmp_path: Path)
 
     rows = {row.kind: row for row in measure_small_obstacles(samples, segment, find)}
     people, vessels = rows["person"], rows["vessel"]
-    assert (people.boxes, people.pictures, people.sequences) == (3, 2, 2)
-    assert [each.value for each in people.recall.values()] == pytest.approx([2 / 3, 1 / 3, 1.0])
+    assert (people.boxes, people.pictures, people.sequences) == (4, 3, 2)
+    assert [each.value for each in people.recall.values()] == pytest.approx([3 / 4, 1 / 4, 1.0])
     assert (people.recall["mask"].low, people.recall["mask"].high) == (0.5, 1.0)
+    assert (vessels.pictures, vessels.sequences) == (1, 1)
     assert (vessels.boxes, vessels.recall["mask"].value, vessels.recall["detector"].value) == (1, 1.0, 0.0)
-    assert (rows["all"].boxes, rows["buoy"].boxes, rows["all"].recall["either"].value) == (4, 0, 1.0)
+    assert (rows["all"].boxes, rows["buoy"].boxes, rows["all"].recall["either"].value) == (5, 0, 1.0)
     text = format_small_obstacles(list(rows.values()))
     assert [line.split()[0] for line in text.splitlines()[2:]] == ["all", "person", "vessel"]
     with pytest.raises(UserError, match="no small obstacle"):
-        measure_small_obstacles(samples[2:], segment, find)
+        measure_small_obstacles(samples[3:], segment, find)

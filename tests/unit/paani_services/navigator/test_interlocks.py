@@ -388,3 +388,9 @@ def test_a_stale_order_is_no_leg_but_that_of_idle(mode: m.DriveMode, leg: str) -
     old_us = NOW_US - round(PAANI.order_max_age_s * 1e6) - 1
     _, command = follow_order(RUNNING, inputs(order=order, order_us=old_us), MISSION, NOW_US, 43, PAANI)
     assert (command.enable, command.inhibits, command.leg) == (False, (Inhibit.STALE_ORDER,), leg)
+
+
+def test_a_boat_without_a_mission_keeps_the_place_it_has_in_the_one_before() -> None:
+    idle = m.OperatorOrder(source_us=NOW_US, mode=m.DriveMode.IDLE)
+    state, _ = follow_order(RUNNING, inputs(order=idle, order_us=NOW_US), None, NOW_US, 43, PAANI)
+    assert (state.progress, state.legs_us) == (RUNNING.progress, 0)

@@ -139,11 +139,6 @@ def test_a_mission_without_legs_moves_nothing() -> None:
     assert (command.enable, command.inhibits) == (False, (Inhibit.MISSION_DONE,))
 
 
-def test_a_boat_without_a_mission_keeps_the_place_it_has_in_the_one_before() -> None:
-    state, _ = follow_order(RUNNING, inputs(order=ordered(DriveMode.IDLE), order_us=NOW_US), None, NOW_US, 43, PAANI)
-    assert (state.progress, state.legs_us) == (RUNNING.progress, 0)
-
-
 def test_idle_is_no_thrust() -> None:
     _, command = step(ordered(DriveMode.IDLE))
     assert (command.enable, command.inhibits, command.leg) == (False, (Inhibit.IDLE,), "idle")
