@@ -32,7 +32,7 @@ MANOEUVRE_TEXT = {
 UNUSABLE_TEXT = {
     UnusableCause.NONE: "gave no reason",
     UnusableCause.UNDECODABLE: "cannot be decoded",
-    UnusableCause.WRONG_SIZE: "has the wrong size",
+    UnusableCause.WRONG_SIZE: "is too small",
     UnusableCause.BLACK: "is black",
     UnusableCause.WHITE: "is white",
     UnusableCause.FLAT: "shows nothing",
@@ -64,7 +64,11 @@ MAX_LENGTH = 400  # characters, the limit of the message type `Text`
 
 def explain_advisory(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     """Say what is advised and why, and what would change it; the reason alone where both are too long."""
-    why = _people_text(advisory) + f"{MANOEUVRE_TEXT[advisory.direction]}: {_reason_text(advisory, tracks)}."
+    people, reason = _people_text(advisory), _reason_text(advisory, tracks)
+    if people and advisory.direction is Direction.STOP:
+        why = f"{people}{reason[0].upper()}{reason[1:]}."  # it begins with Stop already
+    else:
+        why = f"{people}{MANOEUVRE_TEXT[advisory.direction]}: {reason}."
     both = f"{why} {_counterfactual_text(advisory, tracks)}".rstrip()
     return both if len(both) <= MAX_LENGTH else why
 
@@ -137,10 +141,11 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
         who = "somebody is" if advisory.people_ahead else f"{CANDIDATE_TEXT} is"
         centre = f"{who} in the way ahead or beside it"
     limits = [_limit(side, advisory.side_block_risk) for side in (left, right)]
-    if limits[0] == limits[1]:
-        sides = f"left {left.risk:.2f}, right {right.risk:.2f} (limit {limits[0]:.2f})"
-    else:
-        sides = f"left {left.risk:.2f} (limit {limits[0]:.2f}), right {right.risk:.2f} (limit {limits[1]:.2f})"
+    side_texts = [f"left {left.risk:.2f}", f"right {right.risk:.2f}"]
+    if limits[0] != limits[1]:
+        side_texts = [f"{text} (limit {limit:.2f})" for text, limit in zip(side_texts, limits, strict=True)]
+    side_texts = [text + _closed_by(side, tracks) for text, side in zip(side_texts, (left, right), strict=True)]
+    sides = ", ".join(side_texts) + (f" (limit {limits[0]:.2f})" if limits[0] == limits[1] else "")
     match advisory.reason:
         case Reason.NO_EVIDENCE:
             return "nothing has been seen yet"
@@ -176,14 +181,22 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"{centre}; the sides are alike, keeping this one, {sides}"
         case Reason.TIE_STARBOARD:
             return f"{centre}; the sides are alike, starboard by rule, {sides}"
-        case Reason.NO_SAFE_SIDE:
-            return f"{centre} and no side is safe, {sides}"
+        case Reason.NO_SAFE_SIDE | Reason.NO_SIDE_UNOCCUPIED:
+            return f"{centre} and no side is free: {sides}"
         case Reason.NO_SIDE_FOR_LONG:
             return f"{centre} and no side is free for long; looking for a way, {sides}"
-        case Reason.NO_SIDE_UNOCCUPIED:
-            return f"{centre} and the safer side is occupied, {sides}"
         case _:
             return f"{centre}; {sides}"
+
+
+def _closed_by(side: LaneRisk, tracks: tuple[Track, ...]) -> str:
+    """What closes a side whose risk is below its limit; empty where the side is free, and where its risk closes it."""
+    if not side.blocked or side.risk >= side.limit:
+        return ""
+    if side.occupied:
+        return " and occupied"
+    is_somebody_there = any(track.label == "person" and track.id in side.track_ids for track in tracks)
+    return " with somebody in it" if is_somebody_there else " without a way"
 
 
 def _limit(lane: LaneRisk, nominal: float) -> float:

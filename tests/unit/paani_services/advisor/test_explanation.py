@@ -1,0 +1,48 @@
+"""What the words say of sides that are closed, and of people before a stop."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from paani import messages as m
+from paani_services.advisor.explanation import explain_advisory
+from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, box, play, seeing
+
+SWIMMER = box(m.Label.PERSON, (0.20, 0.35, 0.80, 0.64))
+
+
+def words(frame: m.Evidence) -> str:
+    return play([frame] * 3)[1][-1].explanation
+
+
+def test_a_stop_for_somebody_says_stop_once_and_who_closes_both_sides() -> None:
+    text = words(seeing(SWIMMER))
+    assert text.startswith(
+        "Stop: swimmer ahead, waiting. Somebody is in the way ahead or beside it and no side is free: "
+    )
+    assert "left 0.14 with somebody in it, right 0.14 with somebody in it (limit 0.58)." in text
+    assert text.count("Stop") == 1
+
+
+@pytest.mark.parametrize(
+    ("side", "says"),
+    [
+        (m.LaneRisk(risk=0.3, blocked=True, occupied=True, limit=0.58), "right 0.30 and occupied"),
+        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58), "right 0.30 without a way"),
+        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(1,)), "right 0.30 with somebody in it"),
+        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(2,)), "right 0.30 without a way"),
+        (m.LaneRisk(risk=0.58, blocked=True, limit=0.58), "right 0.58 (limit 0.58)"),
+        (m.LaneRisk(risk=0.3, blocked=False, occupied=True, limit=0.58), "right 0.30 (limit 0.58)"),
+    ],
+)
+def test_a_side_says_what_closes_it_unless_its_risk_does(side: m.LaneRisk, says: str) -> None:
+    _, advice, tracks = play([seeing(SWIMMER, box(m.Label.BUOY, (0.85, 0.4, 0.9, 0.5)))] * 3)
+    advisory = msgspec.structs.replace(advice[-1], right=side, reason=m.Reason.NO_SAFE_SIDE)
+    assert [track.label for track in tracks[-1].tracks] == ["person", "buoy"]
+    assert says in explain_advisory(advisory, tracks[-1].tracks)
+
+
+def test_a_picture_of_too_few_pixels_is_called_too_small() -> None:
+    frame = msgspec.structs.replace(CLEAR, usable=False, cause=m.UnusableCause.WRONG_SIZE)
+    assert words(frame).startswith("Stop: the picture is too small.")
