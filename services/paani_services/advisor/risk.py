@@ -14,6 +14,7 @@ from paani.geometry import clip
 from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
 from paani_services.advisor.tracker import (
     TrackerState,
+    TrackMemory,
     current_urgency,
     is_accepted,
     is_confirmed,
@@ -29,6 +30,7 @@ NEAR_FROM, NEAR_SPAN = 0.30, 0.70  # of the picture: a bottom at 0.30 is far, at
 TALL_SPAN = 0.50  # of the picture: a box of half its height, or more, is as tall as counts
 ASHORE_ROWS, MASK_ROWS = 3, 64  # of the mask: its edge is seldom off by more than two
 ASHORE_HEIGHT = 0.20  # of the picture: an adult 8 m away through a lens of 70 degrees; who is nearer is in the way
+SIDE_MARGIN = 0.01  # of the picture: what ends so near its side goes on beyond it
 NEAR_SHARE, TALL_SHARE = 0.6, 0.4  # weights of nearness and height in the severity; the paper gives none
 
 
@@ -190,13 +192,22 @@ def obstacles_from_tracks(
 
     aspect: width of the picture over its height. water: of each lane. water_edge: of the evidence. The box of a quay
     that runs obliquely reaches its lower edge on one side only: where the metric planner acts, a quay occupies no lane
-    that the mask shows clear.
+    that the mask shows clear; without it, not the centre where the mask shows the quay end above `occupancy_bottom`.
     """
     settings, sees_people = config.advisor.tracker, config.advisor.people.use
     open_lanes: tuple[str, ...] = ()
     if config.is_planner_active:
         clear = 1.0 - config.advisor.policy.planned_coverage
         open_lanes = tuple(lane for lane in LANES if water[lane].clear_width > clear)
+
+    def exempt_lanes(track: TrackMemory) -> tuple[str, ...]:
+        policy, span = config.advisor.policy, lane_span("center", config.perception.corridors)
+        if track.label != "pier":
+            return ()
+        if config.is_planner_active or track.held or policy.open_width == 0.0:
+            return open_lanes
+        foot = foot_by_mask(track.box, span, water_edge)
+        return ("center",) if foot is not None and foot < policy.occupancy_bottom else ()
 
     def weight(box: BoxXyxy) -> float:
         return range_weight(box, aspect, config.calibration, config.advisor.risk)
@@ -210,7 +221,7 @@ def obstacles_from_tracks(
             urgency=current_urgency(track, state.at_us, settings) * weight(track.box),
             presence=presence(track, state.at_us, settings),
             is_danger=is_immediate_danger(track.box, settings),
-            exempt_lanes=open_lanes if track.label == "pier" else (),
+            exempt_lanes=exempt_lanes(track),
             is_person=track.label == "person",
             is_confirmed=is_confirmed(track, settings),
             distance_m=foot_range_m(track.box, aspect, config.calibration),
@@ -233,6 +244,20 @@ def stands_ashore(box: BoxXyxy, water_edge: tuple[float, ...]) -> bool:
     columns, width = len(water_edge), box[2] - box[0]
     first, last = max(0, int((box[0] - width) * columns)), min(columns, math.ceil((box[2] + width) * columns))
     return min(water_edge[first:last], default=0.0) >= box[3] + ASHORE_ROWS / MASK_ROWS
+
+
+def foot_by_mask(box: BoxXyxy, span: tuple[float, float], water_edge: tuple[float, ...]) -> float | None:
+    """Where, inside a lane, something ends that goes on beyond the picture's side; None where the mask does not say.
+
+    It comes lowest at that side, and its box claims the water before the rest of it. The mask says where it ends if it
+    shows the thing itself in every column of the box in the lane: water from the bow that ends inside the box.
+    """
+    goes_on = box[0] <= SIDE_MARGIN or box[2] >= 1.0 - SIDE_MARGIN
+    if not goes_on or shared_width(box, span) <= 0.0:
+        return None
+    columns = len(water_edge)
+    edge = water_edge[int(max(box[0], span[0]) * columns) : math.ceil(min(box[2], span[1]) * columns)]
+    return max(edge) if edge and box[1] < min(edge) and max(edge) < box[3] else None
 
 
 def lane_water(evidence: Evidence, lane: str, config: Config) -> LaneEvidence:

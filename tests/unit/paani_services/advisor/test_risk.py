@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import CalibrationConfig, Config, EyeConfig, RiskConfig, calibration_of, load_config
 from paani.messages import BoxXyxy
-from paani_services.advisor.risk import corridor_risk, noisy_or, overlap, range_weight, severity
+from paani_services.advisor.risk import corridor_risk, foot_by_mask, noisy_or, overlap, range_weight, severity
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, box, play, seeing
 
 UNIT = st.floats(0.0, 1.0)
@@ -141,3 +141,49 @@ def test_what_is_left_out_cannot_be_reached_before_the_next_advice() -> None:
     """Safety: at full speed, within the lifetime of an advisory, the boat does not get half way to what counts less."""
     config = load_config()
     assert config.advisor.lifetime_s * config.controller.max_speed_mps < 0.5 * config.advisor.risk.near_m
+
+
+CENTER = PAANI.perception.corridors.center
+QUAY = (0.0, 0.45, 0.45, 0.80)  # along the boat's port side: nearest at the picture's left
+
+
+def water_up_to(quay: float, rest: float = 0.4) -> tuple[float, ...]:
+    """The water's edge of a picture whose left half shows a quay that ends there in the centre, lower on the left."""
+    first = int(CENTER[0] * 80)
+    return tuple(0.79 if x < first else quay if x < 36 else rest for x in range(80))
+
+
+def test_a_quay_along_the_boat_occupies_the_way_ahead_only_where_the_mask_shows_it_there() -> None:
+    """A box reaches as low as the quay's nearest end, beside the boat; the quay ends higher in the way ahead."""
+
+    def direction(label: m.Label, edge: tuple[float, ...], config: Config = PAANI) -> m.Direction:
+        frame = msgspec.structs.replace(seeing(box(label, QUAY, 0.41)), water_edge=edge)
+        return play([frame] * 3, config)[1][-1].direction
+
+    assert direction(m.Label.PIER, water_up_to(0.6)) is m.Direction.STRAIGHT
+    assert direction(m.Label.PIER, water_up_to(0.65)) is m.Direction.RIGHT  # as low as what occupies a lane
+    assert direction(m.Label.PIER, water_up_to(0.45)) is m.Direction.RIGHT  # the mask does not see it there
+    assert direction(m.Label.PIER, water_up_to(0.80)) is m.Direction.RIGHT
+    assert direction(m.Label.PIER, ()) is m.Direction.RIGHT
+    slanting = tuple(max(y - 0.02 * max(0, x - 24), 0.5) for x, y in enumerate(water_up_to(0.7)))
+    assert direction(m.Label.PIER, slanting) is m.Direction.RIGHT  # by its lowest part in the way ahead
+    for label in (m.Label.VESSEL, m.Label.BUOY, m.Label.PERSON):  # a hull may be dark as water
+        assert direction(label, water_up_to(0.6)) is m.Direction.RIGHT
+    assert direction(m.Label.PIER, water_up_to(0.6), PAPER) is m.Direction.RIGHT
+
+
+def test_where_a_held_quay_ends_is_not_asked_of_a_later_mask() -> None:
+    frame = msgspec.structs.replace(seeing(box(m.Label.PIER, QUAY, 0.41)), water_edge=water_up_to(0.8))
+    gone = msgspec.structs.replace(CLEAR, water_edge=water_up_to(0.6))
+    assert play([frame] * 3 + [gone])[1][-1].reason is m.Reason.CENTER_OCCUPIED
+
+
+@given(BOX, st.lists(UNIT, min_size=1, max_size=80))
+def test_the_mask_ends_a_thing_inside_its_box_and_only_one_that_the_side_cuts(xyxy: BoxXyxy, edge: list[float]) -> None:
+    foot = foot_by_mask(xyxy, CENTER, tuple(edge))
+    if foot is not None:
+        assert xyxy[1] < foot < xyxy[3]
+        assert foot in edge
+        assert min(xyxy[0], 1.0 - xyxy[2]) <= 0.01
+        assert foot_by_mask(xyxy, CENTER, tuple(min(y, xyxy[1]) for y in edge)) is None  # water to above the thing
+    assert foot_by_mask((0.02, xyxy[1], 0.98, xyxy[3]), CENTER, tuple(edge)) is None
