@@ -17,8 +17,10 @@ from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
 from paani.option_numbers import whole_number
 from paani.option_paths import output_file, output_folder
-from paani.whole_file import indented_json, write_json
+from paani.statistics.figure_table import table_text
+from paani.whole_file import indented_json, write_json, write_whole
 from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
+from paani_sim.trials.conditions import CONDITIONS, parse_sweep
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.ledger import Ledger
@@ -29,6 +31,7 @@ from paani_sim.trials.run_trial import load_case_config, run_trial
 from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
 from paani_sim.trials.suite_summary import summarise_suite
 from paani_sim.trials.summary_table import format_summary
+from paani_sim.trials.sweep import plot_sweep, tabulate_sweep
 from paani_sim.trials.trial_cases import SUITES, TrialCase, is_fixed_scenario, list_cases, parse_case
 from paani_sim.worlds import WORLDS
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
@@ -38,6 +41,10 @@ from paani_sim.worlds.load import load_scenario
 def main(argv: list[str]) -> int:
     """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake, 130 Ctrl-C."""
     options = _parser().parse_args(argv)
+    if options.sweep and options.report:
+        raise UserError("--report is not for --sweep (which has --json and --svg)")
+    if options.svg and not options.sweep:
+        raise UserError("--svg needs --sweep")
     if options.one:
         return _run_one(options)
     if options.record:
@@ -91,6 +98,14 @@ def _run_suite(options: argparse.Namespace) -> int:
         sys.stderr.write(f"{case.name}: {results[case].error}\n")
     if not results:
         return code or 1
+    if options.sweep:
+        table = tabulate_sweep(results)
+        sys.stdout.write(table_text(table))
+        if options.json:
+            write_json(options.json, table, "--json")
+        if options.svg:
+            write_whole(options.svg, plot_sweep(results).encode(), "--svg")
+        return code or int(bool(failures or diverged))
     counts = ledger.count(choice.part) if ledger is not None else None
     summary = summarise_suite(options.suite, results, len(cases), choice.commit, counts)
     sys.stdout.write(format_summary(summary))
@@ -170,7 +185,7 @@ def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[T
             load_scenario(world)
         elif world not in known:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
-    return list_cases(SUITES[options.suite], worlds, options.policy, choice)
+    return list_cases(SUITES[options.suite], worlds, options.policy, choice, options.sweep)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -198,6 +213,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--jobs", type=whole_number(), default=os.cpu_count() or 1, metavar="N", help="drives side by side"
     )
+    parser.add_argument(
+        "--sweep", type=parse_sweep, default=(), metavar="NAME=V,V,...",
+        help=f"each drive under each value of one condition: {', '.join(CONDITIONS)}",
+    )  # fmt: skip
+    parser.add_argument("--svg", type=output_file("--svg"), metavar="FILE", help="plot the sweep there")
     add_cluster_argument(parser)
     parser.add_argument(
         "--out", type=output_folder("--out"), metavar="DIR", help="where results are kept (default: runs/trial-SUITE)"
@@ -210,7 +230,7 @@ def _parser() -> argparse.ArgumentParser:
         "--set", action="append", default=[], metavar="SECTION.FIELD=VALUE", dest="sets",
         help="one setting, for every policy; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--one", metavar="WORLD[+FAULT]:SEED:POLICY", help="this drive alone, here")
+    parser.add_argument("--one", metavar="WORLD[@NAME=VALUE][+FAULT]:SEED:POLICY", help="this drive alone, here")
     parser.add_argument(
         "--record", type=output_file("--record"), metavar="FILE", help="write the one drive there as MCAP"
     )

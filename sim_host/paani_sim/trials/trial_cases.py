@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from paani.errors import UserError
+from paani_sim.trials.conditions import parse_setting, with_condition
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
@@ -18,7 +19,7 @@ from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
-FIELD_SEPARATOR, FAULT_SEPARATOR = ":", "+"
+FIELD_SEPARATOR, FAULT_SEPARATOR, SWEPT_SEPARATOR = ":", "+", "@"
 FAULT_START_RANGE_S = (12.0, 30.0)  # s, between which a fault begins, drawn by the seed
 # Duration of each fault of the suite [s], and its amount in the unit of its kind.
 SUITE_FAULTS = {
@@ -38,12 +39,16 @@ CAMERA_FAULTS = tuple(kind for kind in SUITE_FAULTS if kind.name.startswith("CAM
 
 
 class TrialCase(msgspec.Struct, frozen=True, order=True):
-    """One drive. `world` is a kind of world in which `seed` draws a scenario, or the name or file of a scenario."""
+    """One drive. `world` is a kind of world in which `seed` draws a scenario, or the name or file of a scenario.
+
+    swept: a condition that the world is given, as `current_mps=0.3`; empty: what it has.
+    """
 
     world: str
     seed: int
     policy: Policy
     fault: str = ""
+    swept: str = ""
 
     @property
     def name(self) -> str:
@@ -52,14 +57,19 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
 
     @property
     def condition(self) -> str:
-        """World and fault, as in `name`."""
-        return self.world + (FAULT_SEPARATOR + self.fault if self.fault else "")
+        """World, swept condition and fault, as in `name`."""
+        return self.world + self._changes
 
     @property
     def stem(self) -> str:
         """Stem of the names of the files that belong to this case."""
         place = Path(self.world).stem if is_fixed_scenario(self.world) else self.world
-        return f"{place}{FAULT_SEPARATOR + self.fault if self.fault else ''}-{self.seed}-{self.policy.value}"
+        return f"{place}{self._changes}-{self.seed}-{self.policy.value}"
+
+    @property
+    def _changes(self) -> str:
+        pairs = ((SWEPT_SEPARATOR, self.swept), (FAULT_SEPARATOR, self.fault))
+        return "".join(separator + change for separator, change in pairs if change)
 
 
 class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
@@ -88,23 +98,28 @@ def is_fixed_scenario(world: str) -> bool:
 
 
 def list_cases(
-    suite: TrialSuite, worlds: Sequence[str], policies: Iterable[Policy], choice: SeedChoice | None = None
+    suite: TrialSuite,
+    worlds: Sequence[str],
+    policies: Iterable[Policy],
+    choice: SeedChoice | None = None,
+    swept: Sequence[str] = (),
 ) -> list[TrialCase]:
     """Every case of a suite, in the order of driving. A choice that says which or how many seeds holds for PAPER too.
 
-    Without one the seeds are the first development seeds.
+    Without one the seeds are the first development seeds. swept: each drive under each of these, and none with a fault.
     """
     choice = choice or SeedChoice()
     seeds, chosen = list_seeds(choice, suite.seed_count), tuple(policies)
     every = {Policy.PAPER: 1 if choice.span or choice.count else suite.paper_seed_stride}
     found = [
-        TrialCase(world, seed, policy)
+        TrialCase(world, seed, policy, swept=condition)
         for number, seed in enumerate(seeds)
         for world in worlds
+        for condition in swept or ("",)
         for policy in chosen
         if number % every.get(policy, 1) == 0
     ]
-    if Policy.PAANI in chosen:
+    if Policy.PAANI in chosen and not swept:
         for kind in SUITE_FAULTS:
             count = suite.camera_faults if kind in CAMERA_FAULTS else suite.other_faults
             found += [
@@ -117,10 +132,11 @@ def list_cases(
 
 
 def parse_case(text: str) -> TrialCase:
-    """Parse `WORLD[+FAULT]:SEED:POLICY`. Raises UserError."""
+    """Parse `WORLD[@NAME=VALUE][+FAULT]:SEED:POLICY`. Raises UserError."""
     place, _, rest = text.partition(FIELD_SEPARATOR)
     seed, _, policy = rest.partition(FIELD_SEPARATOR)
-    world, _, fault = place.partition(FAULT_SEPARATOR)
+    place, _, fault = place.partition(FAULT_SEPARATOR)
+    world, _, swept = place.partition(SWEPT_SEPARATOR)
     if not (is_fixed_scenario(world) or world in WORLDS):
         raise UserError(f"--one {text}: no world '{world}' (have: {', '.join((*WORLDS, *SCENARIOS))}; or a file)")
     if fault and fault not in set(FaultKind):
@@ -129,7 +145,9 @@ def parse_case(text: str) -> TrialCase:
         raise UserError(f"--one {text}: no policy '{policy}' (have: {', '.join(Policy)})")
     if not seed.isdecimal():
         raise UserError(f"--one {text}: '{seed}' is no seed")
-    return TrialCase(world, int(seed), Policy(policy), fault)
+    if swept:
+        parse_setting(swept)
+    return TrialCase(world, int(seed), Policy(policy), fault, swept)
 
 
 def build_scenario(case: TrialCase) -> Scenario:
@@ -138,6 +156,8 @@ def build_scenario(case: TrialCase) -> Scenario:
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
         scenario = draw_random_scenario(case.world, case.seed)
+    if case.swept:
+        scenario = dataclasses.replace(scenario, world=with_condition(scenario.world, case.swept))
     if not case.fault:
         return scenario
     kind = FaultKind(case.fault)
