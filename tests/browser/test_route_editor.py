@@ -37,6 +37,14 @@ MARKS = """async ([legs, fence, turnRadiusM]) => {
   const { findMarks } = await import("/static/mission_checks.js");
   return findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM }).map((mark) => mark.text);
 }"""
+COUNTED = """async ([waypointCount, cornerCount]) => {
+  const { findMarks } = await import("/static/mission_checks.js");
+  const waypoints = Array.from({ length: waypointCount }, (_, i) => ({ x_m: 100 + i, y_m: 0 }));
+  const star = Array.from({ length: cornerCount }, (_, i) => ({ x_m: 9 * Math.cos(2 * i), y_m: 9 * Math.sin(2 * i) }));
+  const legs = [{ kind: "return_home", waypoints, repeat: false, laps: 1 }], fence = [{ keep: "out", corners: star }];
+  const before = performance.now(), marks = findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM: 0 });
+  return [marks.map((mark) => mark.text), performance.now() - before];
+}"""
 
 
 class Editor:
@@ -72,6 +80,21 @@ class Editor:
             await until(self.page, f"document.querySelector('#editor-note').textContent.includes({json.dumps(text)})")
         except TimeoutError:
             pytest.fail(f"not {text!r} but {await self.page.inner_text('#editor-note')!r}")
+
+
+@pytest.mark.parametrize(
+    ("size", "marks"),
+    [
+        ((10_000, 100), ["keep-out area 1: its edges cross"]),
+        ((10_000, 101), ["10000 waypoints times 101 corners is more than 1000000"]),
+        ((10_001, 3), ["more than 10000 waypoints"]),
+        ((999, 1001), ["more than 1000 corners"]),
+    ],
+)
+async def test_what_is_too_much_is_said_at_once_and_nothing_else_is_looked_at(
+    scripts_page: Any, size: tuple[int, int], marks: list[str]
+) -> None:
+    assert (await scripts_page.evaluate(COUNTED, list(size)))[0] == marks
 
 
 async def test_a_mission_is_drawn_checked_and_sent_as_one(

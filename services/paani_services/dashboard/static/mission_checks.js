@@ -6,7 +6,8 @@
 import { between, clearance, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
 
 const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
-const SAME_M = 0.01, MIN_AREA_M2 = 1, MAX_WAYPOINTS = 10000, MAX_CORNERS = 1000, MAX_LEGS = 100;
+const MAX_TESTS = 2e6; // of a place against an edge: of a large mission fewer places are tried, so that the page answers
+const SAME_M = 0.01, MIN_AREA_M2 = 1, MAX_WAYPOINTS = 10000, MAX_CORNERS = 1000, MAX_PAIRS = 1e6, MAX_LEGS = 100;
 const OCCUPIED = 2; // as `Occupancy` in messages/occupancy.py
 
 /**
@@ -19,23 +20,33 @@ const OCCUPIED = 2; // as `Occupancy` in messages/occupancy.py
 
 /** @param {Plan} plan @param {Limits} limits @param {any} [grid] the navigator's `OccupancyGrid` @returns {Mark[]} */
 export function findMarks(plan, limits, grid) {
-  const cells = grid ? unpack(grid) : null;
+  const cells = grid ? unpack(grid) : null, counts = countMarks(plan);
+  if (counts.some(({ isTooMuch }) => isTooMuch)) return counts;
   return [
-    ...countMarks(plan),
+    ...counts,
     ...plan.fence.flatMap((area, index) => areaMarks(area, `${area.keep === "in" ? "keep-in" : "keep-out"} area ${index + 1}`)),
     ...plan.legs.flatMap((leg, index) => legMarks(leg, `leg ${index + 1}`, plan, limits, cells)),
   ];
 }
 
-/** @param {Plan} plan @returns {Mark[]} */
-function countMarks({ legs, fence }) {
-  const waypoints = legs.reduce((all, leg) => all + leg.waypoints.length, 0), corners = fence.reduce((all, area) => all + area.corners.length, 0);
+/** @param {Plan} plan */
+const sizeOf = ({ legs, fence }) => ({
+  waypoints: legs.reduce((all, leg) => all + leg.waypoints.length, 0),
+  corners: fence.reduce((all, area) => all + area.corners.length, 0),
+});
+
+/** Faults of numbers; with one that is too much nothing else is looked at. @param {Plan} plan @returns {(Mark & {isTooMuch: boolean})[]} */
+function countMarks(plan) {
+  const { legs } = plan, { waypoints, corners } = sizeOf(plan);
   const endless = legs.findIndex((leg) => leg.kind === "follow_route" && leg.laps === 0), found = [];
   if (waypoints > MAX_WAYPOINTS) found.push(`more than ${MAX_WAYPOINTS} waypoints`);
   if (corners > MAX_CORNERS) found.push(`more than ${MAX_CORNERS} corners`);
+  if (waypoints * corners > MAX_PAIRS) found.push(`${waypoints} waypoints times ${corners} corners is more than ${MAX_PAIRS}`);
   if (legs.length > MAX_LEGS) found.push(`more than ${MAX_LEGS} legs`);
-  if (endless >= 0 && endless < legs.length - 1) found.push(`leg ${endless + 1} has no end, so no leg may come after it`);
-  return found.map((text) => ({ at: null, text }));
+  /** @type {(Mark & {isTooMuch: boolean})[]} */
+  const marks = found.map((text) => ({ at: null, text, isTooMuch: true }));
+  if (endless >= 0 && endless < legs.length - 1) marks.push({ at: null, text: `leg ${endless + 1} has no end, so no leg may come after it`, isTooMuch: false });
+  return marks;
 }
 
 /** @param {import("./plane_geometry.js").Area} area @param {string} name @returns {Mark[]} */
@@ -58,16 +69,16 @@ function legMarks(leg, name, plan, limits, cells) {
   const { waypoints } = leg;
   if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: a route needs 2 waypoints` }];
   /** @type {Mark[]} */
-  const found = [];
+  const found = [], { waypoints: all, corners } = sizeOf(plan), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * all * Math.max(1, corners))));
   const ways = waypoints.length === 1 ? /** @type {[Point, Point][]} */ ([[waypoints[0], waypoints[0]]]) : segments(waypoints, leg.repeat);
   ways.forEach(([a, b], index) => {
     const where = `${name}, waypoint ${index + 1}`;
     if (waypoints.length > 1 && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: the next is the same` });
-    const outside = firstAlong(a, b, (at) => !isAllowed(plan.fence, at));
+    const outside = firstAlong(a, b, most, (at) => !isAllowed(plan.fence, at));
     if (outside) found.push({ at: outside, text: `${where}: leaves the fence` });
-    const near = outside ? null : firstAlong(a, b, (at) => clearance(plan.fence, at) < limits.marginM);
+    const near = outside ? null : firstAlong(a, b, most, (at) => clearance(plan.fence, at) < limits.marginM);
     if (near) found.push({ at: near, text: `${where}: nearer than ${limits.marginM} m to the fence` });
-    const seen = cells && firstAlong(a, b, (at) => isOccupied(cells, at));
+    const seen = cells && firstAlong(a, b, most, (at) => isOccupied(cells, at));
     if (seen) found.push({ at: seen, text: `${where}: the boat has seen something there` });
   });
   return leg.kind === "follow_route" ? [...found, ...turnMarks(leg, name, limits.turnRadiusM)] : found;
@@ -92,9 +103,9 @@ function turnMarks({ waypoints, repeat }, name, radiusM) {
 /** @param {number} rad */
 const angle = (rad) => Math.atan2(Math.sin(rad), Math.cos(rad));
 
-/** @param {Point} a @param {Point} b @param {(at: Point) => boolean} isWrong */
-function firstAlong(a, b, isWrong) {
-  const steps = Math.max(1, Math.min(MAX_STEPS, Math.ceil(distance(a, b) / STEP_M)));
+/** @param {Point} a @param {Point} b @param {number} most steps @param {(at: Point) => boolean} isWrong */
+function firstAlong(a, b, most, isWrong) {
+  const steps = Math.max(1, Math.min(most, Math.ceil(distance(a, b) / STEP_M)));
   for (let step = 0; step <= steps; step++) {
     const at = between(a, b, step / steps);
     if (isWrong(at)) return at;

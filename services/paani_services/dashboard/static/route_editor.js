@@ -10,6 +10,7 @@ import { hand, hasKey, post } from "./requests.js";
 import { EDITOR, byId, make, setText } from "./text.js";
 
 const REACH_PX = 14, DRAG_PX = 4, MAX_SHOWN = 3;
+const MAX_SHARE = 0.1; // of the page's time for checks: a large mission is checked less often, so that the page answers
 
 export class RouteEditor {
   /** @param {import("./map.js").MapPanel} map */
@@ -22,6 +23,7 @@ export class RouteEditor {
     /** @type {import("./mission_checks.js").Mark[]} */
     this.marks = [];
     this.checked = "";
+    this.checkAgainAt = 0;
     this.note = "";
     /** @type {import("./store.js").Store | null} */
     this.store = null;
@@ -175,9 +177,11 @@ export class RouteEditor {
     if (!this.isOpen) return;
     const { made } = this, settings = store.get("dashboard/settings"), grid = store.isFresh("navigator/occupancy", now) ? store.get("navigator/occupancy") : undefined;
     const state = JSON.stringify(made.plan) + (grid?.source_us ?? "");
-    if (state !== this.checked && settings) {
+    const began = performance.now();
+    if (state !== this.checked && settings && began >= this.checkAgainAt) {
       this.checked = state;
       this.marks = findMarks(made.plan, { marginM: settings.fence_margin_m, turnRadiusM: settings.turn_radius_m }, grid);
+      this.checkAgainAt = began + (performance.now() - began) / MAX_SHARE;
     }
     drawPlan(chart, made, this.marks);
     this.renderItems();
