@@ -196,10 +196,11 @@ STEPS = {
 }
 
 # Who may ask the operator's process to stop, to arm or to drive: the page, `paani stop`, the shore of a fleet
-# (`paani fleet`), and `paani up` for a simulated boat.
-STATION, SHORE = "dashboard", "shore"
-STOPPING_CLIENTS = ("stop", SHORE)  # what they hold arms nothing, and they drive nothing
-COMMAND_LINE_CLIENTS = (*STOPPING_CLIENTS, "arm", "mission")
+# (`paani fleet`), a hardware button, and `paani up` for a simulated boat.
+STATION, SHORE, BUTTON = "dashboard", "shore", "button"
+STOPPING_COMMANDS = ("stop", SHORE)
+STOPPING_CLIENTS = (*STOPPING_COMMANDS, BUTTON)  # what they hold arms nothing, and they drive nothing
+COMMAND_LINE_CLIENTS = (*STOPPING_COMMANDS, "arm", "mission")
 # Processes that carry the bus to what others use, and run only where `up.ports` names them. Some of them ask the
 # operator's process for what a person asks of them.
 PORTS = ("mavlink", "ros2", "foxglove", "nmea")
@@ -269,6 +270,7 @@ SERVICES = (
     "thrusters",
     "bridge",
     "operator",
+    BUTTON,
     "dashboard",
     *PORTS,
 )
@@ -279,11 +281,12 @@ ABSENT: Mapping[Graph, frozenset[str]] = {
     Graph.HULL: frozenset({"plant", "eye", "arm"}),
 }
 BOARD_SERVICES = (
-    "sensors", "camera", "perception", "advisor", "navigator", "controller", "thrusters", "bridge",
+    "sensors", "camera", "perception", "advisor", "navigator", "controller", "thrusters", "bridge", BUTTON,
 )  # fmt: skip
 VITAL_SERVICES = (
     "eye", "camera", "perception", "advisor", "navigator", "controller", "localization", "operator", "dashboard",
 )  # fmt: skip
+BEATING_SERVICES = (*VITAL_SERVICES, BUTTON)  # a button is vital where there is one (`button.line`)
 
 
 def services_in(graph: Graph) -> tuple[str, ...]:
@@ -355,7 +358,7 @@ def health(service: str) -> Topic[m.Health]:
 def every_topic(graph: Graph | None = None) -> tuple[Topic[Any], ...]:
     """What is written in this graph, every pulse and every health report of it. None: of all graphs."""
     services = SERVICES if graph is None else services_in(graph)
-    pulses = (pulse(name) for name in VITAL_SERVICES if name in services)
+    pulses = (pulse(name) for name in BEATING_SERVICES if name in services)
     return (*(TOPICS if graph is None else topics_in(graph)), *pulses, *(health(name) for name in services))
 
 

@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import Any
 
 from paani.keys import (
+    BUTTON,
     STOPPING_CLIENTS,
     Graph,
     Stance,
@@ -39,12 +40,12 @@ class Side(StrEnum):
 # The other processes of the graph are the host's. On a hull nothing that decides where it goes is the host's; but the
 # operator is, without whose word the thrusters stand still: a boat out of reach of STOP does not drive on.
 ON_BOARD: Mapping[Graph, frozenset[str]] = {
-    Graph.SIMULATION: frozenset({"camera", "perception", "advisor", "bridge"}),
-    Graph.HIL: frozenset({"camera", "perception", "advisor", "bridge"}),
+    Graph.SIMULATION: frozenset({"camera", "perception", "advisor", "bridge", BUTTON}),
+    Graph.HIL: frozenset({"camera", "perception", "advisor", "bridge", BUTTON}),
     Graph.HULL: frozenset(
         {
             "sensors", "camera", "perception", "advisor", "navigator", "controller", "localization", "thrusters",
-            "bridge",
+            "bridge", BUTTON,
         }
     ),
 }  # fmt: skip

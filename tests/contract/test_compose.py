@@ -32,7 +32,7 @@ def started(side: Side, *profiles: str) -> set[str]:
 def test_a_file_starts_its_sides_processes(side: Side, graph: Graph, profile: str) -> None:
     """A5; in a hull all control is the board's. Ports run where somebody asks for them, all or each alone."""
     own = set(services_on(side, graph)) - {*PORTS}
-    profiles = (profile, "mcu", "record")
+    profiles = (profile, "mcu", "button", "record")
     assert started(side, *profiles) - {SETUP} == own
     assert started(side, *profiles, "ports") - {SETUP} == set(services_on(side, graph))
     for port in PORTS:

@@ -21,7 +21,6 @@ KNOWN = {  # section that another process owns, and why it is read
     ("navigator", "perception"): "the own hull in the picture, in which nothing was looked for",
     ("navigator", "localization"): "the origin of the map, at which routes and fences in degrees are placed",
     ("operator", "navigator"): "the margin that missions of clients keep from their fence",
-    ("thrusters", "plant"): "the thrust adapter, which the plant has in a simulation and the thrusters on a hull",
     ("mavlink", "advisor"): "the parameters of the policy that ground stations read",
     ("mavlink", "navigator"): "the cruise speed that ground stations read",
     ("mavlink", "recorder"): "the folder whose recordings ground stations download",

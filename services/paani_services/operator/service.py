@@ -37,7 +37,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     await console.restore()
     station = bus.latest(keys.pulse(keys.STATION))
     applied = bus.latest(keys.THRUST_APPLIED)
-    clients = (keys.STATION, *keys.ASKING_PORTS, *keys.command_line_clients_in(bus.graph))
+    clients = (keys.STATION, keys.BUTTON, *keys.ASKING_PORTS, *keys.command_line_clients_in(bus.graph))
     requests = {client: bus.queue(keys.REQUESTS[client]) for client in clients if client in keys.REQUESTS}
     sent = {client: bus.queue(topic, MISSIONS_WAITING) for client, topic in keys.MISSION_REQUESTS.items()}
     try:

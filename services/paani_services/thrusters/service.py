@@ -43,9 +43,9 @@ class Thrusters:
     def __init__(self, bus: Bus, clock: Clock, config: Config) -> None:
         self._bus, self._clock, self._settings = bus, clock, config.thrusters
         self._monotonic = MonotonicClock()
-        self._adapter = ThrustAdapter(config.plant.adapter, config.bus.domain)
+        self._adapter = ThrustAdapter(config.adapter, config.bus.domain)
         self._thrust, self._arming = bus.latest(keys.THRUST), bus.latest(keys.ARMING)
-        for service in config.plant.adapter.require_pulses:
+        for service in config.adapter.require_pulses:
             bus.on(keys.pulse(service), functools.partial(self._receive_pulse, service))
         self._time, self._applied = bus.publisher(keys.SIM_TIME), bus.publisher(keys.THRUST_APPLIED)
         self._state = bus.publisher(keys.THRUSTERS_STATE)

@@ -124,7 +124,7 @@ class Bus:
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
         reporter = HealthReporter(self.user, self.inputs, self.drops, lambda: self.note_text)
         tasks = [asyncio.create_task(self._report(reporter), name="health")]
-        if self.user in keys.VITAL_SERVICES:
+        if self.user in keys.BEATING_SERVICES:
             tasks.append(asyncio.create_task(self._beat(), name="pulse"))
         try:
             yield

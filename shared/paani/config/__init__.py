@@ -10,6 +10,7 @@ from paani.config.advisor import (
     TuningConfig,
 )
 from paani.config.bridge import BridgeConfig
+from paani.config.button import ButtonConfig
 from paani.config.foxglove import FoxgloveConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.loading import decode_config, encode_config, load_config, with_settings
@@ -37,6 +38,7 @@ __all__ = [
     "AdvisorConfig",
     "BridgeConfig",
     "BusConfig",
+    "ButtonConfig",
     "CalibrationConfig",
     "CameraConfig",
     "CandidateConfig",

@@ -8,6 +8,7 @@ import msgspec
 
 from paani.config.advisor import AdvisorConfig
 from paani.config.bridge import BridgeConfig
+from paani.config.button import ButtonConfig
 from paani.config.foxglove import FoxgloveConfig
 from paani.config.guidance import ControllerConfig, LocalizationConfig, NavigatorConfig
 from paani.config.mavlink import MavlinkConfig
@@ -18,9 +19,9 @@ from paani.config.recorder import RecorderConfig
 from paani.config.ros2 import Ros2Config, require_ros_name
 from paani.config.section import Positive, Section
 from paani.config.sensors import SensorDevicesConfig
-from paani.config.simulator import EyeConfig, PlantConfig, WorldConfig
+from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, WorldConfig
 from paani.config.thrusters import ThrustersConfig
-from paani.keys import PORTS, Graph
+from paani.keys import BUTTON, PORTS, Graph
 from paani.port_address import parse_address
 from paani.sides import Side, services_on
 
@@ -93,6 +94,7 @@ class Config(Section, frozen=True):
     dashboard: DashboardConfig = DashboardConfig()
     recorder: RecorderConfig = RecorderConfig()
     bridge: BridgeConfig = BridgeConfig()
+    button: ButtonConfig = ButtonConfig()
     mavlink: MavlinkConfig = MavlinkConfig()
     nmea: NmeaConfig = NmeaConfig()
     ros2: Ros2Config = Ros2Config()
@@ -108,7 +110,17 @@ class Config(Section, frozen=True):
             idle.add("recorder")
         if not self.bridge.line:
             idle.add("bridge")
+        if not self.button.line:
+            idle.add(BUTTON)
         return tuple(name for name in services_on(self.bus.side, self.bus.graph) if name not in idle)
+
+    @property
+    def adapter(self) -> AdapterConfig:
+        """The thrust adapter's settings. It waits for a button's pulse too, where there is one."""
+        adapter = self.plant.adapter
+        if not self.button.line or BUTTON in adapter.require_pulses:
+            return adapter
+        return msgspec.structs.replace(adapter, require_pulses=(*adapter.require_pulses, BUTTON))
 
     @property
     def is_planner_active(self) -> bool:

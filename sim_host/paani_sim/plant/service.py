@@ -58,10 +58,10 @@ async def run_by_thrust(bus: Bus, clock: Clock, config: Config) -> None:
     """Watchdogs run on the monotonic clock that `SimTime` hands out."""
     monotonic = MonotonicClock()
     scenario = configured_scenario(config.world)
-    plant, adapter = Plant.from_scenario(scenario, config.plant), ThrustAdapter(config.plant.adapter, config.bus.domain)
+    plant, adapter = Plant.from_scenario(scenario, config.plant), ThrustAdapter(config.adapter, config.bus.domain)
     link = _BoardLink(plant, scenario.faults)
     thrust, arming = bus.latest(keys.THRUST), bus.latest(keys.ARMING)
-    for service in config.plant.adapter.require_pulses:
+    for service in config.adapter.require_pulses:
         bus.on(keys.pulse(service), functools.partial(_receive_pulse, adapter, service, monotonic, link))
     measurements, report = Measurements(bus, config.plant), _AppliedThrust(bus, monotonic, config, link)
     step_us = round(config.plant.step_s * 1e6)

@@ -185,7 +185,7 @@ export const MODE_BARS = {
 export const MODES = { sim: "SIM", hil: "HIL", hull: "HULL", replay: "REPLAY" };
 
 /** Who stopped or armed the boat, by the name of the process. @type {Record<string, string>} */
-const OPERATORS = { dashboard: "the page", stop: "paani stop", arm: "paani up", "": "an earlier run" };
+const OPERATORS = { dashboard: "the page", stop: "paani stop", button: "the button", arm: "paani up", "": "an earlier run" };
 
 /** @param {string} by */
 export const operatorText = (by) => OPERATORS[by] ?? by;
