@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 from paani.config import BusConfig
@@ -39,6 +42,34 @@ def runtime_dir(config: BusConfig) -> Path:
     if found.st_mode & 0o077:
         folder.chmod(0o700)
     return folder
+
+
+@contextlib.contextmanager
+def own_runtime_dir(config: BusConfig) -> Iterator[Path]:
+    """The runtime folder, with its STOP latch, as one boat's for as long as the context lasts.
+
+    The lock ends with the process that holds it, however it ends. Raises UserError while another process holds it:
+    with one latch for two boats, whoever releases one would release both.
+    """
+    folder = runtime_dir(config)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UserError(
+                f"bus.runtime_dir {folder}: in use by another boat, whose STOP latch lies there: stop that, or choose "
+                "another folder (--set bus.runtime_dir=...)"
+            ) from error
+        yield folder
+    finally:
+        os.close(descriptor)
+
+
+def require_unowned_runtime_dir(config: BusConfig) -> None:
+    """Raises UserError where `own_runtime_dir` would."""
+    with own_runtime_dir(config):
+        pass
 
 
 def write_private(path: Path, text: str) -> None:

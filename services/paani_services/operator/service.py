@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
 
 from paani import keys
 from paani import messages as m
@@ -11,7 +13,7 @@ from paani.bus import Bus, Latest, Queue
 from paani.clock import Clock
 from paani.config import Config
 from paani.missions import mission_of_route
-from paani.runtime import runtime_dir
+from paani.runtime import own_runtime_dir
 from paani_services.operator.console import Console
 from paani_services.operator.missions import NO_MISSION
 from paani_services.operator.wheel import Facts
@@ -22,8 +24,16 @@ LISTENS_S = 5.0  # after which a navigator that publishes no mission has none: i
 
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
-    """Publish the operator's state and answer each client, until told to stop; at the end nobody arms."""
-    folder = await asyncio.to_thread(runtime_dir, config.bus)
+    """Publish the operator's state and answer each client, until told to stop; at the end nobody arms.
+
+    Raises UserError where another boat's operator has the runtime folder.
+    """
+    with ExitStack() as owned:
+        folder = await asyncio.to_thread(owned.enter_context, own_runtime_dir(config.bus))
+        await _serve(bus, clock, config, folder)
+
+
+async def _serve(bus: Bus, clock: Clock, config: Config, folder: Path) -> None:
     console = Console(
         bus.publisher(keys.ARMING),
         bus.publisher(keys.OPERATOR_STATE),

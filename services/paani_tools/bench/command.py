@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgspec
 
@@ -31,7 +32,21 @@ from paani_tools.up.terminal import Display
 
 
 def main(argv: list[str]) -> int:
-    """Run one benchmark and print its figures."""
+    """Run one benchmark and print its figures.
+
+    Without `PAANI_RUNTIME_DIR` or `bus.runtime_dir` a benchmark's boat has a runtime folder that ends with it, so that
+    neither meets the STOP latch of the user's own boat.
+    """
+    with TemporaryDirectory(prefix="paani-bench-") as folder:
+        os.environ.setdefault("PAANI_RUNTIME_DIR", folder)
+        try:
+            return _main(argv)
+        finally:
+            if os.environ.get("PAANI_RUNTIME_DIR") == folder:
+                del os.environ["PAANI_RUNTIME_DIR"]
+
+
+def _main(argv: list[str]) -> int:
     others = installed_commands()
     if argv and argv[0] in others:
         return int(others[argv[0]].load()(argv[1:]))

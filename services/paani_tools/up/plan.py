@@ -19,7 +19,7 @@ from paani.errors import UserError
 from paani.extras import require_modules
 from paani.keys import Graph
 from paani.page_address import is_page_exposed
-from paani.runtime import runtime_dir
+from paani.runtime import require_unowned_runtime_dir, runtime_dir
 from paani_services.camera.picture_sources import read_frames
 from paani_services.navigator.files.mission_file import load_route_and_mission
 
@@ -54,6 +54,8 @@ class _Course(NamedTuple):
 async def make_plan(config: Config) -> Plan:
     """What starts on this machine. Raises UserError for what can be known before anything starts."""
     await asyncio.to_thread(require_addresses, config.bus)
+    if "operator" in config.services:
+        await asyncio.to_thread(require_unowned_runtime_dir, config.bus)
     if config.dashboard.serve and "dashboard" in config.services:
         if is_page_exposed(config):
             await asyncio.to_thread(page_server_tls, config.bus)
