@@ -93,7 +93,9 @@ def record(folder: Path, messages: Messages) -> Path:
         (each.source_us, topic, each) for topic, part in zip(topics, parts, strict=True) for each in part
     ]
     for number, (stamp_us, topic, message) in enumerate(sorted(everything, key=lambda entry: entry[0])):
-        sent = msgspec.structs.replace(message, seq=number, epoch=5, sent_us=stamp_us, producer=topic.producer)
+        sent = msgspec.structs.replace(
+            message, seq=number, epoch=5, sent_us=stamp_us, producer=topic.producer, topic=topic.name
+        )
         small_logs.put(log, topic, sent)
     log.finish({})
     return log.path

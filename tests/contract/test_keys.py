@@ -12,6 +12,7 @@ import pytest
 
 from paani import authority, keys
 from paani import messages as m
+from paani.bus.admission import Admission
 from tests.places import ROOT
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -74,6 +75,15 @@ def test_the_wire_format_has_not_changed(topic: keys.Topic[Any], update_golden: 
     new = msgspec.json.decode(data)
     assert {name: new.get(name) for name in old} == old
     assert msgspec.json.decode(golden.read_bytes(), type=topic.type) is not None
+
+
+@pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
+def test_a_message_under_another_key_is_refused(topic: keys.Topic[Any]) -> None:
+    """What a library delivers to the wrong receiver is never acted on."""
+    data = msgspec.json.encode(msgspec.structs.replace(minimal(topic.type), producer=topic.producer, topic=topic.name))
+    assert Admission(topic, 43, 1.0).judge(data, 1)[1] == ""
+    others = [row for row in ROWS if row is not topic and row.stance is topic.stance]
+    assert [row.name for row in others if Admission(row, 43, 1.0).judge(data, 1)[1] == ""] == []
 
 
 @pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)

@@ -82,7 +82,13 @@ async def forge(peer: Stranger, command: m.NavCommand) -> None:
     for seq in range(TIMES):
         now_us = WallClock().now_us()
         forged = msgspec.structs.replace(
-            command, source_us=now_us, sent_us=now_us, seq=seq, epoch=now_us // 1000, producer="navigator"
+            command,
+            source_us=now_us,
+            sent_us=now_us,
+            seq=seq,
+            epoch=now_us // 1000,
+            producer="navigator",
+            topic=keys.COMMAND.name,
         )
         await asyncio.to_thread(peer.say, keys.COMMAND.name, msgspec.json.encode(forged))
         await asyncio.sleep(0.02)

@@ -99,7 +99,9 @@ async def connected(http: aiohttp.ClientSession, port: int) -> AsyncIterator[Vie
 
 async def request_refused(viewer: Viewer) -> None:
     """Orders thrust, arms, and sets a parameter."""
-    thrust = m.Thrust(source_us=1, left=1.0, right=1.0, enabled=True, producer="controller", seq=10**6)
+    thrust = m.Thrust(
+        source_us=1, left=1.0, right=1.0, enabled=True, producer="controller", seq=10**6, topic="controller/thrust"
+    )
     await viewer.publish("controller/thrust", msgspec.json.encode(thrust))
     await viewer.publish("operator/arming", b'{"armed":true}')
     await viewer.say(op="setParameters", parameters=[{"name": SETTING, "value": 0.99}], id="set")

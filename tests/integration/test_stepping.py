@@ -95,6 +95,7 @@ async def test_a_ledger_of_steps_gives_the_same_thrust_again(open_as: OpenAs, co
                 domain=recorded.domain,
                 producer=recorded.producer,
                 sent_us=sent.sent_us,
+                topic=sent.topic,
             )
             assert msgspec.json.encode(again) == msgspec.json.encode(recorded)
             compared += 1

@@ -207,7 +207,9 @@ async def test_only_the_dashboard_may_tune_and_nonsense_is_counted(
     wanted = m.Tuning(source_us=CLOCK.now_us(), act=m.TuningAct.PROPOSE, request=1, proposal="a", changes=(change,))
     async with spawn("advisor"):
         await shadow.next()
-        forged = msgspec.structs.replace(wanted, producer="dashboard", epoch=CLOCK.now_us() // 1000)
+        forged = msgspec.structs.replace(
+            wanted, producer="dashboard", topic=keys.TUNING.name, epoch=CLOCK.now_us() // 1000
+        )
         for _ in range(5):
             put_raw(navigator, keys.TUNING.name, msgspec.json.encode(forged))
             await asyncio.sleep(0.1)

@@ -170,6 +170,7 @@ class Recomputation:
                 producer=self._producers[sent.topic],
                 sent_us=sent.sent_us,
                 steady_us=sent.steady_us,
+                topic=sent.topic,
             )
         )
 

@@ -74,6 +74,8 @@ class Admission(Generic[T]):
             return None, "wrong_domain"
         if message.producer != self._topic.producer or message.producer == NOBODY:
             return None, "wrong_producer"
+        if message.topic != self._topic.name:
+            return None, "wrong_topic"
         shift_us = self._shift_us(message, now_us)
         latest_us = now_us + self._max_future_us - shift_us  # by the clock of the producer
         epoch = max(message.epoch, message.frame_epoch) if isinstance(message, m.PictureHeader) else message.epoch

@@ -91,6 +91,7 @@ class Publisher(Generic[T]):
             producer=self._topic.producer,
             sent_us=self._clock.now_us(),
             steady_us=0 if self._steady is None else self._steady.now_us(),
+            topic=self._topic.name,
         )
 
 

@@ -21,7 +21,8 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 
     The bus fills the rest when it publishes: `seq` counts this producer's messages on the key, `epoch`
     changes when the producer restarts or its source begins again, `sent_us` is when it left. Where board and host are
-    two machines, `steady_us` is that too, by a clock of the producer's machine that is never set; else it is 0.
+    two machines, `steady_us` is that too, by a clock of the producer's machine that is never set; else it is 0. `topic`
+    is the name of the topic it was published on: whoever gets it by another key refuses it.
     """
 
     source_us: Stamp
@@ -31,3 +32,4 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     producer: Text = ""
     sent_us: Stamp = 0
     steady_us: Stamp = 0
+    topic: Text = ""

@@ -83,6 +83,7 @@ class HostileMessages:
             "twice": self._twice,
             "other domain": lambda tree: _text({**tree, "domain": self._other_domain()}),
             "other producer": lambda tree: _text({**tree, "producer": self._other_producer()}),
+            "other topic": lambda tree: _text({**tree, "topic": rng.choice(("", "x", f"{topic.name}/x"))}),
             "future": self._future,
         }
 
@@ -106,6 +107,7 @@ class HostileMessages:
         assert isinstance(tree, dict)
         self._seq += 1
         tree |= {"seq": self._seq, "epoch": now_us // 1000, "domain": self._domain, "producer": self._topic.producer}
+        tree["topic"] = self._topic.name
         tree |= {"source_us": now_us, "sent_us": now_us}
         if issubclass(self._topic.type, m.PictureHeader):
             tree["frame_epoch"] = min(tree["frame_epoch"], now_us // 1000)

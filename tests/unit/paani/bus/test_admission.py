@@ -18,8 +18,9 @@ NOW_US = 1_000_000_000
 
 def thrust(**changes: object) -> m.Thrust:
     message = m.Thrust(
-        source_us=NOW_US, seq=5, epoch=7, producer="controller", sent_us=NOW_US, left=0.1, right=0.2, enabled=True
-    )
+        source_us=NOW_US, seq=5, epoch=7, producer="controller", sent_us=NOW_US, left=0.1, right=0.2, enabled=True,
+        topic=keys.THRUST.name,
+    )  # fmt: skip
     return msgspec.structs.replace(message, **changes)
 
 
@@ -48,6 +49,8 @@ def raw(message: m.Message, **changes: object) -> bytes:
         (raw(thrust(), left=-1.1), "out_of_range"),
         (raw(thrust(), domain=42), "wrong_domain"),
         (raw(thrust(), producer="advisor"), "wrong_producer"),
+        (raw(thrust(), topic=""), "wrong_topic"),
+        (raw(thrust(), topic=keys.ARMING.name), "wrong_topic"),
         (raw(thrust(), source_us=NOW_US + 2_000_000), "future"),
         (raw(thrust(), sent_us=NOW_US + 2_000_000), "future"),
         (raw(thrust(), epoch=2**53), "future"),
@@ -80,8 +83,9 @@ def test_no_epoch_of_the_future_silences_its_producer() -> None:
 
 def test_no_frame_epoch_of_the_future_is_taken() -> None:
     header = m.PictureHeader(
-        source_us=NOW_US, frame_seq=0, frame_epoch=2**53, width_px=1, height_px=1, epoch=7, producer="camera"
-    )
+        source_us=NOW_US, frame_seq=0, frame_epoch=2**53, width_px=1, height_px=1, epoch=7, producer="camera",
+        topic=keys.PICTURE.name,
+    )  # fmt: skip
     judge = Admission(keys.PICTURE, domain=43, max_future_s=1.0).judge
     assert judge(msgspec.json.encode(header), NOW_US)[1] == "future"
     assert judge(msgspec.json.encode(msgspec.structs.replace(header, frame_epoch=7)), NOW_US)[1] == ""

@@ -87,6 +87,7 @@ def test_nothing_is_taken_for_younger_than_it_is(
             frame_epoch=0,
             epoch=there.wall_us(said_us) // 1000,
             producer="advisor",
+            topic=keys.TRACKS.name,
             sent_us=there.wall_us(said_us),
             steady_us=there.steady_us(said_us),
         )
@@ -132,7 +133,7 @@ def test_a_message_is_at_most_as_much_too_old_as_a_pulse_took(lead_us: int, wall
     sent_us = WALL_US + wall_s * 10**6
     thrust = m.Tracks(
         source_us=sent_us - 100_000, frame_seq=0, frame_epoch=0, epoch=sent_us // 1000, producer="advisor",
-        sent_us=sent_us, steady_us=2 * YEAR_US,
+        sent_us=sent_us, steady_us=2 * YEAR_US, topic=keys.TRACKS.name,
     )  # fmt: skip
     message, cause = Admission(keys.TRACKS, 43, 1.0, other.shift_us).judge(msgspec.json.encode(thrust), WALL_US)
     assert cause == ""
@@ -192,7 +193,7 @@ def test_an_epoch_of_the_future_of_its_own_machine_is_refused() -> None:
     def judged(sent_us: int, epoch: int, seq: int) -> str:
         tracks = m.Tracks(
             source_us=sent_us, frame_seq=0, frame_epoch=0, producer="advisor", epoch=epoch, seq=seq,
-            sent_us=sent_us, steady_us=10**9,
+            sent_us=sent_us, steady_us=10**9, topic=keys.TRACKS.name,
         )  # fmt: skip
         return judge(msgspec.json.encode(tracks), WALL_US)[1]
 
@@ -208,7 +209,7 @@ def test_what_is_only_handed_on_keeps_its_stamps() -> None:
     ahead_us = WALL_US + 5_000_000
     header = m.PictureHeader(
         source_us=ahead_us, frame_seq=1, frame_epoch=1, width_px=1, height_px=1, media_type="image/jpeg",
-        producer="camera", sent_us=ahead_us, steady_us=7,
+        producer="camera", sent_us=ahead_us, steady_us=7, topic=keys.PICTURE.name,
     )  # fmt: skip
     data = msgspec.json.encode(header)
     assert Admission(keys.PICTURE, 43, 1.0, since_sent, as_sent=True).judge(data, WALL_US) == (header, "")

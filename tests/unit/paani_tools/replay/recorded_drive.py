@@ -46,6 +46,7 @@ class Desk:
             epoch=self._epochs.get(topic.producer, T0_US // 1000),
             domain=self.config.bus.domain,
             producer=topic.producer,
+            topic=topic.name,
             sent_us=self.now_us,
         )
         self.records.append(Record(topic.name, self.now_us + 200, sent.seq, msgspec.json.encode(sent)))
