@@ -27,7 +27,7 @@ from tests.places import ROOT
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "bench": "board bridge chain eyes fleet judgement recorder",
+    "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
         exposed_page heading_verdicts indicator_strip installed legibility map_projection map_tiles models_report
         recording_chip recordings_tab replay_page route_editor sensor_strip tuning_strip

@@ -27,6 +27,7 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
 CLOCK = WallClock()
 BETWEEN = water(0.3, 0.47, 0.4)  # clear at 0.48, blocked at 0.46
 ADVISOR = decider_of("advisor")
+HEADER = ("seq", "epoch", "domain", "producer", "sent_us", "topic")
 FEW = "advisor.tuning.min_frames=5"
 
 
@@ -261,7 +262,7 @@ async def test_tuned_advice_is_computed_again_from_the_ledger(open_as: OpenAs, s
         state, outputs = ADVISOR.decide(state, inputs, step.source_us, config)
         for sent in step.sent:
             recorded = found[sent.topic, sent.epoch, sent.seq]
-            header = {name: getattr(recorded, name) for name in ("seq", "epoch", "domain", "producer", "sent_us")}
+            header = {name: getattr(recorded, name) for name in HEADER}
             again = msgspec.structs.replace(outputs[sent.topic], **header)
             assert msgspec.json.encode(again) == msgspec.json.encode(recorded)
             if isinstance(recorded, m.Advisory):

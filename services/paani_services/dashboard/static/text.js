@@ -239,7 +239,7 @@ export const TOPICS_TEXTS = { freeze: "Freeze", thaw: "Frozen: go on", none: "Pr
 export const HEALTH_INPUTS = "health/dashboard";
 
 /** Fields of every message's header, which the tab of devices leaves out. */
-export const DEVICE_FACTS = { header: ["source_us", "seq", "epoch", "domain", "producer", "sent_us", "steady_us", "devices"] };
+export const DEVICE_FACTS = { header: ["source_us", "seq", "epoch", "domain", "producer", "sent_us", "steady_us", "topic", "devices"] };
 
 /** The settings tab. */
 export const SETTING_TEXTS = { tuned: "tuned", try: "Try", sent: "tried beside what is in force", none: "Nothing is tried. A value that judges can be tried beside the one in force, whose advice alone is obeyed.", of: "of" };
