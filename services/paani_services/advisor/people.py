@@ -34,16 +34,21 @@ def people_in_lane(lane: str, obstacles: tuple[Obstacle, ...], config: Config) -
 
 
 def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | None:
-    """The speed that must not be exceeded; None while nobody is within `slow_m`."""
+    """The speed that must not be exceeded; None where the camera is calibrated and nobody is within `slow_m`."""
     people = config.advisor.people
+    if not people.use:
+        return None
     center = lane_span("center", config.perception.corridors)
-    is_near = people.use and any(
+    is_near = any(
         counts(person)
         and (person.candidate is None or shared_width(person.box, center) > 0.0)
         and (person.distance_m is None or person.distance_m <= people.slow_m)
         for person in obstacles
     )
-    return people.slow_mps if is_near else None
+    limits_mps = [people.slow_mps] if is_near else []
+    if not config.calibration.valid:
+        limits_mps.append(people.uncalibrated_mps)
+    return min(limits_mps, default=None)
 
 
 def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> float | None:

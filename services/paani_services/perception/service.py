@@ -86,7 +86,8 @@ def warn_uncalibrated(config: Config) -> None:
     if not config.calibration.valid and config.perception.candidates.use:
         LOG.warning(
             "calibration.valid is false: no distance is known, so everybody in view counts as near, and so does a "
-            "vessel in the middle of the way; `paani calibrate RECORDING` measures the camera"
+            "vessel in the middle of the way, and advice limits the speed (advisor.people.uncalibrated_mps); "
+            "`paani calibrate RECORDING` measures the camera"
         )
 
 
@@ -95,7 +96,8 @@ def sight_note(evidence: m.Evidence, config: Config) -> str:
     if not evidence.usable:
         return f"unusable: {evidence.cause}"
     is_assumed = not config.calibration.valid and config.perception.candidates.use
-    return f"uncalibrated camera, everybody counts as near; {evidence.models}" if is_assumed else evidence.models
+    assumed = "uncalibrated camera, everybody counts as near, speed limited"
+    return f"{assumed}; {evidence.models}" if is_assumed else evidence.models
 
 
 def roll_at_capture_rad(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:

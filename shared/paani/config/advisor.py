@@ -107,7 +107,8 @@ class PeopleConfig(Section, frozen=True):
     """What is done about people; `use=false` weighs them as anything else, as the paper does.
 
     `ahead_m`, `slow_m`, `stop_m`: distances within which a person blocks the way ahead, limits the speed, and stops the
-    boat; they need a calibration. Without one everybody counts as near, and a box of `stop_height` stops the boat.
+    boat; they need a calibration. Without one everybody counts as near, a box of `stop_height` stops the boat, and no
+    advice is to be followed faster than `uncalibrated_mps`, whoever is seen.
     """
 
     use: bool = True  # J1: a person is a box
@@ -115,6 +116,7 @@ class PeopleConfig(Section, frozen=True):
     slow_m: Positive = 10.0
     stop_m: Positive = 1.5
     slow_mps: Positive = 0.3  # half of cruise: the boat stops within 0.4 m
+    uncalibrated_mps: Positive = 0.3  # as near people: how far off anything is, nobody knows
     stop_height: Fraction = 0.6  # of the picture
     drift_frac: Fraction = 0.05  # of the picture, beside the centre: who is there may drift into the way
     widest_m: Positive = 3.0  # somebody on a board, or two together: what is calibrated and wider is no person

@@ -241,8 +241,8 @@ class Counterfactual(msgspec.Struct, frozen=True, kw_only=True):
 class Advisory(Message, frozen=True, kw_only=True):
     """What the advisor advises, the evidence it used (J11), and what would change it.
 
-    speed_limit_mps: not to be exceeded while somebody is near; unset while nobody is. people_ahead: tracks of people
-    who block the way ahead, unset where people are weighed as anything else.
+    speed_limit_mps: not to be exceeded while somebody is near, or by an uncalibrated camera; unset otherwise.
+    people_ahead: tracks of people who block the way ahead, unset where people are weighed as anything else.
     candidates_ahead: numbers of `Evidence.candidates`, from 1, that block the way ahead, as they may be people; unset
     where none does. person_distance_m: of the nearest of all of these, unset where no calibration tells it.
     """

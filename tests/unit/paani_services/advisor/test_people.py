@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani.config import Config
+from paani.config import Config, load_config
 from paani.messages import BoxXyxy
 from paani_services.advisor.people import counts, is_close, nearest_ahead_m, people_in_lane, speed_limit_mps
 from paani_services.advisor.risk import Obstacle
@@ -57,8 +57,7 @@ def test_another_person_makes_no_advice_bolder_and_no_boat_faster(
     before = play([frame] * count)[1][-1]
     after = play([msgspec.structs.replace(frame, detections=(*frame.detections, person))] * count)[1][-1]
     assert BOLDNESS[after.direction] <= BOLDNESS[before.direction]
-    assert before.speed_limit_mps is msgspec.UNSET
-    assert after.speed_limit_mps in (PAANI.advisor.people.slow_mps, msgspec.UNSET)
+    assert before.speed_limit_mps == after.speed_limit_mps == PAANI.advisor.people.uncalibrated_mps
 
 
 def test_a_person_before_an_obstacle_that_reaches_into_the_way_does_not_open_its_side() -> None:
@@ -310,8 +309,22 @@ def test_the_boat_stops_for_somebody_in_the_way_who_is_near(obstacle: Obstacle, 
 )
 def test_people_near_limit_the_speed(obstacle: Obstacle, is_limited: bool) -> None:
     limit = PEOPLE.slow_mps if is_limited else None
-    assert speed_limit_mps((obstacle,), PAANI) == limit
-    assert speed_limit_mps((person(is_ashore=True), obstacle), PAANI) == limit
+    assert speed_limit_mps((obstacle,), CALIBRATED) == limit
+    assert speed_limit_mps((person(is_ashore=True), obstacle), CALIBRATED) == limit
+
+
+@pytest.mark.parametrize(("slow_mps", "uncalibrated_mps"), [(0.3, 0.2), (0.2, 0.3)])
+def test_an_uncalibrated_camera_is_never_followed_fast(slow_mps: float, uncalibrated_mps: float) -> None:
+    """How far off anything is, nobody knows; the lower of both limits holds."""
+    sets = [f"advisor.people.slow_mps={slow_mps}", f"advisor.people.uncalibrated_mps={uncalibrated_mps}"]
+    config = load_config(sets=sets)
+    assert speed_limit_mps((), config) == uncalibrated_mps
+    assert speed_limit_mps((person(),), config) == 0.2
+    measured = msgspec.structs.replace(config, calibration=CALIBRATED.calibration)
+    assert speed_limit_mps((), measured) is None
+    assert speed_limit_mps((person(),), measured) == slow_mps
+    assert play([CLEAR], config)[1][0].speed_limit_mps == uncalibrated_mps
+    assert play([CLEAR], measured)[1][0].speed_limit_mps is msgspec.UNSET
 
 
 def test_the_nearest_is_the_least_known_distance() -> None:

@@ -25,11 +25,12 @@ def test_the_log_says_what_is_assumed_and_what_measures_it(caplog: pytest.LogCap
         assert caplog.messages == []
         warn_uncalibrated(ASSUMED)
     assert "everybody in view counts as near" in caplog.messages[0]
+    assert "advisor.people.uncalibrated_mps" in caplog.messages[0]
     assert "`paani calibrate RECORDING`" in caplog.messages[0]
 
 
 def test_the_page_says_whether_distances_are_known() -> None:
-    assert sight_note(SEEN, ASSUMED) == "uncalibrated camera, everybody counts as near; one, other"
+    assert sight_note(SEEN, ASSUMED) == "uncalibrated camera, everybody counts as near, speed limited; one, other"
     assert sight_note(SEEN, MEASURED) == sight_note(SEEN, PAPER) == "one, other"
     refused = msgspec.structs.replace(SEEN, usable=False, cause=m.UnusableCause.NO_WATER)
     assert sight_note(refused, ASSUMED) == "unusable: no_water"
