@@ -193,10 +193,9 @@ def _closed_by(side: LaneRisk, tracks: tuple[Track, ...]) -> str:
     """What closes a side whose risk is below its limit; empty where the side is free, and where its risk closes it."""
     if not side.blocked or side.risk >= side.limit:
         return ""
-    if side.occupied:
-        return " and occupied"
-    is_somebody_there = any(track.label == "person" and track.id in side.track_ids for track in tracks)
-    return " with somebody in it" if is_somebody_there else " without a way"
+    if any(track.label == "person" and track.id in side.track_ids for track in tracks):
+        return " with somebody in it"
+    return " occupied" if side.occupied else " not free"
 
 
 def _limit(lane: LaneRisk, nominal: float) -> float:

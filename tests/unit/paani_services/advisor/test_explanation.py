@@ -28,10 +28,14 @@ def test_a_stop_for_somebody_says_stop_once_and_who_closes_both_sides() -> None:
 @pytest.mark.parametrize(
     ("side", "says"),
     [
-        (m.LaneRisk(risk=0.3, blocked=True, occupied=True, limit=0.58), "right 0.30 and occupied"),
-        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58), "right 0.30 without a way"),
+        (m.LaneRisk(risk=0.3, blocked=True, occupied=True, limit=0.58), "right 0.30 occupied"),
+        (
+            m.LaneRisk(risk=0.3, blocked=True, occupied=True, limit=0.58, track_ids=(1,)),
+            "right 0.30 with somebody in it",
+        ),
+        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58), "right 0.30 not free"),
         (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(1,)), "right 0.30 with somebody in it"),
-        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(2,)), "right 0.30 without a way"),
+        (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(2,)), "right 0.30 not free"),
         (m.LaneRisk(risk=0.58, blocked=True, limit=0.58), "right 0.58 (limit 0.58)"),
         (m.LaneRisk(risk=0.3, blocked=False, occupied=True, limit=0.58), "right 0.30 (limit 0.58)"),
     ],
