@@ -23,6 +23,7 @@ from paani_models.report.bootstrap import draw_sequence_counts, percentile_inter
 HEIGHTS_PX = ((8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, np.inf))
 ANY_HEIGHT_PX = (0.0, np.inf)
 MATCH_IOU = 0.5
+SEEN_IOU = 0.2
 ALL_SOURCES = "all"
 
 FindBoxes = Callable[[U8, float, int], Detections]
@@ -56,7 +57,11 @@ class Interval(msgspec.Struct, frozen=True):
 
 
 class HeightRow(msgspec.Struct, frozen=True, kw_only=True):
-    """One detector on one class, source and range of heights. n: true boxes; recall and precision at the threshold."""
+    """One detector on one class, source and range of heights. n: true boxes; all but AP50 at the threshold.
+
+    seen: share of the true boxes that a box of the class overlaps by `SEEN_IOU`, however it is drawn: an advice keeps
+    off what is seen, and recall asks for `MATCH_IOU`.
+    """
 
     detector: str
     kind: str
@@ -68,6 +73,7 @@ class HeightRow(msgspec.Struct, frozen=True, kw_only=True):
     ap50: Interval
     recall: Interval
     precision: Interval
+    seen: Interval
 
 
 def run_detectors(detectors: Sequence[DetectorRun], samples: Sequence[Sample]) -> list[PictureResult]:
@@ -119,6 +125,13 @@ def match_in_range(found: Detections, truth: F32, kind: int, range_px: tuple[flo
     return scores[counted], hits[counted], int(wanted.sum())
 
 
+def count_seen(found: Detections, truth: F32, kind: int, range_px: tuple[float, float], threshold: float) -> int:
+    """How many true boxes of the range a box of the class above the threshold overlaps by `SEEN_IOU`."""
+    boxes = found.boxes[(found.classes == kind) & (found.scores > threshold)]
+    real = truth[truth[:, 0] == kind, 1:]
+    return int((iou_matrix(real[_in_range(real, range_px)], boxes) >= SEEN_IOU).any(1).sum())
+
+
 def _in_range(boxes: F32, range_px: tuple[float, float]) -> Bools:
     heights = boxes[:, 3] - boxes[:, 1]
     return np.asarray((heights >= range_px[0]) & (heights < range_px[1]), np.bool_)
@@ -152,13 +165,14 @@ def score_heights(
             if source == ALL_SOURCES:
                 chosen = truth_pictures(results, label)
             for range_px in (*HEIGHTS_PX, ANY_HEIGHT_PX):
-                scored = (
-                    (each, match_pictures(chosen, each.name, kind, range_px))
-                    for each in detectors
-                    if label in each.known
-                )
                 limit = threshold(label)
-                rows += [_row(each.name, label, source, range_px, m, limit) for each, m in scored if m.positives.sum()]
+                for each in detectors:
+                    if label not in each.known:
+                        continue
+                    matched = match_pictures(chosen, each.name, kind, range_px)
+                    if matched.positives.sum():
+                        seen = _seen_per_sequence(chosen, each.name, kind, range_px, limit)
+                        rows.append(_row(each.name, label, source, range_px, matched, seen, limit))
     return rows
 
 
@@ -166,7 +180,7 @@ def match_pictures(
     results: Sequence[PictureResult], detector: str, kind: int, range_px: tuple[float, float]
 ) -> MatchedBoxes:
     """One detector's boxes of one class over pictures that annotate it."""
-    places = {key: i for i, key in enumerate(dict.fromkeys((r.sample.source.name, r.sample.sequence) for r in results))}
+    places = _number_sequences(results)
     positives = np.zeros(len(places), np.int64)
     scores, hits, owners = [np.zeros(0, np.float32)], [np.zeros(0, np.bool_)], [np.zeros(0, np.int64)]
     for result in results:
@@ -181,8 +195,29 @@ def match_pictures(
     return MatchedBoxes(joined[order], np.concatenate(hits)[order], np.concatenate(owners)[order], positives)
 
 
+def _number_sequences(results: Sequence[PictureResult]) -> dict[tuple[str, str], int]:
+    return {key: i for i, key in enumerate(dict.fromkeys((r.sample.source.name, r.sample.sequence) for r in results))}
+
+
+def _seen_per_sequence(
+    results: Sequence[PictureResult], detector: str, kind: int, range_px: tuple[float, float], threshold: float
+) -> F64:
+    places = _number_sequences(results)
+    seen = np.zeros(len(places))
+    for result in results:
+        place = places[result.sample.source.name, result.sample.sequence]
+        seen[place] += count_seen(result.found[detector], result.truth, kind, range_px, threshold)
+    return seen
+
+
 def _row(
-    detector: str, kind: str, source: str, range_px: tuple[float, float], matched: MatchedBoxes, threshold: float
+    detector: str,
+    kind: str,
+    source: str,
+    range_px: tuple[float, float],
+    matched: MatchedBoxes,
+    seen: F64,
+    threshold: float,
 ) -> HeightRow:
     confident = matched.scores > threshold
     right = matched.hits & confident
@@ -192,6 +227,7 @@ def _row(
             np.bincount(matched.places, right, size),
             np.bincount(matched.places, confident, size),
             matched.positives.astype(np.float64),
+            seen,
         ]
     )
     weights = draw_sequence_counts(size) if size > 1 else np.zeros((0, size), np.int64)
@@ -207,8 +243,9 @@ def _row(
         n=int(total[2]),
         sequences=size,
         ap50=_interval(ap50, curves),
-        recall=_interval(_ratio(total[:1], total[2:])[0], _ratio(drawn[:, 0], drawn[:, 2])),
+        recall=_interval(_ratio(total[:1], total[2:3])[0], _ratio(drawn[:, 0], drawn[:, 2])),
         precision=_interval(_ratio(total[:1], total[1:2])[0], _ratio(drawn[:, 0], drawn[:, 1])),
+        seen=_interval(_ratio(total[3:], total[2:3])[0], _ratio(drawn[:, 3], drawn[:, 2])),
     )
 
 

@@ -8,16 +8,19 @@ from itertools import groupby
 
 from paani_models.report.height_scores import HeightRow, Interval
 
-_WIDTHS = (7, 24, 8, 5, 5, 20, 18, 18, 18)
+_WIDTHS = (7, 24, 8, 5, 5, 20, 18, 18, 18, 18)
 
 
 def format_height_table(rows: Sequence[HeightRow]) -> str:
     """One line per detector, class, source and range; values with their 95 % interval over sequences."""
-    heads = ("class", "source", "height", "n", "seq", "detector", "AP50", "recall", "precision")
-    lines = ["Height of the true box in pixels of the source picture; 95 % intervals over sequences.", _line(heads)]
+    heads = ("class", "source", "height", "n", "seq", "detector", "AP50", "recall", "precision", "seen")
+    lines = [
+        "Height of the true box in pixels of the source picture; 95 % intervals over sequences; seen: under a box.",
+        _line(heads),
+    ]
     for _, group in groupby(rows, lambda row: (row.kind, row.source, row.low_px, row.high_px)):
         for row in group:
-            spans = (_format_interval(each) for each in (row.ap50, row.recall, row.precision))
+            spans = (_format_interval(each) for each in (row.ap50, row.recall, row.precision, row.seen))
             cells = (row.kind, row.source, format_range(row), str(row.n), str(row.sequences), row.detector, *spans)
             lines.append(_line(cells))
     return "\n".join(lines) + "\n"

@@ -14,6 +14,7 @@ from paani_models.report.height_scores import (
     DetectorRun,
     HeightRow,
     PictureResult,
+    count_seen,
     match_in_range,
     score_heights,
 )
@@ -41,6 +42,18 @@ def test_only_boxes_of_the_range_are_required_and_counted() -> None:
         assert kept == pytest.approx(scores)
         assert hits.tolist() == [True, False]
         assert positives == 1
+
+
+def test_who_is_boxed_badly_is_seen_and_not_recalled() -> None:
+    """Two people in one box, a box of a third, a fourth whose box is too sure of nothing, and one of another height."""
+    truth = people((0, 0, 40, 80), (40, 0, 80, 80), (100, 0, 140, 80), (200, 0, 240, 80), (300, 0, 310, 12))
+    found = detections((0.9, 0, 0, 80, 160), (0.8, 100, 0, 140, 80), (0.4, 200, 0, 240, 80), (0.9, 300, 0, 310, 12))
+    assert count_seen(found, truth, 0, (64.0, np.inf), 0.40) == 3
+    assert count_seen(found, truth, 0, (64.0, np.inf), 0.39) == 4
+    assert count_seen(found, truth, 0, (8.0, 16.0), 0.40) == 1
+    assert count_seen(found, truth, 1, (64.0, np.inf), 0.40) == 0
+    assert count_seen(detections(), truth, 0, (64.0, np.inf), 0.40) == 0
+    assert count_seen(found, people(), 0, (64.0, np.inf), 0.40) == 0
 
 
 def test_a_second_box_on_one_person_is_an_alarm() -> None:
@@ -78,6 +91,8 @@ def test_over_all_heights_the_figures_are_those_of_the_manifest() -> None:
     row = any_height(score_heights(pictures, runs), "noisy")
     known = summarise_class([match_class(p.found["noisy"], p.truth, 0) for p in pictures])
     assert row.n == known["n"] == 80
+    assert row.recall.value <= row.seen.value <= 1.0
+    assert row.seen.low <= row.seen.value <= row.seen.high
     assert row.ap50.value == pytest.approx(known["ap50"])
     assert row.recall.value == pytest.approx(known["recall_at_0.40"])
     assert row.precision.value == pytest.approx(known["precision_at_0.40"])
