@@ -81,7 +81,10 @@ def test_one_file_one_job(path: Path) -> None:
         ("from cryptography", "services/paani_tools/certs/"),
         ("from distributed", "shared/paani/cluster.py"),
         ("from prometheus_client", "services/paani_services/dashboard/metrics.py"),
-        ("from pymavlink", "services/paani_services/mavlink/codec.py"),
+        (
+            "from pymavlink",
+            "services/paani_services/mavlink/codec.py services/paani_services/thrusters/autopilot_frames.py",
+        ),
         ("import rerun", "services/paani_tools/logs/rerun_view.py"),
         ("import foxglove", "services/paani_services/foxglove/server.py"),
         ("import gpxpy", "services/paani_services/navigator/files/gpx.py"),

@@ -110,17 +110,17 @@ class OutputTracker:
     def applied(self, decided: AppliedThrust, output_cause: m.ZeroCause, now_ms: float) -> AppliedThrust:
         """What is applied now: the decision, unless the microcontroller withholds it or still runs the last one."""
         if output_cause is not m.ZeroCause.NONE and output_cause is not m.ZeroCause.LINE_LOST:
-            return _zero(decided, output_cause)
+            return zero(decided, output_cause)
         last = self._accepted
         is_live = last is not None and now_ms - self._accepted_ms <= self._lease_ms
         if last is not None and is_live and last.zero_cause is m.ZeroCause.NONE:
             return last
         if decided.zero_cause is m.ZeroCause.NONE:
-            return _zero(decided, m.ZeroCause.LINE_LOST)  # not accepted yet
+            return zero(decided, m.ZeroCause.LINE_LOST)  # not accepted yet
         return decided
 
 
-def _zero(decided: AppliedThrust, cause: m.ZeroCause) -> AppliedThrust:
+def zero(decided: AppliedThrust, cause: m.ZeroCause) -> AppliedThrust:
     """Zero thrust: for the adapter's own cause where it has one."""
     if decided.zero_cause is not m.ZeroCause.NONE:
         return decided

@@ -55,6 +55,7 @@ def check_serial(config: Config) -> Iterator[Verdict]:
     lines = {
         "bridge.line": config.bridge.line,
         "thrusters.line": config.thrusters.line,
+        "thrusters.autopilot.line": config.thrusters.autopilot.line,
         "plant.pwm_line": config.plant.pwm_line,
         "sensors.gps.line": sensors.gps.line,
         "sensors.imu.line": sensors.imu.line,

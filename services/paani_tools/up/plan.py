@@ -110,7 +110,7 @@ async def _with_course(config: Config) -> Config:
 def _require_lines(config: Config) -> None:
     """Raises UserError where thrust goes to a microcontroller and nobody has said where that is."""
     graph = config.bus.graph
-    if "thrusters" in config.services and not config.thrusters.line:
+    if "thrusters" in config.services and not config.thrusters.is_connected:
         raise UserError(f"thrusters.line: not set (profile {config.profile} drives a microcontroller)")
     if graph is Graph.HIL and "plant" in config.services and not config.plant.pwm_line:
         raise UserError("plant.pwm_line: not set (the emulator's bench port, by which profile hil moves the boat)")

@@ -9,6 +9,7 @@ from paani.config.advisor import (
     TrackerConfig,
     TuningConfig,
 )
+from paani.config.autopilot import AutopilotConfig
 from paani.config.bridge import BridgeConfig
 from paani.config.button import ButtonConfig
 from paani.config.foxglove import FoxgloveConfig
@@ -36,6 +37,7 @@ __all__ = [
     "PROFILES",
     "AdapterConfig",
     "AdvisorConfig",
+    "AutopilotConfig",
     "BridgeConfig",
     "BusConfig",
     "ButtonConfig",

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from paani.config.autopilot import AutopilotConfig
 from paani.config.section import Section
 from paani.port_address import require_line
 
@@ -19,7 +20,7 @@ class EscConfig(Section, frozen=True):
 
 
 class ThrustersConfig(Section, frozen=True):
-    """The `thrusters` process. `line`: its own way to the microcontroller; empty: not known."""
+    """The `thrusters` process. `line`: its own way to the microcontroller; empty: not known, or an autopilot drives."""
 
     line: str = ""
     rate_hz: Annotated[float, msgspec.Meta(ge=10.0, le=50.0)] = 20.0  # twice the controller's: one frame may be lost
@@ -33,9 +34,19 @@ class ThrustersConfig(Section, frozen=True):
     max_current_a: Annotated[float, msgspec.Meta(ge=0.0, le=327.0)] = 0.0  # above it no thrust; 0: no limit
     left: EscConfig = EscConfig()
     right: EscConfig = EscConfig()
+    autopilot: AutopilotConfig = AutopilotConfig()
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a way to the motors at all."""
+        return bool(self.line or self.autopilot.line)
 
     def __post_init__(self) -> None:
-        """The line is one, and a lease outlives two frames."""
+        """The line is one, there is no second way to the motors, and a lease outlives two frames."""
+        if self.line and self.autopilot.line:
+            raise ValueError(
+                "autopilot.line: thrusters.line is set too; thrust goes to a microcontroller or an autopilot"
+            )
         if self.line:
             try:
                 require_line(self.line)

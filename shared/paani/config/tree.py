@@ -180,6 +180,9 @@ class Config(Section, frozen=True):
         for name, address in (("thrusters.line", line), ("plant.pwm_line", self.plant.pwm_line)):
             if graph is Graph.HIL and address and not is_emulated(address):
                 raise ValueError(f"{name} {address}: profile hil drives an emulator alone ({EMULATED_LINES})")
+        autopilot = self.thrusters.autopilot.line
+        if graph is not Graph.HULL and autopilot:
+            raise ValueError(f"thrusters.autopilot.line {autopilot}: drives a real boat alone (--profile hull)")
         if graph is Graph.HULL and line.startswith("socket:"):
             raise ValueError(f"thrusters.line {line}: a hull's microcontroller is at a serial device or unix:/PATH")
         if graph is not Graph.SIMULATION and self.up.arm_at_start:
@@ -187,21 +190,24 @@ class Config(Section, frozen=True):
 
     def _require_lines(self) -> None:
         """A line has one user, and a recording guides no boat that moves."""
-        sensors = self.sensors
+        sensors, autopilot = self.sensors, self.thrusters.autopilot.line
         devices = {
             "sensors.gps.line": sensors.gps.line,
             "sensors.imu.line": sensors.imu.line,
             "sensors.heading.line": sensors.heading.line,
         }
         for name, line in devices.items():
-            for other, taken in (("bridge.line", self.bridge.line), ("thrusters.line", self.thrusters.line)):
+            for other, taken in (
+                ("bridge.line", self.bridge.line),
+                ("thrusters.line", self.thrusters.line),
+                ("thrusters.autopilot.line", autopilot),
+            ):
                 if line and line.partition("@")[0] == taken.partition("@")[0]:
                     raise ValueError(f"{name} {line}: is also {other}; a sensor needs a line of its own")
-            moves = self.thrusters.line and not is_emulated(self.thrusters.line)
+            moves = autopilot or (self.thrusters.line and not is_emulated(self.thrusters.line))
             if line.startswith("file:") and moves:
-                raise ValueError(
-                    f"{name} {line}: a recording is no sensor of a boat that moves (thrusters.line is set)"
-                )
+                way = "thrusters.autopilot.line" if autopilot else "thrusters.line"
+                raise ValueError(f"{name} {line}: a recording is no sensor of a boat that moves ({way} is set)")
 
 
 def is_emulated(line: str) -> bool:

@@ -56,9 +56,9 @@ class ImuSample(Message, frozen=True, kw_only=True):
 class ZeroCause(StrEnum):
     """Why the thrust adapter applies zero; NONE while it applies the thrust that it was sent.
 
-    The last seven are a hull's: LINE_LOST is that the microcontroller does not answer, REFUSED that it takes no thrust;
-    the others are what holds the thrusters on the microcontroller itself. REARM: it waits for the operator to disarm,
-    and to arm again.
+    The last seven are a hull's: LINE_LOST is that the microcontroller or autopilot does not answer, REFUSED that it
+    takes no thrust; the others are what holds the thrusters on the microcontroller itself. REARM: it waits for the
+    operator to disarm, and to arm again.
     """
 
     NONE = "none"

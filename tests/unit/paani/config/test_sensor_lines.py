@@ -34,10 +34,10 @@ def test_the_speed_of_a_recording() -> None:
 
 
 @pytest.mark.parametrize("device", ["gps", "imu", "heading"])
-@pytest.mark.parametrize("user", ["bridge", "thrusters"])
+@pytest.mark.parametrize("user", ["bridge", "thrusters", "thrusters.autopilot"])
 def test_a_line_to_the_microcontroller_is_no_sensors_line(device: str, user: str) -> None:
     lines = (f"sensors.{device}.line=serial:/dev/ttyACM0@9600", f"{user}.line=serial:/dev/ttyACM0")
-    with pytest.raises(UserError, match=rf"sensors\.{device}\.line .*{user}\.line"):
+    with pytest.raises(UserError, match=rf"sensors\.{device}\.line .* {user}\.line"):
         load_config(profile="hull", sets=lines)
     load_config(profile="hull", sets=(lines[0], f"{user}.line=serial:/dev/ttyACM1"))
 
@@ -45,7 +45,8 @@ def test_a_line_to_the_microcontroller_is_no_sensors_line(device: str, user: str
 @pytest.mark.parametrize("device", ["gps", "imu", "heading"])
 def test_a_recording_guides_no_boat_that_moves(device: str) -> None:
     recording, line = f"sensors.{device}.line=file:drive.nmea", "thrusters.line=serial:/dev/ttyACM0"
-    with pytest.raises(UserError, match=rf"sensors\.{device}\.line file:drive\.nmea: a recording"):
-        load_config(profile="hull", sets=(recording, line))
+    for way in (line, "thrusters.autopilot.line=serial:/dev/ttyACM0", "thrusters.autopilot.line=socket://127.0.0.1:5"):
+        with pytest.raises(UserError, match=rf"sensors\.{device}\.line file:drive\.nmea: a recording"):
+            load_config(profile="hull", sets=(recording, way))
     load_config(profile="hull", sets=(recording,))
     load_config(profile="hull", sets=(recording, "thrusters.line=serial:/dev/pts/7"))  # an emulator moves nothing
