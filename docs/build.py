@@ -14,10 +14,12 @@ from typing import Any
 
 from docs.links import problems_of
 from docs.reference.commands import commands_page
+from docs.reference.markdown import with_statement_links
 from docs.reference.messages import messages_page
 from docs.reference.settings import settings_page
 from docs.reference.statements import statements_page
 from docs.reference.topics import topics_page
+from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report.command import report_text
 
 HERE = Path(__file__).parent
@@ -29,7 +31,9 @@ GENERATED: dict[str, Callable[[], str]] = {
     "commands": commands_page,
     "messages": messages_page,
     "statements": statements_page,
-    "paper-results": lambda: report_text(None),
+    "paper-results": lambda: with_statement_links(
+        report_text(None), {each.id: each.says for each in read_statements()}
+    ),
 }
 
 

@@ -16,7 +16,15 @@ from paani.undecodable import UNREADABLE
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue
 from paani_tools.bench.board.table import BoardRun
-from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table, world_table
+from paani_tools.paper_report.tables import (
+    board_tables,
+    detector_table,
+    network_table,
+    segmenter_table,
+    settings_table,
+    stills_table,
+    world_table,
+)
 
 TITLE = "# The paper's results, and what stands here"
 INTRODUCTION = (
@@ -50,11 +58,13 @@ def main(argv: list[str]) -> int:
 
 def report_text(run: BoardRun | None) -> str:
     """The whole report. run: of the board protocol, where there is one."""
-    catalogue, paper = load_catalogue(), load_config(profile="paper")
+    catalogue, paper, ours = load_catalogue(), load_config(profile="paper"), load_config()
     tables = (
+        network_table(catalogue["detector"], catalogue["segmenter"]),
         detector_table(catalogue["detector"]),
         segmenter_table(catalogue["segmenter"]),
-        stills_table(paper, load_config()),
+        stills_table(paper, ours),
+        settings_table(paper, ours),
         world_table(paper),
         board_tables(run),
     )

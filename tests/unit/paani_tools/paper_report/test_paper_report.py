@@ -14,11 +14,24 @@ from paani_models.catalogue import load_catalogue
 from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report import published
 from paani_tools.paper_report.command import markdown, report_text
-from paani_tools.paper_report.tables import board_tables, detector_table, segmenter_table, stills_table, world_table
+from paani_tools.paper_report.settings import BOAT, RUNTIME
+from paani_tools.paper_report.tables import (
+    board_tables,
+    detector_table,
+    network_table,
+    segmenter_table,
+    settings_table,
+    stills_table,
+    world_table,
+)
 from tests.unit.paani_tools.bench.board.test_board_figures import polls, run_of
 
+CLASSES = published.DETECTOR_CLASSES
 SAYS = {statement.id: statement.says for statement in read_statements()}
 PAPER, OURS = load_config(profile="paper"), load_config()
+
+
+NETWORKS = (published.DETECTOR_NETWORK, published.SEGMENTER_NETWORK)
 
 
 def column(table: Any, name: str) -> list[Any]:
@@ -29,6 +42,17 @@ def test_the_papers_figures_are_those_of_its_statements() -> None:
     for name, value in published.DETECTOR_VALIDATION.items():
         assert f"{value:.6f}" in SAYS[published.DETECTOR_STATEMENTS[name]]
     assert all(f"{value:.6f}" in SAYS["V8"] for value in published.SEGMENTER.values())
+    assert all(f"{value:.6f}" in SAYS["V9"] for value in published.SEGMENTER_ONNX.values())
+    assert f"{published.DETECTOR_AP50:.6f}" in SAYS["V1"]
+    for statement, _, printed in published.DETECTOR_OTHERS:
+        assert all(figure in SAYS[statement] for figure in printed.split(" / ")), statement
+    for (parameters, file), parameters_n, megabytes, difference in NETWORKS:
+        assert f"{parameters_n:,}" in SAYS[parameters]
+        assert f"{megabytes}" in SAYS[file]
+        assert difference in SAYS["T2"]
+    for statement, what, printed, _ in (*RUNTIME, *BOAT):
+        said = " ".join(SAYS[each] for each in statement.split())
+        assert all(number in said for number in printed.split(" / ")), what
     assert all(f"{value:.6f}" in SAYS["V10"] for value in published.INT8.values())
     for still in published.STILLS:
         assert all(f"{risk:.4f}" in SAYS[still.statement] for risk in still.risks)
@@ -65,13 +89,30 @@ def test_figures_of_networks_are_the_manifests() -> None:
     figures = {(each.metric, each.source): each for each in (*detector.figures, *segmenter.figures)}
     here = dict(zip(column(detector_table(detector), "figure"), column(detector_table(detector), "here"), strict=True))
     assert here["AP50-95, buoy"] == figures["buoy_ap50_95", "all"].value
-    four = [figures[f"{name}_ap50_95", "all"].value for name in ("person", "vessel", "pier", "buoy")]
+    four = [figures[f"{name}_ap50_95", "all"].value for name in CLASSES]
     assert here["AP50-95, mean"] == pytest.approx(sum(four) / 4)
     found = dict(
         zip(column(segmenter_table(segmenter), "figure"), column(segmenter_table(segmenter), "here"), strict=True)
     )
-    assert found["iou_water"] == figures["iou_water", "mastr1325"].value
-    assert found["miou, INT8"] is None
+    assert found["IoU of water, ONNX"] == figures["iou_water", "mastr1325"].value
+    assert (found["IoU of water, PyTorch"], found["F1 of edges, ONNX"], found["mean IoU, INT8"]) == (None, None, None)
+    assert here["AP50, mean"] == pytest.approx(0.25 * sum(figures[f"{name}_ap50", "all"].value for name in CLASSES))
+    why = dict(
+        zip(column(detector_table(detector), "figure"), column(detector_table(detector), "what differs"), strict=True)
+    )
+    assert why["AP50-95, buoy"] == f"{figures['buoy_ap50_95', 'rendered'].n} of these boxes are rendered"
+    sizes = column(network_table(detector, segmenter), "here")
+    assert sizes[:2] == [f"{detector.parameters:,}", detector.size_bytes * 1e-6]
+    assert sizes[5] == f"{segmenter.export_max_abs_diff:.2e}"
+
+
+def test_the_paper_profile_has_the_constants_of_the_papers_tables() -> None:
+    table = settings_table(PAPER, OURS)
+    assert column(table, "here") == column(table, "paper")
+    why = dict(zip(column(table, "figure"), column(table, "what differs"), strict=True))
+    assert why["cruise / speed cap [m/s]"] == f"default profile: {OURS.navigator.cruise_mps:g} / 0.9"
+    assert why["risk weights N / O / M / U"] == "nothing"
+    assert column(settings_table(OURS, OURS), "here") != column(table, "paper")
 
 
 def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
@@ -80,10 +121,10 @@ def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text == report_text(None)
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
-        "## Detector", "## Segmenter", "## Single pictures, paper profile",
-        "## World, paper profile", "## Board protocol",
+        "## Networks", "## Detector", "## Segmenter", "## Single pictures, paper profile",
+        "## Constants, paper profile", "## World, paper profile", "## Board protocol",
     ]  # fmt: skip
-    assert "| V10 | miou, INT8 | 0.7303 | - |" in text
+    assert "| V10 | mean IoU, INT8 | 0.7303 | - |" in text
     assert markdown(board_tables(None)).count("| - | 0 |") == 7
 
 
