@@ -45,8 +45,8 @@ def detector_table(detector: Model) -> FigureTable:
         rows.append(
             _precision_row(detector, published.DETECTOR_STATEMENTS[name], f"AP50-95, {name}", paper, name, "ap50_95")
         )
-    for statement, what, paper in published.DETECTOR_OTHERS:
-        rows.append((statement, what, paper, None, 0, NO_COUNTERPART))
+    for statement, what, printed in published.DETECTOR_OTHERS:
+        rows.append((statement, what, printed, None, 0, NO_COUNTERPART))
     return FigureTable(name="Detector", columns=COLUMNS, rows=tuple(rows), note=OTHER_DATA)
 
 
