@@ -68,14 +68,14 @@ def words_of(sets: tuple[str, ...], *more: str) -> list[str]:
     return [*more, *(word for setting in sets for word in ("--set", setting))]
 
 
-def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
+def test_a_drive_on_the_river(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     """The summary has what it promises, perception keeps up, and the boat moves."""
     file = tmp_path / "s.json"
-    up = Up(tmp_path, *words_of(private_sets, "--headless", "--for", "20", "--summary", str(file)))
+    up = Up(tmp_path, *words_of(private_sets, "--headless", "--for", "12", "--summary", str(file)))
     assert up.process.wait(READY_S + 30) == 0, (up.out, up.errors)
     assert up.children() == {}
     summary = json.loads(file.read_text())
-    assert summary["duration_s"] == pytest.approx(20.0, abs=1.0)
+    assert summary["duration_s"] == pytest.approx(12.0, abs=1.0)
     assert (summary["profile"], summary["world"]) == ("paani", "river")
     assert set(summary["services"]) == set(Config().services)
     for service in summary["services"].values():
@@ -89,9 +89,9 @@ def test_twenty_seconds_on_the_river(tmp_path: Path, private_sets: tuple[str, ..
     for stage in summary["latency_ms"].values():
         assert 0 < stage["p50"] <= stage["p95"] <= stage["p99"]
     assert set(summary["decisions"]) == {d.value for d in m.Direction}
-    assert sum(summary["decisions"].values()) == sum(summary["reasons"].values()) > 60
+    assert sum(summary["decisions"].values()) == sum(summary["reasons"].values()) > 36
     assert summary["services"]["perception"]["rate_hz"] >= 4.0
-    assert summary["distance_m"] > 4.0
+    assert summary["distance_m"] > 2.0
     assert summary["collisions"] == 0
     assert isinstance(summary["drops"], dict)
     assert isinstance(summary["waypoints_reached"], int)

@@ -124,6 +124,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
+    train.add_argument("--seed", type=int, metavar="N", help="segmenters only; 42 if not given")
+    train.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        choices=("flip", "jitter", "glare"),
+        help="paper-segmenter: leave this augmentation out, to see what it is worth; repeatable",
+    )
     train.add_argument("--threads", type=int, default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
     export.add_argument("net", choices=TRAINABLE)
@@ -252,6 +260,8 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
             blend=arguments.blend,
             mean_with=arguments.mean_with,
             draws_frac=arguments.draws,
+            seed=arguments.seed,
+            without=tuple(arguments.without),
         )
         train_and_export.train_network(arguments.net, pictures, options, arguments.threads)
     else:

@@ -54,6 +54,8 @@ class TrainingOptions:
     blend: float | None = None
     mean_with: Path | None = None
     draws_frac: float = 1.0
+    seed: int | None = None
+    without: tuple[str, ...] = ()
 
 
 def train_network(net: str, pictures: PictureSelection, options: TrainingOptions, threads: int) -> None:
@@ -89,6 +91,8 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
         recipe,
         stages=parse_stages(options.stages) or recipe.stages,
         peak_rate=options.peak_rate or recipe.peak_rate,
+        seed=recipe.seed if options.seed is None else options.seed,
+        without=options.without,
     )
     torch.manual_seed(recipe.seed)
     model: ShippedSegmenter | PaperSegmenter = PaperSegmenter()

@@ -5,6 +5,8 @@ The generator is seeded, where the paper's glare draws from a new, unseeded one 
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import cv2
 import numpy as np
 
@@ -16,18 +18,25 @@ JITTER_FRAC = 0.5  # S8: share of pictures whose colours are changed
 BRIGHTNESS, CONTRAST, SATURATION = 0.2, 0.2, 0.2  # S8: factors are drawn from 1 - x to 1 + x
 HUE = 0.05  # S8: of the whole circle, to either side
 HUE_STEPS = 180  # of OpenCV's circle of hues in 8 bits
+AUGMENTATIONS = ("flip", "jitter", "glare")
 
 
-def augment_paper_pair(rng: Rng, picture: U8, mask: U8, target_wh: tuple[int, int]) -> tuple[U8, U8]:
-    """One training pair of the target size: RGB uint8 [H,W,3] and mask uint8 [H,W], which moves with the picture."""
+def augment_paper_pair(
+    rng: Rng, picture: U8, mask: U8, target_wh: tuple[int, int], without: Collection[str] = ()
+) -> tuple[U8, U8]:
+    """One training pair of the target size: RGB uint8 [H,W,3] and mask uint8 [H,W], which moves with the picture.
+
+    without: those of AUGMENTATIONS that are left out, to see what each is worth.
+    """
     picture = np.asarray(cv2.resize(picture, target_wh), np.uint8)
     mask = np.asarray(cv2.resize(mask, target_wh, interpolation=cv2.INTER_NEAREST), np.uint8)
     if rng.random() < FLIP_FRAC:
-        picture, mask = np.ascontiguousarray(picture[:, ::-1]), np.ascontiguousarray(mask[:, ::-1])
+        mirrored = np.ascontiguousarray(picture[:, ::-1]), np.ascontiguousarray(mask[:, ::-1])
+        picture, mask = (picture, mask) if "flip" in without else mirrored
     if rng.random() < JITTER_FRAC:
-        picture = jitter_colour_slightly(rng, picture)
+        picture = picture if "jitter" in without else jitter_colour_slightly(rng, picture)
     if rng.random() < GLARE_FRAC:
-        picture = add_glare(rng, picture)
+        picture = picture if "glare" in without else add_glare(rng, picture)
     return picture, mask
 
 

@@ -75,6 +75,7 @@ class SegmenterRecipe:
     workers: int = 2  # S6: 4
     # Every picture once an epoch, augmented as in the paper (S8); else balanced by source, with pasted walls and nulls.
     as_in_paper: bool = False
+    without: tuple[str, ...] = ()  # of the paper's augmentations
 
     @property
     def epochs(self) -> int:
@@ -200,7 +201,8 @@ class SegmenterTraining:
             if index < 0:
                 pairs.append(draw_null_pair(rng, size))
             elif self.recipe.as_in_paper:
-                pairs.append(augment_paper_pair(rng, self.train[index].picture, self.train[index].mask, size))
+                item = self.train[index]
+                pairs.append(augment_paper_pair(rng, item.picture, item.mask, size, self.recipe.without))
             else:
                 item, donor = self.train[index], self.train[int(rng.integers(len(self.train)))]
                 land = crop_land(rng, item.picture, item.mask) if rng.random() < LAND_FRAC else None

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from paani_models.segmenter.paper_augmentation import augment_paper_pair, jitter_colour_slightly
+from paani_models.segmenter.paper_augmentation import AUGMENTATIONS, augment_paper_pair, jitter_colour_slightly
 from paani_models.training import augment
 
 SIZE_WH = (320, 256)
@@ -84,6 +84,24 @@ def test_the_papers_augmentation_has_its_shares_s8() -> None:
     assert is_within(mirrored, n, 0.5)
     assert is_within(jittered, n, 0.5)
     assert 0.30 * n < plain < 0.5 * n  # neither glare (0.35, an eighth of it without light) nor jitter
+
+
+@pytest.mark.parametrize("left_out", AUGMENTATIONS)
+def test_each_of_the_papers_augmentations_may_be_left_out_alone(left_out: str) -> None:
+    """And nothing is left of a picture's change without all three."""
+    picture, mask = np.full((256, 320, 3), 90, np.uint8), np.zeros((256, 320), np.uint8)
+    picture[:, :160], mask[:, :160] = 60, OBSTACLE_CLASS
+    for seed in range(40):
+        draw = np.random.default_rng(seed).random
+        flips = draw() < 0.5
+        jitters = draw() < 0.5
+        out, labels = augment_paper_pair(np.random.default_rng(seed), picture, mask, SIZE_WH, (left_out,))
+        assert bool(labels[0, 0] == 0) is (flips and left_out != "flip")
+        upright = out[:, ::-1] if labels[0, 0] == 0 else out
+        if left_out == "glare":
+            assert np.array_equal(upright, picture) is not jitters
+        none, _ = augment_paper_pair(np.random.default_rng(seed), picture, mask, SIZE_WH, AUGMENTATIONS)
+        assert np.array_equal(none, picture)
 
 
 def test_the_papers_jitter_stays_within_its_ranges_s8() -> None:

@@ -51,8 +51,8 @@ def test_the_papers_figures_are_those_of_its_statements() -> None:
         assert f"{megabytes}" in SAYS[file]
         assert difference in SAYS["T2"]
     for statement, what, printed, _ in (*RUNTIME, *BOAT):
-        said = " ".join(SAYS[each] for each in statement.split())
-        assert all(number in said for number in printed.split(" / ")), what
+        text = " ".join(SAYS[each] for each in statement.split())
+        assert all(number in text for number in printed.split(" / ")), what
     assert all(f"{value:.6f}" in SAYS["V10"] for value in published.INT8.values())
     for still in published.STILLS:
         assert all(f"{risk:.4f}" in SAYS[still.statement] for risk in still.risks)
