@@ -99,6 +99,20 @@ def test_e4_e5_e6_by_hand() -> None:
     assert (lanes.left.clear_width, lanes.center.clear_width, lanes.right.clear_width) == pytest.approx((1.0, 0.5, 0.0))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_e4_e5_e6_corridors_of_cells_are_those_of_the_full_mask(seed: int) -> None:
+    """E4, E5, E6: every pixel counted, with the paper's corridors."""
+    rng, corridors = np.random.default_rng(seed), CorridorConfig(open_water=False)
+    mask = (rng.random((64, 80)) < 0.4).astype(np.uint8)
+    mask[:, rng.random(80) < 0.3] = WATER
+    confidence = rng.uniform(0.34, 1.0, (64, 80)).astype(np.float32)
+    cells = summarise_corridors(mask, confidence, corridors)
+    full = summarise_corridors(*(each.repeat(4, 0).repeat(4, 1) for each in (mask, confidence)), corridors)
+    for name in ("non_water", "uncertainty", "clear_width"):
+        for one, other in zip(cells, full, strict=True):
+            assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-6), name
+
+
 def test_e2_nothing_above_the_region_counts() -> None:
     mask = np.zeros((64, 80), np.uint8)
     mask[:19] = 2  # 0.297 of the height
