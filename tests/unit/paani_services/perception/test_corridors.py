@@ -107,7 +107,8 @@ def test_e4_e5_e6_corridors_of_cells_are_those_of_the_full_mask(seed: int) -> No
     mask[:, rng.random(80) < 0.3] = WATER
     confidence = rng.uniform(0.34, 1.0, (64, 80)).astype(np.float32)
     cells = summarise_corridors(mask, confidence, corridors)
-    full = summarise_corridors(*(each.repeat(4, 0).repeat(4, 1) for each in (mask, confidence)), corridors)
+    large = mask.repeat(4, 0).repeat(4, 1), confidence.repeat(4, 0).repeat(4, 1)
+    full = summarise_corridors(*large, corridors)
     for name in ("non_water", "uncertainty", "clear_width"):
         for one, other in zip(cells, full, strict=True):
             assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-6), name
