@@ -100,13 +100,13 @@ def predict_clearances(
     clearance_m = np.empty((len(obstacles), *paths.x_m.shape))
     for row_m, obstacle in zip(clearance_m, obstacles, strict=True):
         row_m[:] = predicted_clearance_m(obstacle, paths.x_m, paths.y_m, paths.time_s[:, None])
-    resting_m = np.where(is_within_horizon(paths, config), clearance_m[:, :, -1], np.inf)
+    resting_m = np.where(is_within_horizon(paths.time_s, config), clearance_m[:, :, -1], np.inf)
     return DynamicClearance(clearance_m[:, :, :-2], clearance_m[:, :, -2], np.minimum.accumulate(resting_m, axis=1))
 
 
-def is_within_horizon(trajectories: Trajectories, config: PlannerConfig) -> Bools:
+def is_within_horizon(time_s: F64, config: PlannerConfig) -> Bools:
     """Which times lie within `horizon_s` [times]."""
-    return np.asarray(trajectories.time_s <= config.horizon_s + 1e-9)
+    return np.asarray(time_s <= config.horizon_s + 1e-9)
 
 
 def position_deviation_m(obstacle: DynamicObstacle, time_s: F64 | float) -> F64 | float:
@@ -120,7 +120,7 @@ def required_clearance_m(time_s: F64, resting_m: float | F64, config: PlannerCon
     `resting_m` is the clearance of the boat at rest. Where that is less, half a cell less than that is required, so
     that a boat beside an obstacle can leave it; inside an obstacle both are negative.
     """
-    drift_m = np.where(time_s <= config.horizon_s + 1e-9, config.drift_mps * time_s, 0.0)
+    drift_m = np.where(is_within_horizon(time_s, config), config.drift_mps * time_s, 0.0)
     radius_m = config.hull_radius_m + config.margin_m + drift_m
     return np.asarray(np.minimum(radius_m, resting_m - 0.5 * CELL_M))
 

@@ -92,7 +92,7 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     fields = (clearance_field_m(grid, config), distance_field_m(grid.people), distance_field_m(grid.unknown))
     static_m, person_m, unknown_m = interpolate_fields(grid, fields, paths)
     tight_m = config.hull_radius_m + config.tight_margin_m
-    is_in_horizon = is_within_horizon(trajectories, config)[:, None]
+    is_in_horizon = is_within_horizon(trajectories.time_s, config)[:, None]
     last = int(is_in_horizon.sum()) - 1
     at_rest = BoatState(float(paths.x_m[last, -2]), float(paths.y_m[last, -2]), start.yaw_rad)
     dynamic = predict_clearances(obstacles, paths, config)

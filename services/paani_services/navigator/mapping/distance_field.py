@@ -14,6 +14,8 @@ def distance_field_m(cells: Bools) -> F64:
 
     First along each row, then over the rows: padded with rows that are far from any cell of the mask.
     """
+    if not cells.any():
+        return np.full(cells.shape, CELL_M * MAX_DISTANCE_CELLS)
     place = np.arange(cells.shape[1], dtype=np.int16)
     before = np.maximum.accumulate(np.where(cells, place, -MAX_DISTANCE_CELLS), axis=1)
     after = np.minimum.accumulate(np.where(cells, place, place.size + MAX_DISTANCE_CELLS)[:, ::-1], axis=1)[:, ::-1]

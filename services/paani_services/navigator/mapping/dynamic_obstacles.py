@@ -223,12 +223,13 @@ def _associate_measurements(
             for t, (last, number) in recent.items()
             for distance_m, f in _find_matches(last, picture)[number]
         ]
-        extended: dict[int, int] = {}  # by measurement
+        extended, track_of = set[int](), dict[int, int]()  # by measurement
         for _, t, f in sorted(pairs):
-            if f not in extended and t not in extended.values():
-                extended[f] = t
+            if f not in track_of and t not in extended:
+                track_of[f] = t
+                extended.add(t)
         for f, each in enumerate(picture.measurements):
-            t = extended.get(f, len(tracks))
+            t = track_of.get(f, len(tracks))
             if t == len(tracks):
                 tracks.append([])
             tracks[t].append(each)

@@ -258,3 +258,23 @@ def test_two_that_were_seen_as_one_are_two_obstacles() -> None:
     for number in (1, 2, 3):
         memory = observe_from(at_us=START_US + 200_000 * number, memory=memory, detections=(one, other))
     assert len(find_dynamic_obstacles(memory.observations, START_US + 600_000, CAMERA, PLANNER)) == 2
+
+
+@pytest.mark.parametrize(
+    ("seen", "count"),
+    [
+        ({0.0: Label.PERSON, 2.4: Label.PERSON}, 1),
+        ({0.0: Label.PERSON, 2.6: Label.PERSON}, 0),
+        ({0.0: Label.PERSON, 0.2: Label.PERSON, 0.4: Label.VESSEL}, 1),
+    ],
+)
+def test_a_track_goes_on_with_its_own_label_within_the_time_that_is_fitted(
+    seen: dict[float, Label], count: int
+) -> None:
+    """A person seen again is one who may swim, and stays one beside a vessel; one seen long after begins anew."""
+    memory, at_us = ObservationMemory(), START_US
+    for at_s, label in seen.items():
+        at_us = START_US + round(at_s * 1e6)
+        box = detection_of((4.9, -0.2, 5.1, 0.1), 0.4, label)
+        memory = observe_from(at_us=at_us, memory=memory, detections=(box,))
+    assert len(find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)) == count
