@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from paani.config import Config
 from tests.browser.guidance import guiding
-from tests.browser.test_page import has_colour_on_map, until, watch
+from tests.browser.test_page import MAP_PX_PER_M, has_colour_on_map, until, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
@@ -97,6 +97,17 @@ async def test_the_chart_lies_below_the_map(
                 assert answer.status == status, path
         assert watched.errors == []
         assert watched.foreign_requests == []
+        await page.click("#map-up")
+        await until(page, "document.querySelector('#map-up-name').textContent === 'Bow'")
+        await page.wait_for_timeout(500)
+        await page.screenshot(path=tmp_path / "bow-up.png")
+        turn_rad = math.pi / 2 - guidance.odometry.yaw_rad
+        low_m = 0.22 * await page.evaluate("document.querySelector('#map').clientHeight") / MAP_PX_PER_M
+        for east_m, north_m, is_chart in ((20.0, 0.7, True), (-8.0, 0.7, True), (0.7, -12.0, True), (0.7, 20.0, False)):
+            right_m = east_m * math.cos(turn_rad) - north_m * math.sin(turn_rad)
+            up_m = east_m * math.sin(turn_rad) + north_m * math.cos(turn_rad) - low_m
+            assert await has_colour_on_map(page, DUSK_RGB, right_m, up_m) is is_chart, (east_m, north_m)
+        await page.click("#map-up")
         await asyncio.to_thread((folder / str(ZOOM) / str(column) / f"{row}.png").write_bytes, b"<html>")
         await page.reload()
         await until(page, f"{note}.includes('{ZOOM}/{column}/{row}.png is no png picture')")

@@ -89,7 +89,7 @@ export class MapPanel {
     if (odometry && poseAgeS > store.limitS("localization/odometry")) drawGhost(chart, odometry, poseAgeS);
     this.headings.render(chart, prediction?.headings ?? [], odometry, store.get("dashboard/settings")?.planner ?? true, this.editor.isOpen);
     this.editor.render(chart, store, now);
-    drawScale(ctx, projection, colour("--quiet"));
+    drawScale(ctx, projection, colour("--quiet"), colour("--panel"));
     controls.render(turnRad, this.editor.isOpen);
     setText(byId("map-pose"), pose ? `${fixed(pose.x_m, 1)} m E, ${fixed(pose.y_m, 1)} m N, ${fixed(headingDeg(pose.yaw_rad), 0)}°` : "position unknown");
     const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;

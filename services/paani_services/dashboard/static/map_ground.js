@@ -2,7 +2,7 @@
 // Draws what lies under everything else on the map: the grid of metres, and over it the scale.
 
 const ROUND_LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
-const GRID_PX = 56, SCALE_PX = 60;
+const GRID_PX = 56, SCALE_PX = 60, SCALE_ROOM_PX = 6;
 
 /** The least round length that is so wide on the screen. @param {number} pxPerM @param {number} leastPx */
 const roundLength = (pxPerM, leastPx) => ROUND_LENGTHS_M.find((m) => m * pxPerM >= leastPx) ?? 500;
@@ -25,9 +25,11 @@ export function drawGrid(ctx, projection, colour) {
   ctx.globalAlpha = 1;
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {import("./map_projection.js").MapProjection} projection @param {string} colour */
-export function drawScale(ctx, { pxPerM, height }, colour) {
+/** @param {CanvasRenderingContext2D} ctx @param {import("./map_projection.js").MapProjection} projection @param {string} colour @param {string} ground below it, so that it is legible on every chart */
+export function drawScale(ctx, { pxPerM, height }, colour, ground) {
   const metres = roundLength(pxPerM, SCALE_PX), px = metres * pxPerM;
+  ctx.fillStyle = ground;
+  ctx.fillRect(12 - SCALE_ROOM_PX, height - 44, px + 2 * SCALE_ROOM_PX, 38);
   ctx.strokeStyle = ctx.fillStyle = colour;
   ctx.lineWidth = 2;
   ctx.beginPath();
