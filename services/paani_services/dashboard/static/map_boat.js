@@ -1,6 +1,8 @@
 // @ts-check
 // Draws on the map where the boat is, where it was, and the route it follows.
 
+import { drawWords } from "./map_ground.js";
+
 const FONT = "12px system-ui, sans-serif";
 
 /** @typedef {import("./map_objects.js").Chart} Chart */
@@ -28,7 +30,7 @@ export function drawRoute({ ctx, toScreen, pxPerM, colour }, route, next, accept
     if (isNext) {
       ctx.fillStyle = colour("--quiet");
       ctx.font = FONT;
-      ctx.fillText(`next ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
+      drawWords({ ctx, colour }, `next ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
     }
   });
 }

@@ -1,6 +1,7 @@
 // @ts-check
 // Draws on the map what the boat is told and what it sees coming: fence, stations, home, the way ahead, moving obstacles.
 
+import { drawWords } from "./map_ground.js";
 import { ageText, trackNames } from "./text.js";
 
 const ARROW_S = 5; // a velocity is drawn as the way of this long
@@ -89,7 +90,7 @@ export function drawGhost({ ctx, toScreen, pxPerM, colour }, pose, ageS) {
   ctx.stroke();
   ctx.setLineDash([]);
   ctx.font = FONT;
-  ctx.fillText(`not heard for ${ageText(ageS)}`, x + 13, y - 13);
+  drawWords({ ctx, colour }, `not heard for ${ageText(ageS)}`, x + 13, y - 13);
 }
 
 /** The way ahead by the order in force. @param {Chart} chart @param {{x_m: number, y_m: number}[]} path */
@@ -125,6 +126,6 @@ export function drawObstacles({ ctx, toScreen, pxPerM, colour }, obstacles, ageS
     ctx.stroke();
     ctx.font = FONT;
     ctx.fillStyle = colour("--text");
-    ctx.fillText(trackNames(tracks, [obstacle.track_id]), x + radius + 4, y + 4);
+    drawWords({ ctx, colour }, trackNames(tracks, [obstacle.track_id]), x + radius + 4, y + 4);
   }
 }
