@@ -37,16 +37,22 @@ class Sample(msgspec.Struct, frozen=True):
     at_s: float
     pid: int
     rss_mib: float
+    anonymous_mib: float
     descriptors: int
     threads: int
 
 
 class Soaked(msgspec.Struct, frozen=True, kw_only=True):
-    """What a process took after the warm-up; slopes by least squares."""
+    """What a process took after the warm-up; slopes by least squares.
+
+    Anonymous memory is what a process itself has asked for. RSS has pages of files as well, which the kernel takes back
+    and brings again by what else the machine does.
+    """
 
     restarts: int
     rss_mib: float
     rss_slope_mib_h: float
+    anonymous_slope_mib_h: float
     descriptors: tuple[int, int]
     threads: tuple[int, int]
 
@@ -91,11 +97,12 @@ def keeps_bars(report: SoakReport) -> bool:
 def soak_text(report: SoakReport) -> str:
     """The table."""
     rows = [
-        "| process | RSS [MiB] | slope [MiB/h] | descriptors, first and last | threads | restarts |",
-        "|---|---|---|---|---|---|",
+        "| process | RSS [MiB] | slope [MiB/h] | of it anonymous | descriptors, first and last | threads | restarts |",
+        "|---|---|---|---|---|---|---|",
     ]
     rows += [
-        f"| {name} | {one.rss_mib:.1f} | {one.rss_slope_mib_h:+.2f} | {one.descriptors[0]}, {one.descriptors[1]} "
+        f"| {name} | {one.rss_mib:.1f} | {one.rss_slope_mib_h:+.2f} "
+        f"| {one.anonymous_slope_mib_h:+.2f} | {one.descriptors[0]}, {one.descriptors[1]} "
         f"| {one.threads[0]}, {one.threads[1]} | {one.restarts} |"
         for name, one in report.processes.items()
     ]
@@ -116,6 +123,7 @@ def soaked(samples: Sequence[Sample]) -> Soaked:
         restarts=len({each.pid for each in samples}) - 1,
         rss_mib=warm[-1].rss_mib,
         rss_slope_mib_h=slope_per_h((each.at_s, each.rss_mib) for each in warm),
+        anonymous_slope_mib_h=slope_per_h((each.at_s, each.anonymous_mib) for each in warm),
         descriptors=(warm[0].descriptors, warm[-1].descriptors),
         threads=(warm[0].threads, warm[-1].threads),
     )
@@ -167,13 +175,19 @@ def _look(at_s: float) -> dict[str, Sample]:
             found[words[-1]] = Sample(
                 at_s=at_s,
                 pid=int(folder.name),
-                rss_mib=int(status["VmRSS"].split()[0]) / 1024,
+                rss_mib=_mib(status["VmRSS"]),
+                anonymous_mib=_mib(status["RssAnon"]),
                 descriptors=len(list((folder / "fd").iterdir())),
                 threads=int(status["Threads"]),
             )
         except (OSError, KeyError):  # it has just ended
             continue
     return found
+
+
+def _mib(text: str) -> float:
+    """Of a value of `/proc/*/status`, such as `  1024 kB`."""
+    return int(text.split(maxsplit=1)[0]) / 1024
 
 
 def _size_mib(folder: Path) -> float:

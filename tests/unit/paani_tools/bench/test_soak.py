@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 from paani_tools.bench.soak import Sample, Soaked, SoakReport, keeps_bars, slope_per_h, soak_text, soaked
@@ -13,6 +14,7 @@ def samples(rss_mib_h: float, *, warm_up_mib: float = 0.0, restarted: bool = Fal
         Sample(
             at_s=60.0 * k,
             pid=1 if not restarted or k < 40 else 2,
+            anonymous_mib=20.0 + 2.0 * rss_mib_h * k / 60 + (warm_up_mib if k >= 6 else 0.0),
             rss_mib=50.0 + rss_mib_h * k / 60 + (warm_up_mib if k >= 6 else 0.0),
             descriptors=19,
             threads=9,
@@ -36,6 +38,7 @@ def test_a_slope_is_by_the_hour() -> None:
 def test_growth_is_that_after_the_warm_up(growth_mib_h: float) -> None:
     found = soaked(samples(growth_mib_h, warm_up_mib=40.0))
     assert found.rss_slope_mib_h == pytest.approx(growth_mib_h)
+    assert found.anonymous_slope_mib_h == pytest.approx(2.0 * growth_mib_h)
     assert keeps_bars(report(found)) is (growth_mib_h <= 1.0)
 
 
@@ -46,11 +49,11 @@ def test_a_restart_is_no_way_to_keep_memory_flat() -> None:
 
 
 def test_descriptors_that_stay_open_break_the_bar() -> None:
-    leaking = [Sample(each.at_s, each.pid, each.rss_mib, 19 + k // 10, 9) for k, each in enumerate(samples(0.0))]
+    leaking = [msgspec.structs.replace(each, descriptors=19 + k // 10) for k, each in enumerate(samples(0.0))]
     assert not keeps_bars(report(soaked(leaking)))
 
 
 def test_the_table_names_each_process_and_what_was_dropped() -> None:
     text = soak_text(report(soaked(samples(0.5))))
-    assert "| advisor | 50.5 | +0.50 | 19, 19 | 9, 9 | 0 |" in text
+    assert "| advisor | 50.5 | +0.50 | +1.00 | 19, 19 | 9, 9 | 0 |" in text
     assert "late 2" in text
