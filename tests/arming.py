@@ -11,6 +11,7 @@ from paani.operator_key import ensure_operator_key
 from paani_services.dashboard.gatekeeper import KEY_HEADER
 
 REFRESH_S = 0.15
+HOLDS = 3
 
 
 def headers_of(page: str, bus: BusConfig) -> dict[str, str]:
@@ -32,6 +33,9 @@ async def hold_on_page(page: str, bus: BusConfig, held_s: float = 1.3, press: in
 
 
 async def arm_on_page(page: str, bus: BusConfig, press: int = 1) -> None:
-    """Arm, or fail."""
+    """Arm, or fail. A hold that a busy machine interrupts is begun anew, as a person would."""
     status, text = await hold_on_page(page, bus, press=press)
+    for again in range(1, HOLDS):
+        if "the hold was interrupted" in text:
+            status, text = await hold_on_page(page, bus, press=press + again)
     assert status == 200, text
