@@ -15,7 +15,7 @@ from paani_sim.trials.trial_cases import TrialCase
 
 COMPLETED_BAR, TOUCHED_BAR = 0.95, 0.01  # shares of drives below and above which a value is outside the envelope
 CHART_WIDTH_PX, CHART_HEIGHT_PX = 440, 270
-STYLE = ".grid{stroke:#dde4e8}.tick,.label,.name{font:11px sans-serif;fill:#1c2b33}"
+STYLE = ".grid{stroke:#dde4e8}text{font:11px sans-serif}.tick,.label{fill:#1c2b33}"  # a name has its curve's colour
 
 Drives = Mapping[TrialCase, TrialResult]
 
