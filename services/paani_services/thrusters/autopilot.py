@@ -129,7 +129,7 @@ class Autopilot:
         self._heartbeat: Heartbeat | None = None
         self._heard_ms = self._beat_ms = self._asked_ms = self._armed_ms = -math.inf
         self._phase, self._phase_ms = Phase.IDLE, 0.0
-        self._may_arm = self._has_armed = False
+        self._has_been_disarmed = self._has_armed = False
         self._cause_text = self._autopilot_text = ""
         self.sticks = STILL
 
@@ -226,10 +226,9 @@ class Autopilot:
 
     def _follow_operator(self, is_armed: bool | None, now_ms: float) -> None:
         if is_armed is False:
-            self._may_arm = True
+            self._has_been_disarmed = True
             self._enter(Phase.IDLE, now_ms)
-        elif is_armed and self._may_arm and self._phase is Phase.IDLE:
-            self._may_arm = False
+        elif is_armed and self._has_been_disarmed and self._phase is Phase.IDLE:
             self._read.clear()
             self._autopilot_text = ""
             self._enter(Phase.CHECKING, now_ms)

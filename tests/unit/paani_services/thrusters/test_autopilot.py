@@ -41,7 +41,7 @@ class Rover:
         self.parameters = {requirement.names[0]: 0.0 for requirement in failsafe_requirements(254)}
         self.stuck: dict[str, float] = {}
         self.mode, self.is_armed, self.is_silent = MANUAL, False, False
-        self.vehicle = (11, 3)
+        self.vehicle, self.refuses_mode = (11, 3), False
         self.now_ms = 0.0
         self.sent: list[Order] = []
 
@@ -62,7 +62,7 @@ class Rover:
         match order:
             case Command(number, first, _) if number == ARM and not self.is_silent:
                 self.is_armed = first == 1.0
-            case Command(number, _, second) if number == SET_MODE:
+            case Command(number, _, second) if number == SET_MODE and not self.refuses_mode:
                 self.mode = int(second)
             case WriteParameter(name, value) if name in self.parameters:
                 self.parameters[name] = value
@@ -159,6 +159,20 @@ def test_parameters_are_read_anew_before_each_arming(rover: Rover) -> None:
 def test_of_two_names_the_autopilots_own_counts(rover: Rover) -> None:
     rover.parameters["MAV_GCS_SYSID"] = rover.parameters.pop("SYSID_MYGCS")
     rover.drive()
+
+
+def test_it_is_set_to_manual_before_it_arms(rover: Rover) -> None:
+    rover.mode = HOLD
+    rover.drive()
+    assert rover.mode == MANUAL
+
+
+def test_one_that_refuses_manual_is_not_armed(rover: Rover) -> None:
+    rover.mode, rover.refuses_mode = HOLD, True
+    rover.run(is_armed=False)
+    rover.run(is_armed=True, seconds=8.0)
+    assert not rover.arming
+    assert "its mode is HOLD, not MANUAL" in rover.problem
 
 
 def _lose_heartbeat(rover: Rover) -> None:
