@@ -21,7 +21,8 @@ from paani.decider import decider_of
 from paani.errors import UserError
 from paani.link_access import LINK
 from paani.sides import Side
-from paani_services.router.picture_exchange import exchange_pictures
+from paani_services.router.picture_exchange import connected_to_board, exchange_pictures
+from paani_services.router.route_watch import HEARD_S, WATCHED, watch_route
 from tests.bus_peers import joined, routing, until
 from tests.conftest import find_free_port, put_raw
 
@@ -142,6 +143,46 @@ async def test_nobody_of_the_host_writes_at_the_boards_router(sides: Sides, user
         assert heard.received == before + 1
 
 
+async def exchange_with_board(router: Bus, host: BusConfig) -> None:
+    async with connected_to_board(host, CLOCK) as board:
+        await exchange_pictures(router, board, host.graph)
+
+
+@pytest.mark.parametrize("is_joined", [True, False])
+async def test_a_board_heard_only_beside_the_routers_is_told(sides: Sides, is_joined: bool) -> None:
+    """And neither one that both hear nor one that nobody hears."""
+    nowhere = replace(sides.host, link=f"tcp/127.0.0.1:{find_free_port()}")
+    async with (
+        routing(sides.board),
+        routing(sides.host if is_joined else nowhere),
+        joined(sides.board, WATCHED) as board,
+        joined(sides.host, "router") as router,
+        connected_to_board(sides.host, CLOCK) as beside,
+    ):
+        pulse = keys.pulse(WATCHED)
+        direct, routed, beats = beside.latest(pulse), router.latest(pulse), board.publisher(pulse)
+        await until(
+            lambda: direct.received > 0 and (routed.received > 0 or not is_joined),
+            lambda: beats.put(m.Pulse(source_us=CLOCK.now_us())),
+        )
+
+        async def beat() -> None:
+            while True:
+                beats.put(m.Pulse(source_us=CLOCK.now_us()))
+                await asyncio.sleep(0.1)
+
+        beating = asyncio.create_task(beat())
+        try:
+            with pytest.raises(TimeoutError if is_joined else ConnectionError):
+                await asyncio.wait_for(watch_route(direct, routed, 0.6), 3.0 if is_joined else 20.0)
+        finally:
+            beating.cancel()
+            await asyncio.wait([beating])
+        await until(lambda: direct.receipt_age_s() > HEARD_S)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(watch_route(direct, routed, 0.4), 1.5)
+
+
 async def test_pictures_are_pulled_across_and_look_pushed_at_home(sides: Sides) -> None:
     """Both ways: the board's to whoever subscribes on the host, the host's to whoever pulls on the board."""
     header = m.PictureHeader(source_us=CLOCK.now_us(), frame_seq=0, frame_epoch=1, width_px=4, height_px=3)
@@ -153,7 +194,7 @@ async def test_pictures_are_pulled_across_and_look_pushed_at_home(sides: Sides) 
         joined(sides.host, "router") as router,
         joined(sides.host, OBSERVER) as watcher,
     ):
-        exchange = asyncio.create_task(exchange_pictures(router, sides.host, CLOCK))
+        exchange = asyncio.create_task(exchange_with_board(router, sides.host))
         try:
             taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
             seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
@@ -272,7 +313,7 @@ async def test_pictures_are_as_old_on_the_other_machine_as_they_are(sides: Sides
         taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
         seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
         tasks = [
-            asyncio.create_task(exchange_pictures(hands_on, sides.host, CLOCK)),
+            asyncio.create_task(exchange_with_board(hands_on, sides.host)),
             asyncio.create_task(keep_up(pulled)),
         ]
 

@@ -8,6 +8,8 @@ topic is under way, so what decides and what stops the boat never waits behind p
 from __future__ import annotations
 
 import asyncio
+import contextlib
+from collections.abc import AsyncIterator
 from typing import Protocol
 
 from msgspec.structs import replace
@@ -16,6 +18,7 @@ from paani import messages as m
 from paani.bus import Bus, Picture, open_bus
 from paani.clock import Clock
 from paani.config import BusConfig
+from paani.keys import Graph
 from paani.link_access import LINK
 from paani.sides import Side, pictures_sent
 
@@ -42,18 +45,24 @@ class PictureOutput(Protocol):
         ...
 
 
-async def exchange_pictures(host: Bus, config: BusConfig, clock: Clock) -> None:
-    """Pull and offer until cancelled; waits for the board as long as it takes."""
+@contextlib.asynccontextmanager
+async def connected_to_board(config: BusConfig, clock: Clock) -> AsyncIterator[Bus]:
+    """A connection to the board's router beside that of the host's router; waits for the board as long as it takes."""
     board = await open_bus(replace(config, router=config.link), LINK, clock)
     try:
-        async with asyncio.TaskGroup() as group:
-            for topic in pictures_sent(Side.BOARD, config.graph):
-                group.create_task(forward_pictures(board.pull_picture(topic), host.picture_publisher(topic)))
-            for topic in pictures_sent(Side.HOST, config.graph):
-                offered = board.picture_publisher(topic, push=False)
-                group.create_task(forward_pictures(host.pull_picture(topic), offered))
+        yield board
     finally:
         await board.close()
+
+
+async def exchange_pictures(host: Bus, board: Bus, graph: Graph) -> None:
+    """Pull and offer until cancelled."""
+    async with asyncio.TaskGroup() as group:
+        for topic in pictures_sent(Side.BOARD, graph):
+            group.create_task(forward_pictures(board.pull_picture(topic), host.picture_publisher(topic)))
+        for topic in pictures_sent(Side.HOST, graph):
+            offered = board.picture_publisher(topic, push=False)
+            group.create_task(forward_pictures(host.pull_picture(topic), offered))
 
 
 async def forward_pictures(pictures: PictureInput, output: PictureOutput) -> None:
