@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from paani import messages as m
-from paani.keys import PORTS, Graph
+from paani.keys import BUTTON, PORTS, Graph
 from paani.sides import Side, services_on
 from tests.conftest import find_free_port
 from tests.deploy.doors import Doors
@@ -50,7 +50,7 @@ def test_an_image_holds_no_secret_and_nothing_of_the_build(engine: Engine, side:
 @pytest.mark.parametrize("driven_s", [8.0, pytest.param(60.0, marks=pytest.mark.long)])
 async def test_the_river_driven_by_board_and_host_in_containers(engine: Engine, driven_s: float) -> None:
     async with driving(engine) as drive:
-        await asyncio.to_thread(check_confinement, engine, {*PORTS})
+        await asyncio.to_thread(check_confinement, engine, {*PORTS, BUTTON})
         await drive.await_under_way()
         begin_m = drive.distance_m
         decisions = drive.decisions

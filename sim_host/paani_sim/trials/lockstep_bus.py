@@ -78,7 +78,13 @@ class LockstepBus:
         now_us = self._clock.now_us()
         seq = self._seq[topic.name] = self._seq.get(topic.name, -1) + 1
         sent = msgspec.structs.replace(
-            message, seq=seq, epoch=self.epoch, domain=self._domain, producer=topic.producer, sent_us=now_us
+            message,
+            seq=seq,
+            epoch=self.epoch,
+            domain=self._domain,
+            producer=topic.producer,
+            sent_us=now_us,
+            topic=topic.name,
         )
         if self.tap is not None:
             self.tap(topic, sent, now_us, data)  # type: ignore[arg-type]  # a topic of one message type is one of messages

@@ -36,7 +36,7 @@ async def test_the_world_s_route_and_origin_are_handed_over(name: str, private_s
     route = await asyncio.to_thread(load_route, Path(plan.config.navigator.route))
     assert plan.config.localization.origin_lat_lon_deg == (world.origin_lat_deg, world.origin_lon_deg)
     np.testing.assert_allclose([(p.x_m, p.y_m) for p in route.waypoints], world.route_m, atol=1e-4)
-    assert plan.services == tuple(name for name in SIMULATED if name not in {"recorder", "bridge"})
+    assert plan.services == tuple(name for name in SIMULATED if name not in {"recorder", "bridge", "button"})
     assert decode_config(encode_config(plan.config)) == plan.config
 
 
@@ -88,7 +88,7 @@ async def test_a_real_camera_needs_no_eye(private_sets: tuple[str, ...], tmp_pat
     """The plant and everything else still run; the thrust adapter waits for no pulse of the eye."""
     cv2.imwrite(str(tmp_path / "river.png"), river())
     plan = await make_plan(load_config(sets=(*private_sets, f"camera.source={tmp_path}")))
-    assert set(SIMULATED) - set(plan.services) == {"eye", "recorder", "bridge"}
+    assert set(SIMULATED) - set(plan.services) == {"eye", "recorder", "bridge", "button"}
     assert set(keys.VITAL_SERVICES) - set(plan.config.plant.adapter.require_pulses) == {"eye"}
     with pytest.raises(UserError, match=r"camera\.source absent: no such file or folder"):
         await make_plan(load_config(sets=(*private_sets, "camera.source=absent")))
