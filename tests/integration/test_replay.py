@@ -25,6 +25,7 @@ from tests.unit.paani_tools.replay.recorded_drive import drive, write_log
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
 DRIVE_S = 12.0
+FAST = "advisor.people.uncalibrated_mps=1.0"  # the boat of the recording is faster than an uncalibrated camera allows
 # What two machines can differ in: hash seed, threads, time zone, locale, and the C library's elementary functions.
 ENVIRONMENTS: tuple[dict[str, str], ...] = (
     {"PYTHONHASHSEED": "0", "OMP_NUM_THREADS": "1", "TZ": "UTC", "LC_ALL": "C"},
@@ -44,8 +45,8 @@ async def record(spawn: Spawn, open_as: OpenAs, config: Config, folder: Path, *s
         f"[[waypoints]]\nx_m = {x}.0\ny_m = {y}.0\n" for x, y in ((60, 0), (60, 40))
     ))  # fmt: skip
     async with (
-        spawn("recorder", f"recorder.folder={folder}"),
-        spawn("advisor", *sets),
+        spawn("recorder", f"recorder.folder={folder}", FAST),
+        spawn("advisor", FAST, *sets),
         spawn("navigator", f"navigator.route={folder / 'route.toml'}"),
         spawn("controller"),
     ):
