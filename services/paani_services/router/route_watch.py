@@ -15,7 +15,7 @@ HEARD_S = 1.0  # of a pulse ten times a second, on a busy machine as well
 PERIOD_S = 0.2
 
 
-class Heard(Protocol):
+class PulseInput(Protocol):
     """A topic as one connection hears it."""
 
     def receipt_age_s(self) -> float:
@@ -23,7 +23,7 @@ class Heard(Protocol):
         ...
 
 
-async def watch_route(direct: Heard, routed: Heard, silent_s: float = SILENT_S) -> None:
+async def watch_route(direct: PulseInput, routed: PulseInput, silent_s: float = SILENT_S) -> None:
     """Return never while what is heard directly also comes by the routers.
 
     Raises ConnectionError when for so long [s] it was there at every look, and nothing came here.
