@@ -18,6 +18,7 @@ class RoverPeer:
         self.parameters = {
             "SYSID_MYGCS": 255.0, "RC_OVERRIDE_TIME": 3.0, "FS_THR_ENABLE": 1.0, "FS_GCS_ENABLE": 0.0,
             "FS_GCS_TIMEOUT": 5.0, "FS_TIMEOUT": 1.5, "FS_ACTION": 0.0,
+            "PILOT_STEER_TYPE": 1.0, "MOT_THR_MIN": 10.0,
         }  # fmt: skip
         self.read_only: set[str] = set()
         self.mode, self.is_armed, self.is_silent = 4, False, False

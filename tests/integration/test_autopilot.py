@@ -67,7 +67,7 @@ async def test_it_drives_with_its_failsafe_set_and_stops_with_the_operator(boat:
     assert (boat.rover.mode, boat.rover.is_armed) == (0, True)
     assert boat.rover.parameters == {
         "SYSID_MYGCS": 254, "RC_OVERRIDE_TIME": 0.5, "FS_THR_ENABLE": 1, "FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 2,
-        "FS_TIMEOUT": 1, "FS_ACTION": 2,
+        "FS_TIMEOUT": 1, "FS_ACTION": 2, "PILOT_STEER_TYPE": 3, "MOT_THR_MIN": 0,
     }  # fmt: skip
     boat.is_pulsing = False
     await boat.until_cause(m.ZeroCause.PULSE_LOST)

@@ -33,8 +33,11 @@ class Requirement(NamedTuple):
     value: float
 
 
-def failsafe_requirements(own_system: int) -> tuple[Requirement, ...]:
-    """What makes the autopilot let go of the motors when this process, or its line, is gone."""
+def required_parameters(own_system: int) -> tuple[Requirement, ...]:
+    """What makes the autopilot let go of the motors when this process, or its line, is gone.
+
+    And what makes it mix the sticks as `thrust_of` does: its mixer (AP_MotorsUGV) adds and subtracts the two.
+    """
     return (
         Requirement(("SYSID_MYGCS", "MAV_GCS_SYSID"), own_system),  # whose sticks and heartbeat count
         Requirement(("RC_OVERRIDE_TIME",), 0.5),  # sticks not renewed for so long are let go, in seconds
@@ -43,6 +46,8 @@ def failsafe_requirements(own_system: int) -> tuple[Requirement, ...]:
         Requirement(("FS_GCS_TIMEOUT",), 2),  # seconds, the least it takes
         Requirement(("FS_TIMEOUT",), 1),  # seconds from a loss to the action, the least it takes
         Requirement(("FS_ACTION",), 2),  # HOLD: no thrust
+        Requirement(("PILOT_STEER_TYPE",), 3),  # the sticks are ahead and starboard, and not the two sides
+        Requirement(("MOT_THR_MIN",), 0),  # nothing is added to what the thrust adapter decided
     )
 
 
@@ -124,7 +129,7 @@ class Autopilot:
     """
 
     def __init__(self, own_system: int) -> None:
-        self._requirements = failsafe_requirements(own_system)
+        self._requirements = required_parameters(own_system)
         self._read: dict[str, float] = {}
         self._heartbeat: Heartbeat | None = None
         self._heard_ms = self._beat_ms = self._asked_ms = self._armed_ms = -math.inf
@@ -277,7 +282,7 @@ class Autopilot:
             value = self._read.get(name)
             if value is None or not abs(value - requirement.value) <= TOLERANCE:
                 read = "is not answered" if value is None else f"reads {value:g}"
-                return f"failsafe parameter {name} {read}, expected {requirement.value:g}"
+                return f"parameter {name} {read}, expected {requirement.value:g}"
         return ""
 
     def _let_go(self, asks: bool) -> list[Order]:
