@@ -172,7 +172,7 @@ class Autopilot:
         return self._phase is Phase.DRIVING
 
     def advance(self, decided: AppliedThrust, is_armed: bool | None, now_ms: float) -> list[Order]:
-        """What to send now. is_armed: the operator's newest word, None before the first."""
+        """What to send now. is_armed: the operator's newest word, None where it is not known."""
         orders: list[Order] = []
         if now_ms - self._beat_ms >= HEARTBEAT_MS:
             self._beat_ms = now_ms
@@ -233,6 +233,8 @@ class Autopilot:
         if is_armed is False:
             self._has_been_disarmed = True
             self._enter(Phase.IDLE, now_ms)
+        elif is_armed is None and self._phase not in {Phase.IDLE, Phase.LATCHED}:
+            self._latch("the operator's word is not known")
         elif is_armed and self._has_been_disarmed and self._phase is Phase.IDLE:
             self._read.clear()
             self._autopilot_text = ""

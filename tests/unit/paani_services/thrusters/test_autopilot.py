@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from paani import messages as m
@@ -308,6 +308,7 @@ def test_no_set_point_is_beyond_the_gates(left: float, right: float) -> None:
         assert sent * decided >= 0.0
 
 
+@example(words=[(False, 0, 1.0, 0.0, 0.0), (True, 0, 1.0, 0.0, 0.0), (None, 0, 1.0, 0.0, 1.0)])
 @given(
     words=st.lists(
         st.tuples(
