@@ -1,4 +1,4 @@
-"""`python -m docs.strip FILE`: the README's picture strip, from the page in Chromium while a simulated boat drives.
+"""`python -m docs.strip FILE.webp`: the README's picture strip, from the page in Chromium while a boat drives.
 
 Arm, route, swimmer ahead, why, stop, and back to a past moment. Needs the extras `host` and `dev`, and Chromium.
 """
@@ -28,7 +28,7 @@ SIZE = {"width": 1440, "height": 900}
 COLUMNS, CELL_PX, BAND_PX, GAP_PX = 2, (960, 600), 44, 12
 GROUND, INK = (250, 247, 244), (60, 45, 30)  # BGR
 SWIMMER_S, PERIOD_S = 180.0, 0.2
-UNDER_WAY_S, HOLD_S = 12.0, 1.6
+UNDER_WAY_S, HOLD_S = 5.0, 1.6
 SWIMMER_AHEAD = "/swimmer|person/i.test(document.querySelector('#explanation').innerText)"
 
 
@@ -102,7 +102,7 @@ def main(file: Path) -> None:
         sets = ("world.name=river_swimmer", "bus.router=tcp/127.0.0.1:7557", "dashboard.port=8957")
         config = load_config(sets=(*sets, f"bus.runtime_dir={folder}/runtime"))
         frames = asyncio.run(_frames(config))
-    cv2.imwrite(str(file), draw_strip(frames), [cv2.IMWRITE_WEBP_QUALITY, 80, cv2.IMWRITE_JPEG_QUALITY, 82])
+    cv2.imwrite(str(file), draw_strip(frames), [cv2.IMWRITE_WEBP_QUALITY, 80])
 
 
 async def _frames(config: Any) -> list[tuple[str, bytes]]:
