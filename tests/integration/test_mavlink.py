@@ -25,6 +25,7 @@ from paani_services.operator.state import CLEAR
 from tests.arming import arm_on_page
 from tests.conftest import find_free_port
 from tests.integration.test_up import READY_S, Up, words_of
+from tests.paani_command import paani
 
 pytest.importorskip("mavsdk", reason="needs mavsdk")
 from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
@@ -304,6 +305,7 @@ async def test_mavproxy_reads_parameters_and_mission_and_is_refused(river: River
         await expect("CRUISE_SPEED     0.6", "param show CRUISE_SPEED")
         await expect("Saved", "wp list")
         assert "177 3" in printed
+        assert (await paani(river.sets[:3], "stop"))[0] == 0
         await expect("COMPONENT_ARM_DISARM: DENIED", "arm throttle")
         assert "AP: arm: a STOP holds" in printed
         await expect("Mode RTL", "mode RTL")
