@@ -13,7 +13,7 @@ from paani.config import Config, load_config
 from paani_services.thrusters.service import run
 from tests.mcu_peer import until
 from tests.rover_peer import RoverPeer
-from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, opened
+from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, at_work, opened
 
 pytestmark = pytest.mark.integration
 
@@ -47,15 +47,10 @@ async def boat(private_sets: tuple[str, ...]) -> AsyncIterator[Boat]:
     config = load_config(profile="hull", sets=sets)
     async with opened(config) as buses:
         found = Boat(config, buses, rover)
-        works = (run(buses["thrusters"], CLOCK, config), found.speak(), rover.beat())
-        tasks = [asyncio.create_task(work) for work in works]
         try:
-            yield found
-            assert not any(task.done() for task in tasks), "never a crash"
+            async with at_work(run(buses["thrusters"], CLOCK, config), found.speak(), rover.beat()):
+                yield found
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
             await rover.close()
 
 

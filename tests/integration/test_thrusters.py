@@ -18,7 +18,7 @@ from paani.errors import UserError
 from paani_services.thrusters.service import run
 from tests.mcu_peer import PtyLine, until
 from tests.thrust_peer import BATTERY, ESTOP, RECEIVER, ThrustPeer
-from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, opened
+from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, at_work, opened
 
 pytestmark = pytest.mark.integration
 
@@ -39,14 +39,10 @@ async def boat(private_sets: tuple[str, ...], tmp_path: Path) -> AsyncIterator[B
     async with opened(config) as buses:
         line.plug_in()
         found = Boat(config, buses, peer, line)
-        tasks = [asyncio.create_task(run(buses["thrusters"], CLOCK, config)), asyncio.create_task(found.speak())]
         try:
-            yield found
-            assert not any(task.done() for task in tasks), "never a crash"
+            async with at_work(run(buses["thrusters"], CLOCK, config), found.speak()):
+                yield found
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
             line.pull_out()
 
 
