@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from paani import keys
@@ -93,9 +92,7 @@ def record(folder: Path, messages: Messages) -> Path:
         (each.source_us, topic, each) for topic, part in zip(topics, parts, strict=True) for each in part
     ]
     for number, (stamp_us, topic, message) in enumerate(sorted(everything, key=lambda entry: entry[0])):
-        sent = msgspec.structs.replace(
-            message, seq=number, epoch=5, sent_us=stamp_us, producer=topic.producer, topic=topic.name
-        )
+        sent = topic.stamp(message, domain=message.domain, seq=number, epoch=5, sent_us=stamp_us)
         small_logs.put(log, topic, sent)
     log.finish({})
     return log.path

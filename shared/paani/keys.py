@@ -59,6 +59,19 @@ class Topic(msgspec.Struct, Generic[T], frozen=True, kw_only=True):
     def key(self, domain: int, vessel: str) -> str:
         return f"paani/{domain}/{vessel}/{self.name}"
 
+    def stamp(self, message: T, *, domain: int, seq: int, epoch: int, sent_us: int, steady_us: int = 0) -> T:
+        """The message with the header of its publisher: this topic, its producer, and these."""
+        return msgspec.structs.replace(
+            message,
+            seq=seq,
+            epoch=epoch,
+            domain=domain,
+            producer=self.producer,
+            sent_us=sent_us,
+            steady_us=steady_us,
+            topic=self.name,
+        )
+
     @property
     def media_type(self) -> str:
         """Zenoh encoding of the payload."""

@@ -81,7 +81,7 @@ class Recomputation:
     ) -> None:
         self.ledger = Ledger(decider, instead)
         self._decider, self._config, self._evolve = decider, config, evolve
-        self._producers = {topic.name: topic.producer for topic in decider.outputs}
+        self._outputs = {topic.name: topic for topic in decider.outputs}
         self._encoder = msgspec.json.Encoder()
         self._states = msgspec.json.Decoder(type(decider.state()))
         self._state: Any = None
@@ -162,15 +162,13 @@ class Recomputation:
     def _encoded(self, sent: m.OutputMessage, message: m.Message) -> bytes:
         """As the bus would have sent it, with the header that the step has kept."""
         return self._encoder.encode(
-            msgspec.structs.replace(
+            self._outputs[sent.topic].stamp(
                 message,
+                domain=self._config.bus.domain,
                 seq=sent.seq,
                 epoch=sent.epoch,
-                domain=self._config.bus.domain,
-                producer=self._producers[sent.topic],
                 sent_us=sent.sent_us,
                 steady_us=sent.steady_us,
-                topic=sent.topic,
             )
         )
 

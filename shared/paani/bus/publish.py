@@ -83,15 +83,13 @@ class Publisher(Generic[T]):
 
     def _stamp(self, message: T) -> T:
         self._numbering.advance()
-        return msgspec.structs.replace(
+        return self._topic.stamp(
             message,
+            domain=self._domain,
             seq=self._numbering.seq,
             epoch=self._numbering.epoch,
-            domain=self._domain,
-            producer=self._topic.producer,
             sent_us=self._clock.now_us(),
             steady_us=0 if self._steady is None else self._steady.now_us(),
-            topic=self._topic.name,
         )
 
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Any, Protocol, TypeVar
 
-import msgspec
-
 from paani import messages as m
 from paani.clock import Clock
 from paani.decider import Input
@@ -77,15 +75,7 @@ class LockstepBus:
         """Fill in the header as of now; returns the message as sent."""
         now_us = self._clock.now_us()
         seq = self._seq[topic.name] = self._seq.get(topic.name, -1) + 1
-        sent = msgspec.structs.replace(
-            message,
-            seq=seq,
-            epoch=self.epoch,
-            domain=self._domain,
-            producer=topic.producer,
-            sent_us=now_us,
-            topic=topic.name,
-        )
+        sent = topic.stamp(message, domain=self._domain, seq=seq, epoch=self.epoch, sent_us=now_us)
         if self.tap is not None:
             self.tap(topic, sent, now_us, data)  # type: ignore[arg-type]  # a topic of one message type is one of messages
         return sent

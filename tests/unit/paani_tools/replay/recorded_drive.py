@@ -40,13 +40,11 @@ class Desk:
 
     def publish(self, topic: keys.Topic[Any], message: m.Message) -> m.Message:
         numbers = self._numbers.setdefault(topic.name, itertools.count())
-        sent = msgspec.structs.replace(
+        sent: m.Message = topic.stamp(
             message,
+            domain=self.config.bus.domain,
             seq=next(numbers),
             epoch=self._epochs.get(topic.producer, T0_US // 1000),
-            domain=self.config.bus.domain,
-            producer=topic.producer,
-            topic=topic.name,
             sent_us=self.now_us,
         )
         self.records.append(Record(topic.name, self.now_us + 200, sent.seq, msgspec.json.encode(sent)))
