@@ -15,7 +15,7 @@ import shutil
 from pathlib import Path
 
 from paani import keys
-from paani.certificates import BOARD_ROUTER, identities_of, listener_of, require_certificates
+from paani.certificates import BOARD_ROUTER, LISTENERS, Identities, identities_of, listener_of, require_certificates
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani.link_access import LINK, Rule, allow, link_rules
@@ -30,6 +30,17 @@ USERS_FILE = ".users"
 def users_in(graph: keys.Graph) -> tuple[str, ...]:
     """Who may join the bus of this graph, on either side."""
     return (*keys.services_in(graph), *keys.command_line_clients_in(graph), OBSERVER, LINK)
+
+
+def certified_in(graph: keys.Graph) -> tuple[str, ...]:
+    """Who gets a certificate: every identity of the bus, and what listens on either machine."""
+    return (*users_in(graph), *LISTENERS)
+
+
+def uncertified_in(identities: Identities) -> tuple[str, ...]:
+    """Identities of the graph that the folder holds no certificate for; whoever was revoked is none of them."""
+    known = {*identities.holders, *identities.revoked}
+    return tuple(name for name in certified_in(identities.graph) if name not in known)
 
 
 def credentials_folder(config: BusConfig) -> Path:

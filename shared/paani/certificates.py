@@ -25,6 +25,7 @@ from paani.undecodable import UNDECODABLE
 
 INDEX_FILE = "identities.json"
 AUTHORITY = "authority"
+COMPLETE = "`paani certs complete` makes what is missing, and changes no other"
 ALL = "all"  # in place of an identity: each of them, and the authority
 # What listens: clients are told nothing by it but that the authority signed it for this address. Routers, and the page.
 BOARD_ROUTER, HOST_ROUTER = "board_router", "host_router"
@@ -125,9 +126,7 @@ def page_server_tls(config: BusConfig) -> ssl.SSLContext:
         )
     identities = require_certificates(config, (PAGE,))
     if PAGE not in identities.holders:
-        raise UserError(
-            f"bus.certificates {config.certificates}: none for the page (`paani certs rotate all` makes it)"
-        )
+        raise UserError(f"bus.certificates {config.certificates}: none for the page ({COMPLETE})")
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(_path(config, identities, PAGE, "pem"), _path(config, identities, PAGE, "key"))
     return context
@@ -163,7 +162,7 @@ def _tls(
 def _path(config: BusConfig, identities: Identities, name: str, suffix: str) -> Path:
     common_name = identities.common_name(name)
     if common_name is None:
-        state = "revoked" if name in identities.revoked else "unknown"
+        state = "revoked" if name in identities.revoked else COMPLETE
         raise UserError(f"bus.certificates {config.certificates}: {name} has no certificate ({state})")
     return Path(config.certificates) / f"{common_name}.{suffix}"
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from paani.authority import uncertified_in
 from paani.certificates import AUTHORITY, Identities, date_text, read_identities
 from paani.cli import add_config_arguments, config_from
 from paani.clock import WallClock
@@ -18,11 +19,11 @@ RESTART = "in force with the next start of each router: end `paani up` on both m
 
 
 def main(argv: list[str]) -> int:
-    """Exit codes: 0 done, 1 `show` found one that is not valid now, 2 user's mistake."""
+    """Exit codes: 0 done, 1 `show` found one that is not valid now or missing, 2 user's mistake."""
     options = _parser().parse_args(argv)
     folder: Path = options.folder
     if options.action == "show":
-        return _show(read_identities(folder))
+        return _show(folder, read_identities(folder))
     require_modules(f"certs {options.action}", "cryptography")
     from paani_tools.certs import folder as certificates  # noqa: PLC0415  # only whoever makes some needs its library
 
@@ -32,6 +33,10 @@ def main(argv: list[str]) -> int:
         identities = certificates.make(folder, graph, tuple(options.address), now_us, options.days)
         sys.stdout.write(f"{folder}: {len(identities.holders)} certificates for the graph {graph}\n")
         return 0
+    if options.action == "complete":
+        names = certificates.complete(folder, now_us, options.days)
+        sys.stdout.write(f"{', '.join(names)}: made; {RESTART}" if names else f"{folder}: none is missing\n")
+        return 0
     if options.action == "rotate":
         certificates.rotate(folder, options.name, now_us, options.days)
     else:
@@ -40,7 +45,7 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _show(identities: Identities) -> int:
+def _show(folder: Path, identities: Identities) -> int:
     now_s = WallClock().now_us() // 1_000_000
     is_valid = True
     for name, certificate in {AUTHORITY: identities.authority, **identities.holders}.items():
@@ -53,7 +58,10 @@ def _show(identities: Identities) -> int:
         sys.stdout.write(f"{f'{name}.{certificate.number}':<18} {state} until {until}  {certificate.sha256}\n")
     for name, number in identities.revoked.items():
         sys.stdout.write(f"{f'{name}.{number}':<18} REVOKED\n")
-    return 0 if is_valid else 1
+    missing = uncertified_in(identities)
+    for name in missing:
+        sys.stdout.write(f"{name:<18} MISSING: `paani certs complete --folder {folder}` makes it\n")
+    return 0 if is_valid and not missing else 1
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,12 +79,17 @@ def _parser() -> argparse.ArgumentParser:
     add_config_arguments(make)
     rotate = actions.add_parser("rotate", help="a new certificate in place of the one in force")
     rotate.add_argument("name", metavar="IDENTITY", help="or all: with a new authority, which retires every old one")
+    complete = actions.add_parser(
+        "complete", help="one for each identity that has none, as in a folder made before there was such a process"
+    )
     revoke = actions.add_parser("revoke", help="take an identity's rights; `rotate` gives it new ones")
     revoke.add_argument("name", metavar="IDENTITY")
-    show = actions.add_parser("show", help="names, expiry and SHA-256; exit code 1 where one is not valid now")
-    for action in (make, rotate, revoke, show):
+    show = actions.add_parser(
+        "show", help="names, expiry and SHA-256; exit code 1 where one is missing or not valid now"
+    )
+    for action in (make, rotate, complete, revoke, show):
         action.add_argument("--folder", type=Path, required=True, metavar="FOLDER", help="where the certificates lie")
-    for action in (make, rotate):
+    for action in (make, rotate, complete):
         action.add_argument(
             "--days",
             type=whole_number(1, MAX_DAYS),

@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from paani.authority import users_in
+from paani.authority import certified_in, uncertified_in
 from paani.certificates import ALL, AUTHORITY, INDEX_FILE, LISTENERS, Certificate, Identities, read_identities
 from paani.errors import UserError
 from paani.keys import Graph
@@ -26,16 +26,11 @@ from paani_tools.certs.issue import Issued, Signer, make_authority, make_client,
 AUTHORITY_LIVES = 10  # times as long as what it signs, so that one identity can be rotated alone for years
 
 
-def names_in(graph: Graph) -> tuple[str, ...]:
-    """Who gets a certificate: every identity of the bus, and what listens on either machine."""
-    return (*users_in(graph), *LISTENERS)
-
-
 def make(folder: Path, graph: Graph, addresses: tuple[str, ...], now_us: int, days: int) -> Identities:
     """A new folder with an authority and a certificate for each identity. Raises UserError where it exists."""
     with new_folder(folder, "--folder") as beside:
         beside.chmod(0o700)
-        identities = _issue_all(beside, graph, addresses, dict.fromkeys(names_in(graph), 1), 1, now_us, days)
+        identities = _issue_all(beside, graph, addresses, dict.fromkeys(certified_in(graph), 1), 1, now_us, days)
         _write_index(beside, identities)
     return identities
 
@@ -47,7 +42,7 @@ def rotate(folder: Path, name: str, now_us: int, days: int) -> Identities:
     """
     with _changing(folder) as old:
         if name == ALL:
-            lives = [each for each in names_in(old.graph) if each not in old.revoked]
+            lives = [each for each in certified_in(old.graph) if each not in old.revoked]
             numbers = {each: old.holders[each].number + 1 if each in old.holders else 1 for each in lives}
             authority = old.authority.number + 1
             new = _issue_all(folder, old.graph, old.addresses, numbers, authority, now_us, days)
@@ -56,13 +51,23 @@ def rotate(folder: Path, name: str, now_us: int, days: int) -> Identities:
             _require_known(old, name)
             _require_client(name)
             last = old.holders[name].number if name in old.holders else old.revoked.get(name, 0)
-            issued = make_client(_signer(folder, old), name, last + 1, now_us, days)
-            _write_pair(folder, f"{name}.{last + 1}", issued)
+            issued = _issue(folder, _signer(folder, old), name, last + 1, old.addresses, now_us, days)
             revoked = {other: number for other, number in old.revoked.items() if other != name}
-            new = replace(old, holders={**old.holders, name: issued.certificate}, revoked=revoked)
+            new = replace(old, holders={**old.holders, name: issued}, revoked=revoked)
         _write_index(folder, new)
         _remove_unnamed(folder, new)
     return new
+
+
+def complete(folder: Path, now_us: int, days: int) -> tuple[str, ...]:
+    """A certificate for each identity that has none and was not revoked; returns their names. Raises UserError."""
+    with _changing(folder) as old:
+        names = uncertified_in(old)
+        if names:
+            signer = _signer(folder, old)
+            issued = {name: _issue(folder, signer, name, 1, old.addresses, now_us, days) for name in names}
+            _write_index(folder, replace(old, holders={**old.holders, **issued}))
+    return names
 
 
 def revoke(folder: Path, name: str) -> Identities:
@@ -94,13 +99,20 @@ def _issue_all(
     signer = read_signer(authority.pem, authority.key_pem)
     holders: dict[str, Certificate] = {}
     for name, number in numbers.items():
-        if name in LISTENERS:
-            issued = make_listener(signer, name, number, now_us, days, addresses)
-        else:
-            issued = make_client(signer, name, number, now_us, days)
-        _write_pair(folder, f"{name}.{number}", issued)
-        holders[name] = issued.certificate
+        holders[name] = _issue(folder, signer, name, number, addresses, now_us, days)
     return Identities(graph=graph, addresses=addresses, authority=authority.certificate, holders=holders)
+
+
+def _issue(
+    folder: Path, signer: Signer, name: str, number: int, addresses: tuple[str, ...], now_us: int, days: int
+) -> Certificate:
+    """Sign and write one; `addresses`: of what listens."""
+    if name in LISTENERS:
+        issued = make_listener(signer, name, number, now_us, days, addresses)
+    else:
+        issued = make_client(signer, name, number, now_us, days)
+    _write_pair(folder, f"{name}.{number}", issued)
+    return issued.certificate
 
 
 def _signer(folder: Path, identities: Identities) -> Signer:
@@ -114,7 +126,7 @@ def _signer(folder: Path, identities: Identities) -> Signer:
 
 
 def _require_known(identities: Identities, name: str) -> None:
-    known = names_in(identities.graph)
+    known = certified_in(identities.graph)
     if name not in known:
         raise UserError(f"{name}: no identity of the graph {identities.graph} (of {', '.join(known)})")
 
@@ -158,5 +170,5 @@ def _remove_unnamed(folder: Path, identities: Identities) -> None:
     named = {identities.common_name(name) for name in (AUTHORITY, *identities.holders)}
     for path in (*folder.glob("*.pem"), *folder.glob("*.key")):
         name, _, number = path.stem.rpartition(".")
-        if path.stem not in named and number.isdecimal() and name in {AUTHORITY, *names_in(identities.graph)}:
+        if path.stem not in named and number.isdecimal() and name in {AUTHORITY, *certified_in(identities.graph)}:
             path.unlink()

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import paani
-from paani.authority import ensure_credentials
-from paani.certificates import ALL, date_text, identities_of
+from paani.authority import ensure_credentials, uncertified_in
+from paani.certificates import ALL, date_text, identities_of, listener_of
 from paani.clock import WallClock
 from paani.config import Config
 from paani.runtime import runtime_path
@@ -117,6 +117,12 @@ def check_certificates(config: Config) -> Iterator[Verdict]:
     if not folder:
         yield passed("bus.certificates: not set; processes sign in by password")
         return
+    if missing := uncertified_in(identities_of(config.bus)):
+        verdict = failed if {*config.services, listener_of(config.bus)}.intersection(missing) else warned
+        yield verdict(
+            f"bus.certificates {folder}: none for {', '.join(missing)}",
+            f"paani certs complete --folder {folder} where the authority's key is, and copy the folder again",
+        )
     ensure_credentials(config.bus)
     name, first = min(identities_of(config.bus).holders.items(), key=lambda item: item[1].not_after_s)
     text = f"bus.certificates {folder}: {name}.{first.number} is the first to expire, {date_text(first.not_after_s)}"

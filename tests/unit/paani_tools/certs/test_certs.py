@@ -8,10 +8,22 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from paani import authority
-from paani.certificates import AUTHORITY, BOARD_ROUTER, INDEX_FILE, LISTENERS, read_identities, require_certificates
+from paani.certificates import (
+    AUTHORITY,
+    BOARD_ROUTER,
+    INDEX_FILE,
+    LISTENERS,
+    PAGE,
+    client_settings,
+    page_server_tls,
+    read_identities,
+    require_certificates,
+)
 from paani.clock import WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
@@ -68,6 +80,50 @@ def test_rotating_one_leaves_the_others(tmp_path: Path) -> None:
     assert before.keys() - after.keys() == {"advisor.1.key", "advisor.1.pem"}
     assert after.keys() - before.keys() == {"advisor.2.key", "advisor.2.pem"}
     assert {name for name in before.keys() & after.keys() if before[name] != after[name]} == {INDEX_FILE}
+
+
+def forget(folder: Path, *names: str) -> None:
+    """As a folder is that was made before there were such identities."""
+    known = read_identities(folder)
+    kept = {name: holder for name, holder in known.holders.items() if name not in names}
+    (folder / INDEX_FILE).write_bytes(msgspec.json.encode(replace(known, holders=kept)))
+    for path in (path for name in names for path in folder.glob(f"{name}.*")):
+        path.unlink()
+
+
+def test_what_an_older_folder_lacks_is_told_and_made_without_changing_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = made(tmp_path, Graph.HULL)
+    certificates.revoke(folder, "advisor")
+    forget(folder, "button", PAGE)
+    bus, before = BusConfig(certificates=str(folder), graph=Graph.HULL), contents(folder)
+    with pytest.raises(UserError, match=r"button has no certificate \(`paani certs complete`"):
+        client_settings(bus, "button")
+    assert main(["show", "--folder", str(folder)]) == 1
+    assert "button             MISSING: `paani certs complete --folder " in capsys.readouterr().out
+    assert main(["complete", "--folder", str(folder)]) == 0
+    assert capsys.readouterr().out.startswith("button, page: made; ")
+    after = contents(folder)
+    assert after.keys() - before.keys() == {f"{name}.1.{end}" for name in ("button", PAGE) for end in ("key", "pem")}
+    assert {name for name in before if before[name] != after[name]} == {INDEX_FILE}
+    assert client_settings(bus, "button")
+    page_server_tls(bus)
+    assert main(["show", "--folder", str(folder)]) == 0
+    assert "advisor.1          REVOKED" in capsys.readouterr().out
+    assert main(["complete", "--folder", str(folder)]) == 0
+    assert contents(folder) == after
+    assert capsys.readouterr().out == f"{folder}: none is missing\n"
+
+
+def test_nothing_is_made_where_the_authority_has_no_key(tmp_path: Path) -> None:
+    folder = made(tmp_path, Graph.HULL)
+    forget(folder, "button")
+    (folder / "authority.1.key").unlink()
+    before = contents(folder)
+    with pytest.raises(UserError, match="certificates are made where the authority's key is"):
+        main(["complete", "--folder", str(folder)])
+    assert contents(folder) == before
 
 
 def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(tmp_path: Path) -> None:

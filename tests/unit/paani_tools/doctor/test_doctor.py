@@ -12,8 +12,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
+from paani.certificates import INDEX_FILE, read_identities
 from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.keys import Graph
@@ -206,6 +209,20 @@ def test_every_line_is_one_line_and_says_what_to_do(capsys: pytest.CaptureFixtur
     lines = capsys.readouterr().out.splitlines()
     assert {line.split()[1] for line in lines} == {"camera", "disk", "versions"}
     assert all(" -> " in line for line in lines if not line.startswith("ok"))
+
+
+@pytest.mark.parametrize(
+    ("name", "state"), [("controller", State.FAIL), ("host_router", State.FAIL), ("nmea", State.WARN)]
+)
+def test_an_identity_without_certificate_is_told_with_what_makes_one(tmp_path: Path, name: str, state: State) -> None:
+    folder = tmp_path / "certs"
+    certificates.make(folder, Graph.SIMULATION, (), WallClock().now_us(), 30)
+    known = read_identities(folder)
+    holders = {each: holder for each, holder in known.holders.items() if each != name}
+    (folder / INDEX_FILE).write_bytes(msgspec.json.encode(replace(known, holders=holders)))
+    finding = examine("certificates", (f"bus.certificates={folder}",))[0]
+    assert (finding.state, finding.text) == (state, f"bus.certificates {folder}: none for {name}")
+    assert f"paani certs complete --folder {folder}" in finding.remedy
 
 
 @pytest.mark.parametrize(("days", "state"), [(30, State.OK), (7, State.WARN)])
