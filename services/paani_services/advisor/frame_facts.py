@@ -148,10 +148,13 @@ def is_without_water(non_water: float, policy: PolicyConfig) -> bool:
 
 
 def is_closed(water: LaneEvidence, policy: PolicyConfig) -> bool:
-    """Whether the lane shows no way of connected water from the bow; False where the mask was not asked."""
+    """Whether the lane shows no way of connected water from the bow; False where the mask was not asked.
+
+    The share of the mask that is probably mistaken counts as no water: what is not sure to be water opens no lane.
+    """
     if isinstance(water.open_width, msgspec.UnsetType) or policy.open_width == 0.0:
         return False
-    return water.open_width < policy.open_width or water.non_water > policy.not_water
+    return water.open_width < policy.open_width or water.non_water + water.uncertainty > policy.not_water
 
 
 def is_vessel_ahead(obstacle: Obstacle, config: Config) -> bool:

@@ -27,6 +27,7 @@ from paani_tools.look.verdict import judge_still
 from paani_tools.progress import Progress
 
 OCCUPIED = Path(__file__).with_name("occupied_centres.txt")
+MISTAKEN = Path(__file__).with_name("mistaken_masks.txt")
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True):
@@ -92,12 +93,20 @@ def occupied_centres() -> frozenset[str]:
     return frozenset(OCCUPIED.read_text().split())
 
 
+@cache
+def mistaken_masks() -> frozenset[str]:
+    """Pictures whose mask says of water that it is none, by eye: a path a line."""
+    return frozenset(MISTAKEN.read_text().split())
+
+
 def _judge(samples: Sequence[Sample], number: int, perceiver: Perceiver, data: Path, config: Config) -> Judged:
     picture, corridors = samples[0].picture, config.perception.corridors
     boxes = next((read_boxes(sample.label) for sample in samples if sample.label), None)
-    mask = next((read_mask(sample.mask) for sample in samples if sample.mask), None)
-    frame = next(iter(read_frames(picture, config.camera)))
     name = picture.relative_to(data).as_posix()
+    mask = next((read_mask(sample.mask) for sample in samples if sample.mask), None)
+    if name in mistaken_masks():
+        mask = None
+    frame = next(iter(read_frames(picture, config.camera)))
     ahead = annotated_ahead(boxes, mask, corridors)
     if name in occupied_centres():
         ahead = ahead._replace(open_water=False)

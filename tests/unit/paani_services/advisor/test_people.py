@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import Config, load_config
 from paani.messages import BoxXyxy
+from paani_services.advisor.frame_facts import is_closed
 from paani_services.advisor.people import counts, is_close, nearest_ahead_m, people_in_lane, speed_limit_mps
 from paani_services.advisor.risk import Obstacle
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, box, lane, play, seeing
@@ -86,7 +87,30 @@ def test_a_lane_without_connected_water_is_never_advised(frame: m.Evidence) -> N
         return
     way = getattr(frame, m.SIDE_OF.get(advisory.direction, "center"))
     assert way.open_width >= PAANI.advisor.policy.open_width
-    assert way.non_water <= PAANI.advisor.policy.not_water
+    assert way.non_water + way.uncertainty <= PAANI.advisor.policy.not_water
+
+
+@given(FRAMES, st.sampled_from(("left", "center", "right")), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_mask_that_shows_less_water_or_is_less_sure_of_it_closes_no_lane_less(
+    frame: m.Evidence, which: str, non_water: float, uncertainty: float
+) -> None:
+    water = getattr(frame, which)
+    worse = msgspec.structs.replace(
+        water, non_water=max(water.non_water, non_water), uncertainty=max(water.uncertainty, uncertainty)
+    )
+    assert is_closed(worse, PAANI.advisor.policy) >= is_closed(water, PAANI.advisor.policy)
+    assert not is_closed(worse, PAPER.advisor.policy)
+
+
+@pytest.mark.parametrize(
+    ("non_water", "uncertainty", "direction"), [(0.5, 0.2, "STRAIGHT"), (0.5, 0.4, "STOP"), (0.7, 0.2, "STOP")]
+)
+def test_a_lane_is_no_way_where_too_little_of_it_is_surely_water(
+    non_water: float, uncertainty: float, direction: str
+) -> None:
+    lane_water = m.LaneEvidence(non_water=non_water, uncertainty=uncertainty, clear_width=0.5, open_width=0.5)
+    frame = msgspec.structs.replace(CLEAR, left=lane_water, center=lane_water, right=lane_water)
+    assert play([frame] * 3)[1][-1].direction == direction
 
 
 @given(st.floats(0.0, 0.5), st.floats(0.0, 0.2), st.floats(0.5, 1.0))

@@ -155,6 +155,16 @@ def test_a_centre_that_is_occupied_by_eye_is_no_open_water(
     assert "open_water" not in json.loads(out.read_bytes())["pictures"][0]["counts"]
 
 
+def test_a_mask_that_is_mistaken_by_eye_says_nothing(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert all(line.count("/") >= 2 for line in command.mistaken_masks())
+    monkeypatch.setattr(command, "mistaken_masks", lambda: frozenset({"bath_river/images/a.png"}))
+    out = tmp_path / "advice.json"
+    assert main([str(data), "--sources", "bath_river", "--json", str(out)]) == 0
+    assert json.loads(out.read_bytes())["pictures"][0]["counts"].keys() <= {"own_mask"}
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
