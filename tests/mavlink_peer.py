@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common
 
 from paani import messages as m
 from paani.config import AdvisorConfig
+from paani_services.mavlink.camera import Camera, Stream
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.gateway import Gateway, Request
 from paani_services.mavlink.mission_exchange import MissionOrder
@@ -120,9 +121,10 @@ class Port:
         def drive(surge: float, turn: float, hand: int) -> None:
             self.driven.append((surge, turn, hand))
 
+        self.stream: Stream | None = None
         self.gateway = Gateway(
             self.asked.append, self.sent.append, drive, self.written.append, self.counted.append,
-            advisor=AdvisorConfig(), cruise_mps=0.6, is_signed=is_signed,
+            Camera("otter", lambda: self.stream), advisor=AdvisorConfig(), cruise_mps=0.6, is_signed=is_signed,
         )  # fmt: skip
         self.gateway.tick(snapshot)
 

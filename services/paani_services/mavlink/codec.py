@@ -47,6 +47,7 @@ class Codec:
     def __init__(self, link_id: int, signer: Signer | None) -> None:
         self._parser = _Parser(signer)
         self._parser.signing.link_id = link_id % 256
+        self._sequences: dict[int, int] = {}  # of frames, by component
         self.damaged = 0
 
     def decode(self, data: bytes) -> list[Any]:
@@ -63,13 +64,14 @@ class Codec:
             self._parser.buf_index = 0
         return messages
 
-    def encode(self, message: Any, now_us: int) -> bytes:
-        """One frame, signed where there is a key."""
+    def encode(self, message: Any, now_us: int, component: int = COMPONENT) -> bytes:
+        """One frame of this component, signed where there is a key."""
         parser = self._parser
+        parser.srcComponent, parser.seq = component, self._sequences.get(component, 0)
         if parser.signer is not None:
             parser.signing.timestamp = parser.signer.next_stamp(now_us)
         frame = bytes(message.pack(parser))
-        parser.seq = (parser.seq + 1) % 256
+        self._sequences[component] = (parser.seq + 1) % 256
         return frame
 
 

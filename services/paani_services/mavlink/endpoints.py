@@ -51,6 +51,11 @@ class UdpLink(asyncio.DatagramProtocol):
     def unsent_bytes(self) -> int:
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
+    @property
+    def own_host(self) -> str:
+        """Our end of it."""
+        return "" if self._transport is None else str(self._transport.get_extra_info("sockname")[0])
+
     def close(self) -> None:
         if self._transport is not None:
             self._transport.abort()
@@ -74,7 +79,7 @@ class Endpoints:
                 _, link = await loop.create_datagram_endpoint(UdpLink, remote_addr=(host, port))
             except OSError as error:
                 raise UserError(f"mavlink.udp {host}:{port}: {error.strerror}") from error
-            station = self._add(f"udp {host}:{port}", link.write, link.unsent_bytes, host)
+            station = self._add(f"udp {host}:{port}", link.write, link.unsent_bytes, host, link.own_host)
             link.receive = functools.partial(self._receive, station)
             self._udp.append(link)
         if self._settings.tcp:
@@ -102,8 +107,9 @@ class Endpoints:
             address = writer.get_extra_info("peername")
             unsent_bytes = writer.transport.get_write_buffer_size
             station = self._add(
-                f"tcp {address[0]}:{address[1]}", lambda data: _write(writer, data), unsent_bytes, address[0]
-            )
+                f"tcp {address[0]}:{address[1]}", lambda data: _write(writer, data), unsent_bytes, address[0],
+                writer.get_extra_info("sockname")[0],
+            )  # fmt: skip
             try:
                 while data := await reader.read(CHUNK_BYTES):
                     if not self._gateway.receive(station, data, self._clock.now_us()):
@@ -115,9 +121,11 @@ class Endpoints:
     def _receive(self, station: Station, data: bytes) -> None:
         self._gateway.receive(station, data, self._clock.now_us())
 
-    def _add(self, name: str, write: Callable[[bytes], None], unsent_bytes: Callable[[], int], host: str) -> Station:
+    def _add(
+        self, name: str, write: Callable[[bytes], None], unsent_bytes: Callable[[], int], host: str, own_host: str
+    ) -> Station:
         codec = Codec(next(self._link_ids), self._signer)
-        station = Station(name, codec, write, unsent_bytes, is_local=is_loopback(host))
+        station = Station(name, codec, write, unsent_bytes, is_local=is_loopback(host), own_host=own_host)
         self._gateway.stations.append(station)
         return station
 

@@ -9,7 +9,8 @@ from paani import messages as m
 from paani.config import AdvisorConfig
 from paani_services.mavlink import commands
 from paani_services.mavlink.announcements import Announcer, summary
-from paani_services.mavlink.codec import COMPONENT, SYSTEM, dialect
+from paani_services.mavlink.camera import CAMERA_COMPONENT, Camera
+from paani_services.mavlink.codec import COMPONENT, HEARTBEAT, SYSTEM, dialect
 from paani_services.mavlink.commands import Act, Verdict, judge_command, judge_mode
 from paani_services.mavlink.fields import integer
 from paani_services.mavlink.file_transfer import refuse_file
@@ -43,7 +44,8 @@ class Gateway:
     """ask, send: what is asked of the operator's process, and missions for it. drive: says surge and turn of a hand.
     try_parameter: has a parameter tried that a station writes. is_signed: whether there is a key.
 
-    count: something refused, by its cause. advisor, cruise_mps: the settings that stations read as parameters.
+    count: something refused, by its cause. camera: the boat's second component.
+    advisor, cruise_mps: the settings that stations read as parameters.
     """
 
     def __init__(
@@ -53,12 +55,13 @@ class Gateway:
         drive: Callable[[float, float, int], None],
         try_parameter: Callable[[ParameterWrite], None],
         count: Callable[[str], None],
+        camera: Camera,
         *,
         advisor: AdvisorConfig,
         cruise_mps: float,
         is_signed: bool,
     ) -> None:
-        self._ask, self._drive, self._count = ask, drive, count
+        self._ask, self._drive, self._count, self._camera = ask, drive, count, camera
         self._is_signed = is_signed
         self.stations: list[Station] = []
         self.commander_us: int | None = None  # when a station that may command was heard last
@@ -120,12 +123,14 @@ class Gateway:
             self._count("mavlink_damaged")
         for message in messages:
             source = message.get_srcSystem(), message.get_srcComponent()
-            if source == (SYSTEM, COMPONENT):  # our own, come back
+            if source in {(SYSTEM, COMPONENT), (SYSTEM, CAMERA_COMPONENT)}:  # our own, come back
                 continue
             if message.get_signed() if self._is_signed else station.is_local:
                 self.commander_us = now_us
             handler = self._handlers.get(message.get_type())
-            if handler is not None and self._is_addressed(message):
+            if self._is_addressed(message, CAMERA_COMPONENT):
+                self._camera.receive(station, message, source, now_us, self._snapshot.boot_ms)
+            elif handler is not None and self._is_addressed(message, COMPONENT, 0):
                 handler(station, message, source)
         return True
 
@@ -137,11 +142,11 @@ class Gateway:
         if station in self.stations:
             self.stations.remove(station)
 
-    def _is_addressed(self, message: Any) -> bool:
-        """Whether a message is for this boat; 0 is everybody's address."""
+    def _is_addressed(self, message: Any, *components: int) -> bool:
+        """Whether a message is for one of these components of this boat; 0 is everybody's address."""
         system = getattr(message, "target_system", getattr(message, "target", 0))
         component = getattr(message, "target_component", 0)
-        return system in {0, SYSTEM} and component in {0, COMPONENT}
+        return system in {0, SYSTEM} and component in components
 
     def _is_trusted(self, station: Station, message: Any) -> bool:
         return bool(message.get_signed()) if self._is_signed else station.is_local
@@ -245,6 +250,8 @@ class Gateway:
         """Send one message of this kind: whether there was one; None for a kind that is never sent."""
         if message_id not in STREAMED:
             return None
+        if message_id == HEARTBEAT:
+            self._camera.send_heartbeat(station, self._snapshot.now_us)
         message = self._missions.current if message_id == MISSION_CURRENT else BUILDERS[message_id](self._snapshot)
         if message is None:
             return False

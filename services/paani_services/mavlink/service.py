@@ -13,13 +13,16 @@ from paani.clock import Clock, MonotonicClock
 from paani.config import Config
 from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
+from paani.port_address import tcp_address
 from paani_services.mavlink.acts import Acts, is_link_lost
+from paani_services.mavlink.camera import Camera, Stream
 from paani_services.mavlink.endpoints import Endpoints
 from paani_services.mavlink.gateway import Gateway
 from paani_services.mavlink.log_files import serve_logs
 from paani_services.mavlink.signing import Signer, read_signing_key
 from paani_services.mavlink.snapshot import TOPICS, Snapshot
 from paani_services.mavlink.trials import Trials
+from paani_services.mavlink.video import Video
 
 LOG = logging.getLogger(__name__)
 PERIOD_S = 0.02
@@ -45,6 +48,14 @@ class Inputs:
         return Snapshot(now_us=self._clock.now_us(), boot_ms=boot_ms % (1 << 32), **fresh)
 
 
+def stream_of(config: Config, video: Video) -> Stream | None:
+    """What is served now; None where `mavlink.video` names no address."""
+    if not config.mavlink.video:
+        return None
+    hfov_deg = config.calibration.hfov_deg if config.calibration.valid else 0.0
+    return Stream(*tcp_address(config.mavlink.video), keys.PICTURE.rate_hz, hfov_deg, video.size_px)
+
+
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Serve ground stations until told to stop. Raises UserError for an address or a key that cannot be had."""
     settings = config.mavlink
@@ -55,15 +66,19 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     client = OperatorClient(bus, clock)
     acts = Acts(client, MissionClient(bus, clock), clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
     trials = Trials(bus, clock, lambda: inputs.snapshot().shadow, lambda *ended: gateway.parameters.answer(*ended))
+    video = Video(bus.pull_picture(keys.PICTURE), settings, config.bus.vessel, bus.count_drop)
+    camera = Camera(config.bus.vessel, lambda: stream_of(config, video))
     gateway = Gateway(
-        acts.ask, acts.send, client.drive, trials.ask, bus.count_drop, advisor=config.advisor,
+        acts.ask, acts.send, client.drive, trials.ask, bus.count_drop, camera, advisor=config.advisor,
         cruise_mps=config.navigator.cruise_mps, is_signed=signer is not None,
     )  # fmt: skip
     gateway.tick(inputs.snapshot())
     endpoints = Endpoints(gateway, settings, signer, clock)
-    with contextlib.closing(endpoints), contextlib.closing(acts), contextlib.closing(trials):
+    with contextlib.closing(endpoints), contextlib.closing(acts), contextlib.closing(trials), contextlib.closing(video):
         await endpoints.open()
+        await video.open()
         async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(video.show_pictures())
             tasks.create_task(serve_logs(gateway.logs, config.recorder.folder, clock))
             with bus.alive():
                 LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")

@@ -8,7 +8,7 @@ from typing import Any
 
 from paani.clock import has_passed
 from paani_services.mavlink.announcements import WARNING, statustext
-from paani_services.mavlink.codec import Codec, dialect
+from paani_services.mavlink.codec import COMPONENT, Codec, dialect
 from paani_services.mavlink.streams import Schedule
 
 BYTES_PER_S, BURST_BYTES = 100_000, 64_000  # a station that speaks faster is not heard: a mission takes a tenth of it
@@ -22,7 +22,7 @@ PARAMETERS_PER_TICK = 5  # 250 a second
 class Station:
     """`write` takes the bytes of a frame. is_local: at the loopback interface of this machine.
 
-    unsent_bytes: how many of those bytes have not left this machine.
+    unsent_bytes: how many of those bytes have not left this machine. own_host: our end of its link.
     """
 
     def __init__(
@@ -33,8 +33,10 @@ class Station:
         unsent_bytes: Callable[[], int] = lambda: 0,
         *,
         is_local: bool,
+        own_host: str = "127.0.0.1",
     ) -> None:
         self.name, self.is_local, self._codec, self._write = name, is_local, codec, write
+        self.own_host = own_host
         self.unsent_bytes = unsent_bytes
         self.schedule = Schedule()
         self.next_parameter: int | None = None  # to be sent of the list that it asked for
@@ -66,9 +68,9 @@ class Station:
         """Whether it has spoken of late."""
         return self.heard_us is not None and 0 <= now_us - self.heard_us <= silent_s * 1e6
 
-    def send(self, message: Any, now_us: int) -> None:
-        """One message."""
-        self._write(self._codec.encode(message, now_us))
+    def send(self, message: Any, now_us: int, component: int = COMPONENT) -> None:
+        """One message of one of our components."""
+        self._write(self._codec.encode(message, now_us, component))
 
     def refuse(self, text: str, now_us: int) -> bool:
         """Say why something is refused, the same thing no more than once in a while; whether it was said."""

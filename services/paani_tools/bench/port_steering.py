@@ -22,7 +22,7 @@ from paani_tools.bench.ports import StickLatencies
 
 REPEAT_S = 0.1  # of a stick: within the dead man's time
 ANSWER_S = 3.0  # of a stick that no thrust follows
-MANUAL_S = 10.0
+MANUAL_S = 30.0  # until the boat is armed and gives it
 HELD_S = 0.5  # after the thrust has followed
 PHASE_S = 0.037  # by which each stick is held longer than the one before, so that they fall on no clock's beat
 PHASES = 7

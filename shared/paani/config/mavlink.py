@@ -16,12 +16,14 @@ class MavlinkConfig(Section, frozen=True):
     """`udp`: addresses at which ground stations listen, HOST:PORT with commas between them; they get a heartbeat until
     they answer. `tcp`: where ground stations connect, HOST:PORT. Either may be empty. `signing_key_file`: a file, for
     its owner alone, with the passphrase that signs every frame; then nothing is obeyed that is not signed by it.
-    Without one, only this machine may command.
+    Without one, only this machine may command. `video`: where players watch the camera by RTSP, HOST:PORT, or empty;
+    whoever reaches it may.
     """
 
     udp: str = "127.0.0.1:14540,127.0.0.1:14550"  # where MAVSDK and QGroundControl listen unless told otherwise
     tcp: str = ""  # ArduPilot's is port 5760
-    max_clients: Annotated[int, msgspec.Meta(ge=1, le=16)] = 4  # by TCP; one more is let go at once
+    video: str = ""  # RTSP's is port 8554
+    max_clients: Annotated[int, msgspec.Meta(ge=1, le=16)] = 4  # by TCP, and players; one more is let go at once
     signing_key_file: str = ""
     # A boat that was armed from here is stopped when no station that may command has been heard for so long: five
     # heartbeats of a station, as ArduPilot's FS_GCS_TIMEOUT.
@@ -36,5 +38,6 @@ class MavlinkConfig(Section, frozen=True):
         """The addresses can be parsed."""
         if len(self.udp_addresses) > MAX_ADDRESSES:
             raise ValueError(f"mavlink.udp: more than {MAX_ADDRESSES} addresses")
-        if self.tcp:
-            tcp_address(self.tcp)
+        for address in (self.tcp, self.video):
+            if address:
+                tcp_address(address)
