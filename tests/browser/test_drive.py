@@ -149,6 +149,8 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await orders.until(lambda found: found.mode is DriveMode.IDLE)
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")
         assert "another page" in await page.inner_text("#drive-wheel")
+        await until(page, "document.querySelector('#wheel').textContent === 'another page'")
+        await until(other, "document.querySelector('#wheel').textContent === 'this page'")
         await drive_manually(other, orders)
         await page.keyboard.down("s")
         assert await page.evaluate("document.querySelector('#drive').dataset.driving") == "false"

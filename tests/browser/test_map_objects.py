@@ -45,6 +45,10 @@ MISSION = m.Mission(
     ),
 )
 SWIMMER = m.MovingObstacle(track_id=4, x_m=-8.0, y_m=8.0, radius_m=1.0, east_mps=0.0, north_mps=-1.0)
+CROSSING = m.MovingObstacle(
+    track_id=5, x_m=6.0, y_m=-18.0, radius_m=0.5, east_mps=0.0, north_mps=1.0, cpa_m=2.0, cpa_std_m=0.3, tcpa_s=10.0,
+    encounter=m.EncounterClass.CROSSING_STARBOARD,
+)  # fmt: skip
 FREE = (m.Constraint.NONE,) * 3
 BLOCKED = (m.Constraint.PERSON, m.Constraint.PERSON, m.Constraint.UNKNOWN_WATER)
 
@@ -59,7 +63,7 @@ def verdict(off_deg: int) -> m.HeadingVerdict:
 
 
 AHEAD = m.Prediction(
-    source_us=0, path=points((0, 0), (3, 0), (6, 2)), obstacles=(SWIMMER,), home=points((-10, -10)),
+    source_us=0, path=points((0, 0), (3, 0), (6, 2)), obstacles=(SWIMMER, CROSSING), home=points((-10, -10)),
     headings=tuple(verdict(off) for off in (0, *(side * step for step in range(20, 180, 20) for side in (1, -1)))),
 )  # fmt: skip
 
@@ -166,6 +170,7 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
             ("the fence to stay in", GREEN, -20.0, 1.0), ("the fence to stay out of", RED, 10.0, 8.0),
             ("the station", ROUTE, 3.0, -12.0), ("home", ROUTE, -10.0, -8.67), ("the way ahead", AMBER, 3.0, 0.0),
             ("the swimmer", ORANGE, -8.0, 7.8), ("where they will be", ORANGE, -8.0, 4.5),
+            ("where the other one will be nearest", AMBER, 6.0, -8.0), ("and the boat then", AMBER, 5.0, 0.0),
         ]  # fmt: skip
         for what, colour, east_m, north_m in drawn:
             assert await has_colour_on_map(page, colour, east_m, north_m), what

@@ -20,6 +20,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 WAIT_S = 20.0
 TOLERANCE = 14
+OWN_HULL = "[[0.4, 1.0], [0.4, 0.95], [0.6, 0.95], [0.6, 1.0]]"
 WATER_RGBA, OBSTACLE_RGBA = (23, 184, 214, 66), (242, 140, 30, 100)
 ACCEPTED_RGB = (255, 180, 84)
 ROUTE_RGB, TRACK_RGB = (185, 164, 240), (79, 195, 224)
@@ -30,6 +31,12 @@ MAP_PIXELS = """([x, y]) => {
   const data = [...c.getContext("2d").getImageData(place[0], place[1], 5, 5).data];
   return Array.from({ length: 25 }, (_, i) => data.slice(4 * i, 4 * i + 4));
 }"""
+REMAINING = """(() => {
+  const list = document.querySelector("#arm-reasons"), lines = [...list.children].map((each) => each.textContent);
+  const reasons = ["Position: no recent position", "Navigator: no recent order", "Controller: no recent thrust"];
+  return !list.hidden && lines[0] === "Armed, the boat still stands:" && reasons.every((each) => lines.includes(each)) &&
+    !lines.some((each) => each.startsWith("Operator"));
+})()"""
 PIXEL = """([x, y]) => {
   const c = document.querySelector("#camera");
   return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
@@ -76,10 +83,26 @@ def is_colour(pixel: list[int], colour: tuple[float, ...]) -> bool:
     return all(abs(a - b) <= TOLERANCE for a, b in zip(pixel, colour, strict=True))
 
 
+async def check_own_hull_and_opacity(page: Any) -> None:
+    shaded = tuple(0.55 * part + 0.45 * dark for part, dark in zip(blend(WATER_RGBA), (8, 11, 14), strict=True))
+    place = [0.45, 0.975]
+    assert is_colour(await page.evaluate(PIXEL, place), shaded)
+    await page.keyboard.press("5")
+    await page.wait_for_timeout(300)
+    assert is_colour(await page.evaluate(PIXEL, place), blend(WATER_RGBA))
+    await page.fill("#camera-opacity", "0")
+    await page.wait_for_timeout(300)
+    assert is_colour(await page.evaluate(PIXEL, place), PICTURE_BGR[::-1])
+    assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), PICTURE_BGR[::-1])
+    await page.reload()
+    await until(page, "paani.overlay.mask_seq !== null")
+    assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), PICTURE_BGR[::-1]), "it is kept"
+
+
 async def test_the_overlay_lies_on_its_own_frame(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
-    async with spawn("dashboard"):
+    async with spawn("dashboard", f"perception.ego_polygon={OWN_HULL}"):
         watched = await watch(browser, config)
         page = watched.page
         await until(page, "paani.overlay.mask_seq !== null")
@@ -111,6 +134,7 @@ async def test_the_overlay_lies_on_its_own_frame(
             assert is_colour(await page.evaluate(PIXEL, [x, y]), ACCEPTED_RGB), (x, y)
         for x, y in ((x1 + 0.02, y1 + 0.06), (x2 + 0.02, 0.4), (0.3, y2 + 0.03)):
             assert is_colour(await page.evaluate(PIXEL, [x, y]), blend(WATER_RGBA)), (x, y)
+        await check_own_hull_and_opacity(page)
 
         assert await page.inner_text("#advice-word") == "RIGHT"
         assert "centre risk 0.80" in await page.inner_text("#explanation")
@@ -176,6 +200,12 @@ async def test_arming_needs_a_hold_that_has_not_expired(
     async with spawn("operator"), spawn("dashboard"):
         page = (await watch(browser, config)).page
         await until(page, "!document.querySelector('#arm').disabled")
+        await page.focus("#arm")
+        await page.keyboard.down("Enter")
+        await until(page, REMAINING)
+        await page.evaluate("document.querySelector('#arm').blur()")  # lets it go without arming, however late
+        await page.keyboard.up("Enter")
+        await until(page, "document.querySelector('#arm-reasons').hidden")
         await hold_to_arm(page, held_s)
         await asyncio.sleep(0.5)
         assert boat.arming.value is not None

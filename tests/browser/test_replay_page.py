@@ -19,6 +19,12 @@ from tests.unit.paani.logs.small_logs import NAME, START_US, finished
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
+RED_ON_MAP = """(() => {
+  const c = document.querySelector("#map"), { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
+  for (let i = 0; i < data.length; i += 4) if (data[i] > 200 && data[i + 1] < 140 && data[i + 2] < 140) return true;
+  return false;
+})()"""
+
 
 @pytest.fixture
 def private_sets(private_sets: tuple[str, ...]) -> tuple[str, ...]:
@@ -38,6 +44,8 @@ async def test_a_replay_raises_no_alarm(
         await until(page, "document.querySelector('#speed').textContent === '0.40'")
         assert await page.inner_text("#mode") == "REPLAY"
         await until(page, "paani.link === 'ended'")
+        await page.wait_for_timeout(300)
+        assert not await page.evaluate(RED_ON_MAP), "nobody is lost where a recording ends"
         assert await page.inner_text("#order-word") == "READ-ONLY"
         assert await page.evaluate("document.querySelector('#arm').disabled")
         words = await page.evaluate(

@@ -23,9 +23,9 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Settings that the page shows or draws with; constant while the process runs.
 
     mode: what the thrust moves, `sim`, `hil` or `hull`; `replay`: a recording is played, and nothing moves. pictures:
-    where they come from, `sim`, `camera` or `file`. turn_radius_m: of the hull
-    under way, 0 where it turns on the spot. planner: whether it chooses heading and speed. replayed: name of the
-    recording that the page plays instead of the present; empty: none.
+    where they come from, `sim`, `camera` or `file`. own_hull: corners of what the boat's own hull covers of them, in
+    [0, 1]. turn_radius_m: of the hull under way, 0 where it turns on the spot. planner: whether it chooses heading and
+    speed. replayed: name of the recording that the page plays instead of the present; empty: none.
     """
 
     vessel: str
@@ -35,6 +35,7 @@ class PageSettings(msgspec.Struct, frozen=True, kw_only=True):
     pictures: str
     planner: bool
     world: str
+    own_hull: tuple[tuple[float, float], ...]
     corridors: CorridorConfig
     weights: RiskConfig
     acceptance_m: float
@@ -67,6 +68,7 @@ def page_settings(config: Config) -> PageSettings:
         pictures="sim" if source == "sim" else "camera" if source.startswith("webcam") else "file",
         planner=config.is_planner_active,
         world=config.world.name,
+        own_hull=config.perception.ego_polygon,
         corridors=config.perception.corridors,
         weights=config.advisor.risk,
         acceptance_m=config.navigator.acceptance_m,

@@ -2,9 +2,10 @@
 // The camera panel: recent pictures by frame id, and the overlay that belongs to the picture shown.
 
 import { chooseFrame } from "./frame_matching.js";
-import { drawBoxes, drawCorridors, drawCorridorTop, drawMask } from "./overlay.js";
+import { drawBoxes, drawCorridors, drawCorridorTop, drawMask, drawOwnHull } from "./overlay.js";
 import { ageText, byId, setText, words } from "./text.js";
 
+const OPACITY_KEY = "paani-overlay-opacity";
 /** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
 const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null };
 
@@ -14,7 +15,8 @@ export class Camera {
     this.view = view;
     this.canvas = /** @type {HTMLCanvasElement} */ (byId("camera"));
     this.ctx = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d", { willReadFrequently: false }));
-    this.layers = { mask: true, boxes: true, lanes: true, limit: true };
+    this.layers = { mask: true, boxes: true, lanes: true, limit: true, hull: true };
+    this.bindOpacity();
     /** Frame numbers of what the canvas shows now; tests read them. */
     this.overlay = { ...NOTHING };
     this.isDrawScheduled = false;
@@ -28,6 +30,16 @@ export class Camera {
     this.layers[name] = !this.layers[name];
     document.querySelector(`[data-layer="${name}"]`)?.setAttribute("aria-pressed", String(this.layers[name]));
     this.scheduleDraw();
+  }
+
+  /** How much of the picture the overlays cover, kept in this browser. */
+  bindOpacity() {
+    const range = byId("camera-opacity");
+    range.value = localStorage.getItem(OPACITY_KEY) ?? range.max;
+    range.addEventListener("input", () => {
+      localStorage.setItem(OPACITY_KEY, range.value);
+      this.scheduleDraw();
+    });
   }
 
   /** Show the frames of another view. @param {import("./view.js").View} view */
@@ -62,11 +74,15 @@ export class Camera {
     const pane = this.resizeCanvas(bitmap);
     pane.ctx.imageSmoothingQuality = "high";
     pane.ctx.drawImage(bitmap, 0, 0, pane.width, pane.height);
-    const corridors = this.view.store.get("dashboard/settings")?.corridors;
+    const { corridors, own_hull: ownHull = [] } = this.view.store.get("dashboard/settings") ?? {};
+    byId("layer-hull").hidden = !ownHull.length;
+    pane.ctx.globalAlpha = Number(byId("camera-opacity").value) / 100;
     if (mask && this.layers.mask) drawMask(pane, mask);
     if (evidence && corridors && this.layers.limit) drawCorridorTop(pane, corridors.top);
     if (evidence && corridors && this.layers.lanes) drawCorridors(pane, corridors, messages["advisor/advisory"].get(chosen.id));
     if (evidence && this.layers.boxes) drawBoxes(pane, evidence, messages["advisor/tracks"].get(chosen.id));
+    if (ownHull.length && this.layers.hull) drawOwnHull(pane, ownHull);
+    pane.ctx.globalAlpha = 1;
     this.overlay = {
       frame_seq: header.frame_seq,
       picture_seq: header.frame_seq,
@@ -102,7 +118,7 @@ export class Camera {
 
   /** Match the canvas to the panel and the picture. @param {ImageBitmap} bitmap @returns {import("./overlay.js").Pane} */
   resizeCanvas(bitmap) {
-    this.canvas.style.aspectRatio = `${bitmap.width} / ${bitmap.height}`;
+    this.canvas.style.setProperty("--aspect", String(bitmap.width / bitmap.height));
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const width = Math.round(this.canvas.clientWidth * ratio), height = Math.round((width * bitmap.height) / bitmap.width);
     if (this.canvas.width !== width || this.canvas.height !== height) {

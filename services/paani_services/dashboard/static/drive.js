@@ -5,7 +5,8 @@
 
 import { isReplay } from "./inhibits.js";
 import { hand, hasKey, post } from "./requests.js";
-import { MODE_BARS, MODE_TEXTS, byId, fixed, make, operatorText, setText } from "./text.js";
+import { MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, setText } from "./text.js";
+import { describeWheel } from "./wheel.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
 const DEAD_ZONE = 0.15; // of a gamepad's stick, which rests nowhere exactly
@@ -144,15 +145,14 @@ export function bindDrive() {
 export function renderDrive(store, open, now, isAway) {
   byId("drive").hidden = isReplay(store) || isAway;
   const operator = open && store.isFresh("operator/state", now) ? store.get("operator/state") : undefined;
-  const isHolder = operator?.wheel_by === "dashboard" && operator.wheel_hand === hand;
-  const isFree = operator?.wheel_by === "", isManual = operator?.mode === "MANUAL";
+  const { isHolder, isFree, name } = describeWheel(operator), isManual = operator?.mode === "MANUAL";
   const mayDrive = isManual && isHolder && !isAway;
   if (canDrive && !mayDrive) letGo();
   canDrive = mayDrive;
   if (!canDrive) isPadFree = false;
   else renderStick();
   byId("drive").dataset.driving = String(canDrive);
-  setText(byId("drive-wheel"), !operator ? "no word from the operator's process" : isHolder ? "this page holds the wheel" : isFree ? "nobody holds the wheel" : `the wheel: ${operator.wheel_by === "dashboard" ? "another page" : operatorText(operator.wheel_by)}`);
+  setText(byId("drive-wheel"), operator ? `${name} ${WHEEL_TEXTS.holds}` : WHEEL_TEXTS.silent);
   byId("drive-take").hidden = !operator || isHolder || isFree;
   for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("[data-drive]"))) {
     const mode = String(button.dataset.drive), bar = operator?.barred.find((/** @type {any} */ each) => each.mode === mode)?.refusal;

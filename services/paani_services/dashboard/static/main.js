@@ -29,7 +29,7 @@ import { renderTuning } from "./tuning.js";
 import { View } from "./view.js";
 
 const RENDER_PERIOD_MS = 100;
-const LAYERS = ["mask", "boxes", "lanes", "limit"];
+const LAYERS = ["mask", "boxes", "lanes", "limit", "hull"];
 const live = new View(() => performance.now());
 const camera = new Camera(live);
 const map = new MapPanel();

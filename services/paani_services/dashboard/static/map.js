@@ -8,6 +8,7 @@ import { MapHeadings } from "./map_headings.js";
 import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
 import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
+import { isReplay } from "./inhibits.js";
 import { RouteEditor } from "./route_editor.js";
 import { byId, fixed, headingDeg, setText } from "./text.js";
 
@@ -82,11 +83,12 @@ export class MapPanel {
     drawTrack(chart, tracks["@truth/pose"], "--text", 1.5, [2, 4]);
     drawTrack(chart, tracks["localization/odometry"], "--cyan", 2, []);
     const prediction = store.isFresh("navigator/prediction", now) ? store.get("navigator/prediction") : undefined;
-    if (prediction) this.drawPrediction(chart, store, prediction, now);
+    if (prediction) this.drawPrediction(chart, store, prediction, pose, now);
     if (truth) drawBoat(chart, truth, "--text", false, store.isFresh("@truth/pose", now));
     if (odometry) drawBoat(chart, odometry, "--cyan", true, store.isFresh("localization/odometry", now));
     const poseAgeS = store.ageS("localization/odometry", now);
-    if (odometry && poseAgeS > store.limitS("localization/odometry")) drawGhost(chart, odometry, poseAgeS);
+    const isOver = isReplay(store) && store.silenceS(now) > store.limitS("localization/odometry"); // nobody is lost where a recording ends
+    if (odometry && poseAgeS > store.limitS("localization/odometry") && !isOver) drawGhost(chart, odometry, poseAgeS);
     this.headings.render(chart, prediction?.headings ?? [], odometry, store.get("dashboard/settings")?.planner ?? true, this.editor.isOpen);
     this.editor.render(chart, store, now);
     drawScale(ctx, projection, colour("--quiet"), colour("--panel"));
@@ -103,11 +105,11 @@ export class MapPanel {
     if (route) drawRoute(chart, route, store.get("navigator/command")?.waypoint_index ?? -1, store.get("dashboard/settings")?.acceptance_m ?? 1);
   }
 
-  /** What the boat is about to do. @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {any} prediction @param {number} now */
-  drawPrediction(chart, store, prediction, now) {
+  /** What the boat is about to do. @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {any} prediction @param {any} pose @param {number} now */
+  drawPrediction(chart, store, prediction, pose, now) {
     if (prediction.home.length) drawHome(chart, prediction.home[0]);
     if (prediction.path.length) drawPath(chart, prediction.path);
-    drawObstacles(chart, prediction.obstacles, store.ageS("navigator/prediction", now), store.get("advisor/tracks")?.tracks ?? []);
+    drawObstacles(chart, prediction.obstacles, pose, store.ageS("navigator/prediction", now), store.get("advisor/tracks")?.tracks ?? []);
   }
 
   /** @param {{x_m: number, y_m: number}[]} points */

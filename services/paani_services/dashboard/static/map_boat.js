@@ -48,6 +48,16 @@ export function drawTrack({ ctx, toScreen, colour }, points, colourName, thick, 
   ctx.globalAlpha = 1;
 }
 
+/** A wedge of one standard deviation to either side. @param {CanvasRenderingContext2D} ctx @param {number} headingRad on the screen, clockwise @param {number} deviationRad @param {number} farPx */
+function drawHeadingDeviation(ctx, headingRad, deviationRad, farPx) {
+  const halfRad = Math.min(deviationRad, Math.PI);
+  ctx.beginPath();
+  ctx.moveTo(0, 0);
+  ctx.arc(0, 0, farPx, headingRad - halfRad, headingRad + halfRad);
+  ctx.closePath();
+  ctx.stroke();
+}
+
 /** @param {Chart} chart @param {any} pose @param {string} colourName @param {boolean} isEstimate filled, with its deviation @param {boolean} isFresh */
 export function drawBoat({ ctx, toScreen, turnRad, pxPerM, colour }, pose, colourName, isEstimate, isFresh) {
   const [x, y] = toScreen(pose.x_m, pose.y_m), size = Math.max(9, 0.9 * pxPerM);
@@ -61,6 +71,7 @@ export function drawBoat({ ctx, toScreen, turnRad, pxPerM, colour }, pose, colou
     ctx.beginPath();
     ctx.arc(0, 0, pose.position_std_m * pxPerM, 0, 7);
     ctx.stroke();
+    if (pose.yaw_std_rad) drawHeadingDeviation(ctx, -(pose.yaw_rad + turnRad), pose.yaw_std_rad, 2.5 * size);
     ctx.globalAlpha = isFresh ? 1 : 0.35;
   }
   ctx.rotate(-(pose.yaw_rad + turnRad));

@@ -2,7 +2,7 @@
 // Draws on the map what the boat is told and what it sees coming: fence, stations, home, the way ahead, moving obstacles.
 
 import { drawWords } from "./map_ground.js";
-import { ageText, trackNames } from "./text.js";
+import { MAP_TEXTS, ageText, trackNames } from "./text.js";
 
 const ARROW_S = 5; // a velocity is drawn as the way of this long
 const GHOST_S = 30; // no boat that nobody hears is said to go straight on for longer
@@ -90,7 +90,7 @@ export function drawGhost({ ctx, toScreen, pxPerM, colour }, pose, ageS) {
   ctx.stroke();
   ctx.setLineDash([]);
   ctx.font = FONT;
-  drawWords({ ctx, colour }, `not heard for ${ageText(ageS)}`, x + 13, y - 13);
+  drawWords({ ctx, colour }, `${MAP_TEXTS.notHeard} ${ageText(ageS)}`, x + 13, y - 13);
 }
 
 /** The way ahead by the order in force. @param {Chart} chart @param {{x_m: number, y_m: number}[]} path */
@@ -104,12 +104,42 @@ export function drawPath({ ctx, toScreen, colour }, path) {
   ctx.lineCap = "butt";
 }
 
+/** Where something will be that goes on as it does. @param {any} from @param {number} eastMps @param {number} northMps @param {number} afterS @returns {[number, number]} */
+const placeAfter = (from, eastMps, northMps, afterS) => [from.x_m + eastMps * afterS, from.y_m + northMps * afterS];
+
 /**
- * Moving obstacles where they are by now, with the way they make in `ARROW_S` and their number.
- * @param {Chart} chart @param {any[]} obstacles @param {number} ageS of the message @param {{id: number, label: string}[]} tracks
+ * Where an obstacle and the boat will be nearest to each other, joined by a line.
+ * @param {Chart} chart @param {any} obstacle @param {any} pose of the boat @param {number} ageS of the message
  */
-export function drawObstacles({ ctx, toScreen, pxPerM, colour }, obstacles, ageS, tracks) {
+function drawClosest({ ctx, toScreen, colour }, obstacle, pose, ageS) {
+  const cos = Math.cos(pose.yaw_rad), sin = Math.sin(pose.yaw_rad), swayMps = pose.sway_mps ?? 0;
+  const boat = toScreen(...placeAfter(pose, pose.surge_mps * cos - swayMps * sin, pose.surge_mps * sin + swayMps * cos, Math.max(0, obstacle.tcpa_s - ageS)));
+  const other = toScreen(...placeAfter(obstacle, obstacle.east_mps, obstacle.north_mps, obstacle.tcpa_s));
+  ctx.strokeStyle = ctx.fillStyle = colour(obstacle.encounter && obstacle.encounter !== "none" ? "--amber" : "--orange");
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([2, 3]);
+  ctx.beginPath();
+  ctx.moveTo(...boat);
+  ctx.lineTo(...other);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  for (const [x, y] of [boat, other]) ctx.fillRect(x - 3, y - 3, 6, 6);
+}
+
+/** How near an obstacle comes and when; empty where it comes no nearer. @param {any} obstacle @param {number} ageS of the message */
+const closestText = (obstacle, ageS) => (isNearing(obstacle) ? MAP_TEXTS.nearest(obstacle.cpa_m, Math.max(0, obstacle.tcpa_s - ageS)) : "");
+
+/** @param {any} obstacle */
+const isNearing = (obstacle) => obstacle.cpa_m !== undefined && obstacle.tcpa_s > 0;
+
+/**
+ * Moving obstacles where they are by now, with the way they make in `ARROW_S`, their number, and the closest point of approach.
+ * @param {Chart} chart @param {any[]} obstacles @param {any} pose of the boat @param {number} ageS of the message @param {{id: number, label: string}[]} tracks
+ */
+export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
+  const { ctx, toScreen, pxPerM, colour } = chart;
   for (const obstacle of obstacles) {
+    if (pose && isNearing(obstacle)) drawClosest(chart, obstacle, pose, ageS);
     const east = obstacle.x_m + obstacle.east_mps * ageS, north = obstacle.y_m + obstacle.north_mps * ageS;
     const [x, y] = toScreen(east, north), radius = Math.max(6, obstacle.radius_m * pxPerM);
     ctx.strokeStyle = ctx.fillStyle = colour("--orange");
@@ -127,5 +157,6 @@ export function drawObstacles({ ctx, toScreen, pxPerM, colour }, obstacles, ageS
     ctx.font = FONT;
     ctx.fillStyle = colour("--text");
     drawWords({ ctx, colour }, trackNames(tracks, [obstacle.track_id]), x + radius + 4, y + 4);
+    drawWords({ ctx, colour }, closestText(obstacle, ageS), x + radius + 4, y + 19);
   }
 }

@@ -1,10 +1,11 @@
 // @ts-check
 // The operator's controls: arming is a hold that expires; what became of a STOP is shown beside it.
 
-import { isReplay } from "./inhibits.js";
+import { findInhibits, isReplay } from "./inhibits.js";
 import { bindKey, hasKey, post } from "./requests.js";
 import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
-import { byId, fixed, operatorText, setText, words } from "./text.js";
+import { ARM_TEXTS, STAGES, byId, fixed, make, operatorText, setText, words } from "./text.js";
+import { describeWheel } from "./wheel.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, REFRESH_MS = 150;
 let refusal = "", heldFrom = 0, press = 0, refreshing = 0;
@@ -66,12 +67,24 @@ export function renderOperatorState(store, open, now, isPast) {
   const isHeard = open && store.isFresh("operator/state", now);
   button.disabled = !isHeard || !operator || operator.armed || isReplay(store) || isPast;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
-  setText(button.querySelector("span"), heldMs >= HOLD_MS ? "Release to arm" : operator?.armed ? "Armed" : "Hold to arm");
+  setText(button.querySelector("span"), heldMs >= HOLD_MS ? ARM_TEXTS.release : operator?.armed ? ARM_TEXTS.armed : ARM_TEXTS.hold);
+  renderRemaining(heldFrom ? findInhibits(store, now).filter(({ code }) => code !== "NOT_ARMED" && code !== "not_armed") : null);
+  setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
   const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: "READ-ONLY", detail: "a recording is played" } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
   state.dataset.state = shown.state;
   setText(byId("order-word"), shown.word);
   setText(byId("order-detail"), refusal || shown.detail);
+}
+
+/** While the button is held: everything that would keep the boat still when it is armed. @param {import("./inhibits.js").StopReason[] | null} reasons null: it is not held */
+function renderRemaining(reasons) {
+  const list = byId("arm-reasons"), key = JSON.stringify(reasons);
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.hidden = !reasons;
+  const items = (reasons ?? []).map(({ stage, text }) => make("li", "", `${STAGES[stage][0]}: ${text}`));
+  list.replaceChildren(make("li", "quiet", items.length ? ARM_TEXTS.stands : ARM_TEXTS.nothing), ...items);
 }
 
 /** @param {any} operator @param {boolean} isHeard @param {number} ageS */

@@ -5,7 +5,7 @@ import { fixed, trackLabel, words } from "./text.js";
 
 export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
-const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb";
+const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb", OWN_HULL = "#ebf3f8";
 
 /**
  * A class mask as a tinted, transparent canvas.
@@ -114,6 +114,20 @@ export function drawCorridorTop({ ctx, width, height, unit }, top) {
   ctx.beginPath();
   ctx.moveTo(0, top * height);
   ctx.lineTo(width, top * height);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** What the own hull covers of the picture, which is no evidence. @param {Pane} pane @param {[number, number][]} corners */
+export function drawOwnHull({ ctx, width, height, unit }, corners) {
+  ctx.beginPath();
+  for (const [x, y] of corners) ctx.lineTo(x * width, y * height);
+  ctx.closePath();
+  ctx.fillStyle = "rgb(8 11 14 / .45)";
+  ctx.fill();
+  ctx.strokeStyle = OWN_HULL;
+  ctx.lineWidth = 1.5 * unit;
+  ctx.setLineDash([8 * unit, 3 * unit]);
   ctx.stroke();
   ctx.setLineDash([]);
 }

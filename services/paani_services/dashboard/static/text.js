@@ -127,6 +127,8 @@ export const MAP_TEXTS = {
   noTiles: "No tiles of the chart lie here",
   damagedTile: "the picture is damaged",
   drawing: "North is up while a mission is drawn",
+  notHeard: "not heard for",
+  nearest: (/** @type {number} */ cpaM, /** @type {number} */ afterS) => `nearest ${cpaM.toFixed(1)} m in ${afterS.toFixed(0)} s`,
 };
 
 /** What refuses a heading: its name, and a clause. `none`: nothing. @type {Record<string, [string, string]>} */
@@ -171,6 +173,12 @@ export const MODE_TEXTS = {
   MANUAL: ["Manual", "does what your hand says"],
   IDLE: ["Idle", "no thrust"],
 };
+
+/** Who holds the wheel. */
+export const WHEEL_TEXTS = { unknown: "–", nobody: "nobody", thisPage: "this page", otherPage: "another page", silent: "no word from the operator's process", holds: "holds the wheel" };
+
+/** Beside the button that arms. */
+export const ARM_TEXTS = { hold: "Hold to arm", release: "Release to arm", armed: "Armed", stands: "Armed, the boat still stands:", nothing: "Nothing else keeps the boat still." };
 
 /** Why a mode may not start, in a few words. @type {Record<string, string>} */
 export const MODE_BARS = {
