@@ -20,6 +20,7 @@ EXTRA_OF = {
     "cryptography": "certs",
     "distributed": "cluster",
     "prometheus_client": "metrics",
+    "pmtiles": "charts",
     "pymavlink": "mavlink",
     "rosbags": "ros2",
     "foxglove": "foxglove",

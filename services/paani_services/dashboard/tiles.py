@@ -1,4 +1,4 @@
-"""Tiles of a chart from a folder `{z}/{x}/{y}.png`, `.jpg` or `.webp`, for the page to draw below its map."""
+"""Tiles of a chart from a folder `{z}/{x}/{y}.png`, `.jpg` or `.webp`, or from one file, to be drawn below the map."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from aiohttp import web
 from paani.errors import UserError
 from paani_services.dashboard.requests import NoQuery, decode_query
 from paani_services.dashboard.responses import error_response, json_response
+from paani_services.dashboard.tile_archive import SUFFIX, open_archive, read_archived
 
 MAX_ZOOM = 24
 MAX_BYTES = 2 << 20
@@ -35,10 +36,14 @@ class TileRefusedError(Exception):
 
 
 def find_tiles(folder: str) -> TileSet:
-    """What the folder holds; empty: no folder is set. Raises UserError naming `dashboard.tiles`."""
+    """What the folder or file holds; empty: none is set. Raises UserError naming `dashboard.tiles`."""
     if not folder:
         return TileSet()
     path = Path(folder)
+    if is_archive(folder):
+        archive = open_archive(path)
+        within = tuple(zoom for zoom in archive.zooms if zoom <= MAX_ZOOM)
+        return TileSet(zooms=within, credit=archive.credit[:MAX_CREDIT_CHARACTERS])
     try:
         names = [each.name for each in path.iterdir() if each.is_dir()]
         credit = (path / CREDIT).read_text(encoding="utf-8", errors="replace") if (path / CREDIT).is_file() else ""
@@ -50,8 +55,15 @@ def find_tiles(folder: str) -> TileSet:
     return TileSet(zooms=tuple(zooms), credit=" ".join(credit.split())[:MAX_CREDIT_CHARACTERS])
 
 
+def is_archive(place: str) -> bool:
+    """Whether it is one file, by its name or because a file is there."""
+    return place.endswith(SUFFIX) or Path(place).is_file()
+
+
 def read_tile(folder: str, zoom: int, column: int, row: int) -> tuple[str, bytes] | None:
     """Media type and bytes of a tile; None where there is none. Raises TileRefusedError for what is no picture."""
+    if is_archive(folder):
+        return _read_from_archive(Path(folder), zoom, column, row)
     root = Path(folder).resolve()
     for suffix, media_type in MEDIA_TYPES.items():
         path = root / str(zoom) / str(column) / f"{row}.{suffix}"
@@ -64,12 +76,27 @@ def read_tile(folder: str, zoom: int, column: int, row: int) -> tuple[str, bytes
                 body = file.read(MAX_BYTES + 1)
         except OSError as error:
             raise TileRefusedError(500, f"{path.relative_to(root)}: {error.strerror}") from error
-        if len(body) > MAX_BYTES:
-            raise TileRefusedError(409, f"{path.relative_to(root)} is larger than {MAX_BYTES >> 20} MiB")
-        if not _is_picture(media_type, body):
-            raise TileRefusedError(409, f"{path.relative_to(root)} is no {suffix} picture")
-        return media_type, body
+        return media_type, _require_picture(str(path.relative_to(root)), suffix, body)
     return None
+
+
+def _read_from_archive(path: Path, zoom: int, column: int, row: int) -> tuple[str, bytes] | None:
+    try:
+        archive = open_archive(path)
+        body = read_archived(archive, zoom, column, row, MAX_BYTES)
+    except UserError as error:
+        raise TileRefusedError(409, str(error)) from error
+    if body is None:
+        return None
+    return MEDIA_TYPES[archive.suffix], _require_picture(f"{zoom}/{column}/{row}", archive.suffix, body)
+
+
+def _require_picture(name: str, suffix: str, body: bytes) -> bytes:
+    if len(body) > MAX_BYTES:
+        raise TileRefusedError(409, f"{name} is larger than {MAX_BYTES >> 20} MiB")
+    if not _is_picture(MEDIA_TYPES[suffix], body):
+        raise TileRefusedError(409, f"{name} is no {suffix} picture")
+    return body
 
 
 def _is_picture(media_type: str, body: bytes) -> bool:
@@ -82,7 +109,7 @@ def _is_picture(media_type: str, body: bytes) -> bool:
 
 
 class TileRoutes:
-    """Answers from the folder of `dashboard.tiles`."""
+    """Answers from the folder or file of `dashboard.tiles`."""
 
     def __init__(self, folder: str) -> None:
         self._folder = folder

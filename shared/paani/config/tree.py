@@ -62,7 +62,8 @@ class DashboardConfig(Section, frozen=True):
     port: Port = 8043  # ends in the paper's domain
     serve: bool = True  # whether there is a page; the process runs without it too
     picture_rate_hz: Positive = 10.0  # at most so many pictures are sent to a page
-    # Folder of a chart's tiles, `{z}/{x}/{y}.png`, `.jpg` or `.webp` (Web Mercator), drawn below the map. Empty: none.
+    # A chart below the map (Web Mercator): folder of tiles `{z}/{x}/{y}.png`, `.jpg` or `.webp`, or a file of such
+    # pictures in the format PMTiles (extra `charts`). Empty: none.
     tiles: str = ""
     replayed: str = ""  # the recording that the page plays instead of the present; `paani replay --dashboard` sets it
 
