@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import os
 import sys
+from collections import defaultdict
 
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config
@@ -15,7 +16,7 @@ from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.page_address import is_page_exposed, page_host
 from paani.whole_file import write_json
-from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars
+from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars, ratio_of_medians
 from paani_tools.bench.deck.slow_link import slow_link
 from paani_tools.inspect.listen import observer
 from paani_tools.up.command import seconds, up_sets
@@ -25,7 +26,8 @@ from paani_tools.up.run_summary import percentiles
 from paani_tools.up.terminal import Display
 
 LINK_MS = 50.0  # each way
-HERE, CROWDED, LINK = "on this machine", "with 10 clients", f"over a link of {LINK_MS:g} ms each way"
+MANY = 10
+HERE, CROWDED, LINK = "with 1 client", f"with {MANY} clients", f"over a link of {LINK_MS:g} ms each way"
 
 
 def main(argv: list[str]) -> int:
@@ -35,10 +37,16 @@ def main(argv: list[str]) -> int:
     )
     parser.add_argument("--world", help="a world or a scenario (default: lake)", default="lake")
     parser.add_argument("--loads", type=whole_number(), default=5, metavar="N", help="of the page; default: 5")
-    parser.add_argument("--stops", type=whole_number(), default=20, metavar="N", help="each way; default: 20")
+    parser.add_argument("--stops", type=whole_number(), default=20, metavar="N", help="each way and round; default: 20")
     parser.add_argument("--sticks", type=whole_number(), default=40, metavar="N", help="default: 40")
     parser.add_argument("--for", dest="seconds", type=seconds, default=20.0, metavar="S", help="each; default: 20")
-    parser.add_argument("--rounds", type=whole_number(), default=2, metavar="N", help="of 1 and 10 clients; default: 2")
+    parser.add_argument(
+        "--rounds",
+        type=whole_number(),
+        default=2,
+        metavar="N",
+        help="with 1 and 10 clients, one after the other; default: 2",
+    )
     parser.add_argument("--heap", type=seconds, metavar="S", help="leave a page open for so long, and watch its heap")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(parser)
@@ -71,14 +79,15 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | 
             await boat.until_applied(measuring.is_under_way, 0.0, measuring.UNDER_WAY_S)
             received_ms, drawn_ms = await measuring.time_pictures(plan.config, deck, options.seconds)
             loads = [await chromium.load_page() for _ in range(options.loads)]
-            crowds: list[Crowd] = []
-            for _ in range(options.rounds):
-                for clients in (1, measuring.MANY):
-                    crowds.append(await measuring.measure_crowd(plan.config, boat, clients, options.seconds))
-            stops = dict[str, list[float]]()
-            stops[HERE], missed_here = await measuring.time_stops(boat, deck, options.stops)
-            async with measuring.crowd(plan.config, measuring.MANY):
-                stops[CROWDED], missed_crowded = await measuring.time_stops(boat, deck, options.stops)
+            crowds, stops, unanswered = list[Crowd](), defaultdict[str, list[float]](list), 0
+            for number in range(options.rounds):
+                for clients in (1, MANY)[:: (-1) ** number]:  # so that what drifts meets both alike
+                    measured, stops_ms, missed = await measuring.measure_crowd(
+                        plan.config, boat, deck, clients, options.seconds, options.stops
+                    )
+                    crowds.append(measured)
+                    stops[HERE if clients == 1 else CROWDED] += stops_ms
+                    unanswered += missed
             page = plan.config.dashboard
             async with slow_link(page_host(plan.config), page.port, LINK_MS * 1e-3) as port:
                 far, _ = await chromium.open_page(f"http://127.0.0.1:{port}")
@@ -93,8 +102,9 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | 
                     drawn_ms=percentiles(drawn_ms),
                     crowds=tuple(crowds),
                     stop_ms={name: percentiles(found) for name, found in stops.items()},
+                    stop_ratio=ratio_of_medians(stops[CROWDED], stops[HERE]),
                     stick_ms=percentiles(sticks_ms),
-                    unanswered=missed_here + missed_crowded + missed_sticks + missed_link,
+                    unanswered=unanswered + missed_sticks + missed_link,
                     heap_s=options.heap or 0.0,
                     heap_slope_mib_h=heap_slope(heap),
                     load_average=(load_before, os.getloadavg()[0]),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from pathlib import Path
 
 import aiohttp
@@ -22,6 +21,7 @@ from paani.operator_key import ensure_operator_key
 from paani.page_address import page_origin
 from paani_services.dashboard.frames import decode_frame
 from paani_tools.bench.deck.browser import Browser, Deck
+from paani_tools.bench.deck.crowd import crowd, watching
 from paani_tools.bench.deck.report import Crowd
 
 CLOCK = WallClock()
@@ -33,7 +33,6 @@ PHASE_S, PHASES = 0.037, 7  # so that presses fall on no clock's beat
 TURNING = 0.05  # difference of the fans' thrust that is a turn and no trim
 HEAP_PERIOD_S = 10.0
 WARM_UP = 0.2  # of the time: what a page keeps fills meanwhile
-MANY = 10
 
 
 class Boat:
@@ -78,9 +77,9 @@ def is_under_way(report: m.ThrustApplied) -> bool:
     return report.zero_cause is m.ZeroCause.NONE and (report.left != 0.0 or report.right != 0.0)
 
 
-def is_zero(report: m.ThrustApplied) -> bool:
-    """Whether none is, and none may be."""
-    return report.zero_cause is not m.ZeroCause.NONE and report.left == report.right == 0.0
+def is_stopped(report: m.ThrustApplied) -> bool:
+    """Whether none is, because of the STOP: on a busy machine thrust may end for another reason before."""
+    return report.zero_cause is m.ZeroCause.NOT_ARMED and report.left == report.right == 0.0
 
 
 def turns(side: float) -> Callable[[m.ThrustApplied], bool]:
@@ -103,7 +102,7 @@ async def time_stops(boat: Boat, deck: Deck, count: int) -> tuple[list[float], i
         await asyncio.sleep(PHASE_S * (number % PHASES))
         pressed_us = await deck.press_stop()
         try:
-            found_ms.append((await boat.until_applied(is_zero, pressed_us, ANSWER_S) - pressed_us) * 1e-3)
+            found_ms.append((await boat.until_applied(is_stopped, pressed_us, ANSWER_S) - pressed_us) * 1e-3)
         except TimeoutError:
             unanswered += 1
     return found_ms, unanswered
@@ -136,7 +135,7 @@ async def time_pictures(config: Config, deck: Deck, seconds: float) -> tuple[lis
     await deck.watch_drawn()
     await deck.take_drawn()
     stamps_us, received_ms = dict[int, int](), list[float]()
-    async with watching(config) as socket_:
+    async with watching(page_origin(config)) as socket_:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 while True:
@@ -149,29 +148,20 @@ async def time_pictures(config: Config, deck: Deck, seconds: float) -> tuple[lis
     return received_ms, [(at_us - stamps_us[seq]) * 1e-3 for seq, at_us in drawn if seq in stamps_us]
 
 
-async def measure_crowd(config: Config, boat: Boat, clients: int, seconds: float) -> Crowd:
-    """The dashboard's processor time, and the boat's decisions, with so many clients besides the pages."""
-    async with crowd(config, clients):
+async def measure_crowd(
+    config: Config, boat: Boat, deck: Deck, clients: int, seconds: float, stops: int
+) -> tuple[Crowd, list[float], int]:
+    """The dashboard's processor time and the boat's decisions with so many clients besides the page, and its STOPs.
+
+    Of those what `time_stops` returns.
+    """
+    async with crowd(page_origin(config), clients):
         await asyncio.sleep(1.0)
         before_s = await asyncio.to_thread(dashboard_cpu_s)
         decisions_hz = await boat.decisions_hz(seconds)
         used_s = await asyncio.to_thread(dashboard_cpu_s) - before_s
-    return Crowd(clients=clients, cpu_cores=used_s / seconds, decisions_hz=decisions_hz)
-
-
-@contextlib.asynccontextmanager
-async def crowd(config: Config, clients: int) -> AsyncIterator[None]:
-    """So many clients besides the page; of several, one never reads."""
-    async with contextlib.AsyncExitStack() as stack:
-        if clients > 1:
-            stack.enter_context(await asyncio.to_thread(_deaf_client, config))
-        readers = [await stack.enter_async_context(watching(config)) for _ in range(max(1, clients - 1))]
-        reading = [asyncio.create_task(_read_forever(each)) for each in readers]
-        try:
-            yield
-        finally:
-            for task in reading:
-                task.cancel()
+        stops_ms, unanswered = await time_stops(boat, deck, stops)
+    return Crowd(clients=clients, cpu_cores=used_s / seconds, decisions_hz=decisions_hz), stops_ms, unanswered
 
 
 async def watch_heap(browser: Browser, seconds: float) -> list[tuple[float, float]]:
@@ -184,32 +174,6 @@ async def watch_heap(browser: Browser, seconds: float) -> list[tuple[float, floa
         if at_s >= WARM_UP * seconds:
             found.append((at_s, await deck.heap_mib()))
         await asyncio.sleep(min(HEAP_PERIOD_S, seconds / 20))
-    return found
-
-
-@contextlib.asynccontextmanager
-async def watching(config: Config) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
-    """One more client of the page's socket."""
-    origin = page_origin(config)
-    async with aiohttp.ClientSession() as client, client.ws_connect(f"{origin}/ws", origin=origin) as found:
-        yield found
-
-
-async def _read_forever(found: aiohttp.ClientWebSocketResponse) -> None:
-    async for _ in found:
-        pass
-
-
-def _deaf_client(config: Config) -> socket.socket:
-    """Opens the page's socket and never reads."""
-    origin = page_origin(config)
-    host, port = origin.partition("//")[2].rsplit(":", 1)
-    found = socket.create_connection((host.strip("[]"), int(port)), timeout=5.0)
-    found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    found.sendall(
-        f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
-    )
     return found
 
 

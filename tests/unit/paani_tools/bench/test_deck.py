@@ -5,10 +5,21 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
+from paani import messages as m
 from paani.errors import UserError
 from paani_tools.bench.deck.command import main, silence_text
 from paani_tools.bench.deck.loads import PageLoad
-from paani_tools.bench.deck.report import Crowd, DeckReport, decision_ratio, deck_text, heap_slope, keeps_bars
+from paani_tools.bench.deck.measuring import is_stopped
+from paani_tools.bench.deck.report import (
+    Crowd,
+    DeckReport,
+    Ratio,
+    decision_ratio,
+    deck_text,
+    heap_slope,
+    keeps_bars,
+    ratio_of_medians,
+)
 from paani_tools.up.run_summary import Percentiles, percentiles
 
 FEW, MANY = (Crowd(clients=count, cpu_cores=0.03 * count, decisions_hz=5.0) for count in (1, 10))
@@ -17,6 +28,7 @@ KEPT = DeckReport(
     received_ms=percentiles([20.0, 30.0]),
     drawn_ms=percentiles([120.0, 130.0]),
     crowds=(FEW, MANY),
+    stop_ratio=Ratio(1.05, 0.9, 1.2),
     stop_ms={"on this machine": percentiles([40.0, 150.0]), "over a link of 50 ms": percentiles([150.0, 299.0])},
     stick_ms=percentiles([60.0]),
     unanswered=0,
@@ -39,6 +51,8 @@ def test_what_keeps_the_bars_keeps_them() -> None:
         replace(KEPT, unanswered=1),
         replace(KEPT, crowds=(FEW, replace(MANY, decisions_hz=4.74))),
         replace(KEPT, crowds=(FEW,)),
+        replace(KEPT, stop_ratio=Ratio(1.06, 1.0, 1.1)),
+        replace(KEPT, stop_ratio=None),
     ],
 )
 def test_each_bar_can_be_missed(missed: DeckReport) -> None:
@@ -50,6 +64,22 @@ def test_many_clients_are_compared_with_one_over_all_rounds() -> None:
     assert decision_ratio((MANY,)) is None
 
 
+def test_medians_are_compared_with_how_far_the_same_samples_spread() -> None:
+    assert ratio_of_medians([], [1.0]) is None
+    assert ratio_of_medians([1.0], []) is None
+    assert ratio_of_medians([30.0] * 9, [20.0] * 9) == Ratio(1.5, 1.5, 1.5)
+    found = ratio_of_medians([12.0, 14.0, 16.0, 18.0, 90.0] * 4, [11.0, 13.0, 15.0, 17.0, 19.0] * 4)
+    assert found is not None
+    assert found.value == 16.0 / 15.0
+    assert 0.8 < found.low < 1.0 < found.value < found.high < 1.5
+
+
+@pytest.mark.parametrize(("cause", "is_it"), [(m.ZeroCause.NOT_ARMED, True), (m.ZeroCause.TIMEOUT, False)])
+def test_a_stop_is_thrust_that_ended_because_of_it(cause: m.ZeroCause, is_it: bool) -> None:
+    report = m.ThrustApplied(source_us=1, left=0.0, right=0.0, left_n=0.0, right_n=0.0, zero_cause=cause)
+    assert is_stopped(report) is is_it
+
+
 def test_a_slope_is_that_of_the_line_through_the_samples() -> None:
     assert heap_slope([(0.0, 10.0), (1800.0, 11.0), (3600.0, 12.0)]) == pytest.approx(2.0)
     assert heap_slope([(0.0, 10.0), (1.0, 11.0)]) is None
@@ -58,8 +88,11 @@ def test_a_slope_is_that_of_the_line_through_the_samples() -> None:
 def test_every_figure_is_told_with_its_count() -> None:
     text = deck_text(KEPT)
     for words in ("390 to 410 ms (n = 2)", "40, 200 KiB", "p99 150 ms (n = 2)", "with 10 clients | 30.0 % of a core",
-                  "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after"):  # fmt: skip
+                  "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after",
+                  "many clients over one | 1.000; bar 0.95 or more: kept",
+                  "many clients over one | 1.05 (95 % of draws 0.90 to 1.20); bar 1.05 or less: kept"):  # fmt: skip
         assert words in text, words
+    assert "-; bar 1.05 or less: NOT KEPT" in deck_text(replace(KEPT, stop_ratio=None))
     assert "not measured" in deck_text(replace(KEPT, heap_slope_mib_h=None))
 
 
