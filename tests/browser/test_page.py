@@ -34,8 +34,8 @@ MAP_PIXELS = """([x, y]) => {
 REMAINING = """(() => {
   const list = document.querySelector("#arm-reasons"), lines = [...list.children].map((each) => each.textContent);
   const reasons = ["Position: no recent position", "Navigator: no recent order", "Controller: no recent thrust"];
-  return !list.hidden && lines[0] === "Armed, the boat still stands:" && reasons.every((each) => lines.includes(each)) &&
-    !lines.some((each) => each.startsWith("Operator"));
+  return !list.hidden && lines[0] === "Armed, the boat still stands:" && reasons.every((each) => lines.includes(each))
+    && !lines.some((each) => each.startsWith("Operator"));
 })()"""
 PIXEL = """([x, y]) => {
   const c = document.querySelector("#camera");
