@@ -21,12 +21,12 @@ USERS = ("operator", "dashboard", "controller", "navigator", "localization", "ob
 
 
 class ThrusterBus:
-    """`armed` None: the operator is silent. `thrust` is ordered of both sides."""
+    """`armed` None: the operator is silent. `thrust` is ordered of both sides, `turn` more of the left one."""
 
     def __init__(self, config: Config, buses: dict[str, Bus]) -> None:
         self.config, self.buses = config, buses
         self.armed: bool | None = None
-        self.thrust, self.is_pulsing = 0.2, True
+        self.thrust, self.turn, self.is_pulsing = 0.2, 0.0, True
         observer = buses["observer"]
         self.time: Latest[m.SimTime] = observer.latest(keys.SIM_TIME)
         self.applied: Latest[m.ThrustApplied] = observer.latest(keys.THRUST_APPLIED)
@@ -44,7 +44,8 @@ class ThrusterBus:
             for pulse in pulses if self.is_pulsing else ():
                 pulse.put(m.Pulse(source_us=now_us))
             echo_us = self.time.value.stamp_us if self.time.value else 0
-            thrust.put(m.Thrust(source_us=now_us, left=self.thrust, right=self.thrust, enabled=True, echo_us=echo_us))
+            left, right = self.thrust + self.turn, self.thrust - self.turn
+            thrust.put(m.Thrust(source_us=now_us, left=left, right=right, enabled=True, echo_us=echo_us))
             await asyncio.sleep(0.1)
 
     @property

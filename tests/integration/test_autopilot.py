@@ -60,10 +60,12 @@ async def test_it_drives_with_its_failsafe_set_and_stops_with_the_operator(boat:
     await boat.until_cause(m.ZeroCause.NONE)
     await until(lambda: boat.rover.sticks[-1][1:] == (200, 0))
     assert (boat.rover.mode, boat.rover.is_armed) == (0, True)
-    assert boat.rover.parameters == {
+    required = {
         "SYSID_MYGCS": 254, "RC_OVERRIDE_TIME": 0.5, "FS_THR_ENABLE": 1, "FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 2,
-        "FS_TIMEOUT": 1, "FS_ACTION": 2, "PILOT_STEER_TYPE": 3, "MOT_THR_MIN": 0,
+        "FS_TIMEOUT": 1, "FS_ACTION": 2, "PILOT_STEER_TYPE": 3, "MANUAL_STR_EXPO": 0, "MOT_SLEWRATE": 0,
+        "MOT_THR_MIN": 0,
     }  # fmt: skip
+    assert boat.rover.parameters == boat.rover.parameters | required
     boat.is_pulsing = False
     await boat.until_cause(m.ZeroCause.PULSE_LOST)
     await until(lambda: boat.rover.sticks[-1][1:] == (0, 0))

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 from paani import messages as m
 from paani.thrust_adapter import AppliedThrust
+from paani_services.thrusters.autopilot_parameters import ParameterTable
+from paani_services.thrusters.autopilot_sticks import Mixed, StickMixer, Sticks
 
 MANUAL = 0  # ArduPilot Rover's number of the mode
 ROVER_TYPES = (10, 11)  # MAV_TYPE: ground rover, surface boat
@@ -23,32 +25,9 @@ MODE_NAMES = {0: "MANUAL", 1: "ACRO", 3: "STEERING", 4: "HOLD", 5: "LOITER", 10:
 SILENT_MS = 2500.0  # two of its heartbeats, which come once a second, and half of one
 HEARTBEAT_MS, ASK_MS = 1000.0, 250.0
 PATIENCE_MS = 5000.0  # for the parameters, and for the autopilot to arm
-TOLERANCE = 1e-3
-
-
-class Requirement(NamedTuple):
-    """A parameter of the autopilot that must read `value`; of several names the autopilot knows one."""
-
-    names: tuple[str, ...]
-    value: float
-
-
-def required_parameters(own_system: int) -> tuple[Requirement, ...]:
-    """What makes the autopilot let go of the motors when this process, or its line, is gone.
-
-    And what makes it mix the sticks as `thrust_of` does: its mixer (AP_MotorsUGV) adds and subtracts the two.
-    """
-    return (
-        Requirement(("SYSID_MYGCS", "MAV_GCS_SYSID"), own_system),  # whose sticks and heartbeat count
-        Requirement(("RC_OVERRIDE_TIME",), 0.5),  # sticks not renewed for so long are let go, in seconds
-        Requirement(("FS_THR_ENABLE",), 1),  # without sticks and receiver: no thrust, and the action
-        Requirement(("FS_GCS_ENABLE",), 1),  # without our heartbeat: the action
-        Requirement(("FS_GCS_TIMEOUT",), 2),  # seconds, the least it takes
-        Requirement(("FS_TIMEOUT",), 1),  # seconds from a loss to the action, the least it takes
-        Requirement(("FS_ACTION",), 2),  # HOLD: no thrust
-        Requirement(("PILOT_STEER_TYPE",), 3),  # the sticks are ahead and starboard, and not the two sides
-        Requirement(("MOT_THR_MIN",), 0),  # nothing is added to what the thrust adapter decided
-    )
+LATE_MS = 2000.0  # parameters that are not as required by then are told
+REASON_MS = 500.0  # an autopilot first refuses and then says why, each check in a line of its own
+REASON_STARTS, MAX_REASONS = ("Arm: ", "PreArm: "), 3
 
 
 class Phase(Enum):
@@ -74,13 +53,6 @@ class Beat(NamedTuple):
     """Our own, which the autopilot's failsafe waits for."""
 
 
-class Sticks(NamedTuple):
-    """MANUAL_CONTROL: `ahead` and `starboard` from -1000 to 1000."""
-
-    ahead: int
-    starboard: int
-
-
 class Command(NamedTuple):
     """COMMAND_LONG."""
 
@@ -102,22 +74,8 @@ class WriteParameter(NamedTuple):
     value: float
 
 
+STILL = Mixed(Sticks(0, 0), 0.0, 0.0)  # while the autopilot's own rest is not known
 Order = Beat | Sticks | Command | ReadParameter | WriteParameter
-STILL = Sticks(0, 0)
-
-
-def sticks_of(left: float, right: float) -> Sticks:
-    """The sticks that the autopilot mixes to no more than this thrust of either side.
-
-    Both sides are rounded towards zero, to even thousandths, so that their mean and half their difference are whole.
-    """
-    port, starboard = 2 * math.trunc(left * 500), 2 * math.trunc(right * 500)
-    return Sticks((port + starboard) // 2, (port - starboard) // 2)
-
-
-def thrust_of(sticks: Sticks) -> tuple[float, float]:
-    """Left and right, as ArduPilot's skid steering mixes them."""
-    return (sticks.ahead + sticks.starboard) / 1000, (sticks.ahead - sticks.starboard) / 1000
 
 
 class Autopilot:
@@ -129,14 +87,16 @@ class Autopilot:
     """
 
     def __init__(self, own_system: int) -> None:
-        self._requirements = required_parameters(own_system)
-        self._read: dict[str, float] = {}
+        self._parameters = ParameterTable(own_system)
+        self._mixer: StickMixer | None = None
         self._heartbeat: Heartbeat | None = None
         self._heard_ms = self._beat_ms = self._asked_ms = self._armed_ms = -math.inf
         self._phase, self._phase_ms = Phase.IDLE, 0.0
         self._has_been_disarmed = self._has_armed = False
-        self._cause_text = self._autopilot_text = ""
-        self.sticks = STILL
+        self._refused_ms: float | None = None
+        self._reasons: list[str] = []
+        self._cause_text = ""
+        self.mixed = STILL
 
     def receive_heartbeat(self, heartbeat: Heartbeat, now_ms: float) -> None:
         """Take the newest heartbeat of the autopilot."""
@@ -145,17 +105,18 @@ class Autopilot:
     def receive_parameter(self, name: str, value: float) -> None:
         """Take a parameter that was read; one that is not asked for now counts for nothing."""
         if self._phase is Phase.CHECKING:
-            self._read[name] = value
+            self._parameters.receive(name, value)
 
     def receive_text(self, text: str) -> None:
         """Take what the autopilot says, which tells why it does not arm."""
-        if self._phase is Phase.ARMING:
-            self._autopilot_text = text
+        is_new = text.startswith(REASON_STARTS) and text not in self._reasons
+        if self._phase is Phase.ARMING and is_new and len(self._reasons) < MAX_REASONS:
+            self._reasons.append(text)
 
-    def receive_refusal(self, command: int) -> None:
+    def receive_refusal(self, command: int, now_ms: float) -> None:
         """The autopilot does not do what it was told."""
-        if self._phase is Phase.ARMING and command == ARM:
-            self._latch(f"does not arm: {self._autopilot_text or 'without a reason'}")
+        if self._phase is Phase.ARMING and command == ARM and self._refused_ms is None:
+            self._refused_ms = now_ms
 
     def lose_line(self) -> None:
         """The line to the autopilot has broken: what was under way is over."""
@@ -182,9 +143,9 @@ class Autopilot:
         asks = now_ms - self._asked_ms >= ASK_MS
         if asks:
             self._asked_ms = now_ms
-        self.sticks = STILL
-        if self._phase is Phase.DRIVING and decided.zero_cause is m.ZeroCause.NONE:
-            self.sticks = sticks_of(decided.left, decided.right)
+        self.mixed = self._mixer.still if self._mixer else STILL
+        if self._mixer and self._phase is Phase.DRIVING and decided.zero_cause is m.ZeroCause.NONE:
+            self.mixed = self._mixer.mix(decided.left, decided.right)
         heartbeat = self._heartbeat
         if not self._is_alive(now_ms):
             if self._has_armed:
@@ -192,15 +153,15 @@ class Autopilot:
         elif self._phase is Phase.CHECKING and heartbeat is not None and heartbeat.is_armed:
             orders += self._let_go(asks)  # the operator has disarmed since
         elif self._phase is Phase.CHECKING:
-            orders += [STILL, *(self._check(now_ms) if asks else ())]
+            orders += [self.mixed.sticks, *(self._check(now_ms) if asks else ())]
         elif self._phase is Phase.ARMING:
             self._has_armed = True
-            orders.append(STILL)
-            if asks:
+            orders.append(self.mixed.sticks)
+            if asks and self._refused_ms is None:
                 self._armed_ms = now_ms
                 orders.append(Command(ARM, 1.0))
         elif self._phase is Phase.DRIVING:
-            orders.append(self.sticks)
+            orders.append(self.mixed.sticks)
         elif self._has_armed and heartbeat is not None:
             if not heartbeat.is_armed:
                 self._has_armed = now_ms - self._armed_ms <= SILENT_MS  # what is under way may arm it yet
@@ -227,7 +188,8 @@ class Autopilot:
             return foreign
         if self._phase is Phase.IDLE and heartbeat.is_armed and not self._has_armed:
             return "the autopilot was armed by somebody else"
-        return self._differing() if self._phase is Phase.CHECKING else ""
+        is_late = self._phase is Phase.CHECKING and now_ms - self._phase_ms > LATE_MS
+        return self._parameters.problem() if is_late else ""
 
     def _follow_operator(self, is_armed: bool | None, now_ms: float) -> None:
         if is_armed is False:
@@ -236,8 +198,8 @@ class Autopilot:
         elif is_armed is None and self._phase not in {Phase.IDLE, Phase.LATCHED}:
             self._latch("the operator's word is not known")
         elif is_armed and self._has_been_disarmed and self._phase is Phase.IDLE:
-            self._read.clear()
-            self._autopilot_text = ""
+            self._parameters.clear()
+            self._reasons, self._refused_ms = [], None
             self._enter(Phase.CHECKING, now_ms)
 
     def _watch(self, now_ms: float) -> None:
@@ -252,44 +214,36 @@ class Autopilot:
         elif self._phase is Phase.CHECKING and heartbeat.is_armed and not self._has_armed:
             self._latch("the autopilot was armed by somebody else")
         elif self._phase is Phase.CHECKING and waited_ms > PATIENCE_MS:
-            self._latch(self._differing() or f"its mode is {_mode_name(heartbeat.mode)}, not MANUAL")
+            self._latch(self._parameters.problem() or f"its mode is {_mode_name(heartbeat.mode)}, not MANUAL")
         elif self._phase in {Phase.ARMING, Phase.DRIVING} and heartbeat.mode != MANUAL:
             self._latch(f"its mode was changed to {_mode_name(heartbeat.mode)}, not from here")
+        elif self._phase is Phase.ARMING and self._refused_ms is not None:
+            if now_ms - self._refused_ms > REASON_MS:
+                self._latch(f"does not arm: {self._reason('without a reason')}")
         elif self._phase is Phase.ARMING and heartbeat.is_armed:
             self._enter(Phase.DRIVING, now_ms)
         elif self._phase is Phase.ARMING and waited_ms > PATIENCE_MS:
-            self._latch(f"does not arm: {self._autopilot_text or 'no answer'}")
+            self._latch(f"does not arm: {self._reason('no answer')}")
         elif self._phase is Phase.DRIVING and not heartbeat.is_armed:
             self._latch("it was disarmed, not from here")
 
     def _check(self, now_ms: float) -> list[Order]:
         """Read what is not known, write what differs and read it again; then arm."""
-        heartbeat = self._heartbeat
-        orders: list[Order] = []
-        for requirement in self._requirements:
-            known = [name for name in requirement.names if name in self._read]
-            for name in known:
-                if not abs(self._read[name] - requirement.value) <= TOLERANCE:
-                    orders += [WriteParameter(name, requirement.value), ReadParameter(name)]
-            orders += [ReadParameter(name) for name in requirement.names] if not known else []
-        is_manual = heartbeat is not None and heartbeat.mode == MANUAL
-        if not orders and is_manual:
+        writes, reads = self._parameters.due()
+        orders: list[Order] = [WriteParameter(*write) for write in writes]
+        orders += map(ReadParameter, reads)
+        is_manual = self._heartbeat is not None and self._heartbeat.mode == MANUAL
+        if is_manual and not orders and not self._parameters.problem():
+            self._mixer = self._parameters.mixer()
             self._enter(Phase.ARMING, now_ms)
         return orders if is_manual else [*orders, Command(SET_MODE, 1.0, MANUAL)]
 
-    def _differing(self) -> str:
-        """The first parameter that is not known to be as required."""
-        for requirement in self._requirements:
-            name = next((name for name in requirement.names if name in self._read), requirement.names[0])
-            value = self._read.get(name)
-            if value is None or not abs(value - requirement.value) <= TOLERANCE:
-                read = "is not answered" if value is None else f"reads {value:g}"
-                return f"parameter {name} {read}, expected {requirement.value:g}"
-        return ""
+    def _reason(self, otherwise: str) -> str:
+        return "; ".join(self._reasons) or otherwise
 
     def _let_go(self, asks: bool) -> list[Order]:
         """No thrust, and disarmed: whether or not it is heard."""
-        return [STILL, *([Command(ARM, 0.0)] if asks else ())]
+        return [self.mixed.sticks, *([Command(ARM, 0.0)] if asks else ())]
 
     def _is_alive(self, now_ms: float) -> bool:
         return now_ms - self._heard_ms <= SILENT_MS

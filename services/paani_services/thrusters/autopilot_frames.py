@@ -13,9 +13,9 @@ from paani_services.thrusters.autopilot import (
     Heartbeat,
     Order,
     ReadParameter,
-    Sticks,
     WriteParameter,
 )
+from paani_services.thrusters.autopilot_sticks import Sticks
 
 AUTOPILOT_COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
 OWN_COMPONENT = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
@@ -89,7 +89,7 @@ def _pass_on(message: Any, kind: str, autopilot: Autopilot, now_ms: float) -> No
         case "PARAM_VALUE":
             autopilot.receive_parameter(message.param_id.rstrip("\0"), message.param_value)
         case "COMMAND_ACK" if message.result not in DONE:
-            autopilot.receive_refusal(message.command)
+            autopilot.receive_refusal(message.command, now_ms)
         case "STATUSTEXT":
             autopilot.receive_text(message.text.rstrip("\0"))
         case _:

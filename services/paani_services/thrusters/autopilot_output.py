@@ -12,7 +12,7 @@ from paani.config import AutopilotConfig
 from paani.extras import require_modules
 from paani.serial_port import Port, PortError, open_port
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
-from paani_services.thrusters.autopilot import Autopilot, thrust_of
+from paani_services.thrusters.autopilot import Autopilot
 from paani_services.thrusters.output import zero
 
 LOG = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class AutopilotOutput:
 
     def state(self, cause: m.ZeroCause, now_us: int, now_ms: float) -> m.ThrustersState:
         """The line, what was sent, and the problem."""
-        left, right = thrust_of(self._autopilot.sticks)
+        mixed = self._autopilot.mixed
         problem = self._port_problem if self._port is None else self._autopilot.problem(now_ms)
         line = self._settings.line
         return m.ThrustersState(
@@ -91,8 +91,8 @@ class AutopilotOutput:
             zero_cause=cause,
             problem=(f"{line}: {problem}" if problem and line not in problem else problem)[:MAX_TEXT],
             armed=self._autopilot.is_driving,
-            left=left,
-            right=right,
+            left=mixed.left,
+            right=mixed.right,
             sent=self._sent,
             connections=self._connections,
             answer_age_ms=self._autopilot.silence_ms(now_ms),
