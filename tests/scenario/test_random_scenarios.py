@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_sim.worlds import WORLDS, Scenario, actor_pose_at, load_world
+from paani_sim.worlds import FIXED_WORLDS, WORLDS, Scenario, actor_pose_at, load_world
 from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.passability import HEADROOM_M, footprint_distance_m
 from paani_sim.worlds.spec import build_spec
@@ -45,6 +45,8 @@ def _plain(value: object) -> object:
 
 def test_seeds_use_all_of_the_route(scenarios: tuple[Scenario, ...]) -> None:
     name = scenarios[0].world.name
+    if name not in FIXED_WORLDS:
+        pytest.skip("another layout for every seed: test_waterway.py has it")
     starts_m = np.array([s.world.start[:2] for s in scenarios])
     assert np.ptp(starts_m, axis=0).max() > 0.5 * np.ptp(load_world(name).route_m, axis=0).max()
 

@@ -6,6 +6,7 @@ from paani_sim.eye.barges import barge, narrowboat, tug, workboat
 from paani_sim.eye.hull import DARK, HULLS, TIMBER, WHITE, hull
 from paani_sim.eye.mesh import GLASS, WOOD, Mesh, Rgb, box, ellipsoid, loft, merge, placed, rod
 from paani_sim.eye.people import person
+from paani_sim.eye.pleasure_craft import eight, ferry, jetski, paddleboard
 
 
 def boat(look: str, length_m: float, width_m: float, height_m: float, variant: int) -> list[Mesh]:
@@ -21,11 +22,15 @@ def boat(look: str, length_m: float, width_m: float, height_m: float, variant: i
         "pontoonboat": _pontoonboat,
         "narrowboat": narrowboat,
         "tug": tug,
+        "eight": eight,
+        "paddleboard": paddleboard,
+        "jetski": jetski,
+        "ferry": ferry,
     }[look]
     return build(length_m, width_m, height_m, HULLS[variant % len(HULLS)], variant)
 
 
-BOAT_LOOKS = (
+BOAT_LOOKS = (  # of the boats in labelled pictures: the same arguments give the same pictures
     "rowboat",
     "dinghy",
     "kayak",

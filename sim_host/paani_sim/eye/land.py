@@ -10,6 +10,7 @@ from paani.arrays import F64
 from paani_sim.eye import sprites
 from paani_sim.eye.buildings import house
 from paani_sim.eye.mesh import LAND, Mesh, grid_triangles, loft, merge, placed
+from paani_sim.eye.nature import island_height_m
 from paani_sim.eye.quay import PAVED_M, QUAY_TOP_M, furniture, quay
 from paani_sim.eye.structures import bridge_reach_m
 from paani_sim.worlds.curves import clearance_m, normals_left, resample_closed
@@ -43,7 +44,7 @@ def make_land(world: World) -> Land:
         details=furniture(world, edge_rng) if quayed else (),
         ground=merge(edge, *_far_ground(world, field), _hills(world, field)),
         houses=_houses(world, field, rng),
-        plants=_plants(world, field, rng),
+        plants=np.concatenate([_plants(world, field, rng), _island_plants(world)]),
     )
 
 
@@ -236,6 +237,34 @@ def _plants(world: World, field: _NoiseField, rng: np.random.Generator) -> npt.N
         rows.append(np.column_stack([xy, z, width, height, layer, shade]))
     found = np.concatenate(rows).astype(np.float32)
     return found[~_is_on_bridge(world, found[:, :2])]
+
+
+def _island_plants(world: World) -> npt.NDArray[np.float32]:
+    """Reeds round the edge of each island, bushes and a few trees on it."""
+    rows = [np.zeros((0, 7))]
+    for number, thing in enumerate(o for o in world.obstacles if o.look == "island"):
+        rng = np.random.default_rng([world.seed, 6, number])
+        per_m = 0.1 * (thing.length_m + thing.width_m)
+        for kind, share in _ISLAND_PLANTS:
+            count = round(kind.plants * per_m)
+            turn, out = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(*share, count)
+            own = np.column_stack([np.cos(turn), np.sin(turn)]) * out[:, None]
+            own *= [0.5 * thing.length_m, 0.5 * thing.width_m]
+            cos, sin = np.cos(thing.pose.yaw_rad), np.sin(thing.pose.yaw_rad)
+            xy = own @ np.array([[cos, sin], [-sin, cos]]) + np.array(thing.pose[:2])
+            width, height = rng.uniform(*kind.width_m, count), rng.uniform(*kind.height_m, count)
+            z = [island_height_m(thing.length_m, thing.width_m, *at) for at in own.tolist()] - 0.03 * height
+            layer = rng.choice(np.asarray(kind.layers), count)
+            rows.append(np.column_stack([xy, z, width, height, layer, rng.uniform(0.8, 1.15, count)]))
+    return np.concatenate(rows).astype(np.float32)
+
+
+# Of a small island: how many for each 10 m of its length and width together, and how far out they stand.
+_ISLAND_PLANTS = (
+    (_PlantKind(sprites.REED, 26, (0.0, 0.0), 0.0, 0.0, (0.7, 1.4), (0.5, 1.1), 0.0), (0.84, 0.97)),
+    (_PlantKind(sprites.BUSH, 9, (0.0, 0.0), 0.0, 0.0, (1.6, 3.0), (1.2, 2.6), 0.0), (0.0, 0.72)),
+    (_PlantKind(sprites.BROADLEAF, 2, (0.0, 0.0), 0.0, 0.0, (4.0, 6.5), (5.0, 9.0), 0.0), (0.0, 0.4)),
+)
 
 
 def _is_on_bridge(world: World, xy_m: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:

@@ -1,6 +1,6 @@
 """A world as vertex rows: fixed things, moving things, plants, and the numbers of the label picture."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,9 @@ from paani_sim.eye.boats import boat
 from paani_sim.eye.buildings import crane, warehouse
 from paani_sim.eye.land import make_land
 from paani_sim.eye.mesh import Mesh, placed
+from paani_sim.eye.nature import dog, duck, island, log, swan
 from paani_sim.eye.people import person
+from paani_sim.eye.river_works import bridge_pier, weir
 from paani_sim.eye.structures import bridge, buoy, pier
 from paani_sim.eye.wave_motion import is_floating
 from paani_sim.worlds.world import Actor, Kind, Obstacle, World
@@ -19,6 +21,17 @@ from paani_sim.worlds.world import Actor, Kind, Obstacle, World
 SKY, WATER, LAND, FIRST_THING = 0, 1, 2, 3
 ROW_WIDTHS = (3, 3, 4, 1)
 PLANT_WIDTHS = (3, 4, 2)
+_OTHERS: dict[str, Callable[[float, float, float, int], Mesh]] = {
+    "crane": crane,
+    "warehouse": warehouse,
+    "island": island,
+    "weir": weir,
+    "bridge_pier": bridge_pier,
+    "log": log,
+    "dog": dog,
+    "swan": swan,
+    "duck": duck,
+}
 
 
 class Thing(NamedTuple):
@@ -140,10 +153,8 @@ def _build(thing: Obstacle | Actor) -> list[Mesh]:
         return [pier(thing.look, *size, thing.variant)]
     if thing.kind is Kind.PERSON:
         return [person(thing.look, thing.height_m, thing.variant)]
-    if thing.look == "crane":
-        return [crane(*size, thing.variant)]
-    if thing.look == "warehouse":
-        return [warehouse(*size, thing.variant)]
+    if thing.look in _OTHERS:
+        return [_OTHERS[thing.look](*size, thing.variant)]
     base_z_m = thing.base_z_m if isinstance(thing, Obstacle) else 0.0
     return [bridge(thing.length_m, thing.width_m, base_z_m, thing.height_m)]
 

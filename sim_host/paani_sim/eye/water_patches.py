@@ -13,6 +13,7 @@ import numpy.typing as npt
 from paani.arrays import F32, F64
 from paani_sim.eye.wave_motion import is_floating
 from paani_sim.water.waves import GRAVITY_MPS2
+from paani_sim.worlds.sizes import hull_beam_m
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2
 
 PATCH_WIDTHS = (3, 2, 4, 2)
@@ -23,6 +24,7 @@ MIN_SPEED_MPS = 0.2
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 QUAD = np.array([0, 1, 2, 0, 2, 3], np.uint32)
 SHADOW, WAKE = 0.0, 1.0
+SHADOWLESS = frozenset({"bridge", "bridge_pier", "island", "weir"})  # an oval on the water would not be theirs
 
 
 def shadow_cast_per_m(sun_direction: F32) -> F64:
@@ -56,7 +58,7 @@ def standing_shadows(obstacles: Iterable[Obstacle], cast: F64) -> F64:
     """Shadows `(4 n, COLUMNS)` of people and buildings on the ground or deck under them."""
     rows = [np.zeros((0, COLUMNS))]
     for o in obstacles:
-        if is_floating(o) or o.look == "bridge":
+        if is_floating(o) or o.look in SHADOWLESS:
             continue
         if o.kind is Kind.PERSON:
             rows.append(shadow(o.pose, o.base_z_m + 0.03, (0.5, 0.42, 0.8 * o.height_m), 0.75, cast))
@@ -82,7 +84,7 @@ def patch_order(rows: int) -> npt.NDArray[np.uint32]:
 def floating_shadow(thing: Obstacle | Actor, pose: Pose2, cast: F64) -> F64:
     """On the water, round the waterline."""
     tall = 0.7 * min(thing.height_m, 0.4 * thing.length_m + 0.4)
-    return shadow(pose, 0.0, (thing.length_m, thing.width_m, tall), 0.8, cast)
+    return shadow(pose, 0.0, (thing.length_m, hull_beam_m(thing), tall), 0.8, cast)
 
 
 def wake(actor: Actor, along_m: float) -> F64:
@@ -96,9 +98,10 @@ def wake(actor: Actor, along_m: float) -> F64:
     way /= np.maximum(np.hypot(way[:, :1], way[:, 1:]), 1e-9)
     way = -way  # the line runs backwards
     left = np.column_stack([-way[:, 1], way[:, 0]])
-    reach = 0.5 * actor.width_m + 0.8 + KELVIN * 1.35 * behind
+    beam_m = hull_beam_m(actor)
+    reach = 0.5 * beam_m + 0.8 + KELVIN * 1.35 * behind
     wave_radpm = min(GRAVITY_MPS2 / actor.speed_mps**2, 14.0)
-    steep = 0.14 * min(1.5, actor.speed_mps) * min(1.0, actor.width_m / 1.5)
+    steep = 0.14 * min(1.5, actor.speed_mps) * min(1.0, beam_m / 1.5)
     edge = {side: line + side * reach[:, None] * left for side in (1.0, -1.0)}
     rows = np.zeros((TRAIL_STEPS, 4, COLUMNS))
     for corner, (step, side) in enumerate(((0, -1.0), (0, 1.0), (1, 1.0), (1, -1.0))):
@@ -107,7 +110,7 @@ def wake(actor: Actor, along_m: float) -> F64:
         rows[:, corner, 3] = behind[pick]
         rows[:, corner, 4] = side * reach[pick]
         rows[:, corner, 9:] = way[pick]
-    rows[..., 5:9] = (wave_radpm, steep, 0.5 * actor.width_m, WAKE)
+    rows[..., 5:9] = (wave_radpm, steep, 0.5 * beam_m, WAKE)
     straight = np.minimum.accumulate(np.clip(2.0 * way @ way[0] - 1.0, 0.0, 1.0))  # round a bend the strip would fold
     rows[..., 6] *= np.column_stack([straight[:-1], straight[:-1], straight[1:], straight[1:]])
     return rows[straight[:-1] > 0.0].reshape(-1, COLUMNS)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paani_sim.water.waves import GRAVITY_MPS2, peak_omega_radps, significant_height_m
+from paani_sim.worlds.sizes import is_afloat_by_nature
 from paani_sim.worlds.world import Actor, Kind, Obstacle, Pose2, Waves, Wind
 
 MIN_SPEED_MPS = 0.3  # of a wind that moves the water at all
@@ -46,8 +47,7 @@ def is_floating(thing: Obstacle | Actor) -> bool:
     """Whether a thing moves with the water."""
     return (
         isinstance(thing, Actor)
-        or thing.kind in {Kind.VESSEL, Kind.BUOY}
-        or thing.look == "swimming"
+        or is_afloat_by_nature(thing)
         or (thing.kind is Kind.PIER and thing.look in FLOATING_PIERS)
     )
 

@@ -15,6 +15,7 @@ DECELERATION_MPS2 = 0.15  # of a small craft that throttles back
 # An actor that has stopped for the boat this long moves away for a while: astern, or ahead if the boat is abaft.
 PATIENCE_S, YIELDING_MPS, YIELDING_S = 8.0, 0.4, 30.0
 STANDING_MPS = 0.05
+FLIGHT_M, FLIGHT_MPS = 4.0, 1.2  # how near a boat may come to what flees, hull to middle, and how it hurries away
 
 
 class ActorPath:
@@ -52,11 +53,15 @@ def yielding_speed_mps(actor: Actor, pose: Pose2, boat_xy_m: tuple[float, float]
 
     One that gives way slows so that it could stop short of a boat ahead, `VESSEL_KEEPS_CLEAR_M` or, who swims,
     `SWIMMER_KEEPS_CLEAR_M`, and goes on when that is clear; with the boat close alongside it stands still and lets it
-    draw ahead.
+    draw ahead. One that flees hurries away from a boat within `FLIGHT_M`, forward where that is abaft.
     """
-    if actor.behaviour is not Behaviour.GIVES_WAY:
+    if actor.behaviour is Behaviour.HOLDS_ON:
         return actor.speed_mps
     ahead_m, aside_m = locate_boat_m(pose, boat_xy_m)
+    if actor.behaviour is Behaviour.FLEES:
+        if math.hypot(ahead_m, aside_m) - boat_reach_m > FLIGHT_M:
+            return actor.speed_mps
+        return -FLIGHT_MPS if ahead_m > 0.0 else FLIGHT_MPS
     if (
         ahead_m <= -0.5 * actor.length_m - boat_reach_m
         or aside_m > 0.5 * actor.width_m + boat_reach_m + ABREAST_MARGIN_M
@@ -95,7 +100,8 @@ class Actors:
             speed = 0.0
             if t_s > actor.start_s:
                 speed = yielding_speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
-                speed = self._apply_patience(number, speed, pose, boat_xy_m)
+                if actor.behaviour is Behaviour.GIVES_WAY:
+                    speed = self._apply_patience(number, speed, pose, boat_xy_m)
             holds_on = actor.behaviour is Behaviour.HOLDS_ON
             along.append(actor_distance_along_m(actor, t_s) if holds_on else along_m + speed * self._every_s)
             speeds.append(speed)

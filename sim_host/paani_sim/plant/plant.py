@@ -25,7 +25,8 @@ from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.water.surroundings import CALM, Surroundings
 from paani_sim.water.wakes import WakeSource
 from paani_sim.water.water import Water
-from paani_sim.worlds import Fault, Kind, Scenario, World
+from paani_sim.worlds import Fault, Scenario, World
+from paani_sim.worlds.sizes import makes_waves
 from paani_sim.worlds.spec import build_spec
 
 COLLISION_GAP_S = 1.0  # a new contact within this time belongs to the same collision
@@ -83,7 +84,7 @@ class Plant:
         self._actors = Actors(world.actors, ACTORS_EVERY_S, 0.5 * hull.length_m)
         self._actors_every = max(1, round(ACTORS_EVERY_S / config.step_s))
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
-        self._vessels = [index for index, actor in enumerate(world.actors) if actor.kind is Kind.VESSEL]
+        self._vessels = [index for index, actor in enumerate(world.actors) if makes_waves(actor)]
 
         biases, gps, imu, water = np.random.SeedSequence(seed).spawn(4)
         self._gps_rng, self._imu_rng = np.random.default_rng(gps), np.random.default_rng(imu)

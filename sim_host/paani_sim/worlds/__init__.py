@@ -9,6 +9,7 @@ from paani_sim.worlds.harbour import build_harbour
 from paani_sim.worlds.lake import build_lake
 from paani_sim.worlds.river import build_river
 from paani_sim.worlds.scenario import Scenario, Task
+from paani_sim.worlds.waterway import build_waterway
 from paani_sim.worlds.world import (
     Actor,
     Bank,
@@ -26,11 +27,13 @@ from paani_sim.worlds.world import (
     actor_pose_at,
 )
 
+FIXED_WORLDS = ("lake", "river", "canal", "harbour")  # a seed draws weather and encounters there, not the layout
 WORLDS: dict[str, Callable[[], World]] = {
     "lake": build_lake,
     "river": build_river,
     "canal": build_canal,
     "harbour": build_harbour,
+    "waterway": build_waterway,
 }
 
 
@@ -42,6 +45,7 @@ def load_world(name: str) -> World:
 
 
 __all__ = [
+    "FIXED_WORLDS",
     "WORLDS",
     "Actor",
     "Bank",

@@ -3,19 +3,23 @@
 import argparse
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
+import numpy as np
 from tqdm import tqdm
 
+from paani.arrays import U8
 from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
 from paani.option_numbers import whole_number
 from paani.option_paths import output_file, output_folder
 from paani.whole_file import write_whole
-from paani_sim.worlds import WORLDS
+from paani_sim.worlds import FIXED_WORLDS, WORLDS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 from paani_sim.worlds.scenario import Scenario
+from paani_sim.worlds.waterway import SHOWN_SEED
 
 VIEW_PX = (480, 360)
 MAX_VIEW_PX = 2048
@@ -61,15 +65,32 @@ def _check(options: argparse.Namespace) -> int:
 def _render(options: argparse.Namespace) -> int:
     from paani_sim.worlds.scenario_sheet import VIEWS, render_sheet  # noqa: PLC0415  the rest needs no OpenGL
 
-    out: Path = options.out
+    _check_is_png(options.out)
+    return _write_sheet(options, render_sheet(load_scenario(options.scenario), *options.size), VIEWS, options.scenario)
+
+
+def _catalogue(options: argparse.Namespace) -> int:
+    from paani_sim.worlds.catalogue_sheet import count_views, render_catalogue  # noqa: PLC0415
+
+    _check_is_png(options.out)
+    width_px, height_px = options.size
+    pictures = render_catalogue(width_px, height_px, options.seed)
+    return _write_sheet(options, pictures, count_views(), "catalogue")
+
+
+def _check_is_png(out: Path) -> None:
     if out.suffix.lower() != ".png":
         raise UserError(f"--out {out}: must end in .png")
+
+
+def _write_sheet(options: argparse.Namespace, pictures: Iterator[U8 | None], views: int, name: str) -> int:
+    """The last of the pictures, after a None for each view."""
     picture = None
-    with tqdm(total=VIEWS, unit="view", desc=str(options.scenario), disable=None) as progress:
-        for picture in render_sheet(load_scenario(options.scenario), *options.size):
+    with tqdm(total=views, unit="view", desc=name, disable=None) as progress:
+        for picture in pictures:
             progress.update(picture is None)
-    _, data = cv2.imencode(".png", picture)
-    write_whole(out, data.tobytes(), "--out")
+    _, data = cv2.imencode(".png", np.asarray(picture))
+    write_whole(options.out, data.tobytes(), "--out")
     return 0
 
 
@@ -110,6 +131,11 @@ def _parser() -> argparse.ArgumentParser:
     listed.set_defaults(run=_list)
     render = commands.add_parser("render", help="a sheet: the plan, and what the camera sees along the route")
     render.add_argument("--size", type=size, default=VIEW_PX, metavar="WIDTHxHEIGHT", help="of a view (480x360)")
+    catalogue = commands.add_parser("catalogue", help="a sheet: who moves on a waterway, what it is made of, its light")
+    catalogue.add_argument("--size", type=size, default=VIEW_PX, metavar="WIDTHxHEIGHT", help="of a view (480x360)")
+    catalogue.add_argument("--seed", type=whole_number(0), default=SHOWN_SEED, help="of the waterway that is shown")
+    catalogue.add_argument("--out", type=output_file("--out"), required=True, metavar="FILE")
+    catalogue.set_defaults(run=_catalogue)
     check = commands.add_parser("check", help="whether scenario files are sound")
     check.add_argument("files", nargs="+", metavar="FILE")
     check.set_defaults(run=_check)
@@ -122,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     dataset.add_argument("--n", type=whole_number(1, 1_000_000), required=True, help="how many pictures")
     dataset.add_argument("--seed", type=whole_number(0), default=0)
     dataset.add_argument("--out", type=output_folder("--out"), required=True, metavar="DIR")
-    dataset.add_argument("--worlds", nargs="+", default=list(WORLDS), metavar="WORLD")
+    dataset.add_argument("--worlds", nargs="+", default=list(FIXED_WORLDS), metavar="WORLD")
     add_cluster_argument(dataset)
     dataset.set_defaults(run=_dataset)
     return parser

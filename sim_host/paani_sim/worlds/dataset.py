@@ -24,7 +24,7 @@ from paani_sim.eye.labels import CLASSES, Labelled, select_visible_boxes
 from paani_sim.eye.renderer import Eye
 from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.sky import SKIES
-from paani_sim.worlds import WORLDS, load_world
+from paani_sim.worlds import FIXED_WORLDS, load_world
 from paani_sim.worlds.world import Light, Wind, World
 
 PICTURES_PER_SESSION = 24
@@ -88,7 +88,7 @@ def write_dataset(
     out: Path,
     n: int,
     seed: int = 0,
-    worlds: Sequence[str] = tuple(WORLDS),
+    worlds: Sequence[str] = FIXED_WORLDS,
     *,
     width_px: int = 320,
     height_px: int = 240,

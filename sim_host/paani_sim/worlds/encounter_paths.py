@@ -19,6 +19,7 @@ NOMINAL_BOAT_MPS = 0.6
 MAX_LEAD_M = 60.0  # longest stretch of a path before the meeting
 OVERRUN_M = 25.0  # of a path, past the boat's start or the route's end
 PATH_MARGIN_M = 0.4
+TRIM_STEP_M = 1.0
 
 
 class Encounter(StrEnum):
@@ -110,6 +111,32 @@ def is_path_clear(world: World, actor: Actor) -> bool:
     return bool(
         (clearance_m(world.shore_m, points_m) > half_m).all()
         and (obstacle_distance_m(world.obstacles, points_m) > half_m).all()
+    )
+
+
+def trim_to_clear(
+    world: World, timed_path: TimedPath, speed_mps: float, meets_at_m: float, width_m: float
+) -> TimedPath | None:
+    """The part of a path around the meeting that keeps off banks and obstacles; None where it does not there.
+
+    Who would come from before it waits at its beginning, to be at the meeting at the same time as without this.
+    """
+    path_m, half_m = timed_path.path_m, 0.5 * width_m + PATH_MARGIN_M
+    arc_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path_m, axis=0).T))])
+    fine_m = np.arange(0.0, float(arc_m[-1]), TRIM_STEP_M)
+    points_m = np.column_stack([np.interp(fine_m, arc_m, path_m[:, k]) for k in (0, 1)])
+    free = (clearance_m(world.shore_m, points_m) > half_m) & (obstacle_distance_m(world.obstacles, points_m) > half_m)
+    meeting_m = timed_path.start_m + speed_mps * (meets_at_m / NOMINAL_BOAT_MPS - timed_path.start_s)
+    middle = min(int(meeting_m / TRIM_STEP_M), len(free) - 1)
+    blocked = np.flatnonzero(~free)
+    first, last = blocked[blocked < middle].max(initial=-1) + 1, blocked[blocked > middle].min(initial=len(free)) - 1
+    if not free[middle] or last - first < 2:
+        return None
+    late_m = max(0.0, float(fine_m[first]) - timed_path.start_m)
+    return TimedPath(
+        points_m[first : last + 1],
+        max(0.0, timed_path.start_m - float(fine_m[first])),
+        timed_path.start_s + late_m / speed_mps,
     )
 
 

@@ -37,7 +37,12 @@ BOWS = {
     "barge": BowShape(0.38, 0.74, 0.79, 0.02),
     "narrowboat": BowShape(0.58, 0.82, 0.68, 0.02),
     "tug": BowShape(0.26, 0.40, 0.95, 0.43),
+    "paddleboard": BowShape(0.30, 0.74, 0.78, 0.20),
+    "jetski": BowShape(0.10, 0.62, 0.80, 0.10),
+    "ferry": BowShape(0.56, 0.82, 0.80, 0.20),
 }
+# What narrows at both ends: full to the first share of the half length, the second of the half width at the tips.
+TAPERED = {"eight": (0.64, 0.06), "bridge_pier": (0.74, 0.10), "island": (0.48, 0.40)}
 
 
 def is_round(thing: Obstacle | Actor) -> bool:
@@ -47,8 +52,19 @@ def is_round(thing: Obstacle | Actor) -> bool:
 
 def build_outline(thing: Obstacle | Actor) -> F64:
     """Its outline about its own middle, bow along x, `(8, 2)`, convex and counter-clockwise."""
-    unit = _ROUND if is_round(thing) else _build_pointed_outline(BOWS[thing.look]) if thing.look in BOWS else _BOX
+    unit = _BOX
+    if is_round(thing):
+        unit = _ROUND
+    elif thing.look in BOWS:
+        unit = _build_pointed_outline(BOWS[thing.look])
+    elif thing.look in TAPERED:
+        unit = _build_tapered_outline(*TAPERED[thing.look])
     return unit * [0.5 * thing.length_m, 0.5 * thing.width_m]
+
+
+def is_shaped(thing: Obstacle | Actor) -> bool:
+    """Whether its outline is neither a circle nor a rectangle."""
+    return not is_round(thing) and (thing.look in BOWS or thing.look in TAPERED)
 
 
 def place_outline(shape_m: F64, pose: Pose2) -> F64:
@@ -61,3 +77,19 @@ def place_outline(shape_m: F64, pose: Pose2) -> F64:
 def _build_pointed_outline(bow: BowShape) -> F64:
     port = np.array([[1.0, bow.tip_y], [bow.at_x, bow.at_y], [bow.from_x, 1.0], [-1.0, 1.0]])
     return np.vstack([port, port[::-1] * [1.0, -1.0]])
+
+
+def _build_tapered_outline(full_to: float, tip_y: float) -> F64:
+    port = np.array([[1.0, tip_y], [full_to, 1.0], [-full_to, 1.0], [-1.0, tip_y]])
+    return np.vstack([port, port[::-1] * [1.0, -1.0]])
+
+
+def is_apart(one: F64, other: F64, room_m: float) -> bool:
+    """Whether an edge of one of two convex outlines separates them by more than this."""
+    for edges in (one, other):
+        leg = np.roll(edges, -1, axis=0) - edges
+        outward = np.column_stack([leg[:, 1], -leg[:, 0]]) / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
+        far, own = (other if edges is one else one) @ outward.T, edges @ outward.T
+        if (far.min(axis=0) - own.max(axis=0) > room_m).any():
+            return True
+    return False

@@ -1,19 +1,21 @@
-"""Scenarios drawn at random: a stretch of a world's route, one to four things to meet on it, light and weather."""
+"""Scenarios drawn at random: a stretch of a world's route, one to four encounters on it, light and weather."""
 
 import dataclasses
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from paani.arrays import F64
-from paani_sim.worlds import encounter_paths, load_world
+from paani_sim.worlds import encounter_paths, load_world, traffic
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS, TimedPath
+from paani_sim.worlds.meeting_place import MeetingPlace, build_actor
 from paani_sim.worlds.passability import PassabilityGrid, obstacle_distance_m
 from paani_sim.worlds.route_frame import RouteFrame, cut_route
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.sizes import SIZES
+from paani_sim.worlds.waterway import WATERWAY, build_waterway
 from paani_sim.worlds.world import (
     Actor,
     Behaviour,
@@ -41,18 +43,8 @@ MOORED = ("rowboat", "dinghy", "cruiser", "workboat", "sailboat", "barge")
 UNDER_WAY = ("dinghy", "kayak", "cruiser", "workboat")
 ADRIFT = ("rowboat", "dinghy", "kayak")
 
-DrawThing = Callable[["_MeetingPlace", np.random.Generator], Obstacle | Actor | None]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _MeetingPlace:
-    """Where along the route a thing is met, and its id."""
-
-    world: World
-    route: RouteFrame
-    length_m: float
-    at_m: float
-    id: str
+DrawThing = Callable[[MeetingPlace, np.random.Generator], Obstacle | Actor | None]
+DrawEncounter = Callable[[MeetingPlace, np.random.Generator], Sequence[Obstacle | Actor]]
 
 
 def draw_random_scenario(kind: str, seed: int) -> Scenario:
@@ -61,9 +53,15 @@ def draw_random_scenario(kind: str, seed: int) -> Scenario:
     The boat follows an open stretch of the world's route. Whatever is met, a gap of 3 m leads on at any time.
     """
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
-    world = dataclasses.replace(_draw_weather(load_world(kind), rng), actors=())
+    world: World
+    draw: DrawEncounter
+    if kind == WATERWAY:
+        world, draw = build_waterway(seed), traffic.draw_encounter
+    else:
+        world, draw = _draw_weather(load_world(kind), rng), _draw_encounter
+    world = dataclasses.replace(world, actors=())
     while True:
-        found = _draw_route_with_encounters(world, rng)
+        found = _draw_route_with_encounters(world, draw, rng)
         if found is not None:
             break
     length_m = found.route_length_m
@@ -75,7 +73,7 @@ def draw_random_scenario(kind: str, seed: int) -> Scenario:
     )
 
 
-def _draw_route_with_encounters(world: World, rng: np.random.Generator) -> World | None:
+def _draw_route_with_encounters(world: World, draw: DrawEncounter, rng: np.random.Generator) -> World | None:
     """A stretch somewhere along the route with at least one encounter, or None where it does not work out."""
     from_m, length_m = rng.uniform(0.0, world.route_length_m), rng.uniform(*ROUTE_LENGTH_RANGE_M)
     route = RouteFrame(world.route_m, closed=world.route_closed, first_m=from_m)
@@ -92,13 +90,11 @@ def _draw_route_with_encounters(world: World, rng: np.random.Generator) -> World
         at_m = float(rng.uniform(10.0, length_m - GOAL_CLEARANCE_M))
         if any(abs(at_m - other_m) < ENCOUNTER_SPACING_M for other_m in meetings_m):
             continue
-        draw = _KINDS[int(rng.choice(len(_KINDS), p=_PROBABILITIES))]
-        thing = draw(_MeetingPlace(section, route, length_m, at_m, f"met_{number}"), rng)
-        if thing is None:
-            continue
-        candidate = _add_thing(section, thing)
+        things = draw(MeetingPlace(section, route, length_m, at_m, f"met_{number}"), rng)
+        candidate = _add_things(section, things)
         if (
-            _is_clear_of_start(section, thing)
+            things
+            and all(_is_clear_of_start(section, thing) for thing in things)
             and all(encounter_paths.is_path_clear(candidate, actor) for actor in section.actors)
             and lattice.is_passable(candidate.obstacles, candidate.actors, MIN_PASSAGE_M, NOMINAL_BOAT_MPS)
         ):
@@ -109,10 +105,16 @@ def _draw_route_with_encounters(world: World, rng: np.random.Generator) -> World
     return section if meetings_m else None
 
 
-def _add_thing(world: World, thing: Obstacle | Actor) -> World:
-    if isinstance(thing, Obstacle):
-        return dataclasses.replace(world, obstacles=(*world.obstacles, thing))
-    return dataclasses.replace(world, actors=(*world.actors, thing))
+def _draw_encounter(place: MeetingPlace, rng: np.random.Generator) -> Sequence[Obstacle | Actor]:
+    """One of the things of the worlds whose layout is fixed; none where it does not work out."""
+    thing = _KINDS[int(rng.choice(len(_KINDS), p=_PROBABILITIES))](place, rng)
+    return () if thing is None else (thing,)
+
+
+def _add_things(world: World, things: Sequence[Obstacle | Actor]) -> World:
+    still = tuple(thing for thing in things if isinstance(thing, Obstacle))
+    moving = tuple(thing for thing in things if isinstance(thing, Actor))
+    return dataclasses.replace(world, obstacles=(*world.obstacles, *still), actors=(*world.actors, *moving))
 
 
 def _is_clear_of_start(world: World, thing: Obstacle | Actor) -> bool:
@@ -121,11 +123,11 @@ def _is_clear_of_start(world: World, thing: Obstacle | Actor) -> bool:
     return gap_m - 0.5 * thing.length_m > END_CLEARANCE_M
 
 
-def _draw_buoy(place: _MeetingPlace, rng: np.random.Generator) -> Obstacle | None:
+def _draw_buoy(place: MeetingPlace, rng: np.random.Generator) -> Obstacle | None:
     return _place_obstacle(place, str(rng.choice(BUOYS)), place.route.pose_at(place.at_m, rng.uniform(-1.2, 1.2)), rng)
 
 
-def _draw_moored(place: _MeetingPlace, rng: np.random.Generator) -> Obstacle | None:
+def _draw_moored(place: MeetingPlace, rng: np.random.Generator) -> Obstacle | None:
     """Beside the lane with its near side in it, or almost."""
     look = str(rng.choice(MOORED))
     side = float(rng.choice([-1.0, 1.0]))
@@ -134,7 +136,7 @@ def _draw_moored(place: _MeetingPlace, rng: np.random.Generator) -> Obstacle | N
     return _place_obstacle(place, look, place.route.pose_at(place.at_m, left_m, turn_rad), rng)
 
 
-def _place_obstacle(place: _MeetingPlace, look: str, pose: Pose2, rng: np.random.Generator) -> Obstacle | None:
+def _place_obstacle(place: MeetingPlace, look: str, pose: Pose2, rng: np.random.Generator) -> Obstacle | None:
     """None where it would touch the bank or something else."""
     size = SIZES[look]
     thing = Obstacle(place.id, *size[:1], look, pose, *size[1:], 0.0, int(rng.integers(12)))
@@ -154,7 +156,7 @@ def _outline_m(length_m: float, width_m: float, pose: Pose2) -> F64:
     return np.asarray(own @ np.array([[cos, sin], [-sin, cos]]) + np.array(pose[:2]))
 
 
-def _draw_swimmer(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None:
+def _draw_swimmer(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     turn_rad = float(rng.choice([-1.0, 1.0]) * (0.5 * math.pi + rng.normal(0.0, 0.3)))
     speed_mps = float(rng.uniform(0.2, 0.4))
     timed_path = encounter_paths.plan_crossing(
@@ -166,10 +168,10 @@ def _draw_swimmer(place: _MeetingPlace, rng: np.random.Generator) -> Actor | Non
         turn_rad=turn_rad,
         boat_mps=NOMINAL_BOAT_MPS,
     )
-    return _build_actor(place, "swimming", timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, "swimming", timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
-def _draw_adrift(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None:
+def _draw_adrift(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     speed_mps = float(rng.uniform(0.04, 0.18))
     timed_path = encounter_paths.plan_drifting(
         place.world,
@@ -180,10 +182,10 @@ def _draw_adrift(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None
         left_m=float(rng.uniform(-1.2, 1.2)),
         boat_mps=NOMINAL_BOAT_MPS,
     )
-    return _build_actor(place, str(rng.choice(ADRIFT)), timed_path, speed_mps, Behaviour.HOLDS_ON, rng)
+    return _build_sized(place, str(rng.choice(ADRIFT)), timed_path, speed_mps, Behaviour.HOLDS_ON, rng)
 
 
-def _draw_crossing(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None:
+def _draw_crossing(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     look = str(rng.choice(UNDER_WAY))
     turn_rad = float(rng.choice([-1.0, 1.0]) * (0.5 * math.pi + rng.normal(0.0, 0.35)))
     speed_mps = float(rng.uniform(0.6, 1.4))
@@ -196,18 +198,18 @@ def _draw_crossing(place: _MeetingPlace, rng: np.random.Generator) -> Actor | No
         turn_rad=turn_rad,
         boat_mps=NOMINAL_BOAT_MPS,
     )
-    return _build_actor(place, look, timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, look, timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
-def _draw_head_on(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None:
+def _draw_head_on(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     speed_mps, left_m = float(rng.uniform(0.5, 1.1)), float(rng.uniform(-1.0, 1.0))
     timed_path = encounter_paths.plan_head_on(
         place.route, place.at_m, speed_mps=speed_mps, left_m=left_m, boat_mps=NOMINAL_BOAT_MPS
     )
-    return _build_actor(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
-def _draw_overtaking(place: _MeetingPlace, rng: np.random.Generator) -> Actor | None:
+def _draw_overtaking(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     """Most overtake the boat well to its side; some are slower, ahead of it in its lane."""
     slower = rng.random() < 0.4
     speed_mps = float(rng.uniform(0.2, 0.35) if slower else rng.uniform(0.9, 1.4))
@@ -220,37 +222,18 @@ def _draw_overtaking(place: _MeetingPlace, rng: np.random.Generator) -> Actor | 
         left_m=float(rng.uniform(-0.8, 0.8)) if slower else beside_m,
         boat_mps=NOMINAL_BOAT_MPS,
     )
-    return _build_actor(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
-def _build_actor(
-    place: _MeetingPlace,
+def _build_sized(
+    place: MeetingPlace,
     look: str,
     timed_path: TimedPath | None,
     speed_mps: float,
     behaviour: Behaviour,
     rng: np.random.Generator,
 ) -> Actor | None:
-    """None without a run, or where its path is not free."""
-    if timed_path is None:
-        return None
-    size = SIZES[look]
-    actor = Actor(
-        place.id,
-        size.kind,
-        look,
-        timed_path.path_m,
-        speed_mps,
-        size.length_m,
-        size.width_m,
-        size.height_m,
-        timed_path.start_m,
-        int(rng.integers(12)),
-        closed=False,
-        start_s=timed_path.start_s,
-        behaviour=behaviour,
-    )
-    return actor if encounter_paths.is_path_clear(place.world, actor) else None
+    return build_actor(place, look, SIZES[look], timed_path, speed_mps, behaviour, rng)
 
 
 _KINDS: tuple[DrawThing, ...] = (

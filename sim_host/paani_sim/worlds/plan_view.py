@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from paani.arrays import F64, U8
 from paani.statistics.charts import Axes
+from paani_sim.worlds.footprint import build_outline, is_shaped, place_outline
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose_at
 
@@ -67,6 +68,8 @@ def _route_surroundings(scenario: Scenario) -> F64:
 
 def _outline(thing: Obstacle | Actor, pose: Pose2) -> F64:
     """The footprint's corners, of what is long with a bow."""
+    if thing.kind is Kind.OTHER and is_shaped(thing):
+        return place_outline(build_outline(thing), pose)
     half = np.array([0.5 * thing.length_m, 0.5 * thing.width_m])
     corners = np.array([[-1.0, -1.0], [0.55, -1.0], [1.0, 0.0], [0.55, 1.0], [-1.0, 1.0]])
     if thing.kind is not Kind.VESSEL:

@@ -10,7 +10,8 @@ from paani.messages import FenceArea, Keep
 from paani_sim.worlds.curves import clearance_m, is_inside, sampled_legs
 from paani_sim.worlds.passability import footprint_distance_m, obstacle_distance_m
 from paani_sim.worlds.scenario import Scenario
-from paani_sim.worlds.world import Actor, Kind, Obstacle, World, actor_pose_at
+from paani_sim.worlds.sizes import is_afloat_by_nature
+from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose_at
 
 HULL_RADIUS_M = 0.75  # half the diagonal of a 1.3 x 0.75 m hull
 HALF_BEAM_M = 0.375
@@ -67,10 +68,10 @@ def _check_start(world: World, where: str) -> None:
 
 def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:
     if isinstance(thing, Obstacle):
-        if _is_floating(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
+        if is_afloat_by_nature(thing) and clearance_m(world.shore_m, np.array([thing.pose[:2]]))[0] < 0.0:
             raise UserError(f"{where}.at_m: {thing.look} on land")
         return
-    if not _is_floating(thing):
+    if not is_afloat_by_nature(thing):
         return
     for number, points_m in enumerate(sampled_legs(thing.path_m, SAMPLE_M, closed=thing.closed)):
         on_land = clearance_m(world.shore_m, points_m) < 0.0
@@ -98,10 +99,6 @@ def _check_area(corners_m: F64, where: str) -> None:
     if crossing.any():
         one, other = (int(index) for index in np.argwhere(crossing)[0])
         raise UserError(f"{where}: the edges from corners {one} and {other} meet")
-
-
-def _is_floating(thing: Obstacle | Actor) -> bool:
-    return thing.kind in {Kind.VESSEL, Kind.BUOY} or thing.look == "swimming"
 
 
 def _is_allowed(fence: tuple[FenceArea, ...], points_m: F64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -37,7 +37,7 @@ def render_sheet(scenario: Scenario, width_px: int, height_px: int) -> Iterator[
         for number, (distance_m, pose) in enumerate(zip(along_m, poses, strict=True), start=1):
             t_s = float(distance_m) / NOMINAL_BOAT_MPS
             picture = eye.render(BoatPose(*pose), t_s).bgr
-            pictures.append(_add_caption(picture, f"{number}   {distance_m:.0f} m   {t_s:.0f} s"))
+            pictures.append(add_caption(picture, f"{number}   {distance_m:.0f} m   {t_s:.0f} s"))
             yield None
     yield _compose_sheet(scenario, poses, pictures)
 
@@ -84,7 +84,8 @@ def _render_title(scenario: Scenario, width_px: int) -> U8:
     return band
 
 
-def _add_caption(picture: U8, caption: str) -> U8:
+def add_caption(picture: U8, caption: str) -> U8:
+    """The picture with a line of text below it."""
     band = np.full((CAPTION_PX, picture.shape[1], 3), 250, np.uint8)
     cv2.putText(band, caption, (8, 16), FONT, 0.5, INK, 1, cv2.LINE_AA)
     return np.vstack([picture, band])

@@ -9,7 +9,7 @@ import numpy as np
 from paani.arrays import F64
 from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.worlds.curves import simplify_polygon
-from paani_sim.worlds.footprint import BOWS, CORNERS, build_outline, is_round
+from paani_sim.worlds.footprint import CORNERS, build_outline, is_round, is_shaped
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose_at
 
 TIMESTEP_S = 0.01
@@ -155,12 +155,12 @@ def _add_solid(
     yaw_rad: float,
     half_height_m: float,
 ) -> None:
-    """A box for what is long, an upright cylinder for what is round, and a hull as it narrows."""
+    """A box for what is long, an upright cylinder for what is round, and what narrows as it does."""
     half_length_m, half_width_m = 0.5 * thing.length_m, 0.5 * thing.width_m
     kind, size = _BOX, [half_length_m, half_width_m, half_height_m]
     if is_round(thing):
         kind, size = _CYLINDER, [half_width_m, half_height_m, 0.0]
-    elif thing.look in BOWS:
+    elif is_shaped(thing):
         kind = _MESH
         around = build_outline(thing)
         walls = [np.column_stack([around, np.full(CORNERS, z_m)]) for z_m in (-half_height_m, half_height_m)]

