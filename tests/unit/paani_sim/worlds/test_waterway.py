@@ -9,7 +9,7 @@ import pytest
 from paani.arrays import F64
 from paani_sim.plant.actors import FLIGHT_M, SWIMMER_KEEPS_CLEAR_M, Actors
 from paani_sim.trials.seed_parts import FRESH_SEEDS
-from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, World, actor_pose_at
+from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose_at
 from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.footprint import build_outline, place_outline
 from paani_sim.worlds.generate import draw_random_scenario
@@ -188,8 +188,9 @@ def test_a_bird_hurries_away_from_a_boat_that_comes_from_behind() -> None:
 
 
 def test_people_and_vessels_are_classes_and_animals_and_logs_are_not(scenarios: tuple[Scenario, ...]) -> None:
-    worlds: list[World] = [scenario.world for scenario in scenarios]
-    things: list[Obstacle | Actor] = [each for world in worlds for each in (*world.obstacles, *world.actors)]
+    things = list[Obstacle | Actor]()
+    for scenario in scenarios:
+        things += [*scenario.world.obstacles, *scenario.world.actors]
     kinds = {thing.look: thing.kind for thing in things}
     assert {kinds[look] for look in ("eight", "paddleboard", "jetski", "ferry")} == {Kind.VESSEL}
     assert kinds["swimming"] is Kind.PERSON
