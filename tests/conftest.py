@@ -24,6 +24,7 @@ from paani.config import Config, load_config
 from tests.claims_check.left_out import left_out_text
 from tests.claims_check.table import read_table
 from tests.places import ROOT
+from tests.transcript import Transcript
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
@@ -55,6 +56,7 @@ OpenAs = Callable[[str], Awaitable[Bus]]
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write the golden files anew")
+    parser.addoption("--transcripts", type=Path, metavar="FOLDER", help="leave what clients of the ports said there")
 
 
 def is_alone(nodeid: str) -> bool:
@@ -169,6 +171,16 @@ def private_sets(tmp_path: Path) -> tuple[str, ...]:
         f"bus.runtime_dir={tmp_path / 'runtime'}",
         f"dashboard.port={find_free_port()}",
     )
+
+
+@pytest.fixture
+def transcript(request: pytest.FixtureRequest) -> Iterator[Transcript]:
+    """Of this test's session, left in the folder of `--transcripts`."""
+    made = Transcript()
+    yield made
+    folder: Path | None = request.config.getoption("--transcripts")
+    if folder is not None:
+        made.write(folder / f"{request.node.name.removeprefix('test_')}.txt")
 
 
 @pytest.fixture

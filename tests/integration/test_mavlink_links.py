@@ -202,6 +202,7 @@ async def test_mavsdk_downloads_what_is_recorded_and_sees_nothing_else(spawn: Sp
             async with asyncio.timeout(30.0):
                 async for _ in logs.download_log_file(entry, str(copy)):
                     pass
+            logs.destroy()
     assert copy.read_bytes() == recording.read_bytes()
 
 

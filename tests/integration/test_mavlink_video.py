@@ -81,6 +81,7 @@ async def test_a_player_shows_the_camera_where_mavlink_says_it_is(spawn: Spawn, 
         await asyncio.sleep(1.0)
         colour = GREEN
         frames = await watching
+        camera.destroy()
     publishing.cancel()
     assert frames[-1].shape == (240, 320, 3)
     assert frames[-1][200, 200] == pytest.approx(GREEN, abs=4)

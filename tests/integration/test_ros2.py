@@ -29,6 +29,7 @@ from paani_services.ros2 import topics
 from paani_services.ros2.schemas import decode, type_hash
 from tests.conftest import OpenAs, Spawn, find_free_port
 from tests.places import ROOT
+from tests.transcript import Transcript
 from tests.unit.paani_services.ros2.test_schemas import HASHES
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
@@ -47,6 +48,8 @@ class Node:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
+        self.transcript = Transcript()
+        self._asked = ""
         self.heard: dict[str, list[Any]] = {}
         self.leaked: list[str] = []
         self.tokens: list[str] = []
@@ -67,6 +70,9 @@ class Node:
     def ask(self, **words: Any) -> None:
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(words).encode() + b"\n")
+        if "publish" in words and (asked := f"publishes {words['publish']} {compact(words['fields'])}") != self._asked:
+            self._asked = asked  # a stick is said again and again
+            self.transcript.note("node", asked)
 
     async def until(self, condition: Callable[[], bool], what: str, act: Callable[[], None] | None = None) -> None:
         try:
@@ -77,6 +83,18 @@ class Node:
                     await asyncio.sleep(0.1)
         except TimeoutError:
             pytest.fail(f"not within 20 s: {what}; heard { ({name: len(all_) for name, all_ in self.heard.items()}) }")
+        self.transcript.note("checked", what)
+
+
+def compact(fields: dict[str, Any]) -> str:
+    """Fields of a message in one line, the names of their types left out."""
+
+    def without_types(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: without_types(each) for name, each in value.items() if name != "type"}
+        return value[:20] if isinstance(value, str) else value
+
+    return json.dumps(without_types(fields)).replace('"', "")
 
 
 @contextlib.asynccontextmanager
@@ -107,7 +125,7 @@ async def joined(port: int, *wanted: topics.RosTopic, mode: str = "peer") -> Asy
         await listening
 
 
-async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
+async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs, transcript: Transcript) -> None:
     """A boat adrift in the simulated river: its real estimate, beside what other processes would say."""
     listen = find_free_port()
     observer = await open_as("observer")
@@ -137,6 +155,7 @@ async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
         spawn("ros2", f"ros2.listen=tcp/127.0.0.1:{listen}"),
         joined(listen, *(topic for topic in topics.SENT if topic is not topics.TRACKS)) as node,
     ):
+        node.transcript = transcript
         names = {topic.full_name("otter") for topic in topics.SENT} - {"/otter/tracks"}
         await node.until(lambda: "/otter/occupancy" in node.heard, "the map", show)
         node.ask(latched=topics.OCCUPANCY.endpoint("otter").key(43))
@@ -146,6 +165,8 @@ async def test_a_node_hears_a_drive(spawn: Spawn, open_as: OpenAs) -> None:
         node.ask(tokens=True)
         await node.until(lambda: bool(node.tokens), "the graph")
         speak()
+    for name, heard in sorted(node.heard.items()):
+        transcript.note("node", f"has heard {name}, {len(heard)} of them")
     for heard in node.heard["/otter/odometry/global"]:
         pose = estimates[heard["header"]["stamp"]["sec"] * 1_000_000 + heard["header"]["stamp"]["nanosec"] // 1000]
         at = heard["pose"]["pose"]["position"]
@@ -194,7 +215,9 @@ def vector(x: float = 0.0, z: float = 0.0) -> dict[str, float]:
     return {"x": x, "y": 0.0, "z": z}
 
 
-async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, open_as: OpenAs) -> None:
+async def test_a_node_drives_while_its_hand_holds_and_no_longer(
+    spawn: Spawn, open_as: OpenAs, transcript: Transcript
+) -> None:
     """`cmd_vel` moves the boat in MANUAL alone, which a word begins; whoever falls silent has let go."""
     listen = find_free_port()
     observer, station = await open_as("observer"), await open_as("dashboard")
@@ -214,6 +237,7 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
         spawn("ros2", f"ros2.listen=tcp/127.0.0.1:{listen}", "ros2.accept_commands=true"),
         joined(listen) as node,
     ):
+        node.transcript = transcript
         with station.alive():
             hand = OperatorClient(station, CLOCK)
 
@@ -250,6 +274,7 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
             await counted("refused", lambda: say("MANUAL"), "a boat that is not armed takes no MANUAL")
             assert order().mode is m.DriveMode.ROUTE
             assert await hand.hold_to_arm(5.0) is m.ArmRefusal.NONE
+            transcript.note("page", "armed by hand")
             await node.until(lambda: order().surge > 0.0, "the boat is steered", drive)
             assert (order().mode, order().by) == (m.DriveMode.MANUAL, "ros2")
             assert (order().surge, order().turn) == pytest.approx((0.5, 0.2))
@@ -265,6 +290,7 @@ async def test_a_node_drives_while_its_hand_holds_and_no_longer(spawn: Spawn, op
             await counted("undecodable", lambda: say("M" * 70_000), "longer than any command")
             await counted("out_of_range", lambda: say("FULL AHEAD"), "a word that is no mode")
             assert await hand.take_wheel(5.0) is m.ModeRefusal.NONE
+            transcript.note("page", "has taken the wheel")
             await counted("refused", lambda: say("HOLD"), "another hand holds the wheel")
             accepted = missions.value
             await counted("refused", lambda: go("map"), "and the mission")
