@@ -48,7 +48,7 @@ class MissionExchange:
         self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
         self._uploaded: Uploaded | None = None  # whose legs were in force
         self._newest: Uploaded | None = None  # which may be refused
-        self._uploads, self._upload_count = Uploads(), 0
+        self._uploads, self._upload_count = Uploads(count), 0
         self._current = self._reached = self._leg_index = 0
         self.handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
             "MISSION_REQUEST_LIST": self._request_list,
@@ -110,7 +110,7 @@ class MissionExchange:
         if message.mission_type in {MISSION, FENCE, RALLY}:
             station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
         else:
-            self._acknowledge(station, UNSUPPORTED, message, source)
+            self._refuse(station, UNSUPPORTED, message, source, "")
 
     def _request(self, station: Station, message: Any, source: tuple[int, int]) -> None:
         kind = message.mission_type
@@ -118,7 +118,7 @@ class MissionExchange:
         if kind in {MISSION, FENCE, RALLY}:
             item = missions.mission_item(self._plan, kind, message.seq, self._current, source)
         if item is None:
-            self._acknowledge(station, INVALID_SEQUENCE, message, source)
+            self._refuse(station, INVALID_SEQUENCE, message, source, "")
         else:
             station.send(item, self._snapshot.now_us)
 

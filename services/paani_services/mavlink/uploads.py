@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from paani.clock import has_passed
 from paani_services.mavlink.codec import dialect
-from paani_services.mavlink.mission_items import Item
+from paani_services.mavlink.mission_items import NOWHERE, Item
 from paani_services.mavlink.station import Station
 
 MAX_ITEMS = 10_200  # the waypoints that a mission may have, and what stands between them
+MAX_DEGREES = 200.0  # beyond every place, and within the field
 REPEAT_S, ATTEMPTS = 1.0, 5  # an item that does not come is asked for again, and then no more
 CANCELLED, NO_SPACE = dialect.MAV_MISSION_OPERATION_CANCELLED, dialect.MAV_MISSION_NO_SPACE
 SEQUENCE = dialect.MAV_MISSION_INVALID_SEQUENCE
@@ -26,9 +28,10 @@ class Completed(NamedTuple):
 
 
 class Uploads:
-    """One upload at a time for each station; stations do not disturb each other."""
+    """One upload at a time for each station; stations do not disturb each other. count: a refusal, by its cause."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: Callable[[str], None]) -> None:
+        self._count = count
         self._under_way: dict[Station, _Upload] = {}
 
     def begin(self, station: Station, message: Any, target: tuple[int, int], now_us: int) -> None:
@@ -41,12 +44,12 @@ class Uploads:
         """One item; what is complete with it. One that was not asked for is refused, but for one that is repeated."""
         upload = self._under_way.get(station)
         if upload is None or message.mission_type != upload.kind:
-            acknowledge(station, source, SEQUENCE, message.mission_type, now_us)
+            self._refuse(station, source, SEQUENCE, message.mission_type, now_us)
             return None
         wanted = len(upload.items)
         if message.seq != wanted:
             if message.seq > wanted:
-                acknowledge(station, source, SEQUENCE, upload.kind, now_us)
+                self._refuse(station, source, SEQUENCE, upload.kind, now_us)
                 del self._under_way[station]
             return None
         upload.items.append(_item_of(message))
@@ -62,7 +65,7 @@ class Uploads:
         for station, upload in tuple(self._under_way.items()):
             if has_passed(upload.asked_us, REPEAT_S * 1e6, now_us):
                 if upload.attempts >= ATTEMPTS:
-                    acknowledge(station, upload.target, CANCELLED, upload.kind, now_us)
+                    self._refuse(station, upload.target, CANCELLED, upload.kind, now_us)
                     del self._under_way[station]
                 else:
                     upload.ask(now_us)
@@ -70,6 +73,10 @@ class Uploads:
     def forget(self, station: Station) -> None:
         """The station is gone, or has cancelled."""
         self._under_way.pop(station, None)
+
+    def _refuse(self, station: Station, target: tuple[int, int], result: int, kind: int, now_us: int) -> None:
+        self._count("mavlink_refused")
+        acknowledge(station, target, result, kind, now_us)
 
 
 class _Upload:
@@ -91,10 +98,10 @@ def acknowledge(station: Station, target: tuple[int, int], result: int, kind: in
 
 
 def _item_of(message: Any) -> Item:
-    """Both kinds of item; a place that is no number is none."""
+    """Both kinds of item; a place of which one number is none is none."""
     parameters = message.param1, message.param2, message.param3, message.param4
     place = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
-        degrees = [value if math.isfinite(value) and abs(value) <= 200.0 else 0.0 for value in place]
-        place = round(degrees[0] * 1e7), round(degrees[1] * 1e7)
+        degrees = [min(max(value, -MAX_DEGREES), MAX_DEGREES) for value in place]
+        place = NOWHERE if any(map(math.isnan, place)) else (round(degrees[0] * 1e7), round(degrees[1] * 1e7))
     return Item(message.command, parameters, place, message.frame)

@@ -149,6 +149,7 @@ def test_an_item_that_is_missing_is_asked_for_again_and_then_no_more() -> None:
     asked = [each.seq for each in heard if each.get_type() == "MISSION_REQUEST_INT"]
     assert asked == [1] * 4
     assert only(heard, "MISSION_ACK").type == common.MAV_MISSION_OPERATION_CANCELLED
+    assert port.counted == ["mavlink_refused"]
     assert only(peer.send(message_of(1, waypoint(1))), "MISSION_ACK").type == common.MAV_MISSION_INVALID_SEQUENCE
     assert port.sent == []
 
@@ -161,6 +162,37 @@ def test_an_item_out_of_order_ends_the_upload_and_a_repeated_one_does_not() -> N
     assert only(peer.send(message_of(2, waypoint(1))), "MISSION_ACK").type == common.MAV_MISSION_INVALID_SEQUENCE
     assert only(peer.send(message_of(1, waypoint(1))), "MISSION_ACK").type == common.MAV_MISSION_INVALID_SEQUENCE
     assert port.sent == []
+    assert port.counted == ["mavlink_refused"] * 2
+
+
+@pytest.mark.parametrize(
+    ("command", "place"),
+    [
+        (16, (math.nan, 8.6928)),
+        (16, (50.1072, math.nan)),
+        (16, (50.1072, math.inf)),
+        (17, (1e30, 8.6928)),  # which without a place means here
+    ],
+)
+def test_a_place_that_is_no_number_is_refused(command: int, place: tuple[float, float]) -> None:
+    """Of the old kind of item, whose places are floating point."""
+    port, peer = made()
+    peer.send(common.MAVLink_mission_count_message(1, 1, 1, 0))
+    item = common.MAVLink_mission_item_message(1, 1, 0, 3, command, 0, 1, 0.0, 0.0, 0.0, math.nan, *place, 0.0, 0)
+    answers = peer.send(item)
+    assert only(answers, "MISSION_ACK").type == common.MAV_MISSION_INVALID_PARAM5_X
+    assert (port.sent, port.counted) == ([], ["mavlink_refused"])
+
+
+def test_frames_that_lie_about_their_number_are_taken_as_they_come() -> None:
+    """The number of a frame says what a link has lost, and nothing about what the frame asks."""
+    port, peer = made()
+    liar = common.MAVLink(None, 255, 190)
+    for number in (7, 7, 200, 3, 3):
+        liar.seq = number
+        answers = peer.send_bytes(bytes(common.MAVLink_ping_message(1, number, 0, 0).pack(liar)))
+        assert only(answers, "PING").seq == number
+    assert port.counted == []
 
 
 def test_two_stations_upload_at_once_and_do_not_disturb_each_other() -> None:
