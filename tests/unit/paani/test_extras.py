@@ -11,6 +11,7 @@ import pytest
 
 from paani.errors import UserError
 from paani.extras import EXTRA_OF, require_modules
+from paani.keys import PORTS
 from tests.places import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -49,3 +50,11 @@ def test_without_the_host_extra_a_command_is_one_line(words: list[str]) -> None:
     assert re.fullmatch(
         rf"paani: {words[0]} needs [\w, ]+, not installed here: pip install 'paani\[host\]'\n", done.stderr
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("service", [*PORTS, "advisor", "navigator", "operator"])
+def test_a_port_needs_its_own_extra_and_every_other_process_none(service: str) -> None:
+    blocked = {module: None for module, extra in EXTRA_OF.items() if extra != service}
+    code = f"import sys; sys.modules.update({blocked}); import paani_services.{service}.service"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
