@@ -33,8 +33,8 @@ def required_parameters(own_system: int) -> tuple[Requirement, ...]:
         Requirement(("RC_OVERRIDE_TIME",), 0.5),  # sticks not renewed for so long are let go, in seconds
         Requirement(("FS_THR_ENABLE",), 1),  # without sticks and receiver: no thrust, and the action
         Requirement(("FS_GCS_ENABLE",), 1),  # without our heartbeat: the action
-        Requirement(("FS_GCS_TIMEOUT",), 2),  # seconds, the least it takes
-        Requirement(("FS_TIMEOUT",), 1),  # seconds from a loss to the action, the least it takes
+        Requirement(("FS_GCS_TIMEOUT",), 2),  # seconds, the least of its range
+        Requirement(("FS_TIMEOUT",), 1),  # seconds from a loss to the action, the least of its range
         Requirement(("FS_ACTION",), 2),  # HOLD: no thrust
         Requirement(("PILOT_STEER_TYPE",), 3),  # the sticks are ahead and starboard, and not the two sides
         Requirement(("MANUAL_STR_EXPO",), 0),  # the stick to starboard counts as it is

@@ -16,7 +16,7 @@ from paani.errors import UserError
 from paani.undecodable import UNDECODABLE
 
 ENV_PREFIX = "PAANI_"
-NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"})
+NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON", "PAANI_ARDUROVER"})
 MAX_SHOWN = 200  # characters of a setting that an error repeats
 # Earlier names of settings and sections, and their present ones: old files, `--set` paths and recordings still load.
 RENAMED_SETTINGS = {
