@@ -20,7 +20,7 @@ from paani.messages import EncounterClass
 CLEAR_M, NEAR_MISS_M = 1.5, 0.5  # hull to hull: twice the hull's width, and `NEAR_MISS_CLEARANCE_M`; contact is 0
 APPARENT_TURN_DEG = 30.0  # a turn that a camera or an eye notices at once
 TOO_LITTLE = 0.3  # of `course_unchanged` or `speed_unchanged`: an action is apparent with either below it
-CROSSED_AHEAD_DEG = (-165.0, 25.0)  # aspect at the closest point
+CROSSED_AHEAD_DEG = (-25.0, 165.0)  # aspect at the closest point
 
 
 class Manoeuvre(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,5 +1,7 @@
 """Encounter classes and the scores of rules 8 and 13 to 17, against values by hand."""
 
+import math
+
 import msgspec
 import numpy as np
 import pytest
@@ -95,8 +97,8 @@ def test_scores_by_hand() -> None:
     assert not_apparent(changed(least_mps=0.4)) == 0.0
     assert rule_8(GIVEN) == pytest.approx(2.0 / 3.0 * 0.8125)
     assert rule_16(GIVEN) == pytest.approx(0.8 * 2.0 / 3.0 * 0.8125)
-    assert rule_15(GIVEN) == 0.0  # 0.433 - 0.5: -90 is ahead
-    assert rule_15(changed(aspect_deg=-170.0)) == pytest.approx(rule_16(GIVEN))
+    assert rule_15(GIVEN) == pytest.approx(rule_16(GIVEN))
+    assert rule_15(changed(aspect_deg=45.0)) == 0.0  # 0.433 - 0.5
     assert rule_13(GIVEN) == pytest.approx(rule_16(GIVEN))
     assert rule_13(changed(aspect_deg=44.0)) == pytest.approx(rule_16(GIVEN) - 0.3)
     # 0.6 (1 - 0.75^4) and 0.2 / 3 off, times 1 - 0.375
@@ -104,6 +106,23 @@ def test_scores_by_hand() -> None:
     assert rule_14(changed(bearing_deg=90.0, aspect_deg=90.0)) == 0.0
     assert rule_17(GIVEN) == pytest.approx(0.8 - 0.5 * 13.0 / 28.0)
     assert rule_17(changed(turn_deg=2.0, most_mps=0.75, least_mps=0.3)) == pytest.approx(0.8 * 0.64 - 0.25)
+
+
+@pytest.mark.parametrize("course_deg", [70.0, 90.0, 120.0])
+@pytest.mark.parametrize("speed_mps", [0.26, 0.6, 1.5])
+def test_who_passes_ahead_of_a_vessel_from_starboard_loses_half_and_who_passes_astern_nothing(
+    course_deg: float, speed_mps: float
+) -> None:
+    """Ours is north, its course is so much to port of that. Both are held, and one comes to the crossing first."""
+    course_rad, time_s = math.radians(course_deg), np.linspace(-60.0, 60.0, 2401)
+    ahead = np.array([-math.sin(course_rad), math.cos(course_rad)])
+    for late_s, lost in ((4.0, 0.5), (-4.0, 0.0)):
+        offset_m = np.outer(time_s * 0.6, [0.0, 1.0]) - np.outer((time_s - late_s) * speed_mps, ahead)
+        east_m, north_m = offset_m[np.hypot(*offset_m.T).argmin()]
+        clockwise_deg = math.degrees(math.atan2(east_m, north_m) - math.atan2(*ahead))
+        aspect_deg = (clockwise_deg + 180.0) % 360.0 - 180.0
+        clear = changed(clearance_m=3.0, acted_m=20.0, turn_deg=30.0, aspect_deg=aspect_deg)
+        assert rule_16(clear) - rule_15(clear) == pytest.approx(lost)
 
 
 def test_never_seen_or_never_acted_is_the_longest_delay() -> None:
