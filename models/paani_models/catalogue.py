@@ -13,6 +13,7 @@ from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 
 WEIGHTS = Path(__file__).parent / "weights"
+OPEN_WEIGHTS = WEIGHTS / "open"  # a second set, learnt only from what anyone may use
 MANIFEST = "manifest.json"
 
 

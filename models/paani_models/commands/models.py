@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+from paani_models.catalogue import OPEN_WEIGHTS, WEIGHTS, Model, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
 from paani_models.commands import prepare as prepare_command
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
         if arguments.command == "check":
             return _check_file(arguments) if arguments.model else _check_weights(arguments.weights)
         if arguments.command == "card":
-            sys.stdout.write(render_model_card(load_catalogue(arguments.weights)))
+            sys.stdout.write(render_model_card(load_catalogue(arguments.weights), _open_catalogue(arguments.weights)))
             return 0
         if arguments.command == "prepare":
             if arguments.set != "own":
@@ -138,6 +138,9 @@ def _parser() -> argparse.ArgumentParser:
     exported = export.add_mutually_exclusive_group(required=True)
     exported.add_argument("--checkpoint", type=Path)
     exported.add_argument("--untrained", action="store_true", help="random weights, to measure the speed of its shape")
+    export.add_argument(
+        "--looks-at", metavar="HEIGHTxWIDTH", help="segmenters: the picture inside, of a training that ended smaller"
+    )
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
@@ -170,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
     measuring = (evaluate, report, temperature, small_obstacles, quantise, convert, bench)
     for command in (check, held_out, check_data, pack, train, export, *measuring):
         command.add_argument("--data", type=Path, default=data_folder())
-        command.add_argument("--sources", default="", help="comma-separated; all if not given")
+        command.add_argument("--sources", default="", help="comma-separated, or `open`; all if not given")
         command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
     return parser
 
@@ -188,10 +191,19 @@ def _list_held_out(pictures: PictureSelection, without_water: bool) -> int:
 
 
 def _check_weights(weights: Path) -> int:
-    for name, model in load_catalogue(weights).items():
-        verified_path(name, weights)
-        sys.stdout.write(f"{name}: {model.file} {model.size_bytes} bytes, {model.parameters} parameters, ok\n")
+    """The set of a folder, and with the shipped one the open set beside it."""
+    for folder in (weights, OPEN_WEIGHTS) if weights == WEIGHTS else (weights,):
+        kind = "open " if folder == OPEN_WEIGHTS else ""
+        for name, model in load_catalogue(folder).items():
+            verified_path(name, folder)
+            size = f"{model.size_bytes} bytes, {model.parameters} parameters"
+            sys.stdout.write(f"{kind}{name}: {model.file} {size}, ok\n")
     return 0
+
+
+def _open_catalogue(weights: Path) -> dict[str, Model]:
+    """That of the open set, where the folder is the shipped one, else nothing."""
+    return load_catalogue(OPEN_WEIGHTS) if weights == WEIGHTS else {}
 
 
 def _check_file(arguments: argparse.Namespace) -> int:
@@ -265,5 +277,11 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
         )
         train_and_export.train_network(arguments.net, pictures, options, arguments.threads)
     else:
-        train_and_export.export_checkpoint(arguments.net, arguments.checkpoint, arguments.weights, pictures)
+        train_and_export.export_checkpoint(
+            arguments.net,
+            arguments.checkpoint,
+            arguments.weights,
+            pictures,
+            looks_at=arguments.looks_at,
+        )
     return 0

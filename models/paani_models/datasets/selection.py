@@ -15,11 +15,13 @@ from paani_models.datasets.sources import (
     choose_sources,
     read_samples,
 )
+from paani_models.datasets.terms import OPEN, OPEN_TERMS, refusal_of_terms
 
 
 class PictureSelection:
     """The chosen sources below a data folder, and a folder of rendered pictures: as given, or that of a bundle.
 
+    The name "open" stands for the sources that anyone may use, as far as their manifests agree.
     A source without its manifest, and a picture with a malformed label or a box outside it, are named on stderr,
     counted and left out; with `strict` they raise UserError where they are read.
     """
@@ -29,10 +31,14 @@ class PictureSelection:
             raise UserError(f"{data}: no such folder; set PAANI_DATA or --data")
         packed = data / RENDERED
         self.data, self.rendered = data, rendered or (packed if (packed / "manifest.json").is_file() else None)
-        self.sources: tuple[Source, ...] = choose_sources(names)
+        only_open = OPEN in names
+        expanded = dict.fromkeys(name for given in names for name in (OPEN_TERMS if given == OPEN else (given,)))
+        self.sources: tuple[Source, ...] = choose_sources(list(expanded))
         self.skipped: list[str] = []
         if not strict:
             self.sources = self._sources_with_manifests()
+        if only_open:
+            self.sources = self._sources_anyone_may_use()
         self.samples = read_samples(data, self.sources, self.rendered)
         if not strict:
             self.samples = [sample for sample in self.samples if self._has_sound_boxes(sample)]
@@ -51,6 +57,19 @@ class PictureSelection:
                 self.skipped.append(f"source {source.name}: {manifest}: missing")
         if not any(source.name != RENDERED or self.rendered is not None for source in kept):
             raise UserError(self.skipped[0] if self.skipped else "sources: none")
+        return tuple(kept)
+
+    def _sources_anyone_may_use(self) -> tuple[Source, ...]:
+        """Raises UserError where none is left."""
+        kept = []
+        for source in self.sources:
+            refusal = refusal_of_terms(source.name, self.source_folder(source) / "manifest.json")
+            if refusal:
+                self.skipped.append(f"source {source.name}: {refusal}")
+            else:
+                kept.append(source)
+        if self.rendered is None and all(source.name == RENDERED for source in kept):
+            raise UserError(self.skipped[-1])
         return tuple(kept)
 
     def _has_sound_boxes(self, sample: Sample) -> bool:

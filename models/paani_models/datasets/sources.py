@@ -237,7 +237,7 @@ def choose_sources(names: Sequence[str]) -> tuple[Source, ...]:
     known = {source.name: source for source in (*SOURCES, *PREPARED_SOURCES)}
     for name in names:
         if name not in known:
-            raise UserError(f"sources: {name!r} is not one of {', '.join(known)}")
+            raise UserError(f"sources: {name!r} is not one of open, {', '.join(known)}")
     return tuple(known[name] for name in names) if names else SOURCES
 
 

@@ -12,6 +12,7 @@ import onnx
 import torch
 from numpy.typing import NDArray
 from torch import nn
+from torch.nn import functional as F
 
 from paani.errors import UserError
 from paani.undecodable import UNREADABLE
@@ -112,21 +113,42 @@ def build_network(name: str) -> nn.Module:
     return nets[name]()
 
 
+class SmallerInside(nn.Module):
+    """A segmenter that looks at a smaller picture than its input, as in its training; its scores are interpolated."""
+
+    def __init__(self, net: nn.Module, size_hw: tuple[int, int]) -> None:
+        super().__init__()
+        self.net, self.size_hw = net, size_hw
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        outer = (int(x.shape[2]), int(x.shape[3]))
+        scores = self.net(F.interpolate(x, size=self.size_hw, mode="bilinear", align_corners=False))
+        return F.interpolate(scores, size=outer, mode="bilinear", align_corners=False)
+
+
 def export_network(
     name: str,
     checkpoint: Path,
     folder: Path,
     inputs: Sequence[NDArray[np.float32]],
     origins: tuple[Origin, ...],
+    licence: str | None = None,
+    *,
+    looks_at: tuple[int, int] | None = None,
 ) -> Model:
     """Write `folder`/<name>.onnx and its manifest entry, both by renaming, and return the entry.
 
+    licence: that of the contract, which is for research, where not given.
+    looks_at: height and width of the picture inside a segmenter whose training ended at that size.
     inputs: real pictures, already preprocessed, [1,3,256,320] each, for the comparison. Figures are left empty.
     Raises UserError where the checkpoint does not fit or the outputs differ by more than TOLERANCE.
     """
     net = build_network(name)
     load_averaged_weights(net, checkpoint)
-    return _export_and_place(name, net, folder, inputs, origins, load_checkpoint(checkpoint)["recipe"]["seed"])
+    if looks_at is not None:
+        net = SmallerInside(net, looks_at)
+    seed = load_checkpoint(checkpoint)["recipe"]["seed"]
+    return _export_and_place(name, net, folder, inputs, origins, seed, licence)
 
 
 def export_untrained(name: str, folder: Path) -> Model:
@@ -151,6 +173,7 @@ def _export_and_place(
     inputs: Sequence[NDArray[np.float32]],
     origins: tuple[Origin, ...],
     seed: int,
+    licence: str | None = None,
 ) -> Model:
     contract = CONTRACTS[name]
     folder.mkdir(parents=True, exist_ok=True)
@@ -169,6 +192,7 @@ def _export_and_place(
             export_max_abs_diff=float(f"{difference:.2e}"),
             origins=origins,
             seed=seed,
+            licence=licence or contract.licence,
         )
         catalogue = load_catalogue(folder) if (folder / "manifest.json").exists() else {}
     save_catalogue({**catalogue, name: model}, folder)

@@ -14,6 +14,7 @@ from paani.errors import UserError
 from paani_models.catalogue import WEIGHTS, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
+from paani_models.datasets.terms import OPEN_LICENCE, OPEN_TERMS
 from paani_models.detector.data import read_boxed_pictures
 from paani_models.detector.distillation import Teacher, add_teachers_boxes, blend_weights
 from paani_models.detector.off_the_shelf import open_off_the_shelf
@@ -206,8 +207,25 @@ def export_untrained_network(net: str, weights: Path) -> int:
     return 0
 
 
-def export_checkpoint(net: str, checkpoint: Path, weights: Path, pictures: PictureSelection) -> None:
-    """Write the ONNX file and its manifest entry, with the provenance of the chosen sources."""
+def export_checkpoint(
+    net: str,
+    checkpoint: Path,
+    weights: Path,
+    pictures: PictureSelection,
+    *,
+    looks_at: str | None = None,
+) -> None:
+    """Write the ONNX file and its manifest entry, with the provenance of the chosen sources.
+
+    looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. Raises UserError where that is malformed, or the network
+    is none.
+    """
+    inside = None
+    if looks_at is not None:
+        if "segmenter" not in net:
+            raise UserError(f"--looks-at: {net} is no segmenter")
+        (stage,) = parse_stages((f"1x{looks_at}",))
+        inside = (stage.height_px, stage.width_px)
     chosen = (
         pictures.boxed_samples(held_out=True)
         if net in ("detector", "yolo11n")
@@ -222,7 +240,8 @@ def export_checkpoint(net: str, checkpoint: Path, weights: Path, pictures: Pictu
         raise UserError("sources: no held-out picture to compare the export on")
     used = {sample.source.name for sample in pictures.samples}
     origins = tuple(read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
-    model = export_network(net, checkpoint, weights, inputs, origins)
+    licence = OPEN_LICENCE if used <= set(OPEN_TERMS) else None
+    model = export_network(net, checkpoint, weights, inputs, origins, licence, looks_at=inside)
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )

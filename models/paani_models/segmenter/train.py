@@ -126,8 +126,8 @@ def draw_epoch(pictures: list[CachedPicture], recipe: SegmenterRecipe, epoch: in
         )
     rendered = [i for i, p in enumerate(pictures) if p.source == RENDERED]
     if rendered:
-        real = len(drawn) or len(rendered)
-        drawn.extend(_draw_evenly(rng, rendered, round(real * recipe.rendered_frac / (1 - recipe.rendered_frac))))
+        share = recipe.rendered_frac / (1 - recipe.rendered_frac)
+        drawn.extend(_draw_evenly(rng, rendered, round(len(drawn) * share) if drawn else len(rendered)))
     drawn.extend([-1] * round(len(drawn) * NULL_FRAC / (1 - NULL_FRAC)))
     return [int(i) for i in rng.permutation(drawn)]
 

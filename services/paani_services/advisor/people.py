@@ -34,10 +34,14 @@ def people_in_lane(lane: str, obstacles: tuple[Obstacle, ...], config: Config) -
 
 
 def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | None:
-    """The speed that must not be exceeded; None where the camera is calibrated and nobody is within `slow_m`."""
+    """The speed that must not be exceeded; None where the camera is calibrated and nobody is within `slow_m`.
+
+    By the open weights, which miss more, no advice is followed faster than by an uncalibrated camera.
+    """
     people = config.advisor.people
+    limits_mps = [people.uncalibrated_mps] if config.perception.weights == "open" else []
     if not people.use:
-        return None
+        return min(limits_mps, default=None)
     center = lane_span("center", config.perception.corridors)
     is_near = any(
         counts(person)
@@ -45,7 +49,8 @@ def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | No
         and (person.distance_m is None or person.distance_m <= people.slow_m)
         for person in obstacles
     )
-    limits_mps = [people.slow_mps] if is_near else []
+    if is_near:
+        limits_mps.append(people.slow_mps)
     if not config.calibration.valid:
         limits_mps.append(people.uncalibrated_mps)
     return min(limits_mps, default=None)

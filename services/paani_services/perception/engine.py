@@ -9,9 +9,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from paani.arrays import F32, U8
-from paani.config import EngineName
+from paani.config import EngineName, PerceptionConfig
 from paani.errors import UserError
-from paani_models.catalogue import Model, choose_model, file_sha256
+from paani_models.catalogue import OPEN_WEIGHTS, Model, choose_model, file_sha256, verified_path
 from paani_models.engines.last_resize import drop_last_resize
 from paani_services.perception.corridors import cell_shape
 from paani_services.perception.ncnn_engine import NcnnEngine
@@ -50,6 +50,20 @@ class Engine(Protocol):
 def engine_class(name: EngineName) -> type[Engine]:
     """The engine that the setting `perception.engine` names."""
     return NcnnEngine if name == "ncnn" else OnnxEngine
+
+
+def network_path(role: str, config: PerceptionConfig) -> str:
+    """The file of a role's network: the user's own, else that of the chosen set; empty for the one of the full set.
+
+    role: "detector" or "segmenter". Raises UserError naming a file of the open set that is missing or corrupt.
+    """
+    own = config.detector if role == "detector" else config.segmenter
+    return own or ("" if config.weights == "full" else str(verified_path(role, OPEN_WEIGHTS)))
+
+
+def load_network(role: str, config: PerceptionConfig, threads: int) -> Engine:
+    """The detector or the segmenter that the settings choose. Raises UserError as `Engine.load`."""
+    return engine_class(config.engine).load(role, network_path(role, config), threads)
 
 
 def check_onnxruntime(release: str) -> None:

@@ -1,18 +1,19 @@
 """Fitness network of the image-quality check: how far a picture looks like one that the segmenter can be trusted on."""
 
 from paani.arrays import U8
-from paani.config import ImageQualityConfig
+from paani.config import PerceptionConfig
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.image_quality import FitnessFunction
 from paani_services.perception.preprocessing import lookup_tables_for, shrink_picture
 
 
-def load_fitness(config: ImageQualityConfig, threads: int) -> FitnessFunction | None:
-    """The network as a function; None where the check or its network is switched off.
+def load_fitness(perception: PerceptionConfig, threads: int) -> FitnessFunction | None:
+    """The network as a function; None where the check or its network is switched off, and in the open set, without one.
 
     Raises UserError naming a file that cannot be used.
     """
-    if not config.enabled or config.min_fitness == 0.0:
+    config = perception.image_quality
+    if not config.enabled or config.min_fitness == 0.0 or not (config.model or perception.weights == "full"):
         return None
     engine = OnnxEngine.load("gate", config.model, threads)
     height, width = engine.contract.size_hw

@@ -25,7 +25,7 @@ from paani_services.perception.candidates import find_candidates
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
 from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
-from paani_services.perception.engine import Engine, engine_class
+from paani_services.perception.engine import Engine, load_network
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.picture_decoding import decode_picture
@@ -68,12 +68,9 @@ class Perceiver:
     def __init__(self, config: PerceptionConfig, stopwatch_ms: Callable[[], float]) -> None:
         """Raises UserError for a model that cannot be used."""
         self._config, self._stopwatch_ms = config, stopwatch_ms
-        engine = engine_class(config.engine)
-        self._detector = engine.load("detector", config.detector, config.intra_op_threads)
+        self._detector = load_network("detector", config, config.intra_op_threads)
         self._segmenter = (
-            None
-            if config.segmenter == NO_SEGMENTER
-            else engine.load("segmenter", config.segmenter, config.intra_op_threads)
+            None if config.segmenter == NO_SEGMENTER else load_network("segmenter", config, config.intra_op_threads)
         )
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
@@ -81,7 +78,7 @@ class Perceiver:
         self._second_thread = ThreadPoolExecutor(1, "first-network") if config.concurrent else None
         self._detector_first = config.concurrent and self._is_slower(self._detector, self._segmenter)
         self._quality = ImageQualityState()
-        self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
+        self._fitness = load_fitness(config, config.intra_op_threads)
         self._pending: list[Future[Any]] = []
         self._visible_frac: dict[tuple[int, ...], F32] = {}
 

@@ -33,6 +33,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     await loop.run_in_executor(worker, release_freed_memory)  # what loading the networks took: some 15 MiB
     require_people_seen(perceiver, config)
     warn_uncalibrated(config)
+    judge_open_weights(config)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
@@ -91,13 +92,35 @@ def warn_uncalibrated(config: Config) -> None:
         )
 
 
+def judge_open_weights(config: Config) -> None:
+    """Log what the open weights do worse, and how fast their advice may be followed.
+
+    Raises UserError on a hull whose water they would tell: the open segmenter has seen rendered water alone.
+    """
+    if config.perception.weights != "open":
+        return
+    if config.bus.graph is Graph.HULL and not config.perception.segmenter:
+        raise UserError(
+            "perception.weights open: its segmenter has never seen real water; a hull needs perception.segmenter, "
+            "a file of your own, or perception.weights full"
+        )
+    LOG.warning(
+        "perception.weights is open: networks that have learnt from few pictures miss people and vessels that the "
+        "full set sees, most piers and buoys, and where water ends; no network says whether a picture is fit; "
+        "advice limits the speed (advisor.people.uncalibrated_mps); models/MODEL_CARD.md has the figures"
+    )
+
+
 def sight_note(evidence: m.Evidence, config: Config) -> str:
     """What the page says of perception: why a picture is unusable, else by which networks, and whether in metres."""
     if not evidence.usable:
         return f"unusable: {evidence.cause}"
-    is_assumed = not config.calibration.valid and config.perception.candidates.use
-    assumed = "uncalibrated camera, everybody counts as near, speed limited"
-    return f"{assumed}; {evidence.models}" if is_assumed else evidence.models
+    notes = []
+    if not config.calibration.valid and config.perception.candidates.use:
+        notes.append("uncalibrated camera, everybody counts as near, speed limited")
+    if config.perception.weights == "open":
+        notes.append("open weights, which miss more, speed limited")
+    return "; ".join((*notes, evidence.models))
 
 
 def roll_at_capture_rad(source_us: int, odometry: m.Odometry | None, max_age_s: float) -> float:

@@ -15,7 +15,7 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.extras import require_modules
 from paani.version import version_text
-from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_class
+from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_class, network_path
 from paani_tools.doctor.finding import Verdict, failed, passed, warned
 from paani_tools.up.plan import EYE, NEEDED
 
@@ -71,14 +71,18 @@ def check_models(config: Config) -> Iterator[Verdict]:
     """Loads each model that these settings use, which compares its checksum or its shapes."""
     settings = config.perception
     engine = engine_class(settings.engine)
-    wanted = [("detector", settings.detector, engine)]
+    wanted = [("detector", settings.detector)]
     if settings.segmenter != "none":
-        wanted.append(("segmenter", settings.segmenter, engine))
-    if settings.image_quality.enabled and settings.image_quality.min_fitness > 0.0:
-        wanted.append(("gate", settings.image_quality.model, OnnxEngine))
-    for role, path, kind in wanted:
+        wanted.append(("segmenter", settings.segmenter))
+    quality = settings.image_quality
+    if quality.enabled and quality.min_fitness > 0.0 and (quality.model or settings.weights == "full"):
+        wanted.append(("gate", quality.model))
+    for role, path in wanted:
         try:
-            yield passed(kind.load(role, path, 1).info())
+            if role == "gate":
+                yield passed(OnnxEngine.load(role, path, 1).info())
+            else:
+                yield passed(engine.load(role, network_path(role, settings), 1).info())
         except UserError as error:
             remedy = f"see `paani models check {path}`" if path else "install paani again: its files are damaged"
             yield failed(str(error), remedy)

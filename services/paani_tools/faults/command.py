@@ -14,7 +14,7 @@ from paani.messages import UnusableCause
 from paani.option_paths import input_file, input_folder, output_file
 from paani.whole_file import indented_json, write_whole
 from paani_services.perception.corridors import classify_cells
-from paani_services.perception.engine import engine_class
+from paani_services.perception.engine import load_network
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.preprocessing import lookup_tables_for, stretch_picture
@@ -38,9 +38,9 @@ class PictureModels:
     def __init__(self, config: PerceptionConfig) -> None:
         """Raises UserError for a model that cannot be used."""
         self._config = config
-        self._segmenter = engine_class(config.engine).load("segmenter", config.segmenter, config.intra_op_threads)
+        self._segmenter = load_network("segmenter", config, config.intra_op_threads)
         self._table = lookup_tables_for(self._segmenter.contract)
-        self._fitness = load_fitness(config.image_quality, config.intra_op_threads)
+        self._fitness = load_fitness(config, config.intra_op_threads)
 
     def segment(self, bgr: U8) -> U8:
         """Classes uint8 [64, 80]."""

@@ -108,7 +108,7 @@ class PeopleConfig(Section, frozen=True):
 
     `ahead_m`, `slow_m`, `stop_m`: distances within which a person blocks the way ahead, limits the speed, and stops the
     boat; they need a calibration. Without one everybody counts as near, a box of `stop_height` stops the boat, and no
-    advice is to be followed faster than `uncalibrated_mps`, whoever is seen.
+    advice is to be followed faster than `uncalibrated_mps`, whoever is seen; nor is it by the open weights.
     """
 
     use: bool = True  # J1: a person is a box

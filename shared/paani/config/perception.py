@@ -10,6 +10,7 @@ from typing import Literal
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
 EngineName = Literal["onnxruntime", "ncnn"]
+WeightSet = Literal["full", "open"]
 
 
 class CameraConfig(Section, frozen=True):
@@ -113,7 +114,11 @@ class CorridorConfig(Section, frozen=True):
 
 
 class PerceptionConfig(Section, frozen=True):
-    """`ego_polygon`: normalised corners of the own hull in the picture; what lies inside is no evidence.
+    """`weights`: the set of the networks that have no path of their own: `full` has learnt from every source and is for
+    research; `open` has learnt from few that anyone may use, sees worse, and limits the speed as an uncalibrated
+    camera does.
+
+    `ego_polygon`: normalised corners of the own hull in the picture; what lies inside is no evidence.
 
     `engine` runs detector and segmenter; `ncnn` needs the files that `paani models convert` makes, and is chosen by
     `paani models bench` on the machine itself. The fitness network always runs by onnxruntime.
@@ -124,6 +129,7 @@ class PerceptionConfig(Section, frozen=True):
     concurrent: bool = True  # both networks at once on two cores; B4: one after the other
     engine: EngineName = "onnxruntime"
     intra_op_threads: Size = 1  # of each network; two networks with one each use two cores best
+    weights: WeightSet = "full"
     segmenter: str = ""  # path of an ONNX file; empty: the shipped model; "none": the fallback alone (F1)
     detector: str = ""  # path of an ONNX file; empty: the shipped model
     temperature: Positive = 1.0  # of the softmax of the mask; above 1 it is less sure of itself

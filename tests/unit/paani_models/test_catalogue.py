@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_models.catalogue import WEIGHTS, load_catalogue, verified_path
+from paani_models.catalogue import OPEN_WEIGHTS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands.models import main
+from paani_models.datasets.terms import OPEN_LICENCE, OPEN_TERMS, states_open_terms
 from paani_models.engines.onnx_runner import open_network
 from paani_models.network_input import detector_input, segmenter_input
 from paani_models.training.augment import draw_null_picture
@@ -32,6 +33,18 @@ def test_both_models_are_shipped_with_their_class_orders_c2_d6() -> None:
     assert set(catalogue) == {"segmenter", "detector", "gate"}
     assert catalogue["segmenter"].classes == ("water", "obstacle", "sky")
     assert catalogue["detector"].classes == ("person", "vessel", "pier", "buoy")
+
+
+def test_the_open_set_has_the_same_contracts_and_learnt_from_what_anyone_may_use() -> None:
+    shipped, chosen = load_catalogue(), load_catalogue(OPEN_WEIGHTS)
+    assert set(chosen) == {"segmenter", "detector"}
+    for name, model in chosen.items():
+        same = ("file", "input", "output", "classes", "preprocessing", "parameters")
+        assert [getattr(model, field) for field in same] == [getattr(shipped[name], field) for field in same]
+        assert model.licence == OPEN_LICENCE != shipped[name].licence
+        assert {origin.name for origin in model.origins} <= set(OPEN_TERMS)
+        assert all(states_open_terms(origin.licence, OPEN_TERMS[origin.name]) for origin in model.origins)
+        assert verified_path(name, OPEN_WEIGHTS).stat().st_size == model.size_bytes
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -84,6 +97,8 @@ def test_an_unknown_model_is_named() -> None:
 
 
 def test_check_command_needs_no_torch(capsys: pytest.CaptureFixture[str], copied: Path) -> None:
+    assert main(["check"]) == 0
+    assert "open segmenter: segmenter.onnx" in capsys.readouterr().out
     assert main(["check", "--weights", str(copied)]) == 0
     assert "1362395 parameters, ok" in capsys.readouterr().out
     (copied / "detector.onnx").write_bytes(b"not a net")

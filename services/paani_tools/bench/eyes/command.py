@@ -20,6 +20,7 @@ from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_json
 from paani_models.catalogue import verified_path
+from paani_services.perception.engine import network_path
 from paani_services.perception.picture_decoding import decode_picture
 from paani_tools.bench.eyes.drawn_scene import SIZE_WH, draw_scene
 from paani_tools.bench.eyes.memory import Footprint
@@ -181,7 +182,7 @@ def _footprint(config: Config) -> Footprint:
 
 
 def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair: Path | None) -> tuple[Work, ...]:
-    given = {"detector": config.detector, "segmenter": config.segmenter}
+    given = {role: network_path(role, config) for role in ("detector", "segmenter")}
     used = {role: Path(path) if path else verified_path(role) for role, path in given.items()}
     found = [count_work("nets in use", used.values())]
     for candidate in candidates:

@@ -14,7 +14,7 @@ from paani.messages import PictureHeader, UnusableCause
 from paani.statistics.order_statistics import median, nearest_rank
 from paani_services.perception.box_decoding import decode_boxes
 from paani_services.perception.corridors import classify_cells, summarise_corridors
-from paani_services.perception.engine import OnnxEngine, engine_class
+from paani_services.perception.engine import OnnxEngine, load_network, network_path
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.pipeline import Perceiver
@@ -59,7 +59,7 @@ class Candidate(msgspec.Struct, frozen=True):
 
 def usable_pictures(pictures: Sequence[U8], config: PerceptionConfig) -> list[U8]:
     """Those that the image-quality check lets through: the others would cost a pipeline nothing."""
-    fitness = load_fitness(config.image_quality, 1)
+    fitness = load_fitness(config, 1)
     return [
         p
         for p in pictures
@@ -151,12 +151,12 @@ def steps(
 
 def _stages(config: PerceptionConfig) -> dict[str, Step]:
     """The pipeline's own steps, one thread each, on the picture at hand; later ones on what a first picture gave."""
-    detector = engine_class(config.engine).load("detector", config.detector, 1)
-    segmenter = engine_class(config.engine).load("segmenter", config.segmenter, 1)
+    detector = load_network("detector", config, 1)
+    segmenter = load_network("segmenter", config, 1)
     table_d, table_s = lookup_tables_for(detector.contract), lookup_tables_for(segmenter.contract)
     (height, width), (rows_s, columns_s) = detector.contract.size_hw, segmenter.contract.size_hw
     grey = detector.contract.preprocessing.pad_grey
-    fitness = load_fitness(config.image_quality, 1)
+    fitness = load_fitness(config, 1)
     blank = np.zeros((240, 320, 3), np.uint8)
     tensor, place = letterbox_picture(blank, height, width, grey, table_d)
     stretched = stretch_picture(blank, rows_s, columns_s, table_s)
@@ -175,8 +175,8 @@ def _stages(config: PerceptionConfig) -> dict[str, Step]:
 
 
 def _bare(config: PerceptionConfig, threads: int) -> Step:
-    detector = engine_class(config.engine).load("detector", config.detector, threads)
-    segmenter = engine_class(config.engine).load("segmenter", config.segmenter, threads)
+    detector = load_network("detector", config, threads)
+    segmenter = load_network("segmenter", config, threads)
     inputs = [np.zeros(e.contract.input.shape, e.contract.input.dtype) for e in (detector, segmenter)]
 
     def both(_: U8) -> None:
@@ -200,6 +200,6 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
 
 
 def _paper_shaped(config: PerceptionConfig) -> Step:
-    detector = OnnxEngine.load("detector", config.detector, 2, spinning=True)
-    segmenter = OnnxEngine.load("segmenter", config.segmenter, 2, spinning=True, full_size=True)
+    detector = OnnxEngine.load("detector", network_path("detector", config), 2, spinning=True)
+    segmenter = OnnxEngine.load("segmenter", network_path("segmenter", config), 2, spinning=True, full_size=True)
     return lambda bgr: paper_shaped.perceive(bgr, detector.run, segmenter.run, config.detections, config.corridors)

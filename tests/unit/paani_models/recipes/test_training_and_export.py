@@ -18,7 +18,13 @@ from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
 from paani_models.network_input import segmenter_batch  # noqa: E402
-from paani_models.recipes.onnx_export import CONTRACTS, build_network, largest_export_difference, write_onnx  # noqa: E402
+from paani_models.recipes.onnx_export import (  # noqa: E402
+    CONTRACTS,
+    SmallerInside,
+    build_network,
+    largest_export_difference,
+    write_onnx,
+)
 from paani_models.recipes.train_and_export import TrainingOptions, parse_stages, start_detector  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
@@ -170,6 +176,12 @@ def test_rendered_pictures_are_two_in_ten_of_the_shown_ones(river: list[CachedPi
     assert len(indices) == 9
 
 
+def test_rendered_pictures_alone_are_shown_once_each(river: list[CachedPicture]) -> None:
+    rendered = [replace(item, source="rendered") for item in river]
+    order = segmenter_train.draw_epoch(rendered, SMALL, 0)
+    assert sorted(i for i in order if i >= 0) == list(range(len(rendered)))
+
+
 def test_learning_rate_warms_up_and_ends_at_one_hundredth_s3() -> None:
     rates = [learning_rate(1.0, step, 100, 10) for step in range(101)]
     assert rates[0] == pytest.approx(0.1)
@@ -237,6 +249,30 @@ def test_export_equals_the_net_on_pictures_t2(tmp_path: Path, name: str) -> None
     rng = np.random.default_rng(0)
     inputs = [rng.random(CONTRACTS[name].input.shape, dtype=np.float32) for _ in range(2)]
     assert largest_export_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+
+
+def test_a_segmenter_that_looks_at_a_smaller_picture_keeps_its_contract(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    inner = build_network("segmenter").eval()
+    net = SmallerInside(inner, (128, 160)).eval()
+    write_onnx(net, CONTRACTS["segmenter"], tmp_path / "net.onnx")
+    inputs = [np.random.default_rng(0).random(CONTRACTS["segmenter"].input.shape, dtype=np.float32)]
+    assert largest_export_difference(net, tmp_path / "net.onnx", inputs) <= 1e-3
+    small = torch.nn.functional.interpolate(torch.from_numpy(inputs[0]), size=(128, 160), mode="bilinear")
+    with torch.no_grad():
+        seen = torch.nn.functional.interpolate(inner(small), size=(256, 320), mode="bilinear")
+        assert torch.allclose(net(torch.from_numpy(inputs[0])), seen, atol=1e-5)
+
+
+@pytest.mark.parametrize("words", [["detector", "--looks-at", "128x160"], ["segmenter", "--looks-at", "100x160"]])
+def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "surf_people").mkdir()
+    (tmp_path / "surf_people" / "manifest.json").write_text('{"items":[]}')
+    where = ["--data", str(tmp_path), "--sources", "surf_people", "--checkpoint", "last.pt", "--weights", str(tmp_path)]
+    assert main(["export", *words, *where]) == 2
+    assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
 
 
 def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> None:

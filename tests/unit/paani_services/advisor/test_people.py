@@ -351,6 +351,16 @@ def test_an_uncalibrated_camera_is_never_followed_fast(slow_mps: float, uncalibr
     assert play([CLEAR], measured)[1][0].speed_limit_mps is msgspec.UNSET
 
 
+@given(FRAMES, st.booleans())
+def test_by_the_open_weights_no_advice_is_followed_fast(frame: m.Evidence, is_paper: bool) -> None:
+    config = PAPER if is_paper else CALIBRATED
+    chosen = msgspec.structs.replace(config, perception=msgspec.structs.replace(config.perception, weights="open"))
+    advisory = play([frame], chosen)[1][0]
+    assert isinstance(advisory.speed_limit_mps, float)
+    assert advisory.speed_limit_mps <= PAANI.advisor.people.uncalibrated_mps
+    assert advisory.direction is play([frame], config)[1][0].direction
+
+
 def test_the_nearest_is_the_least_known_distance() -> None:
     crowd = (person(distance_m=9.0), person(), person(distance_m=4.0), person(distance_m=2.0))
     assert nearest_ahead_m(crowd, (0, 1, 2)) == 4.0

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from paani.config import ImageQualityConfig, load_config
+from paani.config import ImageQualityConfig, PerceptionConfig, load_config
 from paani.messages import UnusableCause
 from paani.picture_faults import apply_fault
 from paani_services.perception.fitness import load_fitness
@@ -17,7 +17,7 @@ from tests.places import DATA
 
 C = UnusableCause
 ON = ImageQualityConfig()
-FITNESS = load_fitness(ON, 1)
+FITNESS = load_fitness(PerceptionConfig(image_quality=ON), 1)
 
 
 @pytest.mark.parametrize(("name", "causes"), [

@@ -9,7 +9,8 @@ import pytest
 
 from paani import messages as m
 from paani.config import calibration_of, load_config
-from paani_services.perception.service import sight_note, warn_uncalibrated
+from paani.errors import UserError
+from paani_services.perception.service import judge_open_weights, sight_note, warn_uncalibrated
 
 ASSUMED, PAPER = load_config(), load_config(profile="paper")
 MEASURED = msgspec.structs.replace(ASSUMED, calibration=calibration_of(ASSUMED.eye))
@@ -27,6 +28,26 @@ def test_the_log_says_what_is_assumed_and_what_measures_it(caplog: pytest.LogCap
     assert "everybody in view counts as near" in caplog.messages[0]
     assert "advisor.people.uncalibrated_mps" in caplog.messages[0]
     assert "`paani calibrate RECORDING`" in caplog.messages[0]
+
+
+def test_the_log_and_the_page_say_that_the_weights_are_the_open_ones(caplog: pytest.LogCaptureFixture) -> None:
+    chosen = load_config(sets=("perception.weights=open",))
+    with caplog.at_level(logging.WARNING):
+        for config in (MEASURED, PAPER):
+            judge_open_weights(config)
+        assert caplog.messages == []
+        judge_open_weights(chosen)
+    assert "learnt from few pictures" in caplog.messages[0]
+    assert "advisor.people.uncalibrated_mps" in caplog.messages[0]
+    assert sight_note(SEEN, chosen).endswith("; open weights, which miss more, speed limited; one, other")
+
+
+def test_a_hull_is_not_steered_by_a_segmenter_that_has_never_seen_real_water(caplog: pytest.LogCaptureFixture) -> None:
+    sets = ["perception.weights=open"]
+    with pytest.raises(UserError, match=r"perception\.weights open: .* perception\.segmenter"):
+        judge_open_weights(load_config(profile="hull", sets=sets))
+    judge_open_weights(load_config(profile="hull", sets=[*sets, "perception.segmenter=own.onnx"]))
+    assert "people" in caplog.messages[0]
 
 
 def test_the_page_says_whether_distances_are_known() -> None:
