@@ -24,6 +24,7 @@ STILL = Sticks(0, 0)
 CHANNEL = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0, "DZ": 0.0, "REVERSED": 0.0}
 STICKS = {
     "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0, "RC_OPTIONS": 32.0, "MOT_THR_MAX": 100.0,
+    "SERVO2_FUNCTION": 73.0, "SERVO16_FUNCTION": 74.0,
     **{f"RC{number}_{field}": value for number in (1, 3) for field, value in CHANNEL.items()},
 }  # fmt: skip
 ROUND = Channel(1000, 2000, 1500, 0, False)

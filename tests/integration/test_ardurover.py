@@ -65,8 +65,13 @@ class Boat(ThrusterBus):
                 self.armed = False
                 await until(lambda: self.cause is m.ZeroCause.NOT_ARMED and not self.problem, BOOT_S)
                 self.armed = True
-                await until(lambda: self.cause is m.ZeroCause.NONE or "disarm and arm again" in self.problem, BOOT_S)
+                await until(self._is_answered, BOOT_S)
                 self.refusals += [self.problem] if self.problem else []
+
+    def _is_answered(self) -> bool:
+        """Armed, refused, or never heard to be disarmed."""
+        is_refused = "disarm and arm again" in self.problem
+        return is_refused or self.cause in {m.ZeroCause.NONE, m.ZeroCause.REARM}
 
     async def until_motors(self, left: float, right: float) -> None:
         """Until the autopilot's outputs are these."""

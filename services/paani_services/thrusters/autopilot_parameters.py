@@ -13,7 +13,9 @@ STEERING, THROTTLE = "RCMAP_ROLL", "RCMAP_THROTTLE"
 THROTTLE_MOST = "MOT_THR_MAX"
 CHANNEL_FIELDS = ("MIN", "MAX", "TRIM", "DZ", "REVERSED")
 CHANNELS = 16
-ASKED_AT_ONCE = 8  # the autopilot keeps twenty questions and drops the rest
+SIDES = {73: "left", 74: "right"}  # SERVOn_FUNCTION of a motor on that side
+OUTPUTS = tuple(f"SERVO{number}_FUNCTION" for number in range(1, 17))
+ASKED_AT_ONCE = 16  # the autopilot keeps twenty questions and drops the rest
 
 
 class Requirement(NamedTuple):
@@ -80,6 +82,8 @@ class ParameterTable:
             for name in requirement.names
         ]
         unknown += [name for name in self._names_of_sticks() if name not in self._read]
+        if self._side_without_motor():
+            unknown += [name for name in OUTPUTS if name not in self._read]
         return writes, [*(write.name for write in writes), *unknown[:ASKED_AT_ONCE]]
 
     def problem(self) -> str:
@@ -106,7 +110,7 @@ class ParameterTable:
                 return f"parameters {self._prefix(mapping)}MIN, TRIM, MAX and DZ: {problem}"
         if self._read[THROTTLE] == self._read[STEERING]:
             return f"parameters {THROTTLE} and {STEERING} read the same, {self._read[THROTTLE]:g}"
-        return ""
+        return self._side_without_motor()
 
     def mixer(self) -> StickMixer:
         """Of the sticks as they were read; only while there is no problem."""
@@ -121,6 +125,12 @@ class ParameterTable:
             if self._is_channel(mapping):
                 names += [self._prefix(mapping) + field for field in CHANNEL_FIELDS]
         return names
+
+    def _side_without_motor(self) -> str:
+        """What lacks for two sides; where the autopilot turns by a rudder, both."""
+        found = {self._read[name] for name in OUTPUTS if name in self._read}
+        lacking = [f"{number}, thrust of the {side} side" for number, side in SIDES.items() if number not in found]
+        return f"parameters {OUTPUTS[0]} to {OUTPUTS[-1]}: none reads {lacking[0]}" if lacking else ""
 
     def _is_channel(self, mapping: str) -> bool:
         return self._read.get(mapping, 0.0) in range(1, CHANNELS + 1)
