@@ -3,7 +3,7 @@
 
 import { chooseFrame } from "./frame_matching.js";
 import { drawBoxes, drawCorridors, drawCorridorTop, drawMask, drawOwnHull } from "./overlay.js";
-import { ageText, byId, setText, words } from "./text.js";
+import { CAMERA_TEXTS, ageText, byId, setText, words } from "./text.js";
 
 const OPACITY_KEY = "paani-overlay-opacity";
 /** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
@@ -98,7 +98,7 @@ export class Camera {
     this.ctx.clearRect(0, 0, this.canvas.width, this.canvas.height);
     this.overlay = { ...NOTHING };
     setText(byId("camera-id"), "");
-    setText(byId("camera-note"), "No picture of this moment");
+    setText(byId("camera-note"), CAMERA_TEXTS.noneThen);
   }
 
   /** @param {number} now @param {any} header @param {any} evidence */
@@ -107,12 +107,12 @@ export class Camera {
     const newest = this.view.store.get("camera/picture");
     const behind = newest ? newest.frame_seq - header.frame_seq : 0;
     this.canvas.classList.toggle("stale", !fresh);
-    setText(byId("camera-id"), `frame ${header.frame_seq}${behind > 0 ? ` of ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
+    setText(byId("camera-id"), `${CAMERA_TEXTS.frame} ${header.frame_seq}${behind > 0 ? ` ${CAMERA_TEXTS.of} ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
     setText(
       byId("camera-note"),
-      !fresh ? (ageS > this.view.store.limitS("camera/picture") ? `Last picture ${ageText(ageS)} ago` : "Pictures come with gaps")
-        : !evidence ? "No evidence for this frame: overlay left out"
-        : !evidence.usable ? `Picture unusable: ${words(evidence.cause)}` : "",
+      !fresh ? (ageS > this.view.store.limitS("camera/picture") ? CAMERA_TEXTS.last(ageText(ageS)) : CAMERA_TEXTS.gaps)
+        : !evidence ? CAMERA_TEXTS.noEvidence
+        : !evidence.usable ? `${CAMERA_TEXTS.unusable}: ${words(evidence.cause)}` : "",
     );
   }
 

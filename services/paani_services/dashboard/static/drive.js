@@ -5,7 +5,7 @@
 
 import { isReplay } from "./inhibits.js";
 import { hand, hasKey, post } from "./requests.js";
-import { MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, setText } from "./text.js";
+import { DRIVE_TEXTS, MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, setText } from "./text.js";
 import { describeWheel } from "./wheel.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
@@ -163,8 +163,8 @@ export function renderDrive(store, open, now, isAway) {
   }
   byId("drive-hand").hidden = !canDrive;
   const leftS = operator ? operator.override_ms / 1000 : 0;
-  setText(byId("drive-override"), leftS > 0 ? `Advice overridden, ${fixed(leftS, 0)} s left` : "Override the advice for 10 s");
+  setText(byId("drive-override"), leftS > 0 ? DRIVE_TEXTS.overridden(fixed(leftS, 0)) : DRIVE_TEXTS.override);
   byId("drive-override").dataset.on = String(leftS > 0);
   const vetoes = canDrive && store.isFresh("navigator/command", now) ? (store.get("navigator/command").vetoes ?? []) : [];
-  setText(byId("drive-note"), refusal || (vetoes.length ? "The advice gives no thrust ahead" : ""));
+  setText(byId("drive-note"), refusal || (vetoes.length ? DRIVE_TEXTS.vetoed : ""));
 }

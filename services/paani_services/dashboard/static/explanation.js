@@ -1,12 +1,12 @@
 // @ts-check
 // The explanation panel: steps of the decision, risk of the three corridors, input; and the panel of tracks.
 
-import { ageText, byId, fixed, make, reasonText, setFacts, setText, trackLabel, words } from "./text.js";
+import { EXPLANATION_TEXTS, ageText, byId, fixed, make, reasonText, setFacts, setText, trackLabel, words } from "./text.js";
 import { weightsInForce } from "./tuning.js";
 
-const CORRIDORS = [["left", "Left"], ["center", "Centre"], ["right", "Right"]];
+const CORRIDORS = Object.entries(EXPLANATION_TEXTS.corridors);
 const PARTS = [["non_water", "n", "N"], ["obstacle", "o", "O"], ["urgency", "m", "M"], ["uncertainty", "u", "U"]];
-const STEPS = ["Picture", "Age", "Centre", "Sides", "Advice"];
+const STEPS = EXPLANATION_TEXTS.steps;
 /** Index in STEPS of the step that decided. @type {Record<string, number>} */
 const STEP_OF_REASON = {
   UNUSABLE_IMAGE: 0, MALFORMED_EVIDENCE: 0, NO_EVIDENCE: 0, STALE_EVIDENCE: 1, FUTURE_EVIDENCE: 1,
@@ -41,11 +41,11 @@ export function renderExplanation(store, now) {
   const advisory = store.get("advisor/advisory"), settings = store.get("dashboard/settings");
   const fresh = store.isFresh("advisor/advisory", now), panel = /** @type {HTMLElement} */ (document.querySelector(".why"));
   for (const part of panel.children) if (part.tagName !== "HEADER" && part.id !== "stages") part.classList.toggle("stale", !fresh);
-  setText(byId("why-age"), advisory ? `${fresh ? "" : "stale, "}${ageText(store.ageS("advisor/advisory", now))}` : "no advice received");
+  setText(byId("why-age"), advisory ? `${fresh ? "" : EXPLANATION_TEXTS.stale}${ageText(store.ageS("advisor/advisory", now))}` : EXPLANATION_TEXTS.none);
   panel.dataset.empty = String(!advisory);
   const tracks = store.get("advisor/tracks");
   byId("tracks").classList.toggle("stale", !store.isFresh("advisor/tracks", now));
-  setText(byId("tracks-sum"), tracks?.tracks.length ? `${tracks.tracks.length} tracked${advisory ? `, ${advisory.contributing_track_ids.length} in the risk` : ""}` : "");
+  setText(byId("tracks-sum"), tracks?.tracks.length ? EXPLANATION_TEXTS.tracked(tracks.tracks.length, advisory?.contributing_track_ids.length) : "");
   renderTracks(tracks, new Set(advisory?.contributing_track_ids));
   if (!advisory || !settings) return;
   setText(byId("explanation"), advisory.explanation || reasonText(advisory.reason));
@@ -71,7 +71,7 @@ function renderCorridor(row, lane, limit, weights) {
   row.row.dataset.blocked = String(lane.blocked);
   row.limit.style.left = `${limit * 100}%`;
   setText(row.risk, fixed(lane.risk));
-  setText(row.verdict, lane.occupied ? "occupied" : lane.blocked ? "blocked" : "clear");
+  setText(row.verdict, EXPLANATION_TEXTS.verdicts[lane.occupied ? "occupied" : lane.blocked ? "blocked" : "clear"]);
   for (const [part, , letter] of PARTS) {
     row[part].style.width = `${weights[part] * lane[part] * 100}%`;
     setText(row[`${part}_text`], `${letter} ${fixed(lane[part])}`);
@@ -83,10 +83,10 @@ function renderCorridor(row, lane, limit, weights) {
 function renderInput(evidence, advisory, ageS) {
   const timing = evidence?.timing;
   setFacts(byId("input"), [
-    ["Picture", evidence ? (evidence.usable ? "usable" : `unusable: ${words(evidence.cause)}`) : "none", Boolean(evidence && !evidence.usable)],
-    ["Age", ageText(ageS), false],
-    ["Mask", evidence ? words(evidence.segmentation) : "–", Boolean(evidence && evidence.segmentation !== "learned")],
-    ["Inference", timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
+    [EXPLANATION_TEXTS.input.picture, evidence ? (evidence.usable ? EXPLANATION_TEXTS.usable : `${EXPLANATION_TEXTS.unusable}: ${words(evidence.cause)}`) : EXPLANATION_TEXTS.noPicture, Boolean(evidence && !evidence.usable)],
+    [EXPLANATION_TEXTS.input.age, ageText(ageS), false],
+    [EXPLANATION_TEXTS.input.mask, evidence ? words(evidence.segmentation) : "–", Boolean(evidence && evidence.segmentation !== "learned")],
+    [EXPLANATION_TEXTS.input.inference, timing ? `${fixed(timing.inference_ms, 0)} ms` : "–", false],
   ]);
 }
 
@@ -94,14 +94,14 @@ function renderInput(evidence, advisory, ageS) {
 function renderTracks(message, counting) {
   const tracks = message?.tracks ?? [], list = byId("tracks");
   if (!tracks.length) {
-    list.replaceChildren(make("p", "quiet", "No tracks"));
+    list.replaceChildren(make("p", "quiet", EXPLANATION_TEXTS.noTracks));
     return;
   }
   list.replaceChildren(
     ...tracks.map((/** @type {any} */ track) => {
       const row = make("div"), known = track.motion === "unknown" ? "" : track.motion;
       row.dataset.counts = String(counting.has(track.id));
-      row.append(make("span", "", trackLabel(track)), make("span", "", [track.held ? "unseen" : "", known].filter(Boolean).join(", ")));
+      row.append(make("span", "", trackLabel(track)), make("span", "", [track.held ? EXPLANATION_TEXTS.unseen : "", known].filter(Boolean).join(", ")));
       return row;
     }),
   );

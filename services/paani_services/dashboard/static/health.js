@@ -2,7 +2,7 @@
 // The health tab: one row per process with its state, rate, delays, age of its report, load, and what it dropped and why.
 
 import { bindProcessLog } from "./process_log.js";
-import { ageText, byId, fixed, make, setText } from "./text.js";
+import { HEALTH_TEXTS, ageText, byId, fixed, make, setText } from "./text.js";
 
 /** The main output of each process; its rate is shown. @type {Record<string, string>} */
 const MAIN_TOPIC = {
@@ -35,7 +35,7 @@ export function renderHealth(store, open, now) {
     cpu += alive ? report.cpu_cores : 0;
     const [, state, rate, middle, late, age, cores, memory, files, warmth, starts, dropped, says] = rowCells(name);
     const isRecorded = settings.mode === "replay" && name !== "dashboard"; // it need not run
-    const [word, kind] = isRecorded ? [fresh ? "recorded" : "not played", "quiet"] : alive ? ["ready", "good"] : life?.alive && open ? ["no report", "bad"] : life?.starts ? ["stopped", "bad"] : ["not started", "warn"];
+    const [word, kind] = isRecorded ? [fresh ? HEALTH_TEXTS.recorded : HEALTH_TEXTS.notPlayed, "quiet"] : alive ? [HEALTH_TEXTS.ready, "good"] : life?.alive && open ? [HEALTH_TEXTS.silent, "bad"] : life?.starts ? [HEALTH_TEXTS.stopped, "bad"] : [HEALTH_TEXTS.notStarted, "warn"];
     const delays = name in MADE_OF_NOTHING ? [] : store.delaysMs(MAIN_TOPIC[name]);
     setText(state, word);
     state.className = kind;
@@ -48,15 +48,15 @@ export function renderHealth(store, open, now) {
     setText(late, delayText(delays, 0.95));
     setText(files, report?.open_files ? String(report.open_files) : "–");
     setText(warmth, report?.temperature_c ? fixed(report.temperature_c, 0) : "–");
-    setText(dropped, drops ? report.drops.filter((/** @type {any} */ drop) => drop.count).map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? "none" : "–");
+    setText(dropped, drops ? report.drops.filter((/** @type {any} */ drop) => drop.count).map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? HEALTH_TEXTS.noDrops : "–");
     setText(says, report?.note ?? "");
     dropped.className = drops ? "warn wide" : "wide";
     setText(starts, life ? String(life.starts) : "–");
     starts.className = life?.starts > 1 ? "warn number" : "number";
     for (const cell of [rate, age, cores, memory, files, warmth, dropped]) cell.classList.toggle("stale", !fresh);
   }
-  setText(byId("health-sum"), settings.mode === "replay" ? "" : `${ready} of ${settings.services.length}`);
-  byId("health-sum").title = `${ready} of ${settings.services.length} ready, ${fixed(cpu, 2)} cores`;
+  setText(byId("health-sum"), settings.mode === "replay" ? "" : HEALTH_TEXTS.sum(ready, settings.services.length));
+  byId("health-sum").title = HEALTH_TEXTS.sumTitle(ready, settings.services.length, fixed(cpu, 2));
 }
 
 /** A quantile of the time from what a message is made of until it was sent. @param {number[]} delaysMs @param {number} part */

@@ -1,7 +1,7 @@
 // @ts-check
 // Every reason why the boat does not move, in order from the picture to the thrust gate. Pure.
 
-import { STAGES, STOP_REASONS, reasonText, words } from "./text.js";
+import { INHIBIT_TEXTS, STAGES, STOP_REASONS, reasonText, words } from "./text.js";
 
 /** @typedef {{stage: string, code: string, text: string}} StopReason */
 
@@ -45,8 +45,8 @@ export function findInhibits(store, now) {
     if (!store.isFresh(key, now) && !isReplay(store)) add(stage, "SILENT", STAGES[stage][1]);
   }
   const evidence = fresh(store, "perception/evidence", now), operator = fresh(store, "operator/state", now);
-  if (evidence && !evidence.usable) add("perception", "UNUSABLE", `picture unusable: ${words(evidence.cause)}`);
-  if (operator?.stopped) add("operator", "NOT_ARMED", "STOP holds: hold the button to arm, which releases it");
+  if (evidence && !evidence.usable) add("perception", "UNUSABLE", `${INHIBIT_TEXTS.unusable}: ${words(evidence.cause)}`);
+  if (operator?.stopped) add("operator", "NOT_ARMED", INHIBIT_TEXTS.stopHolds);
   for (const [stage, key] of TOPICS) {
     for (const inhibit of fresh(store, key, now)?.inhibits ?? []) add(STAGE_OF_INHIBIT[inhibit] ?? stage, inhibit, inhibitText(store, inhibit));
   }

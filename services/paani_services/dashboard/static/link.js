@@ -2,7 +2,7 @@
 // The link: age of the newest message from the boat. A loss stays red until somebody has seen it.
 
 import { isReplay } from "./inhibits.js";
-import { ageText, byId, fixed, setText } from "./text.js";
+import { LINK_TEXTS, ageText, byId, fixed, setText } from "./text.js";
 
 const LINK_TIMEOUT_S = 1.5;
 let longestLossS = 0, lostAt = "";
@@ -22,7 +22,7 @@ export function renderLink(store, open, now) {
   document.body.dataset.loss = unseen ? "unseen" : "";
   byId("link-seen").hidden = !unseen;
   const isFile = open && Boolean(store.get("dashboard/settings")?.replayed);
-  setText(byId("link-word"), isFile ? "replay" : lost ? `LOST ${ageText(silenceS)}` : never ? "waiting" : silent ? "not playing" : `live ${fixed(silenceS, 1)} s`);
-  setText(byId("link-age"), unseen ? `was lost ${ageText(longestLossS)}, ${lostAt}` : !open ? "no connection" : isFile ? "of a file" : silent ? "no data" : never ? "for data" : "age of data");
-  document.title = lost ? "LOST · PAANI" : "PAANI";
+  setText(byId("link-word"), isFile ? LINK_TEXTS.replay : lost ? `${LINK_TEXTS.lost} ${ageText(silenceS)}` : never ? LINK_TEXTS.waiting : silent ? LINK_TEXTS.notPlaying : `${LINK_TEXTS.live} ${fixed(silenceS, 1)} s`);
+  setText(byId("link-age"), unseen ? `${LINK_TEXTS.wasLost} ${ageText(longestLossS)}, ${lostAt}` : !open ? LINK_TEXTS.noConnection : isFile ? LINK_TEXTS.ofFile : silent ? LINK_TEXTS.noData : never ? LINK_TEXTS.forData : LINK_TEXTS.age);
+  document.title = lost ? `${LINK_TEXTS.lost} · PAANI` : "PAANI";
 }

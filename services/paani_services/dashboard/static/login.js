@@ -1,9 +1,10 @@
 // @ts-check
 // The login: the operator's key once, for a session that scripts cannot read. STOP works without it.
 
+import "./page_text.js"; // before any script looks at what it says
 import { bindPalette } from "./palette.js";
 import { bindStop, pendingStop } from "./stop.js";
-import { byId, setText } from "./text.js";
+import { LOGIN_TEXTS, byId, setText } from "./text.js";
 
 const RENDER_PERIOD_MS = 100;
 let isLatched = false;
@@ -15,12 +16,12 @@ async function logIn(key) {
     if (answer.ok) location.replace("/");
     else setText(byId("login-note"), sentence(answer.status, (await answer.json()).error));
   } catch {
-    setText(byId("login-note"), "No connection to the dashboard.");
+    setText(byId("login-note"), LOGIN_TEXTS.noConnection);
   }
 }
 
 /** @param {number} status @param {string} error */
-const sentence = (status, error) => (status === 403 && error.startsWith("key") ? "That is not the operator's key." : error);
+const sentence = (status, error) => (status === 403 && error.startsWith("key") ? LOGIN_TEXTS.wrongKey : error);
 
 /** A terminal's address has the key after `#`, from where no server and no log sees it. */
 function takeKey() {
@@ -36,7 +37,7 @@ function renderStop() {
   const note = byId("stop-note");
   note.dataset.state = pending?.state ?? (isLatched ? "stopped" : "");
   if (pending) setText(note, `${pending.word}: ${pending.detail}`);
-  else if (isLatched) setText(note, "STOPPED: latched until an operator arms.");
+  else if (isLatched) setText(note, LOGIN_TEXTS.latched);
 }
 
 byId("login").addEventListener("submit", (/** @type {Event} */ event) => {

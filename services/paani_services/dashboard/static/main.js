@@ -1,6 +1,7 @@
 // @ts-check
 // Connects the WebSocket to the store and the panels.
 
+import "./page_text.js"; // before any script looks at what it says
 import { alertOf, alertOfLink, bindAlerts } from "./alerts.js";
 import { Camera } from "./camera.js";
 import { renderDevices } from "./devices.js";

@@ -2,6 +2,7 @@
 // Draws on the map where the boat is, where it was, and the route it follows.
 
 import { drawWords } from "./map_ground.js";
+import { MAP_TEXTS } from "./text.js";
 
 const FONT = "12px system-ui, sans-serif";
 
@@ -30,7 +31,7 @@ export function drawRoute({ ctx, toScreen, pxPerM, colour }, route, next, accept
     if (isNext) {
       ctx.fillStyle = colour("--quiet");
       ctx.font = FONT;
-      drawWords({ ctx, colour }, `next ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
+      drawWords({ ctx, colour }, `${MAP_TEXTS.next} ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
     }
   });
 }

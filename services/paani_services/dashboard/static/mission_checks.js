@@ -3,6 +3,7 @@
 // exactly and whole, before it is in force; these marks say beforehand where it would refuse, and what it does not know:
 // a turn too tight for the hull, and cells in which the boat has seen something. Pure.
 
+import { FAULT_TEXTS } from "./text.js";
 import { between, clearance, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
 
 const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
@@ -24,8 +25,8 @@ export function findMarks(plan, limits, grid) {
   if (counts.some(({ isTooMuch }) => isTooMuch)) return counts;
   return [
     ...counts,
-    ...plan.fence.flatMap((area, index) => areaMarks(area, `${area.keep === "in" ? "keep-in" : "keep-out"} area ${index + 1}`)),
-    ...plan.legs.flatMap((leg, index) => legMarks(leg, `leg ${index + 1}`, plan, limits, cells)),
+    ...plan.fence.flatMap((area, index) => areaMarks(area, FAULT_TEXTS.area(area.keep === "in", index + 1))),
+    ...plan.legs.flatMap((leg, index) => legMarks(leg, FAULT_TEXTS.leg(index + 1), plan, limits, cells)),
   ];
 }
 
@@ -39,47 +40,47 @@ const sizeOf = ({ legs, fence }) => ({
 function countMarks(plan) {
   const { legs } = plan, { waypoints, corners } = sizeOf(plan);
   const endless = legs.findIndex((leg) => leg.kind === "follow_route" && leg.laps === 0), found = [];
-  if (waypoints > MAX_WAYPOINTS) found.push(`more than ${MAX_WAYPOINTS} waypoints`);
-  if (corners > MAX_CORNERS) found.push(`more than ${MAX_CORNERS} corners`);
-  if (waypoints * corners > MAX_PAIRS) found.push(`${waypoints} waypoints times ${corners} corners is more than ${MAX_PAIRS}`);
-  if (legs.length > MAX_LEGS) found.push(`more than ${MAX_LEGS} legs`);
+  if (waypoints > MAX_WAYPOINTS) found.push(FAULT_TEXTS.tooManyWaypoints(MAX_WAYPOINTS));
+  if (corners > MAX_CORNERS) found.push(FAULT_TEXTS.tooManyCorners(MAX_CORNERS));
+  if (waypoints * corners > MAX_PAIRS) found.push(FAULT_TEXTS.tooManyPairs(waypoints, corners, MAX_PAIRS));
+  if (legs.length > MAX_LEGS) found.push(FAULT_TEXTS.tooManyLegs(MAX_LEGS));
   /** @type {(Mark & {isTooMuch: boolean})[]} */
   const marks = found.map((text) => ({ at: null, text, isTooMuch: true }));
-  if (endless >= 0 && endless < legs.length - 1) marks.push({ at: null, text: `leg ${endless + 1} has no end, so no leg may come after it`, isTooMuch: false });
+  if (endless >= 0 && endless < legs.length - 1) marks.push({ at: null, text: FAULT_TEXTS.endless(endless + 1), isTooMuch: false });
   return marks;
 }
 
 /** @param {import("./plane_geometry.js").Area} area @param {string} name @returns {Mark[]} */
 function areaMarks({ corners }, name) {
-  if (corners.length < 3) return [{ at: corners[0] ?? null, text: `${name}: needs 3 corners` }];
+  if (corners.length < 3) return [{ at: corners[0] ?? null, text: `${name}: ${FAULT_TEXTS.fewCorners}` }];
   const edges = segments(corners, true);
   for (let one = 0; one < edges.length; one++) {
-    if (distance(...edges[one]) < SAME_M) return [{ at: corners[one], text: `${name}: two corners are the same` }];
+    if (distance(...edges[one]) < SAME_M) return [{ at: corners[one], text: `${name}: ${FAULT_TEXTS.sameCorners}` }];
     for (let other = one + 2; other < edges.length; other++) {
       const at = one === 0 && other === edges.length - 1 ? null : crossing(edges[one], edges[other]);
-      if (at) return [{ at, text: `${name}: its edges cross` }];
+      if (at) return [{ at, text: `${name}: ${FAULT_TEXTS.crossing}` }];
     }
   }
   const area = Math.abs(edges.reduce((all, [a, b]) => all + a.x_m * b.y_m - b.x_m * a.y_m, 0)) / 2;
-  return area < MIN_AREA_M2 ? [{ at: corners[0], text: `${name}: hardly any area` }] : [];
+  return area < MIN_AREA_M2 ? [{ at: corners[0], text: `${name}: ${FAULT_TEXTS.smallArea}` }] : [];
 }
 
 /** @param {Leg} leg @param {string} name @param {Plan} plan @param {Limits} limits @param {ReturnType<typeof unpack> | null} cells @returns {Mark[]} */
 function legMarks(leg, name, plan, limits, cells) {
   const { waypoints } = leg;
-  if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: a route needs 2 waypoints` }];
+  if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: ${FAULT_TEXTS.fewWaypoints}` }];
   /** @type {Mark[]} */
   const found = [], { waypoints: all, corners } = sizeOf(plan), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * all * Math.max(1, corners))));
   const ways = waypoints.length === 1 ? /** @type {[Point, Point][]} */ ([[waypoints[0], waypoints[0]]]) : segments(waypoints, leg.repeat);
   ways.forEach(([a, b], index) => {
-    const where = `${name}, waypoint ${index + 1}`;
-    if (waypoints.length > 1 && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: the next is the same` });
+    const where = `${name}, ${FAULT_TEXTS.waypoint} ${index + 1}`;
+    if (waypoints.length > 1 && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: ${FAULT_TEXTS.sameWaypoint}` });
     const outside = firstAlong(a, b, most, (at) => !isAllowed(plan.fence, at));
-    if (outside) found.push({ at: outside, text: `${where}: leaves the fence` });
+    if (outside) found.push({ at: outside, text: `${where}: ${FAULT_TEXTS.outside}` });
     const near = outside ? null : firstAlong(a, b, most, (at) => clearance(plan.fence, at) < limits.marginM);
-    if (near) found.push({ at: near, text: `${where}: nearer than ${limits.marginM} m to the fence` });
+    if (near) found.push({ at: near, text: `${where}: ${FAULT_TEXTS.near(limits.marginM)}` });
     const seen = cells && firstAlong(a, b, most, (at) => isOccupied(cells, at));
-    if (seen) found.push({ at: seen, text: `${where}: the boat has seen something there` });
+    if (seen) found.push({ at: seen, text: `${where}: ${FAULT_TEXTS.occupied}` });
   });
   return leg.kind === "follow_route" ? [...found, ...turnMarks(leg, name, limits.turnRadiusM)] : found;
 }
@@ -96,7 +97,7 @@ function turnMarks({ waypoints, repeat }, name, radiusM) {
     const before = waypoints[(index + count - 1) % count], after = waypoints[(index + 1) % count];
     const turn = Math.abs(angle(Math.atan2(after.y_m - at.y_m, after.x_m - at.x_m) - Math.atan2(at.y_m - before.y_m, at.x_m - before.x_m)));
     const room = 0.5 * Math.min(distance(before, at), distance(at, after));
-    return radiusM * Math.tan(turn / 2) > room ? [{ at, text: `${name}, waypoint ${index + 1}: a turn too tight for the hull, ${radiusM} m` }] : [];
+    return radiusM * Math.tan(turn / 2) > room ? [{ at, text: `${name}, ${FAULT_TEXTS.waypoint} ${index + 1}: ${FAULT_TEXTS.tight(radiusM)}` }] : [];
   });
 }
 

@@ -2,6 +2,8 @@
 // Missions as GPX and GeoJSON, as `paani route` and the navigator read and write them: one LineString or route, polygons
 // with `keep`; further legs, and points of stations, as features of their own with `leg`.
 
+import { FILE_TEXTS } from "./text.js";
+
 const SEMI_MAJOR_M = 6378137, ECCENTRICITY2 = 0.00669437999014; // WGS 84
 const MAX_BYTES = 4e6, MAX_POINTS = 10000, DIGITS = 10;
 const GPX = "http://www.topografix.com/GPX/1/1"; // a namespace, which is never asked for
@@ -36,7 +38,7 @@ export function toGeodetic(point, origin) {
 
 /** @param {number} latitude @param {number} longitude @param {Origin} origin @returns {Point} */
 export function toMap(latitude, longitude, origin) {
-  if (!(Math.abs(latitude) <= 90 && Math.abs(longitude) <= 180)) throw new Error("a position is no place on Earth");
+  if (!(Math.abs(latitude) <= 90 && Math.abs(longitude) <= 180)) throw new Error(FILE_TEXTS.noPlace);
   const [east, north] = metresPerDegree(origin.latitude_deg);
   return { x_m: (longitude - origin.longitude_deg) * east, y_m: (latitude - origin.latitude_deg) * north };
 }
@@ -46,19 +48,19 @@ const leg = (waypoints, more = {}) => ({ kind: "follow_route", waypoints, repeat
 
 /** The plan of a file. Throws an Error whose message says what is wrong with it. @param {string} name @param {string} text @param {Origin} origin @returns {Plan} */
 export function readFile(name, text, origin) {
-  if (text.length > MAX_BYTES) throw new Error(`larger than ${MAX_BYTES / 1e6} MB`);
+  if (text.length > MAX_BYTES) throw new Error(FILE_TEXTS.tooLarge(MAX_BYTES / 1e6));
   const plan = /\.gpx$/i.test(name) ? readGpx(text, origin) : readGeoJson(text, origin);
   const count = plan.legs.reduce((all, each) => all + each.waypoints.length, 0);
-  if (count > MAX_POINTS) throw new Error(`${count} points, more than ${MAX_POINTS}`);
-  if (!plan.legs.length && !plan.fence.length) throw new Error("no route and no area in it");
+  if (count > MAX_POINTS) throw new Error(FILE_TEXTS.tooManyPoints(count, MAX_POINTS));
+  if (!plan.legs.length && !plan.fence.length) throw new Error(FILE_TEXTS.empty);
   return plan;
 }
 
 /** Routes, else tracks, else waypoints as one route. @param {string} text @param {Origin} origin @returns {Plan} */
 function readGpx(text, origin) {
-  if (text.includes("<!DOCTYPE")) throw new Error("has a DOCTYPE, which no GPX file needs");
+  if (text.includes("<!DOCTYPE")) throw new Error(FILE_TEXTS.doctype);
   const file = new DOMParser().parseFromString(text, "application/xml");
-  if (file.querySelector("parsererror") || file.documentElement.localName !== "gpx") throw new Error("is no GPX file");
+  if (file.querySelector("parsererror") || file.documentElement.localName !== "gpx") throw new Error(FILE_TEXTS.noGpx);
   const points = (/** @type {Element} */ parent, /** @type {string} */ element) =>
     [...parent.getElementsByTagNameNS("*", element)].map((each) => toMap(number(each.getAttribute("lat")), number(each.getAttribute("lon")), origin));
   for (const [line, element] of [["rte", "rtept"], ["trk", "trkpt"]]) {
@@ -71,7 +73,7 @@ function readGpx(text, origin) {
 
 /** @param {string | null} text */
 function number(text) {
-  if (text === null || text.trim() === "" || !Number.isFinite(Number(text))) throw new Error(`"${text}" is no number of degrees`);
+  if (text === null || text.trim() === "" || !Number.isFinite(Number(text))) throw new Error(FILE_TEXTS.noDegrees(String(text)));
   return Number(text);
 }
 
@@ -86,7 +88,7 @@ function closed(found, repeat) {
 /** @param {string} text @param {Origin} origin @returns {Plan} */
 function readGeoJson(text, origin) {
   const root = JSON.parse(text), features = root?.features ?? [root];
-  if (!Array.isArray(features)) throw new Error("is no GeoJSON");
+  if (!Array.isArray(features)) throw new Error(FILE_TEXTS.noGeoJson);
   /** @type {Plan} */
   const plan = { legs: [], fence: [] };
   const toPoint = (/** @type {any} */ at) => toMap(Number(at?.[1]), Number(at?.[0]), origin);

@@ -2,7 +2,7 @@
 // The motion panel: thrust of the fans, the command in force, and every reason why the boat does not move.
 
 import { findInhibits, isThrustApplied } from "./inhibits.js";
-import { STAGES, byId, fixed, headingDeg, make, sentence, setFacts, setText, trackNames } from "./text.js";
+import { MOTION_TEXTS, STAGES, byId, fixed, headingDeg, make, sentence, setFacts, setText, trackNames } from "./text.js";
 
 const FULL_SCALE = 0.25; // of full thrust, drawn as a full bar; the controller commands less in normal driving
 
@@ -18,7 +18,7 @@ export function renderMotion(store, now) {
   document.querySelector(".fans")?.classList.toggle("stale", !fresh);
   renderCommand(store, now, applied);
   const reasons = findInhibits(store, now);
-  setText(byId("motion-word"), isThrustApplied(store, now) ? "thrust applied" : fresh ? "zero thrust" : "no data from the thrust adapter");
+  setText(byId("motion-word"), isThrustApplied(store, now) ? MOTION_TEXTS.applied : fresh ? MOTION_TEXTS.zero : MOTION_TEXTS.silent);
   const list = byId("inhibits"), key = JSON.stringify([reasons, isThrustApplied(store, now)]);
   if (list.dataset.key === key) return;
   list.dataset.key = key;
@@ -28,7 +28,7 @@ export function renderMotion(store, now) {
     item.append(make("span", "", STAGES[reason.stage][0]), make("span", "", sentence(reason.text)));
     return item;
   });
-  list.replaceChildren(...(items.length ? items : [make("li", "clear", isThrustApplied(store, now) ? "Nothing inhibits thrust" : "")]));
+  list.replaceChildren(...(items.length ? items : [make("li", "clear", isThrustApplied(store, now) ? MOTION_TEXTS.clear : "")]));
 }
 
 /** @param {import("./store.js").Store} store @param {number} now @param {any} applied */
@@ -37,12 +37,12 @@ function renderCommand(store, now, applied) {
   const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
   const planned = command?.obstacle_track_ids ?? [], tracks = store.get("advisor/tracks")?.tracks ?? [];
   setFacts(byId("order"), [
-    ["Set speed", command ? `${fixed(command.speed_mps)} m/s` : "–", false],
-    ["Set heading", command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
-    ["Cross-track", command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
-    ["Command age", Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
+    [MOTION_TEXTS.setSpeed, command ? `${fixed(command.speed_mps)} m/s` : "–", false],
+    [MOTION_TEXTS.setHeading, command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–", false],
+    [MOTION_TEXTS.crossTrack, command ? `${fixed(command.cross_track_m, 1)} m` : "–", false],
+    [MOTION_TEXTS.age, Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–", false],
     ...findPower(store, now),
-    ...(planned.length ? [/** @type {[string, string, boolean]} */ (["Planned for", trackNames(tracks, planned), false])] : []),
+    ...(planned.length ? [/** @type {[string, string, boolean]} */ ([MOTION_TEXTS.plannedFor, trackNames(tracks, planned), false])] : []),
   ]);
   byId("order").classList.toggle("stale", !store.isFresh("navigator/command", now));
 }
@@ -52,5 +52,5 @@ function findPower(store, now) {
   const state = store.get("thrusters/state");
   if (!state) return [];
   const known = store.isFresh("thrusters/state", now) && state.mcu !== "unknown";
-  return [["Battery", known ? `${fixed(state.battery_v, 1)} V, ${fixed(state.current_a, 1)} A` : "–", false]];
+  return [[MOTION_TEXTS.battery, known ? `${fixed(state.battery_v, 1)} V, ${fixed(state.current_a, 1)} A` : "–", false]];
 }

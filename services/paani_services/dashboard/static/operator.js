@@ -4,7 +4,7 @@
 import { findInhibits, isReplay } from "./inhibits.js";
 import { bindKey, hasKey, post } from "./requests.js";
 import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
-import { ARM_TEXTS, STAGES, byId, fixed, make, operatorText, setText, words } from "./text.js";
+import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, make, operatorText, setText, words } from "./text.js";
 import { describeWheel } from "./wheel.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, REFRESH_MS = 150;
@@ -71,7 +71,7 @@ export function renderOperatorState(store, open, now, isPast) {
   renderRemaining(heldFrom ? findInhibits(store, now).filter(({ code }) => code !== "NOT_ARMED" && code !== "not_armed") : null);
   setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: "READ-ONLY", detail: "a recording is played" } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
+  const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
   state.dataset.state = shown.state;
   setText(byId("order-word"), shown.word);
   setText(byId("order-detail"), refusal || shown.detail);
@@ -89,14 +89,14 @@ function renderRemaining(reasons) {
 
 /** @param {any} operator @param {boolean} isHeard @param {number} ageS */
 function operatorState(operator, isHeard, ageS) {
-  if (!operator) return { state: "", word: "–", detail: "operator state unknown" };
-  const word = operator.stopped ? "STOPPED" : operator.armed ? "ARMED" : "NOT ARMED", state = operator.stopped ? "stopped" : operator.armed ? "armed" : "";
-  if (!isHeard) return { state: "", word, detail: "last known state" };
-  if (!operator.stopped) return { state, word, detail: operator.armed ? `by ${operatorText(operator.by)}, ${words(operator.mode)}` : "thrust not allowed" };
-  if (operator.confirmed_us && !operator.latch_kept) return { state, word, detail: "could not be written to disk" };
-  if (operator.confirmed_us) return { state, word, detail: `confirmed by the thrust adapter in ${fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)} ms` };
-  if (!operator.asked_us) return { state, word, detail: "latched before this start" };
+  if (!operator) return { state: "", word: "–", detail: ORDER_TEXTS.unknown };
+  const word = operator.stopped ? ORDER_TEXTS.stopped : operator.armed ? ORDER_TEXTS.armed : ORDER_TEXTS.notArmed, state = operator.stopped ? "stopped" : operator.armed ? "armed" : "";
+  if (!isHeard) return { state: "", word, detail: ORDER_TEXTS.lastKnown };
+  if (!operator.stopped) return { state, word, detail: operator.armed ? `${ORDER_TEXTS.by} ${operatorText(operator.by)}, ${words(operator.mode)}` : ORDER_TEXTS.noThrust };
+  if (operator.confirmed_us && !operator.latch_kept) return { state, word, detail: ORDER_TEXTS.notWritten };
+  if (operator.confirmed_us) return { state, word, detail: ORDER_TEXTS.confirmed(fixed((operator.confirmed_us - operator.asked_us) / 1000, 0)) };
+  if (!operator.asked_us) return { state, word, detail: ORDER_TEXTS.before };
   const waitedMs = (operator.sent_us - operator.asked_us) / 1000 + ageS * 1000;
-  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: "waiting for the thrust adapter" };
-  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: "STOP is latched, but the thrust adapter does not report zero" };
+  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: ORDER_TEXTS.asked, detail: ORDER_TEXTS.waiting };
+  return { state: "unconfirmed", word: ORDER_TEXTS.notConfirmed, detail: ORDER_TEXTS.noZero };
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // Draws the results of perception and advisor over the picture they belong to, in its normalised coordinates.
 
-import { fixed, trackLabel, words } from "./text.js";
+import { EXPLANATION_TEXTS, fixed, trackLabel, words } from "./text.js";
 
 export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
@@ -101,7 +101,7 @@ export function drawCorridors(pane, corridors, advisory) {
     ctx.lineTo(x2, base);
     ctx.lineTo(x2, base - 12 * unit);
     ctx.stroke();
-    const verdict = lane ? `${fixed(lane.risk)} ${lane.blocked ? "blocked" : "clear"}` : words(name);
+    const verdict = lane ? `${fixed(lane.risk)} ${EXPLANATION_TEXTS.verdicts[lane.blocked ? "blocked" : "clear"]}` : words(name);
     drawLabel(pane, verdict, ((x1 + x2) / 2), height - 33 * unit, colour, "center");
   }
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // Requests of the operator's page: with the operator's key, or where a login was asked by the session that it began.
 
-import { byId } from "./text.js";
+import { REQUEST_TEXTS, byId } from "./text.js";
 
 /** Each page is a hand of its own at the wheel, until it is loaded again. */
 export const hand = 1 + Math.floor(Math.random() * 2 ** 50);
@@ -46,7 +46,7 @@ export function bindKey() {
 /** Whether there is a key; asks for one where there is none. */
 export function hasKey() {
   if (hasSession) return true;
-  if (!key) keepKey(prompt("The operator's key, which `paani up` prints:") ?? "");
+  if (!key) keepKey(prompt(REQUEST_TEXTS.askKey) ?? "");
   return Boolean(key);
 }
 
@@ -67,6 +67,6 @@ export async function post(path, body, isLast = false) {
     if (answer.status === 403) keepKey("");
     return String((await answer.json()).error);
   } catch {
-    return "not sent: no connection to the dashboard";
+    return REQUEST_TEXTS.notSent;
   }
 }

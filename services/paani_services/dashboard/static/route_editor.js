@@ -37,8 +37,8 @@ export class RouteEditor {
     const acts = { undo: () => this.made.undo(), point: () => this.made.removePoint(), item: () => this.made.removeItem(), load: () => this.load() };
     for (const [name, act] of Object.entries(acts)) this.addButton("editor-acts", EDITOR.acts[name], act);
     this.addButton("editor-acts", EDITOR.acts.open, () => byId("editor-file").click());
-    this.addButton("editor-acts", "GPX ↓", () => this.save("gpx"));
-    this.addButton("editor-acts", "GeoJSON ↓", () => this.save("geojson"));
+    this.addButton("editor-acts", EDITOR.acts.gpx, () => this.save("gpx"));
+    this.addButton("editor-acts", EDITOR.acts.geojson, () => this.save("geojson"));
     byId("editor-send").addEventListener("click", () => void this.send());
     byId("editor-file").addEventListener("change", (/** @type {any} */ event) => void this.open(event.target.files[0]));
     for (const field of ["repeat", "laps", "radius_m", "duration_s", "speed_mps"]) {

@@ -2,7 +2,7 @@
 // The sensor strip: each device of a real hull, and what is wrong with it. Hidden where no sensor process runs.
 
 import { isReplay } from "./inhibits.js";
-import { byId, fixed, make, setText } from "./text.js";
+import { SENSOR_TEXTS, byId, fixed, make, setText } from "./text.js";
 
 /** @type {Map<string, HTMLElement>} */
 const rows = new Map();
@@ -13,14 +13,14 @@ export function renderSensors(store, now) {
   strip.hidden = !store.get("dashboard/settings")?.services.includes("sensors") || (isReplay(store) && !store.isFresh("sensors/state", now));
   if (strip.hidden) return;
   const state = store.get("sensors/state"), fresh = store.isFresh("sensors/state", now);
-  const devices = state?.devices ?? [{ role: "sensors", status: "silent", note: "no report from the sensor process yet" }];
+  const devices = state?.devices ?? [{ role: "sensors", status: "silent", note: SENSOR_TEXTS.none }];
   for (const device of devices) {
     const row = rowOf(strip, device.role), status = fresh || !state ? device.status : "silent";
     row.dataset.status = status;
     row.title = device.line ? `${device.line}: ${countsText(device)}` : "";
     setText(/** @type {HTMLElement} */ (row.children[0]), device.role);
     setText(/** @type {HTMLElement} */ (row.children[1]), status.replaceAll("_", " "));
-    setText(/** @type {HTMLElement} */ (row.children[2]), fresh ? device.note || rateText(device) : device.note || "the sensor process is silent");
+    setText(/** @type {HTMLElement} */ (row.children[2]), fresh ? device.note || rateText(device) : device.note || SENSOR_TEXTS.silent);
   }
   for (const [role, row] of rows) row.hidden = !devices.some((/** @type {any} */ device) => device.role === role);
 }
@@ -42,4 +42,4 @@ const rateText = (device) => (device.status === "off" ? "" : `${fixed(device.rat
 
 /** @param {any} device */
 const countsText = (device) =>
-  `${device.heard || "nothing heard"}; checksum failures ${device.checksum_failures}, damaged ${device.damaged}, withheld ${device.withheld}, reconnections ${device.reconnections}`;
+  SENSOR_TEXTS.counts(device);

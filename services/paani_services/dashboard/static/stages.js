@@ -2,7 +2,7 @@
 // The way from the advice to the thrust, stage by stage: what each does now, or why it lets nothing through.
 
 import { findInhibits } from "./inhibits.js";
-import { STAGES, byId, fixed, headingDeg, make, operatorText, sentence, setText, trackNames, words } from "./text.js";
+import { STAGES, STAGE_TEXTS, byId, fixed, headingDeg, make, operatorText, sentence, setText, trackNames, words } from "./text.js";
 
 const SHOWN = ["operator", "mission", "planner", "fence", "controller", "gate"];
 
@@ -29,29 +29,29 @@ export function renderStages(store, now) {
 function describeStages(store) {
   const operator = store.get("operator/state"), command = store.get("navigator/command"), route = store.get("navigator/route");
   const mission = store.get("navigator/mission"), thrust = store.get("controller/thrust"), applied = store.get("plant/thrust_applied");
-  const waypoint = route && command ? `, waypoint ${command.waypoint_index + 1} of ${route.waypoints.length} of ${route.name}` : "";
+  const waypoint = route && command ? STAGE_TEXTS.waypoint(command.waypoint_index + 1, route.waypoints.length, route.name) : "";
   const name = mission && mission.name !== route?.name ? `${mission.name}: ` : "";
   return {
-    operator: [operator?.armed ? `armed by ${operatorText(operator.by)}` : "", false],
+    operator: [operator?.armed ? `${STAGE_TEXTS.armedBy} ${operatorText(operator.by)}` : "", false],
     mission: [command?.leg ? `${name}${command.leg}${command.leg.startsWith("follow route") ? waypoint : ""}` : "", false],
     planner: describePlanner(store, command),
     fence: [describeFence(mission?.fence ?? []), false],
-    controller: [thrust?.enabled ? `speed error ${fixed(thrust.speed_error_mps)} m/s, heading error ${fixed((thrust.heading_error_rad * 180) / Math.PI, 0)}°` : "", false],
-    gate: [applied ? `port ${fixed(applied.left_n, 1)} N, starboard ${fixed(applied.right_n, 1)} N` : "", false],
+    controller: [thrust?.enabled ? STAGE_TEXTS.errors(fixed(thrust.speed_error_mps), fixed((thrust.heading_error_rad * 180) / Math.PI, 0)) : "", false],
+    gate: [applied ? STAGE_TEXTS.thrust(fixed(applied.left_n, 1), fixed(applied.right_n, 1)) : "", false],
   };
 }
 
 /** @param {{keep: string, name: string}[]} areas */
 function describeFence(areas) {
-  const names = (/** @type {string} */ keep) => areas.filter((area) => area.keep === keep).map((area) => area.name || "unnamed").join(", ");
-  return [names("in") && `stays in ${names("in")}`, names("out") && `keeps out of ${names("out")}`].filter(Boolean).join("; ");
+  const names = (/** @type {string} */ keep) => areas.filter((area) => area.keep === keep).map((area) => area.name || STAGE_TEXTS.unnamed).join(", ");
+  return [names("in") && `${STAGE_TEXTS.staysIn} ${names("in")}`, names("out") && `${STAGE_TEXTS.keepsOut} ${names("out")}`].filter(Boolean).join("; ");
 }
 
 /** @param {import("./store.js").Store} store @param {any} command @returns {[string, boolean]} */
 function describePlanner(store, command) {
-  if (!store.get("dashboard/settings")?.planner) return ["off: turns as advised", false];
+  if (!store.get("dashboard/settings")?.planner) return [STAGE_TEXTS.off, false];
   if (!command?.enable) return ["", false];
-  const ids = command.obstacle_track_ids, heading = `steers ${fixed(headingDeg(command.heading_rad), 0)}° at ${fixed(command.speed_mps)} m/s`;
-  const turn = /LEFT|RIGHT/.test(command.direction) ? `, advised ${words(command.direction)}` : "";
-  return [`${heading}${turn}${ids.length ? `, for ${trackNames(store.get("advisor/tracks")?.tracks ?? [], ids)}` : ""}`, Boolean(ids.length || turn)];
+  const ids = command.obstacle_track_ids, heading = STAGE_TEXTS.steers(fixed(headingDeg(command.heading_rad), 0), fixed(command.speed_mps));
+  const turn = /LEFT|RIGHT/.test(command.direction) ? `, ${STAGE_TEXTS.advised} ${words(command.direction)}` : "";
+  return [`${heading}${turn}${ids.length ? `, ${STAGE_TEXTS.because} ${trackNames(store.get("advisor/tracks")?.tracks ?? [], ids)}` : ""}`, Boolean(ids.length || turn)];
 }

@@ -2,7 +2,7 @@
 // STOP: one press of the button, of Space, of Escape or of a gamepad's B, without login and key, asked until the server
 // answers.
 
-import { byId, fixed } from "./text.js";
+import { ORDER_TEXTS, byId, fixed } from "./text.js";
 
 const RETRY_MS = 400, PAD_PERIOD_MS = 40;
 const PAD_BUTTON = 1; // B of the standard layout, the circle of others
@@ -52,6 +52,6 @@ function bindPad(press) {
 export function pendingStop(now) {
   if (!isPending) return null;
   const waitedMs = now - askedAt;
-  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: "STOP ASKED", detail: `${fixed(waitedMs, 0)} ms ago` };
-  return { state: "unconfirmed", word: "NOT CONFIRMED", detail: `nobody answers; asked again for ${fixed(waitedMs / 1000, 0)} s` };
+  if (waitedMs <= CONFIRM_MS) return { state: "asked", word: ORDER_TEXTS.asked, detail: ORDER_TEXTS.askedAgo(fixed(waitedMs, 0)) };
+  return { state: "unconfirmed", word: ORDER_TEXTS.notConfirmed, detail: ORDER_TEXTS.nobody(fixed(waitedMs / 1000, 0)) };
 }

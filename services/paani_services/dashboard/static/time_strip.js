@@ -115,8 +115,8 @@ export class TimeStrip {
     const event = series.events.findLast((each) => each.level !== "info" && Math.abs(each.at_us - atUs) < 4e6);
     setText(byId("time-readout"), [
       clockText(atUs),
-      value("advice") ? reasonText(value("advice")) : `advice ${TIME_TEXTS.unknown}`,
-      value("mode") ? words(value("mode")) : `mode ${TIME_TEXTS.unknown}`,
+      value("advice") ? reasonText(value("advice")) : TIME_TEXTS.noAdvice,
+      value("mode") ? words(value("mode")) : TIME_TEXTS.noMode,
       value("latency_ms") === null ? "" : `${fixed(value("latency_ms"), 0)} ms`,
       event?.text ?? "",
     ].filter(Boolean).join(" · "));

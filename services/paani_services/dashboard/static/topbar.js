@@ -3,19 +3,21 @@
 
 import { describeActivity } from "./activity.js";
 import { announce } from "./announcer.js";
-import { ACTIVITIES, MODES, ageText, byId, fixed, headingDeg, reasonText, sentence, setText, words } from "./text.js";
+import { ACTIVITIES, ADVICE_TEXTS, MODES, RECORD_TEXTS, TIME_TEXTS, ageText, byId, fixed, headingDeg, reasonText, sentence, setText, words } from "./text.js";
 
-const NOT_HEARD = { id: "UNKNOWN", word: ACTIVITIES.UNKNOWN[0], kind: "none", reason: "no connection to the dashboard" };
-/** Word, kind and SVG path of the arrow. @type {Record<string, [string, string, string]>} */
-export const ADVICE = {
-  STRAIGHT: ["STRAIGHT", "go", "M24 42V7M11 20L24 7l13 13"],
-  SLIGHT_LEFT: ["SLIGHT LEFT", "turn", "M29 42V26L14 10M13 25V9h16"],
-  SLIGHT_RIGHT: ["SLIGHT RIGHT", "turn", "M19 42V26L34 10M35 25V9H19"],
-  LEFT: ["LEFT", "turn", "M36 42V20H9M21 8L9 20l12 12"],
-  RIGHT: ["RIGHT", "turn", "M12 42V20h27M27 8l12 12-12 12"],
-  STOP: ["STOP", "stop", "M16 6h16l10 10v16L32 42H16L6 32V16zM15 24h18"],
-  NO_DATA: ["NO DATA", "none", "M10 24h6M22 24h4M32 24h6"],
+const NOT_HEARD = { id: "UNKNOWN", word: ACTIVITIES.UNKNOWN[0], kind: "none", reason: TIME_TEXTS.noServer };
+/** Kind and SVG path of the arrow. @type {Record<string, [string, string]>} */
+const ARROWS = {
+  STRAIGHT: ["go", "M24 42V7M11 20L24 7l13 13"],
+  SLIGHT_LEFT: ["turn", "M29 42V26L14 10M13 25V9h16"],
+  SLIGHT_RIGHT: ["turn", "M19 42V26L34 10M35 25V9H19"],
+  LEFT: ["turn", "M36 42V20H9M21 8L9 20l12 12"],
+  RIGHT: ["turn", "M12 42V20h27M27 8l12 12-12 12"],
+  STOP: ["stop", "M16 6h16l10 10v16L32 42H16L6 32V16zM15 24h18"],
+  NO_DATA: ["none", "M10 24h6M22 24h4M32 24h6"],
 };
+/** Word, kind and SVG path of the arrow. @type {Record<string, [string, string, string]>} */
+export const ADVICE = Object.fromEntries(Object.entries(ARROWS).map(([name, arrow]) => [name, [ADVICE_TEXTS.words[name], ...arrow]]));
 
 /** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
 export function renderTopbar(store, open, now) {
@@ -33,7 +35,7 @@ export function renderTopbar(store, open, now) {
   byId("activity").dataset.kind = doing.kind;
   byId("activity").dataset.activity = doing.id;
   const advice = renderAdvice(store, now);
-  announce(`${doing.word}. Advice: ${advice}.`, doing.kind === "stop", now);
+  announce(ADVICE_TEXTS.announced(doing.word, advice), doing.kind === "stop", now);
   renderPose(store, now);
 }
 
@@ -43,9 +45,9 @@ function renderRecord(store, isWanted, now) {
   const on = store.isFresh("recorder/state", now) && state.recording;
   chip.hidden = !isWanted;
   chip.dataset.record = !on ? "off" : state.dropped ? "loses" : "on";
-  const lost = on && state.dropped ? `, ${state.dropped} dropped` : "";
-  setText(chip, on ? `REC ${ageText((state.source_us - state.since_us) / 1e6)}${lost}` : "not recording");
-  chip.title = on ? `${state.file}: ${state.written} written, ${state.dropped} dropped, ${state.missing} missing; ${fixed(state.free_bytes / 2 ** 30, 0)} GiB left` : state?.problem || "the recorder is silent";
+  const lost = on && state.dropped ? `, ${RECORD_TEXTS.dropped(state.dropped)}` : "";
+  setText(chip, on ? `${RECORD_TEXTS.on} ${ageText((state.source_us - state.since_us) / 1e6)}${lost}` : RECORD_TEXTS.off);
+  chip.title = on ? RECORD_TEXTS.title(state, fixed(state.free_bytes / 2 ** 30, 0)) : state?.problem || RECORD_TEXTS.silent;
 }
 
 /** @param {import("./store.js").Store} store @param {number} now */
@@ -60,7 +62,7 @@ function renderAdvice(store, now) {
     byId("advice-arrow").innerHTML = `<path d="${arrow}"/>`;
   }
   setText(byId("advice-word"), word);
-  const old = advisory ? `Last advice ${ageText(store.ageS("advisor/advisory", now))} ago` : "No advice received yet";
+  const old = advisory ? ADVICE_TEXTS.last(ageText(store.ageS("advisor/advisory", now))) : ADVICE_TEXTS.none;
   const cause = fresh && advisory.cause !== "none" ? `: ${words(advisory.cause)}` : "";
   setText(byId("advice-reason"), fresh ? reasonText(advisory.reason) + cause : old);
   return word;

@@ -52,7 +52,7 @@ function filter() {
     row.setAttribute("aria-selected", String(name === chosen));
     shown += row.hidden ? 0 : 1;
   }
-  setText(byId("topics-sum"), `${shown} of ${rows.size}`);
+  setText(byId("topics-sum"), TOPICS_TEXTS.sum(shown, rows.size));
 }
 
 /** @param {string} name */

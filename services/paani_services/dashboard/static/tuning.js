@@ -1,7 +1,7 @@
 // @ts-check
 // The tuning strip: parameters on trial beside those in force, and where their advice differs. Hidden without any.
 
-import { byId, fixed, reasonText, setText } from "./text.js";
+import { TUNING_TEXTS, byId, fixed, reasonText, setText } from "./text.js";
 
 /** @param {import("./store.js").Store} store @param {number} now */
 export function renderTuning(store, now) {
@@ -12,11 +12,11 @@ export function renderTuning(store, now) {
   strip.classList.toggle("stale", !store.isFresh("advisor/shadow", now));
   const force = byId("tuning-force"), counts = byId("tuning-counts"), last = shadow.recent.at(-1);
   force.dataset.promoted = String(Boolean(shadow.active));
-  setText(force, shadow.active ? `${shadow.active} in force: ${changesText(shadow.active_changes)}` : "the configuration in force");
-  setText(byId("tuning-tried"), shadow.proposal ? `${shadow.proposal} tried: ${changesText(shadow.changes)}` : "");
+  setText(force, shadow.active ? TUNING_TEXTS.inForce(shadow.active, changesText(shadow.active_changes)) : TUNING_TEXTS.configured);
+  setText(byId("tuning-tried"), shadow.proposal ? TUNING_TEXTS.tried(shadow.proposal, changesText(shadow.changes)) : "");
   counts.dataset.moves = String(shadow.moves_more > 0);
   setText(counts, shadow.proposal ? countsText(shadow) : "");
-  setText(byId("tuning-last"), last ? `last: ${adviceText(last, "active")}, tried: ${adviceText(last, "shadow")}` : "");
+  setText(byId("tuning-last"), last ? TUNING_TEXTS.last(adviceText(last, "active"), adviceText(last, "shadow")) : "");
 }
 
 /** The weights of the risk in force: those configured, and over them those promoted. @param {Record<string, number>} configured @param {any} shadow */
@@ -27,8 +27,7 @@ export function weightsInForce(configured, shadow) {
 
 /** @param {any} shadow */
 export function countsText(shadow) {
-  const differing = `${shadow.differing} of ${shadow.frames} frames differ (${fixed(100 * shadow.differing_frac, 1)} %)`;
-  return `${differing}, would move on ${shadow.moves_more} where it stops, stop on ${shadow.stops_more} where it moves`;
+  return TUNING_TEXTS.counts(shadow, fixed(100 * shadow.differing_frac, 1));
 }
 
 /** @param {{path: string, value: string}[]} list */
