@@ -37,6 +37,11 @@ REMAINING = """(() => {
   return !list.hidden && lines[0] === "Armed, the boat still stands:" && reasons.every((each) => lines.includes(each))
     && !lines.some((each) => each.startsWith("Operator"));
 })()"""
+RED_ON_MAP = """(() => {
+  const c = document.querySelector("#map"), { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
+  for (let i = 0; i < data.length; i += 4) if (data[i] > 200 && data[i + 1] < 140 && data[i + 2] < 140) return true;
+  return false;
+})()"""
 PIXEL = """([x, y]) => {
   const c = document.querySelector("#camera");
   return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
@@ -302,4 +307,5 @@ async def test_the_map_shows_route_and_position(
         assert not await has_colour_on_map(watched.page, ROUTE_RGB, -5.0, -1.0), "north is up"
         assert await has_colour_on_map(watched.page, TRACK_RGB, -5.0, 0.0), "where the boat was"
         assert await has_colour_on_map(watched.page, TRACK_RGB, 1.0, 0.0), "its bow, ahead of where it was"
+        await until(watched.page, RED_ON_MAP)  # a ghost of the boat that is heard no more
         assert watched.errors == []

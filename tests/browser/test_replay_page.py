@@ -12,18 +12,12 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
-from tests.browser.test_page import until, watch
+from tests.browser.test_page import RED_ON_MAP, until, watch
 from tests.browser.test_time import press_strip
 from tests.conftest import OpenAs, Spawn
 from tests.unit.paani.logs.small_logs import NAME, START_US, finished
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
-
-RED_ON_MAP = """(() => {
-  const c = document.querySelector("#map"), { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
-  for (let i = 0; i < data.length; i += 4) if (data[i] > 200 && data[i + 1] < 140 && data[i + 2] < 140) return true;
-  return false;
-})()"""
 
 
 @pytest.fixture

@@ -45,6 +45,11 @@ COUNTED = """async ([waypointCount, cornerCount]) => {
   const before = performance.now(), marks = findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM: 0 });
   return [marks.map((mark) => mark.text), performance.now() - before];
 }"""
+DROP = """([name, text]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  document.querySelector("#map").dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+}"""
 
 
 class Editor:
@@ -193,8 +198,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
             ("a.gpx", '<gpx><wpt lat="91" lon="0"/></gpx>', "no place on Earth"),
             ("a.geojson", "{}", "no route and no area"),
         ):
-            await asyncio.to_thread((tmp_path / name).write_text, text)
-            await page.set_input_files("#editor-file", str(tmp_path / name))
+            await page.evaluate(DROP, [name, text])
             await editor.until_note(why)
 
         fence = [{"keep": a.keep, "corners": [{"x_m": c.x_m, "y_m": c.y_m} for c in a.corners]} for a in MISSION.fence]
