@@ -246,6 +246,7 @@ async def test_a_stop_of_a_ground_station_is_released_by_a_hand_on_the_page_alon
         while reason not in station.texts:  # MAVSDK asks for a mode first, and the last station's hand may be there yet
             refused = await station.ask("arm", station.action.arm())
             assert stopwatch_ms() < deadline_ms, refused
+            await asyncio.sleep(0.2)
         assert "COMMAND_DENIED" in refused
         await arm_on_page(river.page, river.config.bus)
         assert await station.until(station.telemetry.armed, bool, 5.0)
