@@ -29,7 +29,7 @@ def _beyond_m(outline: F64, points: F64) -> F64:
     return away
 
 
-@pytest.mark.parametrize("look", sorted(BOWS))
+@pytest.mark.parametrize("look", [*sorted(BOWS), "eight"])
 def test_the_drawn_boat_lies_within_its_outline_and_fills_it(look: str) -> None:
     vessel = _vessel(look)
     outline = build_outline(vessel)

@@ -19,6 +19,7 @@ from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.sizes import is_afloat_by_nature
 from paani_sim.worlds.traffic import ACTOR_KINDS
 from paani_sim.worlds.waterway import build_waterway
+from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 pytestmark = pytest.mark.slow
 
@@ -63,6 +64,11 @@ def _plain(value: object) -> object:
 def test_a_seed_gives_one_waterway_and_another_seed_another(seed: int) -> None:
     assert _plain(build_waterway(seed)) == _plain(build_waterway(seed))
     assert not np.array_equal(build_waterway(seed).shore_m, build_waterway(seed + 1).shore_m)
+
+
+def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
+    for scenario in scenarios:
+        check_is_fair(scenario)
 
 
 def test_every_kind_of_actor_and_every_reaction_appears(scenarios: tuple[Scenario, ...]) -> None:
