@@ -21,7 +21,7 @@ from paani_sim.worlds.traffic import ACTOR_KINDS
 from paani_sim.worlds.waterway import build_waterway
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 SEEDS = 24
 BOAT_REACH_M, BOAT_MPS, EVERY_S = 0.65, 0.6, 0.05
