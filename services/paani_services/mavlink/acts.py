@@ -29,6 +29,14 @@ STOP_TIMEOUT_S = 1.0
 MISSION_NAME = "uploaded"  # the protocol has no names
 
 
+def is_repeated(request: Request, under_way: Request) -> bool:
+    """Whether a station asks once more for the mode, or the wheel, that it is about to be answered.
+
+    That answer is for both: MAVSDK takes IN_PROGRESS to a mode for a refusal, and falls at the answer that follows.
+    """
+    return (request.command, request.act, request.mode) == (under_way.command, under_way.act, under_way.mode)
+
+
 class Acts:
     """One press of the button at a time, and one mode of a station; a STOP waits for nothing.
 
@@ -45,7 +53,7 @@ class Acts:
     ) -> None:
         self._client, self._missions, self._clock = client, missions, clock
         self._count, self._hands = count, hands
-        self._changing = set[Station]()
+        self._changing: dict[Station, Request] = {}
         self._tasks = set[asyncio.Task[None]]()
         self._arming: Request | None = None
         self._stopping: asyncio.Task[m.OperatorState | None] | None = None
@@ -55,17 +63,18 @@ class Acts:
         if request.act is Act.STOP:
             self._start(self._stop(request))
         elif request.act in {Act.MODE, Act.WHEEL}:
-            if request.station in self._changing:
-                self._acknowledge(request, IN_PROGRESS, "")
+            if (under_way := self._changing.get(request.station)) is not None:
+                if not is_repeated(request, under_way):
+                    self._acknowledge(request, LATER, "")
             else:
-                self._changing.add(request.station)
+                self._changing[request.station] = request
                 self._start(self._turn_wheel(request))
         elif self._arming is None:
             self._arming = request
             self._start(self._arm(request))
         else:
-            is_repeated = request.station is self._arming.station
-            self._acknowledge(request, IN_PROGRESS if is_repeated else LATER, "")
+            is_own = request.station is self._arming.station
+            self._acknowledge(request, IN_PROGRESS if is_own else LATER, "")
 
     def send(self, order: MissionOrder) -> None:
         """Begin to put a mission, a fence or both in force; the station is told how it ended."""
@@ -129,7 +138,7 @@ class Acts:
             else:
                 self._acknowledge(request, *mode_result(await self._change_mode(request)))
         finally:
-            self._changing.discard(request.station)
+            self._changing.pop(request.station, None)
 
     async def _change_mode(self, request: Request) -> m.ModeRefusal | None:
         """A wheel that was left by a station that is gone is taken; from anybody else it is not."""

@@ -7,8 +7,10 @@ import pytest
 from paani import messages as m
 from paani.config import load_config
 from paani.errors import UserError
-from paani_services.mavlink.acts import is_link_lost
-from tests.mavlink_peer import NOW_US, armed, in_order
+from paani_services.mavlink.acts import is_link_lost, is_repeated
+from paani_services.mavlink.commands import Act
+from paani_services.mavlink.gateway import Request
+from tests.mavlink_peer import NOW_US, Peer, Port, armed, in_order
 
 OURS = m.OperatorState(source_us=NOW_US, armed=True, stopped=False, by="mavlink")
 
@@ -48,3 +50,15 @@ def test_several_addresses() -> None:
     config = load_config(sets=("mavlink.udp=127.0.0.1:14540, [::1]:14550",))
     assert config.mavlink.udp_addresses == (("127.0.0.1", 14540), ("::1", 14550))
     assert load_config(sets=('mavlink.udp=""',)).mavlink.udp_addresses == ()
+
+
+def test_a_mode_that_is_asked_for_once_more_is_answered_once() -> None:
+    station = Peer(Port(in_order()).gateway).station
+    asked = Request(Act.MODE, station, 176, (255, 190), m.DriveMode.IDLE)
+    assert is_repeated(asked._replace(target=(255, 191)), asked)
+    for other in (
+        asked._replace(mode=m.DriveMode.RETURN),
+        asked._replace(command=11),
+        asked._replace(act=Act.WHEEL),
+    ):
+        assert not is_repeated(other, asked)
