@@ -57,6 +57,11 @@ def test_directories_below_the_first_are_followed_and_a_new_file_is_read_anew(tm
     written(path, {(9, 511, 511): PICTURES["png"]})
     assert read_tile(str(path), 9, 511, 511) == ("image/png", PICTURES["png"])
     assert read_tile(str(path), 9, 0, 1) is None
+    sizes = set()
+    for row in (100, 101):  # files whose directories have the same place and size
+        sizes.add(written(path, {(9, 100, row): PICTURES["png"]}).stat().st_size)
+        assert read_tile(str(path), 9, 100, row) == ("image/png", PICTURES["png"])
+    assert len(sizes) == 1
 
 
 def test_what_is_no_picture_or_too_large_is_refused(tmp_path: Path) -> None:
