@@ -15,7 +15,7 @@ from paani_sim.worlds.passability import PassabilityGrid, obstacle_distance_m
 from paani_sim.worlds.route_frame import RouteFrame, cut_route
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.sizes import SIZES
-from paani_sim.worlds.waterway import WATERWAY, build_waterway
+from paani_sim.worlds.waterway import WATERWAY, build_waterway, draw_waterway_light
 from paani_sim.worlds.world import (
     Actor,
     Behaviour,
@@ -64,6 +64,8 @@ def draw_random_scenario(kind: str, seed: int) -> Scenario:
         found = _draw_route_with_encounters(world, draw, rng)
         if found is not None:
             break
+    if kind == WATERWAY:
+        found = dataclasses.replace(found, light=draw_waterway_light(seed, found.start.yaw_rad))
     length_m = found.route_length_m
     return Scenario(
         name=f"random:{kind}:{seed}",

@@ -16,7 +16,7 @@ from paani_sim.worlds.footprint import place_outline
 from paani_sim.worlds.lighting import draw_condition, draw_light
 from paani_sim.worlds.route_frame import start_pose
 from paani_sim.worlds.sizes import SIZES, Size
-from paani_sim.worlds.world import Actor, Behaviour, Current, Kind, Obstacle, Waves, Wind, World
+from paani_sim.worlds.world import Actor, Behaviour, Current, Kind, Light, Obstacle, Waves, Wind, World
 
 WATERWAY = "waterway"
 SHOWN_SEED = 4  # of the world of that name
@@ -39,7 +39,7 @@ Rng = np.random.Generator
 
 def build_waterway(seed: int = SHOWN_SEED, condition: str | None = None) -> World:
     """The waterway of a seed, in a condition of `LIGHT_CONDITIONS` (None: the seed's own)."""
-    rng, light_rng = (np.random.default_rng([zlib.crc32(WATERWAY.encode()), seed, stream]) for stream in (1, 2))
+    rng = _open_stream(seed, 1)
     sites = dict(zip(rng.permutation(FEATURES).tolist(), _middles_m(rng), strict=True))
     channel = _draw_channel(sites, rng)
     loop_m = channel.loop_m(*ROUTE_M, LANE_M)
@@ -47,7 +47,6 @@ def build_waterway(seed: int = SHOWN_SEED, condition: str | None = None) -> Worl
     things = [thing for name, at_m in sites.items() for thing in _FEATURES[name](channel, float(at_m), rng)]
     things += [*_draw_marks(channel, rng), *_draw_people(channel, sites["bridge"], rng)]
     start = start_pose(route_m)
-    drawn = draw_condition(light_rng)
     return World(
         name=WATERWAY,
         seed=int(rng.integers(1 << 30)),
@@ -61,13 +60,24 @@ def build_waterway(seed: int = SHOWN_SEED, condition: str | None = None) -> Worl
         wind=Wind(
             float(rng.uniform(0.0, 5.0)), float(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.05, 0.35)), 12.0
         ),
-        light=draw_light(condition or drawn, start.yaw_rad, light_rng),
+        light=draw_waterway_light(seed, start.yaw_rad, condition),
         water_rgb=WATER_COLOURS_RGB[int(rng.integers(len(WATER_COLOURS_RGB)))],
         season_frac=float(rng.beta(0.8, 1.6)),
         channel_m=channel.centre_m,
         waves=Waves(90.0),
         current=Current(float(rng.uniform(0.0, 0.2))),
     )
+
+
+def draw_waterway_light(seed: int, course_rad: float, condition: str | None = None) -> Light:
+    """Light of a seed for a boat on this course, in a condition of `LIGHT_CONDITIONS` (None: the seed's own)."""
+    rng = _open_stream(seed, 2)
+    drawn = draw_condition(rng)
+    return draw_light(condition or drawn, course_rad, rng)
+
+
+def _open_stream(seed: int, number: int) -> Rng:
+    return np.random.default_rng([zlib.crc32(WATERWAY.encode()), seed, number])
 
 
 def _draw_wind(rng: Rng) -> Wind:

@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 
 from paani.arrays import F64
+from paani.geometry import wrap_rad
 from paani_sim.plant.actors import FLIGHT_M, SWIMMER_KEEPS_CLEAR_M, Actors
 from paani_sim.trials.seed_parts import FRESH_SEEDS
 from paani_sim.worlds import Actor, Behaviour, Kind, Obstacle, Scenario, actor_pose_at
 from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.footprint import build_outline, place_outline
 from paani_sim.worlds.generate import draw_random_scenario
-from paani_sim.worlds.lighting import LIGHT_CONDITIONS
+from paani_sim.worlds.lighting import LIGHT_CONDITIONS, SUN_AHEAD_RAD
 from paani_sim.worlds.passability import footprint_distance_m
 from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.sizes import is_afloat_by_nature
 from paani_sim.worlds.traffic import ACTOR_KINDS
-from paani_sim.worlds.waterway import build_waterway
+from paani_sim.worlds.waterway import build_waterway, draw_waterway_light
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -100,6 +101,14 @@ def test_conditions_change_the_light_and_nothing_else() -> None:
     assert all(one != other for one, other in itertools.combinations(lights, 2))
     same = [_plain(dataclasses.replace(world, light=lights[0])) for world in worlds]
     assert all(each == same[0] for each in same)
+
+
+def test_a_low_sun_stands_ahead_of_the_boat(scenarios: tuple[Scenario, ...]) -> None:
+    for scenario in scenarios:
+        course_rad = scenario.world.start.yaw_rad
+        assert scenario.world.light == draw_waterway_light(scenario.seed, course_rad)
+        sun_rad = draw_waterway_light(scenario.seed, course_rad, "low_sun").sun_azimuth_rad
+        assert abs(wrap_rad(sun_rad - course_rad)) <= SUN_AHEAD_RAD
 
 
 def test_a_layout_has_every_feature_and_nothing_overlaps(scenarios: tuple[Scenario, ...]) -> None:
