@@ -55,7 +55,8 @@ async def observer(river: River) -> AsyncIterator[Bus]:
 class GroundStation:
     """MAVSDK, connected to the first autopilot that it finds.
 
-    None of its calls is given up: each ends by itself, and its library falls where it is closed during one.
+    None of its calls is given up: each ends by itself, and its library falls where it is closed during one. It also
+    falls where the HOLD is refused that it asks for before it arms: whoever arms holds the wheel first.
     """
 
     def __init__(self, system: Any, transcript: Transcript) -> None:
@@ -209,6 +210,7 @@ async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(
 
         # What it does. MAVSDK asks for HOLD before it arms; armed by a hold of the operator's process,
         # the boat makes way along its route when its mission is started.
+        await station.ask_until_taken("hold, by which the wheel is its own", action.hold)
         await station.ask_until_taken("arm", action.arm)
         assert await station.until(telemetry.armed, bool, 5.0)
         assert (await states.next()).mode is m.DriveMode.IDLE
@@ -242,8 +244,9 @@ async def test_a_stop_of_a_ground_station_is_released_by_a_hand_on_the_page_alon
     assert (await paani(river.sets[:3], "stop"))[0] == 0
     async with ground_station(f"tcpout://127.0.0.1:{river.tcp}", transcript) as station:
         reason, refused = "arm: a STOP holds; release it on the page", ""
+        await station.ask_until_taken("hold, by which the wheel is its own", station.action.hold)
         deadline_ms = stopwatch_ms() + 20e3
-        while reason not in station.texts:  # MAVSDK asks for a mode first, and the last station's hand may be there yet
+        while reason not in station.texts:
             refused = await station.ask("arm", station.action.arm())
             assert stopwatch_ms() < deadline_ms, refused
             await asyncio.sleep(0.2)
