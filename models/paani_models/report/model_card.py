@@ -53,8 +53,9 @@ _OPEN = """\
 
 A second set for whoever needs weights of other terms: `perception.weights = "open"`. It has learnt only from sources
 that state terms under which anyone may use, change and sell what is learnt (`--sources open`), from rendered pictures,
-and from starting points under Apache-2.0 (YOLOX-nano and, as a teacher, NanoDet-Plus of COCO's classes; MobileNetV2 of
-ImageNet). No human mask of water is among those sources: the open segmenter has never seen a real one.
+and from starting points whose authors offer them under Apache-2.0 (YOLOX-nano and, as a teacher, NanoDet-Plus of
+COCO's classes; MobileNetV2 of ImageNet). No human mask of water is among those sources: the open segmenter has never
+seen a real one.
 
 What is lost: nearly all buoys and piers, swimmers, and much of where the water ends; every figure below that is lower
 than that of the set above. It is not good enough to steer by. No network says whether a picture is fit; limits on the
