@@ -8,6 +8,7 @@ import os
 import signal
 import socket
 import sys
+from collections import defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
@@ -111,9 +112,11 @@ class WhatRan:
     def __init__(self) -> None:
         self.ran: set[str] = set()
         self.skipped: dict[str, str] = {}
+        self.tier_s: defaultdict[str, float] = defaultdict(float)  # setup and teardown included
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         name = report.nodeid.partition("[")[0]
+        self.tier_s[name.split("/")[1]] += report.duration
         if report.skipped:
             self._skip(name, report.longrepr)
         elif report.when == "call":
@@ -128,7 +131,7 @@ class WhatRan:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A run of everything ends with the statements of the paper that it left out."""
+    """A run of everything ends with the time of each tier, and the statements of the paper that it left out."""
     if not WORKER and is_whole_run(config):
         config.pluginmanager.register(WhatRan(), WhatRan.__name__)
 
@@ -137,6 +140,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     found = config.pluginmanager.get_plugin(WhatRan.__name__)
     if found is not None and found.ran:
+        longest_first = sorted(found.tier_s.items(), key=lambda each: -each[1])
+        print("Seconds by tier:", ", ".join(f"{tier} {time_s:.0f}" for tier, time_s in longest_first))
         print(left_out_text(read_table(ROOT), found.ran, found.skipped), end="\n")
 
 
