@@ -1,6 +1,7 @@
-"""`python -m docs.strip FILE.webp`: the README's picture strip, from the page in Chromium while a boat drives.
+"""`python -m docs.strip STRIP.webp PAGE.png`: the README's pictures, from the page in Chromium while a boat drives.
 
-Arm, route, swimmer ahead, why, stop, and back to a past moment. Needs the extras `host` and `dev`, and Chromium.
+Arm, route, swimmer ahead, why, stop, and back to a past moment; PAGE is the swimmer's. Needs the extras `host` and `dev`,
+and Chromium.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ COLUMNS, CELL_PX, BAND_PX, GAP_PX = 2, (960, 600), 44, 12
 GROUND, INK = (250, 247, 244), (60, 45, 30)  # BGR
 SWIMMER_S, PERIOD_S = 180.0, 0.2
 UNDER_WAY_S, HOLD_S = 5.0, 1.6
+PAGE_FRAME = 2  # of the strip's
 SWIMMER_AHEAD = "/swimmer|person/i.test(document.querySelector('#explanation').innerText)"
 
 
@@ -96,13 +98,14 @@ def draw_strip(frames: list[tuple[str, bytes]]) -> npt.NDArray[np.uint8]:
     return sheet
 
 
-def main(file: Path) -> None:
-    """Drive `river_swimmer` with a bus of its own, and write the strip."""
+def main(strip: Path, page: Path) -> None:
+    """Drive `river_swimmer` with a bus of its own, and write the strip and one whole picture of it."""
     with tempfile.TemporaryDirectory() as folder:
         sets = ("world.name=river_swimmer", "bus.router=tcp/127.0.0.1:7557", "dashboard.port=8957")
         config = load_config(sets=(*sets, f"bus.runtime_dir={folder}/runtime"))
         frames = asyncio.run(_frames(config))
-    cv2.imwrite(str(file), draw_strip(frames), [cv2.IMWRITE_WEBP_QUALITY, 80])
+    page.write_bytes(frames[PAGE_FRAME][1])
+    cv2.imwrite(str(strip), draw_strip(frames), [cv2.IMWRITE_WEBP_QUALITY, 80])
 
 
 async def _frames(config: Any) -> list[tuple[str, bytes]]:
@@ -110,4 +113,4 @@ async def _frames(config: Any) -> list[tuple[str, bytes]]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

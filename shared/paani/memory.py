@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 
-RECYCLE_S = 60.0  # between two calls of `recycle`
+RECYCLE_S = 15.0  # between two calls of `recycle`
 _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None)
 
 

@@ -104,6 +104,18 @@ async def check_own_hull_and_opacity(page: Any) -> None:
     assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), PICTURE_BGR[::-1]), "it is kept"
 
 
+LONG_SENTENCE_GAP_PX = """() => {
+  const [sentence, below] = ["explanation", "path"].map((id) => document.getElementById(id));
+  const text = sentence.textContent;
+  sentence.textContent = "something that may be a person ".repeat(20);
+  const range = document.createRange();
+  range.selectNodeContents(sentence);
+  const gap = below.getBoundingClientRect().top - range.getBoundingClientRect().bottom;
+  sentence.textContent = text;
+  return gap;
+}"""
+
+
 async def test_the_overlay_lies_on_its_own_frame(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -141,6 +153,7 @@ async def test_the_overlay_lies_on_its_own_frame(
             assert is_colour(await page.evaluate(PIXEL, [x, y]), blend(WATER_RGBA)), (x, y)
         await check_own_hull_and_opacity(page)
 
+        assert await page.evaluate(LONG_SENTENCE_GAP_PX) >= 0.0
         assert await page.inner_text("#advice-word") == "RIGHT"
         assert "centre risk 0.80" in await page.inner_text("#explanation")
         assert "Without buoy #4 (left and centre) it would go STRAIGHT." in await page.inner_text("#explanation")

@@ -85,7 +85,7 @@ async def test_ports_speak_at_doors_of_this_machine_alone(engine: Engine) -> Non
     doors = Doors()
     page = {"PAANI_PAGE_PORT": str(find_free_port())}
     async with afloat(engine, "sim,ports", {**doors.environment, **page}):
-        await asyncio.to_thread(check_confinement, engine, {"recorder", "bridge"})
+        await asyncio.to_thread(check_confinement, engine, {"recorder", "bridge", BUTTON})
         await doors.require_all_speak()
 
 
