@@ -1,7 +1,7 @@
 """`python -m docs.strip STRIP.webp PAGE.png`: the README's pictures, from the page in Chromium while a boat drives.
 
-Arm, route, swimmer ahead, why, stop, and back to a past moment; PAGE is the swimmer's. Needs the extras `host` and `dev`,
-and Chromium.
+Arm, route, swimmer ahead, why, stop, and back to a past moment; PAGE is the swimmer's. Needs the extras `host` and
+`dev`, and Chromium.
 """
 
 from __future__ import annotations
