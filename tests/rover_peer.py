@@ -9,8 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from paani.clock import stopwatch_ms
-
-CHANNEL = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0, "DZ": 0.0, "REVERSED": 0.0}
+from tests.rover_by_the_book import STICKS
 
 
 class RoverPeer:
@@ -21,9 +20,7 @@ class RoverPeer:
             "SYSID_MYGCS": 255.0, "RC_OVERRIDE_TIME": 3.0, "FS_THR_ENABLE": 1.0, "FS_GCS_ENABLE": 0.0,
             "FS_GCS_TIMEOUT": 5.0, "FS_TIMEOUT": 1.5, "FS_ACTION": 0.0,
             "PILOT_STEER_TYPE": 1.0, "MANUAL_STR_EXPO": 0.2, "MOT_SLEWRATE": 100.0, "MOT_THR_MIN": 10.0,
-            "RC_OPTIONS": 32.0, "MOT_THR_MAX": 100.0, "SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0,
-            "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
-            **{f"RC{number}_{field}": value for number in (1, 3) for field, value in CHANNEL.items()},
+            **STICKS,
         }  # fmt: skip
         self.read_only: set[str] = set()
         self.mode, self.is_armed, self.is_silent = 4, False, False

@@ -101,6 +101,7 @@ async def check_own_hull_and_opacity(page: Any) -> None:
     assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), PICTURE_BGR[::-1])
     await page.reload()
     await until(page, "paani.overlay.mask_seq !== null")
+    await until(page, "document.querySelector('#advice-word').textContent !== 'NO DATA'")
     assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), PICTURE_BGR[::-1]), "it is kept"
 
 

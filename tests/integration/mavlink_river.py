@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import signal
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from paani.config import Config, load_config
 from paani_services.operator.latch import LATCH_FILE
@@ -14,6 +16,7 @@ from tests.conftest import find_free_port
 from tests.integration.test_up import READY_S, Up, words_of
 
 LINK_LOSS_S = 3.0
+T = TypeVar("T")
 
 
 class River:
@@ -51,3 +54,11 @@ def river_in(folder: Path) -> Iterator[River]:
     finally:
         started.up.process.send_signal(signal.SIGINT)
         assert started.up.process.wait(20.0) == 0
+
+
+async def until(read: Callable[[], Awaitable[T]], is_reached: Callable[[T], bool], limit_s: float = 20.0) -> T:
+    """The first message for which that holds; fails after `limit_s`. read: `next` of an inbox."""
+    async with asyncio.timeout(limit_s):
+        while not is_reached(value := await read()):
+            pass
+    return value

@@ -17,7 +17,7 @@ from paani import messages as m
 from paani.bus import Bus, open_bus
 from paani.clock import WallClock, stopwatch_ms
 from tests.arming import arm_on_page
-from tests.integration.mavlink_river import LINK_LOSS_S, River, river_in
+from tests.integration.mavlink_river import LINK_LOSS_S, River, river_in, until
 from tests.paani_command import paani
 from tests.transcript import Transcript
 
@@ -88,10 +88,7 @@ class GroundStation:
 
     async def ask_until_taken(self, words: str, attempt: Callable[[], Awaitable[Any]], limit_s: float = 20.0) -> None:
         """Again until it is not refused: on a busy machine a process of the boat may be silent for a moment."""
-        deadline_ms = stopwatch_ms() + limit_s * 1e3
-        while (result := await self.ask(words, attempt())) != "taken":
-            assert stopwatch_ms() < deadline_ms, result
-            await asyncio.sleep(0.1)
+        await self.until(lambda: self.ask(words, attempt()), functools.partial(operator.eq, "taken"), limit_s)
 
     async def until(
         self, read: Callable[[], Awaitable[T]], is_reached: Callable[[T], bool], limit_s: float = 20.0
@@ -120,14 +117,6 @@ async def ground_station(link: str, transcript: Transcript) -> AsyncIterator[Gro
             await asyncio.wait({listening})
             for plugin in (station.telemetry, station.action, station.mission, station.parameters):
                 plugin.destroy()
-
-
-async def until(read: Callable[[], Awaitable[T]], is_reached: Callable[[T], bool], limit_s: float = 20.0) -> T:
-    """The first value that is; fails after `limit_s`."""
-    async with asyncio.timeout(limit_s):
-        while not is_reached(value := await read()):
-            await asyncio.sleep(0.1)
-    return value
 
 
 def moved(item: MissionItem, **changes: Any) -> MissionItem:
@@ -228,9 +217,7 @@ async def test_mavsdk_reads_arms_and_is_refused_and_its_silence_stops_the_boat(
             assert ((state := await states.next()).mode, state.armed) == (mode, True)
             transcript.note("boat", f"armed, in {mode.name}")
     transcript.note("MAVSDK", "the link is lost")
-    async with asyncio.timeout(LINK_LOSS_S + 10.0):
-        while not (state := await states.next()).stopped:
-            pass
+    state = await until(states.next, lambda state: state.stopped, LINK_LOSS_S + 10.0)
     assert (state.by, state.armed) == ("mavlink", False)
     transcript.note("boat", f"STOP, asked by {state.by}; not armed")
     await until(speeds.next, lambda own: own.surge_mps < 0.1)
@@ -255,9 +242,7 @@ async def test_a_stop_of_a_ground_station_is_released_by_a_hand_on_the_page_alon
         assert await station.until(station.telemetry.armed, bool, 5.0)
         transcript.note("page", "armed by hand")
         await station.ask_until_taken("disarm", station.action.disarm)
-        async with asyncio.timeout(5.0):
-            while not (state := await states.next()).stopped:
-                pass
+        state = await until(states.next, lambda state: state.stopped, 5.0)
         assert state.by == "mavlink"
         transcript.note("boat", f"STOP, asked by {state.by}")
         assert not await station.until(station.telemetry.armed, lambda is_armed: not is_armed, 5.0)

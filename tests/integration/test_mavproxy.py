@@ -7,16 +7,16 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Latest, open_bus
+from paani.bus import open_bus
 from paani.clock import WallClock
-from tests.integration.mavlink_river import LINK_LOSS_S, River, river_in
+from tests.integration.mavlink_river import River, river_in, until
 from tests.transcript import Transcript
 
 pytestmark = [
@@ -27,6 +27,7 @@ pytestmark = [
 ]
 COMMAND, LATITUDE = 3, 8  # columns of a file of waypoints
 UNPRINTED = re.compile(r"[^\x20-\x7e\n]")
+LIMIT_S = 30.0  # for a word of the boat
 MODULES = "--default-modules=param,wp,fence,arm,mode"
 
 
@@ -72,13 +73,6 @@ class Console:
         self._input.write(f"{command}\n".encode() if command else b"")
 
 
-async def until(inbox: Latest[m.OperatorState], is_reached: Callable[[m.OperatorState], bool]) -> m.OperatorState:
-    async with asyncio.timeout(30.0):
-        while not is_reached(state := await inbox.next()):
-            pass
-    return state
-
-
 async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
     river: River, tmp_path: Path, transcript: Transcript
 ) -> None:
@@ -118,14 +112,10 @@ async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
             for seq, corner in enumerate(corners)
         ))  # fmt: skip
         await console.expect("TYPE_MISSION: ACCEPTED", "wp load own.txt", "TYPE_MISSION: DENIED")
-        async with asyncio.timeout(30.0):
-            while not (mission := await missions.next()).accepted_us:
-                pass
+        mission = await until(missions.next, lambda mission: mission.accepted_us > 0, LIMIT_S)
         assert [len(leg.waypoints) for leg in mission.legs] == [len(items) - 1]
         await console.expect("TYPE_FENCE: ACCEPTED", "fence load fence.txt", "TYPE_FENCE: DENIED")
-        async with asyncio.timeout(30.0):
-            while not (mission := await missions.next()).fence:
-                pass
+        mission = await until(missions.next, lambda mission: bool(mission.fence), LIMIT_S)
         assert [len(area.corners) for area in mission.fence] == [4]
         await console.expect("TYPE_MISSION: UNSUPPORTED", "wp load takeoff.txt")
         assert "the boat cannot do command 22" in console.printed
@@ -133,24 +123,19 @@ async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
         assert "is outside the fence" in console.printed
 
         await console.expect("COMPONENT_ARM_DISARM: ACCEPTED", "arm throttle", "COMPONENT_ARM_DISARM: FAILED")
-        assert (await until(states, lambda state: state.armed)).by == "mavlink"
+        assert (await until(states.next, lambda state: state.armed, LIMIT_S)).by == "mavlink"
         await console.expect("DO_SET_MODE: ACCEPTED", "mode AUTO", "DO_SET_MODE: DENIED")
-        async with asyncio.timeout(30.0):
-            while (await speeds.next()).surge_mps < 0.2:
-                pass
+        await until(speeds.next, lambda own: own.surge_mps >= 0.2, LIMIT_S)
         transcript.note("boat", "makes way")
         await console.expect("Mode RTL", "mode RTL", "DO_SET_MODE: DENIED")
-        await until(states, lambda state: state.mode is m.DriveMode.RETURN)
+        await until(states.next, lambda state: state.mode is m.DriveMode.RETURN, LIMIT_S)
     finally:
         process.kill()
         await process.wait()
     transcript.note("MAVProxy", "is killed: the link is lost")
-    async with asyncio.timeout(LINK_LOSS_S + 30.0):
-        state = await until(states, lambda state: state.stopped)
+    state = await until(states.next, lambda state: state.stopped, LIMIT_S)
     assert (state.by, state.armed) == ("mavlink", False)
     transcript.note("boat", f"STOP, asked by {state.by}; not armed")
-    async with asyncio.timeout(30.0):
-        while (await speeds.next()).surge_mps > 0.1:
-            pass
+    await until(speeds.next, lambda own: own.surge_mps <= 0.1, LIMIT_S)
     transcript.note("boat", "stands")
     await bus.close()

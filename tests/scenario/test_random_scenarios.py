@@ -1,7 +1,5 @@
 """Scenarios drawn at random: fair to the boat, and always the same for the same seed."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -10,6 +8,7 @@ from paani_sim.worlds import FIXED_WORLDS, WORLDS, Scenario, actor_pose_at, load
 from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.passability import HEADROOM_M, footprint_distance_m
 from paani_sim.worlds.spec import build_spec
+from tests.plain_values import as_plain
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair, fine
 
 SEEDS = 4
@@ -29,18 +28,8 @@ def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
 def test_the_same_seed_gives_the_same_scenario(scenarios: tuple[Scenario, ...]) -> None:
     first = scenarios[2]
     again = draw_random_scenario(first.world.name, 2)
-    assert _plain(again) == _plain(first)
-    assert _plain(scenarios[3]) != _plain(first)
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, tuple):
-        return [_plain(part) for part in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    return value
+    assert as_plain(again) == as_plain(first)
+    assert as_plain(scenarios[3]) != as_plain(first)
 
 
 def test_seeds_use_all_of_the_route(scenarios: tuple[Scenario, ...]) -> None:

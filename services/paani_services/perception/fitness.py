@@ -7,15 +7,17 @@ from paani_services.perception.image_quality import FitnessFunction
 from paani_services.perception.preprocessing import lookup_tables_for, shrink_picture
 
 
-def load_fitness(perception: PerceptionConfig, threads: int) -> FitnessFunction | None:
-    """The network as a function; None where the check or its network is switched off, and in the open set, without one.
+def uses_fitness(perception: PerceptionConfig) -> bool:
+    """Whether the check asks the network: not where either is switched off, nor in the open set, which has none."""
+    quality = perception.image_quality
+    return quality.enabled and quality.min_fitness > 0.0 and bool(quality.model or perception.weights == "full")
 
-    Raises UserError naming a file that cannot be used.
-    """
-    config = perception.image_quality
-    if not config.enabled or config.min_fitness == 0.0 or not (config.model or perception.weights == "full"):
+
+def load_fitness(perception: PerceptionConfig, threads: int) -> FitnessFunction | None:
+    """The network as a function; None where it is not used. Raises UserError naming a file that cannot be used."""
+    if not uses_fitness(perception):
         return None
-    engine = OnnxEngine.load("gate", config.model, threads)
+    engine = OnnxEngine.load("gate", perception.image_quality.model, threads)
     height, width = engine.contract.size_hw
     table = lookup_tables_for(engine.contract)
 

@@ -117,14 +117,15 @@ def check_certificates(config: Config) -> Iterator[Verdict]:
     if not folder:
         yield passed("bus.certificates: not set; processes sign in by password")
         return
-    if missing := uncertified_in(identities_of(config.bus)):
+    identities = identities_of(config.bus)
+    if missing := uncertified_in(identities):
         verdict = failed if {*config.services, listener_of(config.bus)}.intersection(missing) else warned
         yield verdict(
             f"bus.certificates {folder}: none for {', '.join(missing)}",
             f"paani certs complete --folder {folder} where the authority's key is, and copy the folder again",
         )
     ensure_credentials(config.bus)
-    name, first = min(identities_of(config.bus).holders.items(), key=lambda item: item[1].not_after_s)
+    name, first = min(identities.holders.items(), key=lambda item: item[1].not_after_s)
     text = f"bus.certificates {folder}: {name}.{first.number} is the first to expire, {date_text(first.not_after_s)}"
     if first.not_after_s - WallClock().now_us() * 1e-6 < EXPIRES_SOON_S:
         yield warned(text, f"paani certs rotate {ALL} --folder {folder}, before the next trip")

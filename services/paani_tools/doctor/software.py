@@ -15,7 +15,8 @@ from paani.config import Config
 from paani.errors import UserError
 from paani.extras import require_modules
 from paani.version import version_text
-from paani_services.perception.engine import OnnxEngine, check_onnxruntime, engine_class, network_path
+from paani_services.perception.engine import OnnxEngine, check_onnxruntime, load_network
+from paani_services.perception.fitness import uses_fitness
 from paani_tools.doctor.finding import Verdict, failed, passed, warned
 from paani_tools.up.plan import EYE, NEEDED
 
@@ -70,19 +71,15 @@ def _installed(name: str) -> str | None:
 def check_models(config: Config) -> Iterator[Verdict]:
     """Loads each model that these settings use, which compares its checksum or its shapes."""
     settings = config.perception
-    engine = engine_class(settings.engine)
     wanted = [("detector", settings.detector)]
     if settings.segmenter != "none":
         wanted.append(("segmenter", settings.segmenter))
-    quality = settings.image_quality
-    if quality.enabled and quality.min_fitness > 0.0 and (quality.model or settings.weights == "full"):
-        wanted.append(("gate", quality.model))
+    if uses_fitness(settings):
+        wanted.append(("gate", settings.image_quality.model))
     for role, path in wanted:
         try:
-            if role == "gate":
-                yield passed(OnnxEngine.load(role, path, 1).info())
-            else:
-                yield passed(engine.load(role, network_path(role, settings), 1).info())
+            engine = OnnxEngine.load(role, path, 1) if role == "gate" else load_network(role, settings, 1)
+            yield passed(engine.info())
         except UserError as error:
             remedy = f"see `paani models check {path}`" if path else "install paani again: its files are damaged"
             yield failed(str(error), remedy)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from paani_sim.eye.mesh import ROCK, STONE, WOOD, Mesh, Rgb, box, ellipsoid, loft, merge, placed, rod
-from paani_sim.worlds.footprint import TAPERED
+from paani_sim.worlds.footprint import build_tapered_outline
 
 CONCRETE: Rgb = (0.56, 0.55, 0.51)
 WEED: Rgb = (0.20, 0.24, 0.14)
@@ -37,9 +37,8 @@ def weir(length: float, width: float, height: float, variant: int) -> Mesh:
 
 def bridge_pier(length: float, width: float, height: float, variant: int) -> Mesh:
     """A stone pier with cutwaters at both ends, and the weed at its foot."""
-    full_to, tip_y = TAPERED["bridge_pier"]
-    half = np.array([[1.0, tip_y], [full_to, 1.0], [-full_to, 1.0], [-1.0, tip_y]])
-    plan = np.vstack([half, -half, half[:1]]) * [0.5 * length, 0.5 * width]
+    around = build_tapered_outline("bridge_pier") * [0.5 * length, 0.5 * width]
+    plan = np.vstack([around, around[:1]])
     tone = 1.0 - 0.1 * (variant % 3)
     stone: Rgb = (0.58 * tone, 0.54 * tone, 0.47 * tone)
     faces = []

@@ -58,7 +58,7 @@ def build_outline(thing: Obstacle | Actor) -> F64:
     elif thing.look in BOWS:
         unit = _build_pointed_outline(BOWS[thing.look])
     elif thing.look in TAPERED:
-        unit = _build_tapered_outline(*TAPERED[thing.look])
+        unit = build_tapered_outline(thing.look)
     return unit * [0.5 * thing.length_m, 0.5 * thing.width_m]
 
 
@@ -75,13 +75,18 @@ def place_outline(shape_m: F64, pose: Pose2) -> F64:
 
 
 def _build_pointed_outline(bow: BowShape) -> F64:
-    port = np.array([[1.0, bow.tip_y], [bow.at_x, bow.at_y], [bow.from_x, 1.0], [-1.0, 1.0]])
-    return np.vstack([port, port[::-1] * [1.0, -1.0]])
+    return _mirrored([[1.0, bow.tip_y], [bow.at_x, bow.at_y], [bow.from_x, 1.0], [-1.0, 1.0]])
 
 
-def _build_tapered_outline(full_to: float, tip_y: float) -> F64:
-    port = np.array([[1.0, tip_y], [full_to, 1.0], [-full_to, 1.0], [-1.0, tip_y]])
-    return np.vstack([port, port[::-1] * [1.0, -1.0]])
+def build_tapered_outline(look: str) -> F64:
+    """The outline of one of `TAPERED` in half lengths and half widths, `(8, 2)`."""
+    full_to, tip_y = TAPERED[look]
+    return _mirrored([[1.0, tip_y], [full_to, 1.0], [-full_to, 1.0], [-1.0, tip_y]])
+
+
+def _mirrored(port: list[list[float]]) -> F64:
+    corners = np.array(port)
+    return np.vstack([corners, corners[::-1] * [1.0, -1.0]])
 
 
 def is_apart(one: F64, other: F64, room_m: float) -> bool:

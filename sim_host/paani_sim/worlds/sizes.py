@@ -1,5 +1,7 @@
 """Kind and usual size of things, by their look. Animals and what drifts are of no class that the detector knows."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from paani_sim.worlds.world import Actor, Kind, Obstacle
@@ -12,6 +14,10 @@ class Size(NamedTuple):
     length_m: float
     width_m: float
     height_m: float
+
+    def scaled(self, factor: float) -> Size:
+        """As tall, and so many times as long and wide."""
+        return self._replace(length_m=factor * self.length_m, width_m=factor * self.width_m)
 
 
 SIZES: dict[str, Size] = {

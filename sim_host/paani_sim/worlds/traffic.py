@@ -22,6 +22,7 @@ from paani_sim.worlds.sizes import SIZES, Size
 from paani_sim.worlds.world import Actor, Behaviour, Obstacle, actor_pose_at
 
 CROSSING, HEAD_ON, OVERTAKING, DRIFTING = Encounter
+UNDER_WAY = (CROSSING, HEAD_ON, OVERTAKING)
 UNSEEING_GAP_M = (2.0, 4.5)  # between the side of who does not see the boat and the route's line
 SEEING_GAP_M = (1.2, 2.4)  # between the side of who overtakes and sees the boat, and the route's line
 AHEAD_GAP_M = 2.0  # left between a boat on its route and who crosses before it without seeing it
@@ -50,15 +51,15 @@ class ActorKind(NamedTuple):
 
 
 ACTOR_KINDS = {
-    "motor_boat": ActorKind(0.10, ("dinghy", "cruiser", "workboat"), (0.9, 1.2), (0.6, 1.8), tuple(Encounter)[:3], 0.9),
-    "kayaks": ActorKind(0.10, ("kayak",), (0.9, 1.1), (0.7, 1.5), tuple(Encounter)[:3], 0.9, group=(1, 3), apart_m=3.5),
+    "motor_boat": ActorKind(0.10, ("dinghy", "cruiser", "workboat"), (0.9, 1.2), (0.6, 1.8), UNDER_WAY, 0.9),
+    "kayaks": ActorKind(0.10, ("kayak",), (0.9, 1.1), (0.7, 1.5), UNDER_WAY, 0.9, group=(1, 3), apart_m=3.5),
     "paddle_boards": ActorKind(
-        0.09, ("paddleboard",), (0.9, 1.1), (0.4, 1.0), tuple(Encounter)[:3], 0.85, group=(1, 3), apart_m=3.0
+        0.09, ("paddleboard",), (0.9, 1.1), (0.4, 1.0), UNDER_WAY, 0.85, group=(1, 3), apart_m=3.0
     ),
     "rowing_eight": ActorKind(0.12, ("eight",), (0.95, 1.0), (1.8, 3.2), (HEAD_ON, OVERTAKING), 0.0),
     "barge": ActorKind(0.10, ("barge", "narrowboat"), (1.1, 1.8), (0.9, 2.2), (HEAD_ON, OVERTAKING), 0.3),
     "ferry": ActorKind(0.14, ("ferry",), (0.85, 1.1), (0.8, 1.6), (CROSSING,), 0.4, turn_deg=(142.0, 8.0)),
-    "jet_ski": ActorKind(0.08, ("jetski",), (0.9, 1.1), (1.6, 2.8), tuple(Encounter)[:3], 0.8),
+    "jet_ski": ActorKind(0.08, ("jetski",), (0.9, 1.1), (1.6, 2.8), UNDER_WAY, 0.8),
     "swimmers": ActorKind(0.11, ("swimming",), (1.0, 1.0), (0.2, 0.4), (CROSSING,), 0.8, group=(1, 4), apart_m=2.2),
     "dog": ActorKind(0.06, ("dog",), (0.8, 1.1), (0.3, 0.7), (CROSSING,), 1.0),
     "birds": ActorKind(0.08, ("swan", "duck"), (0.9, 1.1), (0.1, 0.35), (CROSSING,), 1.0, Behaviour.FLEES, (2, 4), 1.6),
@@ -94,7 +95,7 @@ def draw_actors(name: str, place: MeetingPlace, rng: np.random.Generator) -> Seq
     look, count = str(rng.choice(kind.looks)), int(rng.integers(kind.group[0], kind.group[1] + 1))
     encounter = kind.encounters[int(rng.integers(len(kind.encounters)))]
     sees, factor = bool(rng.random() < kind.seeing), float(rng.uniform(*kind.scale))
-    size = _scaled(SIZES[look], factor)
+    size = SIZES[look].scaled(factor)
     meeting = _Meeting(
         place,
         encounter,
@@ -211,7 +212,3 @@ def _misses_boat(place: MeetingPlace, actor: Actor) -> bool:
 
 def _start_outline_m(actor: Actor) -> F64:
     return place_outline(build_outline(actor), actor_pose_at(actor, 0.0))
-
-
-def _scaled(size: Size, factor: float) -> Size:
-    return size._replace(length_m=factor * size.length_m, width_m=factor * size.width_m)

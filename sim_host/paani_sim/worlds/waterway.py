@@ -15,7 +15,7 @@ from paani_sim.worlds.curves import clearance_m, closed_length_m, resample_close
 from paani_sim.worlds.footprint import place_outline
 from paani_sim.worlds.lighting import draw_condition, draw_light
 from paani_sim.worlds.route_frame import start_pose
-from paani_sim.worlds.sizes import SIZES, Size
+from paani_sim.worlds.sizes import SIZES
 from paani_sim.worlds.world import Actor, Behaviour, Current, Kind, Light, Obstacle, Waves, Wind, World
 
 WATERWAY = "waterway"
@@ -80,11 +80,6 @@ def _open_stream(seed: int, number: int) -> Rng:
     return np.random.default_rng([zlib.crc32(WATERWAY.encode()), seed, number])
 
 
-def _draw_wind(rng: Rng) -> Wind:
-    speed_mps, toward_rad = float(rng.uniform(0.0, 5.0)), float(rng.uniform(-np.pi, np.pi))
-    return Wind(speed_mps, toward_rad, float(rng.uniform(0.05, 0.35)), float(rng.uniform(8.0, 20.0)))
-
-
 def _middles_m(rng: Rng) -> npt.NDArray[np.float64]:
     slot_m = (ROUTE_M[1] - ROUTE_M[0]) / len(FEATURES)
     return ROUTE_M[0] + slot_m * (np.arange(len(FEATURES)) + 0.5) + rng.uniform(-3.0, 3.0, len(FEATURES))
@@ -133,7 +128,7 @@ def _draw_moored_row(channel: Channel, at_m: float, rng: Rng) -> list[Obstacle]:
     along_m, last_m = at_m - 19.0, at_m + 19.0
     while True:
         look = str(rng.choice(ROW_LOOKS))
-        size = _scaled(SIZES[look], float(rng.uniform(0.85, 1.15)))
+        size = SIZES[look].scaled(float(rng.uniform(0.85, 1.15)))
         if along_m + size.length_m > last_m:
             return row
         middle_m, out_m = along_m + 0.5 * size.length_m, 0.5 * size.width_m + 0.7
@@ -157,7 +152,7 @@ def _draw_weir(channel: Channel, at_m: float, rng: Rng) -> list[Obstacle]:
     count = round(length_m / WEIR_BUOYS_EVERY_M) + 1
     for number, off_m in enumerate(np.linspace(-0.5 * length_m, 0.5 * length_m, count).tolist()):
         place = channel.bank(at_m + off_m, side, -WEIR_BUOYS_OFF_M)
-        found.append(Obstacle(f"weir_buoy_{number}", Kind.BUOY, look, place, *_buoy_size(look), 0.0, variant))
+        found.append(Obstacle(f"weir_buoy_{number}", Kind.BUOY, look, place, *SIZES[look][1:], 0.0, variant))
     return found
 
 
@@ -190,7 +185,7 @@ def _draw_marks(channel: Channel, rng: Rng) -> list[Obstacle]:
         left_m = side * 2.0 * LANE_M * channel.half_width_m(along_m) + float(rng.uniform(-0.8, 0.8))
         look = str(rng.choice(MARKS))
         pose = channel.pose_at(along_m, left_m)
-        found.append(Obstacle(f"mark_{number}", Kind.BUOY, look, pose, *_buoy_size(look), 0.0, int(rng.integers(12))))
+        found.append(Obstacle(f"mark_{number}", Kind.BUOY, look, pose, *SIZES[look][1:], 0.0, int(rng.integers(12))))
     return found
 
 
@@ -219,11 +214,3 @@ def _build_actors(channel: Channel, sites: dict[str, float]) -> tuple[Actor, ...
             Actor(f"{look}_under_way", size.kind, look, path_m, 0.8, *size[1:], 12.0, number, behaviour=gives_way)
         )
     return tuple(found)
-
-
-def _buoy_size(look: str) -> tuple[float, float, float]:
-    return SIZES[look][1:]
-
-
-def _scaled(size: Size, factor: float) -> Size:
-    return size._replace(length_m=factor * size.length_m, width_m=factor * size.width_m)

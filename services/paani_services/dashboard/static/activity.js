@@ -1,7 +1,7 @@
 // @ts-check
 // What the boat does and why, from what the processes say. Pure; the words are in text.js.
 
-import { findInhibits, isReplay, isThrustApplied } from "./inhibits.js";
+import { findInhibits, isOfArming, isReplay, isThrustApplied } from "./inhibits.js";
 import { ACTIVITIES, ACTIVITY_TEXTS, STAGES, operatorText, reasonText, trackNames, words } from "./text.js";
 
 const STANDS_STILL_MPS = 0.02; // an order this slow is to wait or to turn on the spot
@@ -25,7 +25,7 @@ export function describeActivity(store, now) {
   if (operator?.stopped && !isMoving) return activity("STOPPED", ACTIVITY_TEXTS.stoppedBy(operatorText(operator.by)));
   if (!store.isFresh("plant/thrust_applied", now)) return activity("UNKNOWN", STAGES.gate[1]);
   if (isMoving) return command?.enable ? describeMotion(store, command, now) : activity("UNDER_WAY", ACTIVITY_TEXTS.noOrder);
-  if (inhibits.some((reason) => reason.code === "NOT_ARMED" || reason.code === "not_armed")) return activity("NOT_ARMED", otherReason(inhibits));
+  if (inhibits.some(isOfArming)) return activity("NOT_ARMED", otherReason(inhibits));
   if (inhibits.some((reason) => reason.code === "IDLE")) return activity("IDLE", otherReason(inhibits.filter((reason) => reason.code !== "IDLE")));
   if (inhibits.some((reason) => reason.code === "NEUTRAL")) return activity("MANUAL", handReason(store, command, ACTIVITY_TEXTS.neutral));
   const inMission = inhibits.find((reason) => reason.stage === "mission");

@@ -1,7 +1,7 @@
 // @ts-check
 // The tab of a hull's devices: its sensors, the bridge to the indicator, and the line to the thrusters. Hidden without any.
 
-import { DEVICE_FACTS, DEVICE_TEXTS, ageText, byId, fixed, make, setFacts, setText } from "./text.js";
+import { DEVICE_FACTS, DEVICE_TEXTS, ageText, agoText, byId, fixed, make, setFacts, setText } from "./text.js";
 
 const TOPICS = ["sensors/state", "bridge/state", "thrusters/state"];
 const NAMES = ["sensors", "bridge", "thrusters"];
@@ -16,7 +16,7 @@ export function renderDevices(store, now) {
     const key = TOPICS[index + 1], state = store.get(key), panel = byId(`${name}-device`);
     panel.hidden = !services.includes(name);
     panel.classList.toggle("stale", !store.isFresh(key, now));
-    setText(byId(`${name}-age`), state ? DEVICE_TEXTS.ago(ageText(store.ageS(key, now))) : DEVICE_TEXTS.none);
+    setText(byId(`${name}-age`), state ? agoText(ageText(store.ageS(key, now))) : DEVICE_TEXTS.none);
     setFacts(byId(`${name}-facts`), state ? factsOf(state) : []);
   });
 }

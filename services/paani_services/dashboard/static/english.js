@@ -67,8 +67,9 @@ export const EXPLANATION_TEXTS = {
 /** A track by its kind, and one whose name is not known. */
 export const TRACK_TEXTS = { immediate: "immediate", accepted: "accepted", tentative: "tentative", unnamed: "track" };
 
-/** An age that is none. */
+/** An age that is none, and one in words. */
 export const NEVER = "never";
+export const agoText = (/** @type {string} */ age) => `${age} ago`;
 
 /** Why the boat stands, beside the list of reasons. */
 export const INHIBIT_TEXTS = { unusable: "picture unusable", stopHolds: "STOP holds: hold the button to arm, which releases it" };
@@ -104,7 +105,7 @@ export const RECORD_TEXTS = {
 
 /** Driving by hand. */
 export const DRIVE_TEXTS = {
-  override: "Override the advice for 10 s", vetoed: "The advice gives no thrust ahead",
+  override: PAGE_TEXTS.override, vetoed: "The advice gives no thrust ahead",
   overridden: (/** @type {string} */ seconds) => `Advice overridden, ${seconds} s left`,
 };
 
@@ -118,7 +119,7 @@ export const STAGE_TEXTS = {
 };
 
 /** The devices of a hull. */
-export const DEVICE_TEXTS = { none: "no report yet", ago: (/** @type {string} */ age) => `${age} ago` };
+export const DEVICE_TEXTS = { none: "no report yet" };
 export const INDICATOR_TEXTS = {
   none: "no report from the bridge yet", silent: "the bridge is silent", unknown: "UNKNOWN",
   facts: (/** @type {string} */ mcu, /** @type {string} */ ms, /** @type {number} */ boot) => `${mcu} · ${ms} ms · boot ${boot}`,
@@ -364,7 +365,6 @@ export const TIME_TEXTS = {
   noAdvice: "advice unknown",
   noMode: "mode unknown",
   place: (/** @type {string} */ name, /** @type {string} */ at, /** @type {string} */ all) => `${name}, ${at} of ${all}`,
-  ago: (/** @type {string} */ age) => `${age} ago`,
   loading: "loading",
 };
 

@@ -5,6 +5,9 @@ import { INHIBIT_TEXTS, STAGES, STOP_REASONS, reasonText, words } from "./text.j
 
 /** @typedef {{stage: string, code: string, text: string}} StopReason */
 
+/** Whether arming ends this reason. @param {StopReason} reason */
+export const isOfArming = ({ code }) => code === "NOT_ARMED" || code === "not_armed";
+
 /** The topic of each stage that sends one. @type {[string, string][]} */
 const TOPICS = [
   ["camera", "camera/picture"], ["perception", "perception/evidence"], ["advisor", "advisor/advisory"],

@@ -140,7 +140,7 @@ export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
   const { ctx, toScreen, pxPerM, colour } = chart;
   for (const obstacle of obstacles) {
     if (pose && isNearing(obstacle)) drawClosest(chart, obstacle, pose, ageS);
-    const east = obstacle.x_m + obstacle.east_mps * ageS, north = obstacle.y_m + obstacle.north_mps * ageS;
+    const [east, north] = placeAfter(obstacle, obstacle.east_mps, obstacle.north_mps, ageS);
     const [x, y] = toScreen(east, north), radius = Math.max(6, obstacle.radius_m * pxPerM);
     ctx.strokeStyle = ctx.fillStyle = colour("--orange");
     ctx.lineWidth = 2;

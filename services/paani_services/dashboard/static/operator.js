@@ -1,7 +1,7 @@
 // @ts-check
 // The operator's controls: arming is a hold that expires; what became of a STOP is shown beside it.
 
-import { findInhibits, isReplay } from "./inhibits.js";
+import { findInhibits, isOfArming, isReplay } from "./inhibits.js";
 import { bindKey, hasKey, post } from "./requests.js";
 import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
 import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, make, operatorText, setText, words } from "./text.js";
@@ -68,7 +68,7 @@ export function renderOperatorState(store, open, now, isPast) {
   button.disabled = !isHeard || !operator || operator.armed || isReplay(store) || isPast;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? ARM_TEXTS.release : operator?.armed ? ARM_TEXTS.armed : ARM_TEXTS.hold);
-  renderRemaining(heldFrom ? findInhibits(store, now).filter(({ code }) => code !== "NOT_ARMED" && code !== "not_armed") : null);
+  renderRemaining(heldFrom ? findInhibits(store, now).filter((reason) => !isOfArming(reason)) : null);
   setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
   const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));

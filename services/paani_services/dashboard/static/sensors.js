@@ -17,7 +17,7 @@ export function renderSensors(store, now) {
   for (const device of devices) {
     const row = rowOf(strip, device.role), status = fresh || !state ? device.status : "silent";
     row.dataset.status = status;
-    row.title = device.line ? `${device.line}: ${countsText(device)}` : "";
+    row.title = device.line ? `${device.line}: ${SENSOR_TEXTS.counts(device)}` : "";
     setText(/** @type {HTMLElement} */ (row.children[0]), device.role);
     setText(/** @type {HTMLElement} */ (row.children[1]), status.replaceAll("_", " "));
     setText(/** @type {HTMLElement} */ (row.children[2]), fresh ? device.note || rateText(device) : device.note || SENSOR_TEXTS.silent);
@@ -39,7 +39,3 @@ function rowOf(strip, role) {
 
 /** @param {any} device */
 const rateText = (device) => (device.status === "off" ? "" : `${fixed(device.rate_hz, device.rate_hz < 10 ? 1 : 0)} Hz`);
-
-/** @param {any} device */
-const countsText = (device) =>
-  SENSOR_TEXTS.counts(device);

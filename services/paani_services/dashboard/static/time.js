@@ -6,7 +6,7 @@ import { showLogOf } from "./log.js";
 import { historySource, loadHistory, replayedSource } from "./past_source.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
-import { TIME_TEXTS, ageText, byId, clockText, setText, spanText } from "./text.js";
+import { TIME_TEXTS, ageText, agoText, byId, clockText, setText, spanText } from "./text.js";
 import { TimeStrip } from "./time_strip.js";
 
 export class Time {
@@ -104,7 +104,7 @@ export class Time {
   renderBanner(source, series, now) {
     const { atUs, problem, buffer } = this.playback;
     setText(byId("past-word"), source.name ? TIME_TEXTS.recording : TIME_TEXTS.past);
-    const place = source.name ? TIME_TEXTS.place(source.name, spanText(atUs - series.startUs), spanText(series.endUs - series.startUs)) : TIME_TEXTS.ago(ageText((this.history.series.endUs - atUs) / 1e6));
+    const place = source.name ? TIME_TEXTS.place(source.name, spanText(atUs - series.startUs), spanText(series.endUs - series.startUs)) : agoText(ageText((this.history.series.endUs - atUs) / 1e6));
     const state = problem || (buffer.length ? TIME_TEXTS.readOnly : TIME_TEXTS.loading);
     setText(byId("past-what"), `${clockText(atUs)}, ${place}: ${state}`);
     const button = byId("past-live-button");

@@ -103,9 +103,8 @@ def _judge(samples: Sequence[Sample], number: int, perceiver: Perceiver, data: P
     picture, corridors = samples[0].picture, config.perception.corridors
     boxes = next((read_boxes(sample.label) for sample in samples if sample.label), None)
     name = picture.relative_to(data).as_posix()
-    mask = next((read_mask(sample.mask) for sample in samples if sample.mask), None)
-    if name in mistaken_masks():
-        mask = None
+    masks = () if name in mistaken_masks() else (sample.mask for sample in samples if sample.mask)
+    mask = next(map(read_mask, masks), None)
     frame = next(iter(read_frames(picture, config.camera)))
     ahead = annotated_ahead(boxes, mask, corridors)
     if name in occupied_centres():

@@ -20,6 +20,7 @@ from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.sizes import is_afloat_by_nature
 from paani_sim.worlds.traffic import ACTOR_KINDS
 from paani_sim.worlds.waterway import build_waterway, draw_waterway_light
+from tests.plain_values import as_plain
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -51,19 +52,9 @@ def _overlap(one: F64, other: F64) -> bool:
     return True
 
 
-def _plain(value: object) -> object:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, tuple):
-        return [_plain(part) for part in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    return value
-
-
 @pytest.mark.parametrize("seed", [0, 7, 10_001, FRESH_SEEDS.start])
 def test_a_seed_gives_one_waterway_and_another_seed_another(seed: int) -> None:
-    assert _plain(build_waterway(seed)) == _plain(build_waterway(seed))
+    assert as_plain(build_waterway(seed)) == as_plain(build_waterway(seed))
     assert not np.array_equal(build_waterway(seed).shore_m, build_waterway(seed + 1).shore_m)
 
 
@@ -99,7 +90,7 @@ def test_conditions_change_the_light_and_nothing_else() -> None:
     worlds = [build_waterway(3, condition) for condition in LIGHT_CONDITIONS]
     lights = [world.light for world in worlds]
     assert all(one != other for one, other in itertools.combinations(lights, 2))
-    same = [_plain(dataclasses.replace(world, light=lights[0])) for world in worlds]
+    same = [as_plain(dataclasses.replace(world, light=lights[0])) for world in worlds]
     assert all(each == same[0] for each in same)
 
 
