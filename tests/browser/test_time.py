@@ -47,6 +47,7 @@ async def test_a_press_shows_that_moment_everywhere(
         before = boat.seq
         guidance.odometry = replace(guidance.odometry, surge_mps=1.25, x_m=40.0)
         await until(page, f"{SPEED} === '1.25'")
+        await until(page, f"{HISTORY_US}.then(([newest, slow]) => newest - slow > 1.5e6)")  # what is played has an end
 
         # Inside the time that the page has seen at this speed, as the strip moves on before it is pressed. The newest
         # mask of a moment may be of the picture before, and is left out then.
