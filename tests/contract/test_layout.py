@@ -112,24 +112,30 @@ def test_every_top_level_folder_explains_itself() -> None:
         assert (ROOT / folder / "README.md").is_file(), folder
 
 
+NAMESPACES = r"http://www\.(w3\.org/(2000/svg|1999/xhtml|1998/Math/MathML)|topografix\.com/GPX/1/1)(?=[\"'])"
+
+
 def test_served_files_name_no_other_host() -> None:
     folders = (ROOT / "services/paani_services/dashboard/static", ROOT / "services/paani_tools/fleet/static")
     for path in (path for folder in folders for path in folder.rglob("*")):
-        if path.suffix in {".js", ".html", ".css"}:
+        if path.suffix in {".js", ".mjs", ".html", ".css"}:
             text = path.read_text(encoding="utf-8")
-            for namespace in ("http://www.w3.org/2000/svg", "http://www.topografix.com/GPX/1/1"):
-                text = text.replace(namespace, "")
+            text = re.sub(NAMESPACES, "", text)
             text = re.sub(r"\A/\*!.*?\*/", "", text)  # where a vendored library comes from
             assert "http://" not in text, path
             assert "https://" not in text, path
 
 
-def test_the_vendored_library_is_the_one_that_its_readme_names() -> None:
-    folder = ROOT / "services/paani_services/dashboard/static/uplot"
-    readme = (folder / "README.md").read_text(encoding="utf-8")
-    for name in ("uPlot.iife.min.js", "uPlot.min.css"):
-        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in readme, name
-    assert "MIT" in (folder / "LICENSE").read_text(encoding="utf-8")
+@pytest.mark.parametrize("folder", ["uplot", "preact"])
+def test_a_vendored_library_is_the_one_that_its_readme_names(folder: str) -> None:
+    place = ROOT / "services/paani_services/dashboard/static" / folder
+    readme = (place / "README.md").read_text(encoding="utf-8")
+    for path in place.iterdir():
+        if path.suffix in {".js", ".mjs", ".css"}:
+            assert f"| {hashlib.sha256(path.read_bytes()).hexdigest()} |" in readme, path.name
+    licences = "".join(path.read_text(encoding="utf-8") for path in sorted(place.glob("LICENSE*")))
+    assert readme.count("| `") == len([path for path in place.iterdir() if path.suffix in {".js", ".mjs", ".css"}])
+    assert all(name in licences for name in re.findall(r"MIT|Apache", readme))
 
 
 # Pronouns, participles and metaphors that have a name in the field: trajectories, set-point, observation, inputs, ...

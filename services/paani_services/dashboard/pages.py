@@ -10,6 +10,7 @@ STATIC = Path(__file__).parent / "static"
 MEDIA_TYPES = {
     ".html": "text/html",
     ".js": "text/javascript",
+    ".mjs": "text/javascript",
     ".css": "text/css",
     ".svg": "image/svg+xml",
     ".png": "image/png",

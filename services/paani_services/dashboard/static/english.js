@@ -11,7 +11,7 @@ export const PAGE_TEXTS = {
   headings_group: "Headings that the planner weighed", map_canvas: "Fence, mission, route, way ahead, moving obstacles, estimated and true track, in metres east and north",
   map_controls: "Which way is up, and how large", zoom_in: "Zoom in", zoom_out: "Zoom out", log: "Log", log_newest_first: "Log, newest first",
   log_past: "Log until the moment shown, newest first", health: "Health", processes: "Processes", log_of_a_process: "Log of a process", recordings: "Recordings",
-  list_of_recordings: "List of recordings", topics: "Topics", search: "Search", search_topics: "Search topics", table_of_topics: "Table of topics", last_value: "Last value",
+  list_of_recordings: "List of recordings", topics: "Topics", search: "Search",
   settings: "Settings", table_of_settings: "Table of settings", search_settings: "Search settings", sensors_and_bridge: "Sensors and bridge",
   plots_group: "Plots of the last ten minutes", time: "Time", playback: "Playback", step_back: "Step back", step_back_key: "Step back (,)", play: "Play",
   play_or_pause_k: "Play or pause (K)", step_forward: "Step forward", step_forward_key: "Step forward (.)", speed: "Speed",
@@ -26,7 +26,7 @@ export const PAGE_TEXTS = {
   taken: "Taken", up: "Up:", north: "North", route_line: "route", fence: "fence", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track",
   how_to_read_logs: "Press a process for the last lines of its log.", process: "Process", state: "State", rate: "Rate", p50: "p50", p95: "p95", age: "Age", cpu: "CPU", mib: "MiB",
   files: "Files", celsius: "°C", starts: "Starts", dropped: "Dropped", says: "Says", read_again: "Read again", file: "File", began: "Began", duration: "Duration", size: "Size",
-  do: "Do", freeze: "Freeze", topic: "Topic", from: "From", rate_nominal_hz: "Rate / nominal [Hz]", changed_only: "Changed only", put_in_force: "Put in force", take_back: "Take back",
+  do: "Do", from: "From", changed_only: "Changed only", put_in_force: "Put in force", take_back: "Take back",
   setting: "Setting", value: "Value", unit: "Unit", default: "Default", range: "Range", try_beside: "Try beside", device: "Device", line: "Line", checksum: "Checksum",
   damaged: "Damaged", withheld: "Withheld", reconnected: "Reconnected", bridge_to_the_indicator: "Bridge to the indicator", line_to_the_thrusters: "Line to the thrusters",
   plots: "Plots", mode: "Mode", alerts_row: "Alerts", latency: "Latency", the_operator_key_which: "The operator's key, which", paani_up: "paani up", prints: "prints", log_in: "Log in",
@@ -377,7 +377,7 @@ export const HEALTH_TEXTS = {
 };
 
 /** The topics tab. */
-export const TOPICS_TEXTS = { freeze: "Freeze", thaw: "Frozen: go on", none: "Press a topic for its last value", silent: "nothing received", sum: (/** @type {number} */ shown, /** @type {number} */ all) => `${shown} of ${all}` };
+export const TOPICS_TEXTS = { title: PAGE_TEXTS.topics, columns: ["Topic", "From", "Rate / nominal [Hz]", "Age", "Size"], search: "Search", searchLabel: "Search topics", table: "Table of topics", value: "Last value", freeze: "Freeze", thaw: "Frozen: go on", none: "Press a topic for its last value", silent: "nothing received", sum: (/** @type {number} */ shown, /** @type {number} */ all) => `${shown} of ${all}` };
 
 /** The settings tab. */
 export const SETTING_TEXTS = { tuned: "tuned", try: "Try", sent: "tried beside what is in force", none: "Nothing is tried. A value that judges can be tried beside the one in force, whose advice alone is obeyed.", of: "of" };

@@ -24,7 +24,8 @@ import { connect } from "./socket.js";
 import { renderStages } from "./stages.js";
 import { bindTabs, isDriveTab, shownTab } from "./tabs.js";
 import { Time, isTyping } from "./time.js";
-import { bindTopics, renderTopics } from "./topics.js";
+import { showMoment } from "./templates.js";
+import { bindTopics } from "./topics.js";
 import { renderTopbar } from "./topbar.js";
 import { renderTuning } from "./tuning.js";
 import { View } from "./view.js";
@@ -82,8 +83,8 @@ function render() {
   if (document.hidden) return;
   renderHealth(store, isOpen, now);
   renderDevices(store, now);
-  if (shownTab() === "settings") renderSettings(live.store, present);
-  if (shownTab() === "topics") renderTopics(store, now, present);
+  showMoment({ store, now, isOpen }, present);
+  if (shownTab.value === "settings") renderSettings(live.store, present);
   if (isDriveTab()) renderPanels(view, now);
 }
 

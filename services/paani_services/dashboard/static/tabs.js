@@ -1,18 +1,19 @@
 // @ts-check
 // The tabs of the page. The first is the one people drive from; the bar, STOP and the strip of time stay on every one.
 
+import { signal } from "./templates.js";
+
 const DRIVE = "drive";
-let shown = DRIVE;
 
 /** The tab that is shown. */
-export const shownTab = () => shown;
+export const shownTab = signal(DRIVE);
 
 /** Whether the tab is shown from which the boat is driven. */
-export const isDriveTab = () => shown === DRIVE;
+export const isDriveTab = () => shownTab.value === DRIVE;
 
 /** @param {string} name */
 export function showTab(name) {
-  shown = name;
+  shownTab.value = name;
   document.body.dataset.tab = name;
   for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-tab-of]"))) {
     if (button.dataset.tabOf === name) button.setAttribute("aria-current", "page");

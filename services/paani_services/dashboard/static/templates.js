@@ -1,0 +1,37 @@
+// @ts-check
+// What draws the lists and forms of the page: templates, and the signals that have them drawn again. The server gives the
+// library's files the address of this one, whichever folder they lie in.
+
+import htm from "./htm.mjs";
+import { h, render } from "./preact.mjs";
+import { effect, signal } from "./signals-core.mjs";
+import { Store } from "./store.js";
+
+export { computed, effect, signal } from "./signals-core.mjs";
+
+/** @typedef {{store: Store, now: number, isOpen: boolean}} Moment what the page shows, when, and whether that is still heard */
+
+const TABLE_PERIOD_MS = 500; // people read a table no faster
+const NOTHING = { store: new Store(), now: 0, isOpen: false };
+/** What the panels show, and what the tables show, which change less often. @type {{value: Moment}} */
+export const moment = signal(NOTHING), tableMoment = signal(NOTHING);
+let tablesAt = -TABLE_PERIOD_MS;
+
+/** @param {Moment} shown @param {number} present milliseconds, by the page's clock */
+export function showMoment(shown, present) {
+  moment.value = shown;
+  if (shown.store === tableMoment.value.store && present - tablesAt < TABLE_PERIOD_MS) return;
+  tablesAt = present;
+  tableMoment.value = shown;
+}
+
+export const html = htm.bind(h);
+
+/** Draw a view into an element, and again whenever a signal that it reads changes. @param {string} selector @param {() => any} view */
+export function mount(selector, view) {
+  const element = /** @type {HTMLElement} */ (document.querySelector(selector));
+  effect(() => render(view(), element));
+}
+
+/** A table's head. @param {string[]} names @param {number[]} [numbers] the columns of numbers */
+export const tableHead = (names, numbers = []) => html`<thead><tr>${names.map((name, column) => html`<th class=${numbers.includes(column) ? "number" : ""}>${name}</th>`)}</tr></thead>`;

@@ -1,0 +1,55 @@
+"""What somebody types, chooses, focuses, scrolls to and freezes in a table stays while its values change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from paani.config import Config
+from tests.browser.conftest import Boat
+from tests.browser.test_page import until, watch
+from tests.conftest import Spawn
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+AGES = "[...document.querySelectorAll('#topics tr')].map((row) => row.children[3].textContent).join()"
+SIZE, VALUE = "document.querySelectorAll('#topics tr').length", "document.querySelector('#topic-value').textContent"
+
+
+async def is_changing(page: Any, expression: str) -> bool:
+    before = await page.evaluate(expression)
+    await page.wait_for_timeout(1200)
+    return bool(await page.evaluate(expression) != before)
+
+
+async def test_topics_are_searched_chosen_and_frozen(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+    async with spawn("dashboard"):
+        watched = await watch(browser, config, 900, 500)
+        page = watched.page
+        await until(page, "paani.overlay.mask_seq !== null")
+        await page.click("[data-tab-of='topics']")
+        await until(page, f"{SIZE} > 20")
+        all_topics = await page.evaluate(SIZE)
+        await page.evaluate("document.querySelector('.topics-tab .scroll').scrollTop = 120")
+        await page.focus("#topics tr:nth-child(6) button")
+        focused = await page.evaluate("document.activeElement.textContent")
+        assert await is_changing(page, AGES)
+        assert await page.evaluate("document.activeElement.textContent") == focused
+        assert await page.evaluate("document.querySelector('.topics-tab .scroll').scrollTop") == 120
+
+        await page.locator("#topics-search").press_sequentially("Advisor/ADV")
+        await until(page, f"{SIZE} === 1")
+        assert await page.inner_text("#topics-sum") == f"1 of {all_topics}"
+        await page.click("#topics button")
+        await until(page, f"{VALUE}.includes('centre risk 0.80')")
+        assert await page.get_attribute("#topics tr", "aria-selected") == "true"
+        assert await is_changing(page, VALUE)
+        await page.click("#topics-freeze")
+        assert not await is_changing(page, f"{AGES} + {VALUE}")
+        await page.fill("#topics-search", "perception/evidence")
+        await page.click("#topics button")
+        assert '"navigation_eligible": true' in await page.evaluate(VALUE), "what was there when it was frozen"
+        assert not await is_changing(page, VALUE)
+        await page.click("#topics-freeze")
+        assert await is_changing(page, VALUE)
+        assert watched.errors == []
