@@ -9,7 +9,6 @@ from paani.errors import UserError
 EXTRA_OF = {
     "mujoco": "host",
     "OpenGL": "host",
-    "filterpy": "host",
     "scipy": "host",
     "gpxpy": "host",
     "tqdm": "host",

@@ -29,7 +29,6 @@ EYE = "eye"
 NEEDED = {
     "plant": ("mujoco",),
     EYE: ("OpenGL",),
-    "localization": ("filterpy",),
     "mavlink": ("pymavlink",),
     "foxglove": ("foxglove",),
     "ros2": ("rosbags",),
