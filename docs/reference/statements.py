@@ -15,16 +15,17 @@ SUBJECTS = {
     "J": "risk and policy", "K": "simulation", "L": "state estimation", "M": "navigator", "N": "controller",
     "O": "thrust adapter and microcontroller", "P": "observability", "Q": "metric grid", "R": "data sets",
     "S": "training", "T": "export and precision", "U": "evaluation", "V": "results", "W": "limitations",
+    "X": "figures", "Y": "tables", "Z": "what the paper leaves unmeasured",
 }  # fmt: skip
 CLAIMS = Path(__file__).parents[2] / "tests" / "claims.toml"
 
 INTRODUCTION = """# The paper's statements
 
 PAANI follows *PAANI: On-Device Visual Evidence Fusion and Explainable Guidance for River-Robot Simulation* (Cardoz
-and Rajan). Each of its statements has an id here, by which code, settings and tests cite it, is given in our own
-words, and is either proved by the tests named or out of scope for the reason given. Where PAANI does better than the
-paper on purpose, it says what is better and how the paper's own form is kept. What a test proves it also misses where
-it is gone: each changed number, operator or branch that is named fails one of the tests beside it.
+and Rajan). Each of its statements, figures and tables has an id here, by which code, settings and tests cite it, is
+given in our own words, and is either proved by the tests named or out of scope for the reason given. Where PAANI does
+better than the paper on purpose, it says what is better and how the paper's own form is kept. What a test proves it
+also misses where it is gone: each changed number, operator or branch that is named fails one of the tests beside it.
 
 """
 

@@ -11,9 +11,11 @@ import msgspec
 from paani.errors import UserError
 
 TABLE = "tests/claims.toml"
+# A to W: statements; X: the figures; Y: the tables; Z: what the paper leaves unmeasured.
 COUNTS = {
     "A": 12, "B": 17, "C": 15, "D": 11, "E": 7, "F": 4, "G": 11, "H": 6, "I": 22, "J": 19, "K": 10, "L": 5, "M": 11,
     "N": 8, "O": 5, "P": 5, "Q": 6, "R": 11, "S": 12, "T": 6, "U": 10, "V": 24, "W": 15,
+    "X": 8, "Y": 11, "Z": 4,
 }  # fmt: skip
 IDS = tuple(f"{letter}{number}" for letter, count in COUNTS.items() for number in range(1, count + 1))
 

@@ -26,7 +26,7 @@ def augment_paper_pair(
 ) -> tuple[U8, U8]:
     """One training pair of the target size: RGB uint8 [H,W,3] and mask uint8 [H,W], which moves with the picture.
 
-    without: those of AUGMENTATIONS that are left out, to see what each is worth.
+    without: those of AUGMENTATIONS that are left out, to see what each is worth; the others are drawn as with them.
     """
     picture = np.asarray(cv2.resize(picture, target_wh), np.uint8)
     mask = np.asarray(cv2.resize(mask, target_wh, interpolation=cv2.INTER_NEAREST), np.uint8)
@@ -34,9 +34,11 @@ def augment_paper_pair(
         mirrored = np.ascontiguousarray(picture[:, ::-1]), np.ascontiguousarray(mask[:, ::-1])
         picture, mask = (picture, mask) if "flip" in without else mirrored
     if rng.random() < JITTER_FRAC:
-        picture = picture if "jitter" in without else jitter_colour_slightly(rng, picture)
+        jittered = jitter_colour_slightly(rng, picture)
+        picture = picture if "jitter" in without else jittered
     if rng.random() < GLARE_FRAC:
-        picture = picture if "glare" in without else add_glare(rng, picture)
+        lit = add_glare(rng, picture)
+        picture = picture if "glare" in without else lit
     return picture, mask
 
 

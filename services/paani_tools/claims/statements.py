@@ -102,5 +102,5 @@ def _ids(name: str, statements: tuple[Statement, ...]) -> set[str]:
     elif dash:
         found = set()
     if not found:
-        raise UserError(f"{name}: no such statement (ids run from A1 to W15; `J` names a group, `J5-J10` a range)")
+        raise UserError(f"{name}: no such statement (`paani claims` lists all; `J` names a group, `J5-J10` a range)")
     return found

@@ -16,6 +16,7 @@ from paani.undecodable import UNREADABLE
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue
 from paani_tools.bench.board.table import BoardRun
+from paani_tools.paper_report.recipes import training_table
 from paani_tools.paper_report.tables import (
     board_tables,
     detector_table,
@@ -66,6 +67,7 @@ def report_text(run: BoardRun | None) -> str:
         stills_table(paper, ours),
         settings_table(paper, ours),
         world_table(paper),
+        training_table(),
         board_tables(run),
     )
     return "\n".join((TITLE, "", INTRODUCTION, "", *(markdown(table) for table in tables)))

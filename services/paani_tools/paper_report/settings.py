@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from functools import reduce
 
-from paani.config import Config
-from paani_sim.vessels.vessel import Vessel
-
 # Statement, what it is, the paper's figures, and the settings that hold them.
 RUNTIME: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ("C6", "detector confidence", "0.4", ("perception.detections.confidence",)),
@@ -50,6 +47,6 @@ BOAT: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
 )  # fmt: skip
 
 
-def figures_at(tree: Config | Vessel, names: tuple[str, ...]) -> str:
-    """What the tree holds under these dotted names, as the paper's tables have it."""
+def figures_at(tree: object, names: tuple[str, ...]) -> str:
+    """What the tree holds under these dotted names, numbers all, as the paper's tables have it."""
     return " / ".join(f"{reduce(getattr, name.split('.'), tree):g}" for name in names)

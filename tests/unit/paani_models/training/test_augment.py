@@ -95,7 +95,12 @@ def test_each_of_the_papers_augmentations_may_be_left_out_alone(left_out: str) -
         draw = np.random.default_rng(seed).random
         flips = draw() < 0.5
         jitters = draw() < 0.5
-        out, labels = augment_paper_pair(np.random.default_rng(seed), picture, mask, SIZE_WH, (left_out,))
+        rngs = [np.random.default_rng(seed) for _ in range(2)]
+        out, labels = augment_paper_pair(rngs[0], picture, mask, SIZE_WH, (left_out,))
+        whole, _ = augment_paper_pair(rngs[1], picture, mask, SIZE_WH)
+        assert rngs[0].random() == rngs[1].random()
+        acts = {"flip": flips, "jitter": jitters, "glare": True}[left_out]
+        assert acts or np.array_equal(out, whole)
         assert bool(labels[0, 0] == 0) is (flips and left_out != "flip")
         upright = out[:, ::-1] if labels[0, 0] == 0 else out
         if left_out == "glare":

@@ -43,7 +43,7 @@ def test_statements_are_chosen_by_id_words_and_state(
     assert printed[-1].startswith(f"{len(ids)} statement")
 
 
-@pytest.mark.parametrize("name", ["X1", "J99", "J7-K2", "7"])
+@pytest.mark.parametrize("name", ["X9", "J99", "J7-K2", "7"])
 def test_an_unknown_id_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["claims", name]) == 2
     assert capsys.readouterr().err.startswith(f"paani: {name}: no such statement")

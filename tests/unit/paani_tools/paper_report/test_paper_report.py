@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from paani_models.catalogue import load_catalogue
 from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report import published
 from paani_tools.paper_report.command import markdown, report_text
+from paani_tools.paper_report.recipes import DETECTOR, SEGMENTER, training_table
 from paani_tools.paper_report.settings import BOAT, RUNTIME
 from paani_tools.paper_report.tables import (
     board_tables,
@@ -50,7 +52,7 @@ def test_the_papers_figures_are_those_of_its_statements() -> None:
         assert f"{parameters_n:,}" in SAYS[parameters]
         assert f"{megabytes}" in SAYS[file]
         assert difference in SAYS["T2"]
-    for statement, what, printed, _ in (*RUNTIME, *BOAT):
+    for statement, what, printed, _ in (*RUNTIME, *BOAT, *DETECTOR, *SEGMENTER):
         text = " ".join(SAYS[each] for each in statement.split())
         assert all(number in text for number in printed.split(" / ")), what
     assert all(f"{value:.6f}" in SAYS["V10"] for value in published.INT8.values())
@@ -115,6 +117,21 @@ def test_the_paper_profile_has_the_constants_of_the_papers_tables() -> None:
     assert column(settings_table(OURS, OURS), "here") != column(table, "paper")
 
 
+def test_the_recipes_are_the_papers_where_they_can_be_read() -> None:
+    pytest.importorskip("torch", reason="extra `train`")
+    table = training_table()
+    assert column(table, "here")[:-1] == column(table, "paper")[:-1]
+
+
+def test_without_pytorch_the_papers_recipe_stands_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [each for each in sys.modules if each.partition(".")[0] in {"torch", "paani_models"}]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    table = training_table()
+    assert set(column(table, "here")) == {None}
+    assert all("extra `train`" in why for why in column(table, "what differs")[:-1])
+
+
 def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     file = tmp_path / "report.md"
     assert paani(["paper-report", "--out", str(file)]) == 0
@@ -122,7 +139,8 @@ def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     assert text == report_text(None)
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
         "## Networks", "## Detector", "## Segmenter", "## Single pictures, paper profile",
-        "## Constants, paper profile", "## World, paper profile", "## Board protocol",
+        "## Constants, paper profile", "## World, paper profile", "## Training, the paper's recipes",
+        "## Board protocol",
     ]  # fmt: skip
     assert "| V10 | mean IoU, INT8 | 0.7303 | - |" in text
     assert markdown(board_tables(None)).count("| - | 0 |") == 7
