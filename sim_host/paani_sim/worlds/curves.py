@@ -110,13 +110,16 @@ def is_inside(polygon_m: F64, points_m: F64) -> npt.NDArray[np.bool_]:
 
 def distance_to_edges_m(polygon_m: F64, points_m: F64) -> npt.NDArray[np.float64]:
     """Unsigned distance `(m,)` from each point to the nearest edge of the closed polygon."""
-    start = polygon_m[None, :, :]
-    edge = np.roll(polygon_m, -1, axis=0)[None, :, :] - start
+    x, y = polygon_m.T
+    edge_x, edge_y = np.roll(x, -1) - x, np.roll(y, -1) - y
+    length2 = np.maximum(edge_x * edge_x + edge_y * edge_y, 1e-12)
     best = np.empty(len(points_m))
     for first in range(0, len(points_m), 2048):
-        rel = points_m[first : first + 2048, None, :] - start
-        part = np.clip((rel * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-12), 0.0, 1.0)
-        best[first : first + 2048] = np.linalg.norm(rel - part[..., None] * edge, axis=-1).min(1)
+        rel_x = points_m[first : first + 2048, 0, None] - x
+        rel_y = points_m[first : first + 2048, 1, None] - y
+        part = np.clip((rel_x * edge_x + rel_y * edge_y) / length2, 0.0, 1.0)
+        off_x, off_y = rel_x - part * edge_x, rel_y - part * edge_y
+        best[first : first + 2048] = np.sqrt((off_x * off_x + off_y * off_y).min(1))
     return best
 
 
