@@ -17,7 +17,13 @@ from paani.geometry import clip, enu_from_geodetic, geodetic_from_enu
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.gyro_bias import estimate_gyro_bias
 from paani_services.localization.levelling import mean_level_motion
-from paani_services.localization.odometry_message import StoppedFlag, is_fresh, odometry_of, unknown_odometry
+from paani_services.localization.odometry_message import (
+    StoppedFlag,
+    is_fresh,
+    odometry_of,
+    unknown_odometry,
+    with_position_std,
+)
 from paani_services.localization.planar_filter import PSI, PX, PY, SIZE, WX, WY, B, C, PlanarFilter, U, V
 from paani_services.localization.rest_detection import MapFix, MotionEvidence, RestDetector
 from paani_services.localization.sensor_checks import check_fix, take_samples
@@ -277,8 +283,7 @@ class Estimator:
         )
         latitude_deg, longitude_deg = geodetic_from_enu(odometry.x_m, odometry.y_m, *self._origin_deg)
         return msgspec.structs.replace(
-            odometry,
-            position_std_m=position_std_m,
+            with_position_std(odometry, position_std_m),
             healthy=healthy,
             latitude_deg=latitude_deg,
             longitude_deg=longitude_deg,

@@ -2,6 +2,8 @@
 
 import math
 
+import msgspec
+
 from paani.config import LocalizationConfig
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.levelling import level_sample
@@ -15,6 +17,9 @@ def odometry_of(source: PlanarFilter, last: ImuSample | None, now_us: int, *, he
     x, std = source.x.tolist(), source.std.tolist()
     vx_mps, vy_mps = source.velocity
     sin, cos = math.sin(x[PSI]), math.cos(x[PSI])
+    major_std_m, major_rad = error_ellipse(
+        source.covariance[PX, PX], source.covariance[PX, PY], source.covariance[PY, PY]
+    )
     tilted = last is not None and last.orientation_available
     return Odometry(
         source_us=last.source_us if last else now_us,
@@ -30,7 +35,22 @@ def odometry_of(source: PlanarFilter, last: ImuSample | None, now_us: int, *, he
         stopped=stopped,
         roll_rad=last.roll_rad if last and tilted else 0.0,
         pitch_rad=last.pitch_rad if last and tilted else 0.0,
+        position_major_std_m=major_std_m,
+        position_major_rad=major_rad,
     )
+
+
+def error_ellipse(xx_m2: float, xy_m2: float, yy_m2: float) -> tuple[float, float]:
+    """Longer half axis [m] and its direction [rad] of the ellipse of one standard deviation of a covariance."""
+    spread_m2 = math.hypot(0.5 * (xx_m2 - yy_m2), xy_m2)
+    return math.sqrt(max(0.5 * (xx_m2 + yy_m2) + spread_m2, 0.0)), 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2)
+
+
+def with_position_std(odometry: Odometry, position_std_m: float) -> Odometry:
+    """The odometry with a larger error, which grows alike in all directions."""
+    added_m2 = position_std_m**2 - odometry.position_std_m**2
+    major_std_m = math.sqrt(max(odometry.position_major_std_m**2 + added_m2, 0.0))
+    return msgspec.structs.replace(odometry, position_std_m=position_std_m, position_major_std_m=major_std_m)
 
 
 def unknown_odometry(now_us: int) -> Odometry:

@@ -49,6 +49,12 @@ export function drawTrack({ ctx, toScreen, colour }, points, colourName, thick, 
   ctx.globalAlpha = 1;
 }
 
+/** The half axes of the ellipse of one standard deviation [m]; a circle where only their mean is known. @param {any} pose */
+export function errorAxesM({ position_std_m: meanM, position_major_std_m: majorM = 0 }) {
+  if (!(majorM > meanM)) return [meanM, meanM];
+  return [majorM, Math.sqrt(Math.max(2 * meanM ** 2 - majorM ** 2, 0))];
+}
+
 /** A wedge of one standard deviation to either side. @param {CanvasRenderingContext2D} ctx @param {number} headingRad on the screen, clockwise @param {number} deviationRad @param {number} farPx */
 function drawHeadingDeviation(ctx, headingRad, deviationRad, farPx) {
   const halfRad = Math.min(deviationRad, Math.PI);
@@ -70,7 +76,8 @@ export function drawBoat({ ctx, toScreen, turnRad, pxPerM, colour }, pose, colou
     ctx.globalAlpha *= 0.5;
     ctx.lineWidth = 1;
     ctx.beginPath();
-    ctx.arc(0, 0, pose.position_std_m * pxPerM, 0, 7);
+    const [majorM, minorM] = errorAxesM(pose);
+    ctx.ellipse(0, 0, majorM * pxPerM, minorM * pxPerM, -((pose.position_major_rad ?? 0) + turnRad), 0, 2 * Math.PI);
     ctx.stroke();
     if (pose.yaw_std_rad) drawHeadingDeviation(ctx, -(pose.yaw_rad + turnRad), pose.yaw_std_rad, 2.5 * size);
     ctx.globalAlpha = isFresh ? 1 : 0.35;
