@@ -10,13 +10,13 @@ from typing import Any
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Latest
-from paani.clock import Clock
+from paani.clock import Clock, patience_us
 from paani.config import Config
 from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani_services.dashboard.gatekeeper import open_gate
 from paani_services.dashboard.history import SAMPLE_KEY, History
-from paani_services.dashboard.hub import Event, Hub
+from paani_services.dashboard.hub import FRAME_KEYS, Event, Hub
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.page_state import ServiceLiveness, page_settings
 from paani_services.dashboard.pages import load_static_files
@@ -45,16 +45,18 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
     operator = OperatorClient(bus, clock)
     missions = MissionClient(bus, clock)
     async with web_server(hub, history, operator, missions, tuner, clock, config), asyncio.TaskGroup() as tasks:
-        picture_period_s = 1.0 / config.dashboard.picture_rate_hz
-        feeds = [forward(hub, topic, inbox, clock, STATE_PERIOD_S) for topic, inbox in subscribe(bus)]
+        picture_period_s = patience_us(config.dashboard.picture_rate_hz) * 1e-6
+        feeds = [
+            forward(hub, row, inbox, clock, picture_period_s if row.name in FRAME_KEYS else STATE_PERIOD_S)
+            for row, inbox in subscribe(bus)
+        ]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
-        feeds.append(forward_while_clients(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
+        feeds.append(pull(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
         feeds.append(forward(hub, keys.THRUST_APPLIED, bus.latest(keys.THRUST_APPLIED), clock, APPLIED_PERIOD_S))
         feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
         feeds += [tuner.relay_forever(client, bus.queue(row)) for client, row in keys.TUNING_PROPOSALS.items()]
-        feeds.append(track_services(hub, bus, clock))
-        feeds.append(keep_history(hub, history, clock))
+        feeds += [track_services(hub, bus, clock), keep_history(hub, history, clock)]
         running = [tasks.create_task(feed) for feed in feeds]
         try:
             yield
@@ -99,9 +101,7 @@ async def forward(hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: C
         await asyncio.sleep(period_s)
 
 
-async def forward_while_clients(
-    hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: Clock, period_s: float
-) -> None:
+async def pull(hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: Clock, period_s: float) -> None:
     """As `forward`, but pull only while there are clients."""
     while True:
         await hub.has_clients.wait()

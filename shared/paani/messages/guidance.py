@@ -130,9 +130,9 @@ class Odometry(Message, frozen=True, kw_only=True):
 
     `healthy` false: the boat may not be guided by it. `stopped`: slow for `localization.stopped_after_s` (L5).
     `nis`: normalised innovation squared of the newest fix, 2 on average if the stated standard deviation is right; 0
-    before the first. `refused_fixes`: fixes outside the validation gate since the estimate began. `position_std_m` is the
-    root mean square of both half axes of the position's error ellipse; `position_major_std_m` is the longer of them,
-    and `position_major_rad` its direction; 0 where only the mean is known.
+    before the first. `refused_fixes`: fixes outside the validation gate since the estimate began.
+    `position_std_m`: root mean square of both half axes of the position's error ellipse; `position_major_std_m`: the
+    longer one, `position_major_rad`: its direction; 0 where only the mean is known.
     """
 
     x_m: Finite

@@ -9,6 +9,9 @@ const OPACITY_KEY = "paani-overlay-opacity";
 /** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
 const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null };
 
+/** @type {[number, number][]} */
+const NO_HULL = [];
+
 export class Camera {
   /** @param {import("./view.js").View} view whose frames are shown */
   constructor(view) {
@@ -20,6 +23,13 @@ export class Camera {
     /** Frame numbers of what the canvas shows now; tests read them. */
     this.overlay = { ...NOTHING };
     this.isDrawScheduled = false;
+    /** What the canvas was drawn from. @type {any[]} */
+    this.drawnFrom = [];
+    this.widthPx = this.canvas.clientWidth;
+    new ResizeObserver(() => {
+      this.widthPx = this.canvas.clientWidth;
+      this.scheduleDraw();
+    }).observe(this.canvas);
     for (const button of document.querySelectorAll("[data-layer]")) {
       button.addEventListener("click", () => this.toggle(/** @type {HTMLElement} */ (button).dataset.layer ?? ""));
     }
@@ -59,29 +69,41 @@ export class Camera {
     });
   }
 
+  /** Whether anything is drawn over the picture that comes later than it. */
+  get waitsForEvidence() {
+    const { mask, boxes, lanes, limit } = this.layers;
+    return (mask || boxes || lanes || limit) && Number(byId("camera-opacity").value) > 0;
+  }
+
   /** @param {number} now */
   draw(now) {
-    const { pictures, masks, messages } = this.view.frames, evidenceOf = messages["perception/evidence"];
-    const chosen = chooseFrame(pictures.ids(), (id) => evidenceOf.get(id) !== undefined, (id) => masks.get(id) !== undefined);
+    const { store, frames: { pictures, masks, messages } } = this.view, { layers } = this, evidenceOf = messages["perception/evidence"];
+    const chosen = this.waitsForEvidence
+      ? chooseFrame(pictures.ids(), (id) => evidenceOf.get(id) !== undefined, (id) => !layers.mask || masks.get(id) !== undefined)
+      : chooseFrame(pictures.ids(), () => false, () => false);
     const shown = chosen.id === null ? undefined : pictures.get(chosen.id);
     if (chosen.id === null || !shown) {
       this.drawNothing();
       return;
     }
-    const { bitmap, header } = shown;
-    const evidence = chosen.evidence ? evidenceOf.get(chosen.id) : undefined;
-    const mask = chosen.mask ? masks.get(chosen.id) : undefined;
-    const pane = this.resizeCanvas(bitmap);
+    const { picture, header } = shown, evidence = evidenceOf.get(chosen.id), mask = evidence && masks.get(chosen.id);
+    const { corridors, own_hull: ownHull = NO_HULL } = store.get("dashboard/settings") ?? {};
+    const tracks = messages["advisor/tracks"].get(chosen.id), advisory = messages["advisor/advisory"].get(chosen.id);
+    const newest = store.isFresh("perception/evidence", now) ? store.get("perception/evidence") : undefined;
+    this.updateCaption(now, header, this.waitsForEvidence ? evidence : newest);
+    const pane = this.resizeCanvas(picture), opacity = Number(byId("camera-opacity").value) / 100;
+    const from = [picture, evidence, mask, tracks, advisory, corridors, ownHull, opacity, pane.width, pane.height, ...Object.values(layers)];
+    if (from.length === this.drawnFrom.length && from.every((part, index) => part === this.drawnFrom[index])) return;
+    this.drawnFrom = from;
     pane.ctx.imageSmoothingQuality = "high";
-    pane.ctx.drawImage(bitmap, 0, 0, pane.width, pane.height);
-    const { corridors, own_hull: ownHull = [] } = this.view.store.get("dashboard/settings") ?? {};
+    pane.ctx.drawImage(picture.image, 0, 0, pane.width, pane.height);
     byId("layer-hull").hidden = !ownHull.length;
-    pane.ctx.globalAlpha = Number(byId("camera-opacity").value) / 100;
-    if (mask && this.layers.mask) drawMask(pane, mask);
-    if (evidence && corridors && this.layers.limit) drawCorridorTop(pane, corridors.top);
-    if (evidence && corridors && this.layers.lanes) drawCorridors(pane, corridors, messages["advisor/advisory"].get(chosen.id));
-    if (evidence && this.layers.boxes) drawBoxes(pane, evidence, messages["advisor/tracks"].get(chosen.id));
-    if (ownHull.length && this.layers.hull) drawOwnHull(pane, ownHull);
+    pane.ctx.globalAlpha = opacity;
+    if (mask && layers.mask) drawMask(pane, mask);
+    if (evidence && corridors && layers.limit) drawCorridorTop(pane, corridors.top);
+    if (evidence && corridors && layers.lanes) drawCorridors(pane, corridors, advisory);
+    if (evidence && layers.boxes) drawBoxes(pane, evidence, tracks);
+    if (ownHull.length && layers.hull) drawOwnHull(pane, ownHull);
     pane.ctx.globalAlpha = 1;
     this.overlay = {
       frame_seq: header.frame_seq,
@@ -89,13 +111,13 @@ export class Camera {
       mask_seq: mask ? header.frame_seq : null,
       evidence_seq: evidence ? evidence.frame_seq : null,
     };
-    this.updateCaption(now, header, evidence);
   }
 
   /** No picture of this view: never another's. */
   drawNothing() {
     if (this.overlay.picture_seq === null && byId("camera-id").textContent === "") return;
     this.ctx.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    this.drawnFrom = [];
     this.overlay = { ...NOTHING };
     setText(byId("camera-id"), "");
     setText(byId("camera-note"), CAMERA_TEXTS.noneThen);
@@ -116,14 +138,19 @@ export class Camera {
     );
   }
 
-  /** Match the canvas to the panel and the picture. @param {ImageBitmap} bitmap @returns {import("./overlay.js").Pane} */
-  resizeCanvas(bitmap) {
-    this.canvas.style.setProperty("--aspect", String(bitmap.width / bitmap.height));
+  /** Match the canvas to the panel and the picture. @param {import("./picture_decoding.js").DecodedPicture} picture @returns {import("./overlay.js").Pane} */
+  resizeCanvas(picture) {
+    const aspect = String(picture.width / picture.height);
+    if (this.canvas.style.getPropertyValue("--aspect") !== aspect) {
+      this.canvas.style.setProperty("--aspect", aspect);
+      this.widthPx = this.canvas.clientWidth;
+    }
     const ratio = Math.min(devicePixelRatio || 1, 2);
-    const width = Math.round(this.canvas.clientWidth * ratio), height = Math.round((width * bitmap.height) / bitmap.width);
+    const width = Math.round(this.widthPx * ratio), height = Math.round((width * picture.height) / picture.width);
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;
+      this.drawnFrom = [];
     }
     return { ctx: this.ctx, width, height, unit: ratio };
   }

@@ -3,13 +3,16 @@
 
 import { FrameRing, frameId } from "./frame_matching.js";
 import { tintMask } from "./overlay.js";
+import { decodePicture } from "./picture_decoding.js";
 
 const MESSAGES = ["perception/evidence", "advisor/tracks", "advisor/advisory"];
+/** What changes how the camera's panel looks. */
+export const CAMERA_KEYS = new Set([...MESSAGES, "camera/picture", "perception/mask", "dashboard/settings"]);
 
 export class CameraFrames {
   constructor() {
-    /** @type {FrameRing<{bitmap: ImageBitmap, header: any}>} */
-    this.pictures = new FrameRing((dropped) => dropped.bitmap.close());
+    /** @type {FrameRing<{picture: import("./picture_decoding.js").DecodedPicture, header: any}>} */
+    this.pictures = new FrameRing((dropped) => dropped.picture.image.close());
     /** @type {FrameRing<OffscreenCanvas>} */
     this.masks = new FrameRing();
     /** @type {Record<string, FrameRing<any>>} */
@@ -27,17 +30,16 @@ export class CameraFrames {
   /** @param {any} header @param {Uint8Array} body */
   async addPicture(header, body) {
     const { generation } = this;
-    const bitmap = await createImageBitmap(new Blob([/** @type {BlobPart} */ (body)], { type: header.media_type }));
-    if (generation !== this.generation) bitmap.close();
-    else this.pictures.put(frameId(header), { bitmap, header });
+    const picture = await decodePicture(body, header.media_type);
+    if (generation !== this.generation) picture.image.close();
+    else this.pictures.put(frameId(header), { picture, header });
   }
 
   /** @param {any} header @param {Uint8Array} body */
   async addMask(header, body) {
-    const { generation } = this, blob = new Blob([/** @type {BlobPart} */ (body)], { type: header.media_type });
-    const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-    if (generation === this.generation) this.masks.put(frameId(header), tintMask(bitmap));
-    bitmap.close();
+    const { generation } = this, classes = await decodePicture(body, header.media_type, "none");
+    if (generation === this.generation) this.masks.put(frameId(header), tintMask(classes));
+    classes.image.close();
   }
 
   clear() {

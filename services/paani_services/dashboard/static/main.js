@@ -4,6 +4,7 @@
 import "./page_text.js"; // before any script looks at what it says
 import { alertOf, alertOfLink, bindAlerts } from "./alerts.js";
 import { Camera } from "./camera.js";
+import { CAMERA_KEYS } from "./camera_frames.js";
 import { renderDevices } from "./devices.js";
 import { bindDrive, isDriving, renderDrive } from "./drive.js";
 import { buildExplanation, renderExplanation } from "./explanation.js";
@@ -49,7 +50,7 @@ function onMessage(key, header, body) {
     return;
   }
   const { value, drawn } = live.put(key, header, body, performance.now());
-  if (!time.isPast) void drawn.then(() => camera.scheduleDraw());
+  if (!time.isPast && CAMERA_KEYS.has(key)) void drawn.then(() => camera.scheduleDraw());
   if (key === "advisor/advisory") logAdvice(value);
   if (key === "dashboard/settings" && value.replayed) replay(value.replayed);
   if (key === "dashboard/sample") time.history.series.append(value);

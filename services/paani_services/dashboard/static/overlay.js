@@ -9,13 +9,13 @@ const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb", OWN_HULL = "#
 
 /**
  * A class mask as a tinted, transparent canvas.
- * @param {ImageBitmap} bitmap grey levels are classes: 0 water, 1 obstacle, 2 sky
+ * @param {import("./picture_decoding.js").DecodedPicture} classes as grey levels: 0 water, 1 obstacle, 2 sky
  */
-export function tintMask(bitmap) {
-  const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+export function tintMask({ image, width, height }) {
+  const canvas = new OffscreenCanvas(width, height);
   const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
-  context.drawImage(bitmap, 0, 0);
-  const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  context.drawImage(image, 0, 0);
+  const pixels = context.getImageData(0, 0, width, height);
   for (let i = 0; i < pixels.data.length; i += 4) {
     pixels.data.set(MASK_RGBA[pixels.data[i]] ?? [0, 0, 0, 0], i);
   }

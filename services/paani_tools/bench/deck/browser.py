@@ -16,6 +16,7 @@ from paani.errors import UserError
 from paani.operator_key import ensure_operator_key
 from paani.page_address import page_origin
 from paani_tools.bench.deck.loads import PageLoad
+from paani_tools.bench.deck.page_probe import PROBE, TAKE
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 LIVE_TIMEOUT_S, POLL_S = 30.0, 0.01
@@ -25,16 +26,10 @@ LOADED = """() => {
   return { load_ms: performance.now(), files: 1 + files.length,
     bytes: page.transferSize + files.reduce((all, file) => all + file.transferSize, 0) };
 }"""
-WATCH_DRAWN = """() => {
-  window.drawn = [];
-  let last = null;
-  const look = () => {
-    const seq = paani.overlay.picture_seq;
-    if (seq !== last) drawn.push([seq, 1e3 * (performance.timeOrigin + performance.now())]);
-    last = seq;
-    requestAnimationFrame(look);
-  };
-  look();
+HIDE_OVERLAYS = """() => {
+  const range = document.querySelector('#camera-opacity');
+  range.value = 0;
+  range.dispatchEvent(new Event('input'));
 }"""
 PRESS_STOP = """() => {
   const at = 1e3 * (performance.timeOrigin + performance.now());
@@ -72,13 +67,14 @@ class Deck:
     async def close(self) -> None:
         await self._page.context.close()
 
-    async def watch_drawn(self) -> None:
-        """Note from now on when each picture is drawn first."""
-        await self._page.evaluate(WATCH_DRAWN)
+    async def take_pictures(self) -> list[dict[str, Any]]:
+        """What the probe noted of each picture that was drawn since the last time; of a probed page alone."""
+        found: list[dict[str, Any]] = await self._page.evaluate(TAKE)
+        return found
 
-    async def take_drawn(self) -> list[tuple[int, float]]:
-        """Number of each picture and when it was drawn, since the last time."""
-        return [(int(seq), at_us) for seq, at_us in await self._page.evaluate("drawn.splice(0)") if seq is not None]
+    async def hide_overlays(self) -> None:
+        """Show the picture alone, which waits for nothing that is found in it."""
+        await self._page.evaluate(HIDE_OVERLAYS)
 
     async def press_stop(self) -> float:
         """When it was pressed."""
@@ -116,10 +112,15 @@ class Browser:
     def __init__(self, browser: Any, config: Config, key: str) -> None:
         self._browser, self._origin, self._key = browser, page_origin(config), key
 
-    async def open_page(self, origin: str = "") -> tuple[Deck, PageLoad]:
-        """A page of a visitor who comes for the first time: nothing is kept. origin: where, if not at the server."""
+    async def open_page(self, origin: str = "", *, probed: bool = False) -> tuple[Deck, PageLoad]:
+        """A page of a visitor who comes for the first time: nothing is kept. origin: where, if not at the server.
+
+        probed: what it does with each picture is noted.
+        """
         context = await self._browser.new_context(viewport={"width": 1440, "height": 900}, service_workers="block")
         page = await context.new_page()
+        if probed:
+            await page.add_init_script(PROBE)
         await page.goto(f"{origin or self._origin}/#key={self._key}")
         async with answering("the page heard nothing of the boat"):
             while not await page.evaluate(LIVE):  # noqa: ASYNC110  # a browser wakes nobody, and the page forbids eval

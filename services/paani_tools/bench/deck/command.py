@@ -16,6 +16,7 @@ from paani.option_numbers import whole_number
 from paani.option_paths import output_file
 from paani.page_address import is_page_exposed, page_host
 from paani.whole_file import write_json
+from paani_tools.bench.deck.picture_path import spread_of_stages
 from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars, ratio_of_medians
 from paani_tools.bench.deck.slow_link import slow_link
 from paani_tools.inspect.listen import observer
@@ -67,7 +68,7 @@ def main(argv: list[str]) -> int:
 
 async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | str:
     """The figures, or why there are none."""
-    from paani_tools.bench.deck import browser, measuring  # noqa: PLC0415  # need the extra
+    from paani_tools.bench.deck import browser, measuring, pictures  # noqa: PLC0415  # need the extra
 
     plan = await make_plan(config)
     load_before, reports, failures = os.getloadavg()[0], list[DeckReport](), list[str]()
@@ -75,9 +76,11 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | 
     async def measure() -> None:
         async with observer(plan.config.bus) as bus, browser.chromium(plan.config) as chromium:
             boat = measuring.Boat(bus, plan.config)
-            deck, _ = await chromium.open_page()
+            deck, _ = await chromium.open_page(probed=True)
             await boat.until_applied(measuring.is_under_way, 0.0, measuring.UNDER_WAY_S)
-            received_ms, drawn_ms = await measuring.time_pictures(plan.config, deck, options.seconds)
+            timed = await pictures.time_pictures(plan.config, bus, deck, options.seconds)
+            await deck.hide_overlays()
+            alone = await pictures.time_pictures(plan.config, bus, deck, options.seconds)
             loads = [await chromium.load_page() for _ in range(options.loads)]
             crowds, stops, unanswered = list[Crowd](), defaultdict[str, list[float]](list), 0
             for number in range(options.rounds):
@@ -98,8 +101,11 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | 
             reports.append(
                 DeckReport(
                     loads=tuple(loads),
-                    received_ms=percentiles(received_ms),
-                    drawn_ms=percentiles(drawn_ms),
+                    received_ms=percentiles(timed.received_ms),
+                    drawn_ms=percentiles(timed.drawn_ms),
+                    stage_ms=spread_of_stages(timed.stages),
+                    beyond_ms=percentiles(timed.beyond_ms),
+                    alone_ms=percentiles(alone.beyond_ms),
                     crowds=tuple(crowds),
                     stop_ms={name: percentiles(found) for name, found in stops.items()},
                     stop_ratio=ratio_of_medians(stops[CROWDED], stops[HERE]),

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
 
 import aiohttp
-import msgspec
 from playwright.async_api import Error as BrowserError
 
 from paani import keys
@@ -19,9 +17,8 @@ from paani.clock import WallClock
 from paani.config import Config
 from paani.operator_key import ensure_operator_key
 from paani.page_address import page_origin
-from paani_services.dashboard.frames import decode_frame
 from paani_tools.bench.deck.browser import Browser, Deck
-from paani_tools.bench.deck.crowd import crowd, watching
+from paani_tools.bench.deck.crowd import crowd
 from paani_tools.bench.deck.report import Crowd
 
 CLOCK = WallClock()
@@ -128,24 +125,6 @@ async def time_sticks(boat: Boat, deck: Deck, count: int) -> tuple[list[float], 
             await deck.take_wheel()
         await deck.let_key_go(code)
     return found_ms, unanswered
-
-
-async def time_pictures(config: Config, deck: Deck, seconds: float) -> tuple[list[float], list[float]]:
-    """Age of each picture [ms] when a client that only reads has it, and when the page draws it with its evidence."""
-    await deck.watch_drawn()
-    await deck.take_drawn()
-    stamps_us, received_ms = dict[int, int](), list[float]()
-    async with watching(page_origin(config)) as socket_:
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                while True:
-                    key, header, _ = decode_frame(await socket_.receive_bytes())
-                    if key == keys.PICTURE.name:
-                        picture = msgspec.json.decode(header.picture, type=m.PictureHeader)
-                        stamps_us[picture.frame_seq] = picture.source_us
-                        received_ms.append((CLOCK.now_us() - picture.source_us) * 1e-3)
-    drawn = await deck.take_drawn()
-    return received_ms, [(at_us - stamps_us[seq]) * 1e-3 for seq, at_us in drawn if seq in stamps_us]
 
 
 async def measure_crowd(

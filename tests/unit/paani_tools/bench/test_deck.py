@@ -10,6 +10,8 @@ from paani.errors import UserError
 from paani_tools.bench.deck.command import main, silence_text
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.bench.deck.measuring import is_stopped
+from paani_tools.bench.deck.page_probe import page_moments
+from paani_tools.bench.deck.picture_path import STAGES, BoatMoments, PageMoments, spread_of_stages, stage_durations_ms
 from paani_tools.bench.deck.report import (
     Crowd,
     DeckReport,
@@ -23,10 +25,23 @@ from paani_tools.bench.deck.report import (
 from paani_tools.up.run_summary import Percentiles, percentiles
 
 FEW, MANY = (Crowd(clients=count, cpu_cores=0.03 * count, decisions_hz=5.0) for count in (1, 10))
+BOAT = BoatMoments(
+    captured_us=0.0,
+    encoded_us=30e3,
+    published_us=32e3,
+    begun_us=35e3,
+    inferred_us=55e3,
+    evidence_us=56e3,
+    heard_us=58e3,
+)
+PAGE = PageMoments(frame_seq=7, evidence_us=61e3, mask_us=65e3, decoded_us=67e3, drawn_us=75e3, shown_us=90e3)
 KEPT = DeckReport(
     loads=(PageLoad(load_ms=410.0, files=40, bytes=204_800), PageLoad(load_ms=390.0, files=40, bytes=204_800)),
     received_ms=percentiles([20.0, 30.0]),
     drawn_ms=percentiles([120.0, 130.0]),
+    stage_ms=spread_of_stages([stage_durations_ms(BOAT, PAGE, jpeg_ms=1.0)]),
+    beyond_ms=percentiles([40.0, 60.0]),
+    alone_ms=percentiles([30.0]),
     crowds=(FEW, MANY),
     stop_ratio=Ratio(1.05, 0.9, 1.2),
     stop_ms={"on this machine": percentiles([40.0, 150.0]), "over a link of 50 ms": percentiles([150.0, 299.0])},
@@ -49,6 +64,8 @@ def test_what_keeps_the_bars_keeps_them() -> None:
         replace(KEPT, stop_ms={**KEPT.stop_ms, "over a link of 50 ms": percentiles([301.0])}),
         replace(KEPT, stop_ms={**KEPT.stop_ms, "with 10 clients": Percentiles()}),
         replace(KEPT, unanswered=1),
+        replace(KEPT, beyond_ms=percentiles([61.0])),
+        replace(KEPT, alone_ms=Percentiles()),
         replace(KEPT, crowds=(FEW, replace(MANY, decisions_hz=4.74))),
         replace(KEPT, crowds=(FEW,)),
         replace(KEPT, stop_ratio=Ratio(1.06, 1.0, 1.1)),
@@ -85,10 +102,34 @@ def test_a_slope_is_that_of_the_line_through_the_samples() -> None:
     assert heap_slope([(0.0, 10.0), (1.0, 11.0)]) is None
 
 
+def test_stages_add_up_to_the_time_from_the_stamp_to_the_screen() -> None:
+    stages = stage_durations_ms(BOAT, PAGE, jpeg_ms=1.0)
+    assert list(stages) == list(STAGES)
+    assert list(stages.values()) == pytest.approx([29, 1, 2, 3, 20, 1, 2, 3, 4, 2, 8, 15])
+    assert sum(stages.values()) == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize(("mask_us", "decoded_us"), [(50e3, 61e3), (61e3, 40e3)])
+def test_what_came_before_the_evidence_is_not_waited_for(mask_us: float, decoded_us: float) -> None:
+    stages = stage_durations_ms(BOAT, replace(PAGE, mask_us=mask_us, decoded_us=decoded_us), jpeg_ms=1.0)
+    assert (stages["mask"], stages["decoding"]) == (0.0, 0.0)
+    assert sum(stages.values()) == pytest.approx(90.0)
+
+
+def test_a_picture_that_was_drawn_before_its_mask_has_no_stages() -> None:
+    noted = {"seq": 7, "picture": 1.0, "evidence": 61e3, "mask": 65e3, "decoded_picture": 60e3, "decoded_mask": 67e3,
+             "drawn": 75e3, "shown": 90e3}  # fmt: skip
+    assert page_moments(noted) == PAGE
+    for late in ("evidence", "mask", "decoded_mask"):
+        assert page_moments({name: at for name, at in noted.items() if name != late}) is None
+
+
 def test_every_figure_is_told_with_its_count() -> None:
     text = deck_text(KEPT)
     for words in ("390 to 410 ms (n = 2)", "40, 200 KiB", "p99 150 ms (n = 2)", "with 10 clients | 30.0 % of a core",
                   "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after",
+                  "of which inference | p50 20, p95 20",
+                  "with evidence | p50 40, p95 60, p99 60 ms (n = 2); bar p95 60 ms: kept",
                   "many clients over one | 1.000; bar 0.95 or more: kept",
                   "many clients over one | 1.05 (95 % of draws 0.90 to 1.20); bar 1.05 or less: kept"):  # fmt: skip
         assert words in text, words
