@@ -21,10 +21,10 @@ AT_LAST_S = 1e5
 def footprint_distance_m(thing: Obstacle | Actor, pose: Pose2, points_m: F64) -> F64:
     """Distance `(n,)` from the points `(n, 2)` to the thing's footprint at `pose`; zero inside."""
     cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
-    rel = points_m - np.array(pose[:2])
-    own = np.abs(np.column_stack([rel[:, 0] * cos + rel[:, 1] * sin, rel[:, 1] * cos - rel[:, 0] * sin]))
-    half = 0.5 * np.array([thing.length_m, thing.width_m])
-    gap_m: F64 = np.linalg.norm(np.maximum(own - half, 0.0), axis=1)
+    east_m, north_m = points_m[:, 0] - pose.x_m, points_m[:, 1] - pose.y_m
+    ahead_m = np.maximum(np.abs(east_m * cos + north_m * sin) - 0.5 * thing.length_m, 0.0)
+    aside_m = np.maximum(np.abs(north_m * cos - east_m * sin) - 0.5 * thing.width_m, 0.0)
+    gap_m: F64 = np.sqrt(ahead_m * ahead_m + aside_m * aside_m)
     return gap_m
 
 
