@@ -21,7 +21,7 @@ DEBIAN_FIRMWARE := gcc-arm-none-eabi qemu-system-arm g++ cppcheck
 # What a Python that cannot make a virtual environment lacks; asked only before there is one.
 DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv))
 
-.PHONY: run test test-long check mutation lint docs firmware containers containers-down setup setup-test system system-test system-firmware system-deploy lock dist sbom clean
+.PHONY: run test test-long check compiled-tests mutation lint docs firmware containers containers-down setup setup-test system system-test system-firmware system-deploy lock dist sbom clean
 .NOTPARALLEL: # Python and its venv module come with the system packages
 
 run: setup ## start the whole loop on the river world
@@ -38,6 +38,9 @@ test-long: setup-test ## what takes hours: the standard suite of trials, tests m
 
 check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests
 	$(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data and not slow"
+
+compiled-tests: setup-test # once, as else every worker of pytest does so when it begins
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -qq --collect-only tests
 
 mutation: system-test $(VENV)/.stamp-host-dev-mutation ## how many small changes of the safety path its unit tests notice; about an hour
 	$(BIN)/python -m tests.mutation
