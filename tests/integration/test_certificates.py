@@ -106,7 +106,7 @@ async def test_strangers_do_not_get_in(config: BusConfig, other: BusConfig) -> N
         await refused(config, "controller")
 
 
-@pytest.mark.parametrize("presented", [None, "another authority's", "our router's"])
+@pytest.mark.parametrize("presented", [None, "another authority's", "our router's", "an expired one"])
 async def test_who_trusts_our_authority_must_show_a_clients_certificate_of_it(
     config: BusConfig, other: BusConfig, presented: str | None
 ) -> None:
@@ -121,7 +121,12 @@ async def test_who_trusts_our_authority_must_show_a_clients_certificate_of_it(
         settings.insert_json5("transport/link/tls", json.dumps(tls))
         zenoh.open(settings).close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
-    stems = {None: None, "another authority's": theirs / "controller.1", "our router's": ours / f"{HOST_ROUTER}.1"}
+    expired = copied(config, "expired")
+    await rotate(expired, "controller", CLOCK.now_us() - 2 * 86_400_000_000)
+    stems = {
+        None: None, "another authority's": theirs / "controller.1", "our router's": ours / f"{HOST_ROUTER}.1",
+        "an expired one": Path(expired.certificates) / "controller.2",
+    }  # fmt: skip
     async with routing(config):
         await asyncio.to_thread(enter, ours / "controller.1")
         with pytest.raises(zenoh.ZError):

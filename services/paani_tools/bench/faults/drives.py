@@ -10,11 +10,17 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from paani.config import load_config
+from paani.errors import UserError
+from paani.extras import require_modules
+from paani_tools.bench.bridge.emulator import IMAGE, emulated, require_emulator
+from paani_tools.bench.faults.cable import Cable, serial_faults
+from paani_tools.bench.faults.expiry import Certificates, certificate_faults
 from paani_tools.bench.faults.fault import Drive, Fault
 from paani_tools.bench.faults.inputs import clock_faults, peer_faults, scenario_faults, scenario_text
 from paani_tools.bench.faults.link import Relay, link_faults
 from paani_tools.bench.faults.processes import process_faults
 from paani_tools.bench.faults.running import Loop, Side, free_port, running
+from paani_tools.bench.faults.versions import other_version
 
 LIBRARIES = ("/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/local/lib/faketime/libfaketimeMT.so.1")
 HOST = "tcp/127.0.0.1"
@@ -24,16 +30,31 @@ def faults_of(drive: Drive) -> list[Fault]:
     """In the order they are made."""
     match drive:
         case Drive.PLAIN:
-            return [*scenario_faults(), *process_faults((*load_config().services, "recorder")), *peer_faults()]
+            services = (*load_config().services, "recorder")
+            return [*scenario_faults(), *process_faults(services), *peer_faults(), other_version()]
         case Drive.CLOCK:
             return clock_faults(Path())
         case Drive.LINK:
             return link_faults(Relay(0, 0))
+        case Drive.CERTIFICATES:
+            return certificate_faults(Certificates(Path()))
+        case Drive.SERIAL:
+            return serial_faults(None, None)
 
 
 def missing(drive: Drive) -> str:
     """What this machine lacks for this drive; empty where nothing."""
-    return "needs libfaketime (Debian: faketime)" if drive is Drive.CLOCK and not faked_clock() else ""
+    try:
+        match drive:
+            case Drive.CLOCK if not faked_clock():
+                return "needs libfaketime (Debian: faketime)"
+            case Drive.CERTIFICATES:
+                require_modules("it", "cryptography")
+            case Drive.SERIAL:
+                require_emulator(IMAGE)
+    except UserError as error:
+        return str(error)
+    return ""
 
 
 @contextlib.asynccontextmanager
@@ -75,6 +96,19 @@ async def _start(drive: Drive, folder: Path) -> AsyncIterator[tuple[Loop, list[F
                     yield loop, link_faults(relay)
             finally:
                 await relay.stop()
+        case Drive.CERTIFICATES:
+            certificates = Certificates(folder)
+            await asyncio.to_thread(certificates.make)
+            sets = (*_own(folder), f"bus.certificates={certificates.live}")
+            async with running([Side((), sets)], folder) as loop:
+                yield loop, certificate_faults(certificates)
+        case Drive.SERIAL:
+            async with emulated(IMAGE, "pty") as (advice_line, thrust_line, pulses_line):
+                with contextlib.closing(Cable(advice_line)) as advice, contextlib.closing(Cable(thrust_line)) as thrust:
+                    lines = (f"bridge.line={advice.address}", f"thrusters.line={thrust.address}")
+                    sets = ("profile=hil", *_own(folder), *lines, f"plant.pwm_line={pulses_line}")
+                    async with running([Side((), sets)], folder) as loop:
+                        yield loop, serial_faults(thrust, advice)
 
 
 def _own(folder: Path) -> tuple[str, ...]:

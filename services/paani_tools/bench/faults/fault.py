@@ -26,11 +26,15 @@ class Expected(StrEnum):
 
 
 class Drive(StrEnum):
-    """Which drive is hurt: the simulated one, the same with a clock that can be set, or board and host apart."""
+    """Which drive is hurt: the simulated one, the same with a clock that can be set, board and host apart, one whose
+    processes have certificates, or one whose thrust goes through the emulated microcontroller.
+    """
 
     PLAIN = "plain"
     CLOCK = "clock"
     LINK = "link"
+    CERTIFICATES = "certificates"
+    SERIAL = "serial"
 
 
 class Fault(msgspec.Struct, frozen=True, kw_only=True):

@@ -8,7 +8,7 @@ import os
 import resource
 import signal
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 from paani_tools.bench.faults.fault import Expected, Fault
@@ -17,7 +17,8 @@ from paani_tools.bench.faults.running import Loop, until
 GONE_S, BACK_S = 10.0, 40.0
 FROZEN_S, REFUSED_S = 1.0, 2.0
 NEEDS_A_HAND = frozenset({"operator", "dashboard"})  # who armed, and where: nobody knows whether they still want it
-NOBODY_WAITS_FOR = frozenset({"recorder", "bridge"})
+RECORDER = "recorder"
+NOBODY_WAITS_FOR = frozenset({RECORDER, "bridge"})
 ADAPTER = "plant"
 SILENT_CONNECTIONS = 150
 NEIGHBOURS = 4
@@ -25,12 +26,14 @@ NEIGHBOURS = 4
 
 def process_faults(services: tuple[str, ...]) -> list[Fault]:
     """One of each kind for every process that can have it."""
+    boat = [name for name in services if name != RECORDER]
     return [
         *(_killed(name) for name in services),
         *(_frozen(name) for name in services),
-        *(_refused_memory(name) for name in ("perception", "controller") if name in services),
-        _full_disk(),
-        _descriptors_gone(),
+        *(_refused_memory(name) for name in services),
+        _limited("disk full", boat, resource.RLIMIT_FSIZE),  # no file grows
+        _limited("no descriptors left", boat, resource.RLIMIT_NOFILE),  # no file, no connection opens
+        _silent_connections(),
         _greedy_neighbour(),
     ]
 
@@ -46,13 +49,18 @@ def _killed(service: str) -> Fault:
         os.kill(pid, signal.SIGKILL)
 
     async def end(loop: Loop) -> None:
-        watch = loop.watch
-        await until(lambda: watch.changed_us.get(service, 0) > loop.hit_us, GONE_S)
-        await until(lambda: watch.alive.get(service, False), BACK_S)
+        await back_again(loop, service)
 
     expected = Expected.HAND if service in NEEDS_A_HAND else _expected(service)
     name, away = f"{service} killed", service == ADAPTER
     return Fault(name=name, expected=expected, begin=begin, end=end, hurts_adapter=away)
+
+
+async def back_again(loop: Loop, service: str) -> None:
+    """Wait until a process that was killed as the fault began has ended, and is alive again. Raises TimeoutError."""
+    watch = loop.watch
+    await until(lambda: watch.changed_us.get(service, 0) > loop.hit_us, GONE_S)
+    await until(lambda: watch.alive.get(service, False), BACK_S)
 
 
 def _frozen(service: str) -> Fault:
@@ -72,48 +80,45 @@ def _frozen(service: str) -> Fault:
     )  # fmt: skip
 
 
-def _refused_memory(service: str) -> Fault:
-    """The kernel gives the process no more address space than it has: what it asks for fails."""
-    limited: list[int] = []
+def _limited(
+    name: str,
+    services: Sequence[str],
+    limit: int,
+    most: Callable[[int], int] = lambda pid: 0,
+    expected: Expected = Expected.GOES_ON,
+) -> Fault:
+    """The kernel gives these processes no more of something than `most` says of each; what they ask for fails."""
+    before: dict[int, tuple[int, int]] = {}
 
     async def begin(loop: Loop) -> None:
-        pid = loop.pid_of(service)
-        limited.append(pid)
-        pages = int(await asyncio.to_thread(_read, Path(f"/proc/{pid}/statm")))
+        before.clear()
+        before.update({pid: resource.prlimit(pid, limit) for pid in map(loop.pid_of, services)})
         loop.mark()
-        resource.prlimit(pid, resource.RLIMIT_AS, (pages * resource.getpagesize(), resource.RLIM_INFINITY))
+        for pid, (_, hard) in before.items():
+            resource.prlimit(pid, limit, (most(pid), hard))
 
     async def end(loop: Loop) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            resource.prlimit(limited[-1], resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-
-    name = f"{service} refused memory"
-    return Fault(name=name, expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)
-
-
-def _read(statm: Path) -> str:
-    return statm.read_text(encoding="ascii").split()[0]
-
-
-def _full_disk() -> Fault:
-    """No process can make a file grow."""
-    limited: list[int] = []
-
-    async def begin(loop: Loop) -> None:
-        limited[:] = [loop.pid_of(name) for name in loop.config.services]
-        loop.mark()
-        for pid in limited:
-            resource.prlimit(pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
-
-    async def end(loop: Loop) -> None:
-        for pid in limited:
+        for pid, limits in before.items():
             with contextlib.suppress(ProcessLookupError):
-                resource.prlimit(pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+                resource.prlimit(pid, limit, limits)
 
-    return Fault(name="disk full", expected=Expected.GOES_ON, begin=begin, end=end, lasts_s=REFUSED_S)
+    return Fault(
+        name=name, expected=expected, begin=begin, end=end, lasts_s=REFUSED_S, hurts_adapter=ADAPTER in services
+    )
 
 
-def _descriptors_gone() -> Fault:
+def _refused_memory(service: str) -> Fault:
+    expected = Expected.MAY_STAND if service in NEEDS_A_HAND else Expected.GOES_ON
+    return _limited(f"{service} refused memory", [service], resource.RLIMIT_AS, _address_space, expected)
+
+
+def _address_space(pid: int) -> int:
+    """What a process has now [bytes]."""
+    pages = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[0]
+    return int(pages) * resource.getpagesize()
+
+
+def _silent_connections() -> Fault:
     """Connections that say nothing, to the page and to the router, until neither takes one more."""
     connected = contextlib.AsyncExitStack()
 

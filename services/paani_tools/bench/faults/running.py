@@ -22,11 +22,13 @@ from paani.bus import Bus, open_bus
 from paani.clock import MonotonicClock, WallClock
 from paani.config import Config, load_config
 from paani.errors import UserError
+from paani.operator_client import OperatorClient
 from paani.operator_key import ensure_operator_key
 
 MONOTONIC = MonotonicClock()
 HOLD_S, REFRESH_S = 1.3, 0.15
 START_S, STOP_S, SETTLE_S = 90.0, 10.0, 40.0
+STOP_CONFIRMED_S = 2.0
 POLL_S = 0.02
 MOVING_S, MOVING_REPORTS = 0.5, 8  # of 10: under way
 ALIVE = "alive after"
@@ -89,13 +91,71 @@ class Side(NamedTuple):
     sets: tuple[str, ...]
 
 
+class Up:
+    """One `paani up`, and the file that holds what it says. environ: of its processes, beside this one's."""
+
+    def __init__(self, side: Side, output: Path, environ: Mapping[str, str]) -> None:
+        self._side, self._output, self._environ = side, output, environ
+        self._process: asyncio.subprocess.Process | None = None
+
+    @property
+    def pid(self) -> int:
+        """Of the supervisor; 0 before its first start."""
+        return 0 if self._process is None else self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """By itself, as it does for a user's mistake."""
+        return self._process is not None and self._process.returncode is not None
+
+    async def start(self) -> None:
+        """Returns when everything is alive. Raises UserError with what it says where it ends first."""
+        words = [word for setting in self._side.sets for word in ("--set", setting)]
+        with self._output.open("wb") as output:
+            command = (sys.executable, "-m", "paani", "up", *self._side.options, *words)
+            self._process = await asyncio.create_subprocess_exec(
+                *command, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=output,
+                env={**os.environ, **self._environ}, process_group=0,
+            )  # fmt: skip
+        deadline_us = MONOTONIC.now_us() + round(START_S * 1e6)
+        while ALIVE not in (text := await asyncio.to_thread(self._text)):
+            if self.has_ended or MONOTONIC.now_us() > deadline_us:
+                raise UserError(f"the drive did not start: {text.strip()[-500:]}")
+            await asyncio.sleep(0.1)
+
+    async def stop(self) -> None:
+        """End it and its processes."""
+        if self._process is None or self.has_ended:
+            return
+        self._process.terminate()
+        try:
+            await asyncio.wait_for(self._process.wait(), STOP_S)
+        except TimeoutError:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            await self._process.wait()
+
+    def _text(self) -> str:
+        with self._output.open(encoding="utf-8", errors="replace") as file:
+            return file.read()
+
+
 class Loop:
     """A drive under way. `hit_us`, `hit_wall_us`: when the present fault began."""
 
-    def __init__(self, config: Config, watch: Watch, clock: ShiftedClock, supervisors: Sequence[int]) -> None:
-        self.config, self.watch, self.clock = config, watch, clock
-        self.supervisors = tuple(supervisors)
+    def __init__(self, config: Config, watch: Watch, clock: ShiftedClock, ups: Sequence[Up]) -> None:
+        self.config, self.watch, self.clock, self._ups = config, watch, clock, ups
         self.hit_us = self.hit_wall_us = 0
+
+    async def wait_for_end(self, limit_s: float) -> None:
+        """Until a `paani up` has ended by itself. Raises TimeoutError."""
+        await until(lambda: any(up.has_ended for up in self._ups), limit_s)
+
+    async def start_again(self) -> None:
+        """Whatever `paani up` has ended by itself, until everything is alive. Raises ChildProcessError."""
+        for up in self._ups:
+            if up.has_ended:
+                await up.start()
 
     def mark(self) -> None:
         """The fault begins now."""
@@ -107,7 +167,7 @@ class Loop:
             with contextlib.suppress(OSError, IndexError):
                 words = (folder / "cmdline").read_text(encoding="utf-8").rstrip("\0").split("\0")
                 parent = int((folder / "stat").read_text(encoding="utf-8").rpartition(") ")[2].split()[1])
-                if parent in self.supervisors and words[-1] == service:
+                if parent in {up.pid for up in self._ups} and words[-1] == service:
                     return int(folder.name)
         raise ProcessLookupError(service)
 
@@ -139,11 +199,17 @@ class Loop:
         return True
 
     def is_unarmed(self) -> bool:
-        """The newest report says that nobody has armed the boat."""
-        return bool(self.watch.reports) and self.watch.reports[-1].cause is m.ZeroCause.NOT_ARMED
+        """The newest report says that nobody has armed the boat, or its microcontroller."""
+        return bool(self.watch.reports) and self.watch.reports[-1].cause in {m.ZeroCause.NOT_ARMED, m.ZeroCause.REARM}
 
     async def arm(self) -> None:
-        """Hold the button of the page once, as a person would; what is refused shows in the reports."""
+        """Hold the button of the page once, as a person would; what is refused shows in the reports.
+
+        A microcontroller that has disarmed by itself wants to see the boat disarmed first: that is STOP.
+        """
+        if self.watch.reports[-1].cause is m.ZeroCause.REARM:
+            async with self.joined("stop") as bus:
+                await OperatorClient(bus, self.clock).stop(STOP_CONFIRMED_S)
         press = MONOTONIC.now_us()
         for _ in range(round(HOLD_S / REFRESH_S)):
             await asyncio.to_thread(self._press, "hold", press)
@@ -183,52 +249,22 @@ async def running(sides: Sequence[Side], folder: Path, environ: Mapping[str, str
 
     folder: for what they write, removed by whoever made it. environ: of their processes, beside this one's.
     """
-    clock, started = ShiftedClock(), []
+    clock, ups = (
+        ShiftedClock(),
+        [Up(side, folder / f"{number}.out", environ or {}) for number, side in enumerate(sides)],
+    )
     try:
-        for number, side in enumerate(sides):
-            words = [word for setting in side.sets for word in ("--set", setting)]
-            with (folder / f"{number}.out").open("wb") as output:
-                command = (sys.executable, "-m", "paani", "up", *side.options, *words)
-                up = await asyncio.create_subprocess_exec(
-                    *command, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=output,
-                    env={**os.environ, **(environ or {})}, process_group=0,
-                )  # fmt: skip
-            started.append(up)
-            await _await_alive(up, folder / f"{number}.out")
+        for up in ups:
+            await up.start()
         config = load_config(sets=sides[-1].sets)
         bus = await open_bus(config.bus, OBSERVER, clock)
         watch = Watch(bus)
         following = asyncio.create_task(watch.follow(bus))
         try:
-            yield Loop(config, watch, clock, [up.pid for up in started])
+            yield Loop(config, watch, clock, ups)
         finally:
             following.cancel()
             await bus.close()
     finally:
-        for up in reversed(started):
-            await _end(up)
-
-
-async def _await_alive(up: asyncio.subprocess.Process, output: Path) -> None:
-    deadline_us = MONOTONIC.now_us() + round(START_S * 1e6)
-    while ALIVE not in (text := await asyncio.to_thread(_read, output)):
-        if up.returncode is not None or MONOTONIC.now_us() > deadline_us:
-            raise UserError(f"the drive did not start: {text.strip()[-500:]}")
-        await asyncio.sleep(0.1)
-
-
-def _read(output: Path) -> str:
-    with output.open(encoding="utf-8", errors="replace") as file:
-        return file.read()
-
-
-async def _end(up: asyncio.subprocess.Process) -> None:
-    if up.returncode is not None:
-        return
-    up.terminate()
-    try:
-        await asyncio.wait_for(up.wait(), STOP_S)
-    except TimeoutError:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(up.pid, signal.SIGKILL)
-        await up.wait()
+        for up in reversed(ups):
+            await up.stop()

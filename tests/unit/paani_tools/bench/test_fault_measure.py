@@ -113,7 +113,7 @@ def test_the_table_has_the_worst_and_says_what_was_not_measured() -> None:
 
 def test_each_fault_has_one_name_and_can_be_chosen_by_a_word_of_it() -> None:
     assert len({each.name for each in ALL}) == len(ALL) >= 20
-    assert {each.name for each in choose(["router"])} == {"router killed", "router not running"}
+    assert {each.name for each in choose(["cut", "stalled"])} == {"link cut", "link stalled"}
     with pytest.raises(UserError, match="no such fault"):
         choose(["kraken"])
 

@@ -1,0 +1,97 @@
+"""Faults of certificates: one expires under way, or has expired when its process is started again.
+
+An expired certificate is a mistake that no restart mends: `paani up` ends. A person puts a valid one in its place,
+starts again, and arms.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import signal
+from pathlib import Path
+
+from paani.clock import WallClock
+from paani.keys import Graph
+from paani_tools.bench.faults.fault import Drive, Expected, Fault
+from paani_tools.bench.faults.processes import back_again
+from paani_tools.bench.faults.running import Loop, until
+
+DAY_US = 86_400_000_000
+EXPIRING, KILLED = "controller", "advisor"
+LIVES_S = 15.0  # of a certificate that expires under way: its process is started again, and the boat under way by then
+LASTS_S = 1.0
+ENDS_S = 30.0  # who is cut off is killed as hanging after 5 s, and started again
+
+
+class Certificates:
+    """Those of a drive, in `live`; each may be replaced by another of the same name, whose rights the router knows."""
+
+    def __init__(self, folder: Path) -> None:
+        self._first, self._valid, self.live = folder / "first", folder / "valid", folder / "certificates"
+
+    def make(self) -> None:
+        """All of them valid for a day. Raises ModuleNotFoundError without what makes certificates."""
+        from paani_tools.certs.folder import make  # noqa: PLC0415  # its library comes with an extra
+
+        make(self._first, Graph.SIMULATION, (), WallClock().now_us(), 1)
+        shutil.copytree(self._first, self._valid)
+        for name in (EXPIRING, KILLED):
+            self._rotate(self._valid, name, WallClock().now_us() + DAY_US)
+        self.restore()
+
+    def replace(self, name: str, until_us: int) -> None:
+        """Another certificate of this name, valid until then [us, Unix time]."""
+        beside = self.live.with_name(f"{name}-{until_us}")
+        shutil.copytree(self._first, beside)
+        self._rotate(beside, name, until_us)
+        shutil.copytree(beside, self.live, dirs_exist_ok=True)
+
+    def restore(self) -> None:
+        """The valid ones again."""
+        shutil.copytree(self._valid, self.live, dirs_exist_ok=True)
+
+    def _rotate(self, folder: Path, name: str, until_us: int) -> None:
+        from paani_tools.certs.folder import rotate  # noqa: PLC0415
+
+        rotate(folder, name, until_us - DAY_US, 1)
+
+
+def certificate_faults(certificates: Certificates) -> list[Fault]:
+    """On a drive whose processes know each other by these."""
+
+    async def expire(loop: Loop) -> None:
+        until_us = WallClock().now_us() + round(LIVES_S * 1e6)
+        await asyncio.to_thread(certificates.replace, EXPIRING, until_us)
+        _kill(loop, EXPIRING)
+        await back_again(loop, EXPIRING)
+        if not await loop.settle() or WallClock().now_us() > until_us:
+            raise TimeoutError(f"it expired after {LIVES_S} s, before the boat was under way again")
+        await until(lambda: WallClock().now_us() >= until_us, LIVES_S)
+        loop.mark()
+
+    async def kill(loop: Loop) -> None:
+        await asyncio.to_thread(certificates.replace, KILLED, WallClock().now_us() - DAY_US)
+        _kill(loop, KILLED)
+
+    async def mend(loop: Loop) -> None:
+        await loop.wait_for_end(ENDS_S)
+        await asyncio.to_thread(certificates.restore)
+        await loop.start_again()
+
+    return [
+        Fault(
+            name=name, expected=Expected.HAND, begin=begin, end=mend, lasts_s=LASTS_S, drive=Drive.CERTIFICATES
+        )
+        for name, begin in (
+            (f"{EXPIRING}'s certificate expires", expire),
+            (f"{KILLED} killed, its certificate expired", kill),
+        )
+    ]  # fmt: skip
+
+
+def _kill(loop: Loop, service: str) -> None:
+    pid = loop.pid_of(service)
+    loop.mark()
+    os.kill(pid, signal.SIGKILL)
