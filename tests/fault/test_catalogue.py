@@ -14,6 +14,7 @@ from paani_tools.bench.faults.fault import Drive
 from paani_tools.bench.faults.inputs import flood
 from paani_tools.bench.faults.measure import keeps_bars, measure
 from paani_tools.bench.faults.running import MONOTONIC, Loop
+from tests.firmware.emulator import build_image
 
 pytestmark = [pytest.mark.fault, pytest.mark.timeout(150)]
 
@@ -39,6 +40,8 @@ def chosen(drive: Drive) -> list[str]:
 @pytest.mark.timeout(400)
 async def test_each_fault_once(drive: Drive) -> None:
     """O2: without fresh orders from a living chain there is no thrust. Nothing but a hand arms again."""
+    if drive is Drive.SERIAL:
+        await asyncio.to_thread(build_image)
     if reason := missing(drive):
         pytest.skip(reason)
     bad = []

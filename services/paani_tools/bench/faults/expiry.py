@@ -1,7 +1,8 @@
 """Faults of certificates: one expires under way, or has expired when its process is started again.
 
-An expired certificate is a mistake that no restart mends: `paani up` ends. A person puts a valid one in its place,
-starts again, and arms.
+Who is cut off comes back by itself where a valid one is there within 5 s; after that it is killed as hanging. With an
+expired one no process starts: that is a mistake which no restart mends, so `paani up` ends. Then a person puts a valid
+one in its place, starts again, and arms.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from paani_tools.bench.faults.running import Loop, until
 
 DAY_US = 86_400_000_000
 EXPIRING, KILLED = "controller", "advisor"
-LIVES_S = 15.0  # of a certificate that expires under way: its process is started again, and the boat under way by then
-LASTS_S = 1.0
-ENDS_S = 30.0  # who is cut off is killed as hanging after 5 s, and started again
+LIVES_S = 15  # of a certificate that expires under way: its process is started again, and the boat under way by then
+LASTS_S = 2.0
+ENDS_S = 30.0  # a killed process is started again, and refused
+SECOND_US = 1_000_000  # X.509 knows nothing shorter
 
 
 class Certificates:
@@ -62,7 +64,7 @@ def certificate_faults(certificates: Certificates) -> list[Fault]:
     """On a drive whose processes know each other by these."""
 
     async def expire(loop: Loop) -> None:
-        until_us = WallClock().now_us() + round(LIVES_S * 1e6)
+        until_us = (WallClock().now_us() // SECOND_US + LIVES_S) * SECOND_US
         await asyncio.to_thread(certificates.replace, EXPIRING, until_us)
         _kill(loop, EXPIRING)
         await back_again(loop, EXPIRING)
@@ -75,19 +77,24 @@ def certificate_faults(certificates: Certificates) -> list[Fault]:
         await asyncio.to_thread(certificates.replace, KILLED, WallClock().now_us() - DAY_US)
         _kill(loop, KILLED)
 
-    async def mend(loop: Loop) -> None:
+    async def renew(loop: Loop) -> None:
+        await asyncio.to_thread(certificates.restore)
+
+    async def start_again(loop: Loop) -> None:
         await loop.wait_for_end(ENDS_S)
         await asyncio.to_thread(certificates.restore)
         await loop.start_again()
 
+    common = {"lasts_s": LASTS_S, "drive": Drive.CERTIFICATES}
     return [
         Fault(
-            name=name, expected=Expected.HAND, begin=begin, end=mend, lasts_s=LASTS_S, drive=Drive.CERTIFICATES
-        )
-        for name, begin in (
-            (f"{EXPIRING}'s certificate expires", expire),
-            (f"{KILLED} killed, its certificate expired", kill),
-        )
+            name=f"{EXPIRING}'s certificate expires", expected=Expected.STOPS, begin=expire, end=renew,
+            **common,  # type: ignore[arg-type]
+        ),
+        Fault(
+            name=f"{KILLED} killed, its certificate expired", expected=Expected.HAND, begin=kill, end=start_again,
+            **common,  # type: ignore[arg-type]
+        ),
     ]  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import os
 import resource
 import signal
@@ -32,7 +33,7 @@ def process_faults(services: tuple[str, ...]) -> list[Fault]:
         *(_frozen(name) for name in services),
         *(_refused_memory(name) for name in services),
         _limited("disk full", boat, resource.RLIMIT_FSIZE),  # no file grows
-        _limited("no descriptors left", boat, resource.RLIMIT_NOFILE),  # no file, no connection opens
+        _limited("no descriptors left", boat, resource.RLIMIT_NOFILE, _first_free),  # no file, no connection opens
         _silent_connections(),
         _greedy_neighbour(),
     ]
@@ -54,6 +55,12 @@ def _killed(service: str) -> Fault:
     expected = Expected.HAND if service in NEEDS_A_HAND else _expected(service)
     name, away = f"{service} killed", service == ADAPTER
     return Fault(name=name, expected=expected, begin=begin, end=end, hurts_adapter=away)
+
+
+def _first_free(pid: int) -> int:
+    """The lowest descriptor that a process has not open, and would be given next."""
+    taken = {int(entry.name) for entry in Path(f"/proc/{pid}/fd").iterdir()}
+    return next(number for number in itertools.count() if number not in taken)
 
 
 async def back_again(loop: Loop, service: str) -> None:
@@ -103,7 +110,7 @@ def _limited(
                 resource.prlimit(pid, limit, limits)
 
     return Fault(
-        name=name, expected=expected, begin=begin, end=end, lasts_s=REFUSED_S, hurts_adapter=ADAPTER in services
+        name=name, expected=expected, begin=begin, end=end, lasts_s=REFUSED_S, hurts_adapter=services == [ADAPTER]
     )
 
 

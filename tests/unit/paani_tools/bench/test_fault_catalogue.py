@@ -48,7 +48,7 @@ def test_every_process_is_killed_not_run_and_refused_memory() -> None:
         ("disk full", Expected.GOES_ON),
         ("no descriptors left", Expected.GOES_ON),
         ("controller of another version", Expected.STOPS),
-        ("controller's certificate expires", Expected.HAND),
+        ("controller's certificate expires", Expected.STOPS),
         ("advisor killed, its certificate expired", Expected.HAND),
         ("thrusters' serial line unplugged for half a second", Expected.STOPS),
         ("thrusters' serial line unplugged", Expected.HAND),
