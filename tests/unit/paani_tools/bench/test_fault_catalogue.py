@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import tty
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from paani_tools.bench.faults.drives import faults_of
 from paani_tools.bench.faults.expiry import EXPIRING, KILLED, Certificates
 from paani_tools.bench.faults.fault import Drive, Expected
 from paani_tools.bench.faults.processes import NEEDS_A_HAND
+from paani_tools.bench.faults.running import Loop, ShiftedClock
 from paani_tools.bench.faults.versions import OTHER_NAMES, in_other_words
 from tests.mcu_peer import until
 
@@ -57,6 +59,30 @@ def test_every_process_is_killed_not_run_and_refused_memory() -> None:
 )
 def test_what_is_expected_of_the_boat(name: str, expected: Expected) -> None:
     assert [fault.expected for drive in Drive for fault in faults_of(drive) if fault.name == name] == [expected]
+
+
+class OneProcess(Loop):
+    """A drive all of whose services are one process."""
+
+    def __init__(self, pid: int) -> None:
+        self.clock, self._pid = ShiftedClock(), pid
+
+    def pid_of(self, service: str) -> int:
+        return self._pid
+
+
+async def test_a_process_without_descriptors_is_given_none_that_it_has_not_and_has_them_back() -> None:
+    fault = next(fault for fault in faults_of(Drive.PLAIN) if fault.name == "no descriptors left")
+    process = await asyncio.create_subprocess_exec("sleep", "60")
+    try:
+        loop, before = OneProcess(process.pid), resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
+        await fault.begin(loop)
+        assert resource.prlimit(process.pid, resource.RLIMIT_NOFILE) == (3, before[1])  # input, output and errors
+        await fault.end(loop)
+        assert resource.prlimit(process.pid, resource.RLIMIT_NOFILE) == before
+    finally:
+        process.kill()
+        await process.wait()
 
 
 def test_nothing_but_the_names_of_its_fields_keeps_an_order_of_another_version_out() -> None:

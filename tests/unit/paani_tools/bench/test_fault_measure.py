@@ -163,6 +163,18 @@ async def test_a_drive_that_is_slow_to_come_back_has_not_armed_itself(monkeypatc
     assert run.back_s >= 0.4
 
 
+@pytest.mark.parametrize(
+    ("cause", "is_unarmed"),
+    [(m.ZeroCause.NOT_ARMED, True), (m.ZeroCause.REARM, True), (m.ZeroCause.LINE_LOST, False)],
+)
+def test_a_hand_is_needed_where_the_boat_or_its_microcontroller_is_not_armed(
+    cause: m.ZeroCause, is_unarmed: bool
+) -> None:
+    loop = SlowLoop()
+    loop.watch.reports.append(Report(HIT_US, False, cause, WALL_US, WALL_US))
+    assert loop.is_unarmed() is is_unarmed
+
+
 class RefusingLoop(SlowLoop):
     """A drive that refuses the first hold and takes the second."""
 
