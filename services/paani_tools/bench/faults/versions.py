@@ -20,6 +20,7 @@ from paani_tools.bench.faults.running import Loop, until
 CONTROLLER = keys.THRUST.producer
 TIMES, PERIOD_S = 20, 0.05  # for a second: the controller of this version is back no sooner
 HEALTH_S = 3.0  # reported once a second
+ZERO_S = 0.55  # the last order of the one before counts for half a second, to the adapter's next step
 FORWARD = 0.3
 OTHER_NAMES = {"left": "port", "right": "starboard"}
 
@@ -53,7 +54,7 @@ def other_version() -> Fault:
         await back_again(loop, CONTROLLER)
 
     name, lasts_s = f"{CONTROLLER} of another version", TIMES * PERIOD_S
-    return Fault(name=name, expected=Expected.STOPS, begin=begin, end=end, lasts_s=lasts_s)
+    return Fault(name=name, expected=Expected.STOPS, begin=begin, end=end, lasts_s=lasts_s, zero_s=ZERO_S)
 
 
 async def _speak(loop: Loop, peer: Bus, stamps_us: list[int]) -> None:
