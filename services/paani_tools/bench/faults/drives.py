@@ -99,7 +99,7 @@ async def _start(drive: Drive, folder: Path) -> AsyncIterator[tuple[Loop, list[F
         case Drive.CERTIFICATES:
             certificates = Certificates(folder)
             await asyncio.to_thread(certificates.make)
-            sets = (*_own(folder), f"bus.certificates={certificates.live}")
+            sets = (*_own(folder), f"bus.certificates={certificates.live}", "up.arm_at_start=false")  # it starts again
             async with running([Side((), sets)], folder) as loop:
                 yield loop, certificate_faults(certificates)
         case Drive.SERIAL:
