@@ -1,42 +1,37 @@
 // @ts-check
 // The tab of a hull's devices: its sensors, the bridge to the indicator, and the line to the thrusters. Hidden without any.
 
-import { DEVICE_FACTS, DEVICE_TEXTS, ageText, agoText, byId, fixed, make, setFacts, setText } from "./text.js";
+import { shownTab } from "./tabs.js";
+import { effect, facts, html, mount, tableHead, tableMoment } from "./templates.js";
+import { DEVICE_FACTS, DEVICE_TEXTS, ageText, agoText, byId, fixed } from "./text.js";
 
-const TOPICS = ["sensors/state", "bridge/state", "thrusters/state"];
-const NAMES = ["sensors", "bridge", "thrusters"];
+const LINES = /** @type {const} */ (["bridge", "thrusters"]);
+/** @type {Record<string, string>} */
+const KINDS = { ok: "good", off: "quiet", no_fix: "warn" };
 
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderDevices(store, now) {
-  const services = store.get("dashboard/settings")?.services ?? [];
-  byId("tab-devices").hidden = !NAMES.some((name) => services.includes(name));
-  if (byId("devices").hidden) return;
-  renderSensors(store, now);
-  NAMES.slice(1).forEach((name, index) => {
-    const key = TOPICS[index + 1], state = store.get(key), panel = byId(`${name}-device`);
-    panel.hidden = !services.includes(name);
-    panel.classList.toggle("stale", !store.isFresh(key, now));
-    setText(byId(`${name}-age`), state ? agoText(ageText(store.ageS(key, now))) : DEVICE_TEXTS.none);
-    setFacts(byId(`${name}-facts`), state ? factsOf(state) : []);
-  });
+const services = () => /** @type {string[]} */ (tableMoment.value.store.get("dashboard/settings")?.services ?? []);
+
+export function bindDevices() {
+  effect(() => { byId("tab-devices").hidden = !["sensors", ...LINES].some((name) => services().includes(name)); });
+  mount("[data-tab-panel=devices]", () => shownTab.value === "devices" && html`${services().includes("sensors") && sensors(tableMoment.value)}${LINES.filter((name) => services().includes(name)).map((name) => line(tableMoment.value, name))}`);
 }
 
-/** @param {import("./store.js").Store} store @param {number} now */
-function renderSensors(store, now) {
-  const state = store.get("sensors/state"), devices = state?.devices ?? [], body = byId("sensor-devices");
-  byId("sensors-device").hidden = !store.get("dashboard/settings")?.services.includes("sensors");
-  body.classList.toggle("stale", !store.isFresh("sensors/state", now));
-  while (body.children.length > devices.length) body.lastChild.remove();
-  devices.forEach((/** @type {any} */ device, /** @type {number} */ index) => {
-    const row = body.children[index] ?? body.appendChild(make("tr"));
-    while (row.children.length < 9) row.append(make("td", row.children.length > 2 && row.children.length < 8 ? "number" : row.children.length === 8 ? "wide" : ""));
-    const texts = [
-      device.role, device.status.replaceAll("_", " "), device.line || "–", `${fixed(device.rate_hz, 1)} Hz`, device.checksum_failures,
-      device.damaged, device.withheld, device.reconnections, [device.note, device.heard].filter(Boolean).join("; "),
-    ];
-    texts.forEach((text, at) => setText(row.children[at], String(text)));
-    row.children[1].className = device.status === "ok" ? "good" : device.status === "off" ? "quiet" : device.status === "no_fix" ? "warn" : "bad";
-  });
+/** @param {import("./templates.js").Moment} moment */
+function sensors({ store, now }) {
+  return html`<div id="sensors-device" class="panel" tabindex="0" role="group" aria-label=${DEVICE_TEXTS.sensors}><header><h2>${DEVICE_TEXTS.sensors}</h2></header>
+    <table>${tableHead(DEVICE_TEXTS.columns, [3, 4, 5, 6, 7])}<tbody id="sensor-devices" class=${store.isFresh("sensors/state", now) ? "" : "stale"}>${(store.get("sensors/state")?.devices ?? []).map(device)}</tbody></table></div>`;
+}
+
+/** @param {any} device */
+const device = ({ role, status, line, note, heard, ...counts }) => html`<tr key=${role}><td>${role}</td><td class=${KINDS[status] ?? "bad"}>${status.replaceAll("_", " ")}</td><td>${line || "–"}</td>
+  <td class="number">${fixed(counts.rate_hz, 1)} Hz</td>${["checksum_failures", "damaged", "withheld", "reconnections"].map((name) => html`<td class="number">${counts[name]}</td>`)}
+  <td class="wide">${[note, heard].filter(Boolean).join("; ")}</td></tr>`;
+
+/** @param {import("./templates.js").Moment} moment @param {"bridge" | "thrusters"} name */
+function line({ store, now }, name) {
+  const key = `${name}/state`, state = store.get(key);
+  return html`<div id="${name}-device" class="panel ${store.isFresh(key, now) ? "" : "stale"}"><header><h2>${DEVICE_TEXTS[name]}</h2><span id="${name}-age" class="quiet">${state ? agoText(ageText(store.ageS(key, now))) : DEVICE_TEXTS.none}</span></header>
+    <dl id="${name}-facts" class="facts">${facts(state ? factsOf(state) : [])}</dl></div>`;
 }
 
 /** Every field of a state but its header. @param {any} state @returns {[string, string, boolean][]} */

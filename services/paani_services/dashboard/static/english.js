@@ -6,30 +6,21 @@ export const PAGE_TEXTS = {
   colours_d: "Colours (D)", signals_of_alerts: "Signals of alerts", what_the_boat_does: "What the boat does", advice: "Advice", tabs: "Tabs", moment_shown: "Moment shown",
   tuning: "Tuning", drive: "Drive", modes: "Modes", stick: "Stick: hold and pull; letting go is zero thrust", camera: "Camera", overlays: "Overlays",
   top_edge_title: "Upper edge of the corridors", own_hull_title: "What the own hull covers of the picture", camera_canvas: "Newest picture with overlay", tracks: "Tracks",
-  motion: "Motion", indicator: "Indicator", sensors: "Sensors", explanation: "Explanation", steps_of_the_decision: "Steps of the decision", stages: "From the advice to the thrust",
-  map: "Map", headings_title: "Why this heading and no other", mission_editor: "Mission editor", legs_and_areas: "Legs and areas", gpx_or_geojson_file: "GPX or GeoJSON file",
-  headings_group: "Headings that the planner weighed", map_canvas: "Fence, mission, route, way ahead, moving obstacles, estimated and true track, in metres east and north",
-  map_controls: "Which way is up, and how large", zoom_in: "Zoom in", zoom_out: "Zoom out", log: "Log", log_newest_first: "Log, newest first",
-  log_past: "Log until the moment shown, newest first", health: "Health", processes: "Processes", log_of_a_process: "Log of a process", recordings: "Recordings",
-  list_of_recordings: "List of recordings", topics: "Topics", search: "Search",
-  settings: "Settings", table_of_settings: "Table of settings", search_settings: "Search settings", sensors_and_bridge: "Sensors and bridge",
-  plots_group: "Plots of the last ten minutes", time: "Time", playback: "Playback", step_back: "Step back", step_back_key: "Step back (,)", play: "Play",
-  play_or_pause_k: "Play or pause (K)", step_forward: "Step forward", step_forward_key: "Step forward (.)", speed: "Speed",
+  motion: "Motion", explanation: "Explanation", map: "Map", headings_title: "Why this heading and no other", mission_editor: "Mission editor", legs_and_areas: "Legs and areas",
+  gpx_or_geojson_file: "GPX or GeoJSON file", headings_group: "Headings that the planner weighed",
+  map_canvas: "Fence, mission, route, way ahead, moving obstacles, estimated and true track, in metres east and north", map_controls: "Which way is up, and how large",
+  zoom_in: "Zoom in", zoom_out: "Zoom out", log: "Log", health: "Health", recordings: "Recordings", topics: "Topics", settings: "Settings",
+  sensors_and_bridge: "Sensors and bridge", plots_group: "Plots of the last ten minutes", time: "Time", playback: "Playback", step_back: "Step back",
+  step_back_key: "Step back (,)", play: "Play", play_or_pause_k: "Play or pause (K)", step_forward: "Step forward", step_forward_key: "Step forward (.)", speed: "Speed",
   strip: "Moment shown: advice, mode, alerts and latency over the last ten minutes", colours: "Colours:", auto: "Auto", alerts: "Alerts:", silent: "Silent", log_out: "Log out",
   waiting: "waiting", seen: "Seen", unknown: "UNKNOWN", no_connection_yet: "no connection yet", no_data: "NO DATA", no_advice_received_yet: "no advice received yet",
   metres_per_second: "m/s", heading: "Heading", degrees_true: "° true", wheel: "Wheel", battery: "Battery", volts: "V", hold_to_arm: "Hold to arm", stop: "STOP", space: "space",
   back_to_live: "Back to live", take_the_wheel: "Take the wheel", how_to_steer: "or arrows, a gamepad, or hold the stick. Letting go is zero thrust.",
   override: "Override the advice for 10 s", mask: "Mask", boxes: "Boxes", corridors: "Corridors", top_edge: "Top edge", own_hull: "Own hull", opacity: "Opacity", water: "water",
-  obstacle: "obstacle", sky: "sky", accepted: "accepted", not_seen_now: "not seen now", immediate_danger: "immediate danger", why_it_does_not_move: "Why it does not move", port: "Port",
-  starboard: "Starboard", leds: "LEDs", part_n: "N not water", part_o: "O obstacle", part_m: "M urgency", part_u: "U uncertainty", limit: "limit", input: "Input", edit: "Edit",
-  follow: "Follow", route: "Route", headings: "Headings", repeat: "repeat", laps: "laps", radius: "radius", metres: "m", for: "for", seconds: "s", speed_field: "speed", send: "Send",
-  taken: "Taken", up: "Up:", north: "North", route_line: "route", fence: "fence", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track",
-  how_to_read_logs: "Press a process for the last lines of its log.", process: "Process", state: "State", rate: "Rate", p50: "p50", p95: "p95", age: "Age", cpu: "CPU", mib: "MiB",
-  files: "Files", celsius: "°C", starts: "Starts", dropped: "Dropped", says: "Says", read_again: "Read again", file: "File", began: "Began", duration: "Duration", size: "Size",
-  do: "Do", from: "From", changed_only: "Changed only", put_in_force: "Put in force", take_back: "Take back",
-  setting: "Setting", value: "Value", unit: "Unit", default: "Default", range: "Range", try_beside: "Try beside", device: "Device", line: "Line", checksum: "Checksum",
-  damaged: "Damaged", withheld: "Withheld", reconnected: "Reconnected", bridge_to_the_indicator: "Bridge to the indicator", line_to_the_thrusters: "Line to the thrusters",
-  plots: "Plots", mode: "Mode", alerts_row: "Alerts", latency: "Latency", the_operator_key_which: "The operator's key, which", paani_up: "paani up", prints: "prints", log_in: "Log in",
+  obstacle: "obstacle", sky: "sky", accepted: "accepted", not_seen_now: "not seen now", immediate_danger: "immediate danger", edit: "Edit", follow: "Follow", route: "Route",
+  headings: "Headings", repeat: "repeat", laps: "laps", radius: "radius", metres: "m", for: "for", seconds: "s", speed_field: "speed", send: "Send", taken: "Taken", up: "Up:",
+  north: "North", route_line: "route", fence: "fence", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track", plots: "Plots",
+  mode: "Mode", alerts_row: "Alerts", latency: "Latency", the_operator_key_which: "The operator's key, which", paani_up: "paani up", prints: "prints", log_in: "Log in",
   stops_the_boat_at_once: "Stops the boat at once, without login.",
 };
 
@@ -58,6 +49,8 @@ export const CAMERA_TEXTS = {
 
 /** The explanation and the tracks. `steps`: of the decision. */
 export const EXPLANATION_TEXTS = {
+  title: PAGE_TEXTS.explanation, path: "Steps of the decision", inputTitle: "Input", tracks: PAGE_TEXTS.tracks,
+  parts: { n: "N not water", o: "O obstacle", m: "M urgency", u: "U uncertainty", limit: "limit" },
   corridors: { left: "Left", center: "Centre", right: "Right" }, steps: ["Picture", "Age", "Centre", "Sides", "Advice"],
   verdicts: { occupied: "occupied", blocked: "blocked", clear: "clear" }, input: { picture: "Picture", age: "Age", mask: "Mask", inference: "Inference" },
   stale: "stale, ", none: "no advice received", usable: "usable", unusable: "unusable", noPicture: "none", noTracks: "No tracks", unseen: "unseen",
@@ -80,8 +73,12 @@ export const LINK_TEXTS = {
   noData: "no data", forData: "for data", age: "age of data",
 };
 
+/** The log. */
+export const LOG_TEXTS = { title: PAGE_TEXTS.log, label: "Log, newest first", past: "Log until the moment shown, newest first" };
+
 /** The motion panel. */
 export const MOTION_TEXTS = {
+  title: PAGE_TEXTS.motion, inhibits: "Why it does not move", left: "Port", right: "Starboard",
   applied: "thrust applied", zero: "zero thrust", silent: "no data from the thrust adapter", clear: "Nothing inhibits thrust",
   setSpeed: "Set speed", setHeading: "Set heading", crossTrack: "Cross-track", age: "Command age", plannedFor: "Planned for", battery: "Battery",
 };
@@ -111,7 +108,7 @@ export const DRIVE_TEXTS = {
 
 /** From the advice to the thrust. */
 export const STAGE_TEXTS = {
-  armedBy: "armed by", unnamed: "unnamed", staysIn: "stays in", keepsOut: "keeps out of", off: "off: turns as advised", advised: "advised", because: "for",
+  label: "From the advice to the thrust", armedBy: "armed by", unnamed: "unnamed", staysIn: "stays in", keepsOut: "keeps out of", off: "off: turns as advised", advised: "advised", because: "for",
   waypoint: (/** @type {number} */ next, /** @type {number} */ all, /** @type {string} */ route) => `, waypoint ${next} of ${all} of ${route}`,
   errors: (/** @type {string} */ speed, /** @type {string} */ heading) => `speed error ${speed} m/s, heading error ${heading}°`,
   thrust: (/** @type {string} */ port, /** @type {string} */ starboard) => `port ${port} N, starboard ${starboard} N`,
@@ -119,15 +116,18 @@ export const STAGE_TEXTS = {
 };
 
 /** The devices of a hull. */
-export const DEVICE_TEXTS = { none: "no report yet" };
+export const DEVICE_TEXTS = {
+  none: "no report yet", sensors: "Sensors", bridge: "Bridge to the indicator", thrusters: "Line to the thrusters",
+  columns: ["Device", "State", "Line", "Rate", "Checksum", "Damaged", "Withheld", "Reconnected", "Says"],
+};
 export const INDICATOR_TEXTS = {
-  none: "no report from the bridge yet", silent: "the bridge is silent", unknown: "UNKNOWN",
+  title: "Indicator", leds: "LEDs", none: "no report from the bridge yet", silent: "the bridge is silent", unknown: "UNKNOWN",
   facts: (/** @type {string} */ mcu, /** @type {string} */ ms, /** @type {number} */ boot) => `${mcu} · ${ms} ms · boot ${boot}`,
   counts: (/** @type {number} */ answered, /** @type {number} */ sent, /** @type {string} */ ms, /** @type {string} */ causes, /** @type {string} */ reset) =>
     `${answered} of ${sent} frames answered, p95 ${ms} ms, refused: ${causes || "none"}; last reset: ${reset}`,
 };
 export const SENSOR_TEXTS = {
-  none: "no report from the sensor process yet", silent: "the sensor process is silent",
+  title: "Sensors", none: "no report from the sensor process yet", silent: "the sensor process is silent",
   counts: (/** @type {any} */ device) =>
     `${device.heard || "nothing heard"}; checksum failures ${device.checksum_failures}, damaged ${device.damaged}, withheld ${device.withheld}, reconnections ${device.reconnections}`,
 };
@@ -155,7 +155,7 @@ export const FILE_TEXTS = {
 
 /** The tuning strip. */
 export const TUNING_TEXTS = {
-  configured: "the configuration in force",
+  title: PAGE_TEXTS.tuning, configured: "the configuration in force",
   inForce: (/** @type {string} */ name, /** @type {string} */ changes) => `${name} in force: ${changes}`,
   tried: (/** @type {string} */ name, /** @type {string} */ changes) => `${name} tried: ${changes}`,
   last: (/** @type {string} */ active, /** @type {string} */ shadow) => `last: ${active}, tried: ${shadow}`,
@@ -285,14 +285,8 @@ export const CONSTRAINTS = {
 
 /** What a heading costs. @type {Record<string, string>} */
 export const COSTS = {
-  course: "off the course",
-  progress: "little made good",
-  heading_change: "off the plan before",
-  advice: "not to the advised side",
-  unknown_water: "unseen water on the way",
-  proximity: "near obstacles",
-  path_obstacle: "obstacle further along",
-  margin: "into the margin",
+  course: "off the course", progress: "little made good", heading_change: "off the plan before", advice: "not to the advised side",
+  unknown_water: "unseen water on the way", proximity: "near obstacles", path_obstacle: "obstacle further along", margin: "into the margin",
 };
 
 /** The headings on the map. */
@@ -320,10 +314,7 @@ export const ARM_TEXTS = { hold: "Hold to arm", release: "Release to arm", armed
 
 /** Why a mode may not start, in a few words. @type {Record<string, string>} */
 export const MODE_BARS = {
-  NOT_HOLDER: "another hand holds the wheel",
-  NO_POSITION: "position not known well enough",
-  NO_HOME: "home not known yet",
-  NO_MISSION: "no mission and no route",
+  NOT_HOLDER: "another hand holds the wheel", NO_POSITION: "position not known well enough", NO_HOME: "home not known yet", NO_MISSION: "no mission and no route",
   NOT_ARMED: "arm first",
 };
 
@@ -370,6 +361,8 @@ export const TIME_TEXTS = {
 
 /** The health tab. */
 export const HEALTH_TEXTS = {
+  title: PAGE_TEXTS.health, table: "Processes", hint: "Press a process for the last lines of its log.", logLabel: "Log of a process", again: "Read again",
+  columns: ["Process", "State", "Rate", "p50", "p95", "Age", "CPU", "MiB", "Files", "°C", "Starts", "Dropped", "Says"],
   recorded: "recorded", notPlayed: "not played", ready: "ready", silent: "no report", stopped: "stopped", notStarted: "not started", noDrops: "none",
   sum: (/** @type {number} */ ready, /** @type {number} */ all) => `${ready} of ${all}`,
   sumTitle: (/** @type {number} */ ready, /** @type {number} */ all, /** @type {string} */ cores) => `${ready} of ${all} ready, ${cores} cores`,
@@ -380,10 +373,15 @@ export const HEALTH_TEXTS = {
 export const TOPICS_TEXTS = { title: PAGE_TEXTS.topics, columns: ["Topic", "From", "Rate / nominal [Hz]", "Age", "Size"], search: "Search", searchLabel: "Search topics", table: "Table of topics", value: "Last value", freeze: "Freeze", thaw: "Frozen: go on", none: "Press a topic for its last value", silent: "nothing received", sum: (/** @type {number} */ shown, /** @type {number} */ all) => `${shown} of ${all}` };
 
 /** The settings tab. */
-export const SETTING_TEXTS = { tuned: "tuned", try: "Try", sent: "tried beside what is in force", none: "Nothing is tried. A value that judges can be tried beside the one in force, whose advice alone is obeyed.", of: "of" };
+export const SETTING_TEXTS = {
+  title: PAGE_TEXTS.settings, table: "Table of settings", search: "Search", searchLabel: "Search settings", changedOnly: "Changed only", promote: "Put in force", rollback: "Take back",
+  columns: ["Setting", "Value", "Unit", "Default", "Range", "From", "Try beside"],
+  tuned: "tuned", try: "Try", sent: "tried beside what is in force", none: "Nothing is tried. A value that judges can be tried beside the one in force, whose advice alone is obeyed.", of: "of",
+};
 
 /** The recordings tab. */
 export const RECORDING_TEXTS = {
+  title: PAGE_TEXTS.recordings, list: "List of recordings", again: "Read again", columns: ["File", "Began", "Duration", "Size", "State", "Do"],
   off: "Nothing is recorded here: recorder.folder is not set (paani up --record DIR).",
   reading: "reading", in: "in", none: "nothing is recorded there yet", leftOut: "older ones are not listed", running: "being written", protected: "protected",
   play: "Replay here", download: "Download", protect: "Protect", unprotect: "Unprotect", delete: "Delete", sure: "Press again to delete",

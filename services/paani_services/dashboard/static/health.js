@@ -1,8 +1,9 @@
 // @ts-check
 // The health tab: one row per process with its state, rate, delays, age of its report, load, and what it dropped and why.
 
-import { bindProcessLog } from "./process_log.js";
-import { HEALTH_TEXTS, ageText, byId, fixed, make, setText } from "./text.js";
+import { processLog, showProcessLog } from "./process_log.js";
+import { computed, html, mount, tableHead, tableMoment } from "./templates.js";
+import { HEALTH_TEXTS, ageText, fixed } from "./text.js";
 
 /** The main output of each process; its rate is shown. @type {Record<string, string>} */
 const MAIN_TOPIC = {
@@ -13,67 +14,57 @@ const MAIN_TOPIC = {
 };
 /** What these send is made of no evidence whose age would tell how long they take. */
 const MADE_OF_NOTHING = { dashboard: true, recorder: true };
-const COLUMNS = 13;
-/** @type {Map<string, HTMLElement[]>} */
-const cells = new Map();
 
-/** @param {import("./store.js").Store} store @param {boolean} open @param {number} now */
-export function renderHealth(store, open, now) {
-  const settings = store.get("dashboard/settings");
-  if (!settings) return;
-  const liveness = new Map((store.get("dashboard/services")?.services ?? []).map((/** @type {any} */ life) => [life.service, life]));
-  const rates = new Map();
-  for (const name of settings.services) {
-    for (const input of store.get(`health/${name}`)?.inputs ?? []) rates.set(input.topic, input);
-  }
-  let ready = 0, cpu = 0;
-  for (const name of settings.services) {
-    const report = store.get(`health/${name}`), life = liveness.get(name), fresh = open && store.isFresh(`health/${name}`, now);
-    const alive = Boolean(open && life?.alive && fresh), input = rates.get(MAIN_TOPIC[name]);
-    const drops = (report?.drops ?? []).reduce((/** @type {number} */ sum, /** @type {any} */ drop) => sum + drop.count, 0);
-    ready += alive ? 1 : 0;
-    cpu += alive ? report.cpu_cores : 0;
-    const [, state, rate, middle, late, age, cores, memory, files, warmth, starts, dropped, says] = rowCells(name);
-    const isRecorded = settings.mode === "replay" && name !== "dashboard"; // it need not run
-    const [word, kind] = isRecorded ? [fresh ? HEALTH_TEXTS.recorded : HEALTH_TEXTS.notPlayed, "quiet"] : alive ? [HEALTH_TEXTS.ready, "good"] : life?.alive && open ? [HEALTH_TEXTS.silent, "bad"] : life?.starts ? [HEALTH_TEXTS.stopped, "bad"] : [HEALTH_TEXTS.notStarted, "warn"];
-    const delays = name in MADE_OF_NOTHING ? [] : store.delaysMs(MAIN_TOPIC[name]);
-    setText(state, word);
-    state.className = kind;
-    setText(rate, input && (alive || (isRecorded && fresh)) ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–");
-    rate.className = alive && input && !input.rate_ok ? "warn number" : "number";
-    setText(age, report ? ageText(store.ageS(`health/${name}`, now)) : "–");
-    setText(cores, report ? `${fixed(report.cpu_cores * 100, 0)} %` : "–");
-    setText(memory, report ? fixed(report.rss_mib, 0) : "–");
-    setText(middle, delayText(delays, 0.5));
-    setText(late, delayText(delays, 0.95));
-    setText(files, report?.open_files ? String(report.open_files) : "–");
-    setText(warmth, report?.temperature_c ? fixed(report.temperature_c, 0) : "–");
-    setText(dropped, drops ? report.drops.filter((/** @type {any} */ drop) => drop.count).map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? HEALTH_TEXTS.noDrops : "–");
-    setText(says, report?.note ?? "");
-    dropped.className = drops ? "warn wide" : "wide";
-    setText(starts, life ? String(life.starts) : "–");
-    starts.className = life?.starts > 1 ? "warn number" : "number";
-    for (const cell of [rate, age, cores, memory, files, warmth, dropped]) cell.classList.toggle("stale", !fresh);
-  }
-  setText(byId("health-sum"), settings.mode === "replay" ? "" : HEALTH_TEXTS.sum(ready, settings.services.length));
-  byId("health-sum").title = HEALTH_TEXTS.sumTitle(ready, settings.services.length, fixed(cpu, 2));
+/** @typedef {{name: string, isReady: boolean, cpuCores: number, cells: [string, string][]}} Process its cells: text and classes */
+
+/** @type {{value: Process[]}} */
+const processes = computed(() => {
+  const { store } = tableMoment.value, services = /** @type {string[]} */ (store.get("dashboard/settings")?.services ?? []);
+  const rates = new Map(services.flatMap((name) => store.get(`health/${name}`)?.inputs ?? []).map((input) => [input.topic, input]));
+  return services.map((name) => readProcess(tableMoment.value, name, rates.get(MAIN_TOPIC[name])));
+});
+
+export function bindHealth() {
+  mount("#tab-health", () => {
+    const ready = processes.value.filter((each) => each.isReady).length, all = processes.value.length, cores = processes.value.reduce((sum, each) => sum + each.cpuCores, 0);
+    const isCounted = all && tableMoment.value.store.get("dashboard/settings").mode !== "replay";
+    return html`${HEALTH_TEXTS.title} <span id="health-sum" title=${all ? HEALTH_TEXTS.sumTitle(ready, all, fixed(cores, 2)) : ""}>${isCounted ? HEALTH_TEXTS.sum(ready, all) : ""}</span>`;
+  });
+  mount("[data-tab-panel=health]", () => html`
+    <div class="panel health" tabindex="0" role="group" aria-label=${HEALTH_TEXTS.table}>
+      <header><h2>${HEALTH_TEXTS.title}</h2><span class="quiet">${HEALTH_TEXTS.hint}</span></header>
+      <table>${tableHead(HEALTH_TEXTS.columns, [2, 3, 4, 5, 6, 7, 8, 9, 10])}<tbody id="health">${processes.value.map(row)}</tbody></table>
+    </div>${processLog.value}`);
+}
+
+/** @param {Process} process */
+const row = ({ name, cells }) => html`<tr key=${name}><td><button type="button" onClick=${() => void showProcessLog(name)}>${name}</button></td>${cells.map(([text, kind]) => html`<td class=${kind}>${text}</td>`)}</tr>`;
+
+/** @param {import("./templates.js").Moment} moment @param {string} name @param {any} input of its main topic @returns {Process} */
+function readProcess({ store, now, isOpen }, name, input) {
+  const report = store.get(`health/${name}`), life = store.get("dashboard/services")?.services.find((/** @type {any} */ each) => each.service === name);
+  const isFresh = isOpen && store.isFresh(`health/${name}`, now), isReady = Boolean(isOpen && life?.alive && isFresh);
+  const isRecorded = store.get("dashboard/settings").mode === "replay" && name !== "dashboard"; // it need not run
+  const drops = (report?.drops ?? []).filter((/** @type {any} */ drop) => drop.count), stale = isFresh ? "" : " stale";
+  const delays = name in MADE_OF_NOTHING ? [] : store.delaysMs(MAIN_TOPIC[name]);
+  return {
+    name, isReady, cpuCores: isReady ? report.cpu_cores : 0,
+    cells: [
+      isRecorded ? [isFresh ? HEALTH_TEXTS.recorded : HEALTH_TEXTS.notPlayed, "quiet"] : isReady ? [HEALTH_TEXTS.ready, "good"] : life?.alive && isOpen ? [HEALTH_TEXTS.silent, "bad"] : life?.starts ? [HEALTH_TEXTS.stopped, "bad"] : [HEALTH_TEXTS.notStarted, "warn"],
+      [input && (isReady || (isRecorded && isFresh)) ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–", `${isReady && input && !input.rate_ok ? "warn number" : "number"}${stale}`],
+      [delayText(delays, 0.5), "number"],
+      [delayText(delays, 0.95), "number"],
+      [report ? ageText(store.ageS(`health/${name}`, now)) : "–", `number${stale}`],
+      [report ? `${fixed(report.cpu_cores * 100, 0)} %` : "–", `number${stale}`],
+      [report ? fixed(report.rss_mib, 0) : "–", `number${stale}`],
+      [report?.open_files ? String(report.open_files) : "–", `number${stale}`],
+      [report?.temperature_c ? fixed(report.temperature_c, 0) : "–", `number${stale}`],
+      [life ? String(life.starts) : "–", life?.starts > 1 ? "warn number" : "number"],
+      [drops.length ? drops.map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? HEALTH_TEXTS.noDrops : "–", `${drops.length ? "warn wide" : "wide"}${stale}`],
+      [report?.note ?? "", "wide quiet"],
+    ],
+  };
 }
 
 /** A quantile of the time from what a message is made of until it was sent. @param {number[]} delaysMs @param {number} part */
 const delayText = (delaysMs, part) => (delaysMs.length < 10 ? "–" : `${fixed([...delaysMs].sort((a, b) => a - b)[Math.floor((delaysMs.length - 1) * part)], 0)} ms`);
-
-/** @param {string} name */
-function rowCells(name) {
-  let found = cells.get(name);
-  if (!found) {
-    found = Array.from({ length: COLUMNS }, (_, index) => make("td", index > 1 && index < COLUMNS - 2 ? "number" : index === COLUMNS - 1 ? "wide quiet" : ""));
-    const line = make("tr"), button = make("button", "", name);
-    button.setAttribute("type", "button");
-    bindProcessLog(button, name);
-    found[0].append(button);
-    line.append(...found);
-    byId("health").append(line);
-    cells.set(name, found);
-  }
-  return found;
-}

@@ -2,27 +2,19 @@
 // The indicator strip: what the microcontroller shows, and how well it is reached. Hidden where no bridge runs.
 
 import { isReplay } from "./inhibits.js";
-import { INDICATOR_TEXTS, byId, fixed, setText } from "./text.js";
+import { html } from "./templates.js";
+import { INDICATOR_TEXTS, fixed } from "./text.js";
 import { ADVICE } from "./topbar.js";
 
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderIndicator(store, now) {
-  const strip = byId("indicator");
-  strip.hidden = !store.get("dashboard/settings")?.services.includes("bridge") || (isReplay(store) && !store.isFresh("bridge/state", now));
-  if (strip.hidden) return;
-  const state = store.get("bridge/state"), fresh = store.isFresh("bridge/state", now);
-  const problem = !state ? INDICATOR_TEXTS.none : !fresh ? INDICATOR_TEXTS.silent : state.problem;
-  const known = fresh && state.mcu !== "unknown";
-  const [word, kind, arrow] = ADVICE[known ? state.display : "NO_DATA"];
-  strip.dataset.kind = kind;
-  strip.dataset.problem = String(Boolean(problem));
-  if (strip.dataset.arrow !== arrow) {
-    strip.dataset.arrow = arrow;
-    byId("indicator-arrow").innerHTML = `<path d="${arrow}"/>`;
-  }
-  setText(byId("indicator-word"), known ? word : INDICATOR_TEXTS.unknown);
-  setText(byId("indicator-facts"), problem || factsText(state));
-  strip.title = state ? `${state.line}: ${countsText(state)}` : "";
+/** @param {import("./templates.js").Moment} moment */
+export function indicatorStrip({ store, now }) {
+  const state = store.get("bridge/state"), isFresh = store.isFresh("bridge/state", now);
+  const isShown = store.get("dashboard/settings")?.services.includes("bridge") && (isFresh || !isReplay(store));
+  const problem = !state ? INDICATOR_TEXTS.none : !isFresh ? INDICATOR_TEXTS.silent : state.problem;
+  const isKnown = isFresh && state.mcu !== "unknown", [word, kind, arrow] = ADVICE[isKnown ? state.display : "NO_DATA"];
+  return html`<div id="indicator" class="indicator" role="status" aria-label=${INDICATOR_TEXTS.title} hidden=${!isShown} data-kind=${kind} data-problem=${Boolean(problem)} title=${state ? `${state.line}: ${countsText(state)}` : ""}>
+    <svg id="indicator-arrow" viewBox="0 0 48 48" aria-hidden="true"><path d=${arrow} /></svg><span class="quiet">${INDICATOR_TEXTS.leds}</span>
+    <b id="indicator-word">${isKnown ? word : INDICATOR_TEXTS.unknown}</b><span id="indicator-facts">${problem || factsText(state)}</span></div>`;
 }
 
 /** @param {any} state */

@@ -1,45 +1,46 @@
 // @ts-check
 // The log panel, newest line first: events of the dashboard, and each change of advice; repeats are counted.
 
-import { byId, clockText, make, reasonText, setText } from "./text.js";
+import { html, mount, signal } from "./templates.js";
+import { LOG_TEXTS, clockText, reasonText } from "./text.js";
 
 const MAX_LINES = 60;
 const REPEATED_WITHIN_US = 30e6, LOOK_BACK = 4; // a line that comes again so soon, among so many, is counted, not added
-let lastAdvice = "";
 
-/** @param {{at_us: number, level: string, text: string}} event */
+/** @typedef {{at_us: number, level: string, text: string}} Event */
+/** @typedef {Event & {key: number, firstUs: number, count: number}} Line an event and when it came again last */
+
+/** @type {{value: Line[]}} */
+const lines = signal([]);
+/** Of a drive of the past, which are shown instead. @type {{value: Event[] | null}} */
+const past = signal(null);
+let lastAdvice = "", added = 0;
+
+export function bindLog() {
+  mount(".log", () => html`<header><h2>${LOG_TEXTS.title}</h2></header>
+    <ol id="log" tabindex="0" aria-label=${LOG_TEXTS.label} hidden=${past.value !== null}>${lines.value.map((line) => item(line, line.firstUs, line.key, line.count))}</ol>
+    <ol id="log-past" tabindex="0" aria-label=${LOG_TEXTS.past} hidden=${past.value === null}>${past.value?.slice(-MAX_LINES).reverse().map((event) => item(event, event.at_us))}</ol>`);
+}
+
+/** @param {Event} event @param {number} atUs @param {number} [key] @param {number} [count] */
+const item = ({ level, text }, atUs, key, count = 1) => html`<li key=${key} data-level=${level}><time>${clockText(atUs)}</time><span>${count > 1 ? `${text} (× ${count})` : text}</span></li>`;
+
+/** @param {Event} event */
 export function addLine(event) {
-  const list = byId("log"), before = [...list.children].slice(0, LOOK_BACK).find((/** @type {any} */ line) => isRepeat(line, event));
-  if (before) {
-    before.dataset.count = String(Number(before.dataset.count) + 1);
-    before.dataset.at = String(event.at_us);
-    setText(before.lastChild, `${event.text} (× ${before.dataset.count})`);
-    return;
-  }
-  list.prepend(lineOf(event));
-  while (list.children.length > MAX_LINES) list.lastChild.remove();
+  const before = lines.value.slice(0, LOOK_BACK).find((line) => line.text === event.text && Math.abs(event.at_us - line.at_us) <= REPEATED_WITHIN_US);
+  lines.value = before
+    ? lines.value.map((line) => (line === before ? { ...line, at_us: event.at_us, count: line.count + 1 } : line))
+    : [{ ...event, key: added++, firstUs: event.at_us, count: 1 }, ...lines.value].slice(0, MAX_LINES);
 }
 
-/** Show the events of a drive of the past instead; null: the log again. @param {{at_us: number, level: string, text: string}[] | null} events */
+export function clearLog() {
+  lines.value = [];
+}
+
+/** Show the events of a drive of the past instead; null: the log again. @param {Event[] | null} events */
 export function showLogOf(events) {
-  const list = byId("log-past"), key = events ? `${events.length} ${events.at(-1)?.at_us}` : "";
-  byId("log").hidden = Boolean(events);
-  list.hidden = !events;
-  if (list.dataset.key === key) return;
-  list.dataset.key = key;
-  list.replaceChildren(...(events ?? []).slice(-MAX_LINES).reverse().map(lineOf));
+  if (events?.length !== past.value?.length || events?.at(-1) !== past.value?.at(-1)) past.value = events;
 }
-
-/** @param {{at_us: number, level: string, text: string}} event */
-function lineOf(event) {
-  const line = make("li");
-  Object.assign(line.dataset, { level: event.level, text: event.text, count: "1", at: String(event.at_us) });
-  line.append(make("time", "", clockText(event.at_us)), make("span", "", event.text));
-  return line;
-}
-
-/** @param {HTMLElement} line @param {{at_us: number, text: string}} event */
-const isRepeat = (line, event) => line.dataset.text === event.text && Math.abs(event.at_us - Number(line.dataset.at)) <= REPEATED_WITHIN_US;
 
 /** @param {any} advisory */
 export function logAdvice(advisory) {

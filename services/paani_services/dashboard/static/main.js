@@ -5,30 +5,27 @@ import "./page_text.js"; // before any script looks at what it says
 import { alertOf, alertOfLink, bindAlerts } from "./alerts.js";
 import { Camera } from "./camera.js";
 import { CAMERA_KEYS } from "./camera_frames.js";
-import { renderDevices } from "./devices.js";
+import { bindDevices } from "./devices.js";
 import { bindDrive, isDriving, renderDrive } from "./drive.js";
-import { buildExplanation, renderExplanation } from "./explanation.js";
+import { bindExplanation } from "./explanation.js";
 import { decodeJson } from "./frames.js";
-import { renderHealth } from "./health.js";
-import { renderIndicator } from "./indicator.js";
+import { bindHealth } from "./health.js";
 import { bindLink, renderLink } from "./link.js";
-import { addLine, logAdvice } from "./log.js";
+import { addLine, bindLog, clearLog, logAdvice } from "./log.js";
 import { MapPanel } from "./map.js";
-import { renderMotion } from "./motion.js";
+import { bindMotion } from "./motion.js";
 import { bindOperatorControls, renderOperatorState } from "./operator.js";
 import { bindPalette, nextPalette } from "./palette.js";
 import { requireSession } from "./requests.js";
 import { bindRecordings } from "./recordings.js";
-import { renderSensors } from "./sensors.js";
-import { bindSettings, renderSettings } from "./settings.js";
+import { bindSettings } from "./settings.js";
 import { connect } from "./socket.js";
-import { renderStages } from "./stages.js";
-import { bindTabs, isDriveTab, shownTab } from "./tabs.js";
+import { bindTabs, isDriveTab } from "./tabs.js";
 import { Time, isTyping } from "./time.js";
 import { showMoment } from "./templates.js";
 import { bindTopics } from "./topics.js";
 import { renderTopbar } from "./topbar.js";
-import { renderTuning } from "./tuning.js";
+import { bindTuning } from "./tuning.js";
 import { View } from "./view.js";
 
 const RENDER_PERIOD_MS = 100;
@@ -68,7 +65,7 @@ function onOpen(isOpen) {
   open = isOpen;
   void requireSession();
   if (isOpen) void time.reload();
-  if (isOpen && opened++ > 0) document.querySelector("#log")?.replaceChildren();
+  if (isOpen && opened++ > 0) clearLog();
 }
 
 function render() {
@@ -82,22 +79,8 @@ function render() {
   renderDrive(live.store, open, present, time.isPast || !isDriveTab());
   camera.show(view);
   if (document.hidden) return;
-  renderHealth(store, isOpen, now);
-  renderDevices(store, now);
-  showMoment({ store, now, isOpen }, present);
-  if (shownTab.value === "settings") renderSettings(live.store, present);
-  if (isDriveTab()) renderPanels(view, now);
-}
-
-/** The panels of the tab people drive from. @param {View} view @param {number} now */
-function renderPanels(view, now) {
-  const { store } = view;
-  renderTuning(store, now);
-  renderExplanation(store, now);
-  renderStages(store, now);
-  renderMotion(store, now);
-  renderIndicator(store, now);
-  renderSensors(store, now);
+  showMoment({ store, now, isOpen }, { store: live.store, now: present, isOpen: open }, isDriveTab());
+  if (!isDriveTab()) return;
   map.render(view, now);
   if (time.isPast || !store.isFresh("camera/picture", now)) camera.scheduleDraw();
 }
@@ -108,15 +91,20 @@ addEventListener("keydown", (event) => {
   if (layer) camera.toggle(layer);
   if (event.key === "d" || event.key === "D") nextPalette();
 });
-buildExplanation();
 bindLink();
 bindPalette();
 bindAlerts();
 void navigator.serviceWorker?.register("/static/service_worker.js", { scope: "/" }).catch(() => {}); // not every browser takes it
 bindTabs();
+bindTuning();
+bindExplanation();
+bindMotion();
+bindLog();
 bindTopics();
 bindRecordings(time);
 bindSettings();
+bindDevices();
+bindHealth();
 bindOperatorControls();
 bindDrive();
 connect(onMessage, onOpen);

@@ -4,10 +4,12 @@
 import { findInhibits, isOfArming, isReplay } from "./inhibits.js";
 import { bindKey, hasKey, post } from "./requests.js";
 import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
-import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, make, operatorText, setText, words } from "./text.js";
+import { html, mount, signal } from "./templates.js";
+import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, operatorText, setText, words } from "./text.js";
 import { describeWheel } from "./wheel.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, REFRESH_MS = 150;
+const remaining = signal("null");
 let refusal = "", heldFrom = 0, press = 0, refreshing = 0;
 
 /** @param {string} act */
@@ -42,6 +44,7 @@ export function bindOperatorControls() {
     release(false);
     refusal = "";
   });
+  mount("#arm-reasons", () => remainingList(JSON.parse(remaining.value)));
   const button = byId("arm");
   button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
     button.setPointerCapture(event.pointerId);
@@ -68,7 +71,7 @@ export function renderOperatorState(store, open, now, isPast) {
   button.disabled = !isHeard || !operator || operator.armed || isReplay(store) || isPast;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? ARM_TEXTS.release : operator?.armed ? ARM_TEXTS.armed : ARM_TEXTS.hold);
-  renderRemaining(heldFrom ? findInhibits(store, now).filter((reason) => !isOfArming(reason)) : null);
+  remaining.value = JSON.stringify(heldFrom ? findInhibits(store, now).filter((reason) => !isOfArming(reason)) : null);
   setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
   const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
@@ -78,13 +81,9 @@ export function renderOperatorState(store, open, now, isPast) {
 }
 
 /** While the button is held: everything that would keep the boat still when it is armed. @param {import("./inhibits.js").StopReason[] | null} reasons null: it is not held */
-function renderRemaining(reasons) {
-  const list = byId("arm-reasons"), key = JSON.stringify(reasons);
-  if (list.dataset.key === key) return;
-  list.dataset.key = key;
-  list.hidden = !reasons;
-  const items = (reasons ?? []).map(({ stage, text }) => make("li", "", `${STAGES[stage][0]}: ${text}`));
-  list.replaceChildren(make("li", "quiet", items.length ? ARM_TEXTS.stands : ARM_TEXTS.nothing), ...items);
+function remainingList(reasons) {
+  byId("arm-reasons").hidden = !reasons;
+  return reasons && html`<li class="quiet">${reasons.length ? ARM_TEXTS.stands : ARM_TEXTS.nothing}</li>${reasons.map(({ stage, text }) => html`<li>${STAGES[stage][0]}: ${text}</li>`)}`;
 }
 
 /** @param {any} operator @param {boolean} isHeard @param {number} ageS */

@@ -2,15 +2,14 @@
 // The last lines of a process's log, in the health tab.
 
 import { ask } from "./past_source.js";
-import { HEALTH_TEXTS, byId, setText } from "./text.js";
+import { computed, html, signal } from "./templates.js";
+import { HEALTH_TEXTS, byId } from "./text.js";
 
-let shown = "";
+const shown = signal({ name: "", text: "", note: "" });
 
 /** @param {string} name */
-async function show(name) {
-  shown = name;
-  byId("process-log").hidden = false;
-  setText(byId("process-log-title"), `${HEALTH_TEXTS.log} ${name}`);
+export async function showProcessLog(name) {
+  shown.value = { name, text: "", note: "" };
   let text = "", note = "";
   try {
     const { lines, cut } = await (await ask(`/api/logs/${encodeURIComponent(name)}`)).json();
@@ -19,15 +18,15 @@ async function show(name) {
   } catch (error) {
     note = String(error instanceof Error ? error.message : error);
   }
-  if (shown !== name) return;
-  setText(byId("process-log-note"), note);
-  setText(byId("process-log-text"), text);
-  const pre = byId("process-log");
-  pre.scrollTop = pre.scrollHeight;
+  if (shown.value.name !== name) return;
+  shown.value = { name, text, note };
+  const panel = byId("process-log");
+  panel.scrollTop = panel.scrollHeight;
 }
 
-/** @param {HTMLElement} button @param {string} name */
-export function bindProcessLog(button, name) {
-  button.addEventListener("click", () => void show(name));
-  byId("process-log-again").onclick = () => void show(shown);
-}
+export const processLog = computed(() => {
+  const { name, text, note } = shown.value;
+  return html`<div id="process-log" class="panel" tabindex="0" role="group" aria-label=${HEALTH_TEXTS.logLabel} hidden=${!name}>
+    <header><h2 id="process-log-title">${HEALTH_TEXTS.log} ${name}</h2><button id="process-log-again" type="button" onClick=${() => void showProcessLog(name)}>${HEALTH_TEXTS.again}</button></header>
+    <p id="process-log-note" class="tab-note quiet">${note}</p><pre id="process-log-text">${text}</pre></div>`;
+});

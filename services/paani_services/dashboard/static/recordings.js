@@ -3,98 +3,89 @@
 
 import { ask, recordingSource } from "./past_source.js";
 import { hasKey, post } from "./requests.js";
-import { showTab } from "./tabs.js";
-import { RECORDING_TEXTS, byId, make, setText, spanText } from "./text.js";
+import { shownTab, showTab } from "./tabs.js";
+import { effect, html, mount, signal, tableHead } from "./templates.js";
+import { RECORDING_TEXTS, spanText } from "./text.js";
 import { sizeText } from "./topics.js";
 
 const SURE_MS = 4000; // a second press on Delete within this time deletes
+const NOTHING = { folder: "", recordings: /** @type {Recording[]} */ ([]), left_out: 0 };
 
 /** @typedef {{name: string, size_bytes: number, start_us: number, duration_s: number | null, protected: boolean, running: boolean}} Recording */
 
+const listed = signal(NOTHING), note = signal({ text: "", isBad: false });
+const asked = signal(""); // the recording whose Delete was pressed once
+
 /** @param {import("./time.js").Time} time */
 export function bindRecordings(time) {
-  byId("recordings-again").addEventListener("click", () => void list(time));
-  document.querySelector('[data-tab-of="recordings"]')?.addEventListener("click", () => void list(time));
+  effect(() => { if (shownTab.value === "recordings") void list(); });
+  mount("[data-tab-panel=recordings]", () => view(time));
 }
 
-/** @param {import("./time.js").Time} time @param {string} [note] */
-async function list(time, note = "") {
-  say(note || RECORDING_TEXTS.reading, false);
+/** @param {string} [told] of what was asked before */
+async function list(told = "") {
+  say(told || RECORDING_TEXTS.reading);
   try {
-    const { folder, recordings, left_out: leftOut } = await (await ask("/api/recordings")).json();
-    setText(byId("recordings-sum"), !folder ? "" : `${recordings.length + leftOut} ${RECORDING_TEXTS.in} ${folder}`);
-    byId("recordings").replaceChildren(...recordings.map((/** @type {Recording} */ each) => rowOf(time, each)));
-    say(note || (leftOut ? `${leftOut} ${RECORDING_TEXTS.leftOut}` : recordings.length ? "" : folder ? RECORDING_TEXTS.none : RECORDING_TEXTS.off), Boolean(note));
+    const found = await (await ask("/api/recordings")).json();
+    listed.value = found;
+    say(told || (found.left_out ? `${found.left_out} ${RECORDING_TEXTS.leftOut}` : found.recordings.length ? "" : found.folder ? RECORDING_TEXTS.none : RECORDING_TEXTS.off), Boolean(told));
   } catch (error) {
-    byId("recordings").replaceChildren();
-    setText(byId("recordings-sum"), "");
-    say(String(error instanceof Error ? error.message : error), false);
+    listed.value = NOTHING;
+    say(messageOf(error));
   }
 }
 
-/** @param {import("./time.js").Time} time @param {Recording} recording */
-function rowOf(time, recording) {
-  const row = make("tr"), acts = make("td"), path = `/api/recordings/${encodeURIComponent(recording.name)}`;
-  const state = recording.running ? RECORDING_TEXTS.running : recording.protected ? RECORDING_TEXTS.protected : "";
-  const link = make("a", "", RECORDING_TEXTS.download);
-  link.setAttribute("href", `${path}/file`);
-  link.setAttribute("download", recording.name);
-  acts.append(
-    button(RECORDING_TEXTS.play, () => void play(time, recording.name), recording.running),
-    link,
-    button(recording.protected ? RECORDING_TEXTS.unprotect : RECORDING_TEXTS.protect, () => void act(time, "protect", { name: recording.name, protected: !recording.protected })),
-    deleteButton(time, recording),
-  );
-  row.dataset.name = recording.name;
-  row.append(
-    make("td", "", recording.name), make("td", "", new Date(recording.start_us / 1000).toLocaleString()),
-    make("td", "number", recording.duration_s === null ? "–" : spanText(recording.duration_s * 1e6)),
-    make("td", "number", sizeText(recording.size_bytes)), make("td", recording.running ? "warn" : "quiet", state), acts,
-  );
-  return row;
+/** @param {import("./time.js").Time} time */
+function view(time) {
+  const { folder, recordings, left_out: leftOut } = listed.value;
+  return html`<div class="panel" tabindex="0" role="group" aria-label=${RECORDING_TEXTS.list}>
+    <header><h2>${RECORDING_TEXTS.title}</h2><span id="recordings-sum" class="quiet">${folder && `${recordings.length + leftOut} ${RECORDING_TEXTS.in} ${folder}`}</span><button id="recordings-again" type="button" onClick=${() => void list()}>${RECORDING_TEXTS.again}</button></header>
+    <p id="recordings-note" class="tab-note quiet" role="status" data-bad=${note.value.isBad}>${note.value.text}</p>
+    <table>${tableHead(RECORDING_TEXTS.columns, [2, 3])}<tbody id="recordings">${recordings.map((each) => row(time, each))}</tbody></table>
+  </div>`;
 }
 
 /** @param {import("./time.js").Time} time @param {Recording} recording */
-function deleteButton(time, recording) {
-  let askedAt = -SURE_MS;
-  const found = button(RECORDING_TEXTS.delete, () => {
-    if (performance.now() - askedAt < SURE_MS) void act(time, "delete", { name: recording.name });
-    askedAt = performance.now();
-    setText(found, RECORDING_TEXTS.sure);
-    setTimeout(() => setText(found, RECORDING_TEXTS.delete), SURE_MS);
-  }, recording.protected || recording.running);
-  return found;
+function row(time, { name, start_us: startUs, duration_s: durationS, size_bytes: bytes, running, protected: isProtected }) {
+  const state = running ? RECORDING_TEXTS.running : isProtected ? RECORDING_TEXTS.protected : "";
+  return html`<tr key=${name} data-name=${name}>
+    <td>${name}</td><td>${new Date(startUs / 1000).toLocaleString()}</td><td class="number">${durationS === null ? "–" : spanText(durationS * 1e6)}</td><td class="number">${sizeText(bytes)}</td><td class=${running ? "warn" : "quiet"}>${state}</td>
+    <td><button type="button" disabled=${running} onClick=${() => void play(time, name)}>${RECORDING_TEXTS.play}</button>
+      <a href="/api/recordings/${encodeURIComponent(name)}/file" download=${name}>${RECORDING_TEXTS.download}</a>
+      <button type="button" onClick=${() => void act("protect", { name, protected: !isProtected })}>${isProtected ? RECORDING_TEXTS.unprotect : RECORDING_TEXTS.protect}</button>
+      <button type="button" disabled=${isProtected || running} onClick=${() => erase(name)}>${asked.value === name ? RECORDING_TEXTS.sure : RECORDING_TEXTS.delete}</button></td></tr>`;
 }
 
-/** @param {string} text @param {() => void} onPress @param {boolean} [isOff] */
-function button(text, onPress, isOff = false) {
-  const found = make("button", "", text);
-  Object.assign(found, { type: "button", disabled: isOff });
-  found.addEventListener("click", onPress);
-  return found;
+/** At the second press. @param {string} name */
+function erase(name) {
+  if (asked.value === name) void act("delete", { name });
+  asked.value = asked.value === name ? "" : name;
+  setTimeout(() => { if (asked.value === name) asked.value = ""; }, SURE_MS);
 }
 
-/** @param {import("./time.js").Time} time @param {string} what @param {object} body */
-async function act(time, what, body) {
-  if (hasKey()) await list(time, await post(`/api/recordings/${what}`, body));
+/** @param {string} what @param {object} body */
+async function act(what, body) {
+  if (hasKey()) await list(await post(`/api/recordings/${what}`, body));
 }
 
 /** @param {import("./time.js").Time} time @param {string} name */
 async function play(time, name) {
-  say(RECORDING_TEXTS.reading, false);
+  say(RECORDING_TEXTS.reading);
   try {
     const source = await recordingSource(name);
     showTab("drive");
     time.open(source, source.series.startUs);
     time.playback.playing = true;
-    say("", false);
+    say("");
   } catch (error) {
-    say(String(error instanceof Error ? error.message : error), true);
+    say(messageOf(error), true);
   }
 }
 
-/** @param {string} text @param {boolean} isBad */
-function say(text, isBad) {
-  setText(byId("recordings-note"), text);
-  byId("recordings-note").dataset.bad = String(isBad);
+/** @param {string} text @param {boolean} [isBad] */
+function say(text, isBad = false) {
+  note.value = { text, isBad };
 }
+
+/** @param {unknown} error */
+export const messageOf = (error) => String(error instanceof Error ? error.message : error);

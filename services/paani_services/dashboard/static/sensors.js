@@ -2,39 +2,19 @@
 // The sensor strip: each device of a real hull, and what is wrong with it. Hidden where no sensor process runs.
 
 import { isReplay } from "./inhibits.js";
-import { SENSOR_TEXTS, byId, fixed, make, setText } from "./text.js";
+import { html } from "./templates.js";
+import { SENSOR_TEXTS, fixed } from "./text.js";
 
-/** @type {Map<string, HTMLElement>} */
-const rows = new Map();
-
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderSensors(store, now) {
-  const strip = byId("sensors");
-  strip.hidden = !store.get("dashboard/settings")?.services.includes("sensors") || (isReplay(store) && !store.isFresh("sensors/state", now));
-  if (strip.hidden) return;
-  const state = store.get("sensors/state"), fresh = store.isFresh("sensors/state", now);
+/** @param {import("./templates.js").Moment} moment */
+export function sensorStrip({ store, now }) {
+  const state = store.get("sensors/state"), isFresh = store.isFresh("sensors/state", now);
+  const isShown = store.get("dashboard/settings")?.services.includes("sensors") && (isFresh || !isReplay(store));
   const devices = state?.devices ?? [{ role: "sensors", status: "silent", note: SENSOR_TEXTS.none }];
-  for (const device of devices) {
-    const row = rowOf(strip, device.role), status = fresh || !state ? device.status : "silent";
-    row.dataset.status = status;
-    row.title = device.line ? `${device.line}: ${SENSOR_TEXTS.counts(device)}` : "";
-    setText(/** @type {HTMLElement} */ (row.children[0]), device.role);
-    setText(/** @type {HTMLElement} */ (row.children[1]), status.replaceAll("_", " "));
-    setText(/** @type {HTMLElement} */ (row.children[2]), fresh ? device.note || rateText(device) : device.note || SENSOR_TEXTS.silent);
-  }
-  for (const [role, row] of rows) row.hidden = !devices.some((/** @type {any} */ device) => device.role === role);
-}
-
-/** @param {HTMLElement} strip @param {string} role */
-function rowOf(strip, role) {
-  let row = rows.get(role);
-  if (!row) {
-    row = make("div");
-    row.append(make("span"), make("b"), make("span"));
-    strip.append(row);
-    rows.set(role, row);
-  }
-  return row;
+  return html`<div id="sensors" class="sensors" role="status" aria-label=${SENSOR_TEXTS.title} hidden=${!isShown}>${isShown && devices.map((/** @type {any} */ device) => {
+    const status = isFresh || !state ? device.status : "silent";
+    return html`<div key=${device.role} data-status=${status} title=${device.line ? `${device.line}: ${SENSOR_TEXTS.counts(device)}` : ""}>
+      <span>${device.role}</span><b>${status.replaceAll("_", " ")}</b><span>${device.note || (isFresh ? rateText(device) : SENSOR_TEXTS.silent)}</span></div>`;
+  })}</div>`;
 }
 
 /** @param {any} device */

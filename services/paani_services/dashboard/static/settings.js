@@ -3,87 +3,80 @@
 // shadow policy would have advised.
 
 import { ask } from "./past_source.js";
+import { messageOf } from "./recordings.js";
 import { hasKey, post } from "./requests.js";
-import { SETTING_TEXTS, byId, make, setText } from "./text.js";
+import { shownTab } from "./tabs.js";
+import { computed, effect, html, mount, present, signal, tableHead } from "./templates.js";
+import { SETTING_TEXTS } from "./text.js";
 import { changesText, countsText } from "./tuning.js";
 
 /** @typedef {{path: string, value: string, default: string, origin: string, unit: string, limits: string, tunable: boolean}} Setting */
 
-/** @type {Map<string, {setting: Setting, row: HTMLElement}>} */
-const rows = new Map();
-let isChangedOnly = false, proposal = "", active = "";
+/** @type {{value: Setting[]}} */
+const settings = signal([]);
+const search = signal(""), isChangedOnly = signal(false), note = signal("");
+/** What is tried and what is in force of late; undefined: unknown. */
+const shadow = computed(() => {
+  const { store, now } = present.value;
+  return store.isFresh("advisor/shadow", now) ? store.get("advisor/shadow") : undefined;
+});
+/** As text, so that the rows are drawn again only where a value is tuned. */
+const changes = computed(() => JSON.stringify(shadow.value?.active_changes ?? []));
+/** Whether somebody looks for each. */
+const found = computed(() => {
+  const text = search.value.trim().toLowerCase(), tuned = tunedValues();
+  return settings.value.map(({ path, origin }) => path.includes(text) && (!isChangedOnly.value || tuned.has(path) || origin !== "default"));
+});
+const rows = computed(() => {
+  const tuned = tunedValues();
+  return settings.value.map((setting, index) => row(setting, tuned.get(setting.path), found.value[index]));
+});
+
+/** @returns {Map<string, string>} */
+const tunedValues = () => new Map(JSON.parse(changes.value).map((/** @type {any} */ change) => [change.path, change.value]));
 
 export function bindSettings() {
-  document.querySelector('[data-tab-of="settings"]')?.addEventListener("click", () => void load());
-  byId("settings-search").addEventListener("input", filter);
-  byId("settings-changed").addEventListener("click", () => {
-    isChangedOnly = !isChangedOnly;
-    byId("settings-changed").setAttribute("aria-pressed", String(isChangedOnly));
-    filter();
-  });
-  byId("settings-promote").addEventListener("click", () => void act("promote", { proposal }));
-  byId("settings-rollback").addEventListener("click", () => void act("rollback", { proposal: proposal || active }));
+  effect(() => { if (shownTab.value === "settings") void load(); });
+  mount("[data-tab-panel=settings]", view);
 }
 
+/** Once: they stay as they are while the boat runs. */
 async function load() {
-  if (rows.size) return;
+  if (settings.value.length) return;
   try {
-    for (const setting of await (await ask("/api/settings")).json()) rows.set(setting.path, { setting, row: rowOf(setting) });
-    byId("settings").replaceChildren(...[...rows.values()].map(({ row }) => row));
-    filter();
+    settings.value = await (await ask("/api/settings")).json();
   } catch (error) {
-    say(String(error instanceof Error ? error.message : error));
+    note.value = messageOf(error);
   }
 }
 
-/** @param {Setting} setting */
-function rowOf(setting) {
-  const row = make("tr"), trial = make("td");
-  row.append(...[setting.path, setting.value, setting.unit, setting.default, setting.limits, setting.origin].map((text, index) => make("td", index === 1 || index === 3 ? "wide" : index > 3 ? "quiet" : "", text === "-" ? "–" : text)), trial);
-  if (!setting.tunable) return row;
-  const field = make("input"), button = make("button", "", SETTING_TEXTS.try);
-  Object.assign(field, { value: setting.value, size: 7 });
-  field.setAttribute("aria-label", `${SETTING_TEXTS.try} ${setting.path}`);
-  button.setAttribute("type", "button");
-  button.addEventListener("click", () => void act("propose", { changes: [{ path: setting.path, value: /** @type {HTMLInputElement} */ (field).value.trim() }] }));
-  trial.append(field, " ", button);
-  return row;
+function view() {
+  const proposal = shadow.value?.proposal ?? "", active = shadow.value?.active ?? "";
+  return html`<div class="panel" tabindex="0" role="group" aria-label=${SETTING_TEXTS.table}>
+    <header><h2>${SETTING_TEXTS.title}</h2><span id="settings-sum" class="quiet">${found.value.filter(Boolean).length} ${SETTING_TEXTS.of} ${found.value.length}</span>
+      <input id="settings-search" type="search" placeholder=${SETTING_TEXTS.search} aria-label=${SETTING_TEXTS.searchLabel} onInput=${(/** @type {any} */ event) => { search.value = event.target.value; }} />
+      <button id="settings-changed" type="button" aria-pressed=${isChangedOnly.value} onClick=${() => { isChangedOnly.value = !isChangedOnly.value; }}>${SETTING_TEXTS.changedOnly}</button>
+      <button id="settings-promote" type="button" disabled=${!proposal} onClick=${() => void act("promote", { proposal })}>${SETTING_TEXTS.promote}</button>
+      <button id="settings-rollback" type="button" disabled=${!proposal && !active} onClick=${() => void act("rollback", { proposal: proposal || active })}>${SETTING_TEXTS.rollback}</button></header>
+    <p id="settings-note" class="tab-note" role="status" data-bad=${note.value !== ""}>${note.value}</p>
+    <p id="settings-trial" class="tab-note quiet">${proposal ? `${proposal} ${SETTING_TEXTS.sent}: ${changesText(shadow.value.changes)}. ${countsText(shadow.value)}` : SETTING_TEXTS.none}</p>
+    <table>${tableHead(SETTING_TEXTS.columns)}<tbody id="settings">${rows.value}</tbody></table>
+  </div>`;
+}
+
+/** A row that nobody looks for is hidden, so that what was typed into its field stays. @param {Setting} setting @param {string | undefined} tuned @param {boolean} isFound */
+function row({ path, value, unit, default: usual, limits, origin, tunable }, tuned, isFound) {
+  const isChanged = tuned !== undefined || origin !== "default", orDash = (/** @type {string} */ text) => (text === "-" ? "–" : text);
+  const propose = (/** @type {any} */ event) => {
+    event.preventDefault();
+    void act("propose", { changes: [{ path, value: event.target.elements[0].value.trim() }] });
+  };
+  return html`<tr key=${path} hidden=${!isFound}>
+    <td>${path}</td><td class="wide">${orDash(tuned ?? value)}</td><td>${orDash(unit)}</td><td class="wide">${orDash(usual)}</td><td class="quiet">${orDash(limits)}</td><td class=${isChanged ? "warn" : "quiet"}>${tuned === undefined ? origin : SETTING_TEXTS.tuned}</td>
+    <td>${tunable && html`<form onSubmit=${propose}><input size="7" defaultValue=${value} aria-label="${SETTING_TEXTS.try} ${path}" /> <button>${SETTING_TEXTS.try}</button></form>`}</td></tr>`;
 }
 
 /** @param {string} what @param {object} body */
 async function act(what, body) {
-  if (hasKey()) say(await post(`/api/tune/${what}`, body));
-}
-
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderSettings(store, now) {
-  const shadow = store.isFresh("advisor/shadow", now) ? store.get("advisor/shadow") : undefined;
-  proposal = shadow?.proposal ?? "";
-  active = shadow?.active ?? "";
-  byId("settings-promote").disabled = !proposal;
-  byId("settings-rollback").disabled = !proposal && !active;
-  setText(byId("settings-trial"), proposal ? `${proposal} ${SETTING_TEXTS.sent}: ${changesText(shadow.changes)}. ${countsText(shadow)}` : SETTING_TEXTS.none);
-  const tuned = new Map((shadow?.active_changes ?? []).map((/** @type {any} */ change) => [change.path, change.value]));
-  for (const [path, { setting, row }] of rows) {
-    setText(row.children[1], tuned.get(path) ?? setting.value);
-    setText(row.children[5], tuned.has(path) ? SETTING_TEXTS.tuned : setting.origin);
-    row.dataset.changed = String(tuned.has(path) || setting.origin !== "default");
-    row.children[5].className = row.dataset.changed === "true" ? "warn" : "quiet";
-  }
-}
-
-function filter() {
-  const text = byId("settings-search").value.trim().toLowerCase();
-  let shown = 0;
-  for (const [path, { row }] of rows) {
-    row.hidden = !path.includes(text) || (isChangedOnly && row.dataset.changed !== "true");
-    shown += row.hidden ? 0 : 1;
-  }
-  setText(byId("settings-sum"), `${shown} ${SETTING_TEXTS.of} ${rows.size}`);
-}
-
-/** @param {string} text */
-function say(text) {
-  setText(byId("settings-note"), text);
-  byId("settings-note").dataset.bad = String(Boolean(text));
+  if (hasKey()) note.value = await post(`/api/tune/${what}`, body);
 }

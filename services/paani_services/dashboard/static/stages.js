@@ -2,27 +2,20 @@
 // The way from the advice to the thrust, stage by stage: what each does now, or why it lets nothing through.
 
 import { findInhibits } from "./inhibits.js";
-import { STAGES, STAGE_TEXTS, byId, fixed, headingDeg, make, operatorText, sentence, setText, trackNames, words } from "./text.js";
+import { computed, html, moment } from "./templates.js";
+import { STAGES, STAGE_TEXTS, fixed, headingDeg, operatorText, sentence, trackNames, words } from "./text.js";
 
 const SHOWN = ["operator", "mission", "planner", "fence", "controller", "gate"];
 
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderStages(store, now) {
-  const list = byId("stages"), inhibits = findInhibits(store, now), does = describeStages(store);
-  if (!list.children.length) {
-    list.append(...SHOWN.map((stage) => {
-      const item = make("li");
-      item.append(make("span", "", STAGES[stage][0]), make("b"));
-      return item;
-    }));
-  }
-  SHOWN.forEach((stage, index) => {
-    const reasons = inhibits.filter((reason) => reason.stage === stage).map((reason) => reason.text);
-    const item = /** @type {HTMLElement} */ (list.children[index]), [text, acts] = does[stage];
-    item.hidden = !text && !reasons.length;
-    item.dataset.state = reasons.length ? "failed" : acts ? "acts" : "passed";
-    setText(item.lastElementChild, sentence(reasons.join("; ") || text));
-  });
+/** Every reason why the boat does not move, at the moment shown. */
+export const inhibits = computed(() => findInhibits(moment.value.store, moment.value.now));
+
+export function stages() {
+  const does = describeStages(moment.value.store);
+  return html`<ol id="stages" class="stages" aria-label=${STAGE_TEXTS.label}>${SHOWN.map((stage) => {
+    const reasons = inhibits.value.filter((reason) => reason.stage === stage).map((reason) => reason.text), [text, acts] = does[stage];
+    return (text || reasons.length > 0) && html`<li key=${stage} data-state=${reasons.length ? "failed" : acts ? "acts" : "passed"}><span>${STAGES[stage][0]}</span><b>${sentence(reasons.join("; ") || text)}</b></li>`;
+  })}</ol>`;
 }
 
 /** What each stage does, and whether it changes what the advice or the route alone would do. @param {import("./store.js").Store} store @returns {Record<string, [string, boolean]>} */

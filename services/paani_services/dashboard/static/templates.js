@@ -9,20 +9,22 @@ import { Store } from "./store.js";
 
 export { computed, effect, signal } from "./signals-core.mjs";
 
-/** @typedef {{store: Store, now: number, isOpen: boolean}} Moment what the page shows, when, and whether that is still heard */
+/** @typedef {{store: Store, now: number, isOpen: boolean}} Moment what is known, when, and whether more of it is heard */
 
 const TABLE_PERIOD_MS = 500; // people read a table no faster
 const NOTHING = { store: new Store(), now: 0, isOpen: false };
-/** What the panels show, and what the tables show, which change less often. @type {{value: Moment}} */
-export const moment = signal(NOTHING), tableMoment = signal(NOTHING);
+/** What the panels show, what the tables of the other tabs show, and the present, which may be neither. @type {{value: Moment}} */
+export const moment = signal(NOTHING), tableMoment = signal(NOTHING), present = signal(NOTHING);
 let tablesAt = -TABLE_PERIOD_MS;
 
-/** @param {Moment} shown @param {number} present milliseconds, by the page's clock */
-export function showMoment(shown, present) {
-  moment.value = shown;
-  if (shown.store === tableMoment.value.store && present - tablesAt < TABLE_PERIOD_MS) return;
-  tablesAt = present;
-  tableMoment.value = shown;
+/** @param {Moment} shown @param {Moment} live @param {boolean} isDrive whether the panels are seen */
+export function showMoment(shown, live, isDrive) {
+  present.value = live;
+  if (shown.store !== tableMoment.value.store || live.now - tablesAt >= TABLE_PERIOD_MS) {
+    tablesAt = live.now;
+    tableMoment.value = shown;
+  }
+  if (isDrive) moment.value = shown;
 }
 
 export const html = htm.bind(h);
@@ -35,3 +37,6 @@ export function mount(selector, view) {
 
 /** A table's head. @param {string[]} names @param {number[]} [numbers] the columns of numbers */
 export const tableHead = (names, numbers = []) => html`<thead><tr>${names.map((name, column) => html`<th class=${numbers.includes(column) ? "number" : ""}>${name}</th>`)}</tr></thead>`;
+
+/** Names, values, and whether a value is bad. @param {[string, any, boolean?][]} list */
+export const facts = (list) => list.map(([name, value, isBad]) => html`<dt>${name}</dt><dd class=${isBad ? "bad" : ""}>${value}</dd>`);

@@ -55,19 +55,6 @@ export function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;
 }
 
-/**
- * A definition list of names, values and whether a value is bad.
- * @param {Element} list @param {[string, string, boolean][]} facts
- */
-export function setFacts(list, facts) {
-  if (list.children.length !== facts.length * 2) list.replaceChildren(...facts.flatMap(() => [make("dt"), make("dd")]));
-  facts.forEach(([name, value, bad], index) => {
-    setText(list.children[index * 2], name);
-    setText(list.children[index * 2 + 1], value);
-    list.children[index * 2 + 1].classList.toggle("bad", bad);
-  });
-}
-
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);
 

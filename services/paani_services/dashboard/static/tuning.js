@@ -1,22 +1,30 @@
 // @ts-check
 // The tuning strip: parameters on trial beside those in force, and where their advice differs. Hidden without any.
 
-import { TUNING_TEXTS, byId, fixed, reasonText, setText } from "./text.js";
+import { computed, effect, html, moment, mount } from "./templates.js";
+import { TUNING_TEXTS, byId, fixed, reasonText } from "./text.js";
 
-/** @param {import("./store.js").Store} store @param {number} now */
-export function renderTuning(store, now) {
-  const shadow = store.get("advisor/shadow"), strip = byId("tuning");
-  strip.hidden = !shadow || !(shadow.active || shadow.proposal);
-  byId("panels").dataset.tuning = String(!strip.hidden);
-  if (strip.hidden) return;
-  strip.classList.toggle("stale", !store.isFresh("advisor/shadow", now));
-  const force = byId("tuning-force"), counts = byId("tuning-counts"), last = shadow.recent.at(-1);
-  force.dataset.promoted = String(Boolean(shadow.active));
-  setText(force, shadow.active ? TUNING_TEXTS.inForce(shadow.active, changesText(shadow.active_changes)) : TUNING_TEXTS.configured);
-  setText(byId("tuning-tried"), shadow.proposal ? TUNING_TEXTS.tried(shadow.proposal, changesText(shadow.changes)) : "");
-  counts.dataset.moves = String(shadow.moves_more > 0);
-  setText(counts, shadow.proposal ? countsText(shadow) : "");
-  setText(byId("tuning-last"), last ? TUNING_TEXTS.last(adviceText(last, "active"), adviceText(last, "shadow")) : "");
+const shadow = computed(() => moment.value.store.get("advisor/shadow"));
+const isShown = computed(() => Boolean(shadow.value?.active || shadow.value?.proposal));
+const isStale = computed(() => !moment.value.store.isFresh("advisor/shadow", moment.value.now));
+
+export function bindTuning() {
+  effect(() => {
+    byId("tuning").hidden = !isShown.value;
+    byId("panels").dataset.tuning = String(isShown.value);
+    byId("tuning").classList.toggle("stale", isStale.value);
+  });
+  mount("#tuning", () => isShown.value && view(shadow.value));
+}
+
+/** @param {any} shadow */
+function view(shadow) {
+  const last = shadow.recent.at(-1);
+  return html`<h2>${TUNING_TEXTS.title}</h2>
+    <span id="tuning-force" data-promoted=${Boolean(shadow.active)}>${shadow.active ? TUNING_TEXTS.inForce(shadow.active, changesText(shadow.active_changes)) : TUNING_TEXTS.configured}</span>
+    <span id="tuning-tried">${shadow.proposal && TUNING_TEXTS.tried(shadow.proposal, changesText(shadow.changes))}</span>
+    <span id="tuning-counts" data-moves=${shadow.moves_more > 0}>${shadow.proposal && countsText(shadow)}</span>
+    <span id="tuning-last" class="quiet">${last && TUNING_TEXTS.last(adviceText(last, "active"), adviceText(last, "shadow"))}</span>`;
 }
 
 /** The weights of the risk in force: those configured, and over them those promoted. @param {Record<string, number>} configured @param {any} shadow */
