@@ -9,6 +9,7 @@ from paani.errors import UserError
 EXTRA_OF = {
     "mujoco": "host",
     "OpenGL": "host",
+    "filterpy": "host",
     "scipy": "host",
     "gpxpy": "host",
     "tqdm": "host",

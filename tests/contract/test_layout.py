@@ -70,6 +70,8 @@ def test_one_file_one_job(path: Path) -> None:
         ),
         ("ncnn.Net(", "models/paani_models/engines/ncnn_runner.py"),
         ("import mujoco", "sim_host/paani_sim/"),
+        ("import filterpy", "services/paani_services/localization/"),
+        ("from filterpy", "services/paani_services/localization/"),
         ("from aiohttp", "services/paani_services/dashboard/ services/paani_tools/fleet/page.py"),
         ("import serial", "shared/paani/serial_port.py"),
         ("from pynmeagps", "services/paani_services/sensors/"),

@@ -3,13 +3,14 @@
 State x = [px, py, psi, u, v, b, gx, gy, c, wx, wy]: map position [m], yaw [rad], surge and sway through the water
 [m/s], gyro bias [rad/s], slow error of the GPS position [m], compass bias [rad], drift of the water in the map [m/s].
 The slow GPS error and the drift of the water are first-order Gauss-Markov processes, the biases random walks.
-The covariance is corrected in Joseph's form, which keeps it positive.
+The update is filterpy's; this is the only file that imports filterpy, because the import takes seconds.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
 
 from paani.arrays import F64
 from paani.geometry import wrap_rad
@@ -45,10 +46,11 @@ class PlanarFilter:
         The yaw at start came from the compass, so its error and the compass bias are correlated.
         Where `std` is zero from `LOCAL_STATES_N` on, there is no GPS to describe, and those states stay as they are.
         """
-        self._x: F64 = np.array(x, dtype=np.float64)
-        self._covariance: F64 = np.diag(np.square(std))
-        self._covariance[PSI, PSI] += std[C] ** 2
-        self._covariance[PSI, C] = self._covariance[C, PSI] = -(std[C] ** 2)
+        self._ekf = ExtendedKalmanFilter(dim_x=SIZE, dim_z=2)
+        self._ekf.x = np.array(x, dtype=np.float64)
+        self._ekf.P = np.diag(np.square(std))
+        self._ekf.P[PSI, PSI] += std[C] ** 2
+        self._ekf.P[PSI, C] = self._ekf.P[C, PSI] = -(std[C] ** 2)
         self._gps_wander_s = gps_wander_s
         self._has_gps = bool(np.any(np.asarray(std[LOCAL_STATES_N:]) > 0.0))
         self._jacobian = np.eye(SIZE)
@@ -57,7 +59,7 @@ class PlanarFilter:
     @property
     def x(self) -> F64:
         """State (11,)."""
-        return self._x
+        return np.asarray(self._ekf.x)
 
     @property
     def std(self) -> F64:
@@ -67,21 +69,21 @@ class PlanarFilter:
     @property
     def covariance(self) -> F64:
         """Covariance of the state (11, 11), symmetric."""
-        return self._covariance
+        return np.asarray(self._ekf.P)
 
     @property
     def velocity(self) -> tuple[float, float]:
         """Velocity over ground in the map frame [m/s]."""
-        _, _, psi, u, v, *_, wx, wy = self._x.tolist()
+        _, _, psi, u, v, *_, wx, wy = self._ekf.x.tolist()
         sin, cos = math.sin(psi), math.cos(psi)
         return u * cos - v * sin + wx, u * sin + v * cos + wy
 
     @property
     def predicted_fix(self) -> tuple[float, float, float]:
         """Predicted position of the next fix [m], and its standard deviation without the receiver's noise."""
-        p = self._covariance
+        p = self._ekf.P
         variance = p[PX, PX] + p[PY, PY] + p[GX, GX] + p[GY, GY] + 2.0 * (p[PX, GX] + p[PY, GY])
-        x = self._x.tolist()
+        x = self._ekf.x.tolist()
         return x[PX] + x[GX], x[PY] + x[GY], math.sqrt(max(0.5 * float(variance), 0.0))
 
     def predict(
@@ -91,13 +93,13 @@ class PlanarFilter:
 
         `gps_std_m`: standard deviation of the receiver's slow error in the long run.
         """
-        px, py, psi, u, v, b, gx, gy, c, wx, wy = self._x.tolist()
+        px, py, psi, u, v, b, gx, gy, c, wx, wy = self._ekf.x.tolist()
         rate = yaw_rate_radps - b
         sin, cos = math.sin(psi), math.cos(psi)
         vx, vy = u * cos - v * sin, u * sin + v * cos
         gps_decay = math.exp(-step_s / self._gps_wander_s)
         drift_decay = math.exp(-step_s / DRIFT_TIME_S)
-        self._x = np.array([
+        self._ekf.x = np.array([
             px + (vx + wx) * step_s,
             py + (vy + wy) * step_s,
             wrap_rad(psi + rate * step_s),
@@ -118,7 +120,7 @@ class PlanarFilter:
         f[V, U], f[V, B] = -rate * step_s, u * step_s
         f[GX, GX] = f[GY, GY] = gps_decay
         f[WX, WX] = f[WY, WY] = drift_decay
-        self._covariance = f @ self._covariance @ f.T + self._process_noise(step_s, gps_std_m, gps_decay, drift_decay)
+        self._ekf.P = f @ self._ekf.P @ f.T + self._process_noise(step_s, gps_std_m, gps_decay, drift_decay)
 
     def correct_position(self, x_m: float, y_m: float, std_m: float, gate2: float) -> CorrectionResult:
         """Correct with a GPS position: the sum of the boat's position and the receiver's slow error."""
@@ -131,7 +133,7 @@ class PlanarFilter:
         self, vx_mps: float, vy_mps: float, std_mps: float, gate2: float, *, is_course_known: bool = True
     ) -> CorrectionResult:
         """Correct with a velocity over ground in the map frame. `is_course_known` false: it corrects no heading."""
-        _, _, psi, u, v, *_ = self._x.tolist()
+        _, _, psi, u, v, *_ = self._ekf.x.tolist()
         sin, cos = math.sin(psi), math.cos(psi)
         predicted_x, predicted_y = self.velocity
         jacobian = np.zeros((2, SIZE))
@@ -143,7 +145,7 @@ class PlanarFilter:
 
     def correct_yaw(self, yaw_rad: float, std_rad: float, gate2: float) -> CorrectionResult:
         """Correct with a compass heading, compared around the circle."""
-        x = self._x
+        x = self._ekf.x
         jacobian = np.zeros((1, SIZE))
         jacobian[0, PSI] = jacobian[0, C] = 1.0
         return self._correct(np.array([wrap_rad(yaw_rad - float(x[PSI] + x[C]))]), jacobian, std_rad, gate2)
@@ -155,21 +157,21 @@ class PlanarFilter:
         """
         known = [V] if surge_std_mps is None else [V, U]
         std = np.array([sway_std_mps, surge_std_mps or 0.0][: len(known)])
-        self._correct(-self._x[known], _IDENTITY[known], std, math.inf)
+        self._correct(-self._ekf.x[known], _IDENTITY[known], std, math.inf)
 
     def reset_position(self, x_m: float, y_m: float, std_m: float, noise_m: float) -> None:
         """Start the position anew at a fix with slow error `std_m` and white noise `noise_m`; keep all other states."""
         reset = [PX, PY, GX, GY]
-        self._x[reset] = (x_m, y_m, 0.0, 0.0)
-        self._covariance[reset, :] = 0.0
-        self._covariance[:, reset] = 0.0
-        self._covariance[reset, reset] = std_m**2
-        self._covariance[[PX, PY], [PX, PY]] += noise_m**2
-        self._covariance[[PX, PY], [GX, GY]] = self._covariance[[GX, GY], [PX, PY]] = -(std_m**2)
+        self._ekf.x[reset] = (x_m, y_m, 0.0, 0.0)
+        self._ekf.P[reset, :] = 0.0
+        self._ekf.P[:, reset] = 0.0
+        self._ekf.P[reset, reset] = std_m**2
+        self._ekf.P[[PX, PY], [PX, PY]] += noise_m**2
+        self._ekf.P[[PX, PY], [GX, GY]] = self._ekf.P[[GX, GY], [PX, PY]] = -(std_m**2)
 
     def inflate_covariance(self, std: F64) -> None:
         """Add `std` (11,) to the standard deviation of each state, in quadrature."""
-        self._covariance = self._covariance + np.diag(np.square(std))
+        self._ekf.P = self._ekf.P + np.diag(np.square(std))
 
     def _process_noise(self, step_s: float, gps_std_m: float, gps_decay: float, drift_decay: float) -> F64:
         """Process noise of one step (11, 11)."""
@@ -191,17 +193,20 @@ class PlanarFilter:
     def _correct(self, residual: F64, jacobian: F64, std: float | F64, gate2: float) -> CorrectionResult:
         """One update, unless the normalised innovation squared exceeds the validation gate `gate2`."""
         measurement_noise = _IDENTITY[: len(residual), : len(residual)] * std**2
-        innovation = jacobian @ self._covariance @ jacobian.T + measurement_noise
         if math.isfinite(gate2):
-            nis = float(residual @ np.linalg.solve(innovation, residual))
+            nis = float(residual @ np.linalg.solve(jacobian @ self._ekf.P @ jacobian.T + measurement_noise, residual))
             if not nis <= gate2:
                 return CorrectionResult(False, nis)
         else:
             nis = 0.0
-        gain = np.linalg.solve(innovation, jacobian @ self._covariance).T
-        rest = _IDENTITY - gain @ jacobian
-        self._x = self._x + gain @ residual
-        self._covariance = rest @ self._covariance @ rest.T + gain @ measurement_noise @ gain.T
-        self._x[PSI] = wrap_rad(float(self._x[PSI]))
-        self._covariance = 0.5 * (self._covariance + self._covariance.T)
+        self._ekf.dim_z = len(residual)
+        self._ekf.update(
+            residual,
+            HJacobian=lambda _: jacobian,
+            Hx=lambda _: 0.0,
+            R=measurement_noise,
+            residual=lambda measured, _: measured,
+        )
+        self._ekf.x[PSI] = wrap_rad(float(self._ekf.x[PSI]))
+        self._ekf.P = 0.5 * (self._ekf.P + self._ekf.P.T)
         return CorrectionResult(True, nis)

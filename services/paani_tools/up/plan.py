@@ -29,6 +29,7 @@ EYE = "eye"
 NEEDED = {
     "plant": ("mujoco",),
     EYE: ("OpenGL",),
+    "localization": ("filterpy",),
     "mavlink": ("pymavlink",),
     "foxglove": ("foxglove",),
     "ros2": ("rosbags",),

@@ -31,10 +31,10 @@ def test_each_module_comes_with_its_extra(module: str, extra: str) -> None:
 
 
 def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    require_modules("up", "mujoco", "gpxpy")
-    monkeypatch.setitem(sys.modules, "gpxpy", None)
-    with pytest.raises(UserError, match=r"up needs gpxpy, not installed here: pip install 'paani\[host\]'"):
-        require_modules("up", "mujoco", "gpxpy")
+    require_modules("up", "mujoco", "filterpy")
+    monkeypatch.setitem(sys.modules, "filterpy", None)
+    with pytest.raises(UserError, match=r"up needs filterpy, not installed here: pip install 'paani\[host\]'"):
+        require_modules("up", "mujoco", "filterpy")
 
 
 @pytest.mark.slow

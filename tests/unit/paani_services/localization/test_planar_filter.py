@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani.messages import ImuSample
 from paani_services.localization.levelling import level_sample
-from paani_services.localization.planar_filter import GX, GY, LOCAL_STATES_N, PSI, PX, PY, SIZE, PlanarFilter, U, V
+from paani_services.localization.planar_filter import LOCAL_STATES_N, PSI, PX, PY, SIZE, PlanarFilter, U, V
 
 pytestmark = pytest.mark.slow
 
@@ -53,20 +53,6 @@ def test_prediction_jacobian_matches_differences() -> None:
     quiet.predict(0.3, 0.2, -0.1, 0.05)
     carried = numeric @ PlanarFilter(x, STD).covariance @ numeric.T
     assert np.allclose(planar_filter.covariance - quiet.covariance, carried, rtol=1e-6, atol=1e-11)
-
-
-def test_a_correction_adds_the_information_of_its_measurement() -> None:
-    """P^-1 grows by H' R^-1 H, and the state moves by P H' R^-1 times the residual."""
-    planar_filter = PlanarFilter(state(3.0, -2.0, 0.7, 0.5, 0.05), STD)
-    planar_filter.predict(0.3, 0.2, -0.1, 0.05, 0.8)
-    before, carried = planar_filter.x.copy(), planar_filter.covariance.copy()
-    planar_filter.correct_position(3.4, -2.3, 0.4, gate2=1e9)
-    seen = np.zeros((2, SIZE))
-    seen[0, [PX, GX]] = seen[1, [PY, GY]] = 1.0
-    corrected = np.linalg.inv(np.linalg.inv(carried) + seen.T @ seen / 0.4**2)
-    assert np.allclose(planar_filter.covariance, corrected, rtol=1e-9, atol=1e-12)
-    moved = corrected @ seen.T @ (np.array([3.4, -2.3]) - seen @ before) / 0.4**2
-    assert np.allclose(planar_filter.x, before + moved, rtol=1e-9, atol=1e-12)
 
 
 def test_yaw_is_corrected_the_short_way_round() -> None:
