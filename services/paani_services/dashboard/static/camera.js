@@ -129,7 +129,7 @@ export class Camera {
     const newest = this.view.store.get("camera/picture");
     const behind = newest ? newest.frame_seq - header.frame_seq : 0;
     this.canvas.classList.toggle("stale", !fresh);
-    setText(byId("camera-id"), `${CAMERA_TEXTS.frame} ${header.frame_seq}${behind > 0 ? ` ${CAMERA_TEXTS.of} ${newest.frame_seq}` : ""}, ${header.width_px} × ${header.height_px}`);
+    setText(byId("camera-id"), behind > 0 ? `${header.frame_seq} ${CAMERA_TEXTS.of} ${newest.frame_seq}` : `${CAMERA_TEXTS.frame} ${header.frame_seq}`);
     setText(
       byId("camera-note"),
       !fresh ? (ageS > this.view.store.limitS("camera/picture") ? CAMERA_TEXTS.last(ageText(ageS)) : CAMERA_TEXTS.gaps)

@@ -263,7 +263,7 @@ export const MAP_TEXTS = {
   noTiles: "No tiles of the chart lie here",
   damagedTile: "the picture is damaged",
   drawing: "North is up while a mission is drawn",
-  pose: (/** @type {string} */ east, /** @type {string} */ north, /** @type {string} */ heading) => `${east} m E, ${north} m N, ${heading}°`,
+  pose: (/** @type {string} */ east, /** @type {string} */ north) => `${east} m E, ${north} m N`,
   noPose: "position unknown", error: "error", next: "next",
   notHeard: "not heard for",
   nearest: (/** @type {number} */ cpaM, /** @type {number} */ afterS) => `nearest ${cpaM.toFixed(1)} m in ${afterS.toFixed(0)} s`,

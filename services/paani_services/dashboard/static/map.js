@@ -10,7 +10,7 @@ import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { isReplay } from "./inhibits.js";
 import { RouteEditor } from "./route_editor.js";
-import { MAP_TEXTS, byId, fixed, headingDeg, setText } from "./text.js";
+import { MAP_TEXTS, byId, fixed, setText } from "./text.js";
 
 const AHEAD_PART = 0.22; // of the map's height, by which the boat stands below the middle where its bow is up
 
@@ -93,7 +93,7 @@ export class MapPanel {
     this.editor.render(chart, store, now);
     drawScale(ctx, projection, colour("--quiet"), colour("--panel"));
     controls.render(turnRad, this.editor.isOpen);
-    setText(byId("map-pose"), pose ? MAP_TEXTS.pose(fixed(pose.x_m, 1), fixed(pose.y_m, 1), fixed(headingDeg(pose.yaw_rad), 0)) : MAP_TEXTS.noPose);
+    setText(byId("map-pose"), pose ? MAP_TEXTS.pose(fixed(pose.x_m, 1), fixed(pose.y_m, 1)) : MAP_TEXTS.noPose);
     const error = odometry && truth ? Math.hypot(odometry.x_m - truth.x_m, odometry.y_m - truth.y_m) : NaN;
     setText(byId("map-error"), Number.isFinite(error) ? `${MAP_TEXTS.error} ${fixed(error, 1)} m` : "");
   }
