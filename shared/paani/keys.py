@@ -116,7 +116,7 @@ ROUTE = Topic(
 )
 MISSION = Topic(
     name="navigator/mission", type=m.Mission, producer="navigator", rate_hz=0.5, fresh_s=10.0,
-    stance=Stance.STATE, summary="the legs of the mission, and the fence",
+    stance=Stance.STATE, summary="the legs of the mission, the fence, and rally points",
 )
 PREDICTION = Topic(
     name="navigator/prediction", type=m.Prediction, producer="navigator", rate_hz=1.0, fresh_s=3.0,
@@ -152,7 +152,7 @@ OPERATOR_ORDER = Topic(
 )
 ORDERED_MISSION = Topic(
     name="operator/mission", type=m.Mission, producer="operator", rate_hz=0.5, fresh_s=10.0,
-    stance=Stance.STATE, summary="the mission and fence accepted last from a client; without legs and stamp before",
+    stance=Stance.STATE, summary="mission, fence and rally points accepted last from a client; empty before",
 )
 TUNING = Topic(
     name="operator/tuning", type=m.Tuning, producer="dashboard", rate_hz=1.0, fresh_s=3.0,
@@ -226,11 +226,11 @@ REQUESTS = {
     )
     for client in (STATION, *ASKING_PORTS, *STOPPING_CLIENTS, "arm")
 }
-# Who may ask it for another mission or fence; `paani mission` may ask for nothing else.
+# Who may ask it for another mission, fence or rally points; `paani mission` may ask for nothing else.
 MISSION_REQUESTS = {
     client: Topic(
         name=f"operator/mission_request/{client}", type=m.MissionRequest, producer=client, rate_hz=1.0, fresh_s=2.0,
-        stance=Stance.EVENT, summary=f"a mission, a fence, or both, that {client} asks the operator's process for",
+        stance=Stance.EVENT, summary=f"mission, fence or rally points that {client} asks the operator's process for",
     )
     for client in (STATION, *ASKING_PORTS, "mission")
 }

@@ -1,4 +1,4 @@
-"""Asks the operator's process, as one of its clients, to put another mission or fence in force."""
+"""Asks the operator's process, as one of its clients, to put another mission, fence or rally points in force."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.clock import Clock
-from paani.missions import find_mission_fault
+from paani.missions import find_mission_fault, find_rally_fault
 
 REPEAT_S = 2.0  # a mission of 10,000 waypoints is half a megabyte, and takes seconds to check
 POLL_S = 0.02
@@ -42,29 +42,48 @@ class MissionClient:
         self._requests = bus.publisher(keys.MISSION_REQUESTS[bus.user])
         self._states = bus.latest(keys.OPERATOR_STATE)
 
-    async def send(self, mission: m.Mission, timeout_s: float = 20.0, hand: int = 0) -> MissionAnswer | None:
-        """Ask for these legs and this fence; None where nobody has answered in time."""
-        request = m.MissionRequest(source_us=0, press=0, name=mission.name, legs=mission.legs, fence=mission.fence)
+    async def send(
+        self,
+        mission: m.Mission,
+        timeout_s: float = 20.0,
+        hand: int = 0,
+        *,
+        keep_fence: bool = False,
+        keep_rally: bool = False,
+    ) -> MissionAnswer | None:
+        """Ask for these legs, this fence and these rally points; None where nobody has answered in time."""
+        request = m.MissionRequest(
+            source_us=0, press=0, name=mission.name, legs=mission.legs, fence=mission.fence, rally=mission.rally,
+            keep_fence=keep_fence, keep_rally=keep_rally,
+        )  # fmt: skip
         return await self._ask(request, timeout_s, hand)
 
     async def send_legs(
         self, name: str, legs: tuple[m.MissionLeg, ...], timeout_s: float = 20.0, hand: int = 0
     ) -> MissionAnswer | None:
-        """Ask for these legs within the fence in force; without legs there is nothing to do. Answered as `send`."""
-        request = m.MissionRequest(source_us=0, press=0, name=name, legs=legs, keep_fence=True)
+        """Ask for these legs alone; without legs there is nothing to do. Answered as `send`."""
+        request = m.MissionRequest(source_us=0, press=0, name=name, legs=legs, keep_fence=True, keep_rally=True)
         return await self._ask(request, timeout_s, hand)
 
     async def send_fence(
         self, fence: tuple[m.FenceArea, ...], timeout_s: float = 20.0, hand: int = 0
     ) -> MissionAnswer | None:
-        """Ask for this fence around the legs in force; without areas there is none. Answered as `send`."""
-        request = m.MissionRequest(source_us=0, press=0, fence=fence, keep_legs=True)
+        """Ask for this fence alone; without areas there is none. Answered as `send`."""
+        request = m.MissionRequest(source_us=0, press=0, fence=fence, keep_legs=True, keep_rally=True)
+        return await self._ask(request, timeout_s, hand)
+
+    async def send_rally(
+        self, rally: tuple[m.Waypoint, ...], timeout_s: float = 20.0, hand: int = 0
+    ) -> MissionAnswer | None:
+        """Ask for these rally points alone; without any, RETURN leads home. Answered as `send`."""
+        request = m.MissionRequest(source_us=0, press=0, rally=rally, keep_legs=True, keep_fence=True)
         return await self._ask(request, timeout_s, hand)
 
     async def _ask(self, request: m.MissionRequest, timeout_s: float, hand: int) -> MissionAnswer | None:
         """What could not travel, as numbers that are none, or is too much for a message, is refused here."""
         fault = await asyncio.to_thread(find_mission_fault, request.legs, (), 0.0)
         fault = fault or await asyncio.to_thread(find_mission_fault, (), request.fence, 0.0)
+        fault = fault or find_rally_fault(request.rally, (), 0.0)
         if fault:
             return MissionAnswer(m.MissionRefusal.INVALID, fault)
         press = secrets.randbits(32) + 1

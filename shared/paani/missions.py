@@ -1,6 +1,6 @@
-"""What is wrong with a mission or a fence, by whichever way it came: file, page, command, ground station. Pure.
+"""What is wrong with a mission, a fence or rally points, whoever made them: file, page, command, station. Pure.
 
-A fault is one line for whoever made it, and names leg, waypoint, area or corner.
+A fault is one line for whoever made it, and names leg, waypoint, area, corner or rally point.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ MIN_LEG_M = 0.01  # waypoints nearer to each other than this are the same: a leg
 MIN_RADIUS_M, MAX_RADIUS_M = 1.0, 1e3  # of a station; a boat would never rest within a radius below its own length
 MAX_CORNERS = 1000  # of all areas together: every edge is tested at each step of the navigator, ten times a second
 MAX_PAIRS = 1_000_000  # of a waypoint and a corner: each leg is tested against each edge, before a mission is accepted
+MAX_RALLY = 20
+MAX_RALLY_PAIRS = 5000  # of a rally point and a corner: the way to each is tested in the moment RETURN is ordered
 MIN_AREA_M2 = 1.0  # of one area: less is a slip of the pen, not water or land
 MAX_DISTANCE_M = 1e6  # of a point from the map's origin; a plane is no map long before that
 
@@ -36,13 +38,32 @@ def mission_of_route(route: Route) -> Mission:
     return Mission(source_us=route.source_us, name=route.name, legs=(leg,))
 
 
-def find_mission_fault(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> str:
-    """Why the navigator could not take these legs within this fence; empty where it can.
+def find_mission_fault(
+    legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, rally: tuple[Waypoint, ...] = ()
+) -> str:
+    """Why the navigator could not take these legs and rally points within this fence; empty where it can.
 
-    margin_m: the least distance of a waypoint or leg from an edge. Numbers that are none count as out of bounds.
+    margin_m: the least distance of a waypoint, leg or rally point from an edge. No number is out of bounds.
     """
     fault = _find_fence_fault(fence) or _find_legs_fault(legs) or _find_size_fault(legs, fence)
-    return fault or _find_violation(legs, fence, margin_m)
+    return fault or _find_violation(legs, fence, margin_m) or find_rally_fault(rally, fence, margin_m)
+
+
+def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float) -> str:
+    """What is wrong with the first rally point that cannot be returned to; empty where nothing is."""
+    corners_n = sum(len(area.corners) for area in fence)
+    if len(rally) > MAX_RALLY:
+        return f"rally: has {len(rally)}, more than {MAX_RALLY}"
+    if len(rally) * corners_n > MAX_RALLY_PAIRS:
+        return f"rally: {len(rally)} times {corners_n} corners of the fence is more than {MAX_RALLY_PAIRS}"
+    fault = _find_point_fault(rally, "rally")
+    if fault:
+        return fault
+    for number, point in enumerate(rally):
+        found = find_route_violation(fence, (point,), margin_m)
+        if found is not None:
+            return f"rally[{number}]: {found[1]}"
+    return ""
 
 
 def find_leg_outside(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> tuple[int, int, str] | None:

@@ -103,7 +103,7 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
      ("navigator/prediction",), ["ROUTE", "FOLLOWING ROUTE", "lap 2, waypoint 2 of 4, planned for person #3"]),
     ({"navigator/command": replace(ORDER, speed_mps=0.0, obstacle_track_ids=(3,))}, (),
      ["WAITING", "WAITING", "for person #3"]),
-    ({"navigator/command": replace(ORDER, leg="return home")}, (), ["HOME", "RETURNING HOME", ""]),
+    ({"navigator/command": replace(ORDER, leg="return home")}, (), ["HOME", "RETURNING", ""]),
     ({"navigator/command": replace(ORDER, leg="hold station")}, (), ["STATION", "GOING TO STATION", ""]),
     (turning(m.Purpose.PASS, 3), (), ["AVOIDING", "AVOIDING #3", "person #3: turning right"]),
     (turning(m.Purpose.PASS), (), ["AVOIDING", "AVOIDING", "centre occupied: turning right"]),

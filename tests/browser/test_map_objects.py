@@ -43,6 +43,7 @@ MISSION = m.Mission(
         m.FenceArea(keep=m.Keep.IN, corners=points((-20, -20), (20, -20), (20, 20), (-20, 20))),
         m.FenceArea(keep=m.Keep.OUT, corners=points((10, 5), (16, 5), (16, 12), (10, 12))),
     ),
+    rally=points((14.0, -14.0)),
 )
 SWIMMER = m.MovingObstacle(track_id=4, x_m=-8.0, y_m=8.0, radius_m=1.0, east_mps=0.0, north_mps=-1.0)
 CROSSING = m.MovingObstacle(

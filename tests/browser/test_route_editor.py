@@ -33,16 +33,17 @@ JUDGE = """async ([fence, points]) => {
   const { isAllowed } = await import("/static/plane_geometry.js");
   return points.map(([x_m, y_m]) => isAllowed(fence, { x_m, y_m }));
 }"""
-MARKS = """async ([legs, fence, turnRadiusM]) => {
+MARKS = """async ([legs, fence, turnRadiusM, points = []]) => {
   const { findMarks } = await import("/static/mission_checks.js");
-  return findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM }).map((mark) => mark.text);
+  const { rallyOf } = await import("/static/mission_files.js");
+  return findMarks({ legs, fence, rally: rallyOf(points) }, { marginM: 1.5, turnRadiusM }).map((mark) => mark.text);
 }"""
 COUNTED = """async ([waypointCount, cornerCount]) => {
   const { findMarks } = await import("/static/mission_checks.js");
   const waypoints = Array.from({ length: waypointCount }, (_, i) => ({ x_m: 100 + i, y_m: 0 }));
   const star = Array.from({ length: cornerCount }, (_, i) => ({ x_m: 9 * Math.cos(2 * i), y_m: 9 * Math.sin(2 * i) }));
   const legs = [{ kind: "return_home", waypoints, repeat: false, laps: 1 }], fence = [{ keep: "out", corners: star }];
-  const before = performance.now(), marks = findMarks({ legs, fence }, { marginM: 1.5, turnRadiusM: 0 });
+  const before = performance.now(), marks = findMarks({ legs, fence, rally: [] }, { marginM: 1.5, turnRadiusM: 0 });
   return [marks.map((mark) => mark.text), performance.now() - before];
 }"""
 DROP = """([name, text]) => {
@@ -153,6 +154,8 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         await editor.until_note("Nothing is wrong")
         await editor.choose("+ Hold")
         await editor.press((0, -14))
+        await editor.choose("+ Rally")
+        await editor.press((-14, -14), (14, -14))
         await page.click("#editor-send")
         await editor.until_note("Accepted")
         async with asyncio.timeout(5.0):
@@ -162,6 +165,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         drawn = [(point.x_m, point.y_m) for point in accepted.value.legs[0].waypoints]
         assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
         assert len(accepted.value.fence) == 2
+        assert [(round(point.x_m), round(point.y_m)) for point in accepted.value.rally] == [(-14, -14), (14, -14)]
         await page.wait_for_timeout(300)
         await page.screenshot(path=tmp_path / "accepted.png")
         axe = await asyncio.to_thread(AXE.read_text, encoding="utf-8")
@@ -190,6 +194,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
             await editor.choose("+ Stop")
             await page.set_input_files("#editor-file", str(path))
             await until(page, "paani.plan.legs.length === 1")
+            assert await page.evaluate("paani.plan.rally[0].waypoints.length") == 2
             assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
         assert [line for line in watched.errors if "409" not in line] == []
         for name, text, why in (
@@ -211,6 +216,11 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
             "leg 1, waypoint 2: a turn too tight for the hull, 2.2 m"
         ]
         assert await page.evaluate(MARKS, [[zigzag], [], 0]) == []
+        assert await page.evaluate(MARKS, [[], fence, 0, [{"x_m": 0, "y_m": 0}, {"x_m": 13, "y_m": 8}]]) == [
+            "rally points, waypoint 2: leaves the fence"
+        ]
+        far = [{"x_m": 0, "y_m": 0}] * 21
+        assert await page.evaluate(MARKS, [[], [], 0, far]) == ["more than 20 rally points"]
         bow = [{"x_m": x, "y_m": y} for x, y in ((0, 0), (9, 9), (9, 0), (0, 9))]
         assert await page.evaluate(MARKS, [[], [{"keep": "in", "corners": bow}], 0]) == [
             "keep-in area 1: its edges cross"

@@ -1,4 +1,4 @@
-"""Takes a mission and a fence drawn on the page to the operator's process, as one request, and tells its answer."""
+"""Takes a mission that was drawn, its fence and rally points to the operator's process, and tells its answer."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ ANSWER_TIMEOUT_S = 20.0
 
 
 class MissionBody(HandRequest, frozen=True, forbid_unknown_fields=True):
-    """Legs and fence that are to take the place of those in force, whole."""
+    """Legs, fence and rally points that are to take the place of those in force, whole; without `rally` those stay."""
 
     name: m.Text = ""
     legs: tuple[m.MissionLeg, ...] = ()
     fence: tuple[m.FenceArea, ...] = ()
+    rally: tuple[m.Waypoint, ...] | None = None
 
 
 class Missions:
@@ -46,8 +47,9 @@ class Missions:
         except TimeoutError:
             return error_response(408, "the request did not come to its end", "body")
         wanted = decode_body(body, MissionBody)
-        mission = m.Mission(source_us=0, name=wanted.name, legs=wanted.legs, fence=wanted.fence)
-        answer = await self._client.send(mission, ANSWER_TIMEOUT_S, wanted.hand)
+        rally = wanted.rally or ()
+        mission = m.Mission(source_us=0, name=wanted.name, legs=wanted.legs, fence=wanted.fence, rally=rally)
+        answer = await self._client.send(mission, ANSWER_TIMEOUT_S, wanted.hand, keep_rally=wanted.rally is None)
         if answer is None:
             return error_response(503, "not accepted: the operator's process does not answer", "mission")
         if answer.refusal is not m.MissionRefusal.NONE:

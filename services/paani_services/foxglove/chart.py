@@ -1,4 +1,4 @@
-"""Route, mission and fence as GeoJSON, for the viewer's map. Pure."""
+"""Route, mission, fence and rally points as GeoJSON, for the viewer's map. Pure."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ def chart(route: m.Route | None, mission: m.Mission | None, origin: LatLon) -> b
         for number, leg in enumerate(mission.legs, 1):
             if leg.kind is m.LegKind.HOLD_STATION and leg.waypoints:
                 features.append(_point(leg.waypoints[0], origin, f"leg {number}: hold station"))
+        features += [_point(point, origin, f"rally point {number}") for number, point in enumerate(mission.rally, 1)]
     collection = {"type": "FeatureCollection", "features": features}
     return pb.encode(pb.GEO_JSON, {"geojson": msgspec.json.encode(collection).decode()})
 

@@ -101,14 +101,17 @@ def route(followed: m.Route) -> Entity:
 
 
 def mission(planned: m.Mission) -> list[Entity]:
-    """The fence, and the stations of the mission with their radius."""
+    """The fence, the stations of the mission with their radius, and rally points."""
     fence = [_line(area.corners, KEEP[area.keep], FENCE_M, closed=True) for area in planned.fence]
     stations = [
         _cylinder((leg.waypoints[0].x_m, leg.waypoints[0].y_m, ABOVE_WATER_M), 2.0 * leg.radius_m, ABOVE_WATER_M, LEG)
         for leg in planned.legs
         if leg.kind is m.LegKind.HOLD_STATION and leg.waypoints and leg.radius_m > 0.0
     ]
+    rally = [_cylinder((p.x_m, p.y_m, ABOVE_WATER_M), POINT_M, 2 * ABOVE_WATER_M, HOME) for p in planned.rally]
+    rally_text = [_text("rally", (p.x_m, p.y_m, TEXT_ABOVE_M), HOME) for p in planned.rally]
     return [
+        _entity("rally", keys.MISSION, planned, cylinders=rally, texts=rally_text),
         _entity("fence", keys.MISSION, planned, lines=fence),
         _entity("stations", keys.MISSION, planned, cylinders=stations),
     ]

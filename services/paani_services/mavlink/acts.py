@@ -77,7 +77,7 @@ class Acts:
             self._acknowledge(request, IN_PROGRESS if is_own else LATER, "")
 
     def send(self, order: MissionOrder) -> None:
-        """Begin to put a mission, a fence or both in force; the station is told how it ended."""
+        """Begin to put a mission, a fence or rally points in force; the station is told how it ended."""
         self._start(self._send_mission(order))
 
     async def stop(self) -> m.OperatorState | None:
@@ -116,13 +116,15 @@ class Acts:
         acknowledge(order.station, order.target, result, order.kind, self._clock.now_us(), text)
 
     async def _put_in_force(self, order: MissionOrder) -> MissionAnswer | None:
-        hand, fence = order.station.hand, order.fence
-        if order.legs is None:
-            return await self._missions.send_fence(fence or (), hand=hand)
-        if fence is None:
-            return await self._missions.send_legs(MISSION_NAME, order.legs, hand=hand)
-        both = m.Mission(source_us=0, name=MISSION_NAME, legs=order.legs, fence=fence)
-        return await self._missions.send(both, hand=hand)
+        hand, legs, fence, rally = order.station.hand, order.legs, order.fence, order.rally
+        if legs is not None and fence is not None:
+            whole = m.Mission(source_us=0, name=MISSION_NAME, legs=legs, fence=fence, rally=rally or ())
+            return await self._missions.send(whole, hand=hand)
+        if legs is not None:
+            return await self._missions.send_legs(MISSION_NAME, legs, hand=hand)
+        if fence is not None:
+            return await self._missions.send_fence(fence, hand=hand)
+        return await self._missions.send_rally(rally or (), hand=hand)
 
     def _is_wheel_left(self) -> bool:
         """Whether the wheel is in the hand of a station that is gone."""

@@ -8,17 +8,25 @@ from typing import Any, NamedTuple
 from paani import messages as m
 from paani.geometry import enu_from_geodetic
 from paani.map_origin import map_origin_deg
+from paani.missions import MAX_RALLY
 from paani_services.mavlink import commands, missions
 from paani_services.mavlink.codec import dialect
-from paani_services.mavlink.mission_items import Item, ItemError, Legs, areas_of_items, legs_of_items
+from paani_services.mavlink.mission_items import (
+    Item,
+    ItemError,
+    Legs,
+    WaypointOf,
+    areas_of_items,
+    legs_of_items,
+    points_of_items,
+)
 from paani_services.mavlink.missions import ALL, EMPTY, FENCE, MISSION, RALLY, Uploaded, plan_of
 from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.station import Station
-from paani_services.mavlink.uploads import MAX_ITEMS, NO_SPACE, Uploads, acknowledge
+from paani_services.mavlink.uploads import MAX_ITEMS, NO_SPACE, Completed, Uploads, acknowledge
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_UNSUPPORTED
 INVALID_SEQUENCE, DENIED = dialect.MAV_MISSION_INVALID_SEQUENCE, dialect.MAV_MISSION_DENIED
-NO_RALLY = "rally: there are no rally points; RTL goes home"
 NO_PARTS = "mission: whole or not at all"
 NO_PLACE = "mission: the boat does not know its place yet"
 NO_LEGS = Legs((), {})
@@ -32,6 +40,7 @@ class MissionOrder(NamedTuple):
     kind: int
     legs: tuple[m.MissionLeg, ...] | None = None
     fence: tuple[m.FenceArea, ...] | None = None
+    rally: tuple[m.Waypoint, ...] | None = None
 
 
 class MissionExchange:
@@ -79,7 +88,7 @@ class MissionExchange:
             self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
         elif snapshot.pose is not None:
             home = prediction.home if prediction is not None else self._plan_key[1]
-            key = ((legs, snapshot.fence), home, snapshot.pose.epoch, self._upload_count)
+            key = ((legs, snapshot.fence, snapshot.rally), home, snapshot.pose.epoch, self._upload_count)
             if key != self._plan_key:
                 if self._newest is not None and self._newest.legs.legs == legs:
                     self._uploaded = self._newest
@@ -128,8 +137,8 @@ class MissionExchange:
         kind = message.mission_type
         if not self._is_trusted(station, message):
             self._refuse(station, DENIED, message, source, commands.NOT_TRUSTED)
-        elif kind == RALLY and message.count > 0:
-            self._refuse(station, UNSUPPORTED, message, source, NO_RALLY)
+        elif kind == RALLY and message.count > MAX_RALLY:
+            self._refuse(station, NO_SPACE, message, source, f"rally: more than {MAX_RALLY} points")
         elif kind not in {MISSION, FENCE, RALLY}:
             self._refuse(station, UNSUPPORTED, message, source, "")
         elif message.count > MAX_ITEMS:
@@ -154,15 +163,22 @@ class MissionExchange:
             return m.Waypoint(x_m=x_m, y_m=y_m)
 
         try:
-            if whole.kind == FENCE:
-                fence = areas_of_items(whole.items, waypoint_of)
-                self._send(MissionOrder(station, whole.target, FENCE, fence=fence))
-            else:
-                legs = legs_of_items(whole.items, waypoint_of)
-                self._keep(whole.items, legs)
-                self._send(MissionOrder(station, whole.target, MISSION, legs=legs.legs))
+            self._send(self._order_of(whole, waypoint_of))
         except ItemError as error:
             self._refuse(station, error.result, message, source, str(error))
+
+    def _order_of(self, whole: Completed, waypoint_of: WaypointOf) -> MissionOrder:
+        """Raises ItemError for the first item that the boat cannot do."""
+        order = MissionOrder(whole.station, whole.target, whole.kind)
+        match whole.kind:
+            case missions.FENCE:
+                return order._replace(fence=areas_of_items(whole.items, waypoint_of))
+            case missions.RALLY:
+                return order._replace(rally=points_of_items(whole.items, waypoint_of))
+            case _:
+                legs = legs_of_items(whole.items, waypoint_of)
+                self._keep(whole.items, legs)
+                return order._replace(legs=legs.legs)
 
     def _keep(self, items: tuple[Item, ...], legs: Legs) -> None:
         self._newest, self._upload_count = Uploaded(items, legs), self._upload_count + 1
@@ -178,13 +194,10 @@ class MissionExchange:
     def _empty(self, station: Station, message: Any, source: tuple[int, int]) -> None:
         kind = message.mission_type
         self._uploads.forget(station)
-        if kind == RALLY:
-            self._acknowledge(station, ACCEPTED, message, source)
-            return
         if kind in {MISSION, ALL}:
             self._keep((), NO_LEGS)
-        legs = None if kind == FENCE else ()
-        self._send(MissionOrder(station, source, kind, legs, None if kind == MISSION else ()))
+        parts = [() if kind in {part, ALL} else None for part in (MISSION, FENCE, RALLY)]
+        self._send(MissionOrder(station, source, kind, *parts))
 
     def _end(self, station: Station, message: Any, _: tuple[int, int]) -> None:
         """A station that will not go on with its upload; after a download it is thanks."""
@@ -197,6 +210,3 @@ class MissionExchange:
     def _refuse(self, station: Station, result: int, message: Any, source: tuple[int, int], text: str) -> None:
         self._count("mavlink_refused")
         acknowledge(station, source, result, message.mission_type, self._snapshot.now_us, text)
-
-    def _acknowledge(self, station: Station, result: int, message: Any, source: tuple[int, int]) -> None:
-        acknowledge(station, source, result, message.mission_type, self._snapshot.now_us)

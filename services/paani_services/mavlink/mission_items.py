@@ -1,4 +1,4 @@
-"""Items that a ground station uploads, as legs of a mission or areas of a fence. Pure.
+"""Items that a ground station uploads, as legs of a mission, areas of a fence, or rally points. Pure.
 
 Waypoints in a row are a route. What the boat cannot do is refused with the number of the item, never left out.
 """
@@ -91,6 +91,16 @@ def areas_of_items(items: Sequence[Item], waypoint_of: WaypointOf) -> tuple[m.Fe
         areas.append(m.FenceArea(keep=keep, corners=places))
         seq += count
     return tuple(areas)
+
+
+def points_of_items(items: Sequence[Item], waypoint_of: WaypointOf) -> tuple[m.Waypoint, ...]:
+    """The rally points; their altitude and what else is for wings is passed over. Raises ItemError."""
+    points: list[m.Waypoint] = []
+    for seq, item in enumerate(items):
+        if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
+            raise ItemError(seq, RESULT_UNSUPPORTED, f"command {item.command} is no rally point")
+        points.append(_place(seq, item, waypoint_of))
+    return tuple(points)
 
 
 class _LegBuilder:

@@ -1,4 +1,4 @@
-"""The mission and the fence as ground stations download them. Pure.
+"""Mission, fence and rally points as ground stations download them. Pure.
 
 As ArduPilot has it, item 0 of a mission is home.
 """
@@ -46,7 +46,7 @@ class Uploaded(NamedTuple):
 
 
 def plan_of(snapshot: Snapshot, uploaded: Uploaded | None = None) -> Plan:
-    """The mission and the fence in degrees; empty while either the mission or the boat's own place is not known.
+    """Mission, fence and rally points in degrees; empty while either the mission or the boat's own place is not known.
 
     A mission that was uploaded, and is in force, has the items that were uploaded.
     """
@@ -59,10 +59,11 @@ def plan_of(snapshot: Snapshot, uploaded: Uploaded | None = None) -> Plan:
         latitude_deg, longitude_deg = geodetic_from_enu(point.x_m, point.y_m, *origin_deg)
         return degrees_e7(latitude_deg), degrees_e7(longitude_deg)
 
+    fence_items = _fence_items(snapshot.fence, place)[:MAX_ITEMS]
+    rally_items = tuple(Item(dialect.MAV_CMD_NAV_RALLY_POINT, place_e7=place(point)) for point in snapshot.rally)
     home = snapshot.prediction.home if snapshot.prediction is not None else ()
     if uploaded is not None and uploaded.legs.legs == legs:
-        fence_items = _fence_items(snapshot.fence, place)[:MAX_ITEMS]
-        return Plan({MISSION: uploaded.items, FENCE: fence_items, RALLY: ()}, uploaded.legs.seq_of)
+        return Plan({MISSION: uploaded.items, FENCE: fence_items, RALLY: rally_items}, uploaded.legs.seq_of)
     items = [Item(WAYPOINT, place_e7=place(home[0]) if home else (0, 0), frame=GLOBAL)]
     seq_of: dict[tuple[int, int], int] = {}
     for number, leg in enumerate(legs):
@@ -70,9 +71,7 @@ def plan_of(snapshot: Snapshot, uploaded: Uploaded | None = None) -> Plan:
             items.append(Item(dialect.MAV_CMD_DO_CHANGE_SPEED, (1.0, leg.speed_mps, -1.0, 0.0)))
         seq_of.update({(number, each): len(items) + each for each in range(max(1, len(leg.waypoints)))})
         items += _leg_items(leg, len(items), place)
-    return Plan(
-        {MISSION: tuple(items[:MAX_ITEMS]), FENCE: _fence_items(snapshot.fence, place)[:MAX_ITEMS], RALLY: ()}, seq_of
-    )
+    return Plan({MISSION: tuple(items[:MAX_ITEMS]), FENCE: fence_items, RALLY: rally_items}, seq_of)
 
 
 def _leg_items(leg: m.MissionLeg, first: int, place: Place) -> list[Item]:

@@ -42,6 +42,9 @@ def parameters_of(snapshot: Snapshot, cruise_mps: float, advisor: AdvisorConfig)
         Parameter("CRUISE_SPEED", cruise_mps, REAL),
         Parameter("SYSID_THISMAV", SYSTEM, INTEGER),
         Parameter("FENCE_ENABLE", bool(snapshot.fence), INTEGER),
+        Parameter("RALLY_TOTAL", len(snapshot.rally), INTEGER),
+        Parameter("RALLY_INCL_HOME", True, INTEGER),
+        Parameter("RALLY_LIMIT_KM", 0.0, REAL),
     ]
     for path in TUNABLE:
         configured = setting_text(advisor, path)

@@ -68,6 +68,11 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
         return self.mission.fence if self.mission is not None else ()
 
     @property
+    def rally(self) -> tuple[m.Waypoint, ...]:
+        """Places beside home that RETURN may lead to; empty where there are none."""
+        return self.mission.rally if self.mission is not None else ()
+
+    @property
     def is_armed(self) -> bool:
         """Whether the operator's process says that it is; what is not known is not armed."""
         return self.operator is not None and self.operator.armed and not self.operator.stopped

@@ -42,6 +42,7 @@ CAPABILITIES = (
     | dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
 CELLS = 10  # fields of BATTERY_STATUS for voltages; a battery that is measured as a whole has the first
 MIN_LINE_V = 1e-3  # a microcontroller that measures no battery says 0

@@ -18,6 +18,7 @@ from paani_services.operator import missions
 from paani_services.operator import state as op
 from paani_services.operator import wheel as w
 from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
+from paani_services.operator.return_place import find_seen_fault
 
 LOG = logging.getLogger(__name__)
 WATCH_PERIOD_S = 0.02  # how late a stick that nobody holds may be let go
@@ -93,6 +94,7 @@ class Console:
             refusal = missions.find_refusal(request, situation)
             if refusal is m.MissionRefusal.NONE and situation.present is not None:
                 fault = await self._check(missions.merge(request, situation.present, 0))
+                fault = fault or ("" if request.keep_rally else find_seen_fault(request.rally, self._facts().occupancy))
                 situation = self._situation(client, request.hand)
                 refusal = m.MissionRefusal.INVALID if fault else missions.find_refusal(request, situation)
             if refusal is m.MissionRefusal.NONE and situation.present is not None:
@@ -201,7 +203,7 @@ class Console:
 
     def _facts(self) -> w.Facts:
         """What the modes need now; what was accepted here is in force as soon as the navigator hears it."""
-        facts = self._read_facts()
+        facts = msgspec.structs.replace(self._read_facts(), margin_m=self._margin_m)
         if self.mission.accepted_us:
             return msgspec.structs.replace(facts, mission=self.mission, has_mission=bool(self.mission.legs))
         return facts
@@ -219,7 +221,9 @@ class Console:
     async def _check(self, mission: m.Mission) -> str:
         self._is_checking = True
         try:
-            return await asyncio.to_thread(find_mission_fault, mission.legs, mission.fence, self._margin_m)
+            return await asyncio.to_thread(
+                find_mission_fault, mission.legs, mission.fence, self._margin_m, mission.rally
+            )
         finally:
             self._is_checking = False
 

@@ -61,6 +61,7 @@ def merge(request: m.MissionRequest, present: m.Mission, now_us: int) -> m.Missi
         name=present.name if request.keep_legs else request.name,
         legs=present.legs if request.keep_legs else request.legs,
         fence=present.fence if request.keep_fence else request.fence,
+        rally=present.rally if request.keep_rally else request.rally,
         accepted_us=accepted_us,
         legs_us=present.legs_us if request.keep_legs else accepted_us,
     )

@@ -71,6 +71,7 @@ def facts_reader(bus: Bus, clock: Clock) -> Callable[[], Facts]:
     begun_us = clock.now_us()
     odometry, prediction = bus.latest(keys.ODOMETRY), bus.latest(keys.PREDICTION)
     missions, routes = bus.latest(keys.MISSION), bus.latest(keys.ROUTE)
+    grids = bus.latest(keys.OCCUPANCY)
 
     def read() -> Facts:
         pose = odometry.fresh(keys.ODOMETRY.fresh_s)
@@ -86,6 +87,7 @@ def facts_reader(bus: Bus, clock: Clock) -> Callable[[], Facts]:
             home=ahead.home[0] if ahead is not None and ahead.home else None,
             has_mission=mission is not None and bool(mission.legs),
             mission=mission,
+            occupancy=grids.fresh(keys.OCCUPANCY.fresh_s),
         )
 
     return read

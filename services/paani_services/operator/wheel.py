@@ -12,6 +12,8 @@ from msgspec.structs import replace
 from paani import messages as m
 from paani.keys import STOPPING_CLIENTS
 from paani.messages import DriveMode, ModeRefusal, RequestAct
+from paani_services.operator.missions import NO_MISSION
+from paani_services.operator.return_place import choose_place
 
 # A deflected stick that nobody says again is let go after this: thrust is zero within 0.5 s of the last word.
 DEFLECTED_MAX_S = 0.3
@@ -22,13 +24,16 @@ OVERRIDE_S = 10.0
 class Facts(msgspec.Struct, frozen=True):
     """What a mode needs: a trusted position, home, and a mission or a route; None or false where there is none.
 
-    `mission`: the one in force, without legs where there is none; None where that is not known.
+    `mission`: the one in force, without legs where there is none; None where that is not known. `occupancy`: what the
+    boat has seen around it, None where that is not fresh. `margin_m`: the least distance of a place from the fence.
     """
 
     position: m.Waypoint | None = None
     home: m.Waypoint | None = None
     has_mission: bool = False
     mission: m.Mission | None = None
+    occupancy: m.OccupancyGrid | None = None
+    margin_m: float = 0.0
 
 
 class Stick(msgspec.Struct, frozen=True):
@@ -176,9 +181,19 @@ def _holds(wheel: Wheel, client: str, hand: int) -> bool:
 def _begin_mode(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, now_us: int) -> Wheel:
     """The mode begins, with the stick in neutral."""
     wheel = _take(wheel, client, request.hand, now_us)
-    targets = {DriveMode.HOLD: facts.position, DriveMode.RETURN: facts.home}
-    target = targets.get(request.mode)
-    return replace(_rest(wheel, now_us), mode=request.mode, target=() if target is None else (target,))
+    return replace(_rest(wheel, now_us), mode=request.mode, target=_find_target(request.mode, facts))
+
+
+def _find_target(mode: DriveMode, facts: Facts) -> tuple[m.Waypoint, ...]:
+    """The station of HOLD, and the place that RETURN leads to, as they are now."""
+    if facts.position is None:
+        return ()
+    if mode is DriveMode.HOLD:
+        return (facts.position,)
+    if mode is not DriveMode.RETURN or facts.home is None:
+        return ()
+    mission = facts.mission or NO_MISSION
+    return (choose_place(facts.position, facts.home, mission, facts.occupancy, facts.margin_m),)
 
 
 def _take(wheel: Wheel, client: str, hand: int, now_us: int) -> Wheel:

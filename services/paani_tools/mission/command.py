@@ -57,10 +57,8 @@ async def _ask_on(bus: Bus, clock: Clock, options: argparse.Namespace, config: C
         origin_deg = config.localization.origin_lat_lon_deg or await _origin_of_boat(bus)
         mission, fence = await asyncio.to_thread(_load, options, config, origin_deg)
         name = mission.name
-        if fence is None:
-            answer = await client.send_legs(name, mission.legs)
-        else:
-            answer = await client.send(replace(mission, fence=fence))
+        sent = mission if fence is None else replace(mission, fence=fence)
+        answer = await client.send(sent, keep_fence=fence is None, keep_rally=not mission.rally)
     return _tell(answer, "no mission any more" if mission is None else f"{name}: {len(mission.legs)} legs, in force")
 
 
@@ -116,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     fences = send.add_mutually_exclusive_group()
     fences.add_argument("--fence", type=input_file("--fence"), metavar="FILE", help="its fence (else: as it is)")
     fences.add_argument("--no-fence", action="store_true", help="without any fence")
-    clear = deeds.add_parser("clear", help="leave the boat without a mission; the fence stays")
+    clear = deeds.add_parser("clear", help="leave the boat without a mission; fence and rally points stay")
     for deed in (send, clear):
         add_config_arguments(deed)
     return parser

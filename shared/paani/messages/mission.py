@@ -56,23 +56,25 @@ class Mission(Message, frozen=True, kw_only=True):
     """The legs in order, and the fence.
 
     The boat stays inside at least one of the areas that keep in, if there are any, and outside all that keep out.
-    Without legs there is nothing to do. `accepted_us`: when the operator's process accepted it, which is its name
-    among the missions of a run; 0: of the boat's files. `legs_us`: the same of the mission that these legs were
-    accepted with; a fence that comes later begins no leg anew.
+    `rally`: places that RETURN may lead to where they are nearer than home. Without legs there is nothing to do.
+    `accepted_us`: when the operator's process accepted it, which is its name among the missions of a run; 0: of the
+    boat's files. `legs_us`: the same of the mission that these legs were
+    accepted with; a fence or rally points that come later begin no leg anew.
     """
 
     name: Text
     legs: tuple[MissionLeg, ...]
     fence: tuple[FenceArea, ...] = ()
+    rally: tuple[Waypoint, ...] = ()
     accepted_us: Stamp = 0
     legs_us: Stamp = 0
 
 
 class MissionRequest(Message, frozen=True, kw_only=True):
-    """A whole mission, a fence, or both, that a client asks the operator's process to put in force.
+    """Legs, a fence, rally points, or all of them, that a client asks the operator's process to put in force.
 
     `press`: a number of its own for each request, the same while it is said again. `hand`: whose of the client it is.
-    `keep_legs`, `keep_fence`: those in force stay, whatever stands here.
+    `keep_legs`, `keep_fence`, `keep_rally`: those in force stay, whatever stands here.
     """
 
     press: Count
@@ -80,8 +82,10 @@ class MissionRequest(Message, frozen=True, kw_only=True):
     name: Text = ""
     legs: tuple[MissionLeg, ...] = ()
     fence: tuple[FenceArea, ...] = ()
+    rally: tuple[Waypoint, ...] = ()
     keep_legs: bool = False
     keep_fence: bool = False
+    keep_rally: bool = False
 
 
 class MissionRefusal(StrEnum):

@@ -14,8 +14,8 @@ from paani.messages.mission import MissionRefusal
 class DriveMode(StrEnum):
     """What the boat does while it is armed.
 
-    ROUTE: follows its mission or route. HOLD: keeps the station where it was ordered to. RETURN: goes home and keeps
-    the station there. MANUAL: does what a hand says. IDLE: no thrust.
+    ROUTE: follows its mission or route. HOLD: keeps the station where it was ordered to. RETURN: goes home, or to
+    a rally point that is nearer, and keeps the station there. MANUAL: does what a hand says. IDLE: no thrust.
     """
 
     ROUTE = "ROUTE"
@@ -105,9 +105,9 @@ class OperatorOrder(Message, frozen=True, kw_only=True):
     """The mode in force. It arms nothing.
 
     `source_us`: of MANUAL when the set-point was received, else now. `since_us`: when the mode was ordered, 0 for that
-    of the start. `target`: the station of HOLD, or home of RETURN. `surge`, `turn`: what the hand says, ahead and to
-    port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto. `mission_us`: `accepted_us` of the
-    mission that is in force; 0: none was accepted in this run of the operator's process.
+    of the start. `target`: the station of HOLD, or where RETURN leads to. `surge`, `turn`: what the hand says,
+    ahead and to port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto. `mission_us`:
+    `accepted_us` of the mission that is in force; 0: none was accepted in this run of the operator's process.
     """
 
     mode: DriveMode

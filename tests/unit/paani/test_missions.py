@@ -102,6 +102,24 @@ def test_what_would_take_long_to_check_is_refused_at_once(corners: int, fault: s
     assert find_mission_fault((changed(ROUTE, waypoints=line(MAX_WAYPOINTS)),), (lake,), MARGIN_M) == fault
 
 
+@pytest.mark.parametrize(
+    ("rally", "corners", "fault"),
+    [
+        (points((1, 0), (2, 0)), 4, ""),
+        (points((1, 0)) * 21, 4, "rally: has 21, more than 20"),
+        (points((1, 0)) * 20, 251, "rally: 20 times 251 corners of the fence is more than 5000"),
+        (points((1, 0), (math.nan, 0)), 4, "rally[1]: is not within 1000 km of the map's origin"),
+        (points((1, 0), (2e6, 0)), 4, "rally[1]: is not within 1000 km of the map's origin"),
+        (points((1, 0), (99, 0)), 4, "rally[1]: is outside the fence"),
+        (points((49, 0)), 4, "rally[0]: is nearer than 2.0 m to the fence"),
+    ],
+)
+def test_a_fault_of_a_rally_point_is_named(rally: tuple[Waypoint, ...], corners: int, fault: str) -> None:
+    ring = points(*((50 * math.cos(at), 50 * math.sin(at)) for at in (math.tau * n / corners for n in range(corners))))
+    fence = (FenceArea(keep=Keep.IN, corners=ring),)
+    assert find_mission_fault((), fence, 2.0, rally) == fault
+
+
 def test_a_route_alone_is_followed_once_or_without_end() -> None:
     for repeat, laps in ((True, 0), (False, 1)):
         (leg,) = mission_of_route(Route(source_us=3, name="r", waypoints=ROUTE.waypoints, repeat=repeat)).legs

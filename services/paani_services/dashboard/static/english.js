@@ -141,6 +141,8 @@ export const FAULT_TEXTS = {
   tooManyWaypoints: (/** @type {number} */ most) => `more than ${most} waypoints`,
   tooManyCorners: (/** @type {number} */ most) => `more than ${most} corners`,
   tooManyPairs: (/** @type {number} */ waypoints, /** @type {number} */ corners, /** @type {number} */ most) => `${waypoints} waypoints times ${corners} corners is more than ${most}`,
+  rally: "rally points", tooManyRally: (/** @type {number} */ most) => `more than ${most} rally points`,
+  tooManyRallyPairs: (/** @type {number} */ points, /** @type {number} */ corners, /** @type {number} */ most) => `${points} rally points times ${corners} corners is more than ${most}`,
   tooManyLegs: (/** @type {number} */ most) => `more than ${most} legs`,
   endless: (/** @type {number} */ number) => `leg ${number} has no end, so no leg may come after it`,
   near: (/** @type {number} */ marginM) => `nearer than ${marginM} m to the fence`,
@@ -229,7 +231,7 @@ export const ACTIVITIES = {
   AVOIDING: ["AVOIDING", "turn"],
   ROUTE: ["FOLLOWING ROUTE", "go"],
   STATION: ["GOING TO STATION", "go"],
-  HOME: ["RETURNING HOME", "go"],
+  HOME: ["RETURNING", "go"],
   UNDER_WAY: ["UNDER WAY", "go"],
   MANUAL: ["DRIVEN BY HAND", "turn"],
   IDLE: ["IDLE", "none"],
@@ -245,9 +247,9 @@ export const ALERTS = { off: "Silent", sound: "Sound", both: "Sound, vibration" 
 
 /** Words of the editor on the map. @type {{kinds: Record<string, string>, acts: Record<string, string>} & Record<string, any>} */
 export const EDITOR = {
-  kinds: { follow_route: "Route", hold_station: "Hold", return_home: "Return", stop: "Stop", in: "Keep in", out: "Keep out" },
+  kinds: { follow_route: "Route", hold_station: "Hold", return_home: "Return", stop: "Stop", in: "Keep in", out: "Keep out", rally: "Rally" },
   acts: { undo: "Undo", point: "Delete point", item: "Delete leg", load: "In force", open: "Open file", gpx: "GPX ↓", geojson: "GeoJSON ↓" },
-  hint: "Press on the map to draw a route, add a leg or an area, or drop a file here.",
+  hint: "Press on the map to draw a route, add a leg, an area or rally points, or drop a file here.",
   fine: "Nothing is wrong with it as far as this page knows.",
   nothing: "No mission and no route is in force.",
   noOrigin: "where the map lies on Earth is not known yet",
@@ -301,7 +303,7 @@ export const HEADING_TEXTS = {
 export const MODE_TEXTS = {
   ROUTE: ["Route", "follows its mission or route"],
   HOLD: ["Hold", "keeps its station here"],
-  RETURN: ["Return", "goes home, keeps station there"],
+  RETURN: ["Return", "goes home or to a nearer rally point, keeps station there"],
   MANUAL: ["Manual", "does what your hand says"],
   IDLE: ["Idle", "no thrust"],
 };

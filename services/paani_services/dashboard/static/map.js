@@ -5,7 +5,7 @@ import { drawBoat, drawRoute, drawTrack } from "./map_boat.js";
 import { MapControls } from "./map_controls.js";
 import { drawGrid, drawScale } from "./map_ground.js";
 import { MapHeadings } from "./map_headings.js";
-import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawStations } from "./map_objects.js";
+import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawRally, drawStations } from "./map_objects.js";
 import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { isReplay } from "./inhibits.js";
@@ -102,6 +102,7 @@ export class MapPanel {
   drawGiven(chart, store, mission, route) {
     if (mission) drawFence(chart, mission);
     if (mission) drawStations(chart, mission);
+    if (mission) drawRally(chart, mission);
     if (route) drawRoute(chart, route, store.get("navigator/command")?.waypoint_index ?? -1, store.get("dashboard/settings")?.acceptance_m ?? 1);
   }
 

@@ -1,5 +1,5 @@
 // @ts-check
-// Draws on the map what the boat is told and what it sees coming: fence, stations, home, the way ahead, moving obstacles.
+// Draws on the map what the boat is told and what it sees coming: fence, stations, rally points, home, the way ahead, moving obstacles.
 
 import { drawWords } from "./map_ground.js";
 import { MAP_TEXTS, ageText, trackNames } from "./text.js";
@@ -59,6 +59,19 @@ export function drawStations({ ctx, toScreen, pxPerM, colour }, mission) {
     ctx.stroke();
   }
   ctx.setLineDash([]);
+}
+
+/** Places that Return may lead to, flags. @param {Chart} chart @param {any} mission */
+export function drawRally({ ctx, toScreen, colour }, mission) {
+  ctx.strokeStyle = ctx.fillStyle = colour("--route");
+  ctx.lineWidth = 2;
+  for (const point of mission.rally ?? []) {
+    const [x, y] = toScreen(point.x_m, point.y_m);
+    ctx.beginPath();
+    ctx.moveTo(x, y); ctx.lineTo(x, y - 16); ctx.lineTo(x + 10, y - 12); ctx.lineTo(x, y - 8);
+    ctx.fill();
+    ctx.stroke();
+  }
 }
 
 /** Home, a house. @param {Chart} chart @param {{x_m: number, y_m: number}} home */

@@ -8,13 +8,14 @@ import { between, clearance, crossing, distance, isAllowed, segments } from "./p
 
 const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
 const MAX_TESTS = 2e6; // of a place against an edge: of a large mission fewer places are tried, so that the page answers
-const SAME_M = 0.01, MIN_AREA_M2 = 1, MAX_WAYPOINTS = 10000, MAX_CORNERS = 1000, MAX_PAIRS = 1e6, MAX_LEGS = 100;
+const SAME_M = 0.01, MIN_AREA_M2 = 1, MAX_WAYPOINTS = 10000, MAX_CORNERS = 1000, MAX_PAIRS = 1e6, MAX_LEGS = 100, MAX_RALLY = 20, MAX_RALLY_PAIRS = 5000;
 const OCCUPIED = 2; // as `Occupancy` in messages/occupancy.py
 
 /**
  * @typedef {import("./plane_geometry.js").Point} Point
  * @typedef {{kind: string, waypoints: Point[], repeat: boolean, laps: number, radius_m: number, duration_s: number, speed_mps: number}} Leg
- * @typedef {{legs: Leg[], fence: import("./plane_geometry.js").Area[]}} Plan
+ * `rally`: at most one, whose waypoints are the rally points.
+ * @typedef {{legs: Leg[], fence: import("./plane_geometry.js").Area[], rally: Leg[]}} Plan
  * @typedef {{marginM: number, turnRadiusM: number}} Limits
  * @typedef {{at: Point | null, text: string}} Mark
  */
@@ -27,23 +28,27 @@ export function findMarks(plan, limits, grid) {
     ...counts,
     ...plan.fence.flatMap((area, index) => areaMarks(area, FAULT_TEXTS.area(area.keep === "in", index + 1))),
     ...plan.legs.flatMap((leg, index) => legMarks(leg, FAULT_TEXTS.leg(index + 1), plan, limits, cells)),
+    ...plan.rally.flatMap((leg) => legMarks(leg, FAULT_TEXTS.rally, plan, limits, cells)),
   ];
 }
 
 /** @param {Plan} plan */
-const sizeOf = ({ legs, fence }) => ({
+const sizeOf = ({ legs, fence, rally }) => ({
+  rally: rally.reduce((all, leg) => all + leg.waypoints.length, 0),
   waypoints: legs.reduce((all, leg) => all + leg.waypoints.length, 0),
   corners: fence.reduce((all, area) => all + area.corners.length, 0),
 });
 
 /** Faults of numbers; with one that is too much nothing else is looked at. @param {Plan} plan @returns {(Mark & {isTooMuch: boolean})[]} */
 function countMarks(plan) {
-  const { legs } = plan, { waypoints, corners } = sizeOf(plan);
+  const { legs } = plan, { waypoints, corners, rally } = sizeOf(plan);
   const endless = legs.findIndex((leg) => leg.kind === "follow_route" && leg.laps === 0), found = [];
   if (waypoints > MAX_WAYPOINTS) found.push(FAULT_TEXTS.tooManyWaypoints(MAX_WAYPOINTS));
   if (corners > MAX_CORNERS) found.push(FAULT_TEXTS.tooManyCorners(MAX_CORNERS));
   if (waypoints * corners > MAX_PAIRS) found.push(FAULT_TEXTS.tooManyPairs(waypoints, corners, MAX_PAIRS));
   if (legs.length > MAX_LEGS) found.push(FAULT_TEXTS.tooManyLegs(MAX_LEGS));
+  if (rally > MAX_RALLY) found.push(FAULT_TEXTS.tooManyRally(MAX_RALLY));
+  if (rally * corners > MAX_RALLY_PAIRS) found.push(FAULT_TEXTS.tooManyRallyPairs(rally, corners, MAX_RALLY_PAIRS));
   /** @type {(Mark & {isTooMuch: boolean})[]} */
   const marks = found.map((text) => ({ at: null, text, isTooMuch: true }));
   if (endless >= 0 && endless < legs.length - 1) marks.push({ at: null, text: FAULT_TEXTS.endless(endless + 1), isTooMuch: false });
@@ -70,11 +75,12 @@ function legMarks(leg, name, plan, limits, cells) {
   const { waypoints } = leg;
   if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: ${FAULT_TEXTS.fewWaypoints}` }];
   /** @type {Mark[]} */
-  const found = [], { waypoints: all, corners } = sizeOf(plan), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * all * Math.max(1, corners))));
-  const ways = waypoints.length === 1 ? /** @type {[Point, Point][]} */ ([[waypoints[0], waypoints[0]]]) : segments(waypoints, leg.repeat);
+  const found = [], { waypoints: all, corners } = sizeOf(plan), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * Math.max(1, all) * Math.max(1, corners))));
+  const isLine = waypoints.length > 1 && leg.kind !== "rally";
+  const ways = isLine ? segments(waypoints, leg.repeat) : waypoints.map((at) => /** @type {[Point, Point]} */ ([at, at]));
   ways.forEach(([a, b], index) => {
     const where = `${name}, ${FAULT_TEXTS.waypoint} ${index + 1}`;
-    if (waypoints.length > 1 && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: ${FAULT_TEXTS.sameWaypoint}` });
+    if (isLine && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: ${FAULT_TEXTS.sameWaypoint}` });
     const outside = firstAlong(a, b, most, (at) => !isAllowed(plan.fence, at));
     if (outside) found.push({ at: outside, text: `${where}: ${FAULT_TEXTS.outside}` });
     const near = outside ? null : firstAlong(a, b, most, (at) => clearance(plan.fence, at) < limits.marginM);

@@ -1,6 +1,6 @@
 // @ts-check
 // Missions as GPX and GeoJSON, as `paani route` and the navigator read and write them: one LineString or route, polygons
-// with `keep`; further legs, and points of stations, as features of their own with `leg`.
+// with `keep`, points with `rally`; further legs, and points of stations, as features of their own with `leg`.
 
 import { FILE_TEXTS } from "./text.js";
 
@@ -44,7 +44,7 @@ export function toMap(latitude, longitude, origin) {
 }
 
 /** @param {Point[]} waypoints @param {Partial<Leg>} [more] @returns {Leg} */
-const leg = (waypoints, more = {}) => ({ kind: "follow_route", waypoints, repeat: false, laps: 1, radius_m: 0, duration_s: 0, speed_mps: 0, ...more });
+export const leg = (waypoints, more = {}) => ({ kind: "follow_route", waypoints, repeat: false, laps: 1, radius_m: 0, duration_s: 0, speed_mps: 0, ...more });
 
 /** The plan of a file. Throws an Error whose message says what is wrong with it. @param {string} name @param {string} text @param {Origin} origin @returns {Plan} */
 export function readFile(name, text, origin) {
@@ -52,7 +52,7 @@ export function readFile(name, text, origin) {
   const plan = /\.gpx$/i.test(name) ? readGpx(text, origin) : readGeoJson(text, origin);
   const count = plan.legs.reduce((all, each) => all + each.waypoints.length, 0);
   if (count > MAX_POINTS) throw new Error(FILE_TEXTS.tooManyPoints(count, MAX_POINTS));
-  if (!plan.legs.length && !plan.fence.length) throw new Error(FILE_TEXTS.empty);
+  if (!plan.legs.length && !plan.fence.length && !plan.rally.length) throw new Error(FILE_TEXTS.empty);
   return plan;
 }
 
@@ -65,10 +65,10 @@ function readGpx(text, origin) {
     [...parent.getElementsByTagNameNS("*", element)].map((each) => toMap(number(each.getAttribute("lat")), number(each.getAttribute("lon")), origin));
   for (const [line, element] of [["rte", "rtept"], ["trk", "trkpt"]]) {
     const lines = [...file.getElementsByTagNameNS("*", line)].map((each) => closed(leg(points(each, element)), each.getElementsByTagNameNS("*", "type")[0]?.textContent === "repeat"));
-    if (lines.some((each) => each.waypoints.length)) return { legs: lines, fence: [] };
+    if (lines.some((each) => each.waypoints.length)) return { legs: lines, fence: [], rally: [] };
   }
   const lone = points(file.documentElement, "wpt");
-  return { legs: lone.length ? [leg(lone)] : [], fence: [] };
+  return { legs: lone.length ? [leg(lone)] : [], fence: [], rally: [] };
 }
 
 /** @param {string | null} text */
@@ -90,17 +90,23 @@ function readGeoJson(text, origin) {
   const root = JSON.parse(text), features = root?.features ?? [root];
   if (!Array.isArray(features)) throw new Error(FILE_TEXTS.noGeoJson);
   /** @type {Plan} */
-  const plan = { legs: [], fence: [] };
+  const plan = { legs: [], fence: [], rally: [] };
+  /** @type {Point[]} */
+  const rally = [];
   const toPoint = (/** @type {any} */ at) => toMap(Number(at?.[1]), Number(at?.[0]), origin);
   for (const feature of features) {
     const geometry = feature?.geometry ?? feature, properties = feature?.properties ?? {}, more = properties.leg ?? {};
     if (geometry?.type === "LineString") plan.legs.push({ ...closed(leg(geometry.coordinates.map(toPoint)), properties.repeat === true), ...more });
+    else if (geometry?.type === "Point" && properties.rally === true) rally.push(toPoint(geometry.coordinates));
     else if (geometry?.type === "Point") plan.legs.push(leg([toPoint(geometry.coordinates)], { kind: "hold_station", radius_m: 3, ...more }));
     else if (geometry?.type === "Polygon") plan.fence.push({ keep: properties.keep === "out" ? "out" : "in", corners: geometry.coordinates[0].slice(0, -1).map(toPoint) });
     else if (feature?.geometry === null && more.kind) plan.legs.push(leg([], more));
   }
-  return plan;
+  return { ...plan, rally: rallyOf(rally) };
 }
+
+/** Rally points as what is drawn at once; nothing where there are none. @param {Point[]} points @returns {Leg[]} */
+export const rallyOf = (points) => (points.length ? [leg(points, { kind: "rally" })] : []);
 
 /** Routes alone: GPX knows no fence and no station. @param {Plan} plan @param {Origin} origin */
 export function writeGpx(plan, origin) {
@@ -135,5 +141,8 @@ export function writeGeoJson(plan, origin) {
   const areas = plan.fence.map(({ keep, corners }) => ({
     type: "Feature", properties: { keep }, geometry: { type: "Polygon", coordinates: [[...corners, corners[0]].map(position)] },
   }));
-  return `${JSON.stringify({ type: "FeatureCollection", features: [...lines, ...areas] }, null, 1)}\n`;
+  const rally = plan.rally.flatMap(({ waypoints }) => waypoints).map((point) => ({
+    type: "Feature", properties: { rally: true }, geometry: { type: "Point", coordinates: position(point) },
+  }));
+  return `${JSON.stringify({ type: "FeatureCollection", features: [...lines, ...areas, ...rally] }, null, 1)}\n`;
 }

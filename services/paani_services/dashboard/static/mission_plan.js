@@ -1,6 +1,7 @@
 // @ts-check
-// The mission that is being drawn: legs, fence, which of them is at hand, and what undo brings back. Pure.
+// The mission that is being drawn: legs, fence, rally points, which of them is at hand, and what undo brings back. Pure.
 
+import { leg } from "./mission_files.js";
 import { distance, nearest, segments } from "./plane_geometry.js";
 
 const MAX_UNDO = 100;
@@ -10,8 +11,8 @@ const MAX_UNDO = 100;
 export class MissionPlan {
   constructor() {
     /** @type {import("./mission_checks.js").Plan} */
-    this.plan = { legs: [], fence: [] };
-    /** The leg or area whose points are drawn: legs first, then areas. */
+    this.plan = { legs: [], fence: [], rally: [] };
+    /** The leg or area whose points are drawn: legs first, then areas, then the rally points together. */
     this.current = 0;
     /** The point at hand, of the current one; -1: none. */
     this.point = -1;
@@ -20,7 +21,7 @@ export class MissionPlan {
   }
 
   get items() {
-    return [...this.plan.legs, ...this.plan.fence];
+    return [...this.plan.legs, ...this.plan.fence, ...this.plan.rally];
   }
 
   /** The points of a leg or an area; undefined where there is none. @param {number} [index] @returns {Point[] | undefined} */
@@ -38,7 +39,7 @@ export class MissionPlan {
   /** How many points the current one may have. */
   get room() {
     const item = this.items[this.current];
-    return !item || "corners" in item || item.kind === "follow_route" ? Infinity : item.kind === "stop" ? 0 : 1;
+    return !item || "corners" in item || ["follow_route", "rally"].includes(item.kind) ? Infinity : item.kind === "stop" ? 0 : 1;
   }
 
   /** Remember what undo brings back; before a change, and once for a whole drag. */
@@ -61,14 +62,17 @@ export class MissionPlan {
     this.point = -1;
   }
 
-  /** @param {string} kind of a leg, or `in` or `out` of an area */
+  /** @param {string} kind of a leg, `in` or `out` of an area, or `rally`, of which there is one */
   addItem(kind) {
     this.remember();
     if (kind === "in" || kind === "out") {
       this.plan.fence.push({ keep: kind, corners: [] });
+      this.current = this.plan.legs.length + this.plan.fence.length - 1;
+    } else if (kind === "rally") {
+      if (!this.plan.rally.length) this.plan.rally.push(leg([], { kind }));
       this.current = this.items.length - 1;
     } else {
-      this.plan.legs.push({ kind, waypoints: [], repeat: false, laps: 1, radius_m: kind === "hold_station" ? 3 : 0, duration_s: kind === "hold_station" ? 60 : 0, speed_mps: 0 });
+      this.plan.legs.push(leg([], kind === "hold_station" ? { kind, radius_m: 3, duration_s: 60 } : { kind }));
       this.current = this.plan.legs.length - 1;
     }
     this.point = -1;
@@ -77,9 +81,10 @@ export class MissionPlan {
   removeItem() {
     if (!this.items.length) return;
     this.remember();
-    const legs = this.plan.legs.length;
-    if (this.current < legs) this.plan.legs.splice(this.current, 1);
-    else this.plan.fence.splice(this.current - legs, 1);
+    const { legs, fence, rally } = this.plan, areas = this.current - legs.length;
+    if (areas < 0) legs.splice(this.current, 1);
+    else if (areas < fence.length) fence.splice(areas, 1);
+    else rally.length = 0;
     this.current = Math.max(0, this.current - 1);
     this.point = -1;
   }
@@ -114,8 +119,8 @@ export class MissionPlan {
 
   /** Insert a point where a line of the current one is within reach. @param {Point} at @param {number} reachM */
   insert(at, reachM) {
-    const points = this.points() ?? [];
-    if (this.room < Infinity) return false;
+    const points = this.points() ?? [], item = this.items[this.current];
+    if (this.room < Infinity || (item && "kind" in item && item.kind === "rally")) return false;
     const index = segments(points, this.isClosed() && points.length > 2).findIndex(([a, b]) => distance(at, nearest(at, a, b)) <= reachM);
     if (index < 0) return false;
     this.remember();

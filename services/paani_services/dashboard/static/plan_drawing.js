@@ -17,7 +17,7 @@ function drawItem({ ctx, toScreen, pxPerM, colour }, made, index) {
   ctx.globalAlpha = isCurrent ? 1 : 0.6;
   ctx.lineWidth = isCurrent ? 3 : 2;
   ctx.beginPath();
-  for (const point of points) ctx.lineTo(...toScreen(point.x_m, point.y_m));
+  if (!("kind" in item && item.kind === "rally")) for (const point of points) ctx.lineTo(...toScreen(point.x_m, point.y_m));
   if (made.isClosed(index) && points.length > 2) ctx.closePath();
   ctx.stroke();
   points.forEach((point, number) => {

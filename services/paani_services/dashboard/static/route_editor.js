@@ -1,9 +1,9 @@
 // @ts-check
-// The editor on the map: legs and fence are drawn, checked as they are, and sent to the operator's process as one request,
+// The editor on the map: legs, fence and rally points are drawn, checked as they are, and sent to the operator's process as one request,
 // which accepts or refuses the whole. Nothing that is drawn is in force before that.
 
 import { findMarks } from "./mission_checks.js";
-import { mapOrigin, readFile, writeGeoJson, writeGpx } from "./mission_files.js";
+import { leg, mapOrigin, rallyOf, readFile, writeGeoJson, writeGpx } from "./mission_files.js";
 import { MissionPlan } from "./mission_plan.js";
 import { drawPlan } from "./plan_drawing.js";
 import { hand, hasKey, post } from "./requests.js";
@@ -122,8 +122,8 @@ export class RouteEditor {
   /** The mission in force, or the route. */
   load() {
     const mission = this.store?.get("navigator/mission"), route = this.store?.get("navigator/route");
-    if (mission) this.made.replace(structuredClone({ legs: mission.legs, fence: mission.fence ?? [] }));
-    else if (route) this.made.replace({ legs: [{ kind: "follow_route", waypoints: structuredClone(route.waypoints), repeat: route.repeat, laps: route.repeat ? 0 : 1, radius_m: 0, duration_s: 0, speed_mps: 0 }], fence: [] });
+    if (mission) this.made.replace(structuredClone({ legs: mission.legs, fence: mission.fence ?? [], rally: rallyOf(mission.rally ?? []) }));
+    else if (route) this.made.replace({ legs: [leg(structuredClone(route.waypoints), { repeat: route.repeat, laps: route.repeat ? 0 : 1 })], fence: [], rally: [] });
     else this.note = EDITOR.nothing;
   }
 
@@ -139,7 +139,9 @@ export class RouteEditor {
     if (!file) return;
     try {
       const found = readFile(file.name, await file.text(), this.origin()), { plan } = this.made;
-      this.made.replace({ legs: found.legs.length ? found.legs : plan.legs, fence: found.fence.length ? found.fence : plan.fence });
+      this.made.replace({
+        legs: found.legs.length ? found.legs : plan.legs, fence: found.fence.length ? found.fence : plan.fence, rally: found.rally.length ? found.rally : plan.rally,
+      });
       this.note = "";
       this.map.fitTo(this.made.items.flatMap((_, index) => this.made.points(index) ?? []));
     } catch (error) {
@@ -166,7 +168,8 @@ export class RouteEditor {
     if (!hasKey()) return;
     byId("editor-send").disabled = true;
     this.note = EDITOR.sent;
-    const refused = await post("/api/mission", { hand, name: "drawn", ...this.made.plan });
+    const { legs, fence, rally } = this.made.plan;
+    const refused = await post("/api/mission", { hand, name: "drawn", legs, fence, rally: rally.flatMap(({ waypoints }) => waypoints) });
     this.note = refused || EDITOR.accepted;
     byId("editor-send").disabled = false;
   }

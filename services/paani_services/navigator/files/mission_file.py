@@ -15,9 +15,11 @@ from paani.missions import (
     MAX_LAPS,
     MAX_LEGS,
     MAX_RADIUS_M,
+    MAX_RALLY,
     MAX_WAYPOINTS,
     MIN_RADIUS_M,
     find_leg_outside,
+    find_rally_fault,
     mission_of_route,
 )
 from paani_services.navigator.files.bounded_reading import read_toml
@@ -71,6 +73,7 @@ class _MissionFile(Section, frozen=True):
     name: Annotated[str, msgspec.Meta(max_length=100)] = ""
     origin: Origin | None = None
     home: FilePoint | None = None
+    rally: Annotated[tuple[FilePoint, ...], msgspec.Meta(max_length=MAX_RALLY)] = ()
 
 
 def load_route_and_mission(
@@ -98,6 +101,8 @@ def load_route_and_mission(
         if found is not None:
             leg, waypoint, what = found
             raise UserError(f"{where}: {f'legs[{leg}].' if config.mission else ''}waypoints[{waypoint}]: {what}")
+        if fault := find_rally_fault(mission.rally, mission.fence, config.fence_margin_m):
+            raise UserError(f"{where}: {fault}")
     return next_route(mission) or route, mission
 
 
@@ -137,7 +142,8 @@ def load_mission(
                 legs.append(MissionLeg(kind=LegKind.STOP))
     if sum(len(leg.waypoints) for leg in legs) > MAX_WAYPOINTS:
         raise UserError(f"{where}: legs: more than {MAX_WAYPOINTS} waypoints together")
-    return Mission(source_us=0, name=file.name or path.stem, legs=tuple(legs))
+    rally = tuple(frame.waypoint_of(point, f"rally[{number}]") for number, point in enumerate(file.rally))
+    return Mission(source_us=0, name=file.name or path.stem, legs=tuple(legs), rally=rally)
 
 
 def next_route(mission: Mission, leg: int = 0) -> Route | None:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
@@ -63,7 +64,8 @@ def test_the_fence_tells_in_from_out() -> None:
     areas = tuple(m.FenceArea(keep=keep, corners=WAYPOINTS) for keep in (m.Keep.IN, m.Keep.OUT))
     station = m.MissionLeg(kind=m.LegKind.HOLD_STATION, waypoints=(WAYPOINTS[1],), radius_m=3.0)
     planned = m.Mission(source_us=NOW_US, name="x", legs=(station, m.MissionLeg(kind=m.LegKind.STOP)), fence=areas)
-    fence, stations = (entity(each) for each in scene.mission(planned))
+    rally, fence, stations = (entity(each) for each in scene.mission(replace(planned, rally=WAYPOINTS[:2])))
+    assert [text.text for text in rally.texts] == ["rally", "rally"]
     inner, outer = fence.lines
     assert inner.type == outer.type == pb.SCENE_LINE_LOOP
     assert inner.color.g > inner.color.r

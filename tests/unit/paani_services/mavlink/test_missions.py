@@ -1,10 +1,11 @@
-"""Mission and fence as they are downloaded."""
+"""Mission, fence and rally points as they are downloaded."""
 
 from __future__ import annotations
 
 import math
 
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import common
 
 from paani import messages as m
@@ -79,6 +80,14 @@ def test_each_corner_of_the_fence_says_how_many_there_are() -> None:
     assert [(item.command, item.parameters[0]) for item in items] == [(5001, 3.0)] * 3 + [(5002, 4.0)] * 4
     assert place_m(items[1].place_e7) == pytest.approx((60.0, 0.0), abs=0.02)
     assert plan().items[RALLY] == ()
+
+
+def test_rally_points_are_items_of_their_own() -> None:
+    snapshot = in_order(mission=replace(WHOLE, rally=POINTS[1:]), prediction=KNOWN_HOME)
+    items = plan_of(snapshot).items[RALLY]
+    assert [(item.command, item.frame) for item in items] == [(5100, common.MAV_FRAME_GLOBAL_RELATIVE_ALT)] * 2
+    for item, point in zip(items, POINTS[1:], strict=True):
+        assert place_m(item.place_e7) == pytest.approx((point.x_m, point.y_m), abs=0.02)
 
 
 @pytest.mark.parametrize("unknown", [{"mission": None}, {"odometry": None}, {"odometry": odometry(healthy=False)}])

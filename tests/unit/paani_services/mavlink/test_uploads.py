@@ -14,7 +14,7 @@ from paani.map_origin import map_origin_deg
 from paani.mission_client import MissionAnswer
 from paani_services.mavlink.commands import mission_result
 from paani_services.mavlink.mission_items import Item, ItemError, areas_of_items, legs_of_items
-from paani_services.mavlink.missions import FENCE, MISSION, plan_of
+from paani_services.mavlink.missions import FENCE, MISSION, RALLY, plan_of
 from tests.mavlink_peer import HEARTBEAT, NOW_US, Peer, Port, in_order, kinds, odometry, only
 
 POINTS = tuple(m.Waypoint(x_m=x, y_m=y) for x, y in ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0)))
@@ -222,21 +222,57 @@ def test_too_many_items_and_what_a_stranger_sends_are_refused_at_once() -> None:
     assert port.sent == []
 
 
-def test_clearing_takes_the_mission_the_fence_or_both() -> None:
+def test_clearing_takes_the_mission_the_fence_the_rally_points_or_all() -> None:
     port, peer = made()
-    for kind in (MISSION, FENCE, 255):
+    for kind in (MISSION, FENCE, RALLY, 255):
         assert peer.send(common.MAVLink_mission_clear_all_message(1, 1, kind)) == []
-    assert [(order.legs, order.fence) for order in port.sent] == [((), None), (None, ()), ((), ())]
+    assert [(order.legs, order.fence, order.rally) for order in port.sent] == [
+        ((), None, None), (None, (), None), (None, None, ()), ((), (), ()),
+    ]  # fmt: skip
 
 
-def test_there_are_no_rally_points() -> None:
-    _, peer = made()
-    for message, result in (
-        (common.MAVLink_mission_count_message(1, 1, 1, 2), common.MAV_MISSION_UNSUPPORTED),
-        (common.MAVLink_mission_count_message(1, 1, 0, 2), common.MAV_MISSION_ACCEPTED),
-        (common.MAVLink_mission_clear_all_message(1, 1, 2), common.MAV_MISSION_ACCEPTED),
-    ):
-        assert only(peer.send(message), "MISSION_ACK").type == result
+def rally_point(place_e7: tuple[int, int], command: int = 5100) -> Item:
+    return Item(command, (0.0, 0.0, 0.0, 0.0), place_e7)
+
+
+def test_rally_points_are_asked_of_the_operators_process_and_come_back() -> None:
+    port, peer = made()
+    assert "MISSION_ACK" not in kinds(upload(peer, [rally_point(place) for place in PLACES[:2]], RALLY))
+    (order,) = port.sent
+    assert (order.kind, order.legs, order.fence) == (RALLY, None, None)
+    assert order.rally is not None
+    origin_deg = map_origin_deg(odometry())
+    assert [(at.x_m, at.y_m) for at in order.rally] == [
+        pytest.approx(enu_from_geodetic(*(each * 1e-7 for each in place), *origin_deg), abs=0.02)
+        for place in PLACES[:2]
+    ]
+    assert only(peer.send(common.MAVLink_mission_request_list_message(1, 1, 2)), "MISSION_COUNT").count == 0
+    mission = m.Mission(source_us=1, name="", legs=(), rally=order.rally, accepted_us=5)
+    port.gateway.tick(in_order(mission=mission, now_us=NOW_US + 20_000))
+    peer.received()
+    assert only(peer.send(common.MAVLink_mission_request_list_message(1, 1, 2)), "MISSION_COUNT").count == 2
+    item = only(peer.send(common.MAVLink_mission_request_int_message(1, 1, 1, 2)), "MISSION_ITEM_INT")
+    assert (item.command, item.mission_type, item.x, item.y) == (5100, RALLY, *PLACES[1])
+
+
+@pytest.mark.parametrize(
+    ("items", "result"),
+    [
+        ([rally_point(PLACES[0]), rally_point((0, 0))], common.MAV_MISSION_INVALID_PARAM5_X),
+        ([rally_point((910_000_000, 0))], common.MAV_MISSION_INVALID_PARAM5_X),
+        ([rally_point(PLACES[0], 16)], common.MAV_MISSION_UNSUPPORTED),
+        ([rally_point(PLACES[0])._replace(frame=1)], common.MAV_MISSION_UNSUPPORTED_FRAME),
+        ([rally_point(PLACES[0])] * 21, common.MAV_MISSION_NO_SPACE),
+    ],
+)
+def test_what_is_no_rally_point_is_refused_and_asks_nothing(items: list[Item], result: int) -> None:
+    port, peer = made()
+    if len(items) > 20:
+        answers = peer.send(common.MAVLink_mission_count_message(1, 1, len(items), RALLY))
+    else:
+        answers = upload(peer, items, RALLY)
+    ack = only(answers, "MISSION_ACK")
+    assert (ack.type, ack.mission_type, port.sent) == (result, RALLY, [])
 
 
 def test_a_fence_of_polygons_and_circles() -> None:

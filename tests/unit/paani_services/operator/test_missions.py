@@ -67,6 +67,18 @@ def test_what_is_kept_stays_and_legs_that_stay_keep_their_stamp() -> None:
     assert (legs.fence, legs.accepted_us) == (FENCE, 51), "a clock that was set back names no two missions alike"
 
 
+def test_rally_points_move_nothing_in_any_mode_but_route_and_stay_where_they_are_kept() -> None:
+    rally = points((3, 0))
+    sent = replace(SENT, rally=rally, keep_legs=True, keep_fence=True)
+    for mode in DriveMode:
+        refusal = MissionRefusal.UNDER_WAY if mode is DriveMode.ROUTE else MissionRefusal.NONE
+        assert missions.find_refusal(sent, replace(FREE, armed=True, mode=mode)) is refusal
+    mission = missions.merge(sent, FILES, 50)
+    assert (mission.legs, mission.fence, mission.rally, mission.legs_us) == (LEGS, FENCE, rally, 0)
+    assert missions.merge(replace(SENT, keep_rally=True), mission, 60).rally == rally
+    assert missions.merge(SENT, mission, 60).rally == ()
+
+
 class MissionDesk(Desk):
     """A console that knows the mission of the files."""
 
@@ -101,6 +113,29 @@ async def test_a_mission_that_leaves_its_fence_is_refused_and_the_one_before_sta
     state = await desk.send(replace(SENT, press=10, fence=NARROW, keep_legs=True))
     assert state.mission_fault.endswith("is outside the fence"), "the legs of the files within another fence"
     assert (state.mission_us, desk.missions.messages) == (0, [])
+
+
+async def test_a_rally_point_outside_the_fence_or_on_what_was_seen_is_refused_and_those_before_stay(
+    tmp_path: Path,
+) -> None:
+    desk = MissionDesk(tmp_path)
+    seen = m.OccupancyGrid(source_us=1, west_m=0.0, south_m=0.0, cell_m=1.0, columns=4, rows=1, cells=b"\x80")
+    desk.console._read_facts = lambda: Facts(mission=FILES, occupancy=seen)
+    alone = replace(SENT, keep_legs=True, keep_fence=True, rally=points((1, 0)))
+    mission_us = (await desk.send(alone)).mission_us
+    for number, (place, fault) in enumerate((
+        ((60, 0), "rally[1]: is outside the fence"),
+        ((3.5, 0.5), "rally[1]: the boat has seen something there"),
+    )):  # fmt: skip
+        state = await desk.send(replace(alone, press=20 + number, rally=points((1, 0), place)))
+        assert (state.mission_refusal, state.mission_fault) == (MissionRefusal.INVALID, fault)
+    state = await desk.send(replace(SENT, press=30, legs=(), fence=NARROW[:0], keep_rally=True))
+    assert state.mission_refusal is MissionRefusal.NONE, "rally points that are kept are not looked at again"
+    assert desk.console.mission.rally == points((1, 0))
+    assert mission_us < state.mission_us
+    narrow = replace(SENT, legs=(), fence=NARROW, keep_rally=True)
+    assert (await desk.send(replace(alone, press=32, rally=points((20, 0))))).mission_refusal is MissionRefusal.NONE
+    assert (await desk.send(replace(narrow, press=33))).mission_fault == "rally[0]: is outside the fence"
 
 
 async def test_under_way_nothing_changes_and_in_idle_it_does(tmp_path: Path) -> None:

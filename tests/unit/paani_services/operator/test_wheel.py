@@ -101,6 +101,20 @@ def test_a_station_is_where_the_mode_was_asked_for_and_home_is_what_is_known_the
     assert not bridge.order.target
 
 
+def test_return_leads_to_a_rally_point_that_is_nearer_and_stays_with_it() -> None:
+    near = m.Waypoint(x_m=4.0, y_m=4.0)
+    known = msgspec.structs.replace(ALL, mission=m.Mission(source_us=1, name="", legs=(), rally=(near,)))
+    bridge = Bridge(known)
+    bridge.mode(DriveMode.RETURN)
+    assert bridge.order.target == (near,)
+    bridge.facts = ALL
+    assert bridge.order.target == (near,)
+    bridge.mode(DriveMode.RETURN)
+    assert bridge.order.target == (HOME,), "a mission that is not known has no rally points"
+    bridge.facts = msgspec.structs.replace(known, home=None)
+    assert bridge.mode(DriveMode.RETURN) is ModeRefusal.NO_HOME
+
+
 def test_a_request_that_is_said_again_is_answered_once() -> None:
     bridge = Bridge()
     request = m.OperatorRequest(source_us=1, act=RequestAct.MODE, press=9, hand=1, mode=DriveMode.HOLD)

@@ -53,6 +53,20 @@ def written(folder: Path, name: str, text: str) -> Path:
     return path
 
 
+def test_rally_points_of_a_mission_file_lie_within_the_fence_or_are_named(tmp_path: Path) -> None:
+    corners = [f"{{x_m = {x}, y_m = {y}}}" for x, y in ((-30, -30), (50, -30), (50, 30), (-30, 30))]
+    fence = written(tmp_path, "f.toml", f'[[areas]]\nkeep = "in"\ncorners = [{", ".join(corners)}]\n')
+    route = written(tmp_path, "r.toml", ROUTE_TOML)
+    mission = written(tmp_path, "m.toml", f"rally = [{{x_m = 5.0, y_m = 6.0}}]\n{MISSION_TOML}")
+    config = msgspec.structs.replace(PAANI, route=str(route), mission=str(mission), fence=str(fence))
+    _, loaded = load_route_and_mission(config, None)
+    assert loaded is not None
+    assert loaded.rally == (Waypoint(x_m=5.0, y_m=6.0),)
+    written(tmp_path, "m.toml", f"rally = [{{x_m = 5.0, y_m = 6.0}}, {{x_m = 60.0, y_m = 0.0}}]\n{MISSION_TOML}")
+    with pytest.raises(UserError, match=r"m\.toml: rally\[1\]: is outside the fence"):
+        load_route_and_mission(config, None)
+
+
 def test_a_mission_file_gives_its_legs_and_the_route_to_show(tmp_path: Path) -> None:
     route, mission = written(tmp_path, "r.toml", ROUTE_TOML), written(tmp_path, "m.toml", MISSION_TOML)
     config = msgspec.structs.replace(PAANI, route=str(route), mission=str(mission))
