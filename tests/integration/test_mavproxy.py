@@ -28,7 +28,7 @@ pytestmark = [
 COMMAND, LATITUDE = 3, 8  # columns of a file of waypoints
 UNPRINTED = re.compile(r"[^\x20-\x7e\n]")
 LIMIT_S = 30.0  # for a word of the boat
-MODULES = "--default-modules=param,wp,fence,rally,arm,mode"
+MODULES = "--default-modules=param,wp,fence,arm,mode"
 
 
 @pytest.fixture
@@ -78,7 +78,6 @@ async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
 ) -> None:
     bus = await open_bus(river.config.bus, "observer", WallClock())
     states, speeds, missions = (bus.latest(key) for key in (keys.OPERATOR_STATE, keys.ODOMETRY, keys.MISSION))
-    orders = bus.latest(keys.OPERATOR_ORDER)
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-W", "ignore", "-m", "MAVProxy.mavproxy", "--master", f"tcp:127.0.0.1:{river.tcp}", "--nowait",
         f"--state-basedir={tmp_path}", MODULES, cwd=tmp_path, env={**os.environ, "HOME": str(tmp_path)},
@@ -123,26 +122,6 @@ async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
         await console.expect("TYPE_MISSION: INVALID", "wp load outside.txt", "TYPE_MISSION: DENIED")
         assert "is outside the fence" in console.printed
 
-        # A rally point outside the fence is refused; those within are taken, listed, and cleared.
-        def save_rally(name: str, *places: tuple[float, float]) -> None:
-            save(name, *(
-                [str(seq), "0", "3", "5100", "0", "0", "0", "0", str(place[0]), str(place[1]), "0", "1"]
-                for seq, place in enumerate(places)
-            ))  # fmt: skip
-
-        inside = (latitudes[0] + 1e-5, longitudes[0]), (latitudes[-1], longitudes[-1])
-        save_rally("rally.txt", *inside)
-        save_rally("ashore.txt", inside[0], (51.0, west))
-        await console.expect("TYPE_RALLY: ACCEPTED", "rally load rally.txt", "TYPE_RALLY: DENIED")
-        mission = await until(missions.next, lambda mission: len(mission.rally) == 2, LIMIT_S)
-        await console.expect("TYPE_RALLY: INVALID", "rally load ashore.txt", "TYPE_RALLY: DENIED")
-        assert "rally[1]: is outside the fence" in console.printed
-        await console.expect("Saved 2 rally items", "rally list")
-        await console.expect("TYPE_RALLY: ACCEPTED", "rally clear", "TYPE_RALLY: DENIED")
-        await until(missions.next, lambda mission: not mission.rally, LIMIT_S)
-        await console.expect("TYPE_RALLY: ACCEPTED", "rally load rally.txt", "TYPE_RALLY: DENIED")
-        assert (await until(missions.next, lambda found: bool(found.rally), LIMIT_S)).rally == mission.rally
-
         await console.expect("COMPONENT_ARM_DISARM: ACCEPTED", "arm throttle", "COMPONENT_ARM_DISARM: FAILED")
         assert (await until(states.next, lambda state: state.armed, LIMIT_S)).by == "mavlink"
         await console.expect("DO_SET_MODE: ACCEPTED", "mode AUTO", "DO_SET_MODE: DENIED")
@@ -150,8 +129,6 @@ async def test_mavproxy_runs_a_mission_is_refused_and_is_lost(
         transcript.note("boat", "makes way")
         await console.expect("Mode RTL", "mode RTL", "DO_SET_MODE: DENIED")
         await until(states.next, lambda state: state.mode is m.DriveMode.RETURN, LIMIT_S)
-        order = await orders.next()
-        transcript.note("boat", f"returns to {order.target}")
     finally:
         process.kill()
         await process.wait()
