@@ -155,7 +155,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         await editor.choose("+ Hold")
         await editor.press((0, -14))
         await editor.choose("+ Rally")
-        await editor.press((-14, -14), (14, -14))
+        await editor.press((-14, -14))  # beside the one in force
         await page.click("#editor-send")
         await editor.until_note("Accepted")
         async with asyncio.timeout(5.0):
@@ -165,7 +165,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         drawn = [(point.x_m, point.y_m) for point in accepted.value.legs[0].waypoints]
         assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
         assert len(accepted.value.fence) == 2
-        assert [(round(point.x_m), round(point.y_m)) for point in accepted.value.rally] == [(-14, -14), (14, -14)]
+        assert [(round(point.x_m), round(point.y_m)) for point in accepted.value.rally] == [(14, -14), (-14, -14)]
         await page.wait_for_timeout(300)
         await page.screenshot(path=tmp_path / "accepted.png")
         axe = await asyncio.to_thread(AXE.read_text, encoding="utf-8")

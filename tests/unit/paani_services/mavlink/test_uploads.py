@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import common
 
 from paani import messages as m
@@ -243,7 +244,7 @@ def test_rally_points_are_asked_of_the_operators_process_and_come_back() -> None
     assert order.rally is not None
     origin_deg = map_origin_deg(odometry())
     assert [(at.x_m, at.y_m) for at in order.rally] == [
-        pytest.approx(enu_from_geodetic(*(each * 1e-7 for each in place), *origin_deg), abs=0.02)
+        pytest.approx(enu_from_geodetic(place[0] * 1e-7, place[1] * 1e-7, *origin_deg), abs=0.02)
         for place in PLACES[:2]
     ]
     assert only(peer.send(common.MAVLink_mission_request_list_message(1, 1, 2)), "MISSION_COUNT").count == 0
@@ -253,6 +254,8 @@ def test_rally_points_are_asked_of_the_operators_process_and_come_back() -> None
     assert only(peer.send(common.MAVLink_mission_request_list_message(1, 1, 2)), "MISSION_COUNT").count == 2
     item = only(peer.send(common.MAVLink_mission_request_int_message(1, 1, 1, 2)), "MISSION_ITEM_INT")
     assert (item.command, item.mission_type, item.x, item.y) == (5100, RALLY, *PLACES[1])
+    port.gateway.tick(in_order(mission=replace(mission, rally=order.rally[:1]), now_us=NOW_US + 40_000))
+    assert only(peer.send(common.MAVLink_mission_request_list_message(1, 1, 2)), "MISSION_COUNT").count == 1
 
 
 @pytest.mark.parametrize(
