@@ -33,7 +33,8 @@ def require_modules(who: str, *modules: str) -> None:
     """Raise UserError that says what to install unless all of these can be imported. who: the command or service."""
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
-        raise UserError(_remedy(who, ", ".join(missing), EXTRA_OF[missing[0]]))
+        extras = dict.fromkeys(EXTRA_OF[module] for module in missing)
+        raise UserError(_remedy(who, ", ".join(missing), ",".join(extras)))
 
 
 def missing_module(who: str, error: ModuleNotFoundError) -> UserError | None:
@@ -42,5 +43,5 @@ def missing_module(who: str, error: ModuleNotFoundError) -> UserError | None:
     return UserError(_remedy(who, module, EXTRA_OF[module])) if module in EXTRA_OF else None
 
 
-def _remedy(who: str, modules: str, extra: str) -> str:
-    return f"{who} needs {modules}, not installed here: pip install 'paani[{extra}]'"
+def _remedy(who: str, modules: str, extras: str) -> str:
+    return f"{who} needs {modules}, not installed here: pip install 'paani[{extras}]'"

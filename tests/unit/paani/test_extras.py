@@ -35,6 +35,9 @@ def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "filterpy", None)
     with pytest.raises(UserError, match=r"up needs filterpy, not installed here: pip install 'paani\[host\]'"):
         require_modules("up", "mujoco", "filterpy")
+    monkeypatch.setitem(sys.modules, "pymavlink", None)
+    with pytest.raises(UserError, match=r"needs filterpy, pymavlink, .*: pip install 'paani\[host,mavlink\]'"):
+        require_modules("up", "filterpy", "pymavlink")
 
 
 @pytest.mark.slow
