@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import contextlib
 import os
+import resource
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -31,19 +32,22 @@ class HealthReporter:
         self._started_us = self._last_us = 0
         self._last_cpu_s = process_cpu_s()
         self._last_received: dict[int, int] = {}
+        self._rss_mib = 0.0
 
     def report(self, now_us: int) -> m.Health:
         """The report for the time since the last one."""
         self._started_us = self._started_us or now_us
         span_s = (now_us - self._last_us) * 1e-6 if self._last_us else 0.0
         cpu_s = process_cpu_s()
+        with contextlib.suppress(OSError):  # a process without a free descriptor says what it last knew
+            self._rss_mib = rss_mib()
         report = m.Health(
             source_us=now_us,
             service=self._service,
             ready=True,
             uptime_s=max(0.0, (now_us - self._started_us) * 1e-6),
             cpu_cores=max(0.0, (cpu_s - self._last_cpu_s) / span_s) if span_s > 0 else 0.0,
-            rss_mib=rss_mib(),
+            rss_mib=self._rss_mib,
             inputs=tuple(self._input(topic, inbox, span_s) for topic, inbox in self._inputs),
             drops=tuple(m.DropCount(cause=cause, count=n) for cause, n in sorted(self._drops.items())),
             note=self._note(),
@@ -76,8 +80,11 @@ def rss_mib() -> float:
 
 
 def count_open_files() -> int:
-    """Descriptors that this process holds."""
-    return len(os.listdir("/proc/self/fd")) - 1  # noqa: PTH208  as in `_read`; one of them reads this folder
+    """Descriptors that this process holds; where it is given no more, all that it may hold."""
+    try:
+        return len(os.listdir("/proc/self/fd")) - 1  # noqa: PTH208  as in `_read`; one of them reads this folder
+    except OSError:
+        return resource.getrlimit(resource.RLIMIT_NOFILE)[0]
 
 
 def warmest_zone_c(folder: str = "/sys/class/thermal") -> float:

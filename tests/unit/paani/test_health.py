@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import collections
+import os
+import resource
 import sys
 from pathlib import Path
 
@@ -49,6 +51,23 @@ async def test_silence_is_first_stale_then_dead(silence_s: float, alive: bool, f
     reporter = HealthReporter("advisor", [(keys.EVIDENCE, inbox)], collections.Counter(), lambda: "")
     report = await asyncio.to_thread(reporter.report, clock.now_us())
     assert (report.inputs[0].alive, report.inputs[0].fresh) == (alive, fresh)
+
+
+def test_a_process_without_a_free_descriptor_still_reports() -> None:
+    """All taken is the moment at which its health is asked for; reports that end would have it killed as hanging."""
+    clock = ManualClock()
+    reporter = HealthReporter("plant", [], collections.Counter(), lambda: "")
+    before = reporter.report(clock.now_us())
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with Path(os.devnull).open(encoding="ascii") as free:
+        limit = free.fileno()
+    resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
+    try:
+        report = reporter.report(clock.now_us())
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    assert report.open_files == limit
+    assert report.rss_mib == before.rss_mib > 1.0
 
 
 async def test_newest_wins_in_an_inbox() -> None:
