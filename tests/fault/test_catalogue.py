@@ -26,7 +26,7 @@ ALSO = {
     "plant not running",
     "controller not running",
 }
-LATER = ("not running", "memory", "picture", "link", "descriptors left", "version")
+LATER = ("not running", "memory", "picture", "link")
 
 
 def chosen(drive: Drive) -> list[str]:
