@@ -14,9 +14,11 @@ from pathlib import Path
 
 from paani_tools.bench.faults.fault import Expected, Fault
 from paani_tools.bench.faults.running import Loop, until
+from paani_tools.up.silence import HUNG_S
 
 GONE_S, BACK_S = 10.0, 40.0
 FROZEN_S, REFUSED_S = 1.0, 2.0
+UNHEARD_S = HUNG_S + REFUSED_S  # a process that hears nothing any more has been ended by then
 NEEDS_A_HAND = frozenset({"operator", "dashboard"})  # who armed, and where: nobody knows whether they still want it
 RECORDER = "recorder"
 NOBODY_WAITS_FOR = frozenset({RECORDER, "bridge"})
@@ -93,6 +95,7 @@ def _limited(
     limit: int,
     most: Callable[[int], int] = lambda pid: 0,
     expected: Expected = Expected.GOES_ON,
+    lasts_s: float = REFUSED_S,
 ) -> Fault:
     """The kernel gives these processes no more of something than `most` says of each; what they ask for fails."""
     before: dict[int, tuple[int, int]] = {}
@@ -110,13 +113,14 @@ def _limited(
                 resource.prlimit(pid, limit, limits)
 
     return Fault(
-        name=name, expected=expected, begin=begin, end=end, lasts_s=REFUSED_S, hurts_adapter=services == [ADAPTER]
+        name=name, expected=expected, begin=begin, end=end, lasts_s=lasts_s, hurts_adapter=services == [ADAPTER]
     )
 
 
 def _refused_memory(service: str) -> Fault:
     expected = Expected.MAY_STAND if service in NEEDS_A_HAND else Expected.GOES_ON
-    return _limited(f"{service} refused memory", [service], resource.RLIMIT_AS, _address_space, expected)
+    name = f"{service} refused memory"
+    return _limited(name, [service], resource.RLIMIT_AS, _address_space, expected, UNHEARD_S)
 
 
 def _address_space(pid: int) -> int:
