@@ -172,22 +172,6 @@ def closest_point_of_approach(obstacle: DynamicObstacle, boat: BoatState) -> App
     return Approach(float(np.hypot(east_m, north_m).min()), float(cpa_m[nearest]), float(time_s[nearest]))
 
 
-def struck_probability(obstacles: Sequence[DynamicObstacle], clearance_m: F64, time_s: F64, radius_m: float) -> F64:
-    """That an obstacle which moves for certain comes within the radius, at the worst moment [paths].
-
-    clearance_m: to each obstacle, as in `DynamicClearance`. Positions are distributed as Student's with two degrees of
-    freedom, as their velocities are.
-    """
-    worst = np.zeros(clearance_m.shape[2])
-    for obstacle, each_m in zip(obstacles, clearance_m, strict=True):
-        if obstacle.is_moving:
-            deviation_m = np.asarray(position_deviation_m(obstacle, time_s))[:, None]
-            inside_m = radius_m - each_m - deviation_m
-            certainty = inside_m / np.sqrt(inside_m * inside_m + 2.0 * deviation_m * deviation_m + 1e-12)
-            worst = np.maximum(worst, 0.5 + 0.5 * certainty.max(axis=0))
-    return worst
-
-
 def is_give_way_needed(obstacles: Sequence[DynamicObstacle], at_rest: BoatState, limit_m: float) -> bool:
     """Whether an obstacle that moves for certain will come nearer than the limit to a boat at rest there.
 

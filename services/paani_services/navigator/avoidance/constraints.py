@@ -29,7 +29,6 @@ from paani_services.navigator.avoidance.rollout import (
 ESCAPE_TOLERANCE_M = 0.2  # clearance that a way out may lose before it gains [m]: the advance of a boat while it turns
 PERSON_DISTANCE_TOLERANCE_M = 0.05  # error of an interpolated distance to a person [m]: a quarter of a cell
 MIN_PIVOT_RAD = math.radians(20.0)  # smaller pivots are not made: the boat would creep where it may wait
-STRUCK_GAIN = 0.2  # probability of being struck that stepping aside must take off
 HALF_FIELD_OF_VIEW_RAD = math.radians(35.0)  # what lies further off the bow is not seen; no usual lens shows less
 
 Refusals = Mapping[Constraint, Bools]
@@ -143,33 +142,6 @@ def unless_escaping(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals
     """NO_ESCAPE: of a boat with no margin left, all that leads not away from static and dynamic obstacles."""
     escapes = _escapes_static(evaluation) & _escapes_dynamic(evaluation)
     return {**hard, Constraint.NO_ESCAPE: ~escapes}
-
-
-def unless_struck_less(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals:
-    """NO_ESCAPE: of a boat that will be struck if it coasts, all that do not step aside; all where it will not be.
-
-    What steps aside keeps off static obstacles and people who may swim, and is struck less probably than coasting and
-    hardly more than by the best. Speed is no reason against it, but beside a person.
-    """
-    request, checked = evaluation.request, evaluation.is_in_checked_range
-    may_move = [not each.is_moving for each in request.predicted_obstacles]
-    beyond_m = least_of_obstacles_m(evaluation.separation_m(request.config)[may_move])
-    person_m = np.where(checked, evaluation.person_distance_m, np.inf).min(axis=0)
-    refusals = {
-        **hard,
-        Constraint.STATIC_OBSTACLE: _is_met(evaluation.static_clearance_m < evaluation.tight_clearance_m, checked),
-        Constraint.DYNAMIC_OBSTACLE: _is_met(beyond_m < 0.0, checked),
-        Constraint.TOO_FAST: hard[Constraint.TOO_FAST]
-        & (person_m < request.config.person_room_m + request.config.hull_radius_m),
-    }
-    coasting, struck = evaluation.struck_when_coasting, np.where(any_refusal(refusals), 1.0, evaluation.struck)
-    enough = min(coasting - STRUCK_GAIN, float(struck.min()) + 0.25 * STRUCK_GAIN) if coasting > 0.5 else 0.0
-    return {**refusals, Constraint.NO_ESCAPE: struck > enough}
-
-
-def _is_met(is_too_near: Bools, checked: Bools) -> Bools:
-    """Whether a candidate comes too near at a time that counts [candidates]."""
-    return np.asarray((is_too_near & checked).any(axis=0))
 
 
 def unless_clearer_than_coasting(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals:

@@ -16,7 +16,6 @@ from paani_services.navigator.avoidance.clearance import (
     least_of_obstacles_m,
     predict_clearances,
     separation_margin_m,
-    struck_probability,
 )
 from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import (
@@ -77,21 +76,6 @@ class CandidateEvaluation(NamedTuple):
         """
         config = step if self.is_give_way_needed else self.request.config
         return separation_margin_m(self.dynamic, self.trajectories.time_s, config)
-
-    @property
-    def struck(self) -> F64:
-        """Probability that what moves strikes the hull, as far as the trajectories are rolled out [candidates]."""
-        return self._struck(self.dynamic.candidates_m)
-
-    @property
-    def struck_when_coasting(self) -> float:
-        """The same of the boat with its thrusters off."""
-        return float(self._struck(self.dynamic.coasting_m[:, :, None])[0])
-
-    def _struck(self, clearance_m: F64) -> F64:
-        request = self.request
-        radius_m, time_s = request.config.hull_radius_m, self.trajectories.time_s
-        return struck_probability(request.predicted_obstacles, clearance_m, time_s, radius_m)
 
     @property
     def is_safe_at_rest(self) -> bool:

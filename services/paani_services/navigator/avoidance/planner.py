@@ -22,7 +22,6 @@ from paani_services.navigator.avoidance.constraints import (
     has_stopped_facing_away,
     unless_clearer_than_coasting,
     unless_escaping,
-    unless_struck_less,
     while_waiting,
 )
 from paani_services.navigator.avoidance.costs import CandidateCosts, weigh_candidates
@@ -61,7 +60,6 @@ def plan_motion(request: PlanRequest) -> Plan:
         up on that side.
       * The swept hull keeps a margin to static obstacles within `horizon_s` or `room_m` (Q4, Q6), the largest one that
         leaves a candidate, and the whole one to the predicted positions of dynamic ones.
-      * Something will strike it if it coasts: it steps aside to where that is least probable.
       * It escapes from the nearest obstacle.
       * It keeps further off than coasting would.
     If there is none, the plan is a stop.
@@ -99,7 +97,5 @@ def _situations(evaluation: CandidateEvaluation, hard: Refusals, check: MarginCh
     if has_stopped_facing_away(evaluation):
         yield before_looking(evaluation, hard)
     yield check.refusals
-    if evaluation.is_give_way_needed:
-        yield unless_struck_less(evaluation, hard)
     yield unless_escaping(evaluation, hard)
     yield unless_clearer_than_coasting(evaluation, hard)

@@ -7,7 +7,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
@@ -68,7 +68,6 @@ def test_the_plan_is_the_cheapest_heading_that_nothing_refuses(
     side: float,
 ) -> None:
     grid = pool(*((x, y, x + deep, y + wide) for x, y, deep, wide in bars))
-    assume(grid.free.any())
     start, crossing = BoatState(0.0, 0.0, 0.0, surge), swimmer(*place, 0.3)
     plan, verdicts = explain_motion(grid, start, GuidanceSetpoint(course, 0.6, side), None, PLANNER, (crossing,))
     headings = [each.heading_rad for each in verdicts]
