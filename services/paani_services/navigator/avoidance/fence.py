@@ -1,5 +1,6 @@
 """The fence under way: how fast the boat may go towards an edge. Pure."""
 
+import itertools
 import math
 
 from paani import portable
@@ -20,23 +21,36 @@ def limit_speed(
     """The speed at which the ordered heading may be sailed, or None where the boat may not move.
 
     The speed is limited so that `fence_margin_m` and the stopping distance (`fence_stop_s` times the speed) fit before
-    the edge along the ordered heading. A boat that would come to the edge within `fence_stop_s` at the velocity it may
-    have by the next order gets no thrust. Outside the fence nothing moves, unless `fence_return` is set and the heading
-    leads to the nearest way in.
+    the edge along the ordered heading. A boat that would come to the edge within `fence_stop_s` at a velocity that it
+    may have by the next order gets no thrust. Outside the fence nothing moves, unless `fence_return` is set and the
+    heading leads to the nearest way in.
     """
     if not fence:
         return speed_mps
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _limit_speed_outside(fence, here, heading_rad, speed_mps, config)
-    east_mps, north_mps = _velocity_at_next_order(odometry, config)
-    stops_at = (here[0] + east_mps * config.fence_stop_s, here[1] + north_mps * config.fence_stop_s)
-    if allowed_distance_m(fence, here, stops_at) < math.inf:
+    way = (here, *_stopping_places(odometry, config), here)  # round all the water on which it may come to rest
+    if any(allowed_distance_m(fence, start, end) < math.inf for start, end in itertools.pairwise(way)):
         return None
     reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
     ahead = (here[0] + reach_m * portable.cos(heading_rad), here[1] + reach_m * portable.sin(heading_rad))
     allowed_mps = (allowed_distance_m(fence, here, ahead) - config.fence_margin_m) / config.fence_stop_s
     return min(speed_mps, allowed_mps) if allowed_mps >= min(MIN_ORDERED_SPEED_MPS, speed_mps) else None
+
+
+def _stopping_places(odometry: Odometry, config: NavigatorConfig) -> tuple[Point, ...]:
+    """Where it is after `fence_stop_s` if it turns until the next order: to starboard, not at all, to port."""
+    east_mps, north_mps = _velocity_at_next_order(odometry, config)
+    turn_rad = config.planner.yaw_rate_radps / config.rate_hz
+    places = []
+    for angle_rad in (-turn_rad, 0.0, turn_rad):
+        sin, cos = portable.sin(angle_rad), portable.cos(angle_rad)
+        ahead_mps = east_mps * cos - north_mps * sin, east_mps * sin + north_mps * cos
+        places.append(
+            (odometry.x_m + ahead_mps[0] * config.fence_stop_s, odometry.y_m + ahead_mps[1] * config.fence_stop_s)
+        )
+    return tuple(places)
 
 
 def _velocity_at_next_order(odometry: Odometry, config: NavigatorConfig) -> tuple[float, float]:
