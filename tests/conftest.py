@@ -27,9 +27,9 @@ from tests.claims_check.table import read_table
 from tests.places import ROOT
 from tests.transcript import Transcript
 
-PROCESSES = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
+ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "bench": "board bridge chain eyes fleet judgement recorder",
+    "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
         exposed_page heading_verdicts indicator_strip installed legibility map_projection map_tiles models_report
         recording_chip recordings_tab replay_page route_editor sensor_strip tuning_strip
@@ -39,11 +39,10 @@ RESULTS_ALONE = {
         trials
     """,
 }  # by folder, the files that wait for results and do not watch the clock
-COMPUTING = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
-SOAK = "tests/bench/test_soak.py"  # before the folder `integration`, so that nothing starts beside the boat's bars
+BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = (0, 3, 10)  # by queue
+NICENESS = 5
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more
 settings.register_profile("thorough", deadline=None)  # a busy machine fails no test
@@ -61,15 +60,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--transcripts", type=Path, metavar="FOLDER", help="leave what clients of the ports said there")
 
 
-def queue_of(nodeid: str) -> int:
-    """Who goes first where the processors are busy.
-
-    0: whole systems, and what has the boat's bars. 1: what waits for a process or two. 2: what computes.
-    """
-    file, folder = nodeid.partition("::")[0], nodeid.split("/")[1]
-    if file in COMPUTING or folder not in PROCESSES:
-        return 2
-    return 1 if folder == "integration" or file == SOAK else 0
+def is_alone(nodeid: str) -> bool:
+    """Whether a test starts processes or watches the clock, by its folder and file."""
+    return nodeid.split("/")[1] in ALONE and nodeid.partition("::")[0] not in BESIDE
 
 
 def is_whole_run(config: pytest.Config) -> bool:
@@ -79,41 +72,34 @@ def is_whole_run(config: pytest.Config) -> bool:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """In a whole run what starts processes gets a second try, which the summary tells; what stops the boat not."""
-    items.sort(key=lambda item: (queue_of(item.nodeid), item.nodeid.split("/")[1] not in STOPS_THE_BOAT))
+    items.sort(key=lambda item: not is_alone(item.nodeid))
     if is_whole_run(config):
         for item in items:
-            if item.nodeid.split("/")[1] in PROCESSES - STOPS_THE_BOAT:
+            if item.nodeid.split("/")[1] in ALONE - STOPS_THE_BOAT:
                 item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Each of the first three workers begins with a queue of its own, file by file, and goes on with the next."""
+    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file."""
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415  a single process does without it
 
-    class QueueForEach(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    class AloneFirst(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
         def _split_scope(self, nodeid: str) -> str:
-            return nodeid.partition("::")[0]
-
-        def _assign_work_unit(self, node: Any) -> None:
-            first = min(self.nodes.index(node), len(NICENESS) - 1)
-            scope = next((scope for scope in self.workqueue if queue_of(scope) >= first), None)
-            if scope is not None:
-                self.workqueue.move_to_end(scope, last=False)
-            super()._assign_work_unit(node)
+            return "alone" if is_alone(nodeid) else nodeid.partition("::")[0]
 
     config.option.loadscopereorder = False
-    return QueueForEach(config, log)
+    return AloneFirst(config, log)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """What computes yields to what watches the clock, and both to whole systems.
+    """What may run beside a test that watches the clock yields to it and to its processes.
 
-    A worker meets the queues in this order, so that it never has to take back its courtesy.
+    The worker that has those gets them first, and only then yields as well.
     """
-    if WORKER:
-        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS[queue_of(item.nodeid)], os.getpriority(os.PRIO_PROCESS, 0)))
+    if WORKER and not is_alone(item.nodeid):
+        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
     if item.get_closest_marker("train"):
         import torch  # noqa: PLC0415  only these tests have it
 

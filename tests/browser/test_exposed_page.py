@@ -104,7 +104,7 @@ async def test_strangers_see_the_login_and_stop_and_whoever_has_the_key_begins_a
         assert key not in token
 
         async with client.get("/") as answer:
-            assert 'id="explanation"' in await answer.text()
+            assert 'id="camera-note"' in await answer.text()
         assert (await status_and_field(client.post("/api/arm/hold", json=HELD)))[0] == 200
         foreign = client.post("/api/arm/hold", json=HELD, headers={"Origin": "https://elsewhere.example"})
         assert await status_and_field(foreign) == (403, "Origin")

@@ -85,6 +85,7 @@ async def test_a_hull_starts_disarmed_and_without_a_simulator(tmp_path: Path) ->
                 assert not alive & {"plant", "eye"}
                 await until(lambda: fixes.value is not None and fixes.value.producer == "sensors", 10.0)
                 await until(lambda: applied.value is not None and applied.value.zero_cause is m.ZeroCause.NOT_ARMED)
+                await until(lambda: state.value is not None)
                 assert state.value is not None
                 assert not state.value.armed
                 await arm_on_page(f"http://127.0.0.1:{page}", config.bus)

@@ -78,6 +78,6 @@ def _rows(
             if value != default
             else DEFAULT,
             unit=unit_of(field.name),
-            limits=range_of(field.type),
+            limits=range_of(field.type).replace("`", ""),  # which mark a pattern in Markdown
             tunable=path in TUNABLE,
         )

@@ -46,13 +46,13 @@ function drawLabel({ ctx, unit, width }, text, x, y, colour, align = "left") {
   ctx.fillText(text, left + 4 * unit, top + labelHeight / 2 + unit);
 }
 
-/** @param {Pane} pane @param {number[]} box @param {string} colour @param {number} lineWidth @param {number[]} dash */
+/** On whole pixels, so that its lines are sharp. @param {Pane} pane @param {number[]} box @param {string} colour @param {number} lineWidth @param {number[]} dash */
 function drawBox({ ctx, width, height, unit }, box, colour, lineWidth, dash) {
-  const [x1, y1, x2, y2] = box;
+  const [x1, x2] = [box[0], box[2]].map((x) => Math.round(x * width)), [y1, y2] = [box[1], box[3]].map((y) => Math.round(y * height));
   ctx.setLineDash(dash.map((part) => part * unit));
   ctx.lineWidth = lineWidth * unit;
   ctx.strokeStyle = colour;
-  ctx.strokeRect(x1 * width, y1 * height, (x2 - x1) * width, (y2 - y1) * height);
+  ctx.strokeRect(x1, y1, x2 - x1, y2 - y1);
   ctx.setLineDash([]);
 }
 

@@ -23,8 +23,8 @@ export const trackState = (track) => (TRACK_TEXTS[track.immediate_danger ? "imme
 /** The label of a track, the same wherever it stands. @param {any} track */
 export const trackLabel = (track) => `#${track.id} ${track.label} ${fixed(track.confidence)} ${trackState(track)}`;
 
-/** @param {number} value @param {number} [digits] */
-export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
+/** A number with so many digits; what rounds to nothing has no sign. @param {number} value @param {number} [digits] */
+export const fixed = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits).replace(/^-(?=[0.]+$)/, "") : "–");
 
 /** @param {number} seconds */
 export function ageText(seconds) {

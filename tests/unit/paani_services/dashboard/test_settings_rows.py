@@ -25,6 +25,7 @@ def test_every_value_says_where_it_comes_from() -> None:
     by_environment = rows["advisor.policy.center_block_risk"]
     assert (by_environment.value, by_environment.origin, by_environment.tunable) == ("0.46", "environment", True)
     assert (by_environment.limits, rows["dashboard.port"].limits) == ("0 to 1", "1 to 65535")
+    assert rows["bus.vessel"].limits == "^[a-z0-9_]{1,32}$"
     assert rows["advisor.policy.dry"].origin == "profile"
     untouched = rows["dashboard.port"]
     assert (untouched.value, untouched.default, untouched.origin, untouched.tunable) == (
