@@ -71,5 +71,5 @@ async def test_the_chip_is_hidden_where_nothing_is_to_be_recorded(
         page = (await watch(browser, config)).page
         await until(page, "paani.overlay.mask_seq !== null")
         assert await page.evaluate(f"{CHIP}.hidden")
-        assert "camera" in await page.text_content("#health")
+        await until(page, "document.querySelector('#health').textContent.includes('camera')")
         assert "recorder" not in await page.text_content("#health")
