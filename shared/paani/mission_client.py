@@ -44,39 +44,22 @@ class MissionClient:
 
     async def send(
         self,
-        mission: m.Mission,
+        name: str = "",
+        *,
+        legs: tuple[m.MissionLeg, ...] | None = None,
+        fence: tuple[m.FenceArea, ...] | None = None,
+        rally: tuple[m.Waypoint, ...] | None = None,
         timeout_s: float = 20.0,
         hand: int = 0,
-        *,
-        keep_fence: bool = False,
-        keep_rally: bool = False,
     ) -> MissionAnswer | None:
-        """Ask for these legs, this fence and these rally points; None where nobody has answered in time."""
+        """Ask for these parts; None: those in force stay. None where nobody has answered in time.
+
+        Without legs there is nothing to do, without areas no fence, and without rally points RETURN leads home.
+        """
         request = m.MissionRequest(
-            source_us=0, press=0, name=mission.name, legs=mission.legs, fence=mission.fence, rally=mission.rally,
-            keep_fence=keep_fence, keep_rally=keep_rally,
+            source_us=0, press=0, name=name, legs=legs or (), fence=fence or (), rally=rally or (),
+            keep_legs=legs is None, keep_fence=fence is None, keep_rally=rally is None,
         )  # fmt: skip
-        return await self._ask(request, timeout_s, hand)
-
-    async def send_legs(
-        self, name: str, legs: tuple[m.MissionLeg, ...], timeout_s: float = 20.0, hand: int = 0
-    ) -> MissionAnswer | None:
-        """Ask for these legs alone; without legs there is nothing to do. Answered as `send`."""
-        request = m.MissionRequest(source_us=0, press=0, name=name, legs=legs, keep_fence=True, keep_rally=True)
-        return await self._ask(request, timeout_s, hand)
-
-    async def send_fence(
-        self, fence: tuple[m.FenceArea, ...], timeout_s: float = 20.0, hand: int = 0
-    ) -> MissionAnswer | None:
-        """Ask for this fence alone; without areas there is none. Answered as `send`."""
-        request = m.MissionRequest(source_us=0, press=0, fence=fence, keep_legs=True, keep_rally=True)
-        return await self._ask(request, timeout_s, hand)
-
-    async def send_rally(
-        self, rally: tuple[m.Waypoint, ...], timeout_s: float = 20.0, hand: int = 0
-    ) -> MissionAnswer | None:
-        """Ask for these rally points alone; without any, RETURN leads home. Answered as `send`."""
-        request = m.MissionRequest(source_us=0, press=0, rally=rally, keep_legs=True, keep_fence=True)
         return await self._ask(request, timeout_s, hand)
 
     async def _ask(self, request: m.MissionRequest, timeout_s: float, hand: int) -> MissionAnswer | None:

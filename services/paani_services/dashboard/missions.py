@@ -47,9 +47,10 @@ class Missions:
         except TimeoutError:
             return error_response(408, "the request did not come to its end", "body")
         wanted = decode_body(body, MissionBody)
-        rally = wanted.rally or ()
-        mission = m.Mission(source_us=0, name=wanted.name, legs=wanted.legs, fence=wanted.fence, rally=rally)
-        answer = await self._client.send(mission, ANSWER_TIMEOUT_S, wanted.hand, keep_rally=wanted.rally is None)
+        answer = await self._client.send(
+            wanted.name, legs=wanted.legs, fence=wanted.fence, rally=wanted.rally,
+            timeout_s=ANSWER_TIMEOUT_S, hand=wanted.hand,
+        )  # fmt: skip
         if answer is None:
             return error_response(503, "not accepted: the operator's process does not answer", "mission")
         if answer.refusal is not m.MissionRefusal.NONE:

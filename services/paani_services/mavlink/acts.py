@@ -116,15 +116,10 @@ class Acts:
         acknowledge(order.station, order.target, result, order.kind, self._clock.now_us(), text)
 
     async def _put_in_force(self, order: MissionOrder) -> MissionAnswer | None:
-        hand, legs, fence, rally = order.station.hand, order.legs, order.fence, order.rally
-        if legs is not None and fence is not None:
-            whole = m.Mission(source_us=0, name=MISSION_NAME, legs=legs, fence=fence, rally=rally or ())
-            return await self._missions.send(whole, hand=hand)
-        if legs is not None:
-            return await self._missions.send_legs(MISSION_NAME, legs, hand=hand)
-        if fence is not None:
-            return await self._missions.send_fence(fence, hand=hand)
-        return await self._missions.send_rally(rally or (), hand=hand)
+        name = "" if order.legs is None else MISSION_NAME
+        return await self._missions.send(
+            name, legs=order.legs, fence=order.fence, rally=order.rally, hand=order.station.hand
+        )
 
     def _is_wheel_left(self) -> bool:
         """Whether the wheel is in the hand of a station that is gone."""

@@ -127,7 +127,7 @@ class Commands:
         except ValueError as error:
             self._refuse_goal(str(error))
             return
-        answer = await self._missions.send_legs(GOAL_MISSION, (leg,), hand=self._operator.hand)
+        answer = await self._missions.send(GOAL_MISSION, legs=(leg,), hand=self._operator.hand)
         if answer is None:
             self._refuse_goal("no answer")
         elif answer.refusal is not m.MissionRefusal.NONE:

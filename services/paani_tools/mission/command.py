@@ -7,8 +7,6 @@ import asyncio
 import sys
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus, open_bus
@@ -52,13 +50,12 @@ async def _ask_on(bus: Bus, clock: Clock, options: argparse.Namespace, config: C
     client = MissionClient(bus, clock)
     name, answer, mission = "", None, None
     if options.deed == "clear":
-        answer = await client.send_legs("", ())
+        answer = await client.send(legs=())
     else:
         origin_deg = config.localization.origin_lat_lon_deg or await _origin_of_boat(bus)
         mission, fence = await asyncio.to_thread(_load, options, config, origin_deg)
         name = mission.name
-        sent = mission if fence is None else replace(mission, fence=fence)
-        answer = await client.send(sent, keep_fence=fence is None, keep_rally=not mission.rally)
+        answer = await client.send(name, legs=mission.legs, fence=fence, rally=mission.rally or None)
     return _tell(answer, "no mission any more" if mission is None else f"{name}: {len(mission.legs)} legs, in force")
 
 

@@ -8,9 +8,8 @@ one in its place, starts again, and arms.
 from __future__ import annotations
 
 import asyncio
-import os
+import functools
 import shutil
-import signal
 from pathlib import Path
 
 from paani.clock import WallClock
@@ -66,7 +65,7 @@ def certificate_faults(certificates: Certificates) -> list[Fault]:
     async def expire(loop: Loop) -> None:
         until_us = (WallClock().now_us() // SECOND_US + LIVES_S) * SECOND_US
         await asyncio.to_thread(certificates.replace, EXPIRING, until_us)
-        _kill(loop, EXPIRING)
+        loop.kill(EXPIRING)
         await back_again(loop, EXPIRING)
         if not await loop.settle() or WallClock().now_us() > until_us:
             raise TimeoutError(f"it expired after {LIVES_S} s, before the boat was under way again")
@@ -75,7 +74,7 @@ def certificate_faults(certificates: Certificates) -> list[Fault]:
 
     async def kill(loop: Loop) -> None:
         await asyncio.to_thread(certificates.replace, KILLED, WallClock().now_us() - DAY_US)
-        _kill(loop, KILLED)
+        loop.kill(KILLED)
 
     async def renew(loop: Loop) -> None:
         await asyncio.to_thread(certificates.restore)
@@ -85,20 +84,8 @@ def certificate_faults(certificates: Certificates) -> list[Fault]:
         await asyncio.to_thread(certificates.restore)
         await loop.start_again()
 
-    common = {"lasts_s": LASTS_S, "drive": Drive.CERTIFICATES}
+    fault = functools.partial(Fault, lasts_s=LASTS_S, drive=Drive.CERTIFICATES)
     return [
-        Fault(
-            name=f"{EXPIRING}'s certificate expires", expected=Expected.STOPS, begin=expire, end=renew,
-            **common,  # type: ignore[arg-type]
-        ),
-        Fault(
-            name=f"{KILLED} killed, its certificate expired", expected=Expected.HAND, begin=kill, end=start_again,
-            **common,  # type: ignore[arg-type]
-        ),
-    ]  # fmt: skip
-
-
-def _kill(loop: Loop, service: str) -> None:
-    pid = loop.pid_of(service)
-    loop.mark()
-    os.kill(pid, signal.SIGKILL)
+        fault(name=f"{EXPIRING}'s certificate expires", expected=Expected.STOPS, begin=expire, end=renew),
+        fault(name=f"{KILLED} killed, its certificate expired", expected=Expected.HAND, begin=kill, end=start_again),
+    ]

@@ -47,9 +47,7 @@ def _expected(service: str) -> Expected:
 
 def _killed(service: str) -> Fault:
     async def begin(loop: Loop) -> None:
-        pid = loop.pid_of(service)
-        loop.mark()
-        os.kill(pid, signal.SIGKILL)
+        loop.kill(service)
 
     async def end(loop: Loop) -> None:
         await back_again(loop, service)

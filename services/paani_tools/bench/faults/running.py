@@ -161,6 +161,12 @@ class Loop:
         """The fault begins now."""
         self.hit_us, self.hit_wall_us = MONOTONIC.now_us(), self.clock.now_us()
 
+    def kill(self, service: str) -> None:
+        """The fault begins with the death of this process. Raises ProcessLookupError where there is none."""
+        pid = self.pid_of(service)
+        self.mark()
+        os.kill(pid, signal.SIGKILL)
+
     def pid_of(self, service: str) -> int:
         """The process of that name. Raises ProcessLookupError where there is none."""
         for folder in Path("/proc").glob("[0-9]*"):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import signal
 from contextlib import AsyncExitStack
 
 import msgspec
@@ -39,9 +37,7 @@ def other_version() -> Fault:
         ear.on(keys.SIM_TIME, lambda time: stamps_us.append(time.stamp_us))
         ear.on(keys.health(ADAPTER), lambda health: counts.append(_of_wrong_type(health)))
         await until(lambda: bool(stamps_us and counts), HEALTH_S)
-        pid = loop.pid_of(CONTROLLER)
-        loop.mark()
-        os.kill(pid, signal.SIGKILL)
+        loop.kill(CONTROLLER)
         speaking.append(asyncio.create_task(_speak(loop, peer, stamps_us)))
 
     async def end(loop: Loop) -> None:

@@ -117,8 +117,9 @@ def test_the_paper_profile_has_the_constants_of_the_papers_tables() -> None:
     assert column(settings_table(OURS, OURS), "here") != column(table, "paper")
 
 
+@pytest.mark.train
 def test_the_recipes_are_the_papers_where_they_can_be_read() -> None:
-    pytest.importorskip("torch", reason="extra `train`")
+    pytest.importorskip("torch", reason="the extra `train` is not installed")
     table = training_table()
     assert column(table, "here")[:-1] == column(table, "paper")[:-1]
 
