@@ -51,7 +51,7 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
             for row, inbox in subscribe(bus)
         ]
         feeds.append(forward(hub, keys.PICTURE, bus.latest_picture(keys.PICTURE), clock, picture_period_s))
-        feeds.append(pull(hub, keys.MASK, bus.pull_picture(keys.MASK), clock, picture_period_s))
+        feeds.append(forward_masks(hub, bus.pull_picture(keys.MASK), clock, picture_period_s))
         feeds.append(forward(hub, keys.THRUST_APPLIED, bus.latest(keys.THRUST_APPLIED), clock, APPLIED_PERIOD_S))
         feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
@@ -101,12 +101,12 @@ async def forward(hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: C
         await asyncio.sleep(period_s)
 
 
-async def pull(hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: Clock, period_s: float) -> None:
+async def forward_masks(hub: Hub, inbox: Latest[Any], clock: Clock, period_s: float) -> None:
     """As `forward`, but pull only while there are clients."""
     while True:
         await hub.has_clients.wait()
         value = await inbox.next()
-        hub.put(topic.name, value, inbox.received_us, clock.now_us())
+        hub.put(keys.MASK.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(period_s)
 
 
