@@ -109,10 +109,11 @@ lock: $(VENV)/release/.stamp ## pin what the next installation takes, with hashe
 dist: setup sbom ## wheel, sdist and bill of materials into dist/, the same bytes for the same commit
 	$(BIN)/python -m hatchling build -d dist
 
-sbom: $(VENV)/release/.stamp ## what the host installs, as CycloneDX JSON, into dist/
+sbom: $(VENV)/release/.stamp ## what the host installs and what the page holds, as CycloneDX JSON, into dist/
 	@mkdir -p dist
 	$(VENV)/release/bin/cyclonedx-py requirements --pyproject pyproject.toml --mc-type application --output-reproducible \
 		--of JSON -o dist/paani.cdx.json requirements/host.lock
+	$(VENV)/release/bin/python -m deploy.page_libraries dist/paani.cdx.json
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis
