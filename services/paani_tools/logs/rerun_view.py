@@ -7,7 +7,7 @@ it was sent. Rerun shows the newest of each thing at a time, so a thing is clear
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,13 @@ TIMELINE = "time"
 MAP, BOAT, CAMERA = "map", "map/boat", "map/boat/camera"
 PICTURE, BOXES, MASK = f"{CAMERA}/picture", f"{CAMERA}/picture/tracks", "mask"
 PLAN, OBSTACLES, ROUTE, FENCE, TRACK = "map/plan", "map/obstacles", "map/route", "map/fence", "map/track"
+HOME, RALLY = "map/home", "map/rally"
 EARTH, EARTH_TRACK = "earth/gps", "earth/track"
 ORANGE, GREY, RED, BLUE, GREEN = (255, 181, 84), (160, 170, 178), (242, 92, 92), (89, 168, 242), (87, 214, 155)
+WHITE = (242, 242, 242)
 EYE_M, LOOK_AT_M = (-9.0, 3.0, 5.0), (5.0, 0.0, 0.0)  # from astern, in the axes of the boat
 CHART_ZOOM = 18.0  # half a kilometre across
-LINE_M, HULL_M, OBSTACLE_M = 0.06, 0.5, 1.0
+LINE_M, HULL_M, OBSTACLE_M, PLACE_M = 0.06, 0.5, 1.0, 0.2
 MAX_FRAMES = 32  # pictures whose evidence may still come
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 PICTURES = (keys.PICTURE.name, keys.MASK.name)
@@ -252,6 +254,7 @@ class RerunDrive:
             labels=[f"#{each.track_id} {np.hypot(each.east_mps, each.north_mps):.1f} m/s" for each in moving],
         )  # fmt: skip
         self._transient(OBSTACLES, obstacles, ahead.sent_us, keys.PREDICTION.fresh_s)
+        self._transient(HOME, _places(ahead.home, "home"), ahead.sent_us, keys.PREDICTION.fresh_s)
 
     def _route(self, route: m.Route) -> None:
         points = [(p.x_m, p.y_m, 0.0) for p in route.waypoints]
@@ -266,6 +269,7 @@ class RerunDrive:
         colours = [GREEN if area.keep is m.Keep.IN else RED for area in mission.fence]
         fence = rr.LineStrips3D(lines, radii=LINE_M, colors=colours)
         self._transient(FENCE, fence, mission.sent_us, keys.MISSION.fresh_s)
+        self._transient(RALLY, _places(mission.rally, "rally"), mission.sent_us, keys.MISSION.fresh_s)
 
     def _plot(self, path: str, value: float) -> None:
         self._stream.log(path, rr.Scalars(value))
@@ -276,6 +280,14 @@ class RerunDrive:
             self._lines[name] = key
             level = rr.TextLogLevel.WARN if warn else rr.TextLogLevel.INFO
             self._stream.log(f"log/{name}", rr.TextLog(text, level=level))
+
+
+def _places(points: Sequence[m.Waypoint], label: str) -> rr.Points3D:
+    """Places that RETURN may lead to."""
+    count = len(points)
+    return rr.Points3D(
+        [(p.x_m, p.y_m, 0.0) for p in points], radii=[PLACE_M] * count, colors=[WHITE] * count, labels=[label] * count
+    )
 
 
 def layout() -> rrb.Blueprint:

@@ -52,10 +52,11 @@ def write_drive(log: LogWriter) -> None:
     mask = cv2.imencode(".png", np.ones((6, 8), np.uint8))[1].tobytes()
     plan = (m.Waypoint(x_m=0.0, y_m=0.0), m.Waypoint(x_m=5.0, y_m=1.0))
     obstacle = m.MovingObstacle(track_id=7, x_m=9.0, y_m=2.0, radius_m=0.75, east_mps=0.3, north_mps=0.4)
-    put(log, keys.PREDICTION, m.Prediction(**at(0), path=plan, obstacles=(obstacle,)))
+    put(log, keys.PREDICTION, m.Prediction(**at(0), path=plan, obstacles=(obstacle,), home=plan[:1]))
     put(log, keys.ROUTE, m.Route(**at(0), name="r", waypoints=plan, repeat=False))
     area = m.FenceArea(keep=m.Keep.IN, corners=(*plan, m.Waypoint(x_m=5.0, y_m=9.0)))
-    put(log, keys.MISSION, m.Mission(**at(0), name="x", legs=(), fence=(area,)))
+    put(log, keys.MISSION, m.Mission(**at(0), name="x", legs=(), fence=(area,), rally=plan))
+    put(log, keys.MISSION, m.Mission(**at(N // 2), name="x", legs=(), fence=(area,)))
     for number in range(N):
         put(log, keys.ODOMETRY, odometry(number, yaw_rad=0.6, healthy=number >= 10))
         risk = m.LaneRisk(risk=0.2, blocked=False)
@@ -152,12 +153,21 @@ def test_boxes_lie_on_their_own_picture_and_on_no_later_one(rrd: dict[str, Entit
 
 def test_what_was_not_renewed_is_cleared_when_it_went_stale(rrd: dict[str, Entity]) -> None:
     stale_us = START_US + 1 + round(keys.PREDICTION.fresh_s * 1e6)
-    for name in ("/map/plan", "/map/obstacles"):
+    for name in ("/map/plan", "/map/obstacles", "/map/home"):
         assert rrd[name].times_us("Clear:is_recursive") == [stale_us]
     assert rrd["/map/route"].times_us("Clear:is_recursive") == []
     assert rrd["/map/obstacles"].column("Cylinders3D:labels") == [["#7 0.5 m/s"]]
     assert len(rrd["/map/fence"].column("LineStrips3D:strips")[0][0]) == 4, "closed"
     assert len(rrd["/map/route"].column("LineStrips3D:strips")[0][0]) == 2, "not closed, as it does not repeat"
+
+
+def test_home_and_rally_points_lie_on_the_map_until_others_are_in_force(rrd: dict[str, Entity]) -> None:
+    assert rrd["/map/home"].column("Points3D:positions") == [[[0.0, 0.0, 0.0]]]
+    assert rrd["/map/home"].column("Points3D:labels") == [["home"]]
+    rally = rrd["/map/rally"]
+    assert rally.column("Points3D:positions") == [[[0.0, 0.0, 0.0], [5.0, 1.0, 0.0]], []]
+    assert rally.column("Points3D:labels")[0] == ["rally", "rally"]
+    assert rally.times_us("Points3D:positions") == [START_US + number * STEP_US + 1 for number in (0, N // 2)]
 
 
 def test_plots_and_log(rrd: dict[str, Entity]) -> None:
