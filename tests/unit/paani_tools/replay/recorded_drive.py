@@ -23,6 +23,7 @@ from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR
 
 T0_US = 1_800_000_000_000_000
 CONFIG = load_config()
+TARGET = m.Waypoint(x_m=40.0, y_m=5.0)  # of every order
 
 
 class Desk:
@@ -95,10 +96,12 @@ def drive(
     seed: int = 1,
     restart_at_s: float | None = None,
     modes: tuple[m.DriveMode, ...] = (),
+    missions: tuple[m.Mission, ...] = (),
 ) -> list[Record]:
     """An armed boat among buoys: evidence at 5 Hz, odometry at 20 Hz, the navigator not always publishing.
 
-    modes: ordered one after the other, each for as long; without any nobody orders one.
+    modes: ordered one after the other, each for as long; without any nobody orders one. missions: in force one after
+    the other, likewise; without any the route alone is.
     """
     desk, dice = Desk(config), random.Random(seed)
     route = m.Route(
@@ -109,6 +112,8 @@ def drive(
         at_s = tick * 0.05
         if tick % 40 == 0:
             desk.publish(keys.ROUTE, route)
+            if missions:
+                desk.publish(keys.MISSION, missions[int(at_s / seconds * len(missions))])
         if restart_at_s is not None and math.isclose(at_s, restart_at_s, abs_tol=0.025):
             desk.restart("advisor")
             desk.restart("controller")
@@ -132,10 +137,10 @@ def drive(
 def _order(now_us: int, modes: tuple[m.DriveMode, ...], part: float) -> m.OperatorOrder:
     """The mode that is due at this part of the drive."""
     number = int(part * len(modes))
-    target = (m.Waypoint(x_m=40.0, y_m=5.0),)
     return m.OperatorOrder(
-        source_us=now_us, mode=modes[number], since_us=number + 1, target=target, surge=0.6, turn=part, by="dashboard"
-    )
+        source_us=now_us, mode=modes[number], since_us=number + 1, target=(TARGET,), surge=0.6, turn=part,
+        by="dashboard",
+    )  # fmt: skip
 
 
 def write_log(

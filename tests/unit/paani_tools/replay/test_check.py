@@ -20,7 +20,7 @@ from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Losses
 from paani_tools.replay.whatif import changes_of
-from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, drive
+from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, TARGET, drive
 
 pytestmark = pytest.mark.slow
 
@@ -362,3 +362,22 @@ def test_a_drive_through_every_mode_is_computed_to_the_byte() -> None:
     assert legs[-1].startswith("follow route")
     unordered = [each for each in records if each.topic != keys.OPERATOR_ORDER.name]
     assert not check("navigator", unordered).is_exact
+
+
+def test_a_return_to_a_rally_point_is_computed_to_the_byte_while_rally_points_change() -> None:
+    """As the operator's process lets them: the legs stay, so that the way that is under way goes on."""
+    leg = m.MissionLeg(kind=m.LegKind.FOLLOW_ROUTE, waypoints=(m.Waypoint(x_m=60.0, y_m=0.0), TARGET))
+    rallies = ((TARGET,), (TARGET, m.Waypoint(x_m=0.1, y_m=1 / 3)), ())
+    missions = tuple(
+        m.Mission(source_us=T0_US, name="a", legs=(leg,), rally=rally, accepted_us=T0_US + number, legs_us=T0_US)
+        for number, rally in enumerate(rallies)
+    )
+    records = drive(12.0, modes=(m.DriveMode.RETURN,), missions=missions)
+    found = check("navigator", records)
+    assert (found.is_exact, found.differing_states) == (True, 0)
+    sent = [msgspec.json.decode(each.data, type=m.Mission) for each in records if each.topic == keys.MISSION.name]
+    assert [len(mission.rally) for mission in sent] == [1, 1, 2, 2, 0, 0]
+    commands = [
+        msgspec.json.decode(each.data, type=m.NavCommand) for each in records if each.topic == keys.COMMAND.name
+    ]
+    assert {command.leg for command in commands} == {"return home"}
