@@ -66,6 +66,12 @@ def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float)
     return ""
 
 
+def find_home_fault(home: tuple[Waypoint, ...], fence: Fence, margin_m: float) -> str:
+    """Why the boat could not keep its station at home; empty where it can, or where no home is named."""
+    found = find_route_violation(fence, home, margin_m)
+    return "" if found is None else f"home: {found[1]}"
+
+
 def find_leg_outside(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> tuple[int, int, str] | None:
     """Leg, waypoint and what is wrong with it, of the first outside the fence or nearer than the margin to it."""
     for number, leg in enumerate(legs):

@@ -45,8 +45,7 @@ async def test_rtl_leads_to_the_rally_point_that_is_nearer_than_home(
     spawn: Spawn, open_as: OpenAs, config: Config, tmp_path: Path, transcript: Transcript
 ) -> None:
     mission, drive, udp = tmp_path / "mission.toml", tmp_path / "drive", find_free_port()
-    home = f"[home]\nx_m = {HOME[0]}\ny_m = {HOME[1]}\n"
-    mission.write_text(f'name = "rest"\n{home}[[legs]]\ndo = "stop"\n[[legs]]\ndo = "return_home"\n')
+    mission.write_text(f'name = "rest"\n[home]\nx_m = {HOME[0]}\ny_m = {HOME[1]}\n[[legs]]\ndo = "stop"\n')
     sets = (
         *SETS, f"navigator.mission={mission}", f"localization.origin_lat_lon_deg={list(ORIGIN_DEG)}",
         f"mavlink.udp=127.0.0.1:{udp}", f"recorder.folder={drive}",

@@ -75,6 +75,8 @@ def _home(state: NavigatorState, mission: Mission | None) -> tuple[Waypoint, ...
     for leg in mission.legs if mission is not None else ():
         if leg.kind is LegKind.RETURN_HOME and leg.waypoints:
             return leg.waypoints[-1:]
+    if mission is not None and mission.home:
+        return mission.home
     return () if state.progress.home is None else (state.progress.home,)
 
 

@@ -62,6 +62,7 @@ def merge(request: m.MissionRequest, present: m.Mission, now_us: int) -> m.Missi
         legs=present.legs if request.keep_legs else request.legs,
         fence=present.fence if request.keep_fence else request.fence,
         rally=present.rally if request.keep_rally else request.rally,
+        home=present.home,
         accepted_us=accepted_us,
         legs_us=present.legs_us if request.keep_legs else accepted_us,
     )

@@ -53,10 +53,11 @@ class FenceArea(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Mission(Message, frozen=True, kw_only=True):
-    """The legs in order, and the fence.
+    """The legs in order, the fence, and where home is.
 
     The boat stays inside at least one of the areas that keep in, if there are any, and outside all that keep out.
     `rally`: places that RETURN may lead to where they are nearer than home. Without legs there is nothing to do.
+    `home`: the one place that the boat's files name; empty: where the boat was first free to move.
     `accepted_us`: when the operator's process accepted it, which is its name among the missions of a run; 0: of the
     boat's files. `legs_us`: the same of the mission that these legs were
     accepted with; a fence or rally points that come later begin no leg anew.
@@ -68,6 +69,7 @@ class Mission(Message, frozen=True, kw_only=True):
     rally: tuple[Waypoint, ...] = ()
     accepted_us: Stamp = 0
     legs_us: Stamp = 0
+    home: tuple[Waypoint, ...] = ()
 
 
 class MissionRequest(Message, frozen=True, kw_only=True):

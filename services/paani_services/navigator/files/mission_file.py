@@ -18,6 +18,7 @@ from paani.missions import (
     MAX_RALLY,
     MAX_WAYPOINTS,
     MIN_RADIUS_M,
+    find_home_fault,
     find_leg_outside,
     find_rally_fault,
     mission_of_route,
@@ -101,7 +102,8 @@ def load_route_and_mission(
         if found is not None:
             leg, waypoint, what = found
             raise UserError(f"{where}: {f'legs[{leg}].' if config.mission else ''}waypoints[{waypoint}]: {what}")
-        if fault := find_rally_fault(mission.rally, mission.fence, config.fence_margin_m):
+        fault = find_home_fault(mission.home, mission.fence, config.fence_margin_m)
+        if fault := fault or find_rally_fault(mission.rally, mission.fence, config.fence_margin_m):
             raise UserError(f"{where}: {fault}")
     return next_route(mission) or route, mission
 
@@ -143,7 +145,8 @@ def load_mission(
     if sum(len(leg.waypoints) for leg in legs) > MAX_WAYPOINTS:
         raise UserError(f"{where}: legs: more than {MAX_WAYPOINTS} waypoints together")
     rally = tuple(frame.waypoint_of(point, f"rally[{number}]") for number, point in enumerate(file.rally))
-    return Mission(source_us=0, name=file.name or path.stem, legs=tuple(legs), rally=rally)
+    own_home = () if home is None else (home,)
+    return Mission(source_us=0, name=file.name or path.stem, legs=tuple(legs), rally=rally, home=own_home)
 
 
 def next_route(mission: Mission, leg: int = 0) -> Route | None:

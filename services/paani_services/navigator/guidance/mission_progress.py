@@ -39,8 +39,8 @@ class MissionProgress(
     """How far the mission has come. It is recorded and kept on disk under the field names given by `rename`.
 
     `leg_index`: the leg that is due; the number of legs when all are done. `waypoints_reached`: of all legs;
-    `waypoints_reached_before`: of the legs before this one. `home`: where the boat was first free to move.
-    Of the leg that is due:
+    `waypoints_reached_before`: of the legs before this one. `home`: that of the mission, else where the
+    boat was first free to move. Of the leg that is due:
     `target`: index of the waypoint steered for, None before the first. `leg_start`: where the leg began.
     `arrived_us`: when the boat first was on station [us of simulated time]. `is_off_station`: it has left the station
     since and is on its way back. `armed_epoch`: the run of the operator's process that last armed the boat.
@@ -104,7 +104,9 @@ def advance_mission(
     turn keeps its waypoint (M1, M3).
     """
     here = Waypoint(x_m=inputs.odometry.x_m, y_m=inputs.odometry.y_m)
-    if progress.home is None and inputs.is_free:
+    if mission.home:
+        progress = msgspec.structs.replace(progress, home=mission.home[0])
+    elif progress.home is None and inputs.is_free:
         progress = msgspec.structs.replace(progress, home=here)
     for _ in mission.legs:
         if is_mission_done(progress, mission) or (progress.leg_start is None and not inputs.is_free):

@@ -138,6 +138,9 @@ def test_home_is_the_missions_before_where_the_boat_set_out() -> None:
     unnamed = replace(mission, legs=(m.MissionLeg(kind=m.LegKind.RETURN_HOME),))
     found = [
         predict(state, STILL, None, task, 1, CAMERA, NAVIGATOR).home
-        for state, task in ((NavigatorState(), None), (began, None), (began, unnamed), (began, mission))
-    ]
-    assert found == [(), (HOME,), (HOME,), (named,)]
+        for state, task in (
+            (NavigatorState(), None), (began, None), (began, unnamed), (began, mission),
+            (began, replace(unnamed, home=(named,))), (began, replace(mission, legs=(), home=(named,))),
+        )
+    ]  # fmt: skip
+    assert found == [(), (HOME,), (HOME,), (named,), (named,), (named,)]

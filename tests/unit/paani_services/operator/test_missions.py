@@ -63,6 +63,7 @@ def test_what_is_kept_stays_and_legs_that_stay_keep_their_stamp() -> None:
     assert (both.name, both.legs, both.fence, both.accepted_us, both.legs_us) == ("sent", OTHER, FENCE, 50, 50)
     fence = missions.merge(replace(SENT, fence=NARROW, keep_legs=True), both, 60)
     assert (fence.name, fence.legs, fence.fence, fence.accepted_us, fence.legs_us) == ("sent", OTHER, NARROW, 60, 50)
+    assert missions.merge(SENT, replace(FILES, home=points((3, 0))), 50).home == points((3, 0))
     legs = missions.merge(replace(SENT, fence=NARROW, keep_fence=True), both, 40)
     assert (legs.fence, legs.accepted_us) == (FENCE, 51), "a clock that was set back names no two missions alike"
 

@@ -67,6 +67,15 @@ def test_rally_points_of_a_mission_file_lie_within_the_fence_or_are_named(tmp_pa
         load_route_and_mission(config, None)
 
 
+def test_home_lies_within_the_fence_even_where_no_leg_goes_there(tmp_path: Path) -> None:
+    corners = ", ".join(f"{{x_m = {x}, y_m = {y}}}" for x, y in ((-9, -9), (9, -9), (9, 9), (-9, 9)))
+    fence = written(tmp_path, "f.toml", f'[[areas]]\nkeep = "in"\ncorners = [{corners}]\n')
+    mission = written(tmp_path, "m.toml", '[home]\nx_m = 8.9\ny_m = 0.0\n[[legs]]\ndo = "stop"\n')
+    config = msgspec.structs.replace(PAANI, mission=str(mission), fence=str(fence))
+    with pytest.raises(UserError, match=r"m\.toml: home: is nearer than 1\.5 m to the fence"):
+        load_route_and_mission(config, None)
+
+
 def test_a_mission_file_gives_its_legs_and_the_route_to_show(tmp_path: Path) -> None:
     route, mission = written(tmp_path, "r.toml", ROUTE_TOML), written(tmp_path, "m.toml", MISSION_TOML)
     config = msgspec.structs.replace(PAANI, route=str(route), mission=str(mission))
@@ -76,6 +85,7 @@ def test_a_mission_file_gives_its_legs_and_the_route_to_show(tmp_path: Path) -> 
     assert [(w.x_m, w.y_m) for w in there.waypoints] == [(20, 10), (20, 0), (0, 0)]
     assert (there.repeat, there.laps, there.speed_mps) == (True, 2, 0.4)
     assert (station.waypoints, station.radius_m, station.duration_s) == ((Waypoint(x_m=20, y_m=10),), 3.0, 60.0)
+    assert loaded.home == (Waypoint(x_m=-2, y_m=1),)
     assert (home.kind, home.waypoints, stop.kind) == (LegKind.RETURN_HOME, (Waypoint(x_m=-2, y_m=1),), LegKind.STOP)
     assert route_to_show == next_route(loaded)
     assert next_route(loaded, 1) is None

@@ -156,6 +156,13 @@ def test_home_and_the_first_leg_begin_where_the_boat_is_armed() -> None:
     assert ship.state.progress.home == Waypoint(x_m=1.0, y_m=1.0)
 
 
+def test_a_leg_home_leads_to_the_home_that_the_mission_names() -> None:
+    mission = Mission(source_us=0, name="m", legs=(HOME,), home=at(9, 0))
+    ship = DriftingBoat(mission, PAANI, at_m=(-3.0, 1.0))
+    until(ship, 1)
+    assert math.dist(ship.position_m, (9.0, 0.0)) < 2.0
+
+
 def test_a_boat_at_home_returns_home_at_once() -> None:
     order = boat(HOME).settle(0.2)
     assert order.inhibits == (Inhibit.MISSION_DONE,)
