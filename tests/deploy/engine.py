@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -57,8 +58,23 @@ class Engine:
         return list(json.loads(self.docker("inspect", *names))) if names else []
 
     def processes(self, name: str) -> list[int]:
-        """Process numbers in a container, as this machine sees them."""
+        """Process numbers in a container, as this machine sees them; a health check's among them."""
         return [int(word) for word in self.docker("top", name, "-eo", "pid").split()[1:]]
+
+    def service_process(self, name: str) -> int:
+        """Number of the one process in a container that is neither its init nor a health check."""
+        lines = [line.split(maxsplit=1) for line in self.docker("top", name, "-eo", "pid,args").splitlines()[1:]]
+        (found,) = (int(pid) for pid, command in lines if re.match(r"\S*python\S* .*\brun\b", command))
+        return found
+
+    def cable(self, name: str, network: str) -> str:
+        """This machine's end of what joins a container to a network; taken down, it is a cable that was pulled out."""
+        address = f'{{{{(index .NetworkSettings.Networks "{network}").MacAddress}}}}'
+        mac = self.docker("inspect", "-f", address, name).strip()
+        find = "grep -l $0 /sys/class/net/*/address | xargs dirname"
+        inside = self.docker("exec", name, "sh", "-c", find, mac).strip()
+        ends = {Path(end, "ifindex").read_text(): end.name for end in Path("/sys/class/net").iterdir()}
+        return ends[self.docker("exec", name, "cat", f"{inside}/iflink")]
 
     def ensure_base_image(self) -> None:
         """A base image without a registry, made once."""

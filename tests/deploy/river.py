@@ -10,6 +10,7 @@ import tarfile
 import tempfile
 from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from paani import keys
 from paani import messages as m
@@ -42,10 +43,17 @@ class Drive:
         self.decisions = 0
         self.distance_m = self.collisions = 0.0
         self.bridge: m.BridgeState | None = None
+        self.newest: dict[str, m.Message] = {}  # of what decides whether the boat moves
+        topics: tuple[keys.Topic[Any], ...] = (keys.THRUST_APPLIED, keys.COMMAND, keys.OPERATOR_STATE, keys.ADVISORY)
+        for topic in topics:
+            bus.on(topic, self._hear)
         bus.on(keys.THRUST_APPLIED, self._hear_applied)
         bus.on(keys.EVIDENCE, self._hear_evidence)
         bus.on(keys.TRUE_POSE, self._hear_pose)
         bus.on(keys.BRIDGE_STATE, self._hear_bridge)
+
+    def _hear(self, message: m.Message) -> None:
+        self.newest[type(message).__name__] = message
 
     def _hear_applied(self, applied: m.ThrustApplied) -> None:
         self.applied.append((CLOCK.now_us(), applied.left_n + applied.right_n))
@@ -126,6 +134,10 @@ async def afloat(engine: Engine, profiles: str, environment: Mapping[str, str]) 
     try:
         await asyncio.to_thread(start, engine)
         yield
+    except BaseException:
+        for side in ("board", "host"):
+            print(engine.compose(side, "logs", "--no-color", "--tail", "30", check=False))
+        raise
     finally:
         await asyncio.to_thread(stop, engine)
 
@@ -148,7 +160,11 @@ async def driving(engine: Engine) -> AsyncIterator[Drive]:
                 page = f"http://127.0.0.1:{port}"
                 drive = Drive(engine, page, mcu, bus)
                 await arm_on_page(page, config.bus)
-                yield drive
+                try:
+                    yield drive
+                except BaseException:
+                    print(*drive.newest.values(), sep="\n")
+                    raise
 
 
 @contextlib.asynccontextmanager
