@@ -11,6 +11,7 @@ import { describeWheel } from "./wheel.js";
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
 const DEAD_ZONE = 0.15; // of a gamepad's stick, which rests nowhere exactly
 const MAX_UNDER_WAY = 3; // set-points on a slow link; more would only come late
+const SETPOINT_MS = 2000; // one that nobody answers for so long is given up, so that a hand drives again when the link is back
 /** What a key asks for: surge ahead, turn to port. @type {Record<string, [number, number]>} */
 const KEYS = {
   KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
@@ -51,7 +52,7 @@ async function say(isLast = false) {
   if (!canDrive || (underWay >= MAX_UNDER_WAY && !isNeutral)) return;
   underWay++;
   number = Math.max(number + 1, Date.now());
-  const refused = await post("/api/drive/setpoint", { hand, number, surge, turn }, isLast);
+  const refused = await post("/api/drive/setpoint", { hand, number, surge, turn }, isLast, SETPOINT_MS);
   underWay--;
   if (refused) letGo();
   if (refused) refusal = refused;

@@ -117,7 +117,7 @@ export const STAGE_TEXTS = {
 
 /** The devices of a hull. */
 export const DEVICE_TEXTS = {
-  none: "no report yet", sensors: "Sensors", bridge: "Bridge to the indicator", thrusters: "Line to the thrusters",
+  none: "no report yet", yes: "yes", no: "no", sensors: "Sensors", bridge: "Bridge to the indicator", thrusters: "Line to the thrusters",
   columns: ["Device", "State", "Line", "Rate", "Checksum", "Damaged", "Withheld", "Reconnected", "Says"],
 };
 export const INDICATOR_TEXTS = {
@@ -166,7 +166,7 @@ export const TUNING_TEXTS = {
 };
 
 /** Requests and the login. */
-export const REQUEST_TEXTS = { askKey: "The operator's key, which `paani up` prints:", notSent: "not sent: no connection to the dashboard" };
+export const REQUEST_TEXTS = { askKey: "The operator's key, which `paani up` prints:", notSent: "not sent: no connection to the dashboard", noAnswer: "no answer from the dashboard" };
 export const LOGIN_TEXTS = { noConnection: "No connection to the dashboard.", wrongKey: "That is not the operator's key.", latched: "STOPPED: latched until an operator arms." };
 
 /** Reasons for zero thrust: inhibits of navigator and controller, and zero causes of the thrust adapter. @type {Record<string, string>} */

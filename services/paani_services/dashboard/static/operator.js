@@ -9,12 +9,15 @@ import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, operatorText, setText, wor
 import { describeWheel } from "./wheel.js";
 
 const HOLD_MS = 1000, EXPIRES_MS = 5000, REFRESH_MS = 150;
+const MAX_UNDER_WAY = 3; // requests on a slow link; more would take the connection that a STOP needs
 const remaining = signal("null");
-let refusal = "", heldFrom = 0, press = 0, refreshing = 0;
+let refusal = "", heldFrom = 0, press = 0, refreshing = 0, underWay = 0;
 
 /** @param {string} act */
 async function send(act) {
+  underWay++;
   const refused = await post(`/api/arm/${act}`, { press });
+  underWay--;
   if (!refused) return;
   refusal = refused;
   release(false);
@@ -27,7 +30,7 @@ function hold() {
   heldFrom = performance.now();
   void send("hold");
   clearInterval(refreshing);
-  refreshing = setInterval(() => void send("hold"), REFRESH_MS);
+  refreshing = setInterval(() => underWay < MAX_UNDER_WAY && void send("hold"), REFRESH_MS);
 }
 
 /** @param {boolean} mayArm */

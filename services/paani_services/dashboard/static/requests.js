@@ -5,6 +5,8 @@ import { REQUEST_TEXTS, byId } from "./text.js";
 
 /** Each page is a hand of its own at the wheel, until it is loaded again. */
 export const hand = 1 + Math.floor(Math.random() * 2 ** 50);
+/** A request that nobody answers is given up, or it would hold one of the few connections that a STOP needs too. */
+const ANSWER_MS = 5000;
 let hasSession = false;
 let key = sessionStorage.getItem("paani-key") ?? "";
 
@@ -52,21 +54,22 @@ export function hasKey() {
 
 /**
  * Send a request; why it was refused, empty where it was not. A key that is refused is forgotten.
- * @param {string} path @param {object} body @param {boolean} [isLast] it is sent although the page goes away
+ * @param {string} path @param {object} body @param {boolean} [isLast] it is sent although the page goes away @param {number} [limitMs]
  */
-export async function post(path, body, isLast = false) {
+export async function post(path, body, isLast = false, limitMs = ANSWER_MS) {
   try {
     const answer = await fetch(path, {
       method: "POST",
       headers: { "Content-Type": "application/json", "X-Paani-Key": key },
       body: JSON.stringify(body),
       keepalive: isLast,
+      signal: AbortSignal.timeout?.(limitMs),
     });
     if (answer.ok) return "";
     if (answer.status === 401) void requireSession();
     if (answer.status === 403) keepKey("");
     return String((await answer.json()).error);
-  } catch {
-    return REQUEST_TEXTS.notSent;
+  } catch (error) {
+    return error instanceof DOMException && error.name === "TimeoutError" ? REQUEST_TEXTS.noAnswer : REQUEST_TEXTS.notSent;
   }
 }

@@ -9,6 +9,7 @@ import { drawPlan } from "./plan_drawing.js";
 import { hand, hasKey, post } from "./requests.js";
 import { EDITOR, byId, make, setText } from "./text.js";
 
+const SEND_MS = 30000; // the server checks a large mission for up to 20 s
 const REACH_PX = 14, DRAG_PX = 4, MAX_SHOWN = 3;
 const MAX_SHARE = 0.1; // of the page's time for checks: a large mission is checked less often, so that the page answers
 
@@ -169,7 +170,7 @@ export class RouteEditor {
     byId("editor-send").disabled = true;
     this.note = EDITOR.sent;
     const { legs, fence, rally } = this.made.plan;
-    const refused = await post("/api/mission", { hand, name: "drawn", legs, fence, rally: rally.flatMap(({ waypoints }) => waypoints) });
+    const refused = await post("/api/mission", { hand, name: "drawn", legs, fence, rally: rally.flatMap(({ waypoints }) => waypoints) }, false, SEND_MS);
     this.note = refused || EDITOR.accepted;
     byId("editor-send").disabled = false;
   }

@@ -4,7 +4,8 @@
 
 import { ORDER_TEXTS, byId, fixed } from "./text.js";
 
-const RETRY_MS = 400, PAD_PERIOD_MS = 40;
+// A link that comes back after it was dead answers on a new connection long before it does on one from before.
+const RETRY_MS = 400, ANSWER_MS = 2000, PAD_PERIOD_MS = 40;
 const PAD_BUTTON = 1; // B of the standard layout, the circle of others
 export const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
 let isPending = false, askedAt = 0;
@@ -15,7 +16,7 @@ async function stop() {
   askedAt = performance.now();
   while (isPending) {
     try {
-      if ((await fetch("/api/stop", { method: "POST" })).ok) isPending = false;
+      if ((await fetch("/api/stop", { method: "POST", signal: AbortSignal.timeout?.(ANSWER_MS) })).ok) isPending = false;
     } catch { /* asked again below */ }
     if (isPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }

@@ -1,0 +1,109 @@
+"""What the page does where an answer or one of its own files never comes."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from paani import keys
+from paani.config import Config
+from tests.arming import arm_on_page
+from tests.browser.conftest import Boat
+from tests.browser.test_drive import WAIT_S, Orders, drive_manually
+from tests.browser.test_page import until, watch
+from tests.conftest import OpenAs, Spawn
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+class Silence:
+    """Requests that are kept without an answer, as on a link that is dead, for as long as it lasts."""
+
+    def __init__(self, most: int | None = None) -> None:
+        self.kept, self._most = 0, most
+
+    async def __call__(self, route: Any) -> None:
+        if self._most is not None and self.kept >= self._most:
+            await route.continue_()
+        else:
+            self.kept += 1
+
+    def end(self) -> None:
+        self._most = 0
+
+
+async def test_a_stop_without_an_answer_is_asked_again_on_a_new_connection(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("operator"), spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await until(page, "document.querySelector('#order-word').textContent === 'STOPPED'")
+        await page.route("**/api/stop", Silence(most=1))
+        await page.keyboard.press("Escape")
+        await until(page, "document.querySelector('#order-word').textContent === 'NOT CONFIRMED'")
+        await until(
+            page, "document.querySelector('#order-detail').textContent.startsWith('confirmed by the thrust adapter in')"
+        )
+
+
+async def test_a_hand_drives_again_after_a_link_that_swallowed_what_it_said(
+    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
+) -> None:
+    orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
+    async with spawn("operator"), spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+        await drive_manually(page, orders)
+        dead = Silence()
+        await page.route("**/api/drive/setpoint", dead)
+        await page.keyboard.down("w")
+        async with asyncio.timeout(WAIT_S):
+            while dead.kept < 3:
+                await asyncio.sleep(0.02)
+        await asyncio.sleep(0.5)
+        assert dead.kept == 3, "no more wait for an answer at once, or a STOP would find no connection"
+        await page.keyboard.up("w")
+        dead.end()
+        await until(page, "document.querySelector('#drive-note').textContent === 'no answer from the dashboard'")
+        await drive_manually(page, orders)
+        await page.keyboard.down("w")
+        await orders.until(lambda found: found.stick == (1.0, 0.0))
+        await page.keyboard.up("w")
+
+
+async def test_holds_without_an_answer_leave_room_for_a_stop(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("operator"), spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await until(page, "!document.querySelector('#arm').disabled")
+        dead = Silence()
+        await page.route("**/api/arm/*", dead)
+        await page.focus("#arm")
+        await page.keyboard.down("Enter")
+        await page.wait_for_timeout(1500)
+        assert dead.kept == 3
+        await page.evaluate("document.querySelector('#arm').blur()")
+
+
+async def test_a_page_without_one_of_its_files_is_loaded_again(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("dashboard"):
+        for name in ("stop.js", "bar.css", "uPlot.iife.min.js"):
+            page, asked = await browser.new_page(), 0
+
+            async def lose_first(route: Any) -> None:
+                nonlocal asked
+                asked += 1
+                await (route.abort() if asked == 1 else route.continue_())
+
+            await page.route(f"**/static/{name}", lose_first)
+            await page.goto(f"http://127.0.0.1:{config.dashboard.port}/")
+            async with asyncio.timeout(WAIT_S):
+                while asked < 2:
+                    await asyncio.sleep(0.05)
+            await page.wait_for_selector("body[data-link='live']", timeout=WAIT_S * 1e3)
+            await page.close()
