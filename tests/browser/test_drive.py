@@ -51,6 +51,10 @@ class Orders:
         order = self._inbox.value
         return (0.0, 0.0) if order is None else (order.surge, order.turn)
 
+    @property
+    def is_overridden(self) -> bool:
+        return self._inbox.value is not None and self._inbox.value.override
+
     async def until(self, condition: Callable[[Orders], bool], limit_s: float = WAIT_S) -> None:
         try:
             async with asyncio.timeout(limit_s):
