@@ -3,8 +3,10 @@
 
 import { shownTab } from "./tabs.js";
 import { effect, facts, html, mount, tableHead, tableMoment } from "./templates.js";
-import { DEVICE_FACTS, DEVICE_TEXTS, ageText, agoText, byId, fixed } from "./text.js";
+import { DEVICE_FACTS, DEVICE_TEXTS, NEVER, ageText, agoText, byId, fixed, words } from "./text.js";
 
+const NO_ANSWER_MS = 1e9; // the age of an answer before the first
+const CODE = /^[A-Za-z]+(_[A-Za-z]+)+$|^[A-Z]+$/; // an enumeration's value, and not what a device says
 const LINES = /** @type {const} */ (["bridge", "thrusters"]);
 /** @type {Record<string, string>} */
 const KINDS = { ok: "good", off: "quiet", no_fix: "warn" };
@@ -36,6 +38,12 @@ function line({ store, now }, name) {
 
 /** Every field of a state but its header. @param {any} state @returns {[string, string, boolean][]} */
 const factsOf = (state) =>
-  Object.entries(state).filter(([name]) => !DEVICE_FACTS.header.includes(name)).map(([name, value]) => [
-    name.replaceAll("_", " "), typeof value === "number" && !Number.isInteger(value) ? fixed(value) : typeof value === "object" ? JSON.stringify(value) : String(value === "" ? "–" : value), name === "problem" && Boolean(value),
-  ]);
+  Object.entries(state).filter(([name]) => !DEVICE_FACTS.header.includes(name)).map(([name, value]) => [words(name), valueText(name, value), name === "problem" && Boolean(value)]);
+
+/** @param {string} name @param {any} value @returns {string} */
+function valueText(name, value) {
+  if (typeof value === "boolean") return value ? DEVICE_TEXTS.yes : DEVICE_TEXTS.no;
+  if (typeof value === "number") return value === NO_ANSWER_MS ? NEVER : Number.isInteger(value) ? String(value) : fixed(value);
+  if (Array.isArray(value)) return value.map(words).join(", ") || "–";
+  return value === "" ? "–" : CODE.test(value) ? words(value) : String(value);
+}
