@@ -6,6 +6,7 @@ import { EXPLANATION_TEXTS, fixed, trackLabel, words } from "./text.js";
 export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
 const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb", OWN_HULL = "#ebf3f8";
+const LABEL_HEIGHT_PX = 18, LABEL_PITCH_PX = 19;
 
 /**
  * A class mask as a tinted, transparent canvas.
@@ -24,6 +25,7 @@ export function tintMask({ image, width, height }) {
 }
 
 /** @typedef {{ctx: CanvasRenderingContext2D, width: number, height: number, unit: number}} Pane */
+/** @typedef {{left: number, top: number, width: number}} LabelPlace */
 
 /** @param {Pane} pane @param {OffscreenCanvas} mask */
 export function drawMask({ ctx, width, height }, mask) {
@@ -31,19 +33,23 @@ export function drawMask({ ctx, width, height }, mask) {
   ctx.drawImage(mask, 0, 0, width, height);
 }
 
-/** @param {Pane} pane @param {string} text @param {number} x @param {number} y @param {string} colour @param {CanvasTextAlign} align */
-function drawLabel({ ctx, unit, width }, text, x, y, colour, align = "left") {
+/** How wide a label is, and where it lies in the picture. @param {Pane} pane @param {string} text @param {number} x @param {number} share of the label that lies left of x @returns {LabelPlace} */
+function placeLabel({ ctx, unit, width: paneWidth }, text, x, share = 0) {
+  ctx.font = `600 ${12 * unit}px system-ui, sans-serif`;
+  const width = ctx.measureText(text).width + 8 * unit;
+  return { left: Math.min(Math.max(0, x - share * width), paneWidth - width), top: 0, width };
+}
+
+/** @param {Pane} pane @param {string} text @param {LabelPlace} place @param {string} colour */
+function drawLabel({ ctx, unit }, text, { left, top, width }, colour) {
+  const height = LABEL_HEIGHT_PX * unit;
   ctx.font = `600 ${12 * unit}px system-ui, sans-serif`;
   ctx.textBaseline = "middle";
-  const labelWidth = ctx.measureText(text).width + 8 * unit, labelHeight = 18 * unit;
-  let left = align === "center" ? x - labelWidth / 2 : x;
-  left = Math.min(Math.max(0, left), width - labelWidth);
-  const top = Math.max(0, y);
   ctx.fillStyle = "rgb(8 11 14 / .78)";
-  ctx.fillRect(left, top, labelWidth, labelHeight);
+  ctx.fillRect(left, top, width, height);
   ctx.fillStyle = colour;
   ctx.textAlign = "left";
-  ctx.fillText(text, left + 4 * unit, top + labelHeight / 2 + unit);
+  ctx.fillText(text, left + 4 * unit, top + height / 2 + unit);
 }
 
 /** On whole pixels, so that its lines are sharp. @param {Pane} pane @param {number[]} box @param {string} colour @param {number} lineWidth @param {number[]} dash */
@@ -58,6 +64,7 @@ function drawBox({ ctx, width, height, unit }, box, colour, lineWidth, dash) {
 
 /** @param {Pane} pane @param {any} evidence @param {any} tracks of the same frame, or undefined */
 export function drawBoxes(pane, evidence, tracks) {
+  /** @type {[string, number[], string][]} */
   const labels = [];
   if (tracks) {
     for (const track of tracks.tracks) {
@@ -73,10 +80,24 @@ export function drawBoxes(pane, evidence, tracks) {
       labels.push([`${found.label} ${fixed(found.confidence)}`, found.box_xyxy, TENTATIVE]);
     }
   }
+  /** @type {LabelPlace[]} */
+  const taken = [];
   for (const [text, box, colour] of labels) {
-    const y = box[1] * pane.height - 19 * pane.unit;
-    drawLabel(pane, text, box[0] * pane.width - pane.unit, y < 0 ? box[1] * pane.height + 2 * pane.unit : y, colour);
+    const above = box[1] * pane.height - LABEL_PITCH_PX * pane.unit, below = box[1] * pane.height + 2 * pane.unit;
+    const place = placeLabel(pane, text, box[0] * pane.width - pane.unit);
+    place.top = freeTop(above, below, LABEL_PITCH_PX * pane.unit, place, taken);
+    taken.push(place);
+    drawLabel(pane, text, place, colour);
   }
+}
+
+/** Where a label hides none of those before it: above its box, else in it, else further up or down. @param {number} above @param {number} below @param {number} pitch @param {LabelPlace} place @param {LabelPlace[]} taken */
+export function freeTop(above, below, pitch, { left, width }, taken) {
+  const steps = taken.map((_, index) => (index + 1) * pitch);
+  const tops = [above, below, ...steps.map((step) => above - step), ...steps.map((step) => below + step)].filter((top) => top >= 0);
+  const isFree = (/** @type {number} */ top) =>
+    taken.every((other) => Math.abs(other.top - top) >= pitch - 1 || other.left + other.width <= left || left + width <= other.left);
+  return tops.find(isFree) ?? tops[0] ?? 0;
 }
 
 /** Corridor brackets along the bottom. @param {Pane} pane @param {any} corridors @param {any} advisory of the same frame, or undefined */
@@ -102,7 +123,7 @@ export function drawCorridors(pane, corridors, advisory) {
     ctx.lineTo(x2, base - 12 * unit);
     ctx.stroke();
     const verdict = lane ? `${fixed(lane.risk)} ${EXPLANATION_TEXTS.verdicts[lane.blocked ? "blocked" : "clear"]}` : words(name);
-    drawLabel(pane, verdict, ((x1 + x2) / 2), height - 33 * unit, colour, "center");
+    drawLabel(pane, verdict, { ...placeLabel(pane, verdict, (x1 + x2) / 2, 0.5), top: height - 33 * unit }, colour);
   }
 }
 

@@ -1,0 +1,53 @@
+"""Labels over the picture, in the engine that draws them: none hides another, as far as there is room."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(60)]
+
+DRAW = """async (tracks) => {
+  const { drawBoxes } = await import("/static/overlay.js");
+  const ctx = new OffscreenCanvas(400, 300).getContext("2d"), drawn = [];
+  const fillRect = ctx.fillRect.bind(ctx);
+  ctx.fillRect = (x, y, width, height) => { drawn.push([x, y, width, height]); fillRect(x, y, width, height); };
+  drawBoxes({ ctx, width: 400, height: 300, unit: 1 }, { detections: [] }, { tracks });
+  return drawn;
+}"""
+
+
+def track(number: int, left: float, top: float) -> dict[str, Any]:
+    return {
+        "id": number, "label": "buoy", "confidence": 0.5, "accepted": True, "held": False, "immediate_danger": False,
+        "box_xyxy": [left, top, left + 0.05, top + 0.05],
+    }  # fmt: skip
+
+
+def overlaps(first: list[float], second: list[float]) -> bool:
+    return all(
+        first[axis] < second[axis] + second[axis + 2] and second[axis] < first[axis] + first[axis + 2]
+        for axis in (0, 1)
+    )
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        [(0.2, 0.5), (0.6, 0.5)],
+        [(0.2, 0.5), (0.25, 0.5), (0.3, 0.52), (0.28, 0.48)],
+        [(0.2, 0.02), (0.25, 0.02)],
+    ],
+    ids=["apart", "crowded", "at the top"],
+)
+async def test_no_label_hides_another(scripts_page: Any, places: list[tuple[float, float]]) -> None:
+    drawn = await scripts_page.evaluate(DRAW, [track(number, *place) for number, place in enumerate(places)])
+    assert len(drawn) == len(places)
+    assert not any(overlaps(a, b) for index, a in enumerate(drawn) for b in drawn[:index]), drawn
+    assert all(0 <= x <= 400 - width and 0 <= y <= 300 - height for x, y, width, height in drawn)
+
+
+async def test_a_label_with_room_stands_above_its_box(scripts_page: Any) -> None:
+    (_, top, _, height) = (await scripts_page.evaluate(DRAW, [track(1, 0.2, 0.5)]))[0]
+    assert top + height <= 150
