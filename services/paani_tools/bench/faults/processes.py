@@ -12,13 +12,15 @@ import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
+import msgspec
+
+from paani.bus.hearing import DEAF_S
 from paani_tools.bench.faults.fault import Expected, Fault
-from paani_tools.bench.faults.running import Loop, until
-from paani_tools.up.silence import HUNG_S
+from paani_tools.bench.faults.running import MONOTONIC, Loop, until
 
 GONE_S, BACK_S = 10.0, 40.0
-FROZEN_S, REFUSED_S = 1.0, 2.0
-UNHEARD_S = HUNG_S + REFUSED_S  # a process that hears nothing any more has been ended by then
+FROZEN_S, REFUSED_S, REFUSED_MEMORY_S = 1.0, 2.0, 5.0
+SPEAKS_S = DEAF_S + 1.0  # whoever reports its health so long after it lacked anything hears, too
 NEEDS_A_HAND = frozenset({"operator", "dashboard"})  # who armed, and where: nobody knows whether they still want it
 RECORDER = "recorder"
 NOBODY_WAITS_FOR = frozenset({RECORDER, "bridge"})
@@ -116,9 +118,17 @@ def _limited(
 
 
 def _refused_memory(service: str) -> Fault:
+    """Of one process, followed until it works, or has been ended and another works in its place."""
     expected = Expected.MAY_STAND if service in NEEDS_A_HAND else Expected.GOES_ON
     name = f"{service} refused memory"
-    return _limited(name, [service], resource.RLIMIT_AS, _address_space, expected, UNHEARD_S)
+    limited = _limited(name, [service], resource.RLIMIT_AS, _address_space, expected, REFUSED_MEMORY_S)
+
+    async def end(loop: Loop) -> None:
+        await limited.end(loop)
+        settled_us = MONOTONIC.now_us() + round(SPEAKS_S * 1e6)
+        await until(lambda: loop.watch.healthy_us.get(service, 0) > settled_us, BACK_S)
+
+    return msgspec.structs.replace(limited, end=end)
 
 
 def _address_space(pid: int) -> int:

@@ -9,7 +9,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,14 +55,20 @@ class Report(NamedTuple):
 
 
 class Watch:
-    """What is heard of the drive by somebody who only looks."""
+    """What is heard of the drive by somebody who only looks.
 
-    def __init__(self, bus: Bus) -> None:
+    `healthy_us`: when each of the services last reported its health [us, monotonic].
+    """
+
+    def __init__(self, bus: Bus, services: Iterable[str]) -> None:
         self.reports: list[Report] = []
         self.decided_us: list[int] = []
         self.sim_s = 0.0
         self.alive: dict[str, bool] = {}
         self.changed_us: dict[str, int] = {}
+        self.healthy_us: dict[str, int] = {}
+        for service in services:
+            bus.on(keys.health(service), self._hear_health)
         bus.on(keys.THRUST_APPLIED, self._hear_applied)
         bus.on(keys.EVIDENCE, self._hear_evidence)
         bus.on(keys.TRUE_POSE, self._hear_pose)
@@ -71,6 +77,9 @@ class Watch:
         moves = applied.left_n != 0.0 or applied.right_n != 0.0
         heard = (MONOTONIC.now_us(), moves, applied.zero_cause, applied.source_us, applied.since_us)
         self.reports.append(Report(*heard))
+
+    def _hear_health(self, health: m.Health) -> None:
+        self.healthy_us[health.producer] = MONOTONIC.now_us()
 
     def _hear_evidence(self, evidence: m.Evidence) -> None:
         self.decided_us.append(MONOTONIC.now_us())
@@ -264,7 +273,7 @@ async def running(sides: Sequence[Side], folder: Path, environ: Mapping[str, str
             await up.start()
         config = load_config(sets=sides[-1].sets)
         bus = await open_bus(config.bus, OBSERVER, clock)
-        watch = Watch(bus)
+        watch = Watch(bus, keys.services_in(config.bus.graph))
         following = asyncio.create_task(watch.follow(bus))
         try:
             yield Loop(config, watch, clock, ups)

@@ -7,6 +7,7 @@ import os
 import resource
 import tty
 from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.bus.admission import Admission
+from paani.bus.hearing import DEAF_S
 from paani.certificates import require_certificates
 from paani.clock import WallClock
 from paani.config import BusConfig, load_config
@@ -23,7 +25,7 @@ from paani_tools.bench.faults.drives import faults_of
 from paani_tools.bench.faults.expiry import EXPIRING, KILLED, Certificates
 from paani_tools.bench.faults.fault import Drive, Expected
 from paani_tools.bench.faults.processes import NEEDS_A_HAND
-from paani_tools.bench.faults.running import Loop, ShiftedClock
+from paani_tools.bench.faults.running import MONOTONIC, Loop, ShiftedClock
 from paani_tools.bench.faults.versions import OTHER_NAMES, in_other_words
 from tests.mcu_peer import until
 
@@ -69,6 +71,26 @@ class OneProcess(Loop):
 
     def pid_of(self, service: str) -> int:
         return self._pid
+
+
+async def test_a_process_refused_memory_is_followed_until_it_has_spoken_long_after() -> None:
+    fault = next(fault for fault in faults_of(Drive.PLAIN) if fault.name == "advisor refused memory")
+    process = await asyncio.create_subprocess_exec("sleep", "60")
+    try:
+        loop, before = OneProcess(process.pid), resource.prlimit(process.pid, resource.RLIMIT_AS)
+        healthy_us: dict[str, int] = {}
+        loop.watch = SimpleNamespace(healthy_us=healthy_us)  # type: ignore[assignment]
+        await fault.begin(loop)
+        assert 0 < resource.prlimit(process.pid, resource.RLIMIT_AS)[0] < 1 << 30
+        ending = asyncio.ensure_future(fault.end(loop))
+        await until(lambda: resource.prlimit(process.pid, resource.RLIMIT_AS) == before)
+        for heard_after_s, has_ended in ((0.5, False), (DEAF_S, False), (DEAF_S + 2.0, True)):
+            healthy_us["advisor"] = MONOTONIC.now_us() + round(heard_after_s * 1e6)
+            await asyncio.wait({ending}, timeout=0.2)
+            assert ending.done() is has_ended
+    finally:
+        process.kill()
+        await process.wait()
 
 
 async def test_a_process_without_descriptors_is_given_none_that_it_has_not_and_has_them_back() -> None:
