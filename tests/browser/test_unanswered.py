@@ -12,7 +12,7 @@ from paani.config import Config
 from tests.arming import arm_on_page
 from tests.browser.conftest import Boat
 from tests.browser.test_drive import WAIT_S, Orders, drive_manually
-from tests.browser.test_page import until, watch
+from tests.browser.test_page import hold_to_arm, until, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
@@ -86,6 +86,23 @@ async def test_holds_without_an_answer_leave_room_for_a_stop(
         await page.wait_for_timeout(1500)
         assert dead.kept == 3
         await page.evaluate("document.querySelector('#arm').blur()")
+
+
+async def test_why_an_earlier_press_did_not_arm_is_not_said_of_an_armed_boat(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    detail = "document.querySelector('#order-detail').textContent"
+    async with spawn("operator"), spawn("dashboard"):
+        page = (await watch(browser, config)).page
+
+        async def refuse(route: Any) -> None:
+            await route.fulfill(status=409, json={"error": "not armed: the hold was interrupted", "field": "press"})
+
+        await page.route("**/api/arm/*", refuse)
+        await hold_to_arm(page, 0.3)
+        await until(page, f"{detail} === 'not armed: the hold was interrupted'")
+        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+        await until(page, f"{detail} === 'by the page, route'")
 
 
 async def test_a_page_without_one_of_its_files_is_loaded_again(

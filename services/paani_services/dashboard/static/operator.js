@@ -71,6 +71,7 @@ export function renderOperatorState(store, open, now, isPast) {
   if (heldMs > EXPIRES_MS || isPast) release(false);
   const button = byId("arm");
   const isHeard = open && store.isFresh("operator/state", now);
+  if (isHeard && operator?.armed) refusal = ""; // of an earlier press, or of one that was answered late
   button.disabled = !isHeard || !operator || operator.armed || isReplay(store) || isPast;
   button.querySelector("i").style.width = `${Math.min(1, heldMs / HOLD_MS) * 100}%`;
   setText(button.querySelector("span"), heldMs >= HOLD_MS ? ARM_TEXTS.release : operator?.armed ? ARM_TEXTS.armed : ARM_TEXTS.hold);
