@@ -13,8 +13,10 @@ DRAW = """async (tracks) => {
   const ctx = new OffscreenCanvas(400, 300).getContext("2d"), drawn = [];
   const fillRect = ctx.fillRect.bind(ctx);
   ctx.fillRect = (x, y, width, height) => { drawn.push([x, y, width, height]); fillRect(x, y, width, height); };
+  let leaders = 0;
+  ctx.lineTo = () => { leaders++; };
   drawBoxes({ ctx, width: 400, height: 300, unit: 1 }, { detections: [] }, { tracks });
-  return drawn;
+  return [drawn, leaders];
 }"""
 
 
@@ -42,12 +44,15 @@ def overlaps(first: list[float], second: list[float]) -> bool:
     ids=["apart", "crowded", "at the top"],
 )
 async def test_no_label_hides_another(scripts_page: Any, places: list[tuple[float, float]]) -> None:
-    drawn = await scripts_page.evaluate(DRAW, [track(number, *place) for number, place in enumerate(places)])
+    drawn, leaders = await scripts_page.evaluate(DRAW, [track(number, *place) for number, place in enumerate(places)])
+    above_or_in = sum(abs(top - 300 * place[1] + 8) < 12 for (_, top, _, _), place in zip(drawn, places, strict=True))
+    assert leaders == len(places) - above_or_in, "a label that stands elsewhere is joined to its box"
     assert len(drawn) == len(places)
     assert not any(overlaps(a, b) for index, a in enumerate(drawn) for b in drawn[:index]), drawn
     assert all(0 <= x <= 400 - width and 0 <= y <= 300 - height for x, y, width, height in drawn)
 
 
 async def test_a_label_with_room_stands_above_its_box(scripts_page: Any) -> None:
-    (_, top, _, height) = (await scripts_page.evaluate(DRAW, [track(1, 0.2, 0.5)]))[0]
+    ((_, top, _, height),), leaders = await scripts_page.evaluate(DRAW, [track(1, 0.2, 0.5)])
+    assert leaders == 0
     assert top + height <= 150

@@ -87,8 +87,20 @@ export function drawBoxes(pane, evidence, tracks) {
     const place = placeLabel(pane, text, box[0] * pane.width - pane.unit);
     place.top = freeTop(above, below, LABEL_PITCH_PX * pane.unit, place, taken);
     taken.push(place);
+    if (place.top !== above && place.top !== below) drawLeader(pane, box, place.top, colour);
     drawLabel(pane, text, place, colour);
   }
+}
+
+/** From a box to its label, where others stand between them. @param {Pane} pane @param {number[]} box @param {number} labelTop @param {string} colour */
+function drawLeader({ ctx, width, height, unit }, box, labelTop, colour) {
+  const x = Math.round(box[0] * width);
+  ctx.lineWidth = unit;
+  ctx.strokeStyle = colour;
+  ctx.beginPath();
+  ctx.moveTo(x, box[1] * height);
+  ctx.lineTo(x, labelTop + 0.5 * LABEL_HEIGHT_PX * unit);
+  ctx.stroke();
 }
 
 /** Where a label hides none of those before it: above its box, else in it, else further up or down. @param {number} above @param {number} below @param {number} pitch @param {LabelPlace} place @param {LabelPlace[]} taken */
