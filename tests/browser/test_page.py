@@ -23,7 +23,7 @@ TOLERANCE = 14
 OWN_HULL = "[[0.4, 1.0], [0.4, 0.95], [0.6, 0.95], [0.6, 1.0]]"
 WATER_RGBA, OBSTACLE_RGBA = (23, 184, 214, 66), (242, 140, 30, 100)
 ACCEPTED_RGB = (255, 180, 84)
-ROUTE_RGB, TRACK_RGB = (185, 164, 240), (79, 195, 224)
+ROUTE_RGB, TRACK_RGB, TRUTH_RGB = (185, 164, 240), (79, 195, 224), (223, 230, 235)
 MAP_PX_PER_M = 6.0  # as the page begins
 MAP_PIXELS = """([x, y]) => {
   const c = document.querySelector("#map"), ratio = c.width / c.clientWidth;
@@ -302,6 +302,7 @@ async def test_the_map_shows_route_and_position(
 ) -> None:
     route = (await open_as("navigator")).publisher(keys.ROUTE)
     odometry = (await open_as("localization")).publisher(keys.ODOMETRY)
+    truth = (await open_as("plant")).publisher(keys.TRUE_POSE)
     async with spawn("dashboard"):
         watched = await watch(browser, config)
         for step in range(20):
@@ -314,6 +315,12 @@ async def test_the_map_shows_route_and_position(
                 )
             )
             odometry.put(m.Odometry(source_us=now_us, x_m=0.5 * step, y_m=1.0, yaw_rad=0.0, surge_mps=0.5))
+            truth.put(
+                m.TruePose(
+                    source_us=now_us, sim_us=now_us, x_m=0.5 * step, y_m=-4.0, z_m=0.0, roll_rad=0.0, pitch_rad=0.0,
+                    yaw_rad=0.0, surge_mps=0.5, sway_mps=0.0, yaw_rate_radps=0.0,
+                )
+            )  # fmt: skip
             await asyncio.sleep(0.1)
         await until(watched.page, "document.querySelector('#map-pose').textContent.startsWith('9.5 m E, 1.0 m N')")
         await until(watched.page, "document.querySelector('#speed').textContent === '0.50'")
@@ -321,5 +328,9 @@ async def test_the_map_shows_route_and_position(
         assert not await has_colour_on_map(watched.page, ROUTE_RGB, -5.0, -1.0), "north is up"
         assert await has_colour_on_map(watched.page, TRACK_RGB, -5.0, 0.0), "where the boat was"
         assert await has_colour_on_map(watched.page, TRACK_RGB, 1.0, 0.0), "its bow, ahead of where it was"
+        assert await has_colour_on_map(watched.page, TRUTH_RGB, 1.0, -5.0), (
+            "where it is in truth, which a simulator knows"
+        )
+        assert await watched.page.inner_text("#map-error") == "error 5.0 m"
         await until(watched.page, RED_ON_MAP)  # a ghost of the boat that is heard no more
         assert watched.errors == []

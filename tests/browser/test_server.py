@@ -332,11 +332,15 @@ async def test_a_client_that_never_reads_delays_nobody(
 async def test_idle_connections_leave_room_for_a_stop(
     client: aiohttp.ClientSession, spawn: Spawn, boat: Boat, config: Config
 ) -> None:
-    """With as many descriptors as a process usually has, and more strangers than these."""
+    """With as many descriptors as a process usually has, and more strangers than these, a third amid a request."""
     async with spawn("operator"), spawn("dashboard") as process, contextlib.AsyncExitStack() as strangers:
         resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (1024, 1024))
-        for _ in range(1100):
-            strangers.enter_context(socket.create_connection(("127.0.0.1", config.dashboard.port), timeout=5.0))
+        for number in range(1100):
+            stranger = socket.create_connection(("127.0.0.1", config.dashboard.port), timeout=5.0)
+            strangers.enter_context(stranger)
+            if number % 3 == 0:
+                with contextlib.suppress(OSError):  # hung up on already
+                    stranger.sendall(b"POST /api/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow")
         async with asyncio.timeout(5.0):
             async with client.post("/api/stop") as response:
                 assert (await response.json())["stopped"]
