@@ -93,6 +93,11 @@ def password_of(config: BusConfig, user: str) -> str:
         raise UserError(f"{path}: {error.strerror} (credentials are made when the router first starts)") from error
 
 
+def has_password(config: BusConfig, user: str) -> bool:
+    """Whether this machine has the user's password of the graph."""
+    return (credentials_folder(config) / user).is_file()
+
+
 def board_router_id(config: BusConfig) -> str:
     """The Zenoh id by which the host knows the board's router; only the credential of the link tells it."""
     return "1" + hashlib.sha256(password_of(config, LINK).encode()).hexdigest()[:31]

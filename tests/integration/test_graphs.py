@@ -15,6 +15,7 @@ from paani.clock import WallClock
 from paani.config import load_config
 from paani.errors import UserError
 from tests.conftest import put_raw
+from tests.paani_command import paani
 
 pytestmark = pytest.mark.integration
 CLOCK = WallClock()
@@ -75,3 +76,36 @@ async def test_a_hulls_clock_and_fixes_have_their_own_writers(private_sets: tupl
         for bus in buses.values():
             await bus.close()
         await asyncio.to_thread(router.close)
+
+
+async def test_paani_stop_reaches_a_hull_whose_profile_is_not_named(private_sets: tuple[str, ...]) -> None:
+    """Also on a machine that has simulated before, and so has the passwords of both."""
+    hull = load_config(profile="hull", sets=private_sets).bus
+    await asyncio.to_thread(ensure_credentials, load_config(sets=private_sets).bus)
+    router = await open_router(hull)
+    boat, desk = await open_bus(hull, "thrusters", CLOCK), await open_bus(hull, "operator", CLOCK)
+    applied, states = boat.publisher(keys.THRUST_APPLIED), desk.publisher(keys.OPERATOR_STATE)
+    asked = desk.latest(keys.REQUESTS["stop"])
+
+    async def answer_forever() -> None:
+        while True:
+            now_us, is_asked = CLOCK.now_us(), asked.value is not None
+            states.put(m.OperatorState(source_us=now_us, armed=False, stopped=is_asked, by="stop" if is_asked else ""))
+            applied.put(
+                m.ThrustApplied(
+                    source_us=now_us, left=0.0, right=0.0, left_n=0.0, right_n=0.0, zero_cause=m.ZeroCause.NOT_ARMED
+                )
+            )
+            await asyncio.sleep(0.05)
+
+    answering = asyncio.create_task(answer_forever())
+    try:
+        code, out, errors = await paani(private_sets, "stop")
+    finally:
+        answering.cancel()
+        await boat.close()
+        await desk.close()
+        await asyncio.to_thread(router.close)
+    assert (code, out.startswith("stopped: zero thrust after ")) == (0, True), out + errors
+    assert asked.value is not None
+    assert asked.value.act is m.RequestAct.STOP

@@ -6,12 +6,15 @@ import argparse
 import asyncio
 import sys
 
+from msgspec.structs import replace
+
 from paani import keys
 from paani import messages as m
+from paani.authority import has_password
 from paani.bus import Bus, Latest, open_bus
 from paani.cli import add_config_arguments, config_from
 from paani.clock import Clock, WallClock
-from paani.config import Config
+from paani.config import BusConfig, Config
 from paani.errors import UserError
 from paani.operator_client import OperatorClient
 
@@ -32,15 +35,34 @@ def main(argv: list[str]) -> int:
 async def _stop(config: Config) -> int:
     clock = WallClock()
     begun_us = clock.now_us()
-    try:
-        async with asyncio.timeout(JOIN_S):
-            bus = await open_bus(config.bus, CLIENT, clock)
-    except TimeoutError:
-        raise UserError(f"bus.router {config.bus.router}: no router answers (is the boat's loop up?)") from None
+    bus = await _join(config.bus, clock)
     try:
         return await _stop_on(bus, clock, begun_us)
     finally:
         await bus.close()
+
+
+async def _join(config: BusConfig, clock: Clock) -> Bus:
+    """The boat's bus, whatever its profile: whoever stops a boat need not name that.
+
+    The passwords of each graph are tried at once, as one that is refused takes seconds. Raises UserError.
+    """
+    others = (replace(config, graph=graph) for graph in keys.Graph if graph is not config.graph)
+    graphs = [config, *(each for each in others if not config.certificates and has_password(each, CLIENT))]
+    joining = [asyncio.create_task(open_bus(each, CLIENT, clock)) for each in graphs]
+    fault = f"bus.router {config.router}: no router answers (is the boat's loop up?)"
+    try:
+        for joined in asyncio.as_completed(joining, timeout=JOIN_S):
+            try:
+                return await joined
+            except UserError as error:
+                fault = str(error)
+    except TimeoutError:
+        pass
+    finally:
+        for each in joining:
+            each.cancel()
+    raise UserError(fault)
 
 
 async def _stop_on(bus: Bus, clock: Clock, begun_us: int) -> int:

@@ -69,19 +69,19 @@ async def open_client(config: BusConfig, user: str) -> zenoh.Session:
         try:
             return await asyncio.to_thread(lambda: zenoh.open(client_config(config, user)))
         except zenoh.ZError:
-            was, problem = problem, await _reach(config.router)
+            was, problem = problem, await _reach(config)
             if problem != was:
                 LOG.warning("the router at %s %s (user %s); waiting", config.router, problem, user)
             await asyncio.sleep(0.1)
 
 
-async def _reach(endpoint: str) -> str:
+async def _reach(config: BusConfig) -> str:
     """Why no session was opened: Zenoh itself does not tell."""
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    host, _, port = config.router.partition("/")[2].rpartition(":")
     try:
         async with asyncio.timeout(REACH_S):
             _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
     except (OSError, TimeoutError):
         return "does not answer"
     writer.close()
-    return "lets nobody in by these credentials"
+    return f"lets nobody in by these credentials, which are of a {config.graph} (--profile says of what)"
