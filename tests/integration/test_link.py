@@ -234,7 +234,9 @@ async def test_a_door_that_stays_shut_is_told_from_one_that_is_not_there(
     opening = asyncio.create_task(open_bus(other, LINK, CLOCK))
     await until(lambda: f"{other.router} does not answer" in caplog.text)
     async with routing(sides.board):
-        await until(lambda: f"{other.router} lets nobody in by these credentials, which are of a simulation" in caplog.text)
+        await until(
+            lambda: f"{other.router} lets nobody in by these credentials, which are of a simulation" in caplog.text
+        )
         opening.cancel()
         await asyncio.wait([opening])
 
