@@ -23,6 +23,8 @@ from paani_services.dashboard.gatekeeper import KEY_HEADER
 from paani_services.dashboard.server import LOGGED_OUT
 from paani_tools.certs.folder import make
 from tests.browser.conftest import Boat
+from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
+from tests.browser.test_page import until
 from tests.conftest import Spawn
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
@@ -135,3 +137,43 @@ async def test_a_stop_finds_a_place_among_strangers_that_never_finish_their_hand
             async with client.post("/api/stop") as response:
                 assert (await response.json())["stopped"]
         assert len(await asyncio.to_thread(os.listdir, f"/proc/{process.pid}/fd")) < 240
+
+
+@pytest.mark.browser
+async def test_the_login_on_a_phone_is_legible_stops_the_boat_and_lets_in_who_has_the_key(
+    browser: Any, spawn: Spawn, boat: Boat, config: Config, origin: str
+) -> None:
+    key, axe = await asyncio.to_thread(ensure_operator_key, config.bus), await asyncio.to_thread(AXE.read_text, "utf-8")
+    async with spawn("operator"), spawn("dashboard"):
+        context = await browser.new_context(ignore_https_errors=True, viewport={"width": 360, "height": 740})
+        page = await context.new_page()
+        await page.goto(origin)
+        assert page.url == f"{origin}/login"
+        for palette in ("day", "dusk", "night"):
+            await page.evaluate("(name) => localStorage.setItem('paani-palette', name)", palette)
+            await page.reload()
+            await until(page, f"document.documentElement.dataset.palette === '{palette}'")
+            await page.evaluate(axe)
+            assert await page.evaluate(SERIOUS) == [], palette
+            assert await page.evaluate(SMALL_TEXT) == []
+            assert await page.evaluate(SMALL_TARGETS, 44) == []
+            assert await page.evaluate("document.documentElement.scrollWidth") == 360
+        note = "document.querySelector('#stop-note').textContent"
+        await page.click("#stop")
+        await until(page, f"{note} === 'STOPPED: latched until an operator arms.'")
+        assert boat.arming.value is not None
+        assert boat.arming.value.stopped
+        await page.fill("#key", "guess")
+        await page.click("#login button")
+        await until(
+            page, """document.querySelector('#login-note').textContent === "That is not the operator's key.\""""
+        )
+        await page.fill("#key", key)
+        await page.click("#login button")
+        await page.wait_for_selector("body[data-link='live']", timeout=20_000)
+        assert page.url == f"{origin}/"
+        assert key not in await page.evaluate("document.cookie + JSON.stringify({...localStorage, ...sessionStorage})")
+        await page.wait_for_selector("#logout:visible", timeout=20_000)
+        await page.click("#logout")
+        await page.wait_for_selector("#login", timeout=20_000)
+        await context.close()
