@@ -114,6 +114,8 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
      ["STANDING", "STANDING STILL", "outside the fence, or too close to it"]),
     (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP) | {"advisor/advisory": STOP_ADVISED}, (),
      ["STANDING", "STANDING STILL", "the advisor advises STOP: no safe side"]),
+    # Advice that has changed since the order is not said to be why.
+    (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP), (), ["STANDING", "STANDING STILL", "the advisor advises STOP"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED), (), ["NOT_ARMED", "NOT ARMED", "nothing else keeps the boat still"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED, m.Inhibit.NO_ROUTE), (), ["NOT_ARMED", "NOT ARMED", "and no route"]),
     # A STOP comes before all else: standing, nothing that looks like driving is said.

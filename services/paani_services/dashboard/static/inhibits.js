@@ -62,10 +62,10 @@ export function findInhibits(store, now) {
 /** @param {import("./store.js").Store} store @param {string} key @param {number} now */
 const fresh = (store, key, now) => (store.isFresh(key, now) ? store.get(key) : undefined);
 
-/** @param {import("./store.js").Store} store @param {string} inhibit */
+/** The advice's reason goes with its own inhibit alone: newer advice may be another already. @param {import("./store.js").Store} store @param {string} inhibit */
 function inhibitText(store, inhibit) {
   const advisory = store.get("advisor/advisory"), text = STOP_REASONS[inhibit] ?? words(inhibit);
-  return inhibit.startsWith("ADVISED_") && advisory ? `${text}: ${reasonText(advisory.reason).toLowerCase()}` : text;
+  return inhibit === `ADVISED_${advisory?.direction}` ? `${text}: ${reasonText(advisory.reason).toLowerCase()}` : text;
 }
 
 /** @param {import("./store.js").Store} store @param {any} applied @param {number} now */
