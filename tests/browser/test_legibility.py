@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,10 @@ from paani import messages as m
 from paani.config import Config
 from tests.browser.conftest import Boat
 from tests.browser.guidance import ORDER, guiding
-from tests.browser.test_page import Watched, until
+from tests.browser.test_page import Watched, until, watch
+from tests.browser.test_time import press_strip
 from tests.conftest import OpenAs, Spawn
+from tests.unit.paani.logs.small_logs import NAME, finished
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 
@@ -94,3 +97,39 @@ async def test_every_palette_and_size_is_legible(
         await page.reload()
         assert await page.evaluate("document.documentElement.dataset.palette") == "night"
         assert watched.errors == []
+
+
+async def serious_in_every_palette(page: Any) -> list[str]:
+    """What axe finds on what is open now."""
+    await page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = []
+    for _ in range(PALETTES):
+        await page.keyboard.press("d")
+        await page.wait_for_timeout(300)
+        current = await page.evaluate("document.documentElement.dataset.palette")
+        found += [f"{current}: {one}" for one in await page.evaluate(SERIOUS)]
+    return found
+
+
+async def test_recordings_the_past_and_a_replay_are_legible_in_every_palette(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    recording = await asyncio.to_thread(finished, tmp_path, 200, 20)
+    async with spawn("dashboard", f"recorder.folder={tmp_path}"):
+        page = (await watch(browser, config)).page
+        await until(page, "paani.overlay.mask_seq !== null")
+        await page.click("[data-tab-of='recordings']")
+        await until(page, "document.querySelectorAll('#recordings tr').length === 1")
+        assert await serious_in_every_palette(page) == []
+        await page.click(f'#recordings [data-name="{NAME}"] button:has-text("Replay here")')
+        await until(page, "document.querySelector('#past-word').textContent === 'RECORDING'")
+        assert await serious_in_every_palette(page) == []
+        await page.keyboard.press("l")
+        await until(page, "paani.shownUs === null")
+        await press_strip(page, 0.99)
+        await until(page, "document.querySelector('#past-word').textContent === 'PAST'")
+        assert await serious_in_every_palette(page) == []
+    async with spawn("dashboard", f"dashboard.replayed={recording}"):
+        page = (await watch(browser, config)).page
+        await until(page, "document.querySelector('#mode').textContent === 'REPLAY' && paani.shownUs !== null")
+        assert await serious_in_every_palette(page) == []
