@@ -68,7 +68,7 @@ def _export(options: argparse.Namespace) -> int:
         if path is not None
     ]
     if not wanted:
-        raise UserError("paani logs export: say what to write: --csv DIR, --geojson FILE, --gpx FILE or --ros2 FILE")
+        raise UserError("logs export: say what to write: --csv DIR, --geojson FILE, --gpx FILE or --ros2 FILE")
     log = open_log(options.path)
     for export, path in wanted:
         with Progress(path.name) as progress:
@@ -81,7 +81,7 @@ def _export(options: argparse.Namespace) -> int:
 
 def _view(options: argparse.Namespace) -> int:
     if not options.rerun:
-        raise UserError("paani logs view: say in what: --rerun")
+        raise UserError("logs view: say in what: --rerun")
     require_modules("logs view --rerun", "rerun")
     from paani_tools.logs.rerun_view import view_in_rerun  # noqa: PLC0415  # of an extra
 

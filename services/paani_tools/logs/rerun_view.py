@@ -57,7 +57,7 @@ def view_in_rerun(log: Log, out: Path | None, seen: Callable[[Record], None]) ->
     stream = rr.RecordingStream("paani", recording_id=log.files[0].stem)
     if out is None:
         if not any(os.environ.get(name) for name in SCREENS):
-            raise UserError("paani logs view: no screen here; name a file to write, to be opened elsewhere: --out FILE")
+            raise UserError("logs view: no screen here; name a file to write, to be opened elsewhere: --out FILE")
         stream.spawn(default_blueprint=layout())
         return f"{_convert(log, stream, seen)} messages shown in Rerun"
     with replacement_file(out, "--out") as beside:
