@@ -14,7 +14,8 @@ from paani.option_paths import input_folder, output_file
 from paani.statistics.figure_table import FigureTable
 from paani.undecodable import UNREADABLE
 from paani.whole_file import write_whole
-from paani_models.catalogue import load_catalogue
+from paani_models.catalogue import WEIGHTS, load_catalogue
+from paani_models.report.experiments import read_experiments
 from paani_tools.bench.board.table import BoardRun
 from paani_tools.paper_report.recipes import training_table
 from paani_tools.paper_report.tables import (
@@ -24,6 +25,7 @@ from paani_tools.paper_report.tables import (
     segmenter_table,
     settings_table,
     stills_table,
+    trained_table,
     world_table,
 )
 
@@ -64,6 +66,7 @@ def report_text(run: BoardRun | None) -> str:
         network_table(catalogue["detector"], catalogue["segmenter"]),
         detector_table(catalogue["detector"]),
         segmenter_table(catalogue["segmenter"]),
+        trained_table(read_experiments(WEIGHTS)),
         stills_table(paper, ours),
         settings_table(paper, ours),
         world_table(paper),

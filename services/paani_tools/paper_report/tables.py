@@ -13,6 +13,7 @@ from paani.config import Config
 from paani.statistics.figure_table import Cell, FigureTable
 from paani_models.catalogue import Figure, Model
 from paani_models.datasets.sources import RENDERED
+from paani_models.report.experiments import Experiment
 from paani_sim.vessels.vessel import load_vessel
 from paani_sim.worlds import load_world
 from paani_sim.worlds.load import configured_scenario
@@ -33,6 +34,8 @@ OTHER_MASKS = (
 )
 BANDED = "recovered masks leave a band between the classes undecided, so that edges are not scored"
 OTHER_NETWORK = "another network ships"
+BANDED_NOTE = f"On held-out pictures; {BANDED}."
+PAPER_SEGMENTER = "paper-segmenter"
 NO_COUNTERPART = "no second artifact and no test split here"
 MASK_SOURCE = "mastr1325"
 BLACK = m.UnusableCause.BLACK
@@ -79,6 +82,20 @@ def segmenter_table(segmenter: Model) -> FigureTable:
         why = "what ships is FP32: INT8 has to pass an acceptance test (`paani models quantise`)"
         rows.append(("V10", f"{published.SEGMENTER_WORDS[metric]}, INT8", paper, None, 0, why))
     return FigureTable(name="Segmenter", columns=COLUMNS, rows=tuple(rows), note=OTHER_MASKS)
+
+
+def trained_table(experiments: Sequence[Experiment]) -> FigureTable:
+    """What the paper's segmenter reached where its recipe was followed on the pictures that there are."""
+    rows: list[tuple[str, str, Cell, Cell, int, str]] = []
+    for experiment in (each for each in experiments if each.net == PAPER_SEGMENTER):
+        statement, paper = ("V10", published.INT8) if experiment.inference else ("V9", published.SEGMENTER_ONNX)
+        artifact = "INT8" if experiment.inference else published.ARTIFACTS["V9"]
+        rows += [
+            (statement, f"{published.SEGMENTER_WORDS[found.metric]}, {artifact}", paper[found.metric], found.value,
+             found.n, experiment.recipe)
+            for found in experiment.figures
+        ]  # fmt: skip
+    return FigureTable(name="The paper's segmenter, trained here", columns=COLUMNS, rows=tuple(rows), note=BANDED_NOTE)
 
 
 def settings_table(paper: Config, ours: Config) -> FigureTable:

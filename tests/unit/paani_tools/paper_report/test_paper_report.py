@@ -11,7 +11,8 @@ import pytest
 
 from paani.cli import main as paani
 from paani.config import load_config
-from paani_models.catalogue import load_catalogue
+from paani_models.catalogue import WEIGHTS, Figure, load_catalogue
+from paani_models.report.experiments import Experiment, read_experiments
 from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report import published
 from paani_tools.paper_report.command import markdown, report_text
@@ -24,6 +25,7 @@ from paani_tools.paper_report.tables import (
     segmenter_table,
     settings_table,
     stills_table,
+    trained_table,
     world_table,
 )
 from tests.unit.paani_tools.bench.board.test_board_figures import polls, run_of
@@ -108,6 +110,20 @@ def test_figures_of_networks_are_the_manifests() -> None:
     assert sizes[5] == f"{segmenter.export_max_abs_diff:.2e}"
 
 
+def test_a_training_by_the_papers_recipe_stands_beside_the_papers_figures() -> None:
+    reached = Figure("miou", "mastr1325", 0.9, 24)
+    trained = Experiment("paper-segmenter", "0", "eighty pictures", (reached,))
+    quantised = msgspec.structs.replace(trained, figures=(Figure("miou", "mastr1325", 0.8, 24),), inference="INT8")
+    table = trained_table((msgspec.structs.replace(trained, net="segmenter"), trained, quantised))
+    assert table.rows == (
+        ("V9", "mean IoU, ONNX", published.SEGMENTER_ONNX["miou"], 0.9, 24, "eighty pictures"),
+        ("V10", "mean IoU, INT8", published.INT8["miou"], 0.8, 24, "eighty pictures"),
+    )
+    shipped = trained_table(read_experiments(WEIGHTS))
+    assert {"V9", "V10"} == set(column(shipped, "statement"))
+    assert shipped.name in report_text(None)
+
+
 def test_the_paper_profile_has_the_constants_of_the_papers_tables() -> None:
     table = settings_table(PAPER, OURS)
     assert column(table, "here") == column(table, "paper")
@@ -139,9 +155,9 @@ def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text == report_text(None)
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
-        "## Networks", "## Detector", "## Segmenter", "## Single pictures, paper profile",
-        "## Constants, paper profile", "## World, paper profile", "## Training, the paper's recipes",
-        "## Board protocol",
+        "## Networks", "## Detector", "## Segmenter", "## The paper's segmenter, trained here",
+        "## Single pictures, paper profile", "## Constants, paper profile", "## World, paper profile",
+        "## Training, the paper's recipes", "## Board protocol",
     ]  # fmt: skip
     assert "| V10 | mean IoU, INT8 | 0.7303 | - |" in text
     assert markdown(board_tables(None)).count("| - | 0 |") == 7
