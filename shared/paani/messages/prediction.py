@@ -74,7 +74,8 @@ class HeadingCosts(msgspec.Struct, frozen=True):
 
     course: off the desired one. progress: made good along it. heading_change: off the plan before. advice: not to the
     advised side. unknown_water: on the path. proximity: to obstacles, and ahead of dynamic ones. path_obstacle: further
-    along the path. margin: how far it is intruded into.
+    along the path. margin: how far it is intruded into. give_way: near to the course of a vessel under way.
+    passing_side: such a vessel is left on the other side than courtesy asks for: ahead of it, or starboard to starboard.
     """
 
     course: Finite
@@ -85,6 +86,8 @@ class HeadingCosts(msgspec.Struct, frozen=True):
     proximity: Finite
     path_obstacle: Finite
     margin: Finite
+    give_way: Finite = 0.0
+    passing_side: Finite = 0.0
 
 
 class HeadingVerdict(msgspec.Struct, frozen=True, kw_only=True):

@@ -24,6 +24,7 @@ from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, Occupanc
 UNSEEN_GROWTH_MPS = 0.1
 # How far ahead an approach is predicted [s]: a boat needs 20 s to turn away from an obstacle that comes at 0.13 m/s.
 APPROACH_S = 30.0
+WANTED_CPA_M = 3.5  # what swimmers and paddlers want between hulls, 3 m, and half a hull
 ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 

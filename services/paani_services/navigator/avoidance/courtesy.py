@@ -11,6 +11,7 @@ from paani.encounters import classify_encounter
 from paani.geometry import wrap_rad
 from paani.messages import EncounterClass, NavCommand
 from paani_services.navigator.avoidance.clearance import (
+    WANTED_CPA_M,
     Approach,
     closest_point_of_approach,
     position_deviation_m,
@@ -18,7 +19,6 @@ from paani_services.navigator.avoidance.clearance import (
 from paani_services.navigator.avoidance.rollout import BoatState
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 
-WANTED_CPA_M = 3.5  # what swimmers and paddlers want between hulls, 3 m, and half a hull
 WAITING_MPS = 0.1  # an order this slow is to wait, or to turn on the spot
 ASIDE_RAD = math.radians(10.0)  # turns of more than this leave the course of what overtakes
 MEETINGS = {

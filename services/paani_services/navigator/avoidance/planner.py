@@ -24,7 +24,7 @@ from paani_services.navigator.avoidance.constraints import (
     unless_escaping,
     while_waiting,
 )
-from paani_services.navigator.avoidance.costs import CandidateCosts, weigh_candidates
+from paani_services.navigator.avoidance.costs import CandidateCosts, add_courtesy, weigh_candidates
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
 from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import Plan
@@ -82,6 +82,7 @@ def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     else:
         situations = _situations(evaluation, hard, check)
         refusals = next((each for each in situations if not any_refusal(each).all()), check.refusals)
+    costs = add_courtesy(costs, evaluation, any_refusal(refusals))
     return JudgedCandidates(evaluation, refusals, costs, is_waiting)
 
 

@@ -47,22 +47,36 @@ class PositionMeasurement(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """A velocity, and its standard deviation in the direction in which that is larger."""
+    """A velocity, and its standard deviation in the direction in which that is larger.
+
+    covariance: of it; None: the same in every direction.
+    """
 
     east_mps: float
     north_mps: float
     deviation_mps: float
+    covariance: SymmetricMatrix | None = None
+
+    def variance_along(self, east: F64 | float, north: F64 | float) -> F64 | float:
+        """The variance of its component along this unit vector."""
+        square = self.deviation_mps * self.deviation_mps
+        east_east, east_north, north_north = (square, 0.0, square) if self.covariance is None else self.covariance
+        return east_east * east * east + 2.0 * east_north * east * north + north_north * north * north
 
 
 class VelocityEstimate(NamedTuple):
     """A velocity, and the information vector: the inverse of its covariance times the velocity.
 
-    deviation_mps: standard deviation in the direction in which that is larger.
     """
 
     velocity_mps: PlaneVector
     information_vector: PlaneVector
-    deviation_mps: float
+    covariance: SymmetricMatrix
+
+    @property
+    def deviation_mps(self) -> float:
+        """Standard deviation along the axis on which that is larger."""
+        return math.sqrt(max(self.covariance[0], self.covariance[2]))
 
     @property
     def squared_significance(self) -> float:
@@ -83,7 +97,7 @@ def velocity_if_significant(estimate: VelocityEstimate | None) -> Velocity | Non
         or math.hypot(*estimate.velocity_mps) < MIN_SPEED_MPS
     ):
         return None
-    return Velocity(*estimate.velocity_mps, estimate.deviation_mps)
+    return Velocity(*estimate.velocity_mps, estimate.deviation_mps, estimate.covariance)
 
 
 def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> VelocityEstimate | None:
@@ -121,7 +135,7 @@ def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Veloc
     covariance = _invert(_add_scaled((rest, 0.0, rest), scale, information_matrix))
     information_vector = (scale * information_vector[0], scale * information_vector[1])
     return VelocityEstimate(
-        _multiply(covariance, information_vector), information_vector, math.sqrt(max(covariance[0], covariance[2]))
+        _multiply(covariance, information_vector), information_vector, covariance
     )
 
 

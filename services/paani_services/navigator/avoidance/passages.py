@@ -1,0 +1,107 @@
+"""How each candidate passes each vessel under way: on which side, how near, when, and how surely. Pure.
+
+Boat and vessel are taken to keep their velocities, the boat the one that it has when it has turned. The closest point
+then lies across the boat's velocity relative to the vessel, and the side is the one on which that track leaves the
+vessel. This side also says who crosses whose bow: who leaves a vessel from starboard to port passes astern of it.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from paani import portable
+from paani.arrays import F64
+from paani.messages import Label
+from paani_services.navigator.avoidance.clearance import APPROACH_S, UNSEEN_GROWTH_MPS, WANTED_CPA_M
+from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+
+UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
+SOON_S = 15.0  # manoeuvres are due from then on: 13 s before a barge at 3 m/s, 8.5 s before a kayak at 1.5 m/s
+PAST_S = 1.0  # in which an encounter ends: the time that half a hull takes
+HEAD_ON_RAD = math.radians(20.0)  # off the reciprocal course; vessels that meet so pass port to port
+SIDE_BLEND = 0.17  # sine of the angle by which the side that is wanted changes from one to the other
+PARALLEL_RAD = math.radians(45.0)  # between the courses: who overtakes at less may pass on either side
+
+
+class Passages(NamedTuple):
+    """Of each vessel, along each candidate [vessels, candidates].
+
+    port_m: from the boat's middle to the vessel's outline where that is left to port; negative where it is not, as far
+    as it reaches over to starboard. starboard_m: the other way round. deviation_m: standard deviation of either.
+    wanted_side: 1 where it should be left to port, -1 to starboard, 0 either, between where its course is between.
+    weight: of the encounter, in [0, 1]: none of a vessel that may be adrift, is past, far off, or may be anywhere.
+    """
+
+    port_m: F64
+    starboard_m: F64
+    deviation_m: F64
+    wanted_side: F64
+    weight: F64
+
+    @property
+    def clearance_m(self) -> F64:
+        """From the boat's middle to the outline at the closest point; negative where the boat's track meets it."""
+        return np.asarray(np.maximum(self.port_m, self.starboard_m))
+
+
+def find_passages(evaluation: CandidateEvaluation) -> Passages:
+    """The passages of the candidates by the vessels that the plan keeps off."""
+    paths, request = evaluation.trajectories, evaluation.request
+    vessels = [each for each in request.predicted_obstacles if each.label is Label.VESSEL and each.is_moving]
+    last = int(evaluation.is_in_horizon.sum()) - 1
+    then_s = float(paths.time_s[last])
+    step_s = then_s - float(paths.time_s[last - 1])
+    east_mps = (paths.x_m[last] - paths.x_m[last - 1]) / step_s
+    north_mps = (paths.y_m[last] - paths.y_m[last - 1]) / step_s
+    settled = (paths.x_m[last] - then_s * east_mps, paths.y_m[last] - then_s * north_mps, east_mps, north_mps)
+    course_rad = request.start.yaw_rad + float(evaluation.offsets_rad[0])
+    shape = (len(vessels), evaluation.offsets_rad.size)
+    found = Passages(*(np.zeros(shape) for _ in Passages._fields))
+    for number, vessel in enumerate(vessels):
+        for row, value in zip(found, _pass(vessel, settled, course_rad), strict=True):
+            row[number] = value
+    return found
+
+
+def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tuple[F64, F64, F64, float, F64]:
+    """One row of `Passages`. boat: east, north, and velocity of each candidate as if it had held that all along."""
+    x_m, y_m, boat_east_mps, boat_north_mps = boat
+    velocity = vessel.velocity
+    east_mps, north_mps = boat_east_mps - velocity.east_mps, boat_north_mps - velocity.north_mps
+    closing_mps = np.maximum(np.sqrt(east_mps * east_mps + north_mps * north_mps), 1e-6)
+    east_m, north_m = vessel.east_m[:, None] - x_m, vessel.north_m[:, None] - y_m
+    to_port_m = (east_mps * north_m - north_mps * east_m) / closing_mps
+    time_s = ((east_mps * east_m + north_mps * north_m) / (closing_mps * closing_mps)).max(axis=0)
+    across_variance = velocity.variance_along(-north_mps / closing_mps, east_mps / closing_mps)
+    unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
+    deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
+    speed_mps = math.sqrt(velocity.east_mps * velocity.east_mps + velocity.north_mps * velocity.north_mps)
+    speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
+    slowest, fastest = UNDER_WAY_MPS
+    weight = (
+        _part((speed_mps - 2.0 * math.sqrt(speed_variance) - slowest) / (fastest - slowest))
+        * _part(time_s / PAST_S)
+        * _part((APPROACH_S - time_s) / (APPROACH_S - SOON_S))
+        * _part(1.0 - deviation_m / WANTED_CPA_M)
+    )
+    return to_port_m.min(axis=0), -to_port_m.max(axis=0), deviation_m, _wanted_side(vessel, speed_mps, course_rad), weight
+
+
+def _wanted_side(vessel: DynamicObstacle, speed_mps: float, course_rad: float) -> float:
+    """Where to leave the vessel, by the angle between its course and the one that the boat wants to steer.
+
+    The boat's own heading does not count: it changes while the boat gives way.
+    """
+    ahead, across = portable.cos(course_rad), portable.sin(course_rad)
+    along = (vessel.velocity.east_mps * ahead + vessel.velocity.north_mps * across) / speed_mps
+    to_port = (vessel.velocity.north_mps * ahead - vessel.velocity.east_mps * across) / speed_mps
+    meeting = max(0.0, -along) * math.tan(HEAD_ON_RAD)
+    side = min(1.0, max(-1.0, (to_port + meeting) / SIDE_BLEND))
+    return side * min(1.0, (1.0 - along) / (1.0 - math.cos(PARALLEL_RAD)))
+
+
+def _part(value: F64 | float) -> F64:
+    return np.asarray(np.minimum(np.maximum(value, 0.0), 1.0))
