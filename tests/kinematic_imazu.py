@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from typing import NamedTuple
 
 import msgspec
@@ -30,7 +31,7 @@ from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 from paani_services.navigator.mapping.velocity_fit import MIN_SIGNIFICANCE, Velocity
 from paani_sim.trials.hull_clearance import HullPath
-from paani_sim.trials.rule_encounters import RuleEncounter, measure_rule_encounters
+from paani_sim.trials.rule_encounters import RuleEncounter, mean_own_score, measure_rule_encounters
 from paani_sim.trials.rule_scores import score_by_rule
 from paani_sim.vessels import load_vessel
 from paani_sim.worlds import Actor
@@ -43,7 +44,6 @@ LENS_DEG, TRACKED_M = 70.0, PLANNER.mover_range_m
 NEAR_DEVIATION_MPS, FAR_DEVIATION_MPS = 0.03, 0.15  # of a velocity beside the boat, and more at `TRACKED_M`
 ACROSS_FRAC = 0.3  # of that, across the line of sight: bearings are known better than ranges
 ERROR_TIME_S = 2.5  # of the fit: after it the error of a velocity is another
-GATES = (EncounterClass.HEAD_ON, EncounterClass.CROSSING_STARBOARD, EncounterClass.OVERTAKING)
 
 
 class Sight(NamedTuple):
@@ -114,7 +114,8 @@ class Tracker:
                 points = np.array([x_m, y_m]) + build_outline(self._actor) @ np.array([[cos, sin], [-sin, cos]])
                 (east_east, east_north), (_, north_north) = covariance.tolist()
                 most_mps = math.sqrt(max(east_east, north_north))
-                fit = Velocity(*velocity.tolist(), most_mps, (east_east, east_north, north_north))
+                east_mps, north_mps = velocity.tolist()
+                fit = Velocity(east_mps, north_mps, most_mps, (east_east, east_north, north_north))
                 self._seen = (time_s, points, fit)
         if self._seen is None:
             return None
@@ -151,7 +152,8 @@ def drive(name: str, seed: int = 0, sight: Sight = AS_CAMERA) -> KinematicDrive:
         path.append((time_s, boat))
     states = [each for _, each in path]
     along_m = np.array([[actor.speed_mps * at_s for actor in world.actors] for at_s, _ in path])
-    hull_path = HullPath(load_vessel("otter").hull, *np.array([each[:3] for each in states]).T, along_m)
+    x_m, y_m, yaw_rad = np.array([each[:3] for each in states]).T
+    hull_path = HullPath(load_vessel("otter").hull, x_m, y_m, yaw_rad, along_m)
     surge_mps = np.array([each.surge_mps for each in states])
     measured = measure_rule_encounters(world, hull_path, surge_mps, PLANNER.speed_mps, sight.lens_deg)
     found = tuple(_since_known(each, t.first_m) for each, t in zip(measured, trackers, strict=True))
@@ -169,36 +171,44 @@ def _since_known(met: RuleEncounter, known_m: float | None) -> RuleEncounter:
 def main() -> None:
     """Print a line for each case, and means."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--all-round", action="store_true")
     parser.add_argument("--cases", nargs="*", default=list(IMAZU_SCENARIOS))
     options = parser.parse_args()
     for fair in (False, True):
         drives = [
-            (name, drive(name, seed, ALL_ROUND if options.all_round else AS_CAMERA))
+            (name, drive(name, options.seed, ALL_ROUND if options.all_round else AS_CAMERA))
             for name in options.cases
             if is_fair(name) is fair
-            for seed in range(options.seeds)
         ]
-        for name, each in drives:
-            parts = " ".join(
-                f"{e.encounter_class.value}:{next(iter(e.scores.values()), math.nan):.2f}"
-                f"/{e.clearance_m:.1f}m{'D' if e.is_domain_entered else ''}"
-                f"(t{e.manoeuvre.starboard_turn_deg:.0f} d{e.manoeuvre.detected_m or 0:.0f} a{e.manoeuvre.acted_m or 0:.0f} as{e.manoeuvre.aspect_deg:.0f})"
-                for e in each.encounters
-            )
-            print(f"{name:15} {each.seconds:6.1f} s {parts}")
-        met = [e for _, each in drives for e in each.encounters]
-        for kind in EncounterClass:
-            scores = [next(iter(e.scores.values())) for e in met if e.encounter_class is kind and e.scores]
-            if scores:
-                print(f"  {'fair' if fair else 'plain'} {kind.value:20} n={len(scores):3} mean {np.mean(scores):.3f}")
-        print(
-            f"  {'fair' if fair else 'plain'} drives {len(drives)}: contacts {sum(e.clearance_m <= 0.0 for e in met)}, near"
-            f" {sum(0.0 < e.clearance_m < 0.5 for e in met)}, domain {sum(any(e.is_domain_entered for e in d.encounters) for _, d in drives)},"
-            f" not done {sum(not math.isfinite(d.seconds) for _, d in drives)},"
-            f" mean time {np.mean([d.seconds for _, d in drives if math.isfinite(d.seconds)]):.1f} s"
-        )
+        lines = [f"{name:15} {each.seconds:6.1f} s {' '.join(map(_tell, each.encounters))}" for name, each in drives]
+        sys.stdout.write("\n".join((*lines, *_tell_means("camera-fair" if fair else "plain", dict(drives)))) + "\n")
+
+
+def _tell(met: RuleEncounter) -> str:
+    """Class, score, clearance, D: domain entered, turn to starboard, range at which it was known and acted upon."""
+    score, did = next(iter(met.scores.values()), math.nan), met.manoeuvre
+    return (
+        f"{met.encounter_class.value}:{score:.2f}/{met.clearance_m:.1f}m{'D' if met.is_domain_entered else ''}"
+        f"(t{did.starboard_turn_deg:.0f} d{did.detected_m or 0:.0f} a{did.acted_m or 0:.0f})"
+    )
+
+
+def _tell_means(form: str, drives: dict[str, KinematicDrive]) -> list[str]:
+    met = [each for drive in drives.values() for each in drive.encounters]
+    lines = []
+    for kind in EncounterClass:
+        mean = mean_own_score(met, kind)
+        if mean is not None:
+            lines.append(f"  {form} {kind.value:20} n={sum(e.encounter_class is kind for e in met):3} mean {mean:.3f}")
+    contacts, near = sum(e.clearance_m <= 0.0 for e in met), sum(0.0 < e.clearance_m < 0.5 for e in met)
+    entered = sum(any(e.is_domain_entered for e in each.encounters) for each in drives.values())
+    done = [each.seconds for each in drives.values() if math.isfinite(each.seconds)]
+    return [
+        *lines,
+        f"  {form} drives {len(drives)}: contacts {contacts}, near {near}, domain {entered}, done {len(done)},"
+        f" mean time {np.mean(done):.1f} s",
+    ]
 
 
 if __name__ == "__main__":

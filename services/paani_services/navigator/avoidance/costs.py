@@ -33,9 +33,13 @@ LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
 HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn off the heading of the plan before
 ADVICE_WEIGHT = 0.15  # nothing turned to the advised side (M5); it falls linearly to none at ADVISED_TURN_RAD
 ADVISED_TURN_RAD = math.radians(25.0)
-GIVE_WAY_WEIGHT = 2.0  # a vessel on a collision course; it falls linearly to none at WANTED_CPA_M
-PASSING_SIDE_WEIGHT = 1.0  # left on the other side than courtesy asks for; it falls to none from WANTED_CPA_M to twice that
-SIDE_SCALE_M = 0.5  # of the side at which a vessel is left, for one whose velocity is known: half a hull
+# A vessel on a collision course; it falls linearly to none at WANTED_CPA_M. With 2, turning further away is cheaper
+# than not doing so until 2 s before the closest point (2 x 0.6 m/s x 2 s / 3.5 m against 2 / pi, per rad).
+GIVE_WAY_WEIGHT = 2.0
+# A vessel that is left on the other side than courtesy asks for; it falls to none from WANTED_CPA_M to twice that.
+# With 1 the other side is taken where it saves more than a quarter turn.
+PASSING_SIDE_WEIGHT = 1.0
+SIDE_SCALE_M = 0.5  # by which a side is certain of a vessel whose velocity is known: the reach of half a hull
 
 
 class CandidateCosts(NamedTuple):
@@ -76,7 +80,6 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
     path_obstacle = np.clip(1.0 - first_m / config.look_m, 0.0, 1.0) if config.look_m > 0.0 else np.zeros_like(first_m)
     intrusion_m = np.maximum(config.hull_radius_m + config.margin_m - evaluation.clearance_m, 0.0)
     mean_intrusion_m = np.add.accumulate(np.where(is_in_horizon, intrusion_m, 0.0))[-1] / float(is_in_horizon.sum())
-    none = np.zeros_like(deviation_rad)
     return CandidateCosts(
         course=deviation_rad / QUARTER_TURN_RAD,
         progress=LOST_PROGRESS_WEIGHT * (1.0 - made_good),
@@ -86,31 +89,29 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
         proximity=PROXIMITY_WEIGHT * nearness * nearness,
         path_obstacle=PATH_OBSTACLE_WEIGHT * path_obstacle,
         margin=MARGIN_INTRUSION_WEIGHT * mean_intrusion_m,
-        give_way=none,
-        passing_side=none,
+        give_way=np.zeros_like(deviation_rad),
+        passing_side=np.zeros_like(deviation_rad),
     )
 
 
 def add_courtesy(costs: CandidateCosts, evaluation: CandidateEvaluation, is_refused: Bools) -> CandidateCosts:
-    """The costs with those of courtesy towards vessels under way (rules 13 to 17 of the collision regulations).
+    """The costs with those of courtesy towards vessels under way (after rules 13 to 17 of the collision regulations).
 
-    They never lead the boat nearer to anything: a candidate with more of the costs that keep it off obstacles than the
-    one it would take without courtesy is given the whole weight, so that it gains nothing by it.
+    They lead the boat no further into the safety margin: a candidate that intrudes more than the one it would take
+    without courtesy is given their whole weight, and so gains nothing by them.
     """
     passages = find_passages(evaluation)
     if not passages.weight.any() or is_refused.all():
         return costs
-    clearance_m, side, scale_m = passages.clearance_m, passages.wanted_side, passages.deviation_m + SIDE_SCALE_M
-    nearness = np.clip(1.0 - clearance_m / WANTED_CPA_M, 0.0, 1.0)
-    beyond_m = 0.5 * (passages.port_m - passages.starboard_m) * np.sign(side)
-    wrong = 0.5 * (1.0 - beyond_m / np.sqrt(beyond_m * beyond_m + scale_m * scale_m))
-    concern = np.clip(2.0 - clearance_m / WANTED_CPA_M, 0.0, 1.0)
-    give_way = GIVE_WAY_WEIGHT * (passages.weight * nearness).max(axis=0)
-    passing_side = PASSING_SIDE_WEIGHT * (passages.weight * np.abs(side) * concern * wrong).max(axis=0)
-    gains_nothing = costs.margin > costs.margin[np.where(is_refused, np.inf, costs.total).argmin()]
+    clearance, scale_m = passages.clearance_m / WANTED_CPA_M, passages.deviation_m + SIDE_SCALE_M
+    beyond_m = passages.middle_m * np.sign(passages.wanted_side)
+    is_wrong = 0.5 * (1.0 - beyond_m / np.sqrt(beyond_m * beyond_m + scale_m * scale_m))
+    near, side = np.clip(1.0 - clearance, 0.0, 1.0), np.abs(passages.wanted_side) * np.clip(2.0 - clearance, 0.0, 1.0)
+    intrudes_more = costs.margin > costs.margin[np.where(is_refused, np.inf, costs.total).argmin()]
+    give_way, passing_side = ((passages.weight * each).max(axis=0) for each in (near, side * is_wrong))
     return costs._replace(
-        give_way=np.where(gains_nothing, GIVE_WAY_WEIGHT, give_way),
-        passing_side=np.where(gains_nothing, PASSING_SIDE_WEIGHT, passing_side),
+        give_way=GIVE_WAY_WEIGHT * np.where(intrudes_more, 1.0, give_way),
+        passing_side=PASSING_SIDE_WEIGHT * np.where(intrudes_more, 1.0, passing_side),
     )
 
 

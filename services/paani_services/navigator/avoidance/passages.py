@@ -21,9 +21,11 @@ from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
 SOON_S = 15.0  # manoeuvres are due from then on: 13 s before a barge at 3 m/s, 8.5 s before a kayak at 1.5 m/s
 PAST_S = 1.0  # in which an encounter ends: the time that half a hull takes
-HEAD_ON_RAD = math.radians(20.0)  # off the reciprocal course; vessels that meet so pass port to port
+# Vessels that meet within this angle (20 degrees) of the reciprocal course pass port to port.
+HEAD_ON_TANGENT = portable.tan(math.radians(20.0))
 SIDE_BLEND = 0.17  # sine of the angle by which the side that is wanted changes from one to the other
-PARALLEL_RAD = math.radians(45.0)  # between the courses: who overtakes at less may pass on either side
+# The side counts in full where the courses differ by more than this (45 degrees): who overtakes may pass on either.
+PARALLEL_COSINE = portable.cos(math.radians(45.0))
 
 
 class Passages(NamedTuple):
@@ -46,11 +48,20 @@ class Passages(NamedTuple):
         """From the boat's middle to the outline at the closest point; negative where the boat's track meets it."""
         return np.asarray(np.maximum(self.port_m, self.starboard_m))
 
+    @property
+    def middle_m(self) -> F64:
+        """How far to port its middle is left; negative: to starboard."""
+        return np.asarray(0.5 * (self.port_m - self.starboard_m))
+
 
 def find_passages(evaluation: CandidateEvaluation) -> Passages:
     """The passages of the candidates by the vessels that the plan keeps off."""
     paths, request = evaluation.trajectories, evaluation.request
-    vessels = [each for each in request.predicted_obstacles if each.label is Label.VESSEL and each.is_moving]
+    vessels = [
+        each
+        for each in request.predicted_obstacles
+        if each.label is Label.VESSEL and math.hypot(*each.velocity[:2]) > UNDER_WAY_MPS[0]
+    ]
     last = int(evaluation.is_in_horizon.sum()) - 1
     then_s = float(paths.time_s[last])
     step_s = then_s - float(paths.time_s[last - 1])
@@ -66,7 +77,7 @@ def find_passages(evaluation: CandidateEvaluation) -> Passages:
     return found
 
 
-def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tuple[F64, F64, F64, float, F64]:
+def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tuple[F64 | float, ...]:
     """One row of `Passages`. boat: east, north, and velocity of each candidate as if it had held that all along."""
     x_m, y_m, boat_east_mps, boat_north_mps = boat
     velocity = vessel.velocity
@@ -78,7 +89,7 @@ def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tu
     across_variance = velocity.variance_along(-north_mps / closing_mps, east_mps / closing_mps)
     unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
     deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
-    speed_mps = math.sqrt(velocity.east_mps * velocity.east_mps + velocity.north_mps * velocity.north_mps)
+    speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
     speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
     slowest, fastest = UNDER_WAY_MPS
     weight = (
@@ -87,7 +98,13 @@ def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tu
         * _part((APPROACH_S - time_s) / (APPROACH_S - SOON_S))
         * _part(1.0 - deviation_m / WANTED_CPA_M)
     )
-    return to_port_m.min(axis=0), -to_port_m.max(axis=0), deviation_m, _wanted_side(vessel, speed_mps, course_rad), weight
+    return (
+        to_port_m.min(axis=0),
+        -to_port_m.max(axis=0),
+        deviation_m,
+        _wanted_side(vessel, speed_mps, course_rad),
+        weight,
+    )
 
 
 def _wanted_side(vessel: DynamicObstacle, speed_mps: float, course_rad: float) -> float:
@@ -98,9 +115,9 @@ def _wanted_side(vessel: DynamicObstacle, speed_mps: float, course_rad: float) -
     ahead, across = portable.cos(course_rad), portable.sin(course_rad)
     along = (vessel.velocity.east_mps * ahead + vessel.velocity.north_mps * across) / speed_mps
     to_port = (vessel.velocity.north_mps * ahead - vessel.velocity.east_mps * across) / speed_mps
-    meeting = max(0.0, -along) * math.tan(HEAD_ON_RAD)
+    meeting = max(0.0, -along) * HEAD_ON_TANGENT
     side = min(1.0, max(-1.0, (to_port + meeting) / SIDE_BLEND))
-    return side * min(1.0, (1.0 - along) / (1.0 - math.cos(PARALLEL_RAD)))
+    return side * min(1.0, (1.0 - along) / (1.0 - PARALLEL_COSINE))
 
 
 def _part(value: F64 | float) -> F64:

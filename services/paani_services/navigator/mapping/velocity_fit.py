@@ -4,6 +4,8 @@ import bisect
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from paani.arrays import F64
 from paani.messages import Label
 
@@ -61,13 +63,12 @@ class Velocity(NamedTuple):
         """The variance of its component along this unit vector."""
         square = self.deviation_mps * self.deviation_mps
         east_east, east_north, north_north = (square, 0.0, square) if self.covariance is None else self.covariance
-        return east_east * east * east + 2.0 * east_north * east * north + north_north * north * north
+        variance = east_east * east * east + 2.0 * east_north * east * north + north_north * north * north
+        return np.maximum(variance, 0.0)  # rounding of a matrix that is nearly singular
 
 
 class VelocityEstimate(NamedTuple):
-    """A velocity, and the information vector: the inverse of its covariance times the velocity.
-
-    """
+    """A velocity, and the information vector: the inverse of its covariance times the velocity."""
 
     velocity_mps: PlaneVector
     information_vector: PlaneVector
@@ -134,9 +135,7 @@ def fit_velocity(measurements: list[PositionMeasurement], fit_s: float) -> Veloc
     rest = 1.0 / (PRIOR_SPEED_DEVIATION_MPS * PRIOR_SPEED_DEVIATION_MPS)
     covariance = _invert(_add_scaled((rest, 0.0, rest), scale, information_matrix))
     information_vector = (scale * information_vector[0], scale * information_vector[1])
-    return VelocityEstimate(
-        _multiply(covariance, information_vector), information_vector, covariance
-    )
+    return VelocityEstimate(_multiply(covariance, information_vector), information_vector, covariance)
 
 
 def first_since(measurements: list[PositionMeasurement], span_us: int) -> int:

@@ -11,9 +11,8 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from paani.messages import EncounterClass, Label, NavCommand
-from paani_services.navigator.avoidance.clearance import APPROACH_S
+from paani_services.navigator.avoidance.clearance import APPROACH_S, WANTED_CPA_M
 from paani_services.navigator.avoidance.courtesy import (
-    WANTED_CPA_M,
     Encounter,
     assess_encounter,
     describe_encounter,

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import UNSEEN_GROWTH_MPS, predicted_clearance_m
 from paani_services.navigator.avoidance.replanning import PlannerState, replan
 from paani_services.navigator.avoidance.rollout import (
@@ -108,9 +109,8 @@ def test_uncertainty_grows_with_the_time_out_of_sight() -> None:
 
 
 def swimmer(x_m: float, y_m: float, east_mps: float, north_mps: float, age_s: float = 0.1) -> DynamicObstacle:
-    return DynamicObstacle(
-        np.array([x_m]), np.array([y_m]), 0.5, Velocity(east_mps, north_mps, 0.05), age_s, frozenset()
-    )
+    velocity = Velocity(east_mps, north_mps, 0.05)
+    return DynamicObstacle(np.array([x_m]), np.array([y_m]), 0.5, velocity, age_s, frozenset(), label=Label.PERSON)
 
 
 def least_gap_m(found: Plan, start: BoatState, obstacle: DynamicObstacle) -> float:
