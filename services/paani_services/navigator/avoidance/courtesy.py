@@ -1,6 +1,6 @@
 """Encounters with what moves on the water: how they meet, how near, and what the order does about it. Pure.
 
-It is knowledge for people; the planner's costs of the passages decide. The boat gives way to everything. It is courtesy,
+It is knowledge for people and steers nothing; the planner's costs do. The boat gives way to everything. It is courtesy,
 not compliance with the collision regulations: a boat with one camera does not keep the lookout that they ask for.
 """
 
