@@ -108,6 +108,15 @@ def test_passing_side_costs_the_wrong_side_alone() -> None:
     assert (port[:4] > starboard[:4] + 0.3).all()
 
 
+def test_the_less_sure_the_side_the_less_it_tells_the_sides_apart() -> None:
+    gaps = []
+    for std_mps in (0.03, 0.15):
+        met = ONCOMING._replace(velocity=Velocity(-0.6, 0.0, std_mps))
+        costs, weight = costs_of(met), find_passages(evaluate(met)).weight.max()
+        gaps.append((costs.passing_side[5] - costs.passing_side[6]) / weight)  # 30 degrees to port, to starboard
+    assert gaps[0] > 0.9 * PASSING_SIDE_WEIGHT > gaps[1] + 0.1
+
+
 @pytest.mark.parametrize(
     ("course_deg", "wanted"),
     [(0.0, 0.0), (15.0, 0.12), (-15.0, -0.12), (60.0, 1.0), (-60.0, -1.0), (-160.0, 0.0), (-140.0, -1.0), (170.0, 1.0)],
