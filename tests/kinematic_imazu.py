@@ -204,10 +204,12 @@ def _tell_means(form: str, drives: dict[str, KinematicDrive]) -> list[str]:
     contacts, near = sum(e.clearance_m <= 0.0 for e in met), sum(0.0 < e.clearance_m < 0.5 for e in met)
     entered = sum(any(e.is_domain_entered for e in each.encounters) for each in drives.values())
     done = [each.seconds for each in drives.values() if math.isfinite(each.seconds)]
+    if not drives:
+        return []
     return [
         *lines,
         f"  {form} drives {len(drives)}: contacts {contacts}, near {near}, domain {entered}, done {len(done)},"
-        f" mean time {np.mean(done):.1f} s",
+        f" mean time {sum(done) / max(1, len(done)):.1f} s",
     ]
 
 

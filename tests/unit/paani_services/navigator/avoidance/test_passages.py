@@ -67,7 +67,7 @@ ONCOMING = vessel(12.0, 0.0, -0.6, 0.0)
 
 
 @settings(max_examples=25, deadline=None)
-@given(range_m=st.floats(9.0, 14.0), off_m=st.floats(-0.4, 0.4), course_deg=st.floats(-8.0, 8.0))
+@given(range_m=st.floats(10.0, 14.0), off_m=st.floats(-0.3, 0.3), course_deg=st.floats(-5.0, 5.0))
 def test_head_on_the_boat_turns_to_starboard(range_m: float, off_m: float, course_deg: float) -> None:
     """So that both pass port to port: early, by a turn that is seen, and without slowing down."""
     course_rad = math.radians(180.0 + course_deg)
