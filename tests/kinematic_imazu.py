@@ -46,7 +46,7 @@ ACROSS_FRAC = 0.3  # of that, across the line of sight: bearings are known bette
 ERROR_TIME_S = 2.5  # of the fit: after it the error of a velocity is another
 
 
-class Sight(NamedTuple):
+class Coverage(NamedTuple):
     """What is tracked. error: of each velocity, in its standard deviations."""
 
     lens_deg: float = LENS_DEG
@@ -54,7 +54,7 @@ class Sight(NamedTuple):
     error: float = 1.0
 
 
-AS_CAMERA, ALL_ROUND = Sight(), Sight(360.0, 60.0, 0.0)
+AS_CAMERA, ALL_ROUND = Coverage(), Coverage(360.0, 60.0, 0.0)
 
 
 class KinematicDrive(NamedTuple):
@@ -86,8 +86,8 @@ def moved(boat: BoatState, plan: Plan, config: PlannerConfig) -> BoatState:
 class Tracker:
     """Of one vessel: what the boat knows of it. The error of the velocity is drawn anew as the fit forgets."""
 
-    def __init__(self, actor: Actor, rng: np.random.Generator, sight: Sight) -> None:
-        self._actor, self._rng, self._sight = actor, rng, sight
+    def __init__(self, actor: Actor, rng: np.random.Generator, coverage: Coverage) -> None:
+        self._actor, self._rng, self._coverage = actor, rng, coverage
         self._draw = rng.normal(size=2)
         self._seen: tuple[float, np.ndarray, Velocity] | None = None
         self.first_m: float | None = None  # range at which its velocity was first known
@@ -102,13 +102,13 @@ class Tracker:
         keep = math.exp(-STEP_S / ERROR_TIME_S)
         self._draw = keep * self._draw + math.sqrt(1.0 - keep * keep) * self._rng.normal(size=2)
         bearing_rad = wrap_rad(math.atan2(y_m - boat.y_m, x_m - boat.x_m) - boat.yaw_rad)
-        if range_m <= self._sight.range_m and abs(bearing_rad) <= math.radians(0.5 * self._sight.lens_deg):
+        if range_m <= self._coverage.range_m and abs(bearing_rad) <= math.radians(0.5 * self._coverage.lens_deg):
             std_mps = NEAR_DEVIATION_MPS + FAR_DEVIATION_MPS * min(1.0, range_m / TRACKED_M) ** 2
-            sight = np.array([[x_m - boat.x_m, boat.y_m - y_m], [y_m - boat.y_m, x_m - boat.x_m]]) / range_m
+            line_of_sight = np.array([[x_m - boat.x_m, boat.y_m - y_m], [y_m - boat.y_m, x_m - boat.x_m]]) / range_m
             deviations_mps = std_mps * np.array([1.0, ACROSS_FRAC])
             velocity = self._actor.speed_mps * np.array([cos, sin])
-            velocity = velocity + self._sight.error * (sight @ (deviations_mps * self._draw))
-            covariance = (sight * deviations_mps**2) @ sight.T
+            velocity = velocity + self._coverage.error * (line_of_sight @ (deviations_mps * self._draw))
+            covariance = (line_of_sight * deviations_mps**2) @ line_of_sight.T
             if velocity @ np.linalg.solve(covariance, velocity) >= MIN_SIGNIFICANCE**2:
                 self.first_m = range_m if self.first_m is None else self.first_m
                 points = np.array([x_m, y_m]) + build_outline(self._actor) @ np.array([[cos, sin], [-sin, cos]])
@@ -125,12 +125,12 @@ class Tracker:
         return DynamicObstacle(east_m, north_m, PLANNER.vessel_near_m, fit, age_s, frozenset(), 1, Label.VESSEL)
 
 
-def drive(name: str, seed: int = 0, sight: Sight = AS_CAMERA) -> KinematicDrive:
+def drive(name: str, seed: int = 0, coverage: Coverage = AS_CAMERA) -> KinematicDrive:
     """Drive one case."""
     world = build_imazu_scenario(name).world
     boat, previous, waiting_since_s = BoatState(0.0, 0.0, 0.0), None, None
     rng = np.random.default_rng([seed, IMAZU_SCENARIOS.index(name)])
-    trackers = [Tracker(actor, rng, sight) for actor in world.actors]
+    trackers = [Tracker(actor, rng, coverage) for actor in world.actors]
     path, time_s = [], DEPARTURE_S
     while boat.x_m < ROUTE_LENGTH_M - 4.0 and time_s < TIME_LIMIT_S:
         course_rad = math.atan2(-boat.y_m, 6.0)  # back to the route, as line-of-sight guidance does
@@ -155,7 +155,7 @@ def drive(name: str, seed: int = 0, sight: Sight = AS_CAMERA) -> KinematicDrive:
     x_m, y_m, yaw_rad = np.array([each[:3] for each in states]).T
     hull_path = HullPath(load_vessel("otter").hull, x_m, y_m, yaw_rad, along_m)
     surge_mps = np.array([each.surge_mps for each in states])
-    measured = measure_rule_encounters(world, hull_path, surge_mps, PLANNER.speed_mps, sight.lens_deg)
+    measured = measure_rule_encounters(world, hull_path, surge_mps, PLANNER.speed_mps, coverage.lens_deg)
     found = tuple(_since_known(each, t.first_m) for each, t in zip(measured, trackers, strict=True))
     done = boat.x_m >= ROUTE_LENGTH_M - 4.0
     return KinematicDrive(time_s - DEPARTURE_S if done else math.inf, found, tuple(states))

@@ -288,14 +288,13 @@ export const CONSTRAINTS = {
 /** What a heading costs. @type {Record<string, string>} */
 export const COSTS = {
   course: "off the course", progress: "little made good", heading_change: "off the plan before", advice: "not to the advised side",
-  unknown_water: "unseen water on the way", proximity: "near obstacles", path_obstacle: "obstacle further along", margin: "into the margin",
-  give_way: "near a vessel's course", passing_side: "past a vessel on the other side",
+  unknown_water: "unseen water on the way", proximity: "near obstacles", path_obstacle: "obstacle further along",
+  margin: "into the margin", give_way: "near a vessel's course", passing_side: "past a vessel on the other side",
 };
 
 /** The headings on the map. */
 export const HEADING_TEXTS = {
-  taken: "taken", free: "free", refused: "refused", costs: "costs", dearer: "dearer by",
-  speeds: { fastest: "at the highest speed", between: "at the next", slowest: "at the lowest" },
+  taken: "taken", free: "free", refused: "refused", costs: "costs", dearer: "dearer by", speeds: { fastest: "at the highest speed", between: "at the next", slowest: "at the lowest" },
   none: "No heading is weighed: there is no plan of the last second.",
   off: "No heading is weighed: the planner is off, and the boat turns as advised.",
 };
