@@ -1,8 +1,8 @@
 """How each candidate passes each vessel under way: on which side, how near, when, and how surely. Pure.
 
-Boat and vessel are taken to keep their velocities, the boat the one that it has after `horizon_s`, when it has turned. The
-closest point then lies across its velocity relative to the vessel, and the side is the one on which that track leaves
-the vessel. It also says who crosses whose bow: who leaves a vessel that comes from starboard to port passes astern of it.
+Boat and vessel are taken to keep their velocities, the boat the one that it has after `horizon_s`, when it has turned.
+The closest point then lies across its velocity relative to the vessel, and the side is the one on which that track
+leaves the vessel. It also says who crosses whose bow: who leaves a vessel from starboard to port passes astern of it.
 """
 
 import math
