@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paani import portable
-from paani.arrays import F64
+from paani.arrays import F64, I64
 from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import APPROACH_S, UNSEEN_GROWTH_MPS, WANTED_CPA_M
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
@@ -35,6 +35,7 @@ class Passages(NamedTuple):
     as it reaches over to starboard. starboard_m: the other way round. deviation_m: standard deviation of either.
     wanted_side: 1 where it should be left to port, -1 to starboard, 0 either, between where its course is between.
     weight: of the encounter, in [0, 1]: none of a vessel that may be adrift, is past, far off, or may be anywhere.
+    It is that at the highest speed: who slows down behind a vessel has not put off the encounter.
     """
 
     port_m: F64
@@ -68,32 +69,37 @@ def find_passages(evaluation: CandidateEvaluation) -> Passages:
     east_mps = (paths.x_m[last] - paths.x_m[last - 1]) / step_s
     north_mps = (paths.y_m[last] - paths.y_m[last - 1]) / step_s
     settled = (paths.x_m[last] - then_s * east_mps, paths.y_m[last] - then_s * north_mps, east_mps, north_mps)
+    count = int((evaluation.offsets_rad == evaluation.offsets_rad[0]).sum())
+    fastest = np.arange(evaluation.offsets_rad.size) // count * count  # of each candidate's heading
     course_rad = request.start.yaw_rad + float(evaluation.offsets_rad[0])
     shape = (len(vessels), evaluation.offsets_rad.size)
     found = Passages(*(np.zeros(shape) for _ in Passages._fields))
     for number, vessel in enumerate(vessels):
-        for row, value in zip(found, _pass(vessel, settled, course_rad), strict=True):
+        for row, value in zip(found, _pass(vessel, settled, fastest, course_rad), strict=True):
             row[number] = value
     return found
 
 
-def _pass(vessel: DynamicObstacle, boat: Sequence[F64], course_rad: float) -> tuple[F64 | float, ...]:
-    """One row of `Passages`. boat: east, north, and velocity of each candidate as if it had held that all along."""
+def _pass(vessel: DynamicObstacle, boat: Sequence[F64], fastest: I64, course_rad: float) -> tuple[F64 | float, ...]:
+    """One row of `Passages`. boat: east, north, and velocity of each candidate as if it had held that all along.
+
+    fastest: for each candidate, the number of the one with its heading and the highest speed.
+    """
     x_m, y_m, boat_east_mps, boat_north_mps = boat
     velocity = vessel.velocity
     east_mps, north_mps = boat_east_mps - velocity.east_mps, boat_north_mps - velocity.north_mps
     closing_mps = np.maximum(np.sqrt(east_mps * east_mps + north_mps * north_mps), 1e-6)
     east_m, north_m = vessel.east_m[:, None] - x_m, vessel.north_m[:, None] - y_m
     to_port_m = (east_mps * north_m - north_mps * east_m) / closing_mps
-    time_s = ((east_mps * east_m + north_mps * north_m) / (closing_mps * closing_mps)).max(axis=0)
+    time_s = ((east_mps * east_m + north_mps * north_m) / (closing_mps * closing_mps)).max(axis=0)[fastest]
     across_variance = velocity.variance_along(-north_mps / closing_mps, east_mps / closing_mps)
     unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
     deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
     speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
     speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
-    slowest, fastest = UNDER_WAY_MPS
+    adrift_mps, sure_mps = UNDER_WAY_MPS
     weight = (
-        _part((speed_mps - 2.0 * math.sqrt(speed_variance) - slowest) / (fastest - slowest))
+        _part((speed_mps - 2.0 * math.sqrt(speed_variance) - adrift_mps) / (sure_mps - adrift_mps))
         * _part(time_s / PAST_S)
         * _part((APPROACH_S - time_s) / (APPROACH_S - SOON_S))
         * _part(1.0 - deviation_m / WANTED_CPA_M)

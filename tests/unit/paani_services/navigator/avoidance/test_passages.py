@@ -158,6 +158,18 @@ def test_the_surer_the_velocity_the_more_it_counts(std_mps: tuple[float, float],
     assert (unsure >= 0.0).all()
 
 
+@settings(max_examples=25, deadline=None)
+@given(range_m=st.floats(4.0, 12.0), north_m=st.floats(-1.0, 1.0), speed_mps=st.floats(0.25, 0.4))
+def test_slowing_down_behind_a_vessel_does_not_end_the_encounter(
+    range_m: float, north_m: float, speed_mps: float
+) -> None:
+    """It would be met later, or never; but the boat that follows it is no less on its course."""
+    evaluation = evaluate(vessel(range_m, north_m, speed_mps, 0.0))
+    weight = find_passages(evaluation).weight.reshape(-1, 3)  # headings, speeds
+    assert weight == pytest.approx(np.repeat(weight[:, :1], 3, axis=1))
+    assert weight[0, 0] > 0.0 or range_m / (0.6 - speed_mps) > 25.0
+
+
 def test_what_counts_is_how_sure_the_velocity_is_across_the_line_of_sight() -> None:
     """A range that is known badly says little of when they meet, and nothing of the side."""
     along, across = (0.09, 0.0, 0.0001), (0.0001, 0.0, 0.09)
