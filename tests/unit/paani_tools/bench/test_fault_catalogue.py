@@ -75,7 +75,11 @@ class OneProcess(Loop):
 
 async def test_a_process_refused_memory_is_followed_until_it_has_spoken_long_after() -> None:
     fault = next(fault for fault in faults_of(Drive.PLAIN) if fault.name == "advisor refused memory")
-    process = await asyncio.create_subprocess_exec("sleep", "60")
+    process = await asyncio.create_subprocess_exec("cat", stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(b"it has all that it needs\n")
+    await process.stdout.readline()
     try:
         loop, before = OneProcess(process.pid), resource.prlimit(process.pid, resource.RLIMIT_AS)
         healthy_us: dict[str, int] = {}
