@@ -45,9 +45,10 @@ export class MapPanel {
     this.pxPerM = Math.min(80, Math.max(0.5, this.pxPerM * factor));
   }
 
-  /** The place in metres under a pixel of the canvas. @param {number} px @param {number} py */
-  toMap(px, py) {
-    const { x, y } = this.projection.toMap(px, py);
+  /** The place in metres under the pointer, as it was drawn: a canvas that was laid out anew shows it stretched until it is drawn again. @param {MouseEvent} event */
+  placeUnder({ clientX, clientY }) {
+    const box = this.canvas.getBoundingClientRect(), { projection } = this;
+    const { x, y } = projection.toMap(((clientX - box.left) * projection.width) / box.width, ((clientY - box.top) * projection.height) / box.height);
     return { x_m: x, y_m: y };
   }
 
@@ -59,6 +60,7 @@ export class MapPanel {
 
   /** @param {import("./view.js").View} view @param {number} now */
   render({ store, tracks }, now) {
+    this.editor.renderForm(store, now); // first, since it may take of the map's room
     const { canvas, ctx, controls } = this, width = canvas.clientWidth, height = canvas.clientHeight;
     if (!width || !height) return;
     const odometry = store.get("localization/odometry"), truth = store.get("@truth/pose"), route = store.get("navigator/route"), pose = odometry ?? truth;
@@ -90,7 +92,7 @@ export class MapPanel {
     const isOver = isReplay(store) && store.silenceS(now) > store.limitS("localization/odometry"); // nobody is lost where a recording ends
     if (odometry && poseAgeS > store.limitS("localization/odometry") && !isOver) drawGhost(chart, odometry, poseAgeS);
     this.headings.render(chart, prediction?.headings ?? [], odometry, store.get("dashboard/settings")?.planner ?? true, this.editor.isOpen);
-    this.editor.render(chart, store, now);
+    this.editor.draw(chart);
     drawScale(ctx, projection, colour("--quiet"), colour("--panel"));
     controls.render(turnRad, this.editor.isOpen);
     setText(byId("map-pose"), pose ? MAP_TEXTS.pose(fixed(pose.x_m, 1), fixed(pose.y_m, 1)) : MAP_TEXTS.noPose);

@@ -19,7 +19,7 @@ export class RouteEditor {
     this.map = map;
     this.made = new MissionPlan();
     this.isOpen = false;
-    /** Where the pointer went down, and whether it drags a point. @type {{x: number, y: number, drags: boolean} | null} */
+    /** Where the pointer went down, on the page and on the map, and whether it drags a point. @type {{x: number, y: number, at: import("./plane_geometry.js").Point, drags: boolean} | null} */
     this.press = null;
     /** @type {import("./mission_checks.js").Mark[]} */
     this.marks = [];
@@ -70,7 +70,7 @@ export class RouteEditor {
   bindMap() {
     const { canvas } = this.map;
     canvas.addEventListener("pointerdown", (event) => this.isOpen && this.down(event));
-    canvas.addEventListener("pointermove", (event) => this.press?.drags && this.made.move(this.at(event)));
+    canvas.addEventListener("pointermove", (event) => this.press?.drags && this.made.move(this.map.placeUnder(event)));
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => this.up(/** @type {PointerEvent} */ (event)));
     canvas.addEventListener("dragover", (event) => event.preventDefault());
     canvas.addEventListener("drop", (event) => {
@@ -94,19 +94,13 @@ export class RouteEditor {
     if (isOpen) this.map.controls.setFollow(false);
   }
 
-  /** @param {MouseEvent} event */
-  at(event) {
-    const box = this.map.canvas.getBoundingClientRect();
-    return this.map.toMap(event.clientX - box.left, event.clientY - box.top);
-  }
-
   /** @param {PointerEvent} event */
   down(event) {
-    const at = this.at(event), reachM = REACH_PX / this.map.pxPerM;
+    const at = this.map.placeUnder(event), reachM = REACH_PX / this.map.pxPerM;
     this.map.canvas.setPointerCapture(event.pointerId);
     const isGrabbed = this.made.grab(at, reachM);
     if (isGrabbed) this.made.remember();
-    this.press = { x: event.clientX, y: event.clientY, drags: isGrabbed || this.made.insert(at, reachM) };
+    this.press = { x: event.clientX, y: event.clientY, at, drags: isGrabbed || this.made.insert(at, reachM) };
     this.note = "";
   }
 
@@ -117,7 +111,7 @@ export class RouteEditor {
     if (!press || press.drags || event.type === "pointercancel") return;
     if (Math.hypot(event.clientX - press.x, event.clientY - press.y) > DRAG_PX) return;
     if (!this.made.items.length) this.made.addItem("follow_route");
-    this.made.addPoint(this.at(event));
+    this.made.addPoint(press.at);
   }
 
   /** The mission in force, or the route. */
@@ -175,8 +169,13 @@ export class RouteEditor {
     byId("editor-send").disabled = false;
   }
 
-  /** @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {number} now */
-  render(chart, store, now) {
+  /** @param {import("./map_objects.js").Chart} chart */
+  draw(chart) {
+    if (this.isOpen) drawPlan(chart, this.made, this.marks);
+  }
+
+  /** What stands above the map. @param {import("./store.js").Store} store @param {number} now */
+  renderForm(store, now) {
     this.store = store;
     if (!this.isOpen) return;
     const { made } = this, settings = store.get("dashboard/settings"), grid = store.isFresh("navigator/occupancy", now) ? store.get("navigator/occupancy") : undefined;
@@ -187,7 +186,6 @@ export class RouteEditor {
       this.marks = findMarks(made.plan, { marginM: settings.fence_margin_m, turnRadiusM: settings.turn_radius_m }, grid);
       this.checkAgainAt = began + (performance.now() - began) / MAX_SHARE;
     }
-    drawPlan(chart, made, this.marks);
     this.renderItems();
     const faults = this.marks.slice(0, MAX_SHOWN).map((mark) => mark.text).join(" · ") + (this.marks.length > MAX_SHOWN ? ` · ${this.marks.length - MAX_SHOWN} more` : "");
     const hint = !made.items.length ? EDITOR.hint : faults || EDITOR.fine;
