@@ -119,7 +119,7 @@ class WhatRan:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         name = report.nodeid.partition("[")[0]
         self.tier_s[name.split("/")[1]] += report.duration
-        if report.outcome == "rerun":
+        if str(report.outcome) == "rerun":  # a plugin's word, of which the type knows nothing
             crash = getattr(report.longrepr, "reprcrash", None)
             self.first_tries[report.nodeid] = str(report.longrepr) if crash is None else crash.message
         if report.skipped:
