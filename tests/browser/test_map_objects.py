@@ -68,6 +68,18 @@ AHEAD = m.Prediction(
     headings=tuple(verdict(off) for off in (0, *(side * step for step in range(20, 180, 20) for side in (1, -1)))),
 )  # fmt: skip
 
+NAMES = """async (places) => {
+  const { drawObstacles } = await import("/static/map_objects.js");
+  const ctx = document.createElement("canvas").getContext("2d"), words = [];
+  ctx.fillText = (text, x, y) => words.push([text, x, y, ctx.measureText(text).width]);
+  const chart = { ctx, toScreen: (x, y) => [10 * x, 10 * y], pxPerM: 10, turnRad: 0, colour: () => "#000" };
+  const still = { radius_m: 1, east_mps: 0, north_mps: 0, cpa_m: 2, tcpa_s: 9 };
+  const obstacles = places.map(([x_m, y_m], index) => ({ ...still, x_m, y_m, track_id: index + 1 }));
+  const tracks = obstacles.map(({ track_id: id }) => ({ id, label: "buoy" }));
+  drawObstacles(chart, obstacles, { x_m: 0, y_m: 0, yaw_rad: 0, surge_mps: 0 }, 0, tracks);
+  return words;
+}"""
+
 
 async def check_bow_up(page: Any, folder: Path) -> None:
     """The boat heads east: what lies north of it is on its left, until a mission is drawn, and after a reload too."""
@@ -184,3 +196,14 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
         assert await has_colour_on_map(page, GREEN, -20.0, 1.0)
         publishing.cancel()
         assert watched.errors == []
+
+
+async def test_the_names_of_obstacles_beside_each_other_lie_on_none_of_the_others(scripts_page: Any) -> None:
+    words = await scripts_page.evaluate(NAMES, [[20.0, 10.0], [20.4, 10.2], [20.1, 10.1], [60.0, 10.0]])
+    boxes = [(x, x + width, y - 12, y) for _, x, y, width in words]
+    assert sorted(text for text, *_ in words if "#" in text) == ["buoy #1", "buoy #2", "buoy #3", "buoy #4"]
+    assert len(words) == 8, "each with how near it comes"
+    for index, (left, right, top, bottom) in enumerate(boxes):
+        for other in boxes[:index]:
+            assert right <= other[0] or other[1] <= left or bottom <= other[2] or other[3] <= top, words
+    assert ("buoy #4", 104.0) in [(text, y) for text, _, y, _ in words], "what stands alone keeps its place"

@@ -6,7 +6,7 @@ import { MAP_TEXTS, ageText, trackNames } from "./text.js";
 
 const ARROW_S = 5; // a velocity is drawn as the way of this long
 const GHOST_S = 30; // no boat that nobody hears is said to go straight on for longer
-const FONT = "12px system-ui, sans-serif";
+const FONT = "12px system-ui, sans-serif", LINE_PX = 15;
 
 /** Metres east and north to pixels. @typedef {(x: number, y: number) => [number, number]} ToScreen */
 /** turnRad: by which every direction is turned, counter-clockwise. @typedef {{ctx: CanvasRenderingContext2D, toScreen: ToScreen, turnRad: number, pxPerM: number, colour: (name: string) => string}} Chart */
@@ -151,6 +151,9 @@ const isNearing = (obstacle) => obstacle.cpa_m !== undefined && obstacle.tcpa_s 
  */
 export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
   const { ctx, toScreen, pxPerM, colour } = chart;
+  /** @type {Label[]} */
+  const labels = [];
+  ctx.font = FONT;
   for (const obstacle of obstacles) {
     if (pose && isNearing(obstacle)) drawClosest(chart, obstacle, pose, ageS);
     const [east, north] = placeAfter(obstacle, obstacle.east_mps, obstacle.north_mps, ageS);
@@ -167,9 +170,24 @@ export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
     ctx.moveTo(x, y);
     ctx.lineTo(...toScreen(east + obstacle.east_mps * ARROW_S, north + obstacle.north_mps * ARROW_S));
     ctx.stroke();
-    ctx.font = FONT;
-    ctx.fillStyle = colour("--text");
-    drawWords({ ctx, colour }, trackNames(tracks, [obstacle.track_id]), x + radius + 4, y + 4);
-    drawWords({ ctx, colour }, closestText(obstacle, ageS), x + radius + 4, y + 19);
+    const lines = [trackNames(tracks, [obstacle.track_id]), closestText(obstacle, ageS)].filter(Boolean);
+    labels.push({ lines, x: x + radius + 4, y: y + 4, width: Math.max(...lines.map((line) => ctx.measureText(line).width)) });
   }
+  ctx.fillStyle = colour("--text");
+  for (const { lines, x, y } of withoutOverlap(labels)) lines.forEach((line, index) => drawWords(chart, line, x, y + index * LINE_PX));
+}
+
+/** @typedef {{lines: string[], x: number, y: number, width: number}} Label its first line begins at a place of the screen */
+
+/** The labels from top to bottom, each as low as it has to be to lie on none before it. @param {Label[]} labels */
+function withoutOverlap(labels) {
+  /** @type {Label[]} */
+  const placed = [];
+  const height = (/** @type {Label} */ { lines }) => lines.length * LINE_PX;
+  for (const label of [...labels].sort((a, b) => a.y - b.y)) {
+    const findCovered = () => placed.find((other) => label.x < other.x + other.width && other.x < label.x + label.width && label.y < other.y + height(other) && other.y < label.y + height(label));
+    for (let other = findCovered(); other; other = findCovered()) label.y = other.y + height(other);
+    placed.push(label);
+  }
+  return placed;
 }
