@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -13,7 +14,29 @@ from tests.conftest import Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 AGES = "[...document.querySelectorAll('#topics tr')].map((row) => row.children[3].textContent).join()"
+CELLS = "[...document.querySelectorAll('#topics tr td')].map((cell) => cell.textContent)"
 SIZE, VALUE = "document.querySelectorAll('#topics tr').length", "document.querySelector('#topic-value').textContent"
+
+
+async def test_a_topic_says_where_it_is_from_how_often_it_comes_its_age_and_its_size(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    async with spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await page.click("[data-tab-of='topics']")
+        await page.fill("#topics-search", "perception/evidence")
+        await until(page, f"{SIZE} === 1 && {CELLS}[2] !== '–'")
+        heads = await page.evaluate("[...document.querySelectorAll('.topics-tab th')].map((head) => head.textContent)")
+        assert heads == ["Topic", "From", "Rate / nominal [Hz]", "Age", "Size"]
+        topic, producer, rate, age, size = await page.evaluate(CELLS)
+        assert (topic, producer) == ("perception/evidence", "perception")
+        assert re.fullmatch(r"[0-9]+\.[0-9] / [0-9.]+", rate)
+        assert re.fullmatch(r"[0-9]\.[0-9] s", age)
+        assert re.fullmatch(r"[0-9.]+ k?B", size)
+        await page.fill("#topics-search", "")
+        await until(page, f"{SIZE} > 20")
+        names = await page.evaluate("[...document.querySelectorAll('#topics button')].map((each) => each.textContent)")
+        assert names == sorted(names), "in the order of their names"
 
 
 async def is_changing(page: Any, expression: str) -> bool:

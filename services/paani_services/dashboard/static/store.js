@@ -48,7 +48,7 @@ export class Store {
   /** Seconds; infinite before the first. @param {string} key @param {number} now */
   ageS(key, now) {
     const entry = this.entries.get(key);
-    return entry ? (now - entry.at + entry.ageMs) / 1000 : Infinity;
+    return entry ? (Math.max(0, now - entry.at) + entry.ageMs) / 1000 : Infinity; // a table is drawn by a moment that its messages may have overtaken
   }
 
   /** The age beyond which a key is stale [s]. @param {string} key */
