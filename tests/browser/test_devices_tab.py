@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from tests.browser.test_indicator_strip import SHOWS
-from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
+from tests.browser.test_legibility import AXE, SERIOUS, SIDEWAYS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_page import until, watch
 from tests.browser.test_sensor_strip import GPS, HEADING, IMU
 from tests.conftest import OpenAs, Spawn
@@ -86,6 +86,7 @@ async def test_a_hulls_devices_and_its_battery(
             assert await page.evaluate(SMALL_TEXT) == []
             assert await page.evaluate(SMALL_TARGETS, least_px) == []
             assert await page.evaluate("document.documentElement.scrollWidth") == width
+            assert await page.evaluate(SIDEWAYS) == []
             assert await page.evaluate(OVERLAP_PX) <= 0, "advice and readouts stand side by side or one above the other"
             assert await page.evaluate(NARROW) == [], "a value has the room of a word"
         is_reporting = False

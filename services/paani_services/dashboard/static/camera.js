@@ -3,7 +3,7 @@
 
 import { chooseFrame } from "./frame_matching.js";
 import { drawBoxes, drawCorridors, drawCorridorTop, drawMask, drawOwnHull } from "./overlay.js";
-import { CAMERA_TEXTS, ageText, byId, setText, words } from "./text.js";
+import { CAMERA_TEXTS, ageText, byId, screenScale, setText, words } from "./text.js";
 
 const OPACITY_KEY = "paani-overlay-opacity";
 /** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
@@ -152,6 +152,6 @@ export class Camera {
       this.canvas.height = height;
       this.drawnFrom = [];
     }
-    return { ctx: this.ctx, width, height, unit: ratio };
+    return { ctx: this.ctx, width, height, unit: ratio * screenScale() };
   }
 }

@@ -2,7 +2,7 @@
 // The tab of a hull's devices: its sensors, the bridge to the indicator, and the line to the thrusters. Hidden without any.
 
 import { shownTab } from "./tabs.js";
-import { effect, facts, html, mount, tableHead, tableMoment } from "./templates.js";
+import { cell, effect, facts, html, mount, tableHead, tableMoment } from "./templates.js";
 import { DEVICE_FACTS, DEVICE_TEXTS, NEVER, ageText, agoText, byId, fixed, words } from "./text.js";
 
 const NO_ANSWER_MS = 1e9; // the age of an answer before the first
@@ -21,13 +21,14 @@ export function bindDevices() {
 /** @param {import("./templates.js").Moment} moment */
 function sensors({ store, now }) {
   return html`<div id="sensors-device" class="panel" tabindex="0" role="group" aria-label=${DEVICE_TEXTS.sensors}><header><h2>${DEVICE_TEXTS.sensors}</h2></header>
-    <table>${tableHead(DEVICE_TEXTS.columns, [3, 4, 5, 6, 7])}<tbody id="sensor-devices" class=${store.isFresh("sensors/state", now) ? "" : "stale"}>${(store.get("sensors/state")?.devices ?? []).map(device)}</tbody></table></div>`;
+    <table class="cards">${tableHead(DEVICE_TEXTS.columns, [3, 4, 5, 6, 7])}<tbody id="sensor-devices" class=${store.isFresh("sensors/state", now) ? "" : "stale"}>${(store.get("sensors/state")?.devices ?? []).map(device)}</tbody></table></div>`;
 }
 
 /** @param {any} device */
-const device = ({ role, status, line, note, heard, ...counts }) => html`<tr key=${role}><td>${role}</td><td class=${KINDS[status] ?? "bad"}>${status.replaceAll("_", " ")}</td><td>${line || "–"}</td>
-  <td class="number">${fixed(counts.rate_hz, 1)} Hz</td>${["checksum_failures", "damaged", "withheld", "reconnections"].map((name) => html`<td class="number">${counts[name]}</td>`)}
-  <td class="wide">${[note, heard].filter(Boolean).join("; ")}</td></tr>`;
+const device = ({ role, status, line, note, heard, ...counts }) => html`<tr key=${role}><td>${role}</td>${[
+  [status.replaceAll("_", " "), KINDS[status] ?? "bad"], [line || "–", "wide"], [`${fixed(counts.rate_hz, 1)} Hz`, "number"],
+  ...["checksum_failures", "damaged", "withheld", "reconnections"].map((name) => [counts[name], "number"]), [[note, heard].filter(Boolean).join("; "), "wide"],
+].map(([value, kind], column) => cell(DEVICE_TEXTS.columns[column + 1], value, kind))}</tr>`;
 
 /** @param {import("./templates.js").Moment} moment @param {"bridge" | "thrusters"} name */
 function line({ store, now }, name) {

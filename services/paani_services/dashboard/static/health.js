@@ -2,7 +2,7 @@
 // The health tab: one row per process with its state, rate, delays, age of its report, load, and what it dropped and why.
 
 import { processLog, showProcessLog } from "./process_log.js";
-import { computed, html, mount, tableHead, tableMoment } from "./templates.js";
+import { cell, computed, html, mount, tableHead, tableMoment } from "./templates.js";
 import { HEALTH_TEXTS, ageText, fixed } from "./text.js";
 
 /** The main output of each process; its rate is shown. @type {Record<string, string>} */
@@ -33,12 +33,12 @@ export function bindHealth() {
   mount("[data-tab-panel=health]", () => html`
     <div class="panel health" tabindex="0" role="group" aria-label=${HEALTH_TEXTS.table}>
       <header><h2>${HEALTH_TEXTS.title}</h2><span class="quiet">${HEALTH_TEXTS.hint}</span></header>
-      <table>${tableHead(HEALTH_TEXTS.columns, [2, 3, 4, 5, 6, 7, 8, 9, 10])}<tbody id="health">${processes.value.map(row)}</tbody></table>
+      <table class="cards">${tableHead(HEALTH_TEXTS.columns, [2, 3, 4, 5, 6, 7, 8, 9, 10])}<tbody id="health">${processes.value.map(row)}</tbody></table>
     </div>${processLog.value}`);
 }
 
 /** @param {Process} process */
-const row = ({ name, cells }) => html`<tr key=${name}><td><button type="button" onClick=${() => void showProcessLog(name)}>${name}</button></td>${cells.map(([text, kind]) => html`<td class=${kind}>${text}</td>`)}</tr>`;
+const row = ({ name, cells }) => html`<tr key=${name}><td><button type="button" onClick=${() => void showProcessLog(name)}>${name}</button></td>${cells.map(([text, kind], column) => cell(HEALTH_TEXTS.columns[column + 1], text, kind))}</tr>`;
 
 /** @param {import("./templates.js").Moment} moment @param {string} name @param {any} input of its main topic @returns {Process} */
 function readProcess({ store, now, isOpen }, name, input) {

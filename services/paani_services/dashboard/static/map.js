@@ -10,7 +10,7 @@ import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { isReplay } from "./inhibits.js";
 import { RouteEditor } from "./route_editor.js";
-import { MAP_TEXTS, byId, fixed, setText } from "./text.js";
+import { MAP_TEXTS, byId, fixed, screenScale, setText } from "./text.js";
 
 const AHEAD_PART = 0.22; // of the map's height, by which the boat stands below the middle where its bow is up
 
@@ -20,11 +20,13 @@ export class MapPanel {
     this.ctx = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
     this.projection = new MapProjection({ x: 0, y: 0 }, 6, NORTH_RAD, 1, 1);
     this.pxPerM = 6;
+    /** By how much larger everything is drawn; all other lengths on the screen are without it. */
+    this.scale = 1;
     /** The place in the middle; null: wherever the boat is first. @type {import("./map_projection.js").Place | null} */
     this.centre = null;
     this.fitRoute = false;
     this.controls = new MapControls((factor) => this.zoom(factor), () => { this.fitRoute = true; this.controls.setFollow(false); });
-    this.headings = new MapHeadings(this.canvas);
+    this.headings = new MapHeadings(this.canvas, (event) => this.pixelUnder(event));
     this.tiles = new MapTiles();
     this.bindPointer();
     this.editor = new RouteEditor(this);
@@ -35,7 +37,7 @@ export class MapPanel {
     this.canvas.addEventListener("pointermove", (event) => {
       if (!event.buttons || this.editor.isDragging) return;
       this.controls.setFollow(false);
-      this.centre = this.projection.dragged(event.movementX, event.movementY);
+      this.centre = this.projection.dragged(event.movementX / this.scale, event.movementY / this.scale);
       this.project();
     });
   }
@@ -45,23 +47,28 @@ export class MapPanel {
     this.pxPerM = Math.min(80, Math.max(0.5, this.pxPerM * factor));
   }
 
-  /** The place in metres under the pointer, as it was drawn: a canvas that was laid out anew shows it stretched until it is drawn again. @param {MouseEvent} event */
-  placeUnder({ clientX, clientY }) {
-    const box = this.canvas.getBoundingClientRect(), { projection } = this;
-    const { x, y } = projection.toMap(((clientX - box.left) * projection.width) / box.width, ((clientY - box.top) * projection.height) / box.height);
+  /** What was drawn under the pointer: a canvas that was laid out anew is stretched until it is drawn again. @param {MouseEvent} event @returns {[number, number]} */
+  pixelUnder({ clientX, clientY }) {
+    const box = this.canvas.getBoundingClientRect(), { width, height } = this.projection;
+    return [((clientX - box.left) * width) / box.width, ((clientY - box.top) * height) / box.height];
+  }
+
+  /** The place in metres under the pointer. @param {MouseEvent} event */
+  placeUnder(event) {
+    const { x, y } = this.projection.toMap(...this.pixelUnder(event));
     return { x_m: x, y_m: y };
   }
 
   /** Lay the map anew. @param {number} [upRad] direction that points up */
   project(upRad = NORTH_RAD - this.projection.turnRad) {
-    const { canvas, pxPerM } = this;
-    this.projection = new MapProjection(this.centre ?? { x: 0, y: 0 }, pxPerM, upRad, canvas.clientWidth, canvas.clientHeight);
+    const { canvas, pxPerM, scale } = this;
+    this.projection = new MapProjection(this.centre ?? { x: 0, y: 0 }, pxPerM, upRad, canvas.clientWidth / scale, canvas.clientHeight / scale);
   }
 
   /** @param {import("./view.js").View} view @param {number} now */
   render({ store, tracks }, now) {
     this.editor.renderForm(store, now); // first, since it may take of the map's room
-    const { canvas, ctx, controls } = this, width = canvas.clientWidth, height = canvas.clientHeight;
+    const { canvas, ctx, controls } = this, scale = (this.scale = screenScale()), width = canvas.clientWidth / scale, height = canvas.clientHeight / scale;
     if (!width || !height) return;
     const odometry = store.get("localization/odometry"), truth = store.get("@truth/pose"), route = store.get("navigator/route"), pose = odometry ?? truth;
     const mission = store.get("navigator/mission"), bounds = route?.waypoints ?? mission?.fence[0]?.corners;
@@ -69,7 +76,7 @@ export class MapPanel {
     const upRad = controls.upRad(pose, this.editor.isOpen);
     if (pose && (controls.follow || !this.centre)) this.centre = placeAhead(pose, upRad, controls.isBoatUp && !this.editor.isOpen ? (AHEAD_PART * height) / this.pxPerM : 0);
     this.project(upRad);
-    const { projection, pxPerM } = this, { turnRad } = projection, ratio = Math.min(devicePixelRatio || 1, 2);
+    const { projection, pxPerM } = this, { turnRad } = projection, ratio = scale * Math.min(devicePixelRatio || 1, 2);
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
@@ -117,7 +124,7 @@ export class MapPanel {
 
   /** @param {{x_m: number, y_m: number}[]} points */
   fitTo(points) {
-    const xs = points.map((p) => p.x_m), ys = points.map((p) => p.y_m), { clientWidth: width, clientHeight: height } = this.canvas;
+    const xs = points.map((p) => p.x_m), ys = points.map((p) => p.y_m), { canvas, scale } = this, width = canvas.clientWidth / scale, height = canvas.clientHeight / scale;
     const [x1, x2, y1, y2] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     this.centre = { x: (x1 + x2) / 2, y: (y1 + y2) / 2 };
     this.pxPerM = Math.min(width / (x2 - x1 + 12), height / (y2 - y1 + 12));

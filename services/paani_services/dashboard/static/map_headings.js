@@ -15,8 +15,9 @@ const COLOURS = {
 /** @typedef {import("./heading_verdicts.js").Verdict} Verdict */
 
 export class MapHeadings {
-  /** @param {HTMLCanvasElement} canvas of the map */
-  constructor(canvas) {
+  /** @param {HTMLCanvasElement} canvas of the map @param {(event: MouseEvent) => [number, number]} pixelUnder what is drawn under the pointer */
+  constructor(canvas, pixelUnder) {
+    this.pixelUnder = pixelUnder;
     this.isOn = false;
     /** The heading somebody chose; null: whichever the planner takes. @type {number | null} */
     this.chosenRad = null;
@@ -48,16 +49,16 @@ export class MapHeadings {
     let down = { x: 0, y: 0 };
     canvas.addEventListener("pointerdown", (event) => { down = { x: event.clientX, y: event.clientY }; });
     canvas.addEventListener("pointerleave", () => { this.pointedRad = null; });
-    canvas.addEventListener("pointermove", (event) => { this.pointedRad = (event.buttons ? undefined : this.rayOf(canvas, event))?.heading_rad ?? null; });
+    canvas.addEventListener("pointermove", (event) => { this.pointedRad = (event.buttons ? undefined : this.rayOf(event))?.heading_rad ?? null; });
     canvas.addEventListener("click", (event) => {
-      if (Math.hypot(event.clientX - down.x, event.clientY - down.y) <= DRAG_PX) this.choose(this.rayOf(canvas, event));
+      if (Math.hypot(event.clientX - down.x, event.clientY - down.y) <= DRAG_PX) this.choose(this.rayOf(event));
     });
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {MouseEvent} event */
-  rayOf(canvas, event) {
-    const box = canvas.getBoundingClientRect();
-    return rayAt(this.verdicts, event.clientX - box.left - this.boatPx[0], this.boatPx[1] - (event.clientY - box.top), this.turnRad);
+  /** @param {MouseEvent} event */
+  rayOf(event) {
+    const [x, y] = this.pixelUnder(event);
+    return rayAt(this.verdicts, x - this.boatPx[0], this.boatPx[1] - y, this.turnRad);
   }
 
   /** @param {Verdict | undefined} verdict */

@@ -1,9 +1,9 @@
 // @ts-check
 // Plots over time, drawn by uPlot: made when they are opened, and again for another palette or width.
 
-import { PLOTS, byId, fixed } from "./text.js";
+import { PLOTS, byId, fixed, screenScale } from "./text.js";
 
-const HEIGHT_PX = 132, GAP_S = 3; // a curve is broken where no sample came for so long
+const HEIGHT_PX = 132, WIDTH_PX = 220, GAP_S = 3; // a curve is broken where no sample came for so long
 
 export class Plots {
   /** @param {(atUs: number) => void} onSeek a moment was chosen */
@@ -43,15 +43,15 @@ export class Plots {
   make(panel) {
     for (const plot of this.plots) plot.destroy();
     const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
-    const columns = Math.max(1, Math.min(PLOTS.length, Math.floor(panel.clientWidth / 220)));
-    const width = Math.floor((panel.clientWidth - 24) / columns) - 8;
-    const axis = { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+    const scale = screenScale(), columns = Math.max(1, Math.min(PLOTS.length, Math.floor(panel.clientWidth / (WIDTH_PX * scale))));
+    const width = Math.floor((panel.clientWidth - 24 * scale) / columns - 8 * scale);
+    const axis = { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false }, font: `${12 * scale}px system-ui, sans-serif` };
     this.plots = PLOTS.map(([title, curves]) => {
       const series = curves.map(([, label, name]) => ({ label, stroke: colour(name), width: 1.5, points: { show: false }, value: (/** @type {any} */ _, /** @type {any} */ value) => (value === null ? "–" : fixed(value)) }));
       // @ts-ignore: uPlot is a script of its own, which the page loads before this one
       const plot = new uPlot({
-        title, width, height: HEIGHT_PX, series: [{}, ...series],
-        axes: [{ ...axis, size: 24, space: 64, values: (/** @type {any} */ _, /** @type {number[]} */ marks) => marks.map((s) => new Date(s * 1000).toTimeString().slice(0, marks[1] - marks[0] < 60 ? 8 : 5)) }, { ...axis, size: 44, space: 26 }],
+        title, width, height: HEIGHT_PX * scale, series: [{}, ...series],
+        axes: [{ ...axis, size: 24 * scale, space: 64 * scale, values: (/** @type {any} */ _, /** @type {number[]} */ marks) => marks.map((s) => new Date(s * 1000).toTimeString().slice(0, marks[1] - marks[0] < 60 ? 8 : 5)) }, { ...axis, size: 44 * scale, space: 26 * scale }],
         scales: { x: { time: true }, y: { range: withMargin } }, cursor: { sync: { key: "time" }, drag: { x: false, y: false } }, legend: { live: true },
         hooks: { draw: [(/** @type {any} */ drawn) => this.drawMoment(drawn, colour("--text"))] },
       }, [[], ...curves.map(() => [])], panel);

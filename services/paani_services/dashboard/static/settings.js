@@ -6,7 +6,7 @@ import { ask } from "./past_source.js";
 import { messageOf } from "./recordings.js";
 import { hasKey, post } from "./requests.js";
 import { shownTab } from "./tabs.js";
-import { computed, effect, html, mount, present, signal, tableHead } from "./templates.js";
+import { cell, computed, effect, html, mount, present, signal, tableHead } from "./templates.js";
 import { SETTING_TEXTS } from "./text.js";
 import { changesText, countsText } from "./tuning.js";
 
@@ -60,7 +60,7 @@ function view() {
       <button id="settings-rollback" type="button" disabled=${!proposal && !active} onClick=${() => void act("rollback", { proposal: proposal || active })}>${SETTING_TEXTS.rollback}</button></header>
     <p id="settings-note" class="tab-note" role="status" data-bad=${note.value !== ""}>${note.value}</p>
     <p id="settings-trial" class="tab-note quiet">${proposal ? `${proposal} ${SETTING_TEXTS.sent}: ${changesText(shadow.value.changes)}. ${countsText(shadow.value)}` : SETTING_TEXTS.none}</p>
-    <table>${tableHead(SETTING_TEXTS.columns)}<tbody id="settings">${rows.value}</tbody></table>
+    <table class="cards">${tableHead(SETTING_TEXTS.columns)}<tbody id="settings">${rows.value}</tbody></table>
   </div>`;
 }
 
@@ -71,9 +71,10 @@ function row({ path, value, unit, default: usual, limits, origin, tunable }, tun
     event.preventDefault();
     void act("propose", { changes: [{ path, value: event.target.elements[0].value.trim() }] });
   };
+  const [, ofValue, ofUnit, ofDefault, ofRange, ofOrigin, ofTrial] = SETTING_TEXTS.columns;
   return html`<tr key=${path} hidden=${!isFound}>
-    <td>${path}</td><td class="wide">${orDash(tuned ?? value)}</td><td>${orDash(unit)}</td><td class="wide">${orDash(usual)}</td><td class="quiet">${orDash(limits)}</td><td class=${isChanged ? "warn" : "quiet"}>${tuned === undefined ? origin : SETTING_TEXTS.tuned}</td>
-    <td>${tunable && html`<form onSubmit=${propose}><input size="7" defaultValue=${value} aria-label="${SETTING_TEXTS.try} ${path}" /> <button>${SETTING_TEXTS.try}</button></form>`}</td></tr>`;
+    <td>${path}</td>${cell(ofValue, orDash(tuned ?? value), "wide")}${cell(ofUnit, orDash(unit))}${cell(ofDefault, orDash(usual), "wide")}${cell(ofRange, orDash(limits), "quiet")}${cell(ofOrigin, tuned === undefined ? origin : SETTING_TEXTS.tuned, isChanged ? "warn" : "quiet")}
+    <td data-column=${tunable ? ofTrial : ""}>${tunable && html`<form onSubmit=${propose}><input size="7" defaultValue=${value} aria-label="${SETTING_TEXTS.try} ${path}" /> <button>${SETTING_TEXTS.try}</button></form>`}</td></tr>`;
 }
 
 /** @param {string} what @param {object} body */

@@ -38,5 +38,8 @@ export function mount(selector, view) {
 /** A table's head. @param {string[]} names @param {number[]} [numbers] the columns of numbers */
 export const tableHead = (names, numbers = []) => html`<thead><tr>${names.map((name, column) => html`<th class=${numbers.includes(column) ? "number" : ""}>${name}</th>`)}</tr></thead>`;
 
+/** A cell that says its column's name where the table is drawn as cards, since a phone has no room for its columns. @param {string} name @param {any} value @param {string} [kind] */
+export const cell = (name, value, kind = "") => html`<td class=${kind} data-column=${name}>${value}</td>`;
+
 /** Names, values, and whether a value is bad. @param {[string, any, boolean?][]} list */
 export const facts = (list) => list.map(([name, value, isBad]) => html`<dt>${name}</dt><dd class=${isBad ? "bad" : ""}>${value}</dd>`);

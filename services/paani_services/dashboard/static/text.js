@@ -55,6 +55,9 @@ export function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;
 }
 
+/** How much larger than on a desk's screen everything is drawn, as the page's style says. */
+export const screenScale = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 10;
+
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);
 
