@@ -18,7 +18,7 @@ from paani.config import Config, CorridorConfig
 from paani_sim.eye.camera import camera_pose, view_projection
 from paani_sim.eye.configured_camera import boat_pose, build_camera
 from paani_sim.trials.evidence_source import EvidenceFrame
-from paani_sim.trials.silhouettes import height_span_m, project_silhouettes
+from paani_sim.trials.silhouettes import bounds_in_picture, height_span_m, project_silhouettes
 from paani_sim.worlds import Actor, Fault, FaultKind, Kind, Obstacle, World, actor_distance_along_m, actor_pose_along
 from paani_sim.worlds.faults import find_active_fault
 from paani_sim.worlds.footprint import build_outline, place_outline
@@ -170,7 +170,7 @@ class GroundTruthEvidenceSource:
         """Cover its cells; its box where enough of it is to be seen."""
         if not len(points):
             return None
-        low, high = np.clip(points.min(axis=0), 0.0, 1.0), np.clip(points.max(axis=0), 0.0, 1.0)
+        low, high = bounds_in_picture(points)
         if not (high > low).all():
             return None
         cells = np.zeros((MASK_ROWS, MASK_COLUMNS), np.uint8)

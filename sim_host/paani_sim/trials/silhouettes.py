@@ -51,3 +51,34 @@ def project_silhouettes(outlines_m: F64, heights_m: F64, clip_from_map: F64) -> 
         down = 0.5 - 0.5 * ends[..., 1] / ends[..., 3]
     place = np.clip(np.stack([across, down], axis=-1), -20.0, 20.0)
     return [place[i, is_visible[i]] for i in range(count)]
+
+
+def bounds_in_picture(points: F64) -> tuple[F64, F64]:
+    """Least and greatest corner of what the picture shows of the convex hull of points; equal where it shows nothing.
+
+    What lies beyond one side of the picture does not stretch the bounds along another.
+    """
+    for axis in (0, 1):
+        for inwards, side in ((1.0, 0.0), (-1.0, -1.0)):
+            points = _cut(points, inwards * points[:, axis] - side)
+    if not len(points):
+        return np.zeros(2), np.zeros(2)
+    low, high = (np.clip(each, 0.0, 1.0) for each in (points.min(axis=0), points.max(axis=0)))
+    return low, high
+
+
+def _cut(points: F64, inside: F64) -> F64:
+    """Points with the part of the convex hull of `points` that is inside: those, and where its edges cross the line.
+
+    inside: of each point, its distance to that line; negative beyond it.
+    """
+    is_beyond = inside < 0.0
+    if not is_beyond.any():
+        return points
+    kept, beyond = points[~is_beyond, None], points[is_beyond]
+    part = inside[~is_beyond, None] / (inside[~is_beyond, None] - inside[is_beyond])
+    crossings = (kept + part[..., None] * (beyond - kept)).reshape(-1, 2)
+    if not len(crossings):
+        return kept[:, 0]
+    ends = (*crossings.argmin(axis=0), *crossings.argmax(axis=0))
+    return np.concatenate([kept[:, 0], crossings[list(ends)]])
