@@ -108,7 +108,7 @@ def find_dynamic_obstacles(
     """
     found = []
     for track in _associate_measurements(observations, now_us, camera, config):
-        complete = [each for each in track if each.is_whole]
+        complete = _latest_whole(track, max(config.fit_s, DRIFT_FIT_S))
         velocity, last = estimate_velocity(complete, config.fit_s), complete[-1] if complete else track[-1]
         if velocity is None and track[-1].label is Label.VESSEL:
             velocity, last = _estimate_drift(track, complete), track[-1]
@@ -133,19 +133,29 @@ def find_dynamic_obstacles(
     return tuple(found)
 
 
+def _latest_whole(track: list[PositionMeasurement], span_s: float) -> list[PositionMeasurement]:
+    """The measurements that show it whole, from `span_s` before the last of them."""
+    number = next((k for k in range(len(track), 0, -1) if track[k - 1].is_whole), 0)
+    first = first_since(track[:number], round(span_s * 1e6))
+    return [each for each in track[first:number] if each.is_whole]
+
+
 def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMeasurement]) -> Velocity | None:
     """The velocity of a vessel adrift, estimated over `DRIFT_FIT_S`.
 
-    It is that of its middle, or of the more certain end where too few pictures show the vessel whole.
+    It is that of its middle, or, where the newest picture does not show the vessel whole, of the more certain end.
     """
-    estimate = _fit_recent(complete, track[-1].stamp_us)
-    if estimate is None:
-        ends = [_fit_recent(_measurements_of_end(track, end), track[-1].stamp_us) for end in (0, 1)]
-        estimate = max((end for end in ends if end is not None), key=lambda end: end.squared_significance, default=None)
-    velocity = velocity_if_significant(estimate)
-    if velocity is None or math.hypot(*velocity[:2]) > MAX_DRIFT_MPS:
+    estimates = [_fit_recent(complete, track[-1].stamp_us)]
+    if not track[-1].is_whole:
+        estimates += [_fit_recent(_measurements_of_end(track, end), track[-1].stamp_us) for end in (0, 1)]
+    known = [each for each in estimates if each is not None]
+    velocity = velocity_if_significant(max(known, key=lambda each: each.squared_significance, default=None))
+    if velocity is None:
         return None
-    return velocity._replace(deviation_mps=max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS))
+    deviation_mps = max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS)
+    if math.hypot(*velocity[:2]) - 2.0 * deviation_mps > MAX_DRIFT_MPS:
+        return None
+    return velocity._replace(deviation_mps=deviation_mps)
 
 
 def _fit_recent(measurements: list[PositionMeasurement], last_us: int) -> VelocityEstimate | None:
@@ -212,29 +222,46 @@ def _associate_measurements(
     Applications to Tracking and Navigation", 2001), among obstacles of one label.
     """
     tracks: list[list[PositionMeasurement]] = []
-    recent: dict[int, tuple[MeasuredPicture, int]] = {}  # by track: where its newest measurement is
+    recent: dict[MeasuredPicture, dict[int, int]] = {}  # by picture: the track that each of its measurements ends
+    fit_us = round(config.fit_s * 1e6)
     for observation in observations:
         if not observation.boxes or observation.stamp_us > now_us:
             continue
         picture = _measure_positions(observation, camera, config.mover_range_m)
-        recent = {t: last for t, last in recent.items() if (picture.stamp_us - last[0].stamp_us) * 1e-6 <= config.fit_s}
-        pairs = [
-            (distance_m, t, f)
-            for t, (last, number) in recent.items()
-            for distance_m, f in _find_matches(last, picture)[number]
-        ]
-        extended, track_of = set[int](), dict[int, int]()  # by measurement
-        for _, t, f in sorted(pairs):
-            if f not in track_of and t not in extended:
-                track_of[f] = t
-                extended.add(t)
+        recent = {last: ends for last, ends in recent.items() if ends and picture.stamp_us - last.stamp_us <= fit_us}
+        newest = tuple((last, tuple(ends)) for last, ends in recent.items())
+        track_of = {f: recent[last].pop(number) for last, number, f in _match_nearest(newest, picture)}
+        recent[picture] = track_of
         for f, each in enumerate(picture.measurements):
-            t = track_of.get(f, len(tracks))
-            if t == len(tracks):
-                tracks.append([])
-            tracks[t].append(each)
-            recent[t] = (picture, f)
+            if f in track_of:
+                tracks[track_of[f]].append(each)
+            else:
+                track_of[f] = len(tracks)
+                tracks.append([each])
     return tracks
+
+
+@functools.lru_cache(maxsize=CACHED_PAIRS)
+def _match_nearest(
+    newest: tuple[tuple[MeasuredPicture, tuple[int, ...]], ...], picture: MeasuredPicture
+) -> Sequence[tuple[MeasuredPicture, int, int]]:
+    """The pairs of a track's newest measurement, by picture and number, and the number of the one that it goes on with.
+
+    newest: of each earlier picture, the numbers of its measurements that are the newest of a track.
+    """
+    pairs = [
+        (distance_m, order, number, f)
+        for order, (last, numbers) in enumerate(newest)
+        for number in numbers
+        for distance_m, f in _find_matches(last, picture)[number]
+    ]
+    matched, extended, found = set[int](), set[tuple[int, int]](), []
+    for _, order, number, f in sorted(pairs):
+        if f not in matched and (order, number) not in extended:
+            matched.add(f)
+            extended.add((order, number))
+            found.append((newest[order][0], number, f))
+    return found
 
 
 @functools.lru_cache(maxsize=CACHED_PAIRS)

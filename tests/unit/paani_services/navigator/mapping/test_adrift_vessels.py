@@ -5,6 +5,8 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import clearance_field_m, predicted_clearance_m
@@ -96,7 +98,25 @@ def test_a_vessel_adrift_is_told_from_a_moored_one_in_8_s(velocity: tuple[float,
     assert vessel.velocity[:2] == pytest.approx(velocity, abs=0.06)
 
 
-@pytest.mark.parametrize("side_m", [0.0, 2.2])
+@settings(max_examples=20, deadline=None)
+@given(
+    speed_mps=st.one_of(st.floats(-0.5, -0.16), st.floats(0.13, 0.2)),
+    past_m=st.floats(1.9, 2.4),
+    side=st.sampled_from([-1.0, 1.0]),
+)
+def test_a_vessel_that_the_picture_s_side_cuts_is_not_taken_for_moored(
+    speed_mps: float, past_m: float, side: float
+) -> None:
+    """It comes in or goes out; the end that is in the picture shows that it moves, however little was seen of it whole.
+
+    Faster ones than those that drift are known by no more than their end as well.
+    """
+    (vessel,) = watched((0.0, side * speed_mps), 4.0, side * past_m)
+    assert vessel.velocity.north_mps * side * speed_mps > 0.0
+    assert 0.5 < vessel.velocity.north_mps / (side * speed_mps) < 1.5
+
+
+@pytest.mark.parametrize("side_m", [0.0, 1.9, -1.9, 2.2])
 def test_a_moored_vessel_is_static(side_m: float) -> None:
     assert watched((0.0, 0.0), 4.0, side_m) == ()
 
