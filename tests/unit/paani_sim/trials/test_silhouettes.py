@@ -30,9 +30,9 @@ def test_the_bounds_are_those_of_the_part_within_the_picture(corners: list[tuple
     points = np.array(corners)
     low, high = bounds_in_picture(points)
     lines = np.concatenate([one + PARTS * (other - one) for one in points for other in points])
-    shown = lines[((lines > 1e-4) & (lines < 1.0 - 1e-4)).all(axis=1)]
-    assert (shown >= low - 1e-9).all()
-    assert (shown <= high + 1e-9).all()
+    visible_part = lines[((lines > 1e-4) & (lines < 1.0 - 1e-4)).all(axis=1)]
+    assert (visible_part >= low - 1e-9).all()
+    assert (visible_part <= high + 1e-9).all()
     assert (low >= 0.0).all()
     assert (high <= 1.0).all()
 
