@@ -44,17 +44,17 @@ def letterbox_affine(source_wh: tuple[int, int], target_wh: tuple[int, int]) -> 
     return np.array([[scale, 0, x], [0, scale, y]], np.float32)
 
 
-def letterbox_picture(picture: U8) -> U8:
-    """Any picture, resized bilinearly into the middle of a grey network-sized one."""
+def letterbox_picture(picture: U8, size_wh: tuple[int, int]) -> U8:
+    """Any picture, resized bilinearly into the middle of a grey one of the network's size."""
     height, width = picture.shape[:2]
-    scale = min(SIZE_WH[0] / width, SIZE_WH[1] / height)
+    scale = min(size_wh[0] / width, size_wh[1] / height)
     inner = (max(1, round(width * scale)), max(1, round(height * scale)))
-    left, top = (SIZE_WH[0] - inner[0]) // 2, (SIZE_WH[1] - inner[1]) // 2
-    boxed = np.full((SIZE_WH[1], SIZE_WH[0], 3), PAD_GREY, np.uint8)
+    left, top = (size_wh[0] - inner[0]) // 2, (size_wh[1] - inner[1]) // 2
+    boxed = np.full((size_wh[1], size_wh[0], 3), PAD_GREY, np.uint8)
     boxed[top : top + inner[1], left : left + inner[0]] = cv2.resize(picture, inner)
     return boxed
 
 
-def detector_input(picture: U8) -> F32:
-    """Any picture, letterboxed -> [1,3,256,320] in 0..1."""
-    return detector_batch(letterbox_picture(picture)[None])
+def detector_input(picture: U8, size_wh: tuple[int, int]) -> F32:
+    """Any picture, letterboxed -> [1,3,H,W] in 0..1."""
+    return detector_batch(letterbox_picture(picture, size_wh)[None])

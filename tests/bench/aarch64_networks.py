@@ -13,6 +13,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -25,9 +26,10 @@ from paani_models.commands.models import data_folder
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import DETECTOR_CLASSES, SEGMENTER_CLASSES, Sample, read_picture
 from paani_models.detector.data import letterbox_example, read_boxed
+from paani_models.detector.exported import open_detector
 from paani_models.detector.metrics import ap50, decode_boxes, match_class
 from paani_models.engines.onnx_runner import open_network
-from paani_models.network_input import SIZE_WH, detector_input, segmenter_input
+from paani_models.network_input import segmenter_input
 from paani_models.segmenter.metrics import class_iou, confusion_matrix
 from paani_models.segmenter.scores import label_from_logits, merge_undrawn_sky, read_truth, scored_classes
 
@@ -55,9 +57,9 @@ def main() -> int:
     segmenting = options.net == "segmenter"
     held_out = pictures.segmented_samples(held_out=True) if segmenting else pictures.boxed_samples(held_out=True)
     samples = held_out[:: max(1, len(held_out) // options.pictures)][: options.pictures]
-    prepare = segmenter_input if segmenting else detector_input
+    prepare = segmenter_input if segmenting else open_detector(verified_path(options.net), 1).prepare
     inputs = np.concatenate([prepare(read_picture(sample.picture)) for sample in samples])
-    score = _miou if segmenting else _ap50
+    score = _miou if segmenting else partial(_ap50, inputs.shape[:1:-1])
     result: dict[str, float] = {"pictures": len(samples)}
     for kind, net in (("fp32", verified_path(options.net)), ("int8", options.int8)):
         run = open_network(net, 1)
@@ -96,10 +98,10 @@ def _miou(outputs: F32, samples: list[Sample]) -> float:
     return float(np.mean([np.nanmean(iou) for iou in ious]))
 
 
-def _ap50(outputs: F32, samples: list[Sample]) -> float:
+def _ap50(size_wh: tuple[int, int], outputs: F32, samples: list[Sample]) -> float:
     """AP50 averaged over the classes that occur."""
     found = [decode_boxes(output, 0.01, 100) for output in outputs]
-    truths = [letterbox_example(read_boxed(sample), SIZE_WH).boxes for sample in samples]
+    truths = [letterbox_example(read_boxed(sample), size_wh).boxes for sample in samples]
     values = []
     for kind, name in enumerate(DETECTOR_CLASSES):
         judged = [

@@ -19,9 +19,8 @@ from paani.errors import UserError
 from paani_models.benchmarks import lars, mods, mods_detection
 from paani_models.datasets.checked_files import decode_picture, read_whole_file
 from paani_models.datasets.sources import DETECTOR_CLASSES
-from paani_models.detector.metrics import CONFIDENCE, decode_boxes
-from paani_models.engines.onnx_runner import open_network
-from paani_models.network_input import SIZE_WH, detector_input, letterbox_affine
+from paani_models.detector.exported import open_detector
+from paani_models.detector.metrics import CONFIDENCE, MAX_BOXES, Detections
 from paani_models.segmenter.scores import open_segmenter
 
 METHOD = "paani"
@@ -52,7 +51,7 @@ def score_mods(
     predictions: folder for the masks and the detection file. Raises UserError as `score_lars`.
     """
     dataset = mods.read_dataset(root / "mods.json")
-    segment, detect = open_segmenter(segmenter_net), open_network(detector_net)
+    segment, detector = open_segmenter(segmenter_net), open_detector(detector_net)
     tally = mods.ModsTally()
     above: list[tuple[F32, F32]] = []
     near: list[tuple[F32, F32]] = []
@@ -68,7 +67,7 @@ def score_mods(
             label = segment(picture, picture.shape)
             complete = bool(sequence.exhaustive and frame.exhaustive)
             tally.add(mods.to_mods_classes(label), frame, zone, exhaustive=complete)
-            rows = boxes_in_picture(detect(detector_input(picture))[0], size_wh)
+            rows = rows_inside(detector.find(picture, CONFIDENCE, MAX_BOXES), size_wh)
             kinds = [DETECTOR_CLASSES[int(kind)] for kind in rows[:, 0]]
             found[sequence.id, frame.id] = mods_detection.as_detections(kinds, rows[:, 1:])
             rows[:, 0] = [mods_detection.TYPE_OF[kind] for kind in kinds]
@@ -95,13 +94,9 @@ def score_mods(
     }
 
 
-def boxes_in_picture(output: NDArray[np.float32], size_wh: tuple[int, int]) -> F32:
-    """Network output [8,A] -> class and corners in picture pixels [n,5], above the board's threshold."""
-    boxes = decode_boxes(output, CONFIDENCE)
-    affine = letterbox_affine(size_wh, SIZE_WH)
-    corners = (boxes.boxes.reshape(-1, 2, 2) - affine[:, 2]) / (affine[0, 0], affine[1, 1])
-    inside = np.clip(corners, 0, size_wh).reshape(-1, 4)
-    return np.hstack([boxes.classes[:, None], inside]).astype(np.float32)
+def rows_inside(found: Detections, size_wh: tuple[int, int]) -> F32:
+    """Class and corners [n,5] of boxes in picture pixels, cut at the picture's edges."""
+    return np.hstack([found.classes[:, None], found.boxes.clip(0, (*size_wh, *size_wh))]).astype(np.float32)
 
 
 def annotated_rows(obstacles: Sequence[mods.Obstacle]) -> F32:

@@ -6,20 +6,17 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from paani.arrays import F32, U8
+from paani.arrays import U8
 from paani.config import DetectorConfig
 from paani.errors import UserError
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import DETECTOR_CLASSES
-from paani_models.detector.metrics import Detections, decode_boxes
+from paani_models.detector.exported import open_detector
+from paani_models.detector.metrics import Detections
 from paani_models.detector.off_the_shelf import KNOWN, NANODET_FILES, YOLOX_FILE, open_off_the_shelf
 from paani_models.engines.ncnn_runner import NOT_INSTALLED, ncnn_version
-from paani_models.engines.onnx_runner import open_network
-from paani_models.network_input import SIZE_WH, detector_input, letterbox_affine
 from paani_models.report.height_scores import (
     DetectorRun,
     FindBoxes,
@@ -36,20 +33,14 @@ from paani_models.report.track_recall import format_tracks, measure_tracks
 
 def open_shipped(path: Path) -> FindBoxes:
     """A detector of the shipped contract as a function from a picture to boxes in the picture's pixels."""
-    run = open_network(path)
+    network = open_detector(path)
 
     def find(picture: U8, confidence: float, limit: int) -> Detections:
-        found = decode_boxes(run(detector_input(picture))[0], confidence, limit)
+        found = network.find(picture, confidence, limit)
         height, width = picture.shape[:2]
-        return Detections(_to_source(found.boxes, (width, height)), found.scores, found.classes)
+        return Detections(found.boxes.clip(0, (width, height, width, height)), found.scores, found.classes)
 
     return find
-
-
-def _to_source(boxes: F32, source_wh: tuple[int, int]) -> F32:
-    affine = letterbox_affine(source_wh, SIZE_WH)
-    corners = (boxes.reshape(-1, 2, 2) - affine[:, 2]) / affine[0, 0]
-    return corners.clip((0, 0), source_wh).reshape(-1, 4).astype(np.float32)
 
 
 def compare_detectors(net: str, weights: Path, pictures: PictureSelection, html: Path | None) -> list[HeightRow]:

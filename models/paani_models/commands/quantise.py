@@ -10,7 +10,8 @@ from paani.whole_file import write_json
 from paani_models.catalogue import file_sha256, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
-from paani_models.network_input import detector_input, segmenter_input
+from paani_models.detector.exported import open_detector
+from paani_models.network_input import segmenter_input
 from paani_models.quantisation import acceptance
 from paani_models.quantisation.acceptance import QuantisationRecord
 from paani_models.quantisation.calibration_pictures import choose_calibration_samples, hash_sample_names
@@ -30,7 +31,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     if not held_out:
         raise UserError("sources: no held-out picture to judge on")
     chosen = choose_calibration_samples(labelled, arguments.calibrate, spread=recipe.spread)
-    prepare = segmenter_input if is_segmenter else detector_input
+    prepare = segmenter_input if is_segmenter else open_detector(source).prepare
     inputs = [prepare(read_picture(sample.picture)) for sample in chosen]
     target = arguments.out / f"{net}-{recipe.name}.onnx"
     quantise_network(source, target, recipe, inputs)

@@ -13,9 +13,9 @@ from paani.cluster import Workers
 from paani_models.datasets.batches import Batch, network_of, score_batches
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, read_picture
 from paani_models.detector.data import letterbox_example, read_boxed
-from paani_models.detector.metrics import CONFIDENCE, ClassMatches, Detections, decode_boxes, iou_matrix, match_class
-from paani_models.engines.onnx_runner import open_network
-from paani_models.network_input import SIZE_WH, detector_input
+from paani_models.detector.exported import open_detector
+from paani_models.detector.metrics import CONFIDENCE, MAX_BOXES, ClassMatches, Detections, iou_matrix, match_class
+from paani_models.network_input import SIZE_WH, letterbox_affine
 
 SCORED_CONFIDENCE = 0.01  # lower than the board's threshold, as a precision-recall curve needs
 SCORED_BOXES = 100
@@ -24,7 +24,10 @@ BACKGROUND = len(DETECTOR_CLASSES)  # last row and column of the confusion matri
 
 @dataclass(frozen=True)
 class ScoredBoxes:
-    """One picture, in input pixels. truth: float32 [n,5], class and corners."""
+    """One picture, in pixels of 320x256 into which it is letterboxed, whatever size the network takes.
+
+    truth: float32 [n,5], class and corners.
+    """
 
     sample: Sample
     detections: Detections
@@ -51,16 +54,15 @@ def score_boxes(net: Path, samples: Sequence[Sample], workers: Workers | None = 
 
 def score_box_batch(batch: Batch) -> list[ScoredBoxes]:
     """As `score_boxes`, of one batch."""
-    run = open_network(network_of(batch))
+    network = open_detector(network_of(batch))
     scored = []
     for sample in batch.samples:
         item = read_boxed(sample)
-        output = run(detector_input(item.picture))[0]
-        scored.append(
-            ScoredBoxes(
-                sample, decode_boxes(output, SCORED_CONFIDENCE, SCORED_BOXES), letterbox_example(item, SIZE_WH).boxes
-            )
-        )
+        found = network.find(item.picture, SCORED_CONFIDENCE, SCORED_BOXES)
+        affine = letterbox_affine((item.picture.shape[1], item.picture.shape[0]), SIZE_WH)
+        corners = found.boxes.reshape(-1, 2, 2) * affine[0, 0] + affine[:, 2]
+        boxes = Detections(corners.reshape(-1, 4).astype(np.float32), found.scores, found.classes)
+        scored.append(ScoredBoxes(sample, boxes, letterbox_example(item, SIZE_WH).boxes))
     return scored
 
 
@@ -71,10 +73,10 @@ def count_false_alarms(net: Path, samples: Sequence[Sample], workers: Workers | 
 
 def count_batch_alarms(batch: Batch) -> list[int]:
     """As `count_false_alarms`, of one batch."""
-    run = open_network(network_of(batch))
+    network = open_detector(network_of(batch))
     alarms = []
     for sample in batch.samples:
-        found = decode_boxes(run(detector_input(read_picture(sample.picture)))[0], CONFIDENCE)
+        found = network.find(read_picture(sample.picture), CONFIDENCE, MAX_BOXES)
         absent = [DETECTOR_CLASSES.index(kind) for kind in sample.source.empty_of]
         alarms.append(int(np.isin(found.classes, absent).sum()))
     return alarms

@@ -1,7 +1,7 @@
 """The shipped detector: YOLOX-nano (Ge et al. 2021) with batch norm folded away, four classes, joint scores.
 
-Input RGB 0..1 float32 [N,3,256,320]; output float32 [N,8,1680]: cx, cy, w, h in input pixels, then the scores
-of person, vessel, pier, buoy, each objectness times class, in 0..1 (C1, C2, C4). Candidates run over
+Input RGB 0..1 float32 [N,3,H,W], sides multiples of 32; output float32 [N,8,A]: cx, cy, w, h in input pixels, then
+the scores of person, vessel, pier, buoy, each objectness times class, in 0..1 (C1, C2, C4). Candidates run over
 strides 8, 16, 32 in that order, row by row.
 """
 
@@ -18,10 +18,7 @@ from torch.nn import functional as F
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES
 
-INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 256, 320  # C1
 STRIDES = (8, 16, 32)
-CANDIDATES = sum((INPUT_HEIGHT_PX // s) * (INPUT_WIDTH_PX // s) for s in STRIDES)  # C4: 1,680
-
 HEAD_CHANNELS = 64
 FIRST_STAGES = ("stem", "dark2", "dark3")  # edges and parts, not objects; half of a pass
 
@@ -210,6 +207,11 @@ def load_yolox_weights(model: Detector, path: Path) -> None:
             raise UserError(f"{path}: convolution {index} has shape {weight.shape}, expected {expected}")
         conv.weight.data = torch.tensor(np.ascontiguousarray(weight, np.float32))
         conv.bias.data = torch.tensor(np.ascontiguousarray(bias, np.float32))
+
+
+def count_candidates(height_px: int, width_px: int) -> int:
+    """Candidates of an input size: 1,680 of the paper's 256x320 (C4)."""
+    return sum((height_px // stride) * (width_px // stride) for stride in STRIDES)
 
 
 def candidate_grid(height_px: int, width_px: int) -> tuple[Tensor, Tensor]:

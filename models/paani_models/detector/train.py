@@ -72,6 +72,13 @@ class DetectorRecipe:
     draws_frac: float = 1.0  # of DRAWS_PER_EPOCH: shorter epochs, each of other pictures
     frozen: tuple[str, ...] = ()  # parts of the network that do not learn
     distilled: bool = False
+    height_px: int = SIZE_WH[1]  # of the network's input
+    width_px: int = SIZE_WH[0]
+
+    @property
+    def size_wh(self) -> tuple[int, int]:
+        """Width and height of the network's input, in pixels."""
+        return self.width_px, self.height_px
 
 
 def draw_epoch(pictures: list[BoxedPicture], recipe: DetectorRecipe, epoch: int) -> list[int]:
@@ -115,7 +122,7 @@ class DetectorTraining:
         self.state.resume(self.folder, recipe)
         while self.state.epoch < (self.recipe.epochs if until is None else until):
             box_loss, score_loss = self._train_epoch()
-            figures = figures_by_class(self.state.average.model, self.held_out)
+            figures = figures_by_class(self.state.average.model, self.held_out, self.recipe.size_wh)
             losses = {"box_loss": box_loss, "score_loss": score_loss}
             record = {"epoch": self.state.epoch + 1, "seed": self.recipe.seed, **losses, **figures}
             append_record(self.folder / "epochs.jsonl", record)
@@ -143,7 +150,7 @@ class DetectorTraining:
             taught = None
             if self.teacher is not None:
                 taught = self.teacher.answer(first.detach() if is_shared else self.teacher.first_stages(seen))
-            size_hw = (SIZE_WH[1], SIZE_WH[0])
+            size_hw = (recipe.height_px, recipe.width_px)
             box_loss, score_loss = detector_loss(boxes, logits, known, to_device(judged), size_hw, taught)
             rate = learning_rate(recipe.peak_rate, state.step, total, recipe.warmup_steps)
             state.update(box_loss + score_loss, rate, clip_norm=10.0)
@@ -160,15 +167,15 @@ class DetectorTraining:
 
     def _example(self, rng: np.random.Generator, order: list[int], slot: int, epoch: int) -> TrainingExample:
         if order[slot] < 0:
-            cells = (len(DETECTOR_CLASSES), SIZE_WH[1] // 8, SIZE_WH[0] // 8)
+            cells = (len(DETECTOR_CLASSES), self.recipe.height_px // 8, self.recipe.width_px // 8)
             return TrainingExample(
-                draw_null_picture(rng, SIZE_WH), np.zeros((0, 5), np.float32), np.ones(cells, np.bool_)
+                draw_null_picture(rng, self.recipe.size_wh), np.zeros((0, 5), np.float32), np.ones(cells, np.bool_)
             )
         chosen = [order[slot]]
         late = epoch >= self.recipe.epochs - self.recipe.plain_epochs
         if not late and rng.random() < self.recipe.mosaic_frac:
             chosen += [max(0, order[int(i)]) for i in rng.integers(len(order), size=3)]
-        return augment_example(rng, [self.train[i] for i in chosen], SIZE_WH)
+        return augment_example(rng, [self.train[i] for i in chosen], self.recipe.size_wh)
 
 
 def stack_examples(examples: Sequence[TrainingExample]) -> Batch:
@@ -181,7 +188,9 @@ def stack_examples(examples: Sequence[TrainingExample]) -> Batch:
 
 
 @torch.no_grad()
-def figures_by_class(model: torch.nn.Module, pictures: list[BoxedPicture]) -> dict[str, dict[str, float]]:
+def figures_by_class(
+    model: torch.nn.Module, pictures: list[BoxedPicture], size_wh: tuple[int, int]
+) -> dict[str, dict[str, float]]:
     """Class name -> figures of `class_figures`, on letterboxed pictures of the sources that annotate the class."""
     annotated = {source.name: source.annotated for source in SOURCES}
     found: list[Detections] = []
@@ -189,7 +198,7 @@ def figures_by_class(model: torch.nn.Module, pictures: list[BoxedPicture]) -> di
     names: list[str] = []
     labelled = [item for item in pictures if annotated[item.source] and item.exhaustive_mask.ndim == 1]
     for start in range(0, len(labelled), 16):
-        chunk = [letterbox_example(item, SIZE_WH) for item in labelled[start : start + 16]]
+        chunk = [letterbox_example(item, size_wh) for item in labelled[start : start + 16]]
         outputs = model(to_device(torch.from_numpy(detector_batch(np.stack([e.picture for e in chunk]))))).cpu().numpy()
         found.extend(decode_boxes(output, confidence=0.01, limit=100) for output in outputs)
         truths.extend(e.boxes for e in chunk)

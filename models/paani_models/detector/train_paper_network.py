@@ -16,6 +16,7 @@ from paani_models.detector.paper_data import Augmentation, augment_paper_example
 from paani_models.detector.paper_loss import task_aligned_loss
 from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.train import Batch, figures_by_class, mean_ap50, stack_examples
+from paani_models.network_input import SIZE_WH
 from paani_models.training.training_state import (
     Prefetch,
     TrainingState,
@@ -78,7 +79,7 @@ class Yolo11nTraining:
         last = self.recipe.epochs if until is None else until
         while self.state.epoch < last and self._since_best() < self.recipe.patience:
             losses = self._train_epoch()
-            figures = figures_by_class(self.state.average.model, self.held_out)
+            figures = figures_by_class(self.state.average.model, self.held_out, SIZE_WH)
             score = round(mean_ap50(figures), 4)
             row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
             append_record(self._records(), row)

@@ -28,7 +28,7 @@ from paani_models.catalogue import (
 )
 from paani_models.datasets.sources import DETECTOR_CLASSES, RENDERED, SEGMENTER_CLASSES, Source
 from paani_models.detector.paper_network import FUSED_PARAMETERS, Yolo11n
-from paani_models.detector.shipped_network import CANDIDATES, Detector
+from paani_models.detector.shipped_network import Detector, count_candidates
 from paani_models.engines.onnx_runner import open_network
 from paani_models.image_quality.network import ImageQualityNetwork
 from paani_models.network_input import IMAGE_QUALITY_WH, SIZE_WH
@@ -64,7 +64,7 @@ CONTRACTS = {
         parameters=0,
         opset=OPSET,
         input=Tensor("input", (1, 3, SIZE_WH[1], SIZE_WH[0])),
-        output=Tensor("candidates", (1, 8, CANDIDATES)),
+        output=Tensor("candidates", (1, 8, count_candidates(*SIZE_WH[::-1]))),
         classes=DETECTOR_CLASSES,
         preprocessing=Preprocessing("letterbox", _UNCHANGED, (1.0, 1.0, 1.0), pad_grey=114),
         architecture="YOLOX-nano shape, joint objectness and class scores",
@@ -87,6 +87,17 @@ CONTRACTS["gate"] = Model(
     architecture="first four stages of MobileNetV2, two dense layers",
     licence="weights: for research; see the terms of each training source",
 )
+
+
+def sized_detector(contract: Model, height_px: int, width_px: int) -> Model:
+    """The contract of a detector for another size of input."""
+    return msgspec.structs.replace(
+        contract,
+        input=Tensor(contract.input.name, (1, 3, height_px, width_px)),
+        output=Tensor(contract.output.name, (1, 8, count_candidates(height_px, width_px))),
+    )
+
+
 CONTRACTS["yolo11n"] = msgspec.structs.replace(
     CONTRACTS["detector"],
     name="yolo11n",
@@ -140,7 +151,7 @@ def export_network(
 
     licence: that of the contract, which is for research, where not given.
     looks_at: height and width of the picture inside a segmenter whose training ended at that size.
-    inputs: real pictures, already preprocessed, [1,3,256,320] each, for the comparison. Figures are left empty.
+    inputs: real pictures, already preprocessed, for the comparison. Figures are left empty.
     Raises UserError where the checkpoint does not fit or the outputs differ by more than TOLERANCE.
     """
     net = build_network(name)
@@ -148,7 +159,15 @@ def export_network(
     if looks_at is not None:
         net = SmallerInside(net, looks_at)
     seed = load_checkpoint(checkpoint)["recipe"]["seed"]
-    return _export_and_place(name, net, folder, inputs, origins, seed, licence)
+    return _export_and_place(contract_of(name, checkpoint), net, folder, inputs, origins, seed, licence)
+
+
+def contract_of(name: str, checkpoint: Path) -> Model:
+    """The contract of a network; of a detector, for the size of input that it was trained with."""
+    if name != "detector":
+        return CONTRACTS[name]
+    recipe = load_checkpoint(checkpoint)["recipe"]
+    return sized_detector(CONTRACTS[name], recipe.get("height_px", SIZE_WH[1]), recipe.get("width_px", SIZE_WH[0]))
 
 
 def export_untrained(name: str, folder: Path) -> Model:
@@ -163,11 +182,11 @@ def export_untrained(name: str, folder: Path) -> Model:
             module.momentum = 1.0
     with torch.no_grad():
         net(torch.from_numpy(noise))  # without statistics the numbers shrink from step to step until they slow it down
-    return _export_and_place(name, net.eval(), folder, [noise], (), seed)
+    return _export_and_place(CONTRACTS[name], net.eval(), folder, [noise], (), seed)
 
 
 def _export_and_place(
-    name: str,
+    contract: Model,
     net: nn.Module,
     folder: Path,
     inputs: Sequence[NDArray[np.float32]],
@@ -175,7 +194,7 @@ def _export_and_place(
     seed: int,
     licence: str | None = None,
 ) -> Model:
-    contract = CONTRACTS[name]
+    name = contract.name
     folder.mkdir(parents=True, exist_ok=True)
     with replacement_file(folder / contract.file) as beside:
         write_onnx(net, contract, beside)

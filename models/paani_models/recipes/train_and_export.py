@@ -23,8 +23,14 @@ from paani_models.detector.shipped_network import FIRST_STAGES, Detector, load_y
 from paani_models.detector.train import DetectorRecipe, DetectorTraining
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
 from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
-from paani_models.network_input import SIZE_WH, detector_input, image_quality_input, segmenter_batch, segmenter_input
-from paani_models.recipes.onnx_export import export_network, export_untrained, read_origin
+from paani_models.network_input import (
+    SIZE_WH,
+    detector_input,
+    image_quality_input,
+    segmenter_batch,
+    segmenter_input,
+)
+from paani_models.recipes.onnx_export import contract_of, export_network, export_untrained, read_origin
 from paani_models.recipes.warm_start import load_exported
 from paani_models.segmenter.distillation import Distillation
 from paani_models.segmenter.paper_network import PaperSegmenter
@@ -55,6 +61,7 @@ class TrainingOptions:
     blend: float | None = None
     mean_with: Path | None = None
     draws_frac: float = 1.0
+    size: str | None = None
     seed: int | None = None
     without: tuple[str, ...] = ()
 
@@ -84,6 +91,12 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
             raise UserError(f"stage: {text!r}: height and width must be multiples of 32")
         parsed.append(stage)
     return tuple(parsed)
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """`320x416` -> height and width. Raises UserError as `parse_stages`."""
+    (stage,) = parse_stages((f"1x{text}",))
+    return stage.height_px, stage.width_px
 
 
 def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
@@ -124,7 +137,8 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
 
 
 def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
-    recipe = DetectorRecipe()
+    height_px, width_px = parse_size(options.size) if options.size else SIZE_WH[::-1]
+    recipe = DetectorRecipe(height_px=height_px, width_px=width_px)
     keeps = options.blend is not None
     recipe = replace(
         recipe,
@@ -224,17 +238,19 @@ def export_checkpoint(
     if looks_at is not None:
         if "segmenter" not in net:
             raise UserError(f"--looks-at: {net} is no segmenter")
-        (stage,) = parse_stages((f"1x{looks_at}",))
-        inside = (stage.height_px, stage.width_px)
+        inside = parse_size(looks_at)
     chosen = (
         pictures.boxed_samples(held_out=True)
         if net in ("detector", "yolo11n")
         else pictures.segmented_samples(held_out=True)
     )
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    prepare = {"detector": detector_input, "yolo11n": detector_input, "gate": image_quality_input}.get(
-        net, segmenter_input
-    )
+    size_wh = contract_of(net, checkpoint).size_hw[::-1]
+    prepare = {
+        "detector": lambda picture: detector_input(picture, size_wh),
+        "yolo11n": lambda picture: detector_input(picture, size_wh),
+        "gate": image_quality_input,
+    }.get(net, segmenter_input)
     inputs = [prepare(read_picture(sample.picture)) for sample in chosen[::step][:COMPARED_PICTURES]]
     if not inputs:
         raise UserError("sources: no held-out picture to compare the export on")

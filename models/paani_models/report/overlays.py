@@ -17,7 +17,7 @@ from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES, IGNORE, RENDERED, read_picture
 from paani_models.detector.metrics import CONFIDENCE
 from paani_models.detector.scores import ScoredBoxes
-from paani_models.network_input import letterbox_picture
+from paani_models.network_input import SIZE_WH, letterbox_picture
 from paani_models.segmenter.scores import OBSTACLE, SKY, WATER, ScoredMask, merge_undrawn_sky, read_truth
 
 ScoredPicture = TypeVar("ScoredPicture", ScoredMask, ScoredBoxes)
@@ -61,7 +61,7 @@ def draw_boxes(folder: Path, scored: Sequence[ScoredBoxes]) -> list[DrawnPicture
     """Draw boxes on letterboxed pictures: true boxes thin green, found boxes thick orange with class and score."""
     drawn = []
     for index, item in enumerate(scored):
-        overlay = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture)), 2, 0), 2, 1)
+        overlay = np.repeat(np.repeat(letterbox_picture(read_picture(item.sample.picture), SIZE_WH), 2, 0), 2, 1)
         for kind, *corners in item.truth:
             _draw_rectangle(overlay, np.array(corners), _TRUE_RGB, 1, DETECTOR_CLASSES[int(kind)], below=True)
         confident = item.detections.scores > CONFIDENCE

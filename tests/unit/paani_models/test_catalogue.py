@@ -10,8 +10,9 @@ from paani.errors import UserError
 from paani_models.catalogue import OPEN_WEIGHTS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands.models import main
 from paani_models.datasets.terms import OPEN_LICENCE, OPEN_TERMS, states_open_terms
+from paani_models.detector.exported import open_detector
 from paani_models.engines.onnx_runner import open_network
-from paani_models.network_input import detector_input, segmenter_input
+from paani_models.network_input import segmenter_input
 from paani_models.training.augment import draw_null_picture
 
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
@@ -132,8 +133,8 @@ def test_nothing_to_see_is_never_water_v15(kind: str) -> None:
 
 
 def test_null_pictures_hold_no_object_above_the_boards_threshold_c6() -> None:
-    run = open_network(verified_path("detector"), threads=1)
+    net = open_detector(verified_path("detector"), threads=1)
     top = max(
-        run(detector_input(draw_null_picture(np.random.default_rng(s), (320, 256))))[0, 4:].max() for s in range(20)
+        net.run(net.prepare(draw_null_picture(np.random.default_rng(s), (320, 256))))[0, 4:].max() for s in range(20)
     )
     assert top < 0.40

@@ -27,18 +27,25 @@ class PaperEvidence(NamedTuple):
 
 
 def perceive(
-    bgr: U8, detect: Run, segment: Run, detections: DetectorConfig, corridors: CorridorConfig
+    bgr: U8,
+    detect: Run,
+    segment: Run,
+    detections: DetectorConfig,
+    corridors: CorridorConfig,
+    detector_hw: tuple[int, int] = (256, 320),
 ) -> PaperEvidence:
-    """One picture, BGR uint8 [H, W, 3]."""
-    return PaperEvidence(decode_boxes(detect(letterbox(bgr)), detections), lanes(segment(stretch(bgr)), corridors))
+    """One picture, BGR uint8 [H, W, 3]. detector_hw: of the detector's input, which was 256x320 in the paper."""
+    boxes = decode_boxes(detect(letterbox(bgr, detector_hw)), detections)
+    return PaperEvidence(boxes, lanes(segment(stretch(bgr)), corridors))
 
 
-def letterbox(bgr: U8) -> F32:
-    """float32 [1, 3, 256, 320]."""
-    scale = min(320 / bgr.shape[1], 256 / bgr.shape[0])
+def letterbox(bgr: U8, size_hw: tuple[int, int]) -> F32:
+    """float32 [1, 3, H, W]."""
+    height, width = size_hw
+    scale = min(width / bgr.shape[1], height / bgr.shape[0])
     inner = cv2.resize(bgr, (round(bgr.shape[1] * scale), round(bgr.shape[0] * scale)))
-    picture = np.full((256, 320, 3), PAD_GREY, np.uint8)
-    top, left = (256 - inner.shape[0]) // 2, (320 - inner.shape[1]) // 2
+    picture = np.full((height, width, 3), PAD_GREY, np.uint8)
+    top, left = (height - inner.shape[0]) // 2, (width - inner.shape[1]) // 2
     picture[top : top + inner.shape[0], left : left + inner.shape[1]] = inner
     rgb = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB).astype(np.float32) / 255.0
     return np.ascontiguousarray(rgb.transpose(2, 0, 1)[None])

@@ -202,4 +202,7 @@ def _pipeline(config: PerceptionConfig, stopwatch_ms: Callable[[], float], *, co
 def _paper_shaped(config: PerceptionConfig) -> Step:
     detector = OnnxEngine.load("detector", network_path("detector", config), 2, spinning=True)
     segmenter = OnnxEngine.load("segmenter", network_path("segmenter", config), 2, spinning=True, full_size=True)
-    return lambda bgr: paper_shaped.perceive(bgr, detector.run, segmenter.run, config.detections, config.corridors)
+    size_hw = detector.contract.size_hw
+    return lambda bgr: paper_shaped.perceive(
+        bgr, detector.run, segmenter.run, config.detections, config.corridors, size_hw
+    )

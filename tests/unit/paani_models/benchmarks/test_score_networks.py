@@ -14,8 +14,9 @@ from paani.errors import UserError
 from paani_models.benchmarks.lars import read_prediction
 from paani_models.benchmarks.mods import Obstacle
 from paani_models.benchmarks.mods_detection import Results
-from paani_models.benchmarks.score_networks import annotated_rows, boxes_in_picture, drop_ignored, read_calibration
+from paani_models.benchmarks.score_networks import annotated_rows, drop_ignored, read_calibration, rows_inside
 from paani_models.commands.models import main
+from paani_models.detector.exported import ExportedDetector
 from tests.pictures import river
 from tests.unit.paani_models.datasets.public_sets import write_picture
 
@@ -111,12 +112,16 @@ def test_what_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[
         read_calibration(root, "stru2-1")
 
 
-def test_boxes_come_back_to_the_picture() -> None:
-    """1280x720 is 320x180 in the middle of 320x256: 4 picture pixels to one, 38 px of grey above."""
-    output = np.zeros((8, 2), np.float32)
-    output[:, 0] = (160, 128, 40, 20, 0, 0.9, 0, 0)
-    rows = boxes_in_picture(output, (1280, 720))
-    np.testing.assert_allclose(rows, [[1, 560, 320, 720, 400]], atol=1e-3)
+@pytest.mark.parametrize("size_wh", [(320, 256), (416, 320)])
+def test_boxes_come_back_to_the_picture(size_wh: tuple[int, int]) -> None:
+    """1280x720 lies in the middle of the input, with grey above; what reaches beyond is cut."""
+    scale = size_wh[0] / 1280
+    output = np.zeros((1, 8, 2), np.float32)
+    output[0, :, 0] = (size_wh[0] / 2, size_wh[1] / 2, 160 * scale, 80 * scale, 0, 0.9, 0, 0)
+    output[0, :, 1] = (size_wh[0] / 2, size_wh[1], 160 * scale, 800 * scale, 0, 0, 0, 0.8)
+    found = ExportedDetector(lambda _: output, size_wh).find(np.zeros((720, 1280, 3), np.uint8), 0.4, 24)
+    wanted = [[1, 560, 320, 720, 400], [3, 560, found.boxes[1, 1], 720, 720]]
+    np.testing.assert_allclose(rows_inside(found, (1280, 720)), wanted, atol=1e-3)
 
 
 def test_boxes_mostly_in_the_ignored_part_are_left_out() -> None:

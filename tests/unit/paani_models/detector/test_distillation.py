@@ -146,7 +146,9 @@ def test_frozen_parts_do_not_learn_and_the_rest_does(
     monkeypatch.setattr(detector_train, "NULL_DRAWS", 1)
     box = np.array([[1, 0.3, 0.4, 0.6, 0.6]], np.float32)
     item = BoxedPicture("mcoe_boats", SEEN, box, np.array([0, 1, 0, 1], np.uint8))
-    recipe = detector_train.DetectorRecipe(epochs=1, batch=4, warmup_steps=1, frozen=("stem", "dark2"), distilled=True)
+    recipe = detector_train.DetectorRecipe(
+        epochs=1, batch=4, warmup_steps=1, frozen=("stem", "dark2"), distilled=True, height_px=128, width_px=160
+    )
     torch.manual_seed(0)
     model = Detector()
     before = {name: value.clone() for name, value in model.state_dict().items()}

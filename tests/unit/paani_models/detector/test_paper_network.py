@@ -15,7 +15,7 @@ from paani.clock import stopwatch_ms  # noqa: E402
 from paani.config import DetectorConfig, PerceptionConfig  # noqa: E402
 from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import load_catalogue  # noqa: E402
-from paani_models.detector import paper_loss, train  # noqa: E402
+from paani_models.detector import paper_loss, train_paper_network  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.paper_data import Augmentation, augment_paper_example, jitter_hsv  # noqa: E402
 from paani_models.detector.paper_loss import assign_task_aligned, bins_loss, complete_iou, task_aligned_loss  # noqa: E402
@@ -72,6 +72,8 @@ def test_output_c1_c2_c4() -> None:
     assert tuple(out.shape) == (1, 8, 1680)
     assert ((out[:, 4:] >= 0) & (out[:, 4:] <= 1)).all()
     assert (out[:, 2:4] > 0).all()
+    assert CONTRACTS["yolo11n"].input.shape == (1, 3, 256, 320)
+    assert CONTRACTS["yolo11n"].output.shape == (1, 8, 1680)
     assert CONTRACTS["yolo11n"].classes == ("person", "vessel", "pier", "buoy")
     assert CONTRACTS["yolo11n"].preprocessing.resize == "letterbox"
 
@@ -264,7 +266,7 @@ def small_run(folder: Path, epochs: int) -> Yolo11nTraining:
 
 
 def test_training_overfits_four_pictures_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train_paper_network, "SIZE_WH", (160, 128))
     small_run(tmp_path, 12).run()
     rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
     totals = [sum(row[part] for part in ("box_loss", "score_loss", "bins_loss")) for row in rows]
@@ -274,7 +276,7 @@ def test_training_overfits_four_pictures_s4(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train_paper_network, "SIZE_WH", (160, 128))
     small_run(tmp_path / "whole", 2).run()
     small_run(tmp_path / "broken", 2).run(until=1)
     torch.manual_seed(999)
@@ -286,7 +288,7 @@ def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytes
 
 
 def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train, "SIZE_WH", (160, 128))
+    monkeypatch.setattr(train_paper_network, "SIZE_WH", (160, 128))
     run = small_run(tmp_path, 5)
     run.recipe = replace(run.recipe, peak_rate=0.0, warmup_bias_rate=0.0, patience=1)
     run.run()

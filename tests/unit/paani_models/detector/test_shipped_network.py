@@ -16,7 +16,7 @@ def test_detector_output_c4() -> None:
     torch.manual_seed(0)
     out = detector.Detector().eval()(torch.rand(1, 3, 256, 320)).detach()
     assert tuple(out.shape) == (1, 8, 1680)
-    assert detector.CANDIDATES == 1680
+    assert detector.count_candidates(256, 320) == 1680
     assert ((out[:, 4:] >= 0) & (out[:, 4:] <= 1)).all()
     assert (out[:, 2:4] > 0).all()
 

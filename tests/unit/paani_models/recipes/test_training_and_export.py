@@ -22,10 +22,11 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
     CONTRACTS,
     SmallerInside,
     build_network,
+    export_network,
     largest_export_difference,
     write_onnx,
 )
-from paani_models.recipes.train_and_export import TrainingOptions, parse_stages, start_detector  # noqa: E402
+from paani_models.recipes.train_and_export import TrainingOptions, parse_size, parse_stages, start_detector  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
 from paani_models.segmenter.paper_network import DECODER_CHANNELS, PaperSegmenter  # noqa: E402
@@ -43,6 +44,7 @@ from paani_models.training.training_state import (  # noqa: E402
 
 pytestmark = pytest.mark.train
 
+NO_BOXES = np.zeros((0, 5), np.float32)
 SMALL = segmenter_train.SegmenterRecipe(stages=(Stage(2, 64, 64),), batch=4, warmup_steps=2)
 
 
@@ -135,7 +137,7 @@ def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.Monk
     picture[100:150, 100:200] = (200, 30, 30)
     box = np.array([[1, 100 / 320, 100 / 256, 200 / 320, 150 / 256]], np.float32)
     item = BoxedPicture("mcoe_boats", picture, box, np.array([0, 1, 0, 1], np.uint8))
-    recipe = detector_train.DetectorRecipe(epochs=2, batch=4, warmup_steps=1)
+    recipe = detector_train.DetectorRecipe(epochs=2, batch=4, warmup_steps=1, height_px=128, width_px=160)
     torch.manual_seed(0)
     run = detector_train.DetectorTraining(Detector(), recipe, tmp_path, [item] * 7, [item])
     run.run()
@@ -143,6 +145,26 @@ def test_detector_learns_from_one_batch(tmp_path: Path, monkeypatch: pytest.Monk
     assert rows[0]["vessel"]["n"] == 1
     assert rows[0]["person"]["n"] == 0
     assert sum(rows[1][k] for k in ("box_loss", "score_loss")) < sum(rows[0][k] for k in ("box_loss", "score_loss"))
+
+
+@pytest.mark.train
+def test_a_detector_is_exported_for_the_size_that_it_was_trained_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(detector_train, "NULL_DRAWS", 1)
+    item = BoxedPicture("mcoe_boats", np.full((96, 128, 3), 90, np.uint8), NO_BOXES, np.array([0, 1, 0, 1], np.uint8))
+    recipe = detector_train.DetectorRecipe(epochs=1, batch=4, warmup_steps=1, height_px=64, width_px=96)
+    detector_train.DetectorTraining(Detector(), recipe, tmp_path, [item] * 3, [item]).run()
+    inputs = [np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)]
+    model = export_network("detector", tmp_path / "last.pt", tmp_path / "out", inputs, ())
+    assert (model.input.shape, model.output.shape) == ((1, 3, 64, 96), (1, 8, 8 * 12 + 4 * 6 + 2 * 3))
+
+
+def test_a_size_is_height_times_width_in_whole_cells() -> None:
+    assert parse_size("320x416") == (320, 416)
+    for wrong in ("320", "320x416x3", "300x400"):
+        with pytest.raises(UserError, match="stage"):
+            parse_size(wrong)
 
 
 @pytest.mark.train
